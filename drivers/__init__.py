@@ -1,0 +1,1 @@
+"""Speak to devices: CANopen inverters and the Modbus PLC. No physics, no estimation."""

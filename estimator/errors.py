@@ -1,0 +1,39 @@
+"""What a caller of the estimator can do wrong.
+
+::
+
+    EstimatorError
+     +-- BadShape     (ValueError)   arrays of the wrong shape, or not finite
+     +-- BadModel     (ValueError)   a model whose parameters are missing, unknown or non-physical
+     +-- NotExciting                 the data do not determine what was asked
+
+Inside a sample loop nothing raises: there a status says what is wrong with the estimate.
+"""
+
+from __future__ import annotations
+
+
+class EstimatorError(Exception):
+    """Base of every error of this package; never raised itself."""
+
+
+class BadShape(EstimatorError, ValueError):
+    """An array has the wrong shape or holds values that are not finite: the caller is at fault."""
+
+
+class BadModel(EstimatorError, ValueError):
+    """A model names unknown parameters or effects, misses some, or is non-physical."""
+
+
+class NotExciting(EstimatorError):
+    """The data do not determine what was asked.
+
+    Attributes
+    ----------
+    names : tuple[str, ...]
+        What can't be determined.
+    """
+
+    def __init__(self, message: str, names: tuple[str, ...] = ()) -> None:
+        super().__init__(message)
+        self.names = names

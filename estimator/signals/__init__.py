@@ -1,0 +1,1 @@
+"""Signals: what was recorded, and the excitation that made it."""

@@ -1,0 +1,88 @@
+"""One recording as the estimator sees it: uniformly sampled SI arrays and a mask, nothing of files or buses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator.errors import BadShape
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+
+class OutputKind(Enum):
+    """The measured output; its value is the quantity's name in files and messages."""
+
+    SPEED = "speed"
+    POSITION = "position"
+    FORCE = "force"
+
+
+class Location(Enum):
+    """Which end of the driveline the output is measured at."""
+
+    MOTOR = "motor"
+    LOAD = "load"
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """A recording on a uniform time base, reflected to the motor shaft.
+
+    Attributes
+    ----------
+    name : str
+        File stem; names the recording in every result.
+    sample_time_s : float
+        Sampling period [s].
+    time_s : ndarray, shape (N,)
+        Time of each sample [s]; ``time_s[k+1] - time_s[k]`` is the sampling period.
+    torque_nm : ndarray, shape (N, M)
+        Torque (translation: force, N) of each of the M inputs. Sample k acts from ``time_s[k]`` to
+        ``time_s[k+1]`` (zero-order hold).
+    output : ndarray, shape (N,)
+        Measured output [rad/s, rad, Nm; translation m/s, m, N].
+    okay : ndarray of bool, shape (N,)
+        False where the sample must not be used; time goes on there.
+    kind, location
+        What the output is, and where it is measured.
+    """
+
+    name: str
+    sample_time_s: float
+    time_s: FloatArray
+    torque_nm: FloatArray
+    output: FloatArray
+    okay: BoolArray
+    kind: OutputKind = OutputKind.SPEED
+    location: Location = Location.MOTOR
+
+    def __post_init__(self) -> None:
+        n = self.time_s.shape[0]
+        shapes = {"torque_nm": self.torque_nm.shape[:1], "output": self.output.shape, "okay": self.okay.shape}
+        for name, shape in shapes.items():
+            if shape != (n,):
+                raise BadShape(
+                    f"recording {self.name}: {name} has shape {shape}, expected ({n},) like time_s. "
+                    "Give every signal one value per sample."
+                )
+        if self.torque_nm.ndim != 2 or self.torque_nm.shape[1] == 0:
+            raise BadShape(
+                f"recording {self.name}: torque_nm has shape {self.torque_nm.shape}, expected (N, M) with "
+                "one column per torque input."
+            )
+        if not (np.isfinite(self.torque_nm).all() and np.isfinite(self.output[self.okay]).all()):
+            raise BadShape(
+                f"recording {self.name}: torque or unmasked output holds NaN or infinity. "
+                "Mask such samples with okay = False and hold the last torque."
+            )
+
+    @property
+    def total_torque_nm(self) -> FloatArray:
+        """Sum of the torque inputs, T_tot = T_M1 + T_M2 in the paper; shape (N,) [Nm]."""
+        total: FloatArray = self.torque_nm.sum(axis=1)
+        return total

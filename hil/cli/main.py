@@ -1,0 +1,119 @@
+"""The command line: one table of commands, each imported only when called, and one map to exit statuses."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Callable, Sequence
+from enum import IntEnum
+
+import typer
+
+from hil import __version__
+from hil.errors import HilError, InputError
+
+
+class ExitStatus(IntEnum):
+    """Exit statuses of every command (CONTRACT: commands)."""
+
+    DONE = 0
+    BAD_INPUT = 2
+    DEVICE_FAULT = 3
+    REFUSED_BY_GUARD = 4
+    INTERRUPTED = 130
+
+
+COMMANDS: dict[str, str] = {
+    "demo": "The whole job with nothing connected: sealed effect, verdict, seal opened.",
+    "sim": "Serve the simulated slaves: two inverters, PLC, driveline.",
+    "check": "Find every device, compare it with rig file and EDS; commands no torque.",
+    "run": "Run one experiment and record it.",
+    "identify": "Identify the driveline from recordings.",
+    "diagnose": "Locate the mismatch and name the missing physics.",
+    "simulate": "Free-run simulation from the measured torques.",
+    "compare": "Simulation against recording, in figures and plots.",
+    "effects": "The catalogue of effects.",
+}
+"""Each command's line in ``hil --help``; the command itself is ``app`` in ``hil.cli.<name>``."""
+
+
+def _overview() -> typer.Typer:
+    """Build the group that prints help and refuses unknown names, without importing any command."""
+    app = typer.Typer(
+        no_args_is_help=True,
+        add_completion=False,
+        help="Identify a driveline over its fieldbus and name the physics its model left out.",
+        epilog="Start with: hil demo. Each command has --help with an example.",
+    )
+
+    @app.callback(invoke_without_command=True)
+    def version(
+        version: bool = typer.Option(False, "--version", help="Print the version and exit."),
+    ) -> None:
+        if version:
+            typer.echo(f"hil {__version__}")
+            raise typer.Exit
+
+    for name, line in COMMANDS.items():
+        app.command(name, help=line)(lambda: None)
+    return app
+
+
+def _application(arguments: Sequence[str]) -> tuple[Callable[..., object], list[str], str]:
+    """Choose what runs: the named command's own application, or the overview."""
+    if arguments and arguments[0] in COMMANDS:
+        name = arguments[0]
+        return importlib.import_module(f"hil.cli.{name}").app, list(arguments[1:]), f"hil {name}"
+    return _overview(), list(arguments), "hil"
+
+
+def exit_status(error: BaseException) -> ExitStatus | None:
+    """Map an error to its exit status; None for one that is a defect of this program."""
+    from drivers.errors import CommandRefused, DriverError
+    from estimator.errors import EstimatorError
+
+    families: tuple[tuple[type[BaseException], ExitStatus], ...] = (
+        (KeyboardInterrupt, ExitStatus.INTERRUPTED),
+        (CommandRefused, ExitStatus.REFUSED_BY_GUARD),
+        (DriverError, ExitStatus.DEVICE_FAULT),
+        (InputError, ExitStatus.BAD_INPUT),
+        (EstimatorError, ExitStatus.BAD_INPUT),
+        (HilError, ExitStatus.DEVICE_FAULT),
+    )
+    return next((status for family, status in families if isinstance(error, family)), None)
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Run one command line.
+
+    Returns
+    -------
+    int
+        The exit status; one line of cause and cure is on standard error where it is not 0. An error that is
+        none of ours is a defect and is raised with its traceback.
+    """
+    app, rest, name = _application(arguments)
+    try:
+        result = app(rest, prog_name=name, standalone_mode=False)
+    except typer.Abort:
+        return ExitStatus.INTERRUPTED
+    except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001 - the one place that maps errors to statuses
+        return _report(error)
+    return result if isinstance(result, int) else ExitStatus.DONE
+
+
+def _report(error: BaseException) -> int:
+    status = exit_status(error)
+    if status is not None:
+        typer.echo("interrupted" if isinstance(error, KeyboardInterrupt) else f"error: {error}", err=True)
+        return status
+    if hasattr(error, "format_message") and hasattr(error, "exit_code"):  # typer's own usage errors
+        if message := error.format_message():  # empty where typer printed the help instead
+            typer.echo(f"error: {message}", err=True)
+        return int(error.exit_code)
+    raise error
+
+
+def main() -> None:
+    """Entry point of the console script ``hil``."""
+    sys.exit(run(sys.argv[1:]))

@@ -1,0 +1,42 @@
+"""One cycle of the rig: what was commanded and what every device answered, in SI units."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntFlag
+
+
+class SampleFlag(IntFlag):
+    """Quality of one sample; 0 is good."""
+
+    GOOD = 0
+    M1_STALE = 1  # inverter m1 did not answer this SYNC: its last value is repeated
+    M2_STALE = 2
+    LATE = 4  # the cycle started later than half a period after its time
+    PLC_STALE = 8
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """One SYNC cycle. SI units; ``time_s`` counts from the first recorded cycle, ``t_ns`` is host time.
+
+    ``torque_*_nm`` and ``speed_rad_s`` are NaN where a device has never answered yet. ``age_ns`` is the age
+    of the oldest of the values at the end of the cycle.
+    """
+
+    cycle: int
+    t_ns: int
+    time_s: float
+    torque_ref_m1_nm: float
+    torque_ref_m2_nm: float
+    prbs_nm: float
+    torque_m1_nm: float
+    torque_m2_nm: float
+    speed_rad_s: float
+    age_ns: int
+    flags: SampleFlag
+
+    @property
+    def torque_ref_nm(self) -> float:
+        """Total torque reference of both inverters, PRBS included [Nm]."""
+        return self.torque_ref_m1_nm + self.torque_ref_m2_nm
