@@ -1,0 +1,75 @@
+"""What the PLC says and what it is asked for, in SI units and enumerations; nothing of registers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+
+class DriveMode(Enum):
+    """How the hybrid driveline is coupled; the value is the name in the register map."""
+
+    SERIES = "series"  # the inverters drive the wheels, the coupling to the engine is open
+    PARALLEL = "parallel"  # the engine is coupled to the motor shaft
+    ELECTRIC = "electric"  # as series, with the engine off
+
+
+class ClutchState(Enum):
+    """The coupling between engine and motor shaft; the value is the name in the register map."""
+
+    OPEN = "open"
+    CLOSED = "closed"
+
+
+class PrbsSource(Enum):
+    """Who makes the pseudo-random binary torque; the value is the name in map and rig file."""
+
+    PLC = "plc"
+    HOST = "host"
+
+
+@dataclass(frozen=True, slots=True)
+class PrbsSettings:
+    """The PLC's pseudo-random binary torque: a ten-cell shift register.
+
+    Attributes
+    ----------
+    enabled : bool
+        Whether the PLC's generator runs.
+    amplitude_nm : float
+        The level is plus or minus this torque, both inverters together [Nm].
+    clock_divider : int
+        PLC cycles each level is held.
+    seed : int
+        First state of the register, 1 to 1023.
+    source : PrbsSource
+        Who makes the PRBS.
+    """
+
+    enabled: bool
+    amplitude_nm: float
+    clock_divider: int
+    seed: int
+    source: PrbsSource
+
+
+@dataclass(frozen=True, slots=True)
+class PlcWatchdog:
+    """Life signs both ways: what the PLC counts, and the last count of the host it has seen."""
+
+    plc_count: int
+    host_count_seen: int
+
+
+@dataclass(frozen=True, slots=True)
+class PlcStatus:
+    """Everything the PLC reports, as read at ``t_ns`` of the host's monotonic clock."""
+
+    drive_mode: DriveMode
+    clutch: ClutchState
+    permissive: bool
+    speed_limit_rad_s: float
+    torque_limit_nm: float
+    watchdog: PlcWatchdog
+    prbs: PrbsSettings
+    t_ns: int

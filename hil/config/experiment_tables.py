@@ -1,0 +1,73 @@
+"""The tables ``[experiments.NAME]``: one class per kind, told apart by ``kind``.
+
+Torques are of both inverters together. What every kind has:
+
+- ``duration_s``: length of the recorded part; getting to the start speed and ramping out come on top;
+- ``torque_nm``: the base torque never exceeds this magnitude, in any phase;
+- ``slew_nm_per_s``: nor does it change faster than this;
+- ``approach_timeout_s``: time in which the start speed must be reached.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from hil.config.problems import Fault, refuse
+from hil.config.table import NotNegative, Positive, Table
+
+APPROACH_TIMEOUT_S = 60.0
+"""Time to reach the start speed where the file gives none [s]; it limits patience, not torque."""
+
+
+class ExperimentTable(Table):
+    """What every kind of experiment has; see the module's text."""
+
+    duration_s: Positive
+    torque_nm: Positive
+    slew_nm_per_s: Positive
+    approach_timeout_s: Positive = APPROACH_TIMEOUT_S
+
+
+class CruiseTable(ExperimentTable):
+    """Hold ``speed_rad_s`` slowly while the PRBS acts: the paper's own test."""
+
+    kind: Literal["cruise"]
+    speed_rad_s: float
+
+
+class ReversalTable(ExperimentTable):
+    """Swing by ``swing_nm`` either way, turning where the speed reaches ``turning_speed_rad_s``."""
+
+    kind: Literal["reversal"]
+    turning_speed_rad_s: Positive
+    swing_nm: Positive
+
+    @model_validator(mode="after")
+    def _swing_within_torque(self) -> Self:
+        refuse(_part_above_torque("swing_nm", self.swing_nm, self.torque_nm))
+        return self
+
+
+class TipTable(ExperimentTable):
+    """Step the torque by ``step_nm`` up and down about what holds ``speed_rad_s``, ``step_s`` each."""
+
+    kind: Literal["tip"]
+    speed_rad_s: NotNegative
+    step_nm: Positive
+    step_s: Positive
+
+    @model_validator(mode="after")
+    def _step_within_torque(self) -> Self:
+        refuse(_part_above_torque("step_nm", self.step_nm, self.torque_nm))
+        return self
+
+
+AnyExperiment = Annotated[CruiseTable | ReversalTable | TipTable, Field(discriminator="kind")]
+
+
+def _part_above_torque(key: str, value_nm: float, torque_nm: float) -> Iterator[Fault]:
+    if value_nm > torque_nm:
+        yield Fault(key, f"at most torque_nm of the same table ({torque_nm:g})", value_nm)

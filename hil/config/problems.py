@@ -1,0 +1,169 @@
+"""All faults of a hand-written TOML file at once, one line each: ``key | expected ... | came ...``.
+
+Two steps serve every file of this program, each with the error class of the file at hand:
+
+1. `read_toml` turns text into a dictionary, or names the line that is not TOML;
+2. `validate` turns the dictionary into a pydantic model, or names every key at fault.
+
+Rules across keys are model validators that call `refuse` with every fault they find.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, TypeVar
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails, PydanticCustomError
+
+from hil.config.model_walk import ModelWalk
+from hil.errors import FileProblem
+
+Model = TypeVar("Model", bound=BaseModel)
+
+ACROSS_KEYS: Final = "across_keys"
+"""Type of the validation errors made by `refuse`."""
+
+TOML_PLACE: Final = re.compile(r"^(?P<what>.*) \(at (?P<place>line \d+, column \d+|end of document)\)$", re.DOTALL)
+"""How `tomllib` ends its messages; it has no attributes for the place before Python 3.14."""
+
+LONGEST_VALUE: Final = 80
+"""Characters of a wrong value that a message shows."""
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """One broken rule across keys: the key to mend (dotted, from the validator's own table), and why."""
+
+    key: str
+    expected: str
+    came: object
+
+
+def refuse(faults: Iterable[Fault]) -> None:
+    """Refuse a table with all its faults; for the model validators that check rules across keys.
+
+    Raises
+    ------
+    PydanticCustomError
+        If there is any fault; `validate` turns it into one line per fault.
+    """
+    found = tuple(faults)
+    if found:
+        raise PydanticCustomError(ACROSS_KEYS, "rules across keys are broken", {"faults": found})
+
+
+def read_toml(path: Path, error: type[FileProblem]) -> dict[str, Any]:
+    """Read one TOML file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    error : type of FileProblem
+        What to raise: `hil.errors.RigFileError`, `hil.errors.ModelFileError`, ...
+
+    Returns
+    -------
+    dict
+        The file's tables.
+
+    Raises
+    ------
+    FileProblem
+        Of the class given, if the file can't be read, is not UTF-8, or is not TOML; with the line.
+    """
+    try:
+        content = path.read_bytes()
+    except OSError as cause:
+        raise error(path, f"the file | expected a readable TOML file | came: {cause.strerror}") from cause
+    try:
+        return tomllib.loads(content.decode("utf-8"))
+    except UnicodeDecodeError as cause:
+        line = content.count(b"\n", 0, cause.start) + 1
+        byte = content[cause.start]
+        raise error(path, f"line {line} | expected UTF-8 text | came byte 0x{byte:02x}: save as UTF-8") from cause
+    except tomllib.TOMLDecodeError as cause:
+        raise error(path, _toml_problem(str(cause))) from cause
+
+
+def validate(model: type[Model], data: Mapping[str, Any], path: Path, error: type[FileProblem]) -> Model:
+    """Check a file's tables against a model.
+
+    Parameters
+    ----------
+    model : type of BaseModel
+        The model of the whole file.
+    data : mapping
+        What `read_toml` returned.
+    path : Path
+        The file, for the message; validators find it as ``info.context["path"]``, for paths relative to it.
+    error : type of FileProblem
+        What to raise.
+
+    Returns
+    -------
+    BaseModel
+        An instance of ``model``.
+
+    Raises
+    ------
+    FileProblem
+        Of the class given, with one line for every key that is missing, unknown or wrong.
+    """
+    try:
+        return model.model_validate(data, context={"path": path})
+    except ValidationError as cause:
+        raise error(path, *problem_lines(model, cause)) from cause
+
+
+def problem_lines(model: type[BaseModel], cause: ValidationError) -> list[str]:
+    """Put a validation error into lines ``key | expected ... | came ...``, one per fault."""
+    return [line for detail in cause.errors() for line in _lines(model, detail)]
+
+
+def _toml_problem(message: str) -> str:
+    match = TOML_PLACE.match(message)
+    what, place = (match["what"], match["place"]) if match else (message, "the file")
+    return f"{place} | expected TOML | came: {what}"
+
+
+def _lines(model: type[BaseModel], detail: ErrorDetails) -> Iterator[str]:
+    """Word one of pydantic's errors; those of `refuse` carry several faults."""
+    where, kind, context = detail["loc"], detail["type"], detail.get("ctx", {})
+    table = ModelWalk.along(model, where)
+    if kind == ACROSS_KEYS:
+        for fault in context["faults"]:
+            yield _line((*table.keys, fault.key), fault.expected, _shown(fault.came))
+    elif kind == "missing":
+        yield _line(table.keys, "this key", "nothing: add it")
+    elif kind == "extra_forbidden":
+        known = ", ".join(ModelWalk.along(model, where[:-1]).known_keys())
+        yield _line(table.keys, f"one of the known keys ({known})", "this unknown key: mend or remove it")
+    elif kind in ("union_tag_invalid", "union_tag_not_found"):
+        came = repr(context["tag"]) if "tag" in context else "nothing: add it"
+        yield _line((*table.keys, context["discriminator"].strip("'")), f"one of {table.known_tags()}", came)
+    else:
+        yield _line(table.keys, _expected(detail), _shown(detail["input"]))
+
+
+def _line(keys: Iterable[int | str], expected: str, came: str) -> str:
+    key = ".".join(str(part) for part in keys if part != "") or "the file"
+    return f"{key} | expected {expected} | came {came}"
+
+
+def _expected(detail: ErrorDetails) -> str:
+    """Keep pydantic's own words, without the part that every one of its messages begins with."""
+    message = detail["msg"]
+    for opening in ("Input should be ", "Value error, "):
+        message = message.removeprefix(opening)
+    return message[:1].lower() + message[1:]
+
+
+def _shown(value: object) -> str:
+    text = "a table" if isinstance(value, Mapping) else repr(value)
+    return text if len(text) <= LONGEST_VALUE else f"{text[: LONGEST_VALUE - 3]}..."

@@ -1,0 +1,34 @@
+"""What every table of a configuration file is: frozen, strict, complete; and the field types they share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo
+
+
+class Table(BaseModel):
+    """A table of a file: a number is no text, an unknown key is a fault, nothing changes after reading."""
+
+    model_config = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
+
+
+def _beside_the_file(value: object, info: ValidationInfo) -> Path:
+    """Resolve a path against the folder of the file it stands in, and see that it is there."""
+    if not isinstance(value, str):
+        raise ValueError("the path of a file, as text")
+    folder = (info.context or {}).get("path", Path("file")).parent
+    path: Path = (folder / value).resolve()
+    if not path.is_file():
+        raise ValueError(f"an existing file, looked for {path}")
+    return path
+
+
+Positive = Annotated[float, Field(gt=0)]
+NotNegative = Annotated[float, Field(ge=0)]
+Text = Annotated[str, Field(min_length=1)]
+TcpPort = Annotated[int, Field(ge=1, le=65535)]
+Unsigned32 = Annotated[int, Field(ge=0, le=0xFFFF_FFFF)]
+ExistingFile = Annotated[Path, BeforeValidator(_beside_the_file)]
+"""A file named relative to the file that names it; read as an absolute path."""

@@ -1,0 +1,245 @@
+"""A simulated drive PLC: what its program does, in simulated time; nothing of registers, sockets or clocks.
+
+- A drive mode takes effect as it is requested, unless the PLC refuses it. Parallel mode closes the clutch,
+  the other two open it.
+- The watchdog counts one per PLC cycle; the host's count is taken over as it is written.
+- The PRBS generator runs while it is enabled and the source is the PLC; it starts at the seed whenever one of
+  its settings is written.
+
+The device is stepped by the thread of the CAN bus and asked by that of the Modbus server: one lock for both.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from threading import Lock
+from types import MappingProxyType
+from typing import Final
+
+from drivers.plc_types import ClutchState, DriveMode, PrbsSource
+from drivers.register import Value
+from hil.simulator.plc_prbs import CELLS, PlcPrbs
+
+IDENTITY: Final = MappingProxyType({"vendor_code": 0x00484944, "device_code": 0x2024, "map_version": 1})
+"""What this PLC identifies as; the shipped map expects the same, which a test sees to."""
+
+COUNTS: Final = 65536
+"""The PLC's watchdog starts over here: it is a 16-bit register."""
+
+ROUNDING_CYCLES: Final = 1e-6
+"""Part of a PLC cycle by which sums of steps may fall short of a whole one."""
+
+
+class ValueRefusedError(ValueError):
+    """The PLC's program does not accept what the host writes; the server answers with an exception code."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlcSetup:
+    """How the PLC is built, and what it starts with.
+
+    Attributes
+    ----------
+    drive_mode : DriveMode
+        Mode at the start.
+    speed_limit_rad_s, torque_limit_nm : float
+        Limits it reports [rad/s, Nm].
+    period_s : float
+        PLC cycle [s].
+    host_timeout_s : float
+        Simulated time without a beat, from a host that has begun to beat, after which the permissive is
+        withdrawn [s]. Infinite by default: a simulation may run far ahead of a host that beats by the wall
+        clock.
+    """
+
+    drive_mode: DriveMode = DriveMode.SERIES
+    speed_limit_rad_s: float = 320.0
+    torque_limit_nm: float = 450.0
+    period_s: float = 0.01
+    host_timeout_s: float = math.inf
+
+
+@dataclass(frozen=True, slots=True)
+class PlcFaults:
+    """What goes wrong, and when in simulated time [s]; nothing by default.
+
+    Attributes
+    ----------
+    clutch_closes_at_s : float
+        The clutch closes by itself and stays closed.
+    permissive_withdrawn_at_s : float
+        The permissive goes and stays away.
+    refused_modes : frozenset of DriveMode
+        The PLC takes the request and does not follow it.
+    """
+
+    clutch_closes_at_s: float = math.inf
+    permissive_withdrawn_at_s: float = math.inf
+    refused_modes: frozenset[DriveMode] = frozenset()
+
+
+_ACCEPTED: Final[Mapping[str, tuple[str, Callable[[Value], bool]]]] = MappingProxyType(
+    {
+        "host_count": ("a count", lambda value: True),
+        "drive_mode_request": ("a drive mode", lambda value: value in [mode.value for mode in DriveMode]),
+        "prbs_enable": ("on or off", lambda value: True),
+        "prbs_amplitude": ("0 Nm or more", lambda value: float(value) >= 0.0),
+        "prbs_divider": ("1 or more", lambda value: int(value) >= 1),
+        "prbs_seed": (f"1 to {2**CELLS - 1}", lambda value: 1 <= int(value) < 2**CELLS),
+        "prbs_source": ("a source", lambda value: value in [source.value for source in PrbsSource]),
+    }
+)
+"""Registers the host may write: what the program accepts in each."""
+
+
+class PlcDevice:
+    """The PLC's program.
+
+    Parameters
+    ----------
+    setup : PlcSetup
+        How it is built.
+    faults : PlcFaults
+        What goes wrong.
+    """
+
+    __slots__ = (
+        "_clutch",
+        "_cycles",
+        "_drive_mode",
+        "_faults",
+        "_held",
+        "_lock",
+        "_permissive",
+        "_prbs",
+        "_seen_s",
+        "_setup",
+        "_time_s",
+    )
+
+    def __init__(self, setup: PlcSetup | None = None, faults: PlcFaults | None = None) -> None:
+        self._setup = setup or PlcSetup()
+        self._faults = faults or PlcFaults()
+        self._lock = Lock()
+        self._time_s = 0.0
+        self._cycles = 0
+        self._seen_s = math.inf  # no beat yet
+        self._drive_mode = self._setup.drive_mode
+        self._clutch = _clutch_in(self._drive_mode)
+        self._permissive = True
+        self._prbs: PlcPrbs | None = None
+        self._held: dict[str, Value] = {
+            "host_count": 0,
+            "drive_mode_request": self._drive_mode.value,
+            "prbs_enable": False,
+            "prbs_amplitude": 0.0,
+            "prbs_divider": 1,
+            "prbs_seed": 1,
+            "prbs_source": PrbsSource.HOST.value,
+        }
+
+    @property
+    def clutch(self) -> ClutchState:
+        """The coupling between engine and motor shaft, for the driveline simulation."""
+        with self._lock:
+            return self._clutch
+
+    @property
+    def prbs_torque_nm(self) -> float:
+        """Output of the PLC's own generator, both inverters together [Nm]; 0 while it does not run."""
+        with self._lock:
+            return self._prbs_nm()
+
+    def close_clutch(self) -> None:
+        """Close the clutch now, whatever the drive mode."""
+        with self._lock:
+            self._clutch = ClutchState.CLOSED
+
+    def withdraw_permissive(self) -> None:
+        """Withdraw the permissive now."""
+        with self._lock:
+            self._permissive = False
+
+    def step(self, dt_s: float) -> None:
+        """Let simulated time pass [s]; the PLC cycles that end in it run."""
+        with self._lock:
+            self._time_s += dt_s
+            whole_cycles = math.floor(self._time_s / self._setup.period_s + ROUNDING_CYCLES)
+            for _ in range(whole_cycles - self._cycles):
+                self._cycle()
+            self._fail()
+
+    def values(self) -> dict[str, Value]:
+        """Take a snapshot of everything the PLC shows, by register name."""
+        with self._lock:
+            return {
+                **IDENTITY,
+                **self._held,
+                "permissive": self._permissive,
+                "drive_mode": self._drive_mode.value,
+                "clutch": self._clutch.value,
+                "speed_limit": self._setup.speed_limit_rad_s,
+                "torque_limit": self._setup.torque_limit_nm,
+                "plc_count": self._cycles % COUNTS,
+                "host_count_seen": self._held["host_count"],
+                "prbs_torque": self._prbs_nm(),
+            }
+
+    def write(self, values: Mapping[str, Value]) -> None:
+        """Take what the host writes, by register name: all of it or nothing.
+
+        Raises
+        ------
+        ValueRefusedError
+            If the program does not accept a value, or the host may not write a register.
+        """
+        for name, value in values.items():
+            expected, accepts = _ACCEPTED.get(name, ("no write: this register is read only", _nothing))
+            if not accepts(value):
+                raise ValueRefusedError(f"PLC register {name}: expected {expected}, came {value!r}.")
+        with self._lock:
+            self._held.update(values)
+            self._react(values)
+
+    def _react(self, values: Mapping[str, Value]) -> None:
+        if "host_count" in values:
+            self._seen_s = self._time_s
+        if "drive_mode_request" in values:
+            self._follow(DriveMode(values["drive_mode_request"]))
+        if any(name.startswith("prbs_") for name in values):
+            runs = self._held["prbs_enable"] and self._held["prbs_source"] == PrbsSource.PLC.value
+            self._prbs = self._generator() if runs else None
+
+    def _follow(self, mode: DriveMode) -> None:
+        if mode not in self._faults.refused_modes:
+            self._drive_mode = mode
+            self._clutch = _clutch_in(mode)
+
+    def _generator(self) -> PlcPrbs:
+        held = self._held
+        return PlcPrbs(float(held["prbs_amplitude"]), int(held["prbs_divider"]), int(held["prbs_seed"]))
+
+    def _prbs_nm(self) -> float:
+        return 0.0 if self._prbs is None else self._prbs.torque_nm
+
+    def _cycle(self) -> None:
+        self._cycles += 1
+        if self._prbs is not None:
+            self._prbs.clock()
+
+    def _fail(self) -> None:
+        if self._time_s >= self._faults.clutch_closes_at_s:
+            self._clutch = ClutchState.CLOSED
+        silent_s = self._time_s - self._seen_s
+        if self._time_s >= self._faults.permissive_withdrawn_at_s or silent_s > self._setup.host_timeout_s:
+            self._permissive = False
+
+
+def _clutch_in(mode: DriveMode) -> ClutchState:
+    return ClutchState.CLOSED if mode is DriveMode.PARALLEL else ClutchState.OPEN
+
+
+def _nothing(value: Value) -> bool:
+    return False

@@ -1,0 +1,152 @@
+"""The Modbus connection against peers that misbehave: each way has its own error, none is silent."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+
+import pytest
+
+from drivers.errors import BusDown, DeviceFault, DeviceTimeout, DriverError, ProtocolViolation
+from drivers.modbus_link import EXCEPTION_TEXT, ModbusLink
+from drivers.register import RegisterKind
+from tests.drivers.modbus_peers import Answer, frame, peer
+
+HOLDING, COIL = RegisterKind.HOLDING_REGISTER, RegisterKind.COIL
+TIMEOUT_S = 0.1
+
+
+def read_from(answer: Answer, kind: RegisterKind = HOLDING, count: int = 2) -> tuple[int, ...]:
+    async def run() -> tuple[int, ...]:
+        async with peer(answer) as port:
+            link = ModbusLink("127.0.0.1", port, 1, TIMEOUT_S)
+            await link.open()
+            try:
+                return await link.read(kind, 5, count)
+            finally:
+                link.close()
+
+    return asyncio.run(run())
+
+
+def write_to(answer: Answer, kind: RegisterKind = HOLDING) -> None:
+    async def run() -> None:
+        async with peer(answer) as port:
+            link = ModbusLink("127.0.0.1", port, 1, TIMEOUT_S)
+            await link.open()
+            try:
+                await link.write(kind, 5, (1, 0))
+            finally:
+                link.close()
+
+    asyncio.run(run())
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def test_words_arrive_in_the_order_of_addresses() -> None:
+    assert read_from(lambda request: frame(request, b"\x03\x04\x12\x34\xab\xcd")) == (0x1234, 0xABCD)
+
+
+def test_bits_arrive_least_significant_first() -> None:
+    assert read_from(lambda request: frame(request, b"\x01\x01\x05"), COIL, 3) == (1, 0, 1)
+
+
+@pytest.mark.parametrize("code", sorted(EXCEPTION_TEXT))
+def test_an_exception_answer_is_raised_with_its_text(code: int) -> None:
+    family = ProtocolViolation if code <= 3 else DeviceFault
+    with pytest.raises(family, match=rf"PLC at .* holding_register.*exception {code} \(") as refusal:
+        read_from(lambda request: frame(request, bytes([0x83, code])))
+    assert EXCEPTION_TEXT[code] in str(refusal.value)
+
+
+def test_an_exception_code_modbus_does_not_define() -> None:
+    with pytest.raises(DeviceFault, match=r"exception 99 \(a code Modbus does not define\)"):
+        read_from(lambda request: frame(request, b"\x83\x63"))
+
+
+@pytest.mark.parametrize(
+    ("pdu", "expected"),
+    [
+        (b"\x03\x02\x12\x34", "expected 2 values, came 1"),
+        (b"\x03\x06\x00\x01\x00\x02\x00\x03", "expected 2 values, came 3"),
+        (b"\x04\x04\x12\x34\xab\xcd", "expected function 3, came function 4"),
+        (b"\x03\x09\x12\x34", "expected a Modbus answer, came bytes 03 09 12 34"),
+        (b"\x55\x01", "expected a Modbus answer, came bytes 55 01"),
+    ],
+)
+def test_a_wrong_answer_is_refused(pdu: bytes, expected: str) -> None:
+    with pytest.raises(ProtocolViolation, match=expected):
+        read_from(lambda request: frame(request, pdu))
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        lambda request: b"",
+        lambda request: b"HTTP/1.1 400 Bad Request\r\n\r\n",
+        lambda request: frame(request, b"\x03\x04\x12\x34\xab\xcd", unit=9),
+        lambda request: frame(request, b"\x03\x04\x12\x34\xab\xcd", transaction=4711),
+    ],
+    ids=["silent", "not Modbus", "another unit", "another transaction"],
+)
+def test_no_answer_to_this_request_is_a_timeout(answer: Answer) -> None:
+    with pytest.raises(DeviceTimeout, match=r"expected an answer within 0\.1 s, none came"):
+        read_from(answer)
+
+
+def test_a_lost_connection_is_not_a_timeout() -> None:
+    with pytest.raises(BusDown, match="the connection was lost"):
+        read_from(lambda request: None)
+
+
+def test_a_confirmed_write_passes() -> None:
+    write_to(lambda request: frame(request, b"\x10\x00\x05\x00\x02"))
+    write_to(lambda request: frame(request, b"\x0f\x00\x05\x00\x02"), COIL)
+
+
+@pytest.mark.parametrize("confirmed", [b"\x10\x00\x06\x00\x02", b"\x10\x00\x05\x00\x01"])
+def test_a_write_confirmed_for_something_else_is_refused(confirmed: bytes) -> None:
+    with pytest.raises(ProtocolViolation, match="expected address 5, count 2 confirmed, came address"):
+        write_to(lambda request: frame(request, confirmed))
+
+
+@pytest.mark.parametrize("kind", [RegisterKind.INPUT_REGISTER, RegisterKind.DISCRETE_INPUT])
+def test_what_modbus_can_t_write_is_refused(kind: RegisterKind) -> None:
+    with pytest.raises(ProtocolViolation, match="expected a kind that Modbus can write"):
+        write_to(lambda request: b"", kind)
+
+
+def test_no_server_is_a_bus_that_is_down() -> None:
+    port = free_port()
+    with pytest.raises(BusDown, match=f"PLC at 127.0.0.1:{port}.*expected a Modbus TCP server"):
+        asyncio.run(ModbusLink("127.0.0.1", port, 1, TIMEOUT_S).open())
+
+
+def test_nothing_is_sent_before_it_is_open_or_after_it_is_closed() -> None:
+    async def run() -> None:
+        async with peer(lambda request: frame(request, b"\x03\x02\x00\x01")) as port:
+            link = ModbusLink("127.0.0.1", port, 1, TIMEOUT_S)
+            with pytest.raises(BusDown, match="expected an open connection"):
+                await link.read(HOLDING, 0, 1)
+            await link.open()
+            assert await link.read(HOLDING, 0, 1) == (1,)
+            link.close()
+            link.close()
+            with pytest.raises(BusDown, match="expected an open connection"):
+                await link.read(HOLDING, 0, 1)
+
+    asyncio.run(run())
+
+
+@pytest.mark.parametrize("pdu", [b"\x55\x01", b"\x83\x04"])
+def test_nothing_leaks_to_the_terminal(pdu: bytes, capfd: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(DriverError):
+        read_from(lambda request: frame(request, pdu))
+    with pytest.raises(BusDown):
+        asyncio.run(ModbusLink("127.0.0.1", free_port(), 1, TIMEOUT_S).open())
+    assert capfd.readouterr() == ("", "")

@@ -1,0 +1,175 @@
+"""The simulated PLC's program, in simulated time and with nothing connected."""
+
+from __future__ import annotations
+
+import pytest
+
+from drivers.plc_types import ClutchState, DriveMode
+from drivers.register import Value
+from drivers.register_map import load_register_map
+from drivers.resources import data_file
+from estimator.signals.prbs import Prbs
+from hil.simulator.plc_device import IDENTITY, PlcDevice, PlcFaults, PlcSetup, ValueRefusedError
+
+RUNNING: dict[str, Value] = {
+    "prbs_amplitude": 60.0,
+    "prbs_divider": 1,
+    "prbs_seed": 5,
+    "prbs_source": "plc",
+    "prbs_enable": True,
+}
+
+
+def test_it_identifies_as_the_shipped_map_expects() -> None:
+    assert dict(IDENTITY) == load_register_map(data_file("plc.toml")).identity
+
+
+def test_it_shows_every_register_of_the_shipped_map() -> None:
+    assert set(PlcDevice().values()) == set(load_register_map(data_file("plc.toml")).registers)
+
+
+@pytest.mark.parametrize("dt_s", [0.001, 0.01, 0.0025, 0.1])
+def test_the_watchdog_counts_cycles_whatever_the_step(dt_s: float) -> None:
+    device = PlcDevice()
+    for _ in range(round(2.0 / dt_s)):
+        device.step(dt_s)
+    assert device.values()["plc_count"] == 200
+
+
+def test_the_watchdog_starts_over() -> None:
+    device = PlcDevice()
+    device.step(655.37)
+    assert device.values()["plc_count"] == 1
+
+
+@pytest.mark.parametrize(
+    ("mode", "clutch"),
+    [
+        (DriveMode.SERIES, ClutchState.OPEN),
+        (DriveMode.PARALLEL, ClutchState.CLOSED),
+        (DriveMode.ELECTRIC, ClutchState.OPEN),
+    ],
+)
+def test_the_drive_mode_moves_the_clutch(mode: DriveMode, clutch: ClutchState) -> None:
+    device = PlcDevice()
+    device.write({"drive_mode_request": mode.value})
+    assert device.values()["drive_mode"] == mode.value
+    assert device.clutch is clutch
+    assert PlcDevice(PlcSetup(drive_mode=mode)).clutch is clutch
+
+
+def test_a_refused_mode_is_requested_and_not_taken() -> None:
+    device = PlcDevice(faults=PlcFaults(refused_modes=frozenset({DriveMode.PARALLEL})))
+    device.write({"drive_mode_request": "parallel"})
+    assert device.values()["drive_mode_request"] == "parallel"
+    assert device.values()["drive_mode"] == "series"
+    assert device.clutch is ClutchState.OPEN
+
+
+def test_the_clutch_closes_when_told_and_stays() -> None:
+    device = PlcDevice(faults=PlcFaults(clutch_closes_at_s=1.0))
+    device.step(0.99)
+    assert device.clutch is ClutchState.OPEN
+    device.step(0.01)
+    assert device.clutch is ClutchState.CLOSED
+    device.write({"drive_mode_request": "series"})
+    device.step(0.01)
+    assert device.clutch is ClutchState.CLOSED
+
+
+def test_the_permissive_goes_when_told_and_stays_away() -> None:
+    device = PlcDevice(faults=PlcFaults(permissive_withdrawn_at_s=0.5))
+    device.step(0.49)
+    assert device.values()["permissive"] is True
+    device.step(0.02)
+    assert device.values()["permissive"] is False
+
+
+def test_hooks_act_at_once() -> None:
+    device = PlcDevice()
+    device.close_clutch()
+    device.withdraw_permissive()
+    assert device.clutch is ClutchState.CLOSED
+    assert device.values()["permissive"] is False
+
+
+class TestHostWatchdog:
+    def test_a_host_that_stops_beating_loses_the_permissive(self) -> None:
+        device = PlcDevice(PlcSetup(host_timeout_s=0.5))
+        device.write({"host_count": 1})
+        device.step(0.5)
+        assert device.values()["permissive"] is True
+        device.step(0.01)
+        assert device.values()["permissive"] is False
+
+    def test_a_host_that_beats_keeps_it(self) -> None:
+        device = PlcDevice(PlcSetup(host_timeout_s=0.5))
+        for count in range(10):
+            device.write({"host_count": count})
+            device.step(0.4)
+        assert device.values()["permissive"] is True
+
+    def test_a_host_that_has_never_beaten_is_not_missed(self) -> None:
+        device = PlcDevice(PlcSetup(host_timeout_s=0.5))
+        device.step(60.0)
+        assert device.values()["permissive"] is True
+
+
+class TestPrbs:
+    def levels(self, device: PlcDevice, cycles: int) -> list[float]:
+        course = []
+        for _ in range(cycles):
+            course.append(device.prbs_torque_nm)
+            device.step(0.01)
+        return course
+
+    def test_one_period_is_of_maximum_length(self) -> None:
+        device = PlcDevice()
+        device.write(RUNNING)
+        course = self.levels(device, 2 * 1023)
+        assert course[:1023] == course[1023:]
+        assert course[:1023].count(60.0) == 512
+        assert course[:1023].count(-60.0) == 511
+
+    @pytest.mark.parametrize("divider", [1, 3])
+    def test_it_agrees_with_the_host_s_generator(self, divider: int) -> None:
+        device = PlcDevice()
+        device.write({**RUNNING, "prbs_divider": divider})
+        host = Prbs(60.0, cells=10, clock_divider=divider, seed=5)
+        assert self.levels(device, 500) == [host.next() for _ in range(500)]
+
+    def test_a_new_setting_starts_it_at_the_seed(self) -> None:
+        device = PlcDevice()
+        device.write(RUNNING)
+        first = self.levels(device, 50)
+        device.write({"prbs_seed": 5})
+        assert self.levels(device, 50) == first
+
+    @pytest.mark.parametrize("change", [{"prbs_enable": False}, {"prbs_source": "host"}])
+    def test_it_is_silent_unless_enabled_and_the_source(self, change: dict[str, Value]) -> None:
+        device = PlcDevice()
+        device.write(RUNNING)
+        device.write(change)
+        assert set(self.levels(device, 20)) == {0.0}
+        assert device.values()["prbs_torque"] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("prbs_amplitude", -0.1),
+        ("prbs_divider", 0),
+        ("prbs_seed", 0),
+        ("prbs_seed", 1024),
+        ("prbs_source", "nobody"),
+        ("drive_mode_request", "flying"),
+        ("permissive", True),
+        ("no_such_register", 1),
+    ],
+)
+def test_what_the_program_does_not_accept_changes_nothing(name: str, value: Value) -> None:
+    device = PlcDevice()
+    before = device.values()
+    with pytest.raises(ValueRefusedError, match=f"PLC register {name}: expected .*, came {value!r}"):
+        device.write({"prbs_divider": 9, "drive_mode_request": "parallel", name: value})
+    assert device.values() == before
