@@ -1,0 +1,109 @@
+"""Start values for the output-error fit, whose cost has more than one minimum.
+
+Least squares on the equation error (ARX) needs none but is biased by noise on y. The iteration of K.
+Steiglitz and L. E. McBride (IEEE Trans. Automatic Control 10, 1965) filters u and y by the last 1 / A_hat and
+repeats it; for white noise on y it converges to the output-error minimum. It is started twice: from the ARX
+model itself, and from the simulated output of an ARX model of high order, in which the noise is averaged out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from scipy.signal import lfilter
+
+from estimator.identification.linear_model import LinearModel, Orders
+from estimator.identification.triangular import solve_least_squares
+from estimator.signals.record import BoolArray, FloatArray
+
+ITERATIONS = 20
+HIGH_ORDER = 16
+"""Order of the averaging ARX model: four times the paper's order."""
+
+LARGEST_RADIUS = 0.999
+"""Radius to which a pole on or outside the unit circle is brought; its time constant is then 1000 samples."""
+
+
+def stabilised(model: LinearModel) -> LinearModel:
+    """Reflect poles outside the unit circle into it (same magnitude response but for a factor)."""
+    poles = model.poles
+    radius = np.abs(poles)
+    if (radius < 1.0).all():
+        return model
+    inside = np.where(radius < 1.0, radius, np.minimum(1.0 / np.maximum(radius, 1.0), LARGEST_RADIUS))
+    moved = np.real(np.poly(poles * inside / np.maximum(radius, np.finfo(np.float64).tiny)))
+    return LinearModel(tuple(moved[1:].tolist()), model.b, model.nk, model.sample_time_s)
+
+
+def delayed(x: FloatArray, delay: int) -> FloatArray:
+    """Return x delayed by a number of samples, zeros before the start, shape (N,)."""
+    out = np.zeros_like(x)
+    out[delay:] = x[: x.shape[0] - delay]
+    return out
+
+
+def regressor(u: FloatArray, y: FloatArray, orders: Orders) -> FloatArray:
+    """Return ``[-y(t-1) .. -y(t-na), u(t-nk) .. u(t-nk-nb+1)]`` for every t, shape (N, na+nb)."""
+    columns = [-delayed(y, i) for i in range(1, orders.na + 1)]
+    columns += [delayed(u, orders.nk + j) for j in range(orders.nb)]
+    return np.column_stack(columns)
+
+
+def complete_rows(okay: BoolArray, orders: Orders) -> BoolArray:
+    """Tell for which t the output and all past outputs in its regressor were measured, shape (N,)."""
+    rows = okay.copy()
+    for i in range(1, orders.na + 1):
+        rows &= delayed(okay.astype(np.float64), i) > 0
+    rows[: orders.n_states] = False
+    return rows
+
+
+def arx(u: FloatArray, y: FloatArray, okay: BoolArray, orders: Orders, sample_time_s: float) -> LinearModel | None:
+    """Fit by least squares on the equation error; None if too few unbroken stretches are left of the mask."""
+    rows = complete_rows(okay, orders)
+    if np.count_nonzero(rows) < 2 * orders.n_parameters:
+        return None
+    measured = np.where(okay, y, 0.0)
+    theta = solve_least_squares(regressor(u, measured, orders)[rows], y[rows])
+    return stabilised(LinearModel.from_theta(theta, orders, sample_time_s))
+
+
+def steiglitz_mcbride(u: FloatArray, y: FloatArray, okay: BoolArray, orders: Orders, start: LinearModel) -> LinearModel:
+    """Iterate from a start; outputs that are masked are filled by the last model's simulation."""
+    model, rows = start, okay.copy()
+    rows[: orders.n_states] = False
+    for _ in range(ITERATIONS):
+        filled = np.where(okay, y, model.simulate(u))
+        u_f, y_f = lfilter([1.0], model.A, u), lfilter([1.0], model.A, filled)
+        theta = solve_least_squares(regressor(u_f, y_f, orders)[rows], y_f[rows])
+        model = stabilised(LinearModel.from_theta(theta, orders, start.sample_time_s))
+    return model
+
+
+def candidates(
+    u: FloatArray, y: FloatArray, okay: BoolArray, orders: Orders, sample_time_s: float
+) -> Iterator[LinearModel]:
+    """Yield start models, all stable; always at least one.
+
+    Parameters
+    ----------
+    u, y, okay : ndarray, shape (N,)
+        Input, output, mask.
+    orders : Orders
+        Structure of the model.
+    sample_time_s : float
+        Sampling period [s].
+    """
+    at_rest = LinearModel((0.0,) * orders.na, (0.0,) * orders.nb, orders.nk, sample_time_s)
+    first = arx(u, y, okay, orders, sample_time_s)
+    if first is not None:
+        yield first
+    yield steiglitz_mcbride(u, y, okay, orders, first or at_rest)
+    high = Orders(HIGH_ORDER, HIGH_ORDER, orders.nk)
+    averaging = arx(u, y, okay, high, sample_time_s)
+    if averaging is not None:
+        smooth = averaging.simulate(u)
+        everywhere = np.ones_like(okay)
+        begin = arx(u, smooth, everywhere, orders, sample_time_s) or at_rest
+        yield steiglitz_mcbride(u, smooth, everywhere, orders, begin)

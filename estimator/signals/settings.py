@@ -1,0 +1,56 @@
+"""Settings that make no sense are refused where they are given, by name, with what would be right.
+
+A check is one row of a table (name, value, test, what is expected); one loop reads them all, so that a caller
+sees every fault at once.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from estimator.errors import EstimatorError
+
+
+class BadSetting(EstimatorError, ValueError):
+    """A setting is outside what its algorithm can work with: the caller is at fault.
+
+    Examples: a shift register that starts at zero, a sampling period that does not divide the wanted one.
+    To do: give a value of the kind the message names.
+    """
+
+
+@dataclass(frozen=True, slots=True)
+class Requirement:
+    """One row: the setting's name (unit included), its value, whether it fits, and what would."""
+
+    name: str
+    value: float
+    fits: bool
+    expected: str
+
+
+def require(where: str, rows: Iterable[Requirement]) -> None:
+    """Refuse settings that do not fit.
+
+    Parameters
+    ----------
+    where
+        What is being set up; it opens every line of the message.
+    rows
+        The checks.
+
+    Raises
+    ------
+    BadSetting
+        With one line per fault.
+    """
+    faults = [f"{where}: {row.name} is {row.value}, expected {row.expected}." for row in rows if not row.fits]
+    if faults:
+        raise BadSetting("\n".join(faults))
+
+
+def is_positive(value: float) -> bool:
+    """Tell whether a number is finite and above zero."""
+    return math.isfinite(value) and value > 0

@@ -1,0 +1,180 @@
+"""``hil identify`` on real files: what it writes, what it prints, what it refuses."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from estimator.identification.identify import identify
+from estimator.identification.linear_model import LinearModel
+from hil.cli.main import run
+from hil.recording import read_record
+from tests.estimator.identification.driveline import cruise, true_resonance
+
+MODEL = """schema = "hil.model/1"
+structure = "two_mass"
+motion = "rotation"
+
+[parameters]
+J_M = { value = 1.6, tolerance = 0.2 }
+J_L = { value = 100.0, tolerance = 0.2 }
+k = { value = 4200, tolerance = 0.2 }
+c = { value = 9.0, tolerance = 0.2 }
+b_M = { value = 0.35, tolerance = 0.2 }
+b_L = { value = 0.9, tolerance = 0.2 }
+"""
+
+ONE_MASS = """schema = "hil.model/1"
+structure = "one_mass"
+motion = "rotation"
+
+[parameters]
+J_M = { value = 100.0, tolerance = 0.2 }
+b_M = { value = 0.9, tolerance = 0.2 }
+"""
+
+
+def write(path: Path, seed: int, prbs_nm: float = 60.0, duration_s: float = 22.0) -> Path:
+    record = cruise(seed, duration_s=duration_s, prbs_nm=prbs_nm).record
+    rows = np.column_stack([record.time_s, record.torque_nm, record.output])
+    header = "time_s,torque_m1_nm,torque_m2_nm,speed_rad_s"
+    np.savetxt(path, rows, fmt=("%.2f", "%.1f", "%.1f", "%.6f"), delimiter=",", header=header, comments="")
+    return path
+
+
+@pytest.fixture(scope="module")
+def recordings(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    folder = tmp_path_factory.mktemp("recordings")
+    return [write(folder / f"run_{seed}.csv", seed) for seed in (1, 2)]
+
+
+def arguments(recordings: list[Path], out: Path, *more: str) -> list[str]:
+    return ["identify", *map(str, recordings), "--out", str(out), *more]
+
+
+def test_writes_the_identification_of_every_recording(recordings: list[Path], tmp_path: Path) -> None:
+    assert run(arguments(recordings, tmp_path / "made" / "out")) == 0
+    document = json.loads((tmp_path / "made" / "out" / "identification.json").read_text())
+    assert document["schema"] == "hil.identification/1"
+    assert [entry["name"] for entry in document["recordings"]] == ["run_1", "run_2"]
+    frequency_hz, damping = true_resonance()
+    for entry in document["recordings"]:
+        for model in (entry["online"], entry["batch"]):
+            assert model["resonance"]["frequency_hz"] == pytest.approx(frequency_hz, rel=0.02)
+            assert model["resonance"]["damping"] == pytest.approx(damping, rel=0.15)
+        assert (entry["online"]["status"], entry["online"]["reason"]) == ("estimated", "")
+        assert entry["online"]["samples_used"] == 1024
+        spectral = entry["spectral"]
+        assert {len(spectral[key]) for key in ("frequency_hz", "magnitude", "phase_rad", "coherence")} == {128}
+    assert [path.name for path in (tmp_path / "made" / "out").iterdir()] == ["identification.json"]
+
+
+def test_the_models_read_back_are_those_of_the_estimator_to_the_bit(recordings: list[Path], tmp_path: Path) -> None:
+    run(arguments(recordings[:1], tmp_path))
+    entry = json.loads((tmp_path / "identification.json").read_text())["recordings"][0]
+    result = identify(read_record(recordings[0]))
+    assert entry["online"]["theta"] == result.online.theta.tolist()
+    assert entry["batch"]["A"] == result.batch.model.A.tolist()
+    assert entry["filter_L"] == result.L.tolist()
+    nk = entry["online"]["B"].index(next(b for b in entry["online"]["B"] if b))
+    online = LinearModel(tuple(entry["online"]["A"][1:]), tuple(entry["online"]["B"][nk:]), nk, 0.02)
+    assert online == result.online
+    poles = [complex(*pair) for pair in entry["online"]["poles"]]
+    np.testing.assert_array_equal(poles, online.poles)
+
+
+def test_prints_a_short_table(recordings: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run(arguments(recordings, tmp_path))
+    printed = capsys.readouterr()
+    assert "run_2" in printed.out
+    assert "8.2" in printed.out
+    assert "Hz" in printed.out
+    assert str(tmp_path / "identification.json") in printed.out.replace("\n", "")
+    assert printed.err == ""  # no progress where nobody watches
+
+
+def test_prints_json_that_is_the_file(
+    recordings: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run(arguments(recordings[:1], tmp_path, "--json"))
+    assert capsys.readouterr().out == (tmp_path / "identification.json").read_text()
+
+
+def test_a_model_file_adds_what_was_expected(
+    recordings: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model = tmp_path / "bus.toml"
+    model.write_text(MODEL)
+    assert run(arguments(recordings[:1], tmp_path, "--model", str(model))) == 0
+    nominal = json.loads((tmp_path / "identification.json").read_text())["nominal_resonance"]
+    assert (nominal["frequency_hz"], nominal["damping"]) == pytest.approx(true_resonance())
+    assert "model file" in capsys.readouterr().out
+    model.write_text(ONE_MASS)
+    assert run(arguments(recordings[:1], tmp_path, "--model", str(model))) == 0
+    assert json.loads((tmp_path / "identification.json").read_text())["nominal_resonance"] is None
+
+
+def test_samples_and_period_can_be_chosen(recordings: list[Path], tmp_path: Path) -> None:
+    assert run(arguments(recordings[:1], tmp_path, "--samples", "300", "--sample-time", "0.01")) == 0
+    entry = json.loads((tmp_path / "identification.json").read_text())["recordings"][0]
+    assert entry["online"]["samples_used"] == 300
+    assert entry["online"]["sample_time_s"] == 0.01
+    assert run(arguments(recordings[:1], tmp_path, "--samples", "0")) == 0
+    entry = json.loads((tmp_path / "identification.json").read_text())["recordings"][0]
+    assert entry["online"]["samples_used"] == entry["batch"]["samples_used"] > 1024
+
+
+def test_help_has_an_example(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["identify", "--help"]) == 0
+    assert "Example: hil identify run_1.csv" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("more", "named"),
+    [
+        (("--sample-time", "0.015"), "sampled every 0.01 s, expected a whole fraction"),
+        (("--samples", "-3"), "samples is -3, expected 1 or more"),
+        (("--model", "nowhere.toml"), "nowhere.toml"),
+    ],
+)
+def test_wrong_use_is_refused_and_nothing_written(
+    recordings: list[Path],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    more: tuple[str, ...],
+    named: str,
+) -> None:
+    assert run(arguments(recordings[:1], tmp_path / "out", *more)) == 2
+    assert named in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_recording_without_excitation_is_refused_by_name(
+    recordings: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    quiet = write(tmp_path / "quiet.csv", 3, prbs_nm=0.0)
+    assert run(arguments([recordings[0], quiet], tmp_path / "out")) == 2
+    message = capsys.readouterr().err
+    assert "recording quiet" in message
+    assert "a_1, a_2, a_3, a_4, b_1, b_2, b_3, b_4 can't be determined" in message
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_recording_too_short_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    short = write(tmp_path / "short.csv", 3, duration_s=1.5)
+    assert run(arguments([short], tmp_path / "out")) == 2
+    assert "expected at least 80 for 8 parameters" in capsys.readouterr().err
+
+
+def test_a_recording_that_is_not_there_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(arguments([tmp_path / "lost.csv"], tmp_path / "out")) == 2
+    assert "lost.csv" in capsys.readouterr().err
+
+
+def test_a_file_in_place_of_the_folder_is_refused(recordings: list[Path], tmp_path: Path) -> None:
+    (tmp_path / "out").write_text("mine")
+    assert run(arguments(recordings[:1], tmp_path / "out")) == 2
+    assert (tmp_path / "out").read_text() == "mine"

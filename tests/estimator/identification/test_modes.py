@@ -1,0 +1,88 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.signal import cont2discrete
+
+from estimator.identification.linear_model import LinearModel
+from estimator.identification.modes import antiresonances, modes, resonance, two_mass_resonance
+from tests.estimator.identification import driveline
+
+T_S = 0.02
+
+
+def with_poles(*pairs: tuple[float, float], real: tuple[float, ...] = (), gain: float = 1.0) -> LinearModel:
+    """Return a model with poles of these natural frequencies [Hz] and damping ratios."""
+    s = [2 * np.pi * f * (-z + 1j * np.sqrt(1 - z**2)) for f, z in pairs]
+    roots = np.concatenate([np.exp(np.array(s) * T_S), np.exp(np.conj(s) * T_S), real])
+    a = np.real(np.poly(roots))[1:]
+    return LinearModel(tuple(a.tolist()), (gain,), 1, T_S)
+
+
+def test_frequency_and_damping_of_known_poles() -> None:
+    first, second = sorted(modes(with_poles((8.2, 0.057), (15.0, 0.3))), key=lambda mode: mode.frequency_hz)
+    assert (first.frequency_hz, first.damping) == (pytest.approx(8.2), pytest.approx(0.057))
+    assert (second.frequency_hz, second.damping) == (pytest.approx(15.0), pytest.approx(0.3))
+
+
+def test_the_discretised_two_mass_driveline_has_its_continuous_mode() -> None:
+    system = (driveline.A, driveline.B[:, :1], np.array([[1.0, 0.0, 0.0]]), np.zeros((1, 1)))
+    Ad, Bd, C, _, _ = cont2discrete(system, T_S)
+    a = np.real(np.poly(Ad))
+    b = np.real(np.poly(Ad - Bd @ C)) - a  # the numerator of C (zI - A)^-1 B
+    model = LinearModel(tuple(a[1:].tolist()), tuple(b[1:].tolist()), 1, T_S)
+    mode = resonance(model)
+    assert mode is not None
+    assert (mode.frequency_hz, mode.damping) == pytest.approx(driveline.true_resonance())
+    # The load on its spring holds the motor still near sqrt(k / J_L); sampled zeros map to it only roughly.
+    assert antiresonances(model)[0].frequency_hz == pytest.approx(np.sqrt(4200 / 100) / 2 / np.pi, rel=0.06)
+
+
+def test_the_two_mass_formula_agrees() -> None:
+    mode = two_mass_resonance(1.6, 100.0, 4200.0, 9.0, 0.35, 0.9)
+    assert mode is not None
+    assert (mode.frequency_hz, mode.damping) == pytest.approx(driveline.true_resonance())
+    assert two_mass_resonance(1.6, 100.0, 10.0, 500.0, 0.35, 0.9) is None  # overdamped
+
+
+def test_the_height_is_that_of_the_peak() -> None:
+    model = with_poles((8.2, 0.02))
+    mode = modes(model)[0]
+    assert mode.height == pytest.approx(abs(model.response(np.array([8.2])))[0], rel=0.05)
+
+
+def test_the_dominant_mode_wins_not_the_first() -> None:
+    mode = resonance(with_poles((6.0, 0.4), (12.0, 0.03)))
+    assert mode is not None
+    assert mode.frequency_hz == pytest.approx(12.0)
+
+
+def test_a_cancelled_pair_does_not_win() -> None:
+    pair = np.exp(T_S * 2 * np.pi * 14.0 * (-0.01 + 1j))
+    true = with_poles((8.2, 0.057))
+    poles = np.concatenate([true.poles, [pair, pair.conj()]])
+    zeros = np.array([pair, pair.conj()]) * 1.0005
+    model = LinearModel(tuple(np.real(np.poly(poles))[1:].tolist()), tuple(np.real(np.poly(zeros)).tolist()), 1, T_S)
+    mode = resonance(model)
+    assert mode is not None
+    assert mode.frequency_hz == pytest.approx(8.2)
+
+
+@pytest.mark.parametrize(
+    "model",
+    [
+        with_poles((8.2, 0.6)),  # no peak
+        with_poles((1.0, 0.05)),  # below the band
+        with_poles(real=(0.99, 0.5)),
+        with_poles(real=(-0.9,)),  # a real pole at the Nyquist frequency does not oscillate
+        LinearModel((), (1.0,), 1, T_S),
+        LinearModel((0.0, 0.0), (1.0, 0.5), 1, T_S),
+    ],
+)
+def test_where_there_is_no_resonance_none_is_named(model: LinearModel) -> None:
+    assert resonance(model) is None
+
+
+def test_the_band_can_be_chosen() -> None:
+    model = with_poles((8.2, 0.05), (16.0, 0.05))
+    assert resonance(model, (10.0, 25.0)).frequency_hz == pytest.approx(16.0)  # type: ignore[union-attr]

@@ -1,0 +1,345 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from estimator.errors import BadModel, BadShape
+from estimator.identification.adaptation import (
+    Adaptation,
+    ConstantForgetting,
+    DecreasingGain,
+    DecreasingThenConstantTrace,
+)
+from estimator.identification.linear_model import LinearModel, Orders
+from estimator.identification.oefo import Filtering, Oefo
+from estimator.identification.recursive import Reason, RecursiveEstimator, Status
+from estimator.signals.prbs import prbs_nm
+from estimator.signals.record import BoolArray, FloatArray
+from estimator.signals.settings import BadSetting
+
+TRUTH = LinearModel(a=(-1.2, 0.85), b=(0.5, 0.3), nk=1, sample_time_s=0.02)
+ORDERS = TRUTH.orders
+Data = tuple[FloatArray, FloatArray, BoolArray]
+
+
+def data(n: int = 1500, noise: float = 0.1, seed: int = 0) -> Data:
+    u = prbs_nm(n, 1.0, seed=seed + 1)
+    y = TRUTH.simulate(u) + noise * np.random.default_rng(seed).normal(size=n)
+    return u, y, np.ones(n, dtype=bool)
+
+
+def textbook(u: FloatArray, y: FloatArray, L: FloatArray, orders: Orders, start_up: int = 0) -> FloatArray:
+    """Equations (1) to (7) with whole signals and matrices; decreasing gain; theta after each sample."""
+    na, nb, nk = orders.na, orders.nb, orders.nk
+    theta, information = np.zeros(na + nb), np.eye(na + nb) / 1000
+    y_hat, history = np.zeros(u.shape[0]), []
+    u_f = lfilter([1.0], L, u)
+    for t in range(u.shape[0]):
+        y_hat_f = lfilter([1.0], L, y_hat[:t]) if t else np.zeros(0)
+
+        def lag(x: FloatArray, k: int, t: int = t) -> float:
+            return float(x[t - k]) if t >= k else 0.0
+
+        phi = np.array([-lag(y_hat, i + 1) for i in range(na)] + [lag(u, nk + j) for j in range(nb)])  # (3)
+        Phi = np.array([-lag(y_hat_f, i + 1) for i in range(na)] + [lag(u_f, nk + j) for j in range(nb)])  # (7)
+        if t < start_up:
+            Phi = phi
+        F = np.linalg.inv(information)
+        e_prior = y[t] - theta @ phi  # (1)
+        e_post = e_prior / (1 + Phi @ F @ Phi)  # (6)
+        theta = theta + F @ Phi * e_post  # (4)
+        information = information + np.outer(Phi, Phi)  # (5), lambda_1 = lambda_2 = 1
+        y_hat[t] = theta @ phi
+        history.append(theta)
+    return np.array(history)
+
+
+@pytest.mark.parametrize("start_up", [0, 25])
+@pytest.mark.parametrize(
+    ("L", "orders"),
+    [
+        ([1.0], ORDERS),
+        ([1.0, -1.1, 0.8], ORDERS),
+        ([1.0, -0.9], Orders(3, 2, 1)),
+        ([1.0, -1.1, 0.8], Orders(2, 3, 2)),
+        ([1.0, -1.1, 0.8], Orders(2, 3, 0)),
+        ([1.0, -0.5, 0.1, 0.02, 0.01], Orders(1, 1, 1)),
+    ],
+)
+def test_equals_the_equations_written_plainly(L: list[float], orders: Orders, start_up: int) -> None:
+    u, y, okay = data(250)
+    estimator = Oefo(np.array(L), orders, DecreasingGain(), start_up_samples=start_up)
+    expected = textbook(u, y, np.array(L), orders, start_up)
+    np.testing.assert_allclose(estimator.run(u, y, okay).theta, expected, rtol=1e-6, atol=1e-8)
+
+
+def test_errors_are_those_of_equations_1_and_6() -> None:
+    u, y, okay = data(100)
+    estimator = Oefo(TRUTH.A, ORDERS, DecreasingGain())
+    block = estimator.run(u, y, okay)
+    for t in range(3, 100):
+        phi = np.array([-block.y_hat[t - 1], -block.y_hat[t - 2], u[t - 1], u[t - 2]])
+        assert block.e_prior[t] == pytest.approx(y[t] - block.theta[t - 1] @ phi, abs=1e-12)
+        assert block.y_hat[t] == pytest.approx(block.theta[t] @ phi, abs=1e-12)
+    assert np.abs(block.e_post).max() <= np.abs(block.e_prior).max()
+
+
+def test_without_outputs_in_the_regressor_it_is_batch_least_squares() -> None:
+    u, y, okay = data(400)
+    orders = Orders(na=0, nb=5, nk=1)
+    estimator = Oefo(np.ones(1), orders, DecreasingGain())
+    estimator.run(u, y, okay)
+    rows = np.column_stack([np.concatenate([np.zeros(k), u[:-k]]) for k in range(1, 6)])
+    weighed = np.vstack([rows, np.eye(5) / math.sqrt(1000)])  # F(0) = 1000 I is a prior of that weight
+    batch = np.linalg.lstsq(weighed, np.concatenate([y, np.zeros(5)]), rcond=None)[0]
+    np.testing.assert_allclose(estimator.theta, batch, rtol=1e-9)
+
+
+@pytest.mark.parametrize("L", [[1.0], TRUTH.A])
+def test_finds_the_truth_without_noise(L: FloatArray) -> None:
+    u, y, okay = data(noise=0.0)
+    estimator = Oefo(np.asarray(L), ORDERS, DecreasingGain())
+    assert estimator.run(u, y, okay)[1499].status is Status.ESTIMATED
+    np.testing.assert_allclose(estimator.theta, TRUTH.theta, atol=1e-4)
+
+
+def test_noise_on_the_output_does_not_bias_it_as_it_does_least_squares() -> None:
+    u, y, okay = data(n=20_000, noise=0.5)
+    estimator = Oefo(TRUTH.A, ORDERS, DecreasingGain())
+    estimator.run(u, y, okay)
+    rows = np.column_stack([-y[1:-1], -y[:-2], u[1:-1], u[:-2]])
+    least_squares = np.linalg.lstsq(rows, y[2:], rcond=None)[0]
+    assert np.abs(estimator.theta - TRUTH.theta).max() < 0.02
+    assert np.abs(least_squares - TRUTH.theta).max() > 0.1
+
+
+def test_forty_percent_masked_samples_do_not_bias_it() -> None:
+    u, y, _ = data(n=5000, noise=0.05)
+    okay = np.random.default_rng(5).random(5000) > 0.4
+    y = np.where(okay, y, 1e6)  # what is masked must not be looked at
+    estimator = Oefo(TRUTH.A, ORDERS)
+    final = estimator.run(u, y, okay)[4999]
+    assert final.status is Status.ESTIMATED
+    np.testing.assert_allclose(final.theta, TRUTH.theta, atol=0.01)
+
+
+@pytest.mark.parametrize("filtering", list(Filtering))
+@pytest.mark.parametrize("profile", [DecreasingGain(), DecreasingThenConstantTrace(), ConstantForgetting(0.99)])
+def test_one_by_one_and_in_blocks_give_the_same_bits(filtering: Filtering, profile: Adaptation) -> None:
+    u, y, okay = data(600)
+    okay[100:130] = False
+    y[300], u[400] = np.nan, np.nan
+
+    def fresh() -> Oefo:
+        return Oefo(TRUTH.A, ORDERS, profile, filtering, start_up_samples=40)
+
+    block = fresh().run(u, y, okay)
+    live, pieces = fresh(), fresh()
+    single = [live.update(float(u[t]), float(y[t]), bool(okay[t])) for t in range(600)]
+    cuts = [(0, 7), (7, 350), (350, 351), (351, 600)]
+    joined = np.concatenate([pieces.run(u[a:b], y[a:b], okay[a:b]).theta for a, b in cuts])
+    assert np.array_equal(block.theta, np.array([estimate.theta for estimate in single]))
+    assert np.array_equal(block.theta, joined)
+    for name in ("y_hat", "e_prior", "e_post", "used"):
+        assert np.array_equal(getattr(block, name), [getattr(estimate, name) for estimate in single])
+    assert [Reason(int(code)) for code in block.reason] == [estimate.reason for estimate in single]
+    assert np.array_equal(live.F, pieces.F)
+
+
+def test_strided_arrays_give_the_same_bits() -> None:
+    u, y, okay = data(300)
+    spread = np.zeros((300, 2))
+    spread[:, 0], spread[:, 1] = u, y
+    straight = Oefo(TRUTH.A, ORDERS).run(u, y, okay).theta
+    assert np.array_equal(straight, Oefo(TRUTH.A, ORDERS).run(spread[:, 0], spread[:, 1], okay).theta)
+
+
+def test_inputs_are_not_changed_and_estimates_are_copies() -> None:
+    u, y, okay = data(200)
+    before = (u.copy(), y.copy(), okay.copy())
+    L = TRUTH.A
+    estimator = Oefo(L, ORDERS, filtering=Filtering.ADAPTED)
+    first = estimator.update(1.0, 1.0)
+    kept = first.theta.copy()
+    estimator.run(u, y, okay)
+    assert np.array_equal(L, TRUTH.A)
+    assert np.array_equal(first.theta, kept)
+    assert all(np.array_equal(a, b) for a, b in zip((u, y, okay), before, strict=True))
+
+
+def test_a_masked_sample_lets_time_advance_and_nothing_else() -> None:
+    u, y, okay = data(300)
+    estimator = Oefo(TRUTH.A, ORDERS)
+    estimator.run(u, y, okay)
+    theta, F = estimator.theta, estimator.F
+    last = estimator.update(1.0, 123.0, okay=False)
+    following = estimator.update(-1.0, 123.0, okay=False)
+    assert np.array_equal(estimator.theta, theta)
+    assert np.array_equal(estimator.F, F)
+    assert (last.used, last.e_prior, last.e_post) == (False, 0.0, 0.0)
+    assert following.y_hat != last.y_hat
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e31])
+def test_an_output_that_is_no_number_is_masked(value: float) -> None:
+    u, y, okay = data(300)
+    masked, wrong = okay.copy(), y.copy()
+    masked[150], wrong[150] = False, value
+    assert np.array_equal(
+        Oefo(TRUTH.A, ORDERS).run(u, wrong, okay).theta, Oefo(TRUTH.A, ORDERS).run(u, y, masked).theta
+    )
+
+
+def test_an_input_that_is_no_number_is_held_and_masks_until_it_has_left_the_regressor() -> None:
+    u, y, okay = data(300)
+    u[150] = np.nan
+    block = Oefo(TRUTH.A, ORDERS).run(u, y, okay)
+    assert np.flatnonzero(~block.used).tolist() == [150, 151, 152]  # held at 150; in phi with lags 1 and 2
+    assert np.isfinite(block.theta).all()
+
+
+@pytest.mark.parametrize("value", [1e29, 1e31, 1e308, -1e308])
+@pytest.mark.parametrize("where", ["u", "y", "both"])
+@pytest.mark.parametrize("profile", [DecreasingGain(), DecreasingThenConstantTrace(), ConstantForgetting(0.95)])
+def test_absurd_values_never_make_theta_not_a_number(value: float, where: str, profile: Adaptation) -> None:
+    u, y, okay = data(600)
+    if where != "y":
+        u[200:205] = value
+    if where != "u":
+        y[200:205] = value
+    estimator = Oefo(TRUTH.A, ORDERS, profile)
+    block = estimator.run(u, y, okay)
+    assert np.isfinite(block.theta).all()
+    assert np.isfinite(block.y_hat).all()
+    assert np.isfinite(estimator.F).all()
+
+
+def test_status_names_what_is_wrong_step_by_step() -> None:
+    u, y, okay = data(300)
+    estimator = Oefo(TRUTH.A, ORDERS)
+    assert estimator.run(u[:39], y[:39], okay[:39])[38].reason is Reason.TOO_FEW_SAMPLES
+    assert estimator.update(float(u[39]), float(y[39])).status is Status.ESTIMATED
+    masked = Oefo(TRUTH.A, ORDERS).run(u, y, np.zeros(300, dtype=bool))
+    assert masked[299].reason is Reason.TOO_FEW_SAMPLES
+    assert not masked.theta.any()
+
+
+@pytest.mark.parametrize(
+    ("u", "undetermined"),
+    [
+        (np.zeros(500), ("a_1", "a_2", "b_1", "b_2")),
+        (np.eye(1, 500, 498)[0], ("a_1", "a_2", "b_2")),
+    ],
+)
+def test_without_excitation_it_says_what_is_not_determined(u: FloatArray, undetermined: tuple[str, ...]) -> None:
+    estimator = Oefo(np.ones(1), ORDERS, DecreasingGain())
+    final = estimator.run(100.0 * u, np.random.default_rng(0).normal(size=500), np.ones(500, dtype=bool))[499]
+    assert final.reason is Reason.NOT_EXCITED
+    assert final.status is Status.UNESTIMATED
+    assert "PRBS" in final.reason.message
+    assert set(undetermined) <= set(estimator.undetermined)
+
+
+def test_forgetting_without_excitation_takes_the_status_back() -> None:
+    u, y, okay = data(300)
+    estimator = Oefo(np.ones(1), ORDERS, ConstantForgetting(0.98))
+    assert estimator.run(u, y, okay)[299].status is Status.ESTIMATED
+    quiet = np.zeros(3000)
+    assert estimator.run(quiet, quiet, np.ones(3000, dtype=bool))[2999].reason is Reason.NOT_EXCITED
+    assert np.isfinite(estimator.F).all()
+
+
+def test_an_unstable_estimate_is_invalid_and_the_prediction_does_not_run_away() -> None:
+    unstable = LinearModel(a=(-1.9, 0.95), b=(1.0, 0.2), nk=1, sample_time_s=0.02)
+    growing = LinearModel(a=(-2.02, 1.03), b=(1.0, 0.2), nk=1, sample_time_s=0.02)
+    u = prbs_nm(400, 1.0)
+    y = np.concatenate([unstable.simulate(u[:100]), growing.simulate(u[100:])])
+    block = Oefo(np.ones(1), ORDERS, ConstantForgetting(0.95)).run(u, y, np.ones(400, dtype=bool))
+    codes = set(block.reason.tolist())
+    assert Reason.UNSTABLE in codes
+    assert Reason.UNSTABLE.status is Status.INVALID
+    assert np.abs(block.y_hat).max() <= 1e3 * np.abs(y).max()
+
+
+def test_the_last_stable_filter_keeps_filtering() -> None:
+    growing = LinearModel(a=(-2.02, 1.03), b=(1.0, 0.2), nk=1, sample_time_s=0.02)
+    u = prbs_nm(200, 1.0)
+    y = growing.simulate(u)
+    estimator = Oefo(np.ones(1), ORDERS, ConstantForgetting(0.95), Filtering.ADAPTED)
+    unstable_seen = 0
+    for t in range(200):
+        L = estimator.L
+        estimate = estimator.update(float(u[t]), float(y[t]))
+        if np.abs(np.roots([1.0, *estimate.theta[:2]])).max() >= 1.0:
+            unstable_seen += 1
+            assert np.array_equal(estimator.L, L)
+        else:
+            assert np.array_equal(estimator.L, [1.0, *estimate.theta[:2]])
+    assert unstable_seen > 20
+
+
+@pytest.mark.parametrize("na", [1, 2, 3, 4, 7])
+def test_stability_is_judged_as_by_the_roots(na: int) -> None:
+    from estimator.identification.oefo_kernel import is_stable
+
+    rng = np.random.default_rng(na)
+    verdicts = set()
+    for _ in range(300):
+        half = rng.uniform(0.7, 1.1) * np.exp(1j * rng.uniform(0, np.pi, na // 2))
+        roots = np.concatenate([half, half.conj(), rng.uniform(-1.05, 1.05, na % 2)])
+        polynomial = np.real(np.poly(roots))
+        expected = bool(np.abs(np.roots(polynomial)).max() < 1)
+        assert is_stable(polynomial[1:].copy(), np.zeros(na)) is expected
+        verdicts.add(expected)
+    assert verdicts == {True, False}
+
+
+def test_memory_does_not_grow() -> None:
+    u, y, okay = data(300)
+    estimator = Oefo(TRUTH.A, ORDERS)
+    sizes = []
+    for _ in range(3):
+        estimator.run(u, y, okay)
+        sizes.append(sum(value.nbytes for value in vars(estimator).values() if isinstance(value, np.ndarray)))
+    assert sizes[0] == sizes[1] == sizes[2]
+
+
+def test_it_offers_the_interface_of_every_recursive_estimator() -> None:
+    estimator: RecursiveEstimator = Oefo(TRUTH.A, ORDERS)
+    assert estimator.orders == ORDERS
+    assert estimator.undetermined == ORDERS.names
+    assert estimator.model(0.02) == LinearModel((0.0, 0.0), (0.0, 0.0), 1, 0.02)
+
+
+@pytest.mark.parametrize(
+    ("L", "named"),
+    [
+        ([1.0, -1.0], "root of magnitude 1, expected all inside"),
+        ([1.0, -2.5, 1.0], "root of magnitude 2"),
+        ([2.0, 0.1], "expected finite coefficients 1, l_1"),
+        ([1.0, np.nan], "expected finite coefficients"),
+        ([], "expected finite coefficients"),
+        ([[1.0, 0.2]], "expected finite coefficients"),
+    ],
+)
+def test_a_filter_that_can_not_filter_is_refused(L: list[float], named: str) -> None:
+    with pytest.raises(BadModel, match=named):
+        Oefo(np.array(L), ORDERS)
+
+
+def test_an_adapted_filter_of_higher_order_than_its_successor_is_refused() -> None:
+    with pytest.raises(BadModel, match="L has order 3, expected at most na = 2"):
+        Oefo(np.array([1.0, 0.1, 0.1, 0.1]), ORDERS, filtering=Filtering.ADAPTED)
+
+
+def test_a_negative_start_up_is_refused() -> None:
+    with pytest.raises(BadSetting, match="start_up_samples is -1"):
+        Oefo(TRUTH.A, ORDERS, start_up_samples=-1)
+
+
+def test_signals_of_different_lengths_are_refused() -> None:
+    with pytest.raises(BadShape, match=r"\(5,\), \(4,\), \(5,\)"):
+        Oefo(TRUTH.A, ORDERS).run(np.zeros(5), np.zeros(4), np.ones(5, dtype=bool))

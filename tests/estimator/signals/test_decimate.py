@@ -1,0 +1,165 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from estimator.errors import BadShape
+from estimator.signals.decimate import HALF_LENGTH, Decimated, Decimator, decimate, low_pass_taps
+from estimator.signals.record import FloatArray, Record
+from estimator.signals.settings import BadSetting
+
+SAMPLE_TIME_S = 0.01
+
+
+def tone(frequency_hz: float, n: int = 4000) -> FloatArray:
+    return np.sin(2 * np.pi * frequency_hz * SAMPLE_TIME_S * np.arange(n))
+
+
+def chain(y: FloatArray, okay: np.ndarray | None = None, factor: int = 2) -> Decimated:
+    mask = np.ones(y.shape, dtype=bool) if okay is None else okay
+    return Decimator(SAMPLE_TIME_S, factor).run(2.0 * np.nan_to_num(y), y, mask)
+
+
+def settled_amplitude(frequency_hz: float) -> float:
+    kept = chain(tone(frequency_hz))
+    return float(np.sqrt(2.0) * kept.y[kept.okay][500:].std())
+
+
+def record(n: int = 500) -> Record:
+    rng = np.random.default_rng(3)
+    return Record(
+        name="run_1",
+        sample_time_s=SAMPLE_TIME_S,
+        time_s=5.0 + SAMPLE_TIME_S * np.arange(n),
+        torque_nm=rng.normal(size=(n, 2)),
+        output=rng.normal(size=n),
+        okay=np.ones(n, dtype=bool),
+    )
+
+
+@pytest.mark.parametrize("frequency_hz", [4.0, 8.2, 19.0])
+def test_the_band_of_the_resonance_passes(frequency_hz: float) -> None:
+    assert settled_amplitude(frequency_hz) == pytest.approx(1.0, abs=0.01)
+
+
+@pytest.mark.parametrize("frequency_hz", [31.0, 42.0, 48.0])
+def test_what_would_fold_back_into_that_band_is_damped_by_50_db(frequency_hz: float) -> None:
+    assert settled_amplitude(frequency_hz) < 10 ** (-50 / 20)
+
+
+def test_a_constant_goes_and_the_corner_is_at_three_decibels() -> None:
+    constant = chain(np.full(4000, 130.0))
+    assert abs(constant.y).max() < 1e-9
+    assert settled_amplitude(0.3) == pytest.approx(np.sqrt(0.5), abs=0.02)
+
+
+def test_both_signals_pass_the_same_filters() -> None:
+    rng = np.random.default_rng(0)
+    y = rng.normal(size=1000)
+    kept = chain(y)
+    np.testing.assert_allclose(kept.u, 2.0 * kept.y, rtol=1e-12, atol=1e-14)
+
+
+@pytest.mark.parametrize("factor", [1, 2, 5])
+def test_a_block_and_single_samples_give_the_same_bits(factor: int) -> None:
+    rng = np.random.default_rng(1)
+    u, y, okay = rng.normal(size=700), rng.normal(size=700), rng.random(700) > 0.05
+    y[~okay] = np.nan
+    block = Decimator(SAMPLE_TIME_S, factor).run(u, y, okay)
+    live = Decimator(SAMPLE_TIME_S, factor)
+    pieces = [live.run(u[k : k + 1], y[k : k + 1], okay[k : k + 1]) for k in range(700)]
+    assert np.array_equal(block.u, np.concatenate([p.u for p in pieces]))
+    assert np.array_equal(block.y, np.concatenate([p.y for p in pieces]))
+    assert np.array_equal(block.okay, np.concatenate([p.okay for p in pieces]))
+    assert block.u.shape == (-(-700 // factor),)
+
+
+def test_a_bad_sample_spoils_exactly_the_outputs_whose_window_holds_it() -> None:
+    n, bad, taps = 400, 201, low_pass_taps(2).shape[0]
+    y, okay = tone(8.2, n), np.ones(n, dtype=bool)
+    okay[bad] = False
+    newest = 2 * np.arange(n // 2)  # newest input sample of each output's window
+    expected = (newest >= taps - 1) & ~((newest >= bad) & (newest < bad + taps))
+    assert np.array_equal(chain(y, okay).okay, expected)
+
+
+def test_unspoilt_outputs_do_not_depend_on_a_bad_value() -> None:
+    y, okay = tone(8.2, 1000), np.ones(1000, dtype=bool)
+    okay[300] = False
+    outputs = []
+    for value in (np.nan, np.inf, 1e9):
+        y[300] = value
+        outputs.append(Decimator(SAMPLE_TIME_S, 2).run(tone(3.0, 1000), y, okay))
+    for kept in outputs:
+        assert np.isfinite(kept.y).all()
+        assert np.array_equal(kept.y, outputs[0].y)
+
+
+def test_an_infinite_torque_is_held_and_spoils_though_the_sample_says_okay() -> None:
+    u = tone(3.0, 400)
+    u[200] = np.inf
+    kept = Decimator(SAMPLE_TIME_S, 2).run(u, tone(8.2, 400), np.ones(400, dtype=bool))
+    assert np.isfinite(kept.u).all()
+    assert not kept.okay[100:116].any()
+    assert kept.okay[117:].all()
+
+
+def test_after_a_long_gap_the_mean_is_not_trusted_at_once() -> None:
+    y, okay = tone(8.2, 2000), np.ones(2000, dtype=bool)
+    okay[400:1000] = False
+    kept = chain(y, okay)
+    back = np.flatnonzero(kept.okay & (np.arange(1000) > 500))[0]
+    window_only_s = (1000 + low_pass_taps(2).shape[0]) * SAMPLE_TIME_S
+    half_life_s = np.log(2) / (2 * np.pi * 0.3)  # the held share of the mean falls below one half after this
+    assert back * 0.02 == pytest.approx(window_only_s + half_life_s, abs=0.04)
+
+
+def test_no_output_is_okay_before_the_first_good_sample() -> None:
+    y, okay = np.full(300, np.nan), np.zeros(300, dtype=bool)
+    assert not chain(y, okay).okay.any()
+
+
+def test_the_delay_is_taken_out_of_the_time_base() -> None:
+    n = 1000
+    pulse = np.exp(-0.5 * ((np.arange(n) - 600) / 6.0) ** 2)
+    source = Record("pulse", 0.01, 0.01 * np.arange(n), pulse[:, None], pulse, np.ones(n, dtype=bool))
+    kept = decimate(source, 2)
+    assert kept.time_s[np.argmax(kept.output)] == pytest.approx(6.0)
+    assert kept.time_s[0] == pytest.approx(-HALF_LENGTH * 0.02)
+    assert kept.sample_time_s == pytest.approx(0.02)
+
+
+def test_the_recording_is_not_changed_and_torques_are_summed() -> None:
+    source = record()
+    before = (source.torque_nm.copy(), source.output.copy(), source.okay.copy())
+    kept = decimate(source, 2)
+    for array, copy in zip((source.torque_nm, source.output, source.okay), before, strict=True):
+        assert np.array_equal(array, copy)
+    expected = Decimator(SAMPLE_TIME_S, 2).run(source.torque_nm.sum(axis=1), source.output, source.okay)
+    assert kept.torque_nm.shape == (250, 1)
+    assert np.array_equal(kept.total_torque_nm, expected.u)
+    assert kept.time_s[HALF_LENGTH] == pytest.approx(5.0)
+
+
+def test_an_empty_recording_gives_an_empty_one() -> None:
+    assert decimate(record(0), 2).output.shape == (0,)
+
+
+@pytest.mark.parametrize(
+    ("settings", "named"),
+    [
+        ((0.01, 0, 0.3), "factor is 0"),
+        ((0.0, 2, 0.3), "sample_time_s is 0.0"),
+        ((0.01, 2, 0.0), "high_pass_hz is 0.0"),
+        ((0.01, 2, 25.0), "below 25 Hz"),
+        ((0.01, 2, float("nan")), "high_pass_hz is nan"),
+    ],
+)
+def test_settings_out_of_range_are_refused(settings: tuple[float, int, float], named: str) -> None:
+    with pytest.raises(BadSetting, match=named):
+        Decimator(*settings)
+
+
+def test_signals_of_different_lengths_are_refused() -> None:
+    with pytest.raises(BadShape, match=r"\(5,\), \(4,\), \(5,\)"):
+        Decimator(0.01, 2).run(np.zeros(5), np.zeros(4), np.ones(5, dtype=bool))

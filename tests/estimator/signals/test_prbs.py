@@ -1,0 +1,93 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from estimator.signals.prbs import TAPS, Prbs, prbs_nm, shift
+from estimator.signals.settings import BadSetting
+
+
+@pytest.mark.parametrize("cells", sorted(TAPS))
+def test_every_register_runs_through_all_its_non_zero_states(cells: int) -> None:
+    state, seen = 1, 0
+    while not seen or state != 1:
+        state = shift(state, cells)
+        seen += 1
+        assert 0 < state < 2**cells
+    assert seen == 2**cells - 1
+
+
+def test_ten_cells_have_period_1023_and_no_shorter_one() -> None:
+    levels = prbs_nm(2 * 1023, amplitude_nm=1.0)
+    assert np.array_equal(levels[:1023], levels[1023:])
+    shorter = (3, 11, 31, 33, 93, 341)  # the divisors of 1023
+    assert not any(np.array_equal(levels[:1023], np.roll(levels[:1023], d)) for d in shorter)
+    assert Prbs(1.0).period_cycles == 1023
+
+
+def test_balance_512_to_511() -> None:
+    levels = prbs_nm(1023, amplitude_nm=40.0)
+    assert (np.count_nonzero(levels == 40.0), np.count_nonzero(levels == -40.0)) == (512, 511)
+
+
+def test_autocorrelation_has_two_values() -> None:
+    levels = prbs_nm(1023, amplitude_nm=3.0)
+    correlation = np.array([np.dot(levels, np.roll(levels, lag)) for lag in range(1023)]) / 1023
+    assert correlation[0] == pytest.approx(9.0)
+    np.testing.assert_allclose(correlation[1:], -9.0 / 1023, rtol=1e-9)
+
+
+def test_the_longest_run_is_ten_levels() -> None:
+    levels = prbs_nm(2 * 1023, amplitude_nm=1.0)
+    edges = np.flatnonzero(np.diff(levels))
+    assert np.diff(edges).max() == 10
+
+
+def test_the_divider_holds_each_level() -> None:
+    fast = prbs_nm(100, amplitude_nm=5.0, seed=77)
+    slow = prbs_nm(300, amplitude_nm=5.0, clock_divider=3, seed=77)
+    assert np.array_equal(slow, np.repeat(fast, 3))
+    assert Prbs(5.0, clock_divider=3).period_cycles == 3069
+
+
+def test_the_seed_only_shifts_the_sequence() -> None:
+    first, other = prbs_nm(1023, 1.0, seed=1), prbs_nm(1023, 1.0, seed=600)
+    assert any(np.array_equal(first, np.roll(other, lag)) for lag in range(1023))
+    assert not np.array_equal(first, other)
+
+
+def test_the_level_is_the_last_cell_of_the_visible_state() -> None:
+    source = Prbs(1.0, seed=0b10_0000_0001)
+    for _ in range(50):
+        expected = 1.0 if source.state & 0b10_0000_0000 else -1.0
+        assert source.next() == expected
+
+
+def test_step_by_step_equals_the_array() -> None:
+    source = Prbs(2.5, cells=7, clock_divider=2, seed=9)
+    assert [source.next() for _ in range(400)] == prbs_nm(400, 2.5, 7, 2, 9).tolist()
+
+
+@pytest.mark.parametrize(
+    ("settings", "named"),
+    [
+        ({"seed": 0}, "seed is 0, expected a state from 1 to 1023"),
+        ({"seed": 1024}, "seed is 1024"),
+        ({"seed": -1}, "seed is -1"),
+        ({"cells": 1}, "cells is 1, expected a register length from 2 to 16"),
+        ({"cells": 17}, "cells is 17"),
+        ({"clock_divider": 0}, "clock_divider is 0, expected 1 or more"),
+        ({"amplitude_nm": 0.0}, "amplitude_nm is 0.0, expected a torque above 0 Nm"),
+        ({"amplitude_nm": float("nan")}, "amplitude_nm is nan"),
+        ({"amplitude_nm": float("inf")}, "amplitude_nm is inf"),
+    ],
+)
+def test_settings_that_make_no_sequence_are_refused(settings: dict[str, float], named: str) -> None:
+    with pytest.raises(BadSetting, match=named):
+        Prbs(**({"amplitude_nm": 1.0} | settings))  # type: ignore[arg-type]
+
+
+def test_all_faults_come_at_once() -> None:
+    with pytest.raises(BadSetting) as refusal:
+        Prbs(-1.0, cells=40, clock_divider=0, seed=0)
+    assert len(str(refusal.value).splitlines()) == 4
