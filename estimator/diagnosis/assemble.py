@@ -1,0 +1,139 @@
+"""From a selection to the parts of a diagnosis: effects with their intervals, parameters, the augmented model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from estimator.diagnosis.holdout import Examiner
+from estimator.diagnosis.intervals import Z95, covariance, interval
+from estimator.diagnosis.result import Estimated, Evidence, FoundEffect, Profile, Retuned
+from estimator.diagnosis.selection import Selection, Trial
+from estimator.physics.catalogue import EFFECTS
+from estimator.physics.effects import road_grade
+from estimator.physics.fit import FitResult, local_part
+from estimator.physics.model import DrivelineModel, EffectValue, parameter_unit, unit
+from estimator.physics.unknowns import LOAD_TORQUE
+from estimator.signals.record import FloatArray
+
+PROFILE_POINTS_S = 1.0
+"""A profile is reported every second."""
+
+
+def found_effects(selection: Selection, model: DrivelineModel, examiner: Examiner) -> tuple[FoundEffect, ...]:
+    """Return the chosen effects, strongest first, with values and intervals of the final fit."""
+    cov = covariance(selection.result)
+    trials = sorted(selection.accepted.values(), key=lambda trial: -trial.gain.delta_bic)
+    return tuple(_found(trial, selection, cov, model, examiner) for trial in trials)
+
+
+def _found(
+    trial: Trial, selection: Selection, cov: FloatArray, model: DrivelineModel, examiner: Examiner
+) -> FoundEffect:
+    entry = EFFECTS[trial.name]
+    profiles = _profiles(selection.result, cov, model) if entry.profile else {}
+    parameters = (
+        _profile_size(selection.result, cov, model)
+        if entry.profile
+        else _parameters(trial.name, selection.result, cov, model)
+    )
+    held = trial.holdout
+    if held is None:
+        without = examiner.compare(selection.retuned, frozenset(), selection.result, selection.chosen)
+        held = without
+    return FoundEffect(
+        name=entry.name,
+        element=entry.element,
+        statement=entry.sentence({name: p.value for name, p in parameters.items()}, model.motion),
+        parameters=parameters,
+        time_s={},
+        indistinguishable_from=entry.equivalent,
+        evidence=Evidence(trial.gain.delta_bic, held.before, held.after, trial.p_value),
+        profiles=profiles,
+    )
+
+
+def _parameters(name: str, result: FitResult, cov: FloatArray, model: DrivelineModel) -> dict[str, Estimated]:
+    units = {parameter.name: parameter.unit(model.motion) for parameter in EFFECTS[name].parameters}
+    return {
+        shared.name: Estimated(float(result.x[i]) * shared.scale, interval(result, cov, i), units[shared.name])
+        for i, shared in enumerate(result.problem.shared)
+        if shared.effect == name
+    }
+
+
+def _profiles(result: FitResult, cov: FloatArray, model: DrivelineModel) -> dict[str, Profile]:
+    torque_unit = unit("torque", model.motion)
+    profiles = {}
+    first = len(result.problem.shared)
+    for i, (record, basis) in enumerate(zip(result.problem.records, result.problem.local, strict=True)):
+        local = local_part(result.problem, result.x, i)
+        rows = slice(first + local.size - basis.profile.shape[0], first + local.size)
+        first += local.size
+        times = np.arange(record.time_s[0], record.time_s[-1], PROFILE_POINTS_S)
+        weights = (road_grade.basis(record.time_s, times) * basis.scale[-basis.profile.shape[0] :, None]).T
+        weights = weights - weights.mean(axis=0)  # the mean is the constant load's
+        value = weights @ result.x[rows]
+        spread = Z95 * np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", weights, cov[rows, rows], weights), 0.0))
+        profiles[record.name] = Profile(times, value, value - spread, value + spread, torque_unit)
+    return profiles
+
+
+def _profile_size(result: FitResult, cov: FloatArray, model: DrivelineModel) -> dict[str, Estimated]:
+    profiles = _profiles(result, cov, model).values()
+    value = np.concatenate([profile.value for profile in profiles])
+    half = np.concatenate([0.5 * (profile.high - profile.low) for profile in profiles])
+    size = float(np.sqrt(np.mean(value**2)))
+    spread = float(np.sqrt(np.mean(half**2) / max(len(value), 1)))
+    name = road_grade.EFFECT.parameters[0].name
+    return {name: Estimated(size, (max(size - spread, 0.0), size + spread), unit("torque", model.motion))}
+
+
+def retuned_parameters(result: FitResult, model: DrivelineModel) -> dict[str, Retuned]:
+    """Return every nominal parameter before and after; one trusted exactly stays what it was."""
+    cov = covariance(result)
+    fitted = {
+        shared.name: (float(result.x[i]) * shared.scale, interval(result, cov, i))
+        for i, shared in enumerate(result.problem.shared)
+        if not shared.effect
+    }
+    parameters = {}
+    for name, parameter in model.parameters.items():
+        value, ci95 = fitted.get(name, (parameter.value, (parameter.value, parameter.value)))
+        parameters[name] = Retuned(parameter.value, value, ci95, parameter_unit(name, model.motion))
+    return parameters
+
+
+def load_torques(result: FitResult, model: DrivelineModel) -> dict[str, Estimated]:
+    """Return the constant load torque of each recording (translation: the offset force), by name."""
+    cov = covariance(result)
+    torques = {}
+    first = len(result.problem.shared)
+    for i, (record, basis) in enumerate(zip(result.problem.records, result.problem.local, strict=True)):
+        value = local_part(result.problem, result.x, i)[LOAD_TORQUE] * basis.scale[LOAD_TORQUE]
+        index = first + LOAD_TORQUE
+        spread = Z95 * float(np.sqrt(max(cov[index, index], 0.0))) * float(basis.scale[LOAD_TORQUE])
+        torques[record.name] = Estimated(
+            float(value), (float(value - spread), float(value + spread)), unit("torque", model.motion)
+        )
+        first += basis.guess.size
+    return torques
+
+
+def augmented_model(result: FitResult, model: DrivelineModel, effects: Sequence[FoundEffect]) -> DrivelineModel:
+    """Return the model with re-tuned parameters and the effects found beside those it had."""
+    values = {
+        shared.name: float(result.x[i]) * shared.scale
+        for i, shared in enumerate(result.problem.shared)
+        if not shared.effect
+    }
+    parameters = {
+        name: replace(parameter, value=values.get(name, parameter.value))
+        for name, parameter in model.parameters.items()
+    }
+    added: dict[str, Mapping[str, EffectValue]] = {
+        effect.name: {name: EffectValue(p.value, p.ci95) for name, p in effect.parameters.items()} for effect in effects
+    }
+    return replace(model, parameters=parameters, effects={**model.effects, **added})

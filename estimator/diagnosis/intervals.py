@@ -1,0 +1,65 @@
+"""Intervals of fitted parameters that hold although the errors are correlated."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from estimator.diagnosis.evidence import residuals_by_record
+from estimator.diagnosis.noise import correlation_length
+from estimator.physics.fit import FitResult
+from estimator.signals.record import FloatArray
+
+Z95 = 1.959963984540054
+"""97.5 % point of the normal distribution."""
+
+
+def covariance(result: FitResult) -> FloatArray:
+    """Return the covariance of the scaled unknowns, shape (U, U), by the sandwich formula.
+
+    ``C = B M B`` with ``B = (J'J)^-1`` and ``M`` the long-run covariance of the scores ``J_k e_k``, Bartlett
+    weights over several correlation lengths of the error (Newey and West, Econometrica 55, 1987). An unknown at a
+    bound is held there: its variance is 0.
+    """
+    free = ~result.pinned
+    j = result.jacobian[:, free]
+    bread = np.linalg.pinv(j.T @ j, hermitian=True)
+    full = np.zeros((result.x.size, result.x.size))
+    full[np.ix_(free, free)] = bread @ _meat(result, j) @ bread
+    return full
+
+
+def _meat(result: FitResult, jacobian: FloatArray) -> FloatArray:
+    errors = residuals_by_record(result)
+    shortest = min(error.size for error in errors)
+    lags = int(min(4.0 * correlation_length(errors), shortest / 4))
+    total = np.zeros((jacobian.shape[1], jacobian.shape[1]))
+    first = 0
+    for error in errors:
+        scores = jacobian[first : first + error.size] * error[:, None]
+        first += error.size
+        total += _long_run(scores, lags)
+    n = result.residual.size
+    meat: FloatArray = total * n / max(n - jacobian.shape[1], 1)
+    return meat
+
+
+def _long_run(scores: FloatArray, lags: int) -> FloatArray:
+    """Sum the Bartlett-weighted cross products of the scores up to ``lags`` apart, by block differences.
+
+    Bartlett weights over L lags are what overlapping blocks of length L give: the covariance of sums over a window,
+    divided by its length. That costs one cumulative sum instead of L products.
+    """
+    window = max(lags, 1)
+    padded = np.vstack([np.zeros((window, scores.shape[1])), scores, np.zeros((window - 1, scores.shape[1]))])
+    sums = np.cumsum(padded, axis=0)
+    blocks = sums[window:] - sums[:-window]
+    product: FloatArray = blocks.T @ blocks / window
+    return product
+
+
+def interval(result: FitResult, cov: FloatArray, index: int) -> tuple[float, float]:
+    """Return the 95 % interval of a shared parameter in its unit, by its index among the unknowns."""
+    scale = result.problem.shared[index].scale
+    spread = Z95 * float(np.sqrt(max(cov[index, index], 0.0))) * scale
+    value = float(result.x[index]) * scale
+    return (value - spread, value + spread)

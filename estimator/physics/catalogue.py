@@ -1,0 +1,68 @@
+"""The catalogue: every effect the superset model holds. A new one is a file in ``effects/`` and a line here."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+from estimator.physics.effects import (
+    actuator_lag,
+    backlash,
+    coulomb_friction_motor,
+    road_grade,
+    stiffness_nonlinearity,
+    stribeck_friction,
+    transport_delay,
+)
+
+if TYPE_CHECKING:
+    from estimator.physics.effect import Effect
+    from estimator.physics.model import DrivelineModel, EffectValue
+
+_ENTRIES = (
+    actuator_lag.EFFECT,
+    transport_delay.EFFECT,
+    coulomb_friction_motor.EFFECT,
+    stribeck_friction.EFFECT,
+    backlash.EFFECT,
+    stiffness_nonlinearity.EFFECT,
+    road_grade.EFFECT,
+)
+
+EFFECTS: Mapping[str, Effect] = MappingProxyType({entry.name: entry for entry in _ENTRIES})
+"""Name to entry, along the chain from torque command to load."""
+
+
+def effect_problems(name: str, values: Mapping[str, EffectValue], model: DrivelineModel) -> list[str]:
+    """Return what is wrong with an effect of a model, one line per fault; empty where nothing is."""
+    entry = EFFECTS.get(name)
+    if entry is None:
+        return [f"effects.{name}: unknown effect, expected one of {', '.join(EFFECTS)}"]
+    problems = []
+    if model.structure not in entry.structures:
+        fits = ", ".join(sorted(structure.value for structure in entry.structures))
+        problems.append(f"effects.{name}: makes no sense in {model.structure.value}, expected {fits}")
+    expected = [parameter.name for parameter in entry.parameters]
+    listed = ", ".join(expected)
+    required = [parameter.name for parameter in entry.parameters if not parameter.optional]
+    problems += [f"effects.{name}.{key}: missing, expected {listed}" for key in required if key not in values]
+    problems += [f"effects.{name}.{key}: unknown parameter, expected {listed}" for key in values if key not in expected]
+    problems += [
+        f"effects.{name}.{key}.value: expected a finite number, came {entry_value.value}"
+        for key, entry_value in values.items()
+        if not math.isfinite(entry_value.value)
+    ]
+    return problems + _sign_problems(entry, values)
+
+
+def _sign_problems(entry: Effect, values: Mapping[str, EffectValue]) -> list[str]:
+    """Refuse values on the far side of zero: a negative delay would read the future, a negative gap overlaps."""
+    problems = []
+    for parameter in entry.parameters:
+        value = values[parameter.name].value if parameter.name in values else parameter.null
+        least = "greater than 0" if parameter.low > 0 and parameter.null > 0 else "0 or greater"
+        if value < 0 <= parameter.low or (value == 0 and least == "greater than 0"):
+            problems.append(f"effects.{entry.name}.{parameter.name}.value: expected a number {least}, came {value}")
+    return problems

@@ -1,0 +1,126 @@
+"""What an entry of the catalogue is: a law that can be released from its null, and what is known of it.
+
+A missing effect is a constraint of the superset model to release: at ``null`` its law does nothing. The law itself
+is compiled into the one kernel (``estimator.physics.kernel``); everything else about it stands in its entry.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+from estimator.physics.model import DrivelineModel, Motion, Structure, unit
+from estimator.signals.record import Record
+
+
+class Element(Enum):
+    """Where in the chain from torque command to recorded sample an effect lives (CONTRACT)."""
+
+    TORQUE_PATH = "torque_path"
+    MOTOR = "motor"
+    SHAFT = "shaft"
+    LOAD = "load"
+    SPEED_SENSOR = "speed_sensor"
+    ACQUISITION = "acquisition"
+
+
+@dataclass(frozen=True, slots=True)
+class EffectParameter:
+    """One parameter of an effect's law.
+
+    Attributes
+    ----------
+    name : str
+        As in the model file, for example ``gap_rad``.
+    dimension : str
+        ``torque``, ``angle``, ``speed``, ``stiffness`` ... (translated to a unit by the kind of motion), or a unit.
+    null : float
+        The value at which the law does nothing.
+    low, high : float
+        Bounds of the fit, in multiples of the scale the effect's ``scales`` gives for the data at hand.
+    meaning : str
+        One line for people.
+    optional : bool
+        True where a model file may leave it out; it is then at ``null``.
+    """
+
+    name: str
+    dimension: str
+    null: float
+    low: float
+    high: float
+    meaning: str
+    optional: bool = False
+
+    def unit(self, motion: Motion) -> str:
+        """Return the parameter's unit in a kind of motion."""
+        return unit(self.dimension, motion)
+
+
+@dataclass(frozen=True, slots=True)
+class Untestable:
+    """Why a set of recordings can't tell whether an effect is there, and which test would."""
+
+    reason: str
+    suggested_test: str
+
+
+Scales = Callable[[DrivelineModel, Sequence[Record]], tuple[float, ...]]
+Starts = Callable[[DrivelineModel, Sequence[Record]], list[tuple[float, ...]]]
+Testable = Callable[[DrivelineModel, Sequence[Record]], Untestable | None]
+
+
+@dataclass(frozen=True, slots=True)
+class Effect:
+    """An entry of the catalogue.
+
+    Attributes
+    ----------
+    name, element
+        As in the contract.
+    title : str
+        A few words for tables.
+    law : str
+        The equation, as text.
+    source : str
+        Where the law is from.
+    excited_by : str
+        What a test must do to show it.
+    parameters : tuple[EffectParameter, ...]
+    structures : frozenset[Structure]
+        Where it makes sense.
+    resembles : tuple[str, ...]
+        Rivals that look alike in part: names of effects.
+    equivalent : tuple[str, ...]
+        Effects that are the same linear system seen from torque and speed: no recording tells them apart.
+    contains : tuple[str, ...]
+        Effects that are special cases of this one.
+    scales : callable
+        Model and records to a typical size of each parameter (positive).
+    starts : callable
+        Model and records to start points of the fit, in units of the scales.
+    testable : callable
+        Model and records to None, or to the reason why they can't tell.
+    sentence : callable
+        Parameter values to the statement a driveline engineer would write.
+    profile : bool
+        True where the parameters are a profile over each recording's own time (road grade) and not constants.
+    """
+
+    name: str
+    element: Element
+    title: str
+    law: str
+    source: str
+    excited_by: str
+    parameters: tuple[EffectParameter, ...]
+    structures: frozenset[Structure]
+    resembles: tuple[str, ...]
+    equivalent: tuple[str, ...]
+    contains: tuple[str, ...]
+    scales: Scales
+    starts: Starts
+    testable: Testable
+    sentence: Callable[[Mapping[str, float], Motion], str]
+    profile: bool = False

@@ -1,0 +1,63 @@
+"""The torque in the air gap follows its reading with a first-order lag."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from estimator.compiled import compiled
+from estimator.physics.effect import Effect, EffectParameter, Element, Untestable
+from estimator.physics.model import DrivelineModel, Motion, Structure
+from estimator.signals.record import Record
+
+FASTEST_S = 1e-9
+"""Below this a lag is none; it keeps the exponential's argument finite."""
+
+
+@compiled
+def step(torque: float, lagged: float, time_constant: float, step_s: float) -> tuple[float, float]:
+    """Return the mean of the lagged torque over a step of constant input, and its value at the end (exact)."""
+    if time_constant < FASTEST_S:
+        return torque, torque
+    decay = math.exp(-step_s / time_constant)
+    difference = lagged - torque
+    return torque + difference * time_constant / step_s * (1.0 - decay), torque + difference * decay
+
+
+def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+    """Return one sampling period."""
+    return (min(record.sample_time_s for record in records),)
+
+
+def starts(model: DrivelineModel, records: Sequence[Record]) -> list[tuple[float, ...]]:
+    """Return a start below and one above a sampling period."""
+    return [(0.3,), (2.0,)]
+
+
+def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
+    """Any recording in which the torque steps will do."""
+    return None
+
+
+def sentence(values: Mapping[str, float], motion: Motion) -> str:
+    """Say what was found."""
+    return f"the torque follows its reading with a lag of {1e3 * values['time_constant_s']:.3g} ms"
+
+
+EFFECT = Effect(
+    name="actuator_lag",
+    element=Element.TORQUE_PATH,
+    title="lag of the torque",
+    law="tau dT/dt + T = T_read",
+    source="first-order model of a closed current loop: Leonhard, Control of Electrical Drives, 3rd ed., chapter 12",
+    excited_by="torque steps: PRBS, tip-in and tip-out",
+    parameters=(EffectParameter("time_constant_s", "s", 0.0, 0.0, 50.0, "time constant tau"),),
+    structures=frozenset({Structure.ONE_MASS, Structure.TWO_MASS}),
+    resembles=("transport_delay", "speed_filter"),
+    equivalent=("speed_filter",),
+    contains=(),
+    scales=scales,
+    starts=starts,
+    testable=testable,
+    sentence=sentence,
+)

@@ -1,0 +1,69 @@
+"""Backlash: a gap in the line that the twist must cross before the shaft carries torque."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from estimator.compiled import compiled
+from estimator.physics.effect import Effect, EffectParameter, Element, Untestable
+from estimator.physics.model import DrivelineModel, Motion, Structure, unit
+from estimator.physics.motion import torque_reverses, torque_scale
+from estimator.signals.record import Record
+
+
+@compiled
+def damping_share(loaded_twist: float, contact: float) -> float:
+    """Return how much of the shaft's damping acts: 0 in the gap, rising to 1 over the contact depth.
+
+    Damping that switched on at full size at first touch would pull the faces together and kick the motor; flanks
+    in contact squeeze out their play first (Hunt and Crossley, J. Appl. Mech. 42, 1975). No depth: all at once.
+    """
+    if contact <= 0.0:
+        return 0.0 if loaded_twist == 0.0 else 1.0
+    return 1.0 - math.exp(-abs(loaded_twist) / contact)
+
+
+def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+    """Return a fifth of the twist that the torque in use gives, and a fiftieth of it for the contact depth."""
+    twist = torque_scale(records) / model.parameters["k"].value
+    return (0.2 * twist, 0.01 * twist)
+
+
+def starts(model: DrivelineModel, records: Sequence[Record]) -> list[tuple[float, ...]]:
+    """Return a ladder of gap sizes: a gap that is too large or too small is a local optimum."""
+    return [(0.1, 1.0), (0.4, 1.0), (1.2, 1.0)]
+
+
+def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
+    """Need torque of both signs, so that the gap is crossed."""
+    if any(torque_reverses(record) for record in records):
+        return None
+    return Untestable("the shaft torque never changes sign: the gap stays closed on one side", "reversal")
+
+
+def sentence(values: Mapping[str, float], motion: Motion) -> str:
+    """Say what was found."""
+    return f"the shaft has a backlash of {values['gap_rad']:.3g} {unit('angle', motion)} in total"
+
+
+EFFECT = Effect(
+    name="backlash",
+    element=Element.SHAFT,
+    title="backlash in the shaft line",
+    law="T_S = k e + c (1 - exp(-|e|/e_c)) de/dt, e = twist beyond +-gap/2",
+    source="Nordin, Gutman: Automatica 38(10), 2002; contact damping after Hunt, Crossley 1975",
+    excited_by="shaft torque that changes sign: reversal, tip-in and tip-out",
+    parameters=(
+        EffectParameter("gap_rad", "angle", 0.0, 0.0, 20.0, "total gap"),
+        EffectParameter("contact_rad", "angle", 0.0, 0.02, 20.0, "depth over which the damping engages: e_c", True),
+    ),
+    structures=frozenset({Structure.TWO_MASS}),
+    resembles=("stiffness_nonlinearity", "coulomb_friction_motor", "shaft_hysteresis"),
+    equivalent=(),
+    contains=(),
+    scales=scales,
+    starts=starts,
+    testable=testable,
+    sentence=sentence,
+)

@@ -1,0 +1,70 @@
+"""A shaft that hardens or softens with twist."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from estimator.compiled import compiled
+from estimator.physics.effect import Effect, EffectParameter, Element, Untestable
+from estimator.physics.model import DrivelineModel, Motion, Structure
+from estimator.physics.motion import torque_scale
+from estimator.signals.record import Record
+
+
+@compiled
+def factor(twist: float, hardening: float, shape: float) -> float:
+    """Return the factor on the stiffness, ``(1 + |h| e^2 / m)^(+-m)`` with the sign of h.
+
+    To first order it is ``1 + h e^2`` whatever the shape m. A hardening shaft with m = 1 is the Duffing spring; a
+    softening one with m = 1/2 ends in a constant torque, and none ever pulls the wrong way.
+    """
+    if hardening == 0.0:
+        return 1.0
+    size = 1.0 + abs(hardening) * twist * twist / shape
+    return math.pow(size, shape if hardening > 0.0 else -shape)
+
+
+def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+    """Return the hardening that changes the stiffness by a fifth at the twist of the torque in use, and 1."""
+    twist = torque_scale(records) / model.parameters["k"].value
+    return (0.2 / twist**2, 1.0)
+
+
+def starts(model: DrivelineModel, records: Sequence[Record]) -> list[tuple[float, ...]]:
+    """Return a hardening and a softening start."""
+    return [(0.5, 1.0), (-0.5, 0.5)]
+
+
+def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
+    """Any recording in which the torque varies will do; how well it does is told by the interval."""
+    return None
+
+
+def sentence(values: Mapping[str, float], motion: Motion) -> str:
+    """Say what was found."""
+    hardening = values["hardening_per_rad2"]
+    kind = "hardens" if hardening > 0 else "softens"
+    return f"the shaft {kind} with twist: stiffness changes by {hardening:.3g} times the twist squared"
+
+
+EFFECT = Effect(
+    name="stiffness_nonlinearity",
+    element=Element.SHAFT,
+    title="hardening or softening shaft",
+    law="T_S = k e (1 + |h| e^2 / m)^(m sign h) + c de/dt",
+    source="Duffing spring; for couplings: DIN 740-2 (progressive characteristic)",
+    excited_by="large and small shaft torques in the same set of tests",
+    parameters=(
+        EffectParameter("hardening_per_rad2", "per_angle_squared", 0.0, -200.0, 200.0, "relative stiffness change h"),
+        EffectParameter("shape", "1", 1.0, 0.1, 3.0, "how the change goes on at large twist: m", True),
+    ),
+    structures=frozenset({Structure.TWO_MASS}),
+    resembles=("backlash", "shaft_hysteresis"),
+    equivalent=(),
+    contains=(),
+    scales=scales,
+    starts=starts,
+    testable=testable,
+    sentence=sentence,
+)

@@ -1,0 +1,72 @@
+"""Dry friction that is higher near standstill: breakaway torque falling to the Coulomb level with speed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from estimator.compiled import compiled
+from estimator.physics.effect import Effect, EffectParameter, Element, Untestable
+from estimator.physics.effects import coulomb_friction_motor
+from estimator.physics.laws import smooth_sign
+from estimator.physics.model import DrivelineModel, Motion, Structure, unit
+from estimator.physics.motion import speed_scale, torque_scale
+from estimator.signals.record import Record
+
+
+@compiled
+def law(speed: float, excess: float, coulomb: float, stribeck_speed: float, width: float) -> float:
+    """Return ``(T_c + T_x exp(-(w/w_s)^2)) sign(w)``, the friction torque against the motion."""
+    if stribeck_speed <= 0.0:
+        return 0.0
+    ratio = speed / stribeck_speed
+    return (coulomb + excess * math.exp(-ratio * ratio)) * smooth_sign(speed, width)
+
+
+def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+    """Return a twentieth of the torque in use, twice, and a twentieth of the top speed."""
+    torque = 0.05 * torque_scale(records)
+    return (torque, torque, 0.05 * speed_scale(records))
+
+
+def starts(model: DrivelineModel, records: Sequence[Record]) -> list[tuple[float, ...]]:
+    """Return starts at a narrow and a wide Stribeck range: the fit is not convex in its width."""
+    return [(0.5, 0.3, 0.6), (0.5, 0.3, 3.0)]
+
+
+def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
+    """Need what Coulomb friction needs: both signs of the speed."""
+    return coulomb_friction_motor.testable(model, records)
+
+
+def sentence(values: Mapping[str, float], motion: Motion) -> str:
+    """Say what was found."""
+    torque, speed = unit("torque", motion), unit("speed", motion)
+    breakaway = values["coulomb_nm"] + values["excess_nm"]
+    return (
+        f"dry friction at the motor with a Stribeck effect: {breakaway:.3g} {torque} at breakaway, falling to "
+        f"{values['coulomb_nm']:.3g} {torque} above about {values['stribeck_rad_s']:.3g} {speed}"
+    )
+
+
+EFFECT = Effect(
+    name="stribeck_friction",
+    element=Element.MOTOR,
+    title="Stribeck friction at the motor",
+    law="T_f = (T_c + T_x exp(-(w_M/w_s)^2)) sign(w_M)",
+    source="Armstrong-Helouvry, Dupont, Canudas de Wit: Automatica 30(7), 1994, equation 5",
+    excited_by="slow motion in both directions, several passes through standstill",
+    parameters=(
+        EffectParameter("excess_nm", "torque", 0.0, 0.0, 40.0, "breakaway torque above T_c: T_x"),
+        EffectParameter("coulomb_nm", "torque", 0.0, 0.0, 40.0, "friction torque at speed: T_c"),
+        EffectParameter("stribeck_rad_s", "speed", 0.0, 0.02, 20.0, "speed range of the fall: w_s"),
+    ),
+    structures=frozenset({Structure.ONE_MASS, Structure.TWO_MASS}),
+    resembles=("coulomb_friction_motor", "backlash"),
+    equivalent=(),
+    contains=("coulomb_friction_motor",),
+    scales=scales,
+    starts=starts,
+    testable=testable,
+    sentence=sentence,
+)

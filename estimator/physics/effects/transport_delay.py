@@ -1,0 +1,67 @@
+"""The torque acts later than its reading says: a dead time between reading and shaft."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from estimator.compiled import compiled
+from estimator.physics.effect import Effect, EffectParameter, Element, Untestable
+from estimator.physics.model import DrivelineModel, Motion, Structure
+from estimator.signals.record import FloatArray, Record
+
+
+@compiled
+def delayed_mean(torque: FloatArray, start: float, length: float) -> float:
+    """Return the mean of a zero-order-held torque over ``[start, start + length]`` [samples]; length at most 1.
+
+    Before the first sample the torque is held at it, after the last at that one: the end of the last period may
+    come out one rounding error late. The mean is continuous in ``start``, which a fit needs.
+    """
+    end = start + length
+    first = math.floor(start)
+    last = min(math.floor(end), torque.size - 1)
+    before = float(torque[max(first, 0)])
+    share = (end - last) / length
+    if last == first or share <= 0.0:
+        return before
+    return before + (float(torque[max(last, 0)]) - before) * share
+
+
+def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+    """Return one sampling period."""
+    return (min(record.sample_time_s for record in records),)
+
+
+def starts(model: DrivelineModel, records: Sequence[Record]) -> list[tuple[float, ...]]:
+    """Return starts within one period and at a few: the error is not convex in the delay."""
+    return [(0.4,), (1.5,), (4.0,)]
+
+
+def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
+    """Any recording in which the torque steps will do."""
+    return None
+
+
+def sentence(values: Mapping[str, float], motion: Motion) -> str:
+    """Say what was found."""
+    return f"the torque acts {1e3 * values['delay_s']:.3g} ms later than its reading"
+
+
+EFFECT = Effect(
+    name="transport_delay",
+    element=Element.TORQUE_PATH,
+    title="delay of the torque",
+    law="T(t) = T_read(t - t_d)",
+    source="dead time of bus and inverter: Leonhard, Control of Electrical Drives, 3rd ed., chapter 12",
+    excited_by="torque steps: PRBS, tip-in and tip-out",
+    parameters=(EffectParameter("delay_s", "s", 0.0, 0.0, 20.0, "dead time t_d"),),
+    structures=frozenset({Structure.ONE_MASS, Structure.TWO_MASS}),
+    resembles=("actuator_lag", "speed_filter", "stale_samples"),
+    equivalent=(),
+    contains=(),
+    scales=scales,
+    starts=starts,
+    testable=testable,
+    sentence=sentence,
+)

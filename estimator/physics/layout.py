@@ -1,0 +1,48 @@
+"""Where each parameter of the superset model stands in the kernel's flat vector."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from estimator.physics.catalogue import EFFECTS
+from estimator.physics.model import DrivelineModel, Structure
+from estimator.signals.record import FloatArray
+
+NOMINAL = Structure.TWO_MASS.parameter_names
+"""The largest structure's parameters; a smaller structure leaves the rest at zero."""
+
+_SLOTS: dict[tuple[str, str], int] = {}
+for _name in NOMINAL:
+    _SLOTS["", _name] = len(_SLOTS)
+for _entry in EFFECTS.values():
+    for _parameter in _entry.parameters:
+        _SLOTS[_entry.name, _parameter.name] = len(_SLOTS)
+
+SIZE = len(_SLOTS)
+"""Length of the flat vector."""
+
+
+def slot(effect: str, parameter: str) -> int:
+    """Index of an effect's parameter; of a nominal one where ``effect`` is empty."""
+    return _SLOTS[effect, parameter]
+
+
+def flat(model: DrivelineModel) -> FloatArray:
+    """Return the kernel's parameter vector of a model, shape (SIZE,): its values, every other effect at null."""
+    return flat_values(model.values(), {name: {k: v.value for k, v in e.items()} for name, e in model.effects.items()})
+
+
+def flat_values(nominal: Mapping[str, float], effects: Mapping[str, Mapping[str, float]]) -> FloatArray:
+    """Return the kernel's parameter vector from plain values, shape (SIZE,)."""
+    vector = np.zeros(SIZE)
+    for entry in EFFECTS.values():
+        for parameter in entry.parameters:
+            vector[slot(entry.name, parameter.name)] = parameter.null
+    for name, value in nominal.items():
+        vector[slot("", name)] = value
+    for effect, values in effects.items():
+        for name, value in values.items():
+            vector[slot(effect, name)] = value
+    return vector

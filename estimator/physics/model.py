@@ -1,0 +1,177 @@
+"""The driveline model: structure, parameters with the tolerance they are trusted to, and effects beyond it.
+
+Equations of motion, reflected to the motor shaft (translation: read kg, N, m, N s/m)::
+
+    two_mass   J_M dw_M/dt = T - b_M w_M - T_S          one_mass   J_M dw_M/dt = T - b_M w_M - T_0
+               J_L dw_L/dt = T_S - b_L w_L - T_0
+               T_S = k (phi_M - phi_L) + c (w_M - w_L)
+
+``T_0`` is the constant load torque; it and the initial state are unknown in every recording.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+
+from estimator.errors import BadModel
+
+
+class Structure(Enum):
+    """How many inertias the driveline has; the value is the name in the model file."""
+
+    ONE_MASS = "one_mass"
+    TWO_MASS = "two_mass"
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Nominal parameters of the structure, in the order used everywhere."""
+        return _PARAMETER_NAMES[self]
+
+
+_PARAMETER_NAMES = {
+    Structure.ONE_MASS: ("J_M", "b_M"),
+    Structure.TWO_MASS: ("J_M", "J_L", "k", "c", "b_M", "b_L"),
+}
+
+STRICTLY_POSITIVE = frozenset({"J_M", "J_L", "k"})
+"""Parameters that can't be zero; the others can't be negative."""
+
+
+class Motion(Enum):
+    """Rotation (kg m^2, Nm, rad) or translation (kg, N, m)."""
+
+    ROTATION = "rotation"
+    TRANSLATION = "translation"
+
+
+_UNITS = {
+    Motion.ROTATION: {
+        "inertia": "kg m^2",
+        "stiffness": "Nm/rad",
+        "damping": "Nm s/rad",
+        "torque": "Nm",
+        "angle": "rad",
+        "speed": "rad/s",
+        "per_angle_squared": "1/rad^2",
+    },
+    Motion.TRANSLATION: {
+        "inertia": "kg",
+        "stiffness": "N/m",
+        "damping": "N s/m",
+        "torque": "N",
+        "angle": "m",
+        "speed": "m/s",
+        "per_angle_squared": "1/m^2",
+    },
+}
+
+_DIMENSIONS = {
+    "J_M": "inertia",
+    "J_L": "inertia",
+    "k": "stiffness",
+    "c": "damping",
+    "b_M": "damping",
+    "b_L": "damping",
+}
+
+
+def unit(dimension: str, motion: Motion) -> str:
+    """Return the unit of a quantity; a dimension that is not mechanical, such as ``"s"``, is its own unit."""
+    return _UNITS[motion].get(dimension, dimension)
+
+
+def parameter_unit(name: str, motion: Motion) -> str:
+    """Return the unit of a nominal parameter, for example ``kg m^2`` for ``J_M``."""
+    return unit(_DIMENSIONS[name], motion)
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """A nominal value [SI] and the relative tolerance within which re-tuning it is no missing physics."""
+
+    value: float
+    tolerance: float
+
+
+@dataclass(frozen=True, slots=True)
+class EffectValue:
+    """One parameter of an effect: its value and, where it was estimated, its 95 % interval.
+
+    A profile (road grade over time) has several values; a scalar parameter has one.
+    """
+
+    value: float
+    ci95: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class DrivelineModel:
+    """A driveline as the model file describes it.
+
+    Attributes
+    ----------
+    parameters : mapping of name to Parameter
+        Exactly ``structure.parameter_names``.
+    effects : mapping of effect name to mapping of parameter name to EffectValue
+        Physics beyond the nominal model; empty for a nominal one.
+    gear_ratio : float or None
+        Motor turns per wheel turn.
+
+    Raises
+    ------
+    BadModel
+        With every fault of the model, one per line.
+    """
+
+    structure: Structure
+    parameters: Mapping[str, Parameter]
+    motion: Motion = Motion.ROTATION
+    effects: Mapping[str, Mapping[str, EffectValue]] = field(default_factory=dict)
+    gear_ratio: float | None = None
+
+    def __post_init__(self) -> None:
+        problems = [*self._parameter_problems(), *self._effect_problems()]
+        if problems:
+            raise BadModel("\n".join(problems))
+
+    def _parameter_problems(self) -> list[str]:
+        expected = self.structure.parameter_names
+        listed = ", ".join(expected)
+        problems = [
+            f"parameters.{name}: missing, {self.structure.value} needs {listed}"
+            for name in expected
+            if name not in self.parameters
+        ]
+        problems += [
+            f"parameters.{name}: unknown, {self.structure.value} has {listed}"
+            for name in self.parameters
+            if name not in expected
+        ]
+        for name, parameter in self.parameters.items():
+            problems += _value_problems(name, parameter)
+        return problems
+
+    def _effect_problems(self) -> list[str]:
+        from estimator.physics.catalogue import effect_problems
+
+        return [problem for name, values in self.effects.items() for problem in effect_problems(name, values, self)]
+
+    def values(self) -> dict[str, float]:
+        """Nominal parameter values alone."""
+        return {name: self.parameters[name].value for name in self.structure.parameter_names}
+
+
+def _value_problems(name: str, parameter: Parameter) -> list[str]:
+    problems = []
+    low = "greater than 0" if name in STRICTLY_POSITIVE else "0 or greater"
+    fits = parameter.value > 0 if name in STRICTLY_POSITIVE else parameter.value >= 0
+    if not (math.isfinite(parameter.value) and fits):
+        problems.append(f"parameters.{name}.value: expected a finite number {low}, came {parameter.value}")
+    if not 0 <= parameter.tolerance < 1:
+        problems.append(
+            f"parameters.{name}.tolerance: expected a relative tolerance from 0 up to 1, came {parameter.tolerance}"
+        )
+    return problems

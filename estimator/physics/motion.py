@@ -1,0 +1,50 @@
+"""What the recordings say about the motion before any model is fitted: sizes and whether the speed changes sign."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from estimator.signals.record import FloatArray, OutputKind, Record
+
+SPEED_WINDOW_S = 0.02
+"""Positions are differentiated over this window, so that encoder steps do not pass for speed."""
+
+
+def measured_speed(record: Record) -> FloatArray:
+    """Return the speed of a recording: measured, or the slope of the position; shape (N,), NaN where masked."""
+    output = np.where(record.okay, record.output, np.nan)
+    if record.kind is not OutputKind.POSITION:
+        return output
+    half = max(1, round(0.5 * SPEED_WINDOW_S / record.sample_time_s))
+    slope = np.full_like(output, np.nan)
+    slope[half:-half] = (output[2 * half :] - output[: -2 * half]) / (2 * half * record.sample_time_s)
+    return slope
+
+
+def speed_scale(records: Sequence[Record]) -> float:
+    """Return the largest typical speed of the recordings: the 99th percentile of its size."""
+    return max(float(np.nanpercentile(np.abs(measured_speed(record)), 99)) for record in records)
+
+
+def torque_scale(records: Sequence[Record]) -> float:
+    """Return the largest typical torque of the recordings: the 99th percentile of its size."""
+    return max(float(np.percentile(np.abs(record.total_torque_nm), 99)) for record in records)
+
+
+def reverses(record: Record) -> bool:
+    """Tell whether the speed clearly takes both signs in a recording.
+
+    Clearly: on each side it reaches a hundredth of its own range, for at least ten samples.
+    """
+    speed = measured_speed(record)
+    threshold = 0.01 * float(np.nanpercentile(np.abs(speed), 99))
+    return bool(np.sum(speed > threshold) >= 10 and np.sum(speed < -threshold) >= 10)
+
+
+def torque_reverses(record: Record) -> bool:
+    """Tell whether the torque clearly takes both signs in a recording (a tenth of its size, ten samples each)."""
+    torque = record.total_torque_nm
+    threshold = 0.1 * float(np.percentile(np.abs(torque), 99))
+    return bool(np.sum(torque > threshold) >= 10 and np.sum(torque < -threshold) >= 10)

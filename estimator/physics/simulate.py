@@ -1,0 +1,125 @@
+"""Free-run simulation of one recording: measured torques in, simulated output out, nothing fed back."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimator.errors import BadModel
+from estimator.physics import kernel
+from estimator.physics.model import DrivelineModel, Structure
+from estimator.physics.motion import speed_scale
+from estimator.signals.record import FloatArray, Location, OutputKind, Record
+
+RADIANS_PER_STEP = 0.15
+"""Integration step in radians of the line's natural frequency: fourth order leaves 1e-6 of amplitude per step."""
+
+SIGN_WIDTH = 1e-3
+"""Dry friction changes sign within this share of the top speed."""
+
+_MASSES = {Structure.ONE_MASS: 1, Structure.TWO_MASS: 2}
+
+_OUTPUT_STATE = {
+    (OutputKind.SPEED, Location.MOTOR): kernel.SPEED,
+    (OutputKind.SPEED, Location.LOAD): kernel.LOAD_SPEED,
+    (OutputKind.POSITION, Location.MOTOR): kernel.ANGLE,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """How a model is integrated on a set of recordings: sub-steps per period and width of a sign change."""
+
+    structure: Structure
+    substeps: int
+    sign_width: float
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """What is unknown in every recording: constant load torque [Nm] and initial state [rad, rad/s]."""
+
+    load_torque_nm: float
+    angle_rad: float
+    speed_rad_s: float
+    twist_rad: float = 0.0
+    load_speed_rad_s: float = 0.0
+
+
+def natural_frequency_rad_s(values: Mapping[str, float]) -> float:
+    """Return the undamped natural frequency of the line, sqrt(k (1/J_M + 1/J_L)) [rad/s]; 0 for one mass."""
+    if "k" not in values:
+        return 0.0
+    return math.sqrt(values["k"] * (1.0 / values["J_M"] + 1.0 / values["J_L"]))
+
+
+def grid_for(model: DrivelineModel, records: Sequence[Record]) -> Grid:
+    """Choose the integration grid for a model on a set of recordings of one sampling period."""
+    angle = natural_frequency_rad_s(model.values()) * records[0].sample_time_s
+    return Grid(model.structure, max(1, math.ceil(angle / RADIANS_PER_STEP)), SIGN_WIDTH * speed_scale(records))
+
+
+def output_state(record: Record, structure: Structure) -> int:
+    """Return the index of the state a recording measures.
+
+    Raises
+    ------
+    BadModel
+        Where the structure has no such output.
+    """
+    index = _OUTPUT_STATE.get((record.kind, record.location))
+    if index is None or (structure is Structure.ONE_MASS and record.location is Location.LOAD):
+        raise BadModel(
+            f"recording {record.name}: {record.kind.value} at the {record.location.value} is no output of "
+            f"{structure.value}. Expected speed at the motor, position at the motor, or (two_mass) speed at the load."
+        )
+    return index
+
+
+def simulate(
+    grid: Grid,
+    record: Record,
+    p: FloatArray,
+    start: Start,
+    extra_load_nm: FloatArray | None = None,
+    output: int | None = None,
+) -> FloatArray:
+    """Simulate the recorded output from the recorded torque.
+
+    Parameters
+    ----------
+    p : ndarray, shape (layout.SIZE,)
+        Parameters of the superset model.
+    extra_load_nm : ndarray, shape (N,), optional
+        Load torque over time, beside the constant one.
+    output : int, optional
+        State to return (``kernel.SPEED`` ...); the recorded output by default.
+
+    Returns
+    -------
+    ndarray, shape (N,)
+        In the unit of ``record.output``.
+    """
+    torque = record.total_torque_nm
+    load = np.full(torque.shape, start.load_torque_nm)
+    if extra_load_nm is not None:
+        load += extra_load_nm
+    state = np.array([start.angle_rad, start.speed_rad_s, start.twist_rad, start.load_speed_rad_s, torque[0]])
+    out = np.empty_like(torque)
+    kernel.integrate(
+        _MASSES[grid.structure],
+        record.sample_time_s,
+        grid.substeps,
+        grid.sign_width,
+        0,
+        torque,
+        load,
+        p,
+        state,
+        output_state(record, grid.structure) if output is None else output,
+        out,
+    )
+    return out
