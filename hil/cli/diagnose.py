@@ -1,0 +1,105 @@
+"""``hil diagnose``: locate the mismatch, name the missing physics, model it, show the fit improve."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperCommand
+
+HOLDOUT = "--holdout"
+
+Progress = Callable[[str, float], None]
+
+
+class SeveralHoldouts(TyperCommand):
+    """A command whose ``--holdout`` takes every word up to the next option, as in the contract."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Repeat the option before each of its words, which is the form the parser knows."""
+        return super().parse_args(ctx, _repeated(args))
+
+
+def _repeated(args: list[str]) -> list[str]:
+    out: list[str] = []
+    inside = False
+    for i, word in enumerate(args):
+        if word.startswith("-"):
+            inside = word == HOLDOUT and i + 1 < len(args) and not args[i + 1].startswith("-")
+            out += [] if inside else [word]  # without a word to go with, the parser asks for it
+        else:
+            out += [HOLDOUT, word] if inside else [word]
+    return out
+
+
+app = typer.Typer(add_completion=False)
+
+
+@app.command(
+    cls=SeveralHoldouts,
+    epilog="Example: hil diagnose run_1.csv run_2.csv --model bus.toml --out result --holdout run_3.csv",
+)
+def diagnose(
+    recordings: Annotated[list[Path], typer.Argument(metavar="REC", help="Recordings to explain.")],
+    model: Annotated[Path, typer.Option("--model", metavar="MODEL", help="Model file to question.")],
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the results.")],
+    holdout: Annotated[
+        list[Path] | None,
+        typer.Option(HOLDOUT, metavar="REC...", help="Recordings kept back to judge the explanation on."),
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print diagnosis.json instead of the summary.")] = False,
+) -> None:
+    """Say where simulation and recordings differ, and which physics the model left out.
+
+    Writes DIR/diagnosis.json, DIR/augmented.toml and DIR/report.html.
+    """
+    from rich.console import Console
+
+    from estimator.diagnosis.diagnose import diagnose as diagnose_records
+    from hil.config.model_file import read_model, write_model
+    from hil.recording import read_records
+    from hil.report.diagnosis_html import diagnosis_page
+    from hil.report.diagnosis_json import diagnosis_text
+    from hil.report.diagnosis_text import diagnosis_summary
+    from hil.report.outputs import publish, require_folder
+
+    require_folder(out)
+    file = read_model(model)
+    records = read_records([*recordings, *(holdout or ())], file.signals)
+    training, kept_back = records[: len(recordings)], records[len(recordings) :]
+    with progress_bar() as progress:
+        diagnosis = diagnose_records(training, file.model, kept_back, progress)
+    text = diagnosis_text(diagnosis)
+    publish(
+        out,
+        {
+            "diagnosis.json": lambda path: path.write_text(text, encoding="utf-8"),
+            "augmented.toml": lambda path: write_model(path, diagnosis.augmented, file.signals),
+            "report.html": lambda path: path.write_text(diagnosis_page(diagnosis), encoding="utf-8"),
+        },
+    )
+    if as_json:
+        typer.echo(text, nl=False)
+    else:
+        Console().print(diagnosis_summary(diagnosis))
+        typer.echo(f"report: {out / 'report.html'}")
+
+
+@contextmanager
+def progress_bar() -> Iterator[Progress]:
+    """Show stage and share done on standard error, where that is a terminal."""
+    from rich.console import Console
+    from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import Progress as Bar
+
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield lambda stage, share: None
+        return
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    with Bar(*columns, console=console, transient=True) as bar:
+        task = bar.add_task("reading", total=1.0)
+        yield lambda stage, share: bar.update(task, description=stage, completed=share)

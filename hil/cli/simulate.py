@@ -1,0 +1,45 @@
+"""``hil simulate``: free-run simulation of a recording from its measured torques."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+app = typer.Typer(add_completion=False)
+
+
+@app.command(epilog="Example: hil simulate --model bus.toml --input run_1.csv --out run_1_simulated.csv")
+def simulate(
+    model: Annotated[Path, typer.Option(metavar="MODEL", help="Model file, nominal or augmented.")],
+    recording: Annotated[Path, typer.Option("--input", metavar="REC", help="Recording with the torques.")],
+    out: Annotated[Path, typer.Option(metavar="CSV", help="Simulated output, one row per sample of REC.")],
+) -> None:
+    """Simulate the output from the measured torques, nothing fed back.
+
+    Only the initial state and the constant load torque are estimated from REC.
+    """
+    from estimator.physics.free_run import free_run
+    from estimator.physics.model import unit
+    from hil.config.model_file import read_model
+    from hil.errors import UsageError
+    from hil.recording import Table, csv_format, read_record
+    from hil.report.numbers import shown
+    from hil.report.outputs import publish, require_folder
+    from hil.report.wording import output_unit, simulated_column
+
+    if out.suffix.lower() != ".csv":
+        raise UsageError(f"--out {out}: expected a name that ends in .csv, came {out.suffix!r}")
+    if out.exists() and recording.exists() and out.samefile(recording):
+        raise UsageError(f"--out {out}: expected another file than the recording itself. Choose another name.")
+    require_folder(out.parent)
+    file = read_model(model)
+    record = read_record(recording, file.signals)
+    run = free_run(file.model, record)
+    column = simulated_column(record.kind, file.model.motion)
+    table = Table(out, {"time_s": record.time_s, column: run.output})
+    publish(out.parent, {out.name: lambda path: csv_format.write(table, path)})
+    error = shown(run.rms, output_unit(record.kind, file.model.motion))
+    load = shown(run.start.load_torque_nm, unit("torque", file.model.motion))
+    typer.echo(f"{record.name}: {record.time_s.size} samples, RMS error {error}, constant load {load}; in {out}")

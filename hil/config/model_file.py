@@ -1,0 +1,230 @@
+"""The model file, ``hil.model/1``: a driveline as a person writes it down, and as a diagnosis hands it back.
+
+What a file may hold is in the contract; what makes a model is in ``estimator.physics.model``. Faults of both
+kinds are reported together, so that a file is mended in one go: a value of the wrong type is replaced by a
+neutral one while the rest of the model is checked.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self, TypeVar
+
+import tomlkit
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+from tomlkit.items import InlineTable, Table
+
+from estimator.errors import BadModel
+from estimator.physics.model import DrivelineModel, EffectValue, Motion, Parameter, Structure, parameter_unit
+from hil.config.problems import Fault, problem_lines, read_toml, refuse
+from hil.errors import ModelFileError
+from hil.recording.signals_config import SignalsConfig
+
+Kind = TypeVar("Kind", bound=Enum)
+Default = TypeVar("Default", float, None)
+
+SCHEMA = "hil.model/1"
+
+NOT_YET = ("three_mass", "joint")
+"""Structures of the contract that the estimator does not have yet."""
+
+NEUTRAL = 1.0
+"""Stands for a number of the wrong type while the rest is checked: allowed for every parameter."""
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class _Entry(_Strict):
+    value: float
+
+    @model_validator(mode="before")
+    @classmethod
+    def _is_a_table(cls, entry: object) -> object:
+        if not isinstance(entry, Mapping):
+            raise ValueError(f"a table of {', '.join(cls.model_fields)}, such as {{ value = 1.5, ... }}")
+        return entry
+
+
+class _ParameterEntry(_Entry):
+    tolerance: float
+
+
+class _EffectEntry(_Entry):
+    ci95: Annotated[list[float], Field(min_length=2, max_length=2)] | None = None
+
+    @model_validator(mode="after")
+    def _interval_is_ordered(self) -> Self:
+        if self.ci95 and self.ci95[0] > self.ci95[1]:
+            refuse([Fault("ci95", "the lower bound first", self.ci95)])
+        return self
+
+
+class _Geometry(_Strict):
+    gear_ratio: float = Field(gt=0)
+
+
+class _Document(_Strict):
+    schema_: Literal["hil.model/1"] = Field(alias="schema")
+    structure: Annotated[Structure, Field(strict=False)]
+    motion: Annotated[Motion, Field(strict=False)] = Motion.ROTATION
+    parameters: dict[str, _ParameterEntry]
+    geometry: _Geometry | None = None
+    effects: dict[str, dict[str, _EffectEntry]] = {}
+    signals: SignalsConfig | None = None
+
+    @field_validator("structure", mode="before")
+    @classmethod
+    def _is_supported(cls, value: object) -> object:
+        if value in NOT_YET:
+            raise ValueError("one_mass or two_mass: this structure is not supported yet")
+        return value
+
+
+@dataclass(frozen=True, slots=True)
+class ModelFile:
+    """A model and, where the file has one, the way its recordings are read."""
+
+    model: DrivelineModel
+    signals: SignalsConfig | None = None
+
+
+def read_model(path: Path | str) -> ModelFile:
+    """Read a model file.
+
+    Raises
+    ------
+    ModelFileError
+        With one line for every fault: the key, what was expected, what came.
+    """
+    path = Path(path)
+    content = read_toml(path, ModelFileError)
+    problems: list[str] = []
+    document = model = None
+    try:
+        document = _Document.model_validate(content)
+    except ValidationError as error:
+        problems += problem_lines(_Document, error)
+    try:
+        model = _model(content)
+    except BadModel as error:
+        problems += str(error).splitlines()
+    if document is None or model is None or problems:
+        raise ModelFileError(path, *problems)
+    return ModelFile(model, document.signals)
+
+
+def write_model(path: Path | str, model: DrivelineModel, signals: SignalsConfig | None = None) -> None:
+    """Write a model file, whole or not at all; one that is there is replaced.
+
+    An interval that is not finite is left out: a model file holds finite numbers only.
+    """
+    path = Path(path)
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        part.write_text(_as_toml(model, signals), encoding="utf-8")
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def _model(content: Mapping[str, Any]) -> DrivelineModel | None:
+    """Build the model from what is usable of a file's tables; None where not even the structure is known."""
+    structure = _member(Structure, content.get("structure"))
+    if structure is None:
+        return None
+    return DrivelineModel(
+        structure=structure,
+        motion=_member(Motion, content.get("motion")) or Motion.ROTATION,
+        parameters={
+            name: Parameter(_number(entry, "value", NEUTRAL), _number(entry, "tolerance", 0.0))
+            for name, entry in _table(content.get("parameters")).items()
+        },
+        effects={
+            name: {key: _effect_value(entry) for key, entry in _table(values).items()}
+            for name, values in _table(content.get("effects")).items()
+        },
+        gear_ratio=_number(content.get("geometry"), "gear_ratio", None),
+    )
+
+
+def _member(kind: type[Kind], value: object) -> Kind | None:
+    return next((member for member in kind if member.value == value), None)
+
+
+def _table(value: object) -> Mapping[str, object]:
+    return value if isinstance(value, dict) else {}
+
+
+def _number(entry: object, key: str, otherwise: Default) -> float | Default:
+    value = _table(entry).get(key)
+    if isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value):
+        return float(value)
+    return otherwise
+
+
+def _effect_value(entry: object) -> EffectValue:
+    interval = _table(entry).get("ci95")
+    match interval:
+        case [int() | float() as low, int() | float() as high]:
+            return EffectValue(_number(entry, "value", NEUTRAL), (float(low), float(high)))
+    return EffectValue(_number(entry, "value", NEUTRAL))
+
+
+def _as_toml(model: DrivelineModel, signals: SignalsConfig | None) -> str:
+    document = tomlkit.document()
+    document["schema"] = SCHEMA
+    document["structure"] = model.structure.value
+    document["motion"] = model.motion.value
+    parameters = tomlkit.table()
+    for name in model.structure.parameter_names:
+        parameter = model.parameters[name]
+        entry = {"value": float(parameter.value), "tolerance": float(parameter.tolerance)}
+        parameters[name] = _inline(entry).comment(parameter_unit(name, model.motion))
+    document["parameters"] = parameters
+    if model.gear_ratio is not None:
+        document["geometry"] = {"gear_ratio": float(model.gear_ratio)}
+    if model.effects:
+        document["effects"] = _effects_table(model)
+    if signals is not None:
+        document["signals"] = _signals_table(signals)
+    return tomlkit.dumps(document)
+
+
+def _effects_table(model: DrivelineModel) -> Table:
+    effects = tomlkit.table(is_super_table=True)
+    for name, values in model.effects.items():
+        effect = tomlkit.table()
+        for key, value in values.items():
+            entry: dict[str, Any] = {"value": float(value.value)}
+            if value.ci95 is not None and all(math.isfinite(bound) for bound in value.ci95):
+                entry["ci95"] = [float(bound) for bound in value.ci95]
+            effect[key] = _inline(entry)
+        effects[name] = effect
+    return effects
+
+
+def _signals_table(signals: SignalsConfig) -> Table:
+    """Write the keys that were given, in the contract's way: one inline table each."""
+    table = tomlkit.table()
+    given = signals.model_dump(mode="json", exclude_unset=True, exclude_none=True)
+    for key, value in given.items():
+        if isinstance(value, list):
+            rows = tomlkit.array()
+            rows.extend([_inline(entry) for entry in value])
+            table[key] = rows
+        else:
+            table[key] = _inline(value)
+    return table
+
+
+def _inline(entry: Mapping[str, Any]) -> InlineTable:
+    inline = tomlkit.inline_table()
+    inline.update(entry)
+    return inline

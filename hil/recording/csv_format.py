@@ -1,0 +1,176 @@
+"""CSV: one header line, one line per row, nothing else.
+
+- Floats are written as the shortest decimal that reads back to the same bits, integers without a point; that
+  difference is how a reader tells them apart, so that CSV to Parquet and back loses nothing. Text that looks
+  like a number becomes one, and units and metadata have no place here.
+- A last line without line end is taken (RFC 4180 allows it): a file cut inside its very last number can't be
+  told from a whole one. A cut anywhere else leaves a row with cells missing, and is refused.
+- A quoted cell must end on its line, so that a row is a line and every fault has its number.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute
+import pyarrow.csv
+
+from hil.errors import RecordingError
+from hil.recording.format_hints import FormatHints
+from hil.recording.table import Column, Table
+
+DELIMITERS = ",;\t|"
+"""Tried on the header where no hint is given, the most frequent wins."""
+
+BLOCK_BYTES = 1 << 22
+"""pyarrow parses this much at once; also the longest line it can take."""
+
+FIRST_ROW_LINE = 2
+
+
+def read(path: Path, hints: FormatHints) -> Table:
+    """Read a CSV recording.
+
+    Raises
+    ------
+    RecordingError
+        With the line of the fault, if the file is not text in its encoding, has no row, a header with empty
+        or repeated names, or a row with another number of cells.
+    """
+    content = _utf8(path, hints.encoding)
+    if not content:
+        return Table(path, {})  # refuses: nothing in it
+    header = content.split(b"\n", 1)[0].decode("utf-8")
+    delimiter = hints.delimiter or max(DELIMITERS, key=header.count)
+    names = _column_names(path, header, delimiter)
+    if b"\n" not in content:
+        return Table(path, {})  # refuses: no rows
+    cells = _parse(path, content, names, delimiter)
+    return Table(path, {name: _column(cells[name]) for name in names}, first_line=FIRST_ROW_LINE)
+
+
+def write(table: Table, path: Path) -> None:
+    """Write a table as CSV; units and metadata are left out.
+
+    Raises
+    ------
+    RecordingError
+        If a text cell holds a line break.
+    """
+    columns = [_cells(table, path, name) for name in table.columns]
+    with path.open("w", encoding="utf-8", newline="") as file:
+        file.write(_header(table.columns))
+        file.writelines(",".join(row) + "\n" for row in zip(*columns, strict=True))
+
+
+def _utf8(path: Path, encoding: str) -> bytes:
+    """Read a text file as UTF-8 bytes with line feeds only, no byte order mark, no empty lines at the end."""
+    content = path.read_bytes()
+    try:
+        text = content.decode(encoding)
+    except UnicodeError as error:
+        start = error.start if isinstance(error, UnicodeDecodeError) else 0
+        line = content.count(b"\n", 0, start) + 1
+        byte = content[start : start + 1].hex()
+        raise RecordingError(
+            path,
+            f"line {line}: expected {encoding} text, came byte 0x{byte}. "
+            'Give its encoding in the model file: [signals] format = { encoding = "latin-1" }.',
+        ) from error
+    lines = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
+    return lines.rstrip("\n").encode("utf-8")
+
+
+def _split(line: str, delimiter: str) -> list[str]:
+    """Cut one line into cells; none where it can't be cut (a cell beyond the module's 128 KiB)."""
+    try:
+        return next(csv.reader([line], delimiter=delimiter), [])
+    except csv.Error:
+        return []
+
+
+def _column_names(path: Path, header: str, delimiter: str) -> list[str]:
+    names = [name.strip() for name in _split(header, delimiter) or [""]]
+    problems = [
+        f"line 1: cell {number} of the header is empty, expected a column name"
+        for number, name in enumerate(names, start=1)
+        if not name
+    ]
+    repeated = sorted({name for name in names if name and names.count(name) > 1})
+    problems += [f"line 1: column {name} comes twice, expected every name once" for name in repeated]
+    if problems:
+        raise RecordingError(path, *problems)
+    return names
+
+
+def _parse(path: Path, content: bytes, names: list[str], delimiter: str) -> pa.Table:
+    """Cut the rows into cells, all as text."""
+    try:
+        cells = pa.csv.read_csv(
+            pa.BufferReader(content),
+            pa.csv.ReadOptions(column_names=names, skip_rows=1, block_size=BLOCK_BYTES),
+            pa.csv.ParseOptions(delimiter=delimiter, newlines_in_values=False, ignore_empty_lines=False),
+            pa.csv.ConvertOptions(
+                column_types=dict.fromkeys(names, pa.string()), strings_can_be_null=False, check_utf8=False
+            ),
+        )
+    except pa.ArrowInvalid as error:
+        raise RecordingError(path, _broken_line(content, len(names), delimiter)) from error
+    if cells.num_rows != content.count(b"\n"):
+        raise RecordingError(path, _broken_line(content, len(names), delimiter))
+    return cells
+
+
+def _broken_line(content: bytes, expected: int, delimiter: str) -> str:
+    """Find the first line that is no row of the header's number of cells, and say what is wrong with it."""
+    lines = content.decode("utf-8").split("\n")
+    for number, line in enumerate(lines[1:], start=FIRST_ROW_LINE):
+        if line.count('"') % 2:
+            return f"line {number}: expected every quoted cell to end on its line, came one that does not"
+        count = len(_split(line, delimiter) or [""])
+        if count != expected:
+            cut = number == len(lines) and count < expected
+            cure = "the file is truncated: remove its last line or record again" if cut else "mend that line"
+            return f"line {number}: expected {expected} cells as in the header, came {count}; {cure}"
+    return f"expected lines shorter than {BLOCK_BYTES} bytes, came a longer one"
+
+
+def _column(cells: pa.ChunkedArray) -> Column:
+    """Turn text into int64, float64, or leave it, whichever is the first to fit every cell."""
+    trimmed = pa.compute.utf8_trim_whitespace(cells)
+    for kind in (pa.int64(), pa.float64()):
+        try:
+            return np.asarray(pa.compute.cast(trimmed, kind).to_numpy())
+        except pa.ArrowInvalid:
+            continue
+    return np.array(trimmed.to_pylist(), dtype=object)
+
+
+def _cells(table: Table, path: Path, name: str) -> Iterable[str]:
+    column = table.columns[name]
+    if column.dtype != object:
+        return map(repr, column.tolist())
+    texts = [str(cell) for cell in column]
+    broken = next((row for row, text in enumerate(texts) if "\n" in text or "\r" in text), None)
+    if broken is not None:
+        raise RecordingError(
+            path,
+            f"column {name}, row {broken + 1}: expected a text of one line, came one with a line break. "
+            "CSV can't hold it: write Parquet.",
+        )
+    return map(_quoted, texts)
+
+
+def _quoted(text: str) -> str:
+    return '"' + text.replace('"', '""') + '"' if any(c in text for c in ',"') else text
+
+
+def _header(names: Iterable[str]) -> str:
+    line = io.StringIO()
+    csv.writer(line, lineterminator="\n").writerow(names)
+    return line.getvalue()

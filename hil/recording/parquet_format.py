@@ -1,0 +1,76 @@
+"""Parquet: columns with their unit as field metadata, the recording's own metadata in the schema."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet
+
+from hil.errors import RecordingError
+from hil.recording.format_hints import FormatHints
+from hil.recording.table import Column, Table
+
+UNIT_KEY = b"unit"
+
+FOREIGN_KEYS = frozenset({b"pandas", b"ARROW:schema"})
+"""Metadata other programs put there for themselves."""
+
+
+def read(path: Path, hints: FormatHints) -> Table:
+    """Read a Parquet recording; hints are for text formats and play no part.
+
+    Raises
+    ------
+    RecordingError
+        If the file is no whole Parquet file, or holds no rows.
+    """
+    try:
+        with pa.parquet.ParquetFile(path) as file:
+            content = file.read()
+    except (pa.ArrowException, OSError) as error:
+        raise RecordingError(
+            path, f"expected a whole Parquet file, came a damaged or truncated one ({error})"
+        ) from error
+    units = {
+        f.name: f.metadata[UNIT_KEY].decode("utf-8", "replace")
+        for f in content.schema
+        if f.metadata and UNIT_KEY in f.metadata
+    }
+    columns = {name: _column(content[name]) for name in content.column_names}
+    return Table(path, columns, units, _metadata(content.schema.metadata or {}))
+
+
+def write(table: Table, path: Path) -> None:
+    """Write a table with its units and metadata."""
+    fields, arrays = [], []
+    for name, column in table.columns.items():
+        array = pa.array(column, type=pa.string() if column.dtype == object else None)
+        unit = table.units.get(name)
+        fields.append(
+            pa.field(name, array.type, metadata=None if unit is None else {UNIT_KEY: unit.encode()})
+        )
+        arrays.append(array)
+    schema = pa.schema(fields, metadata=dict(table.metadata) or None)
+    pa.parquet.write_table(pa.Table.from_arrays(arrays, schema=schema), path)
+
+
+def _metadata(raw: Mapping[bytes, bytes]) -> dict[str, str]:
+    return {
+        key.decode("utf-8", "replace"): value.decode("utf-8", "replace")
+        for key, value in raw.items()
+        if key not in FOREIGN_KEYS
+    }
+
+
+def _column(cells: pa.ChunkedArray) -> Column:
+    """Turn a column into int64, float64 (a null is NaN) or text."""
+    kind = cells.type
+    if pa.types.is_floating(kind) or pa.types.is_null(kind):
+        return np.asarray(cells.cast(pa.float64()).to_numpy(), dtype=np.float64)
+    if pa.types.is_integer(kind) or pa.types.is_boolean(kind):
+        wide = pa.float64() if cells.null_count else pa.int64()
+        return np.asarray(cells.cast(wide, safe=False).to_numpy())
+    return np.array(["" if cell is None else str(cell) for cell in cells.to_pylist()], dtype=object)

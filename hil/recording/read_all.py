@@ -1,0 +1,60 @@
+"""The recordings of one command, read together: all at fault are reported, and they must fit together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from estimator.signals.record import Record
+from hil.errors import InputError, RecordingError, UsageError
+from hil.recording.signals import read_record
+from hil.recording.signals_config import SignalsConfig
+
+
+def read_records(paths: Sequence[Path], signals: SignalsConfig | None = None) -> tuple[Record, ...]:
+    """Read recordings that are to be explained by one model.
+
+    Raises
+    ------
+    UsageError
+        If two have the same name: results are told by it.
+    RecordingError
+        If one can't be read, or has another sampling period than the first.
+    InputError
+        If several can't be read; with the faults of each.
+    """
+    _require_own_names(paths)
+    records: list[Record] = []
+    errors: list[RecordingError] = []
+    for path in paths:
+        try:
+            records.append(read_record(path, signals))
+        except RecordingError as error:
+            errors.append(error)
+    if len(errors) == 1:
+        raise errors[0]
+    if errors:
+        raise InputError("\n".join(str(error) for error in errors))
+    _require_one_period(paths, records)
+    return tuple(records)
+
+
+def _require_own_names(paths: Sequence[Path]) -> None:
+    names: dict[str, Path] = {}
+    for path in paths:
+        if path.stem in names:
+            raise UsageError(
+                f"{path}: expected recordings of different names, came {path.stem!r} twice "
+                f"(also {names[path.stem]}). Rename one, or give it once."
+            )
+        names[path.stem] = path
+
+
+def _require_one_period(paths: Sequence[Path], records: Sequence[Record]) -> None:
+    for path, record in zip(paths, records, strict=True):
+        if abs(record.sample_time_s - records[0].sample_time_s) > 1e-6 * records[0].sample_time_s:
+            raise RecordingError(
+                path,
+                f"expected the sampling period of {paths[0]}, {records[0].sample_time_s:g} s, "
+                f"came {record.sample_time_s:g} s. Give recordings of one period.",
+            )

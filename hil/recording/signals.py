@@ -1,0 +1,117 @@
+"""From a table to the estimator's ``Record``, by the contract's columns or by ``[signals]`` of a model file.
+
+A row is a missing sample (``okay`` False) where torque or output is NaN, where the rig flagged it, or where a
+mask says so. Time goes on there, so the simulation needs a torque: the last good value is held where the
+reading is not to be trusted (NaN, flagged, outside a mask on that very column). A mask on another column says
+that the model does not hold there, not that the torque was misread; the torque stays as recorded.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator.signals.record import Record
+from hil.errors import RecordingError
+from hil.recording import columns
+from hil.recording.formats import read_table
+from hil.recording.signals_config import MaskRange, SignalsConfig
+from hil.recording.table import FloatArray, Table
+from hil.recording.time_base import time_base
+
+FEWEST_SAMPLES = 10
+"""A recording with fewer usable samples can't carry a constant load, an initial state and anything beside."""
+
+
+def read_record(path: Path | str, signals: SignalsConfig | None = None) -> Record:
+    """Read a recording as the estimator takes it.
+
+    Parameters
+    ----------
+    path : Path or str
+        The recording; its stem names it.
+    signals : SignalsConfig, optional
+        Of the model file; the contract's columns without it.
+
+    Returns
+    -------
+    Record
+        One sample per row of the file.
+
+    Raises
+    ------
+    RecordingError
+        If the file is at fault, with every fault of a kind, by name and line.
+    """
+    signals = signals or SignalsConfig()
+    return to_record(read_table(path, signals.format), signals)
+
+
+def to_record(table: Table, signals: SignalsConfig) -> Record:
+    """Pick the signals out of a table; see :func:`read_record`."""
+    torques = signals.torques()
+    kind, output = signals.output()
+    named = [] if signals.time.column is None else [signals.time.column]
+    named += [torque.column for torque in torques] + [output.column] + [mask.column for mask in signals.mask]
+    numbers = table.numeric(named)
+    time_s, period_s = time_base(table, signals.time)
+    masks = {mask: _inside(numbers[mask.column], mask) for mask in signals.mask}
+    flagged = _flagged(table, signals)
+    trusted = np.column_stack(
+        [_trusted(numbers[torque.column], torque.column, masks) & ~flagged for torque in torques]
+    )
+    torque_nm = np.column_stack([numbers[torque.column] * torque.scale for torque in torques])
+    measured = numbers[output.column] * output.scale
+    okay = trusted.all(axis=1) & np.isfinite(measured) & np.logical_and.reduce([~flagged, *masks.values()])
+    _require_samples(table, okay)
+    return Record(
+        name=table.path.stem,
+        sample_time_s=period_s,
+        time_s=time_s,
+        torque_nm=_held(torque_nm, trusted),
+        output=measured,
+        okay=okay,
+        kind=kind,
+        location=output.at,
+    )
+
+
+def _inside(values: FloatArray, mask: MaskRange) -> NDArray[np.bool_]:
+    low = -np.inf if mask.min is None else mask.min
+    high = np.inf if mask.max is None else mask.max
+    inside: NDArray[np.bool_] = (values >= low) & (values <= high)  # NaN is outside
+    return inside
+
+
+def _flagged(table: Table, signals: SignalsConfig) -> NDArray[np.bool_]:
+    if not (signals.is_own_recording and columns.FLAGS in table.columns):
+        return np.zeros(table.n_rows, dtype=np.bool_)
+    flagged: NDArray[np.bool_] = table.numeric([columns.FLAGS])[columns.FLAGS] != 0
+    return flagged
+
+
+def _trusted(values: FloatArray, column: str, masks: dict[MaskRange, NDArray[np.bool_]]) -> NDArray[np.bool_]:
+    own = [inside for mask, inside in masks.items() if mask.column == column]
+    trusted: NDArray[np.bool_] = np.logical_and.reduce([np.isfinite(values), *own])
+    return trusted
+
+
+def _held(torque_nm: FloatArray, trusted: NDArray[np.bool_]) -> FloatArray:
+    """Replace what is not trusted by the last value that is, at the start by the first; all shapes (N, M)."""
+    rows = np.where(trusted, np.arange(torque_nm.shape[0])[:, np.newaxis], -1)
+    last = np.maximum.accumulate(rows, axis=0)
+    first = np.argmax(trusted, axis=0)
+    held: FloatArray = np.take_along_axis(torque_nm, np.where(last < 0, first, last), axis=0)
+    return held
+
+
+def _require_samples(table: Table, okay: NDArray[np.bool_]) -> None:
+    usable = int(okay.sum())
+    if usable < FEWEST_SAMPLES:
+        raise RecordingError(
+            table.path,
+            f"expected {FEWEST_SAMPLES} usable samples or more, came {usable} of {okay.size} rows "
+            "(the others are nan, flagged or masked). Record longer or mend the mask.",
+        )

@@ -1,0 +1,125 @@
+"""``[signals]`` of a model file: which columns of a recording are time, torque and output, and in what unit.
+
+A key left out means the contract's: ``time_s``, ``torque_m1_nm`` and ``torque_m2_nm``, ``speed_rad_s``.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from estimator.signals.record import Location, OutputKind
+from hil.config.problems import Fault, refuse
+from hil.recording import columns
+from hil.recording.format_hints import FormatHints
+
+Column = Annotated[str, Field(min_length=1)]
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class _Scaled(_Strict):
+    """A column times ``scale`` is the SI quantity, reflected to the motor shaft."""
+
+    column: Column
+    scale: float = 1.0
+
+    @model_validator(mode="after")
+    def _scale_is_not_zero(self) -> Self:
+        refuse([Fault("scale", "a number other than 0", self.scale)] if self.scale == 0 else [])
+        return self
+
+
+class TimeSignal(_Strict):
+    """The time of each row [s]: a column times ``scale``, or a fixed period ``sample_time_s``."""
+
+    column: Column | None = None
+    scale: float = Field(default=1.0, gt=0)
+    sample_time_s: float | None = Field(default=None, gt=0)
+
+    @model_validator(mode="after")
+    def _is_one_of_two(self) -> Self:
+        if (self.column is None) == (self.sample_time_s is None):
+            came = "neither" if self.column is None else "both"
+            refuse([Fault("", "either column or sample_time_s", came)])
+        return self
+
+
+class TorqueSignal(_Scaled):
+    """One torque input [Nm; translation N]; the inputs are summed."""
+
+
+class OutputSignal(_Scaled):
+    """The measured output [rad/s, rad, Nm; translation m/s, m, N] and where it is measured."""
+
+    at: Annotated[Location, Field(strict=False)] = Location.MOTOR
+
+
+class MaskRange(_Strict):
+    """Rows whose value in ``column``, as in the file, is outside ``min`` to ``max`` are missing samples."""
+
+    column: Column
+    min: float | None = None
+    max: float | None = None
+
+    @model_validator(mode="after")
+    def _is_a_range(self) -> Self:
+        if self.min is None and self.max is None:
+            refuse([Fault("", "min, max or both", "neither")])
+        elif self.min is not None and self.max is not None and self.min > self.max:
+            refuse([Fault("max", f"{self.min} or more, the value of min", self.max)])
+        return self
+
+
+class SignalsConfig(_Strict):
+    """How a recording is read.
+
+    Attributes
+    ----------
+    torque
+        The inputs; empty for the contract's two.
+    speed, position, force
+        The output: one of them; none for the contract's motor speed.
+    mask
+        Rows that count only inside these ranges.
+    """
+
+    time: TimeSignal = TimeSignal(column=columns.TIME)
+    torque: list[TorqueSignal] = []
+    speed: OutputSignal | None = None
+    position: OutputSignal | None = None
+    force: OutputSignal | None = None
+    mask: list[MaskRange] = []
+    format: FormatHints = FormatHints()
+
+    @model_validator(mode="after")
+    def _has_one_output(self) -> Self:
+        given = [kind.value for kind, _ in self._outputs()]
+        if len(given) > 1:
+            refuse([Fault("", "one of speed, position, force", " and ".join(given))])
+        return self
+
+    def _outputs(self) -> list[tuple[OutputKind, OutputSignal]]:
+        pairs = (
+            (OutputKind.SPEED, self.speed),
+            (OutputKind.POSITION, self.position),
+            (OutputKind.FORCE, self.force),
+        )
+        return [(kind, signal) for kind, signal in pairs if signal is not None]
+
+    @property
+    def is_own_recording(self) -> bool:
+        """True where the torques are the contract's columns: then the contract's ``flags`` count too."""
+        return not self.torque
+
+    def torques(self) -> list[TorqueSignal]:
+        """Return the inputs, the contract's where none are named."""
+        own = [TorqueSignal(column=name) for name in (columns.TORQUE_M1, columns.TORQUE_M2)]
+        return self.torque or own
+
+    def output(self) -> tuple[OutputKind, OutputSignal]:
+        """Return kind and column of the output, the contract's motor speed where none is named."""
+        return next(iter(self._outputs()), (OutputKind.SPEED, OutputSignal(column=columns.SPEED)))

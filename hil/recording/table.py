@@ -1,0 +1,123 @@
+"""What a recording file holds: named columns of equal length, units and metadata; nothing of their meaning.
+
+A column is numeric (float64 or int64) where every cell is a number, else text. Text is kept, for a recording
+may carry columns nobody asks for; it is refused, with its place, when such a column is read as numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hil.errors import RecordingError
+
+Column = NDArray[Any]
+FloatArray = NDArray[np.float64]
+
+LONGEST_CELL = 40
+"""Characters of a wrong cell that a message shows."""
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """The content of one recording.
+
+    Attributes
+    ----------
+    path : Path
+        The file it is from, for messages; its stem is the recording's name.
+    columns : mapping of name to ndarray, shape (N,)
+        float64, int64, or object (text).
+    units : mapping of column name to unit
+        Of the columns whose unit is known; CSV knows none.
+    metadata : mapping of str to str
+        What else the file says of itself; CSV says nothing.
+    first_line : int or None
+        Line of the first row in a text file; None where rows have no lines.
+
+    Raises
+    ------
+    RecordingError
+        If there is no column or no row, or columns differ in length.
+    """
+
+    path: Path
+    columns: Mapping[str, Column]
+    units: Mapping[str, str] = field(default_factory=dict)
+    metadata: Mapping[str, str] = field(default_factory=dict)
+    first_line: int | None = None
+
+    def __post_init__(self) -> None:
+        lengths = {name: column.shape[0] for name, column in self.columns.items()}
+        if not lengths or min(lengths.values()) == 0:
+            raise RecordingError(
+                self.path,
+                "expected columns with at least one row, came none: the file is empty or truncated. "
+                "Record again.",
+            )
+        if len(set(lengths.values())) > 1:
+            listed = ", ".join(f"{name} {length}" for name, length in lengths.items())
+            raise RecordingError(self.path, f"expected columns of one length, came {listed} rows")
+
+    @property
+    def n_rows(self) -> int:
+        """Number of rows, N."""
+        return int(next(iter(self.columns.values())).shape[0])
+
+    def place(self, row: int) -> str:
+        """Name a row (counted from 0) for people: by line of a text file, else by row number from 1."""
+        return f"row {row + 1}" if self.first_line is None else f"line {row + self.first_line}"
+
+    def numeric(self, names: Iterable[str]) -> dict[str, FloatArray]:
+        """Return columns as numbers; NaN marks a missing value.
+
+        Returns
+        -------
+        dict of name to ndarray, shape (N,)
+            float64.
+
+        Raises
+        ------
+        RecordingError
+            With one line for each column that is missing or holds a cell that is no finite number or NaN.
+        """
+        wanted = list(dict.fromkeys(names))
+        problems = [problem for name in wanted if (problem := self._problem(name))]
+        if problems:
+            raise RecordingError(self.path, *problems)
+        return {name: self.columns[name].astype(np.float64) for name in wanted}
+
+    def _problem(self, name: str) -> str | None:
+        column = self.columns.get(name)
+        if column is None:
+            listed = ", ".join(self.columns)
+            return (
+                f"column {name}: missing, the file has {listed}. "
+                "For a foreign recording, name its columns in [signals] of the model file."
+            )
+        row = _first_bad(column)
+        if row is None:
+            return None
+        cell = str(column[row])
+        shown = repr(cell[:LONGEST_CELL]) if cell else "an empty cell"
+        return f"{self.place(row)}, column {name}: expected a finite number or nan, came {shown}"
+
+
+def _first_bad(column: Column) -> int | None:
+    """Find the first cell that is neither a finite number nor NaN; None where all are."""
+    if column.dtype == object:
+        return next((row for row, cell in enumerate(column) if not _is_number(cell)), None)
+    infinite = np.flatnonzero(np.isinf(column)) if column.dtype.kind == "f" else np.empty(0)
+    return int(infinite[0]) if infinite.size else None
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        return not np.isinf(float(cell))
+    except ValueError:
+        return False

@@ -1,0 +1,121 @@
+"""A recording as it is made: every sample leaves the program at once, the file gets its name when whole.
+
+While the run goes on, rows stand in ``<stem>.part.csv`` beside the target, one line each, handed to the
+operating system line by line. When the run ends, in any way Python can still act on (end, error, Ctrl-C), the
+rows become the recording, in its own format. What a harder end leaves:
+
+- killed process: the part file with every appended sample; it is a recording itself and can be read as it is;
+- power failure: the part file without what the operating system had not yet written (on Linux up to about
+  30 s), perhaps with a torn last line, which readers refuse by its number.
+
+Parquet could not do that itself: without its footer, written last, it can't be read at all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Self, TextIO
+
+from hil.errors import RecordingError
+from hil.recording import columns
+from hil.recording.formats import read_table, write_table, writer_for
+from hil.recording.table import Table
+from hil.rig.sample import Sample
+
+CSV = ".csv"
+
+
+class RecordingWriter:
+    """Write the samples of one run; a context manager.
+
+    A run without a sample leaves no file.
+
+    Parameters
+    ----------
+    path : Path or str
+        The recording to make; its suffix chooses the format.
+    metadata : mapping of str to str
+        What the recording shall say of itself; CSV has no place for it.
+
+    Raises
+    ------
+    RecordingError
+        On entry: if the name is taken, also by the part file of a run that was killed, or can't be written.
+    """
+
+    def __init__(self, path: Path | str, metadata: Mapping[str, str] | None = None) -> None:
+        self.path = Path(path)
+        self.part_path = self.path.with_name(f"{self.path.stem}.part{CSV}")
+        self.n_samples = 0
+        self._metadata = dict(metadata or {})
+        self._file: TextIO | None = None
+
+    def __enter__(self) -> Self:
+        writer_for(self.path)
+        try:
+            # Line-buffered: each row reaches the operating system when it is appended.
+            self._file = self.part_path.open("x", buffering=1, encoding="utf-8", newline="\n")
+        except FileExistsError as error:
+            raise RecordingError(
+                self.part_path,
+                "expected no such file, came one left by a run that was killed. "
+                "It is a recording up to that moment: rename it to keep it, or remove it.",
+            ) from error
+        except OSError as error:
+            raise RecordingError(self.path, f"expected a place to write, came: {error.strerror}") from error
+        self._file.write(",".join(columns.UNITS) + "\n")
+        return self
+
+    def append(self, sample: Sample) -> None:
+        """Write one sample.
+
+        Raises
+        ------
+        RecordingError
+            If the writer is not open.
+        """
+        if self._file is None:
+            raise RecordingError(
+                self.path, "expected an open writer, came one that is closed. Use it by 'with'."
+            )
+        self._file.write(_row(sample))
+        self.n_samples += 1
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Make the recording of what has been appended, however the run ended."""
+        if self._file is None:
+            return
+        self._file.close()
+        self._file = None
+        if self.n_samples == 0:
+            self.part_path.unlink()
+        else:
+            self._publish()
+
+    def _publish(self) -> None:
+        if self.path.suffix.lower() == CSV:
+            writer_for(self.path)
+            self.part_path.rename(self.path)
+            return
+        rows = read_table(self.part_path)
+        write_table(Table(self.path, rows.columns, columns.UNITS, self._metadata), self.path)
+        self.part_path.unlink()
+
+
+def _row(sample: Sample) -> str:
+    """Format one row in the order of ``columns.UNITS``."""
+    floats = (
+        sample.time_s,
+        sample.torque_ref_nm,
+        sample.torque_m1_nm,
+        sample.torque_m2_nm,
+        sample.speed_rad_s,
+        sample.prbs_nm,
+    )
+    references = (sample.torque_ref_m1_nm, sample.torque_ref_m2_nm, sample.age_ns / 1e9)
+    cells = [*(repr(float(x)) for x in floats), str(int(sample.flags)), *(repr(float(x)) for x in references)]
+    return ",".join(cells) + "\n"

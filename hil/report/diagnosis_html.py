@@ -1,0 +1,263 @@
+"""``report.html``: a diagnosis as one self-contained page.
+
+From the top: verdict and statement, the fit in figures, where the mismatch is, the physics found with its law
+and sizes, the recordings with their simulations and errors, the rivals and why each lost, what these tests
+can't tell, and the parameters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+
+import numpy as np
+
+from estimator.diagnosis.result import Diagnosis, FoundEffect, Interval, Trace
+from estimator.physics.catalogue import EFFECTS
+from estimator.signals.record import FloatArray
+from hil.report import page as html
+from hil.report.figures import (
+    Line,
+    Panel,
+    Style,
+    band_figure,
+    input_lines,
+    spectrum_figure,
+    stretches_for,
+    time_figure,
+)
+from hil.report.numbers import shown, shown_interval, shown_p, shown_ratio, shown_times
+from hil.report.wording import BADGES, ELEMENTS, headline, listed, location_rows, quantity, torque_axis
+
+MOST_DRAWN = 20
+"""Recordings drawn at most; beyond, those with the largest error of the re-tuned model."""
+
+WHOLE = 0.95
+"""From this share on, a mismatch is everywhere in a recording."""
+
+RETUNED = "nominal re-tuned"
+AUGMENTED = "augmented"
+KEPT_BACK = "stretches kept back as unseen data"
+
+
+def diagnosis_page(diagnosis: Diagnosis) -> str:
+    """Return the text of the page."""
+    body = [
+        _top(diagnosis),
+        _fit(diagnosis),
+        _location(diagnosis),
+        _found(diagnosis),
+        *_recordings(diagnosis),
+        _rivals(diagnosis),
+        _untestable(diagnosis),
+        _parameters(diagnosis),
+    ]
+    seconds = shown(diagnosis.timing_s.get("total", float("nan")), "s")
+    return html.page(
+        f"Diagnosis: {headline(diagnosis)}",
+        (piece for piece in body if piece),
+        f"hil diagnose, computed in {seconds}. Errors are those of free-run simulations: measured torque in, "
+        "nothing fed back; constant load torque and initial state estimated in each recording.",
+    )
+
+
+def _top(diagnosis: Diagnosis) -> str:
+    verdict, fit = diagnosis.verdict, diagnosis.fit
+    training = [trace.name for trace in diagnosis.traces if not trace.holdout]
+    held_out = len(diagnosis.traces) - len(training)
+    warnings = "".join(html.paragraph(f"Note: {text}", "warning") for text in diagnosis.warnings)
+    figures = html.tiles(
+        [
+            (
+                "error before",
+                shown(fit.retuned, fit.unit),
+                f"model re-tuned, {shown_ratio(fit.retuned, fit.noise_floor)} noise floor",
+            ),
+            (
+                "error after",
+                shown(fit.augmented, fit.unit),
+                f"augmented model, {shown_ratio(fit.augmented, fit.noise_floor)} noise floor",
+            ),
+            (
+                "on unseen data",
+                shown(fit.holdout_augmented, fit.unit),
+                f"before: {shown(fit.holdout_retuned, fit.unit)}",
+            ),
+            ("recordings", str(len(training)), f"and {held_out} held out" if held_out else KEPT_BACK),
+        ]
+    )
+    return (
+        f'<header class="top {verdict.value}">\n'
+        f'<span class="badge {verdict.value}">{BADGES[verdict]}</span>\n'
+        f"<h1>{escape(headline(diagnosis))}</h1>\n"
+        + html.paragraph(diagnosis.statement, "statement")
+        + warnings
+        + figures
+        + "\n</header>"
+    )
+
+
+def _fit(diagnosis: Diagnosis) -> str:
+    fit = diagnosis.fit
+    rows = (
+        ("nominal, as given", fit.nominal, float("nan"), ""),
+        ("nominal, re-tuned", fit.retuned, fit.holdout_retuned, "before"),
+        ("augmented", fit.augmented, fit.holdout_augmented, "after"),
+        ("noise floor", fit.noise_floor, float("nan"), "floor"),
+    )
+    largest = np.nanmax([value for _, value, _, _ in rows])
+    cells = [
+        [
+            escape(name),
+            shown(value),
+            shown_ratio(value, fit.noise_floor),
+            shown(unseen),
+            html.bar(value / largest if largest > 0 and np.isfinite(value) else 0.0, kind),
+        ]
+        for name, value, unseen, kind in rows
+    ]
+    headings = ("model", f"RMS error [{fit.unit}]", "to noise floor", f"on unseen data [{fit.unit}]", "")
+    return html.section("Fit", html.html_table(headings, cells, numbers=(1, 2, 3)))
+
+
+def _location(diagnosis: Diagnosis) -> str:
+    if not diagnosis.mismatch.detected:
+        return ""
+    return html.section(
+        "Where simulation and recording differ", html.table(("", ""), location_rows(diagnosis.mismatch))
+    )
+
+
+def _found(diagnosis: Diagnosis) -> str:
+    if not diagnosis.effects:
+        return ""
+    pieces = [piece for effect in diagnosis.effects for piece in _effect(effect)]
+    return html.section("The physics found", *pieces)
+
+
+def _effect(effect: FoundEffect) -> list[str]:
+    evidence = effect.evidence
+    pieces = [
+        f"<h3>{escape(effect.name)} <small>({ELEMENTS[effect.element]})</small></h3>",
+        html.paragraph(effect.statement),
+    ]
+    if entry := EFFECTS.get(effect.name):
+        pieces += [html.paragraph(entry.law, "law"), html.paragraph(f"Law: {entry.source}", "note")]
+    if effect.parameters:
+        rows = [(name, shown(p.value), shown_interval(p.ci95), p.unit) for name, p in effect.parameters.items()]
+        pieces.append(html.table(("parameter", "value", "95 % interval", "unit"), rows, numbers=(1, 2)))
+    pieces.append(
+        html.paragraph(
+            f"Evidence: information criterion better by {shown(evidence.delta_bic)}; error on unseen data "
+            f"{shown(evidence.holdout_rms_before)} → {shown(evidence.holdout_rms_after)}; "
+            f"p = {shown_p(evidence.p_value)}."
+        )
+    )
+    pieces += [
+        html.paragraph(f"Acts in {name}: {shown_times(spans)}.") for name, spans in effect.time_s.items() if spans
+    ]
+    if effect.indistinguishable_from:
+        rivals = listed(effect.indistinguishable_from)
+        pieces.append(html.paragraph(f"These recordings can't tell it from {rivals}.", "warning"))
+    for number, (name, profile) in enumerate(effect.profiles.items()):
+        pieces.append(f"<h3>{escape(effect.name)} over time in {escape(name)}</h3>")
+        div = f"profile-{effect.name}-{number}"
+        axis = f"{effect.name} [{profile.unit}]"
+        pieces.append(band_figure(div, profile.time_s, profile.value, profile.low, profile.high, axis))
+    return pieces
+
+
+def _recordings(diagnosis: Diagnosis) -> list[str]:
+    traces = sorted(diagnosis.traces, key=lambda trace: _rms(trace.retuned - trace.measured), reverse=True)
+    drawn = set(map(id, traces[:MOST_DRAWN]))
+    stretches = stretches_for(len(drawn))
+    kept = [trace for trace in diagnosis.traces if id(trace) in drawn]
+    sections = [_recording(diagnosis, trace, i, stretches) for i, trace in enumerate(kept)]
+    left_out = len(diagnosis.traces) - len(drawn)
+    if left_out:
+        text = f"{left_out} more recordings, with smaller errors of the re-tuned model, are not drawn."
+        sections.append(html.section("More recordings", html.paragraph(text, "note")))
+    return sections
+
+
+def _rms(error: FloatArray) -> float:
+    finite = error[np.isfinite(error)]
+    return float(np.sqrt(np.mean(finite**2))) if finite.size else 0.0
+
+
+def _recording(diagnosis: Diagnosis, trace: Trace, number: int, stretches: int) -> str:
+    fit = diagnosis.fit
+    measured = np.where(trace.okay, trace.measured, np.nan)
+    before, after = measured - trace.retuned, measured - trace.augmented
+    inputs = input_lines(trace.torque_nm)
+    errors = (Line(RETUNED, before, Style.BEFORE), Line(AUGMENTED, after, Style.AFTER))
+    panels = (
+        Panel(torque_axis(diagnosis.augmented.motion), inputs),
+        Panel(
+            f"{quantity(fit.unit)} [{fit.unit}]",
+            (
+                Line("measured", measured, Style.MEASURED),
+                Line("nominal as given", trace.nominal, Style.NOMINAL, hidden=True),
+                Line(RETUNED, trace.retuned, Style.BEFORE),
+                Line(AUGMENTED, trace.augmented, Style.AFTER),
+            ),
+        ),
+        Panel(f"error [{fit.unit}]", errors, band=fit.noise_floor),
+    )
+    shaded = _worth_marking(trace, diagnosis.mismatch.time_s.get(trace.name, ()))
+    sample_time_s = float(np.median(np.diff(trace.time_s)))
+    kind = "held out" if trace.holdout else "used for the fit"
+    figures = f"RMS error {shown(_rms(before))} → {shown(_rms(after))} {fit.unit}; {kind}."
+    marked = " Shaded: where the mismatch is." if shaded else ""
+    return html.section(
+        f"Recording {trace.name}",
+        html.paragraph(
+            f"{figures} Drag to zoom, double click to go back; the dotted pair of lines is the noise floor.{marked}",
+            "note",
+        ),
+        time_figure(f"time-{number}", trace.time_s, panels, stretches, shaded),
+        "<h3>Spectrum of the error</h3>",
+        spectrum_figure(f"spectrum-{number}", sample_time_s, errors, fit.unit),
+    )
+
+
+def _worth_marking(trace: Trace, spans: Sequence[Interval]) -> Sequence[Interval]:
+    """Return the intervals to shade: none where they are the whole recording, which tells nothing."""
+    covered = sum(high - low for low, high in spans)
+    return spans if covered < WHOLE * float(trace.time_s[-1] - trace.time_s[0]) else ()
+
+
+def _rivals(diagnosis: Diagnosis) -> str:
+    if not diagnosis.rejected:
+        return ""
+    rows = [(rival.name, rival.reason, shown(rival.delta_bic)) for rival in diagnosis.rejected]
+    return html.section(
+        "Rivals, and why each lost",
+        html.table(("effect", "why it lost", "ΔBIC to the explanation"), rows, numbers=(2,)),
+    )
+
+
+def _untestable(diagnosis: Diagnosis) -> str:
+    if not diagnosis.untestable:
+        return ""
+    rows = [(entry.name, entry.reason, entry.suggested_test) for entry in diagnosis.untestable]
+    return html.section(
+        "What these recordings can't tell", html.table(("effect", "why", "a test that would tell"), rows)
+    )
+
+
+def _parameters(diagnosis: Diagnosis) -> str:
+    rows = [
+        (name, shown(p.nominal), shown(p.value), shown_interval(p.ci95), _change(p.nominal, p.value), p.unit)
+        for name, p in diagnosis.parameters.items()
+    ]
+    rows += [
+        (f"constant load in {name}", "–", shown(load.value), shown_interval(load.ci95), "–", load.unit)
+        for name, load in diagnosis.load_torque.items()
+    ]
+    headings: Sequence[str] = ("parameter", "nominal", "found", "95 % interval", "change", "unit")
+    return html.section("Parameters of the model", html.table(headings, rows, numbers=(1, 2, 3, 4)))
+
+
+def _change(nominal: float, value: float) -> str:
+    return f"{100 * (value / nominal - 1):+.1f} %" if nominal else "–"

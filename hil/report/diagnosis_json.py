@@ -1,0 +1,143 @@
+"""``diagnosis.json`` (CONTRACT, schema ``hil.diagnosis/1``): a Diagnosis for scripts.
+
+Keys beyond the contract: ``warnings``, and ``profiles`` in an effect that was found as a course over time.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from estimator.diagnosis.result import (
+    Diagnosis,
+    Estimated,
+    Evidence,
+    Fit,
+    FoundEffect,
+    Interval,
+    Mismatch,
+    Profile,
+    RejectedEffect,
+    Retuned,
+)
+from hil.report.numbers import json_number
+
+SCHEMA = "hil.diagnosis/1"
+
+Json = dict[str, Any]
+
+
+def diagnosis_text(diagnosis: Diagnosis) -> str:
+    """Return the text of the file."""
+    return json.dumps(diagnosis_json(diagnosis), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def diagnosis_json(diagnosis: Diagnosis) -> Json:
+    """Return the content of the file; a number that is not finite is None."""
+    return {
+        "schema": SCHEMA,
+        "verdict": diagnosis.verdict.value,
+        "statement": diagnosis.statement,
+        "mismatch": _mismatch(diagnosis.mismatch),
+        "effects": [_effect(effect) for effect in diagnosis.effects],
+        "rejected": [_rejected(rival) for rival in diagnosis.rejected],
+        "untestable": [
+            {"name": entry.name, "reason": entry.reason, "suggested_test": entry.suggested_test}
+            for entry in diagnosis.untestable
+        ],
+        "fit": _fit(diagnosis.fit),
+        "parameters": {name: _retuned(value) for name, value in diagnosis.parameters.items()},
+        "load_torque": {name: _estimated(value) for name, value in diagnosis.load_torque.items()},
+        "timing_s": {name: json_number(value) for name, value in diagnosis.timing_s.items()},
+        "warnings": list(diagnosis.warnings),
+    }
+
+
+def _numbers(values: Iterable[float]) -> list[float | None]:
+    return [json_number(float(value)) for value in values]
+
+
+def _times(time_s: Mapping[str, Iterable[Interval]]) -> Json:
+    return {name: [_numbers(interval) for interval in intervals] for name, intervals in time_s.items()}
+
+
+def _mismatch(mismatch: Mismatch) -> Json:
+    region = mismatch.region
+    return {
+        "detected": mismatch.detected,
+        "element": None if mismatch.element is None else mismatch.element.value,
+        "time_s": _times(mismatch.time_s),
+        "band_hz": None if mismatch.band_hz is None else _numbers(mismatch.band_hz),
+        "region": None
+        if region is None
+        else {"signal": region.signal, "low": json_number(region.low), "high": json_number(region.high)},
+        "p_value": json_number(mismatch.p_value),
+    }
+
+
+def _effect(effect: FoundEffect) -> Json:
+    content = {
+        "name": effect.name,
+        "element": effect.element.value,
+        "statement": effect.statement,
+        "parameters": {name: _estimated(value) for name, value in effect.parameters.items()},
+        "time_s": _times(effect.time_s),
+        "indistinguishable_from": list(effect.indistinguishable_from),
+        "evidence": _evidence(effect.evidence),
+    }
+    if effect.profiles:
+        content["profiles"] = {name: _profile(profile) for name, profile in effect.profiles.items()}
+    return content
+
+
+def _estimated(estimated: Estimated) -> Json:
+    return {
+        "value": json_number(estimated.value),
+        "ci95": _numbers(estimated.ci95),
+        "unit": estimated.unit,
+    }
+
+
+def _retuned(parameter: Retuned) -> Json:
+    return {
+        "nominal": json_number(parameter.nominal),
+        "value": json_number(parameter.value),
+        "ci95": _numbers(parameter.ci95),
+        "unit": parameter.unit,
+    }
+
+
+def _evidence(evidence: Evidence) -> Json:
+    return {
+        "delta_bic": json_number(evidence.delta_bic),
+        "holdout_rms_before": json_number(evidence.holdout_rms_before),
+        "holdout_rms_after": json_number(evidence.holdout_rms_after),
+        "p_value": json_number(evidence.p_value),
+    }
+
+
+def _profile(profile: Profile) -> Json:
+    return {
+        "time_s": _numbers(profile.time_s),
+        "value": _numbers(profile.value),
+        "low": _numbers(profile.low),
+        "high": _numbers(profile.high),
+        "unit": profile.unit,
+    }
+
+
+def _rejected(rival: RejectedEffect) -> Json:
+    return {"name": rival.name, "reason": rival.reason, "delta_bic": json_number(rival.delta_bic)}
+
+
+def _fit(fit: Fit) -> Json:
+    return {
+        "unit": fit.unit,
+        "nominal": json_number(fit.nominal),
+        "retuned": json_number(fit.retuned),
+        "augmented": json_number(fit.augmented),
+        "holdout_retuned": json_number(fit.holdout_retuned),
+        "holdout_augmented": json_number(fit.holdout_augmented),
+        "noise_floor": json_number(fit.noise_floor),
+    }

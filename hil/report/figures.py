@@ -1,0 +1,195 @@
+"""Plotly figures as pieces of HTML: signals over time in panels that zoom together, and spectra.
+
+Colours are of the set of Okabe and Ito (2008), told apart by people with any common colour blindness. A model
+has one colour throughout, in the signals, their errors and the spectra.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+import plotly.graph_objects as go
+import scipy.signal
+from plotly.offline import get_plotlyjs
+from plotly.subplots import make_subplots
+
+from estimator.signals.record import FloatArray
+from hil.report.decimate import extremes
+
+Interval = tuple[float, float]
+
+
+class Style(Enum):
+    """Colour, width and dash of a line."""
+
+    MEASURED = ("#b4bac1", 4.5, "solid")  # wide and pale, under the simulations
+    NOMINAL = ("#666666", 1.2, "dot")
+    BEFORE = ("#d55e00", 1.3, "solid")
+    AFTER = ("#0072b2", 1.3, "solid")
+    FIRST_INPUT = ("#222222", 1.2, "solid")
+    SECOND_INPUT = ("#009e73", 1.2, "dash")
+    THIRD_INPUT = ("#cc79a7", 1.2, "dot")
+
+
+INPUT_STYLES = (Style.FIRST_INPUT, Style.SECOND_INPUT, Style.THIRD_INPUT)
+
+SHADE = "#e69f00"
+PANEL_PX = 230
+LEGEND_PX = 130
+AXIS_TITLE_PX = 54
+CONFIG = {"responsive": True, "displaylogo": False, "modeBarButtonsToRemove": ["select2d", "lasso2d"]}
+
+SPECTRUM_SEGMENTS = 6
+"""A recording is cut into about this many segments for Welch's average, which smooths the spectrum."""
+
+SHORTEST_SEGMENT = 256
+LONGEST_SEGMENT = 4096
+
+DRAWN_STRETCHES = 11_000
+"""Shared by the recordings of a page: eight lines of two points per stretch keep it under 10 MB."""
+
+LONGEST_STRETCHES = 1500
+"""More points than pixels of a wide screen show nothing more."""
+
+TORQUE_NAMES = ("T_M1", "T_M2")
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """One line of a panel; ``y`` has shape (N,), NaN is a gap. A ``hidden`` one waits in the legend."""
+
+    name: str
+    y: FloatArray
+    style: Style
+    hidden: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Panel:
+    """Lines that share an axis; ``band`` draws a pair of limits at plus and minus this value."""
+
+    axis: str
+    lines: tuple[Line, ...]
+    band: float | None = None
+
+
+def stretches_for(recordings: int) -> int:
+    """Return how finely each of so many recordings is drawn; see :func:`hil.report.decimate.extremes`."""
+    return min(LONGEST_STRETCHES, DRAWN_STRETCHES // max(1, recordings))
+
+
+def input_lines(torque_nm: FloatArray) -> tuple[Line, ...]:
+    """Name and style the inputs of a recording; ``torque_nm`` has shape (N, M)."""
+    count = torque_nm.shape[1]
+    names = TORQUE_NAMES if count == len(TORQUE_NAMES) else [f"input {i + 1}" for i in range(count)]
+    return tuple(
+        Line("input" if count == 1 else name, torque_nm[:, i], INPUT_STYLES[i % len(INPUT_STYLES)])
+        for i, name in enumerate(names)
+    )
+
+
+def plotly_script() -> str:
+    """Return plotly itself as a script element, to stand in the page once."""
+    return f"<script>{get_plotlyjs()}</script>"
+
+
+def time_figure(
+    name: str,
+    time_s: FloatArray,
+    panels: Sequence[Panel],
+    stretches: int,
+    shaded: Sequence[Interval] = (),
+) -> str:
+    """Draw panels over a common time axis.
+
+    Parameters
+    ----------
+    name : str
+        Unique in the page.
+    time_s : ndarray, shape (N,)
+        Time [s].
+    stretches : int
+        See :func:`hil.report.decimate.extremes`.
+    shaded : sequence of (float, float)
+        Intervals of time to mark [s].
+    """
+    figure = make_subplots(rows=len(panels), cols=1, shared_xaxes=True, vertical_spacing=0.04)
+    seen: set[str] = set()
+    for row, panel in enumerate(panels, start=1):
+        for line in panel.lines:
+            kept = extremes(line.y, stretches)
+            trace = _scatter(line, time_s[kept], line.y[kept], first=line.name not in seen)
+            figure.add_trace(trace, row=row, col=1)
+            seen.add(line.name)
+        figure.update_yaxes(title_text=panel.axis, row=row, col=1)
+        for limit in () if panel.band is None else (-panel.band, panel.band):
+            figure.add_hline(y=limit, line={"color": "#777777", "width": 1, "dash": "dot"}, row=row, col=1)
+    for low, high in shaded:
+        figure.add_vrect(x0=low, x1=high, fillcolor=SHADE, opacity=0.25, line_width=0, layer="below")
+    figure.update_xaxes(title_text="time [s]", row=len(panels), col=1)
+    return _html(figure, name, PANEL_PX * len(panels) + LEGEND_PX)
+
+
+def spectrum_figure(name: str, sample_time_s: float, lines: Sequence[Line], unit: str) -> str:
+    """Draw amplitude spectral densities (Welch, Hann window); a gap counts as zero error."""
+    figure = go.Figure()
+    for line in lines:
+        length = min(line.y.size, max(SHORTEST_SEGMENT, min(LONGEST_SEGMENT, line.y.size // SPECTRUM_SEGMENTS)))
+        frequency, power = scipy.signal.welch(
+            np.nan_to_num(line.y), fs=1.0 / sample_time_s, nperseg=length, detrend="constant"
+        )
+        figure.add_trace(_scatter(line, frequency[1:], np.sqrt(power[1:]), first=True))
+    decades = {
+        "type": "log",
+        "dtick": 1,
+        "exponentformat": "power",
+        "minor": {"dtick": "D1", "showgrid": True},
+    }
+    figure.update_xaxes(title_text="frequency [Hz]", **decades)
+    figure.update_yaxes(title_text=f"{unit}/√Hz", **decades)
+    return _html(figure, name, PANEL_PX + LEGEND_PX)
+
+
+def band_figure(name: str, x: FloatArray, y: FloatArray, low: FloatArray, high: FloatArray, axis: str) -> str:
+    """Draw a course over time with its confidence band; all shapes (K,)."""
+    figure = go.Figure()
+    colour, width, _ = Style.AFTER.value
+    edge = {"mode": "lines", "line": {"width": 0, "color": colour}, "showlegend": False, "hoverinfo": "skip"}
+    figure.add_trace(go.Scatter(x=x, y=low, **edge))
+    figure.add_trace(go.Scatter(x=x, y=high, fill="tonexty", fillcolor="rgba(0,114,178,0.2)", **edge))
+    figure.add_trace(
+        go.Scatter(x=x, y=y, mode="lines", line={"color": colour, "width": width}, name="found, 95 % band")
+    )
+    figure.update_xaxes(title_text="time [s]")
+    figure.update_yaxes(title_text=axis)
+    return _html(figure, name, PANEL_PX + LEGEND_PX)
+
+
+def _scatter(line: Line, x: FloatArray, y: FloatArray, *, first: bool) -> go.Scatter:
+    colour, width, dash = line.style.value
+    return go.Scatter(
+        x=x.astype(np.float32) if x.size > 1 and np.ptp(x) < 1e3 else x,
+        y=y.astype(np.float32),
+        name=line.name,
+        legendgroup=line.name,
+        showlegend=first,
+        mode="lines",
+        line={"color": colour, "width": width, "dash": dash},
+        visible="legendonly" if line.hidden else True,
+    )
+
+
+def _html(figure: go.Figure, name: str, height_px: int) -> str:
+    figure.update_layout(
+        template="plotly_white",
+        height=height_px,
+        margin={"l": 64, "r": 12, "t": 34, "b": LEGEND_PX - 34},
+        legend={"orientation": "h", "yanchor": "top", "y": -AXIS_TITLE_PX / (height_px - LEGEND_PX), "x": 0},
+        hovermode="x unified",
+        font={"family": "system-ui, sans-serif", "size": 13},
+    )
+    html: str = figure.to_html(full_html=False, include_plotlyjs=False, config=CONFIG, div_id=name)
+    return html

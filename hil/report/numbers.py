@@ -1,0 +1,61 @@
+"""How numbers are shown to people and written for programs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+JSON_DIGITS = 10
+"""Significant digits in JSON: more than any estimate here carries, without the noise of the last bits."""
+
+SHOWN_DIGITS = 4
+
+LARGEST_RATIO = 1000
+
+SMALLEST_P = 1e-300
+"""Below this a probability is a number that underflowed."""
+
+
+def json_number(value: float) -> float | None:
+    """Round for JSON; NaN and infinity, which JSON has not, become None."""
+    if not math.isfinite(value):
+        return None
+    rounded = float(f"{value:.{JSON_DIGITS}g}")
+    return rounded if math.isfinite(rounded) else value  # the largest doubles round beyond their range
+
+
+def shown(value: float, unit: str = "") -> str:
+    """Format a number for a table: four significant digits and its unit, a dash where there is none."""
+    if not math.isfinite(value):
+        return "–"
+    magnitude = abs(value)
+    digits = f"{value:.{SHOWN_DIGITS}g}"
+    if 1e4 <= magnitude < 1e6:
+        digits = f"{value:.0f}"
+    return f"{digits} {unit}".rstrip()
+
+
+def shown_interval(interval: tuple[float, float]) -> str:
+    """Format an interval, for example ``0.02 … 0.022``."""
+    low, high = interval
+    return f"{shown(low)} … {shown(high)}"
+
+
+def shown_p(value: float) -> str:
+    """Format a probability."""
+    if not math.isfinite(value):
+        return "–"
+    return f"< {SMALLEST_P:.0e}" if value < SMALLEST_P else f"{value:.2g}"
+
+
+def shown_ratio(value: float, reference: float) -> str:
+    """Format a value as a multiple of a reference; beyond a thousand the multiple itself says nothing."""
+    if not (math.isfinite(value) and reference > 0):
+        return "–"
+    ratio = value / reference
+    return f"{ratio:.3g} ×" if ratio <= LARGEST_RATIO else f"> {LARGEST_RATIO} ×"
+
+
+def shown_times(intervals: Iterable[tuple[float, float]]) -> str:
+    """Format time intervals [s]."""
+    return ", ".join(f"{low:.4g} to {high:.4g} s" for low, high in intervals)

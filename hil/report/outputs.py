@@ -1,0 +1,44 @@
+"""Results of a command in a folder: all files are made beside it first and moved in when each is whole."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from hil.errors import UsageError
+
+
+def require_folder(folder: Path) -> None:
+    """Refuse a folder that can't be written to, before anything is computed.
+
+    Raises
+    ------
+    UsageError
+        If the name, or one above it, is that of a file, or writing is not allowed there.
+    """
+    existing = next(parent for parent in (folder, *folder.absolute().parents) if parent.exists())
+    if not existing.is_dir():
+        raise UsageError(f"{folder}: expected a folder to write into, came {existing}, which is a file")
+    if not os.access(existing, os.W_OK):
+        raise UsageError(f"{folder}: expected a folder to write into, came {existing}, which is read-only")
+
+
+def publish(folder: Path, files: Mapping[str, Callable[[Path], object]]) -> None:
+    """Make files and move them into a folder; what was there under the same name is replaced.
+
+    Parameters
+    ----------
+    folder
+        Made where it is not there.
+    files
+        File name to what writes it, given the path to write to.
+    """
+    require_folder(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=folder, prefix=".unfinished-") as workshop:
+        for name, write in files.items():
+            write(Path(workshop) / name)
+        for name in files:
+            (Path(workshop) / name).replace(folder / name)

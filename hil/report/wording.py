@@ -1,0 +1,97 @@
+"""The words a report uses for verdicts, elements and quantities; one place for page and terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from types import MappingProxyType
+
+from estimator.diagnosis.result import Diagnosis, Mismatch, Verdict
+from estimator.physics.catalogue import EFFECTS
+from estimator.physics.effect import Element
+from estimator.physics.model import Motion, unit
+from estimator.signals.record import OutputKind
+from hil.report.numbers import shown, shown_p, shown_times
+
+BADGES = MappingProxyType(
+    {
+        Verdict.EXPLAINED: "✓ explained",
+        Verdict.UNEXPLAINED: "? mismatch, not explained",
+        Verdict.NO_MISMATCH: "= no mismatch",
+    }
+)
+
+ELEMENTS = MappingProxyType(
+    {
+        Element.TORQUE_PATH: "torque path",
+        Element.MOTOR: "motor",
+        Element.SHAFT: "shaft",
+        Element.LOAD: "load",
+        Element.SPEED_SENSOR: "speed sensor",
+        Element.ACQUISITION: "acquisition",
+    }
+)
+
+_QUANTITIES = MappingProxyType(
+    {"rad/s": "speed", "m/s": "speed", "rad": "position", "m": "position", "Nm": "torque", "N": "force"}
+)
+
+
+def quantity(output_unit: str) -> str:
+    """Name a measured output by its unit."""
+    return _QUANTITIES.get(output_unit, "output")
+
+
+_DIMENSIONS = MappingProxyType({OutputKind.SPEED: "speed", OutputKind.POSITION: "angle", OutputKind.FORCE: "torque"})
+
+
+def output_unit(kind: OutputKind, motion: Motion) -> str:
+    """Return the unit of a measured output, for example ``rad/s``."""
+    return unit(_DIMENSIONS[kind], motion)
+
+
+def simulated_column(kind: OutputKind, motion: Motion) -> str:
+    """Name the column of a simulated output by its unit, for example ``speed_sim_rad_s`` (CONTRACT)."""
+    suffix = output_unit(kind, motion).lower().replace("/", "_")
+    return f"{kind.value}_sim_{suffix}"
+
+
+def torque_axis(motion: Motion) -> str:
+    """Name the input and its unit."""
+    return f"{'torque' if motion is Motion.ROTATION else 'force'} [{unit('torque', motion)}]"
+
+
+def headline(diagnosis: Diagnosis) -> str:
+    """Say the verdict in one line."""
+    found = [_title(effect.name) for effect in diagnosis.effects]
+    if diagnosis.verdict is Verdict.EXPLAINED:
+        return f"Missing in the model: {listed(found)}"
+    if diagnosis.verdict is Verdict.NO_MISMATCH:
+        return "Nothing is missing: the nominal model, re-tuned, explains the recordings"
+    if found:
+        return f"Missing in the model: {listed(found)}, and more that no entry of the catalogue explains"
+    return "Something is missing that no entry of the catalogue explains"
+
+
+def _title(name: str) -> str:
+    return EFFECTS[name].title if name in EFFECTS else name.replace("_", " ")
+
+
+def listed(words: Sequence[str]) -> str:
+    """Join words as in a sentence."""
+    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+
+
+def location_rows(mismatch: Mismatch) -> list[tuple[str, str]]:
+    """List where the mismatch is, as far as it is known: what, and its value."""
+    rows = []
+    if mismatch.element is not None:
+        rows.append(("element", ELEMENTS[mismatch.element]))
+    if mismatch.band_hz is not None:
+        low, high = mismatch.band_hz
+        rows.append(("frequency", f"{shown(low)} to {shown(high)} Hz"))
+    if mismatch.region is not None:
+        region = mismatch.region
+        rows.append((f"where {region.signal} is", f"from {shown(region.low)} to {shown(region.high)}"))
+    rows += [(f"time in {name}", shown_times(spans)) for name, spans in mismatch.time_s.items() if spans]
+    rows.append(("p-value of the re-tuned model", shown_p(mismatch.p_value)))
+    return rows

@@ -1,0 +1,89 @@
+"""``hil compare``: the figures are those of the noise, wrong input leaves nothing."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hil.cli.main import run
+from tests.cli import bench
+
+NOISE = 0.05
+
+
+@pytest.fixture
+def inputs(tmp_path: Path) -> list[str]:
+    bench.record(tmp_path / "run_1.csv", 1, noise=NOISE)
+    bench.record(tmp_path / "run_2.csv", 2, noise=2 * NOISE)
+    return [
+        str(bench.model(tmp_path / "drive.toml")),
+        str(tmp_path / "run_1.csv"),
+        str(tmp_path / "run_2.csv"),
+    ]
+
+
+def test_the_right_model_is_off_by_the_noise(inputs: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["compare", *inputs, "--json"]) == 0
+    content = json.loads(capsys.readouterr().out)
+    assert content["schema"] == "hil.compare/1"
+    for name, noise, truth in (("run_1", NOISE, 1), ("run_2", 2 * NOISE, 2)):
+        figures = content["recordings"][name]
+        assert figures["unit"] == "rad/s"
+        assert figures["rms"] == pytest.approx(noise, rel=0.06)  # 3 sigma of a spread from 1500 samples
+        assert 3 * noise < figures["largest"] < 6 * noise
+        spread = np.std(bench.record(Path(inputs[truth]), truth, noise=noise))
+        assert figures["fit_percent"] == pytest.approx(100 * (1 - noise / spread), abs=0.2)
+        assert figures["load_torque"] == pytest.approx(bench.LOAD, abs=0.02)
+        assert (figures["samples_used"], figures["samples"]) == (1500, 1500)
+
+
+def test_figures_and_plots_are_written(inputs: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["compare", *inputs, "--out", str(tmp_path / "result")]) == 0
+    out = capsys.readouterr().out
+    assert "run_1" in out
+    assert "run_2" in out
+    assert sorted(path.name for path in (tmp_path / "result").iterdir()) == ["compare.html", "compare.json"]
+    page = (tmp_path / "result" / "compare.html").read_text()
+    assert page.count('class="plotly-graph-div"') == 4
+    assert "drive.toml against 2 recordings" in page
+
+
+@pytest.mark.parametrize(
+    ("position", "text", "said"),
+    [
+        (0, bench.MODEL.replace("one_mass", "joint"), "not supported yet"),
+        (0, None, "No such file"),
+        (1, "time_s,torque_m1_nm\n0,1\n", "column speed_rad_s: missing"),
+        (2, "time_s\n", "empty or truncated"),
+    ],
+)
+def test_wrong_input_is_refused_and_nothing_written(
+    inputs: list[str],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    position: int,
+    text: str | None,
+    said: str,
+) -> None:
+    if text is None:
+        Path(inputs[position]).unlink()
+    else:
+        Path(inputs[position]).write_text(text)
+    assert run(["compare", *inputs, "--out", str(tmp_path / "result")]) == 2
+    error = capsys.readouterr().err
+    assert said in error
+    assert Path(inputs[position]).name in error
+    assert not (tmp_path / "result").exists()
+
+
+def test_a_result_that_is_a_file_is_refused(inputs: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["compare", *inputs, "--out", inputs[0]]) == 2
+    assert "which is a file" in capsys.readouterr().err
+
+
+def test_help_has_an_example(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["compare", "--help"]) == 0
+    assert "hil compare bus.toml run_1.csv run_2.csv" in " ".join(capsys.readouterr().out.split())

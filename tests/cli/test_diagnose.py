@@ -1,0 +1,124 @@
+"""``hil diagnose``: the whole line on recordings whose missing physics is known, and its refusals."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from hil.cli.diagnose import app, progress_bar
+from hil.cli.main import run
+from hil.config.model_file import read_model
+from tests.cli import bench
+
+OUTPUTS = ["augmented.toml", "diagnosis.json", "report.html"]
+DRY_NM = 2.0
+
+
+@pytest.fixture(scope="module")
+def bench_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("bench")
+    for seed in (1, 2, 3):
+        bench.record(folder / f"run_{seed}.csv", seed, noise=0.02, dry=DRY_NM)
+    bench.model(folder / "drive.toml", bench.MODEL + "\n[signals]\ntime = { column = 'time_s' }\n")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def result(bench_folder: Path) -> Iterator[Path]:
+    out = bench_folder / "deep" / "result"
+    recordings = [str(bench_folder / f"run_{seed}.csv") for seed in (1, 2, 3)]
+    arguments = [*recordings[:2], "--model", str(bench_folder / "drive.toml"), "--out", str(out)]
+    assert run(["diagnose", *arguments, "--holdout", recordings[2]]) == 0
+    return out
+
+
+def test_the_dry_friction_that_was_put_in_is_found(result: Path) -> None:
+    content = json.loads((result / "diagnosis.json").read_text())
+    assert content["schema"] == "hil.diagnosis/1"
+    assert content["verdict"] == "explained"
+    assert [effect["name"] for effect in content["effects"]] == ["coulomb_friction_motor"]
+    found = content["effects"][0]["parameters"]["friction_nm"]
+    assert found["value"] == pytest.approx(DRY_NM, rel=0.05)
+    assert content["fit"]["augmented"] < 0.2 * content["fit"]["retuned"]
+
+
+def test_all_three_results_are_whole_and_alone(result: Path) -> None:
+    assert sorted(path.name for path in result.iterdir()) == OUTPUTS
+    page = (result / "report.html").read_text()
+    assert page.endswith("</html>\n")
+    assert "Recording run_3" in page
+    assert "held out" in page
+
+
+def test_the_augmented_model_is_valid_input_and_keeps_the_signals(result: Path, bench_folder: Path) -> None:
+    file = read_model(result / "augmented.toml")
+    assert list(file.model.effects) == ["coulomb_friction_motor"]
+    assert file.signals == read_model(bench_folder / "drive.toml").signals
+    simulated = bench_folder / "simulated.csv"
+    arguments = ["--model", str(result / "augmented.toml"), "--input", str(bench_folder / "run_3.csv")]
+    assert run(["simulate", *arguments, "--out", str(simulated)]) == 0
+
+
+def test_json_goes_to_standard_output_alone(
+    bench_folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = [str(bench_folder / "run_1.csv"), "--model", str(bench_folder / "drive.toml"), "--json"]
+    assert run(["diagnose", *arguments, "--out", str(tmp_path)]) == 0
+    captured = capsys.readouterr()
+    assert captured.out == (tmp_path / "diagnosis.json").read_text()
+    assert captured.err == ""
+
+
+def test_no_progress_is_shown_where_nobody_looks(capsys: pytest.CaptureFixture[str]) -> None:
+    with progress_bar() as progress:
+        progress("fitting", 0.5)
+    captured = capsys.readouterr()
+    assert (captured.out, captured.err) == ("", "")
+
+
+def test_progress_is_shown_on_a_terminal(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("FORCE_COLOR", "1")  # rich takes standard error for a terminal
+    with progress_bar() as progress:
+        progress("fitting the nominal", 0.5)
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert "fitting the nominal" in captured.err
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("run_1.csv --model drive.toml --out OUT --holdout nowhere.csv run_9.csv", "run_9.csv"),
+        ("nowhere.csv --model drive.toml --out OUT", "nowhere.csv: expected a readable file"),
+        ("run_1.csv --model nowhere.toml --out OUT", "nowhere.toml"),
+        ("run_1.csv --model run_1.csv --out OUT", "expected TOML"),
+        ("run_1.csv run_1.csv --model drive.toml --out OUT", "came 'run_1' twice"),
+        ("run_1.csv --model drive.toml --out OUT --holdout run_1.csv", "came 'run_1' twice"),
+        ("run_1.csv --model drive.toml --out drive.toml", "which is a file"),
+        ("run_1.csv --model drive.toml", "--out"),
+        ("--model drive.toml --out OUT", "REC"),
+        ("run_1.csv --model drive.toml --out OUT --holdout", "--holdout"),
+    ],
+)
+def test_wrong_input_is_refused_and_nothing_written(
+    bench_folder: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    words: str,
+    said: str,
+) -> None:
+    monkeypatch.chdir(bench_folder)
+    out = tmp_path / "result"
+    assert run(["diagnose", *words.replace("OUT", str(out)).split()]) == 2
+    assert said in capsys.readouterr().err
+    assert not out.exists()
+
+
+def test_help_has_an_example(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["diagnose", "--help"]) == 0
+    assert "hil diagnose run_1.csv run_2.csv --model bus.toml" in " ".join(capsys.readouterr().out.split())
+    assert app.registered_commands

@@ -1,0 +1,319 @@
+"""The model file: read, written back, and refused with every fault at once."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from estimator.physics.catalogue import EFFECTS
+from estimator.physics.model import DrivelineModel, EffectValue, Motion, Parameter, Structure
+from estimator.signals.record import Location, OutputKind
+from hil.config.model_file import read_model, write_model
+from hil.errors import ModelFileError
+from hil.recording import SignalsConfig
+
+ONE_MASS = """
+schema = "hil.model/1"
+structure = "one_mass"
+motion = "rotation"
+[parameters]
+J_M = { value = 1.6, tolerance = 0.2 }
+b_M = { value = 0, tolerance = 0 }
+"""
+
+TWO_MASS = """
+schema = "hil.model/1"
+structure = "two_mass"
+[parameters]
+J_M = { value = 1.6, tolerance = 0.2 }
+J_L = { value = 95.0, tolerance = 0.2 }
+k = { value = 4200, tolerance = 0.2 }
+c = { value = 9.0, tolerance = 0.2 }
+b_M = { value = 0.35, tolerance = 0.2 }
+b_L = { value = 0.9, tolerance = 0.2 }
+[geometry]
+gear_ratio = 5.6
+"""
+
+
+def write(tmp_path: Path, text: str) -> Path:
+    path = tmp_path / "model.toml"
+    path.write_text(text)
+    return path
+
+
+def refusal(tmp_path: Path, text: str) -> list[str]:
+    path = write(tmp_path, text)
+    with pytest.raises(ModelFileError) as caught:
+        read_model(path)
+    lines = str(caught.value).splitlines()
+    assert all(line.startswith(f"{path}: ") for line in lines)
+    return [line.removeprefix(f"{path}: ") for line in lines]
+
+
+def test_a_nominal_file_becomes_a_model(tmp_path: Path) -> None:
+    file = read_model(write(tmp_path, TWO_MASS))
+    assert file.signals is None
+    assert file.model.structure is Structure.TWO_MASS
+    assert file.model.motion is Motion.ROTATION
+    assert file.model.gear_ratio == 5.6
+    assert file.model.effects == {}
+    assert file.model.parameters["k"] == Parameter(4200.0, 0.2)
+    assert list(file.model.values()) == ["J_M", "J_L", "k", "c", "b_M", "b_L"]
+
+
+def test_signals_say_how_a_recording_is_read(tmp_path: Path) -> None:
+    text = """
+    [signals]
+    time = { sample_time_s = 0.001 }
+    torque = [ { column = "a" }, { column = "b", scale = -2 } ]
+    position = { column = "q", scale = 0.5, at = "load" }
+    mask = [ { column = "Throttle [%]", min = 2.0 } ]
+    format = { delimiter = ";", encoding = "latin-1" }
+    """
+    signals = read_model(write(tmp_path, ONE_MASS + text)).signals
+    assert signals is not None
+    assert signals.time.sample_time_s == 0.001
+    assert [(torque.column, torque.scale) for torque in signals.torques()] == [("a", 1.0), ("b", -2.0)]
+    kind, output = signals.output()
+    assert (kind, output.column, output.scale, output.at) == (OutputKind.POSITION, "q", 0.5, Location.LOAD)
+    assert (signals.format.delimiter, signals.format.encoding) == (";", "latin-1")
+
+
+def test_the_example_of_the_linear_drive_is_a_nominal_model() -> None:
+    file = read_model(Path(__file__).parents[2] / "examples" / "emps.toml")
+    assert file.model.structure is Structure.ONE_MASS
+    assert file.model.motion is Motion.TRANSLATION
+    assert file.model.effects == {}
+    assert file.signals is not None
+    assert file.signals.output()[0] is OutputKind.POSITION
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ('schema = "hil.model/2"', "schema | expected 'hil.model/1' | came 'hil.model/2'"),
+        ('structure = "four_mass"', "structure | expected 'one_mass' or 'two_mass' | came 'four_mass'"),
+        (
+            'structure = "three_mass"',
+            "structure | expected one_mass or two_mass: this structure is not supported yet",
+        ),
+        (
+            'structure = "joint"',
+            "structure | expected one_mass or two_mass: this structure is not supported yet",
+        ),
+        ("structure = [1]", "structure | expected 'one_mass' or 'two_mass' | came [1]"),
+        ('motion = "sideways"', "motion | expected 'rotation' or 'translation' | came 'sideways'"),
+        (
+            "J_M = { value = '1', tolerance = 0.2 }",
+            "parameters.J_M.value | expected a valid number | came '1'",
+        ),
+        (
+            "J_M = { value = true, tolerance = 0.2 }",
+            "parameters.J_M.value | expected a valid number | came True",
+        ),
+        (
+            "J_M = { value = nan, tolerance = 0.2 }",
+            "parameters.J_M.value | expected a finite number | came nan",
+        ),
+        ("J_M = { value = 1 }", "parameters.J_M.tolerance | expected this key | came nothing"),
+        (
+            "J_M = { value = 1, tolerance = 0.2, x = 1 }",
+            "parameters.J_M.x | expected one of the known keys (value, tol",
+        ),
+        ("J_M = 1.6", "parameters.J_M | expected a table of value, tolerance"),
+        (
+            "J_M = { value = 0, tolerance = 0.2 }",
+            "parameters.J_M.value: expected a finite number greater than 0, came 0",
+        ),
+        (
+            "J_M = { value = 1, tolerance = 1 }",
+            "parameters.J_M.tolerance: expected a relative tolerance from 0 up to 1",
+        ),
+    ],
+)
+def test_a_wrong_line_is_refused_by_its_key(tmp_path: Path, line: str, said: str) -> None:
+    key = line.split(" =")[0]
+    text = "\n".join(line if old.startswith(f"{key} =") else old for old in ONE_MASS.splitlines())
+    assert line in text
+    lines = refusal(tmp_path, text)
+    assert len(lines) == 1
+    assert lines[0].startswith(said)
+
+
+@pytest.mark.parametrize(
+    ("added", "said"),
+    [
+        ("k = { value = 1, tolerance = 0 }", "parameters.k: unknown, one_mass has J_M, b_M"),
+        ("[geometry]\ngear_ratio = 0", "geometry.gear_ratio | expected greater than 0 | came 0"),
+        ("[geometry]\nratio = 5", "geometry.gear_ratio | expected this key"),
+        ("[geometries]", "geometries | expected one of the known keys (schema, structure,"),
+        ("[effects.gremlins]\nsize = { value = 1 }", "effects.gremlins: unknown effect, expected one of"),
+        (
+            "[effects.backlash]\ngap_rad = { value = 1 }",
+            "effects.backlash: makes no sense in one_mass, expected two_mass",
+        ),
+        ("[effects.coulomb_friction_motor]", "effects.coulomb_friction_motor.friction_nm: missing"),
+        (
+            "[effects.coulomb_friction_motor]\nfriction_nm = { value = 1, ci95 = [2, 1] }",
+            "effects.coulomb_friction_motor.friction_nm.ci95 | expected the lower bound first",
+        ),
+        (
+            "[effects.coulomb_friction_motor]\nfriction_nm = 3",
+            "effects.coulomb_friction_motor.friction_nm | expected a table of value, ci95",
+        ),
+        (
+            "[signals]\nspeed = { column = 'v', at = 'roof' }",
+            "signals.speed.at | expected 'motor' or 'load' | came 'roof'",
+        ),
+        (
+            "[signals]\nspeed = { column = 'v', scale = 0 }",
+            "signals.speed.scale | expected a number other than 0",
+        ),
+        (
+            "[signals]\nspeed = { column = 'v' }\nforce = { column = 'f' }",
+            "signals | expected one of speed, position, force",
+        ),
+        ("[signals]\ntime = { }", "signals.time | expected either column or sample_time_s | came 'neither'"),
+        (
+            "[signals]\ntime = { column = 't', sample_time_s = 1 }",
+            "signals.time | expected either column or sample_time_s",
+        ),
+        (
+            "[signals]\ntime = { sample_time_s = 0 }",
+            "signals.time.sample_time_s | expected greater than 0 | came 0",
+        ),
+        ("[signals]\ntorque = [ { colum = 'a' } ]", "signals.torque.0.column | expected this key"),
+        (
+            "[signals]\nmask = [ { column = 'a' } ]",
+            "signals.mask.0 | expected min, max or both | came 'neither'",
+        ),
+        (
+            "[signals]\nmask = [ { column = 'a', min = 2, max = 1 } ]",
+            "signals.mask.0.max | expected 2.0 or more",
+        ),
+        (
+            "[signals]\nformat = { encoding = 'klingon' }",
+            "signals.format.encoding | expected a text encoding such as",
+        ),
+        ("[signals]\nformat = { delimiter = ';;' }", "signals.format.delimiter | expected"),
+        (
+            "[signals]\nformat = { delimiter = '.' }",
+            "signals.format.delimiter | expected a character that can't be part",
+        ),
+        (
+            "[signals]\nlevel = { column = 'a' }",
+            "signals.level | expected one of the known keys (time, torque, speed,",
+        ),
+    ],
+)
+def test_a_wrong_addition_is_refused_by_its_key(tmp_path: Path, added: str, said: str) -> None:
+    lines = refusal(tmp_path, f"{ONE_MASS}{added}\n")
+    assert any(line.startswith(said) for line in lines), lines
+
+
+def test_every_fault_is_told_at_once(tmp_path: Path) -> None:
+    text = ONE_MASS.replace("1.6", "'x'").replace("b_M", "bM").replace('"rotation"', "3")
+    assert [line.split(" |")[0].split(":")[0] for line in refusal(tmp_path, f"{text}[effects.gremlins]")] == [
+        "motion",
+        "parameters.J_M.value",
+        "parameters.b_M",
+        "parameters.bM",
+        "effects.gremlins",
+    ]
+
+
+def test_a_file_without_its_tables_is_refused(tmp_path: Path) -> None:
+    lines = refusal(tmp_path, "")
+    assert [line.split(" |")[0] for line in lines] == ["schema", "structure", "parameters"]
+
+
+def test_text_that_is_not_toml_is_refused_by_line(tmp_path: Path) -> None:
+    assert refusal(tmp_path, "schema = \n")[0].startswith("line 1")
+
+
+def test_a_file_that_is_not_there_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ModelFileError, match="No such file"):
+        read_model(tmp_path / "model.toml")
+
+
+finite = st.floats(min_value=1e-12, max_value=1e12)
+
+
+@st.composite
+def models(draw: st.DrawFn) -> DrivelineModel:
+    structure = draw(st.sampled_from(Structure))
+    fitting = sorted(name for name, entry in EFFECTS.items() if structure in entry.structures)
+    pairs = st.tuples(finite, finite).map(lambda pair: (min(pair), max(pair)))
+    chosen = draw(st.lists(st.sampled_from(fitting), unique=True, max_size=3))
+    return DrivelineModel(
+        structure=structure,
+        motion=draw(st.sampled_from(Motion)),
+        parameters={
+            name: Parameter(draw(finite), draw(st.floats(0, 0.99))) for name in structure.parameter_names
+        },
+        effects={
+            name: {
+                parameter.name: EffectValue(draw(finite), draw(st.none() | pairs))
+                for parameter in EFFECTS[name].parameters
+            }
+            for name in chosen
+        },
+        gear_ratio=draw(st.none() | finite),
+    )
+
+
+names = st.text(st.characters(codec="utf-8", exclude_categories=("Cs",)), min_size=1, max_size=10)
+
+
+@st.composite
+def signals_configs(draw: st.DrawFn) -> SignalsConfig:
+    scaled = st.fixed_dictionaries({"column": names}, optional={"scale": finite})
+    content = draw(
+        st.fixed_dictionaries(
+            {},
+            optional={
+                "time": st.fixed_dictionaries({"column": names})
+                | st.fixed_dictionaries({"sample_time_s": finite}),
+                "torque": st.lists(scaled, min_size=1, max_size=3),
+                draw(st.sampled_from(["speed", "position", "force"])): scaled,
+                "mask": st.lists(st.fixed_dictionaries({"column": names, "min": finite}), max_size=2),
+                "format": st.just({"delimiter": ";", "encoding": "latin-1"}),
+            },
+        )
+    )
+    return SignalsConfig.model_validate(content)
+
+
+@given(models(), st.none() | signals_configs())
+@settings(max_examples=60, deadline=None)
+def test_what_is_written_reads_back_the_same(
+    tmp_path_factory: pytest.TempPathFactory, model: DrivelineModel, signals: SignalsConfig | None
+) -> None:
+    path = tmp_path_factory.getbasetemp() / "written.toml"
+    write_model(path, model, signals)
+    file = read_model(path)
+    assert file.model == model
+    assert file.signals == signals
+
+
+def test_a_second_writing_replaces_the_first_and_leaves_nothing_beside(tmp_path: Path) -> None:
+    model = read_model(write(tmp_path, ONE_MASS)).model
+    write_model(tmp_path / "model.toml", replace(model, motion=Motion.TRANSLATION))
+    assert read_model(tmp_path / "model.toml").model.motion is Motion.TRANSLATION
+    assert "J_M = {value = 1.6, tolerance = 0.2} # kg\n" in (tmp_path / "model.toml").read_text()
+    assert [path.name for path in tmp_path.iterdir()] == ["model.toml"]
+
+
+def test_an_interval_that_is_not_finite_is_left_out(tmp_path: Path) -> None:
+    model = read_model(write(tmp_path, ONE_MASS)).model
+    loose = EffectValue(np.float64(3.0), (float("nan"), float("inf")))
+    effects = {"coulomb_friction_motor": {"friction_nm": loose}}
+    write_model(tmp_path / "out.toml", replace(model, effects=effects))
+    read = read_model(tmp_path / "out.toml").model
+    assert read.effects["coulomb_friction_motor"]["friction_nm"] == EffectValue(3.0)

@@ -1,0 +1,148 @@
+"""CSV: what is read, and what is refused with its line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hil.errors import RecordingError
+from hil.recording import Table, csv_format
+from hil.recording.format_hints import FormatHints
+
+
+def read(tmp_path: Path, content: str | bytes, hints: FormatHints | None = None) -> Table:
+    path = tmp_path / "run.csv"
+    path.write_bytes(content.encode() if isinstance(content, str) else content)
+    return csv_format.read(path, hints or FormatHints())
+
+
+def test_integers_floats_and_text_are_told_apart_by_their_cells(tmp_path: Path) -> None:
+    table = read(tmp_path, "a,b,c\n1,1.0,x\n-2,nan,\n")
+    assert table.columns["a"].dtype == np.int64
+    assert table.columns["a"].tolist() == [1, -2]
+    assert table.columns["b"].dtype == np.float64
+    np.testing.assert_array_equal(table.columns["b"], [1.0, np.nan])
+    assert table.columns["c"].tolist() == ["x", ""]
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+def test_every_line_end_reads_alike(tmp_path: Path, end: str) -> None:
+    table = read(tmp_path, end.join(["a,b", "1,2", "3,4", "", ""]))
+    assert {name: column.tolist() for name, column in table.columns.items()} == {"a": [1, 3], "b": [2, 4]}
+
+
+@pytest.mark.parametrize("delimiter", [",", ";", "\t", "|"])
+def test_the_delimiter_is_read_off_the_header(tmp_path: Path, delimiter: str) -> None:
+    table = read(tmp_path, f"a{delimiter}b\n1{delimiter}2.5\n")
+    assert {name: column.tolist() for name, column in table.columns.items()} == {"a": [1], "b": [2.5]}
+
+
+def test_a_delimiter_given_wins_over_the_header(tmp_path: Path) -> None:
+    table = read(tmp_path, "a [x,y],b;c\n1;2\n", FormatHints(delimiter=";"))
+    assert list(table.columns) == ["a [x,y],b", "c"]
+
+
+def test_an_encoding_and_quoted_names_are_read(tmp_path: Path) -> None:
+    table = read(tmp_path, 'T [°C];"a;b"\n1;2\n'.encode("latin-1"), FormatHints(encoding="latin-1"))
+    assert list(table.columns) == ["T [°C]", "a;b"]
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])
+def test_a_byte_order_mark_is_no_part_of_the_first_name(tmp_path: Path, encoding: str) -> None:
+    given = "utf-8" if encoding == "utf-8-sig" else encoding
+    table = read(tmp_path, "time_s,b\n1,2\n".encode(encoding), FormatHints(encoding=given))
+    assert list(table.columns) == ["time_s", "b"]
+
+
+def test_spaces_around_names_and_cells_do_not_count(tmp_path: Path) -> None:
+    assert read(tmp_path, "a , b\n 1 , 2.5\n").columns["b"].tolist() == [2.5]
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ("", "the file is empty or truncated"),
+        ("\n\n", "the file is empty or truncated"),
+        ("\n1,2\n", "line 1: cell 1 of the header is empty"),
+        ("a,,c\n1,2,3\n", "line 1: cell 2 of the header is empty"),
+        ("a,b,a\n1,2,3\n", "line 1: column a comes twice"),
+        ("a,b\n", "the file is empty or truncated"),
+        ("a,b", "the file is empty or truncated"),
+        ("a,b\n1,2\n3,4,5\n6,7\n", "line 3: expected 2 cells as in the header, came 3; mend that line"),
+        ("a,b\n1,2\n3,4\n5", "line 4: expected 2 cells as in the header, came 1; the file is truncated"),
+        ('a,b\n1,2\n3,"4\n5,6\n', "line 3: expected every quoted cell to end on its line"),
+        ('a,b\n1,"2\n3"\n5,6\n', "line 2: expected every quoted cell to end on its line"),
+        (b"a,b\n1,2\n3,\xe94\n", "line 3: expected utf-8 text, came byte 0xe9"),
+        (b"\xff\xfea\x00", "line 1: expected utf-8 text, came byte 0xff"),
+        ("a,b\n1," + "2" * 9_000_000 + "\n", "line 2: expected 2 cells as in the header, came 1"),
+        ("x" * 200_000 + "\n1\n", "line 1: cell 1 of the header is empty"),
+    ],
+    ids=range(15),
+)
+def test_a_file_that_is_no_table_is_refused_by_line(tmp_path: Path, content: str | bytes, said: str) -> None:
+    with pytest.raises(RecordingError) as refusal:
+        read(tmp_path, content)
+    assert said in str(refusal.value)
+    assert "run.csv" in str(refusal.value)
+
+
+def test_a_wrong_encoding_without_a_place_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match="line 1: expected utf-16 text"):
+        read(tmp_path, b"a", FormatHints(encoding="utf-16"))
+
+
+@pytest.mark.parametrize("cell", ["abc", "", "1,5", "inf", "1e999", "--"])
+def test_a_cell_that_is_no_number_is_refused_by_line_and_column(tmp_path: Path, cell: str) -> None:
+    table = read(tmp_path, f"a;b\n1;2.0\n3;{cell}\n5;6\n")
+    with pytest.raises(RecordingError) as refusal:
+        table.numeric(["a", "b"])
+    assert "line 3, column b: expected a finite number or nan, came" in str(refusal.value)
+    assert (cell or "an empty cell") in str(refusal.value) or "inf" in str(refusal.value)
+
+
+def test_an_empty_line_is_a_row_without_numbers(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match=r"line 3, column a: .* an empty cell"):
+        read(tmp_path, "a,b\n1,2\n\n3,4\n").numeric(["a"])
+
+
+def test_every_faulty_column_is_named_at_once(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError) as refusal:
+        read(tmp_path, "a,b\nx,2\n3,y\n").numeric(["a", "b", "c"])
+    said = str(refusal.value).splitlines()
+    assert ["line 2, column a" in said[0], "line 3, column b" in said[1], "column c: missing" in said[2]] == [
+        True
+    ] * 3
+
+
+def test_a_column_nobody_asks_for_may_be_text(tmp_path: Path) -> None:
+    assert read(tmp_path, "a,comment\n1,start\n2,end\n").numeric(["a"])["a"].tolist() == [1.0, 2.0]
+
+
+def test_text_is_quoted_where_it_must_be(tmp_path: Path) -> None:
+    texts = ["a,b", 'say "go"', "plain"]
+    csv_format.write(Table(tmp_path, {"x,y": np.array(texts, dtype=object)}), tmp_path / "run.csv")
+    assert csv_format.read(tmp_path / "run.csv", FormatHints()).columns["x,y"].tolist() == texts
+
+
+def test_text_with_a_line_break_is_not_written(tmp_path: Path) -> None:
+    table = Table(tmp_path, {"x": np.array(["a", "b\nc"], dtype=object)})
+    with pytest.raises(RecordingError, match="column x, row 2: expected a text of one line"):
+        csv_format.write(table, tmp_path / "run.csv")
+
+
+@pytest.mark.parametrize("delimiter", ["", ",", ";", "\t", " ", ":"])
+def test_sensible_delimiters_are_taken(delimiter: str) -> None:
+    assert FormatHints(delimiter=delimiter).delimiter == delimiter
+
+
+@pytest.mark.parametrize("delimiter", ['"', "\n", ".", "-", "1", "e", ";;"])
+def test_delimiters_that_could_be_data_are_refused(delimiter: str) -> None:
+    with pytest.raises(ValueError, match="delimiter"):
+        FormatHints(delimiter=delimiter)
+
+
+def test_an_unknown_encoding_is_refused() -> None:
+    with pytest.raises(ValueError, match="such as 'utf-8' or 'latin-1'"):
+        FormatHints(encoding="klingon")

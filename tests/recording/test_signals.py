@@ -1,0 +1,251 @@
+"""From columns to the estimator's Record: roles, scales, masks, held torque, time base."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.io
+
+from estimator.signals.record import Location, OutputKind
+from hil.errors import InputError, RecordingError, UsageError
+from hil.recording import SignalsConfig, Table, read_record, read_records, write_table
+from hil.recording.signals import to_record
+
+Changed = Callable[..., Table]
+
+
+def signals(**keys: Any) -> SignalsConfig:
+    return SignalsConfig.model_validate(keys)
+
+
+def test_own_columns_are_two_inputs_and_the_motor_speed(own_table: Table) -> None:
+    record = to_record(own_table, SignalsConfig())
+    assert (record.name, record.sample_time_s) == ("run_1", 0.01)
+    assert (record.kind, record.location) == (OutputKind.SPEED, Location.MOTOR)
+    np.testing.assert_array_equal(record.torque_nm[:, 0], own_table.columns["torque_m1_nm"])
+    np.testing.assert_array_equal(record.torque_nm[:, 1], own_table.columns["torque_m2_nm"])
+    np.testing.assert_array_equal(record.output, own_table.columns["speed_rad_s"])
+    assert record.okay.all()
+
+
+@pytest.mark.parametrize("kind", list(OutputKind))
+@pytest.mark.parametrize("at", list(Location))
+def test_named_columns_are_scaled_into_their_roles(own_table: Table, kind: OutputKind, at: Location) -> None:
+    config = signals(
+        time={"column": "time_s", "scale": 2.0},
+        torque=[{"column": "torque_m2_nm", "scale": -3.0}],
+        **{kind.value: {"column": "torque_m1_nm", "scale": 0.5, "at": at.value}},
+    )
+    record = to_record(own_table, config)
+    assert (record.sample_time_s, record.kind, record.location) == (0.02, kind, at)
+    np.testing.assert_array_equal(record.torque_nm, -3.0 * own_table.columns["torque_m2_nm"][:, np.newaxis])
+    np.testing.assert_array_equal(record.output, 0.5 * own_table.columns["torque_m1_nm"])
+
+
+def test_a_period_makes_the_time_where_no_column_has_it(changed: Changed) -> None:
+    record = to_record(changed(time_s=None), signals(time={"sample_time_s": 0.25}))
+    assert record.sample_time_s == 0.25
+    assert record.time_s[:3].tolist() == [0.0, 0.25, 0.5]
+
+
+def test_missing_and_flagged_samples_hold_the_last_good_torque(changed: Changed) -> None:
+    torque = np.arange(40.0)
+    torque[[0, 1, 5, 6]] = np.nan
+    flags = np.zeros(40, dtype=np.int64)
+    flags[10] = 4
+    speed = np.ones(40)
+    speed[20] = np.nan
+    record = to_record(changed(torque_m1_nm=torque, flags=flags, speed_rad_s=speed), SignalsConfig())
+    expected = np.arange(40.0)
+    expected[[0, 1, 5, 6, 10]] = [2, 2, 4, 4, 9]
+    np.testing.assert_array_equal(record.torque_nm[:, 0], expected)
+    assert np.flatnonzero(~record.okay).tolist() == [0, 1, 5, 6, 10, 20]
+
+
+def test_flags_of_a_foreign_recording_mean_nothing(changed: Changed) -> None:
+    table = changed(flags=np.ones(40, dtype=np.int64))
+    assert to_record(table, signals(torque=[{"column": "torque_m1_nm"}])).okay.all()
+    with pytest.raises(RecordingError, match="came 0 of 40 rows"):
+        to_record(table, SignalsConfig())
+
+
+def test_a_mask_takes_rows_out_and_keeps_their_torque(changed: Changed, own_table: Table) -> None:
+    throttle = np.full(40, 50.0)
+    throttle[7:12] = 1.0
+    throttle[30] = np.nan
+    record = to_record(changed(throttle=throttle), signals(mask=[{"column": "throttle", "min": 2.0}]))
+    assert np.flatnonzero(~record.okay).tolist() == [7, 8, 9, 10, 11, 30]
+    np.testing.assert_array_equal(record.torque_nm[:, 0], own_table.columns["torque_m1_nm"])
+
+
+def test_a_mask_on_a_torque_holds_it_where_it_is_outside(changed: Changed) -> None:
+    torque = np.arange(40.0)
+    torque[9] = 9999.0
+    record = to_record(
+        changed(torque_m1_nm=torque), signals(mask=[{"column": "torque_m1_nm", "min": -100, "max": 100}])
+    )
+    assert record.torque_nm[8:11, 0].tolist() == [8.0, 8.0, 10.0]
+    assert np.flatnonzero(~record.okay).tolist() == [9]
+
+
+def test_missing_columns_are_named_together(changed: Changed) -> None:
+    with pytest.raises(RecordingError) as refusal:
+        to_record(changed(torque_m1_nm=None, speed_rad_s=None), SignalsConfig())
+    said = str(refusal.value)
+    assert "column torque_m1_nm: missing, the file has time_s" in said
+    assert "column speed_rad_s: missing" in said
+    assert "[signals] of the model file" in said
+
+
+def test_too_few_usable_samples_are_refused(changed: Changed) -> None:
+    speed = np.full(40, np.nan)
+    speed[:9] = 1.0
+    with pytest.raises(RecordingError, match="expected 10 usable samples or more, came 9 of 40 rows"):
+        to_record(changed(speed_rad_s=speed), SignalsConfig())
+
+
+def with_time(changed: Changed, time_s: np.ndarray) -> Table:
+    table = changed(time_s=time_s)
+    return Table(table.path, table.columns, first_line=2)
+
+
+@pytest.mark.parametrize(
+    ("row", "value", "said"),
+    [
+        (5, 0.04, "line 7, column time_s: expected a time greater than in the row before"),
+        (
+            5,
+            0.0,
+            "line 7, column time_s: expected a time greater than in the row before, came 0 s after 0.04 s",
+        ),
+        (5, np.nan, "line 7, column time_s: expected a time greater than in the row before, came nan s"),
+        (39, 0.41, "line 41, column time_s: expected a uniform step of 0.01 s within 50%"),
+    ],
+)
+def test_a_time_that_does_not_go_on_evenly_is_refused_by_line(
+    changed: Changed, row: int, value: float, said: str
+) -> None:
+    time_s = np.arange(40) * 0.01
+    time_s[row] = value
+    with pytest.raises(RecordingError) as refusal:
+        to_record(with_time(changed, time_s), SignalsConfig())
+    assert said in str(refusal.value)
+
+
+def test_a_row_left_out_is_refused_with_the_cure(changed: Changed) -> None:
+    time_s = np.delete(np.arange(41) * 0.01, 17)
+    with pytest.raises(
+        RecordingError, match=r"line 19, .*a missing sample is a row with nan, not a row left out"
+    ):
+        to_record(with_time(changed, time_s), SignalsConfig())
+
+
+def test_a_rate_that_changes_is_refused(tmp_path: Path) -> None:
+    steps = np.concatenate([np.full(500, 0.01), np.full(300, 0.012)])
+    n = steps.size
+    table = Table(
+        tmp_path / "run.csv",
+        {name: np.ones(n) for name in ("torque_m1_nm", "torque_m2_nm", "speed_rad_s")}
+        | {"time_s": np.cumsum(steps)},
+    )
+    with pytest.raises(
+        RecordingError, match=r"expected a constant rate, a mean step of 0\.01 s over 100 rows"
+    ):
+        to_record(table, SignalsConfig())
+
+
+def test_jitter_of_time_stamps_is_no_fault(changed: Changed) -> None:
+    rng = np.random.default_rng(3)
+    jitter = rng.uniform(-0.002, 0.002, size=40)
+    jitter[[0, -1]] = 0.0
+    record = to_record(changed(time_s=np.arange(40) * 0.01 + jitter), SignalsConfig())
+    assert record.sample_time_s == 0.01
+
+
+def test_one_row_has_no_period(own_table: Table) -> None:
+    table = Table(own_table.path, {name: column[:1] for name, column in own_table.columns.items()})
+    with pytest.raises(RecordingError, match="expected two rows or more, came 1"):
+        to_record(table, SignalsConfig())
+
+
+def test_a_drive_in_a_mat_file_is_read(tmp_path: Path) -> None:
+    t = np.arange(100) * 0.001
+    scipy.io.savemat(
+        tmp_path / "DRIVE.mat",
+        {
+            "t": (t + 1e-8 * np.sin(1000 * np.pi * t))[:, None],
+            "vir": t[:, None] + 1,
+            "qm": t[:, None],
+            "gtau": 35.15,
+        },
+    )
+    record = read_record(
+        tmp_path / "DRIVE.mat",
+        signals(time={"column": "t"}, torque=[{"column": "vir", "scale": 35.15}], position={"column": "qm"}),
+    )
+    assert (record.name, record.sample_time_s, record.kind) == ("DRIVE", 0.001, OutputKind.POSITION)
+    np.testing.assert_allclose(record.torque_nm[:, 0], 35.15 * (t + 1))
+
+
+def test_a_logger_with_its_own_csv_is_read(tmp_path: Path) -> None:
+    lines = ["Time [s];Velocity [km/h];Throttle [%];Motor Torque [Nm];Temperature [°C];Braking Signal "]
+    lines += [f"{0.1 * k:.1f};{3.6 * k};{k % 10};{2 * k};21;0" for k in range(50)]
+    (tmp_path / "Trip.csv").write_bytes("\r\n".join([*lines, ""]).encode("latin-1"))
+    record = read_record(
+        tmp_path / "Trip.csv",
+        signals(
+            time={"column": "Time [s]"},
+            torque=[{"column": "Motor Torque [Nm]"}],
+            speed={"column": "Velocity [km/h]", "scale": 1 / 3.6, "at": "load"},
+            mask=[{"column": "Throttle [%]", "min": 2.0}],
+            format={"delimiter": ";", "encoding": "latin-1"},
+        ),
+    )
+    assert (record.sample_time_s, record.location) == (0.1, Location.LOAD)
+    np.testing.assert_allclose(record.output, np.arange(50))
+    assert np.flatnonzero(~record.okay)[:4].tolist() == [0, 1, 10, 11]
+
+
+@pytest.fixture
+def three_runs(tmp_path: Path, own_table: Table) -> list[Path]:
+    paths = [tmp_path / f"run_{k}.csv" for k in range(3)]
+    for path in paths:
+        write_table(own_table, path)
+    return paths
+
+
+def test_recordings_are_read_in_order(three_runs: list[Path]) -> None:
+    assert [record.name for record in read_records(three_runs)] == ["run_0", "run_1", "run_2"]
+
+
+def test_one_faulty_recording_is_named(three_runs: list[Path]) -> None:
+    three_runs[1].write_text("time_s\n")
+    with pytest.raises(RecordingError, match=r"run_1\.csv: .*empty or truncated"):
+        read_records(three_runs)
+
+
+def test_all_faulty_recordings_are_named(three_runs: list[Path]) -> None:
+    three_runs[0].unlink()
+    three_runs[2].write_text("time_s\n1\n2\n")
+    with pytest.raises(
+        InputError, match=r"(?s)run_0\.csv: .*No such file.*run_2\.csv: column torque_m1_nm: missing"
+    ):
+        read_records(three_runs)
+
+
+def test_two_recordings_of_one_name_are_refused(three_runs: list[Path]) -> None:
+    with pytest.raises(UsageError, match="came 'run_1' twice"):
+        read_records([*three_runs, three_runs[1]])
+
+
+def test_recordings_of_two_periods_are_refused(three_runs: list[Path], changed: Changed) -> None:
+    three_runs[2].unlink()
+    write_table(changed(time_s=np.arange(40) * 0.02), three_runs[2])
+    with pytest.raises(
+        RecordingError, match=r"run_2\.csv: expected the sampling period of .*run_0\.csv, 0\.01 s"
+    ):
+        read_records(three_runs)

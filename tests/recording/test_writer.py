@@ -1,0 +1,154 @@
+"""Recordings as they are made: whole, interrupted, killed."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+from hil.errors import RecordingError
+from hil.recording import RecordingWriter, columns, read_record, read_table
+from hil.rig.sample import Sample, SampleFlag
+
+
+def sample(k: int) -> Sample:
+    return Sample(
+        cycle=k,
+        t_ns=10_000_000 * k,
+        time_s=0.01 * k,
+        torque_ref_m1_nm=1.1 * k,
+        torque_ref_m2_nm=2.2 * k,
+        prbs_nm=(-1.0) ** k,
+        torque_m1_nm=math.nan if k == 0 else k / 3,
+        torque_m2_nm=k / 7,
+        speed_rad_s=k * math.pi,
+        age_ns=1_234_567 + k,
+        flags=SampleFlag.M2_STALE | SampleFlag.LATE if k == 3 else SampleFlag.GOOD,
+    )
+
+
+def check(path: Path, n: int) -> None:
+    table = read_table(path)
+    assert list(table.columns) == list(columns.UNITS)
+    for k in range(n):
+        s = sample(k)
+        expected = (s.time_s, s.torque_ref_nm, s.torque_m1_nm, s.torque_m2_nm, s.speed_rad_s, s.prbs_nm)
+        expected += (int(s.flags), s.torque_ref_m1_nm, s.torque_ref_m2_nm, s.age_ns / 1e9)
+        row = [table.columns[name][k] for name in columns.UNITS]
+        assert [repr(float(a)) for a in row] == [repr(float(b)) for b in expected]
+    assert table.n_rows == n
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+def test_a_run_is_recorded_to_the_bit(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"run{suffix}"
+    with RecordingWriter(path, {"rig": "bench"}) as writer:
+        for k in range(30):
+            writer.append(sample(k))
+    check(path, 30)
+    assert [file.name for file in tmp_path.iterdir()] == [path.name]
+    record = read_record(path)
+    assert record.okay.tolist() == [k not in (0, 3) for k in range(30)]
+
+
+def test_parquet_carries_units_and_metadata(tmp_path: Path) -> None:
+    with RecordingWriter(tmp_path / "run.parquet", {"rig": "bench"}) as writer:
+        writer.append(sample(1))
+    table = read_table(tmp_path / "run.parquet")
+    assert dict(table.metadata) == {"rig": "bench"}
+    assert dict(table.units) == dict(columns.UNITS)
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+@pytest.mark.parametrize("error", [RuntimeError, KeyboardInterrupt])
+def test_an_interrupted_run_leaves_what_it_had(
+    tmp_path: Path, suffix: str, error: type[BaseException]
+) -> None:
+    path = tmp_path / f"run{suffix}"
+
+    def run() -> None:
+        with RecordingWriter(path) as writer:
+            for k in range(12):
+                writer.append(sample(k))
+            raise error
+
+    with pytest.raises(error):
+        run()
+    check(path, 12)
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+def test_a_killed_run_leaves_every_appended_row_readable(tmp_path: Path, suffix: str) -> None:
+    writer = RecordingWriter(tmp_path / f"run{suffix}")
+    with writer:
+        for k in range(12):
+            writer.append(sample(k))
+        # Seen from outside at this moment, as after a kill: no flush, no close.
+        check(tmp_path / "run.part.csv", 12)
+        assert not writer.path.exists()
+
+
+def test_a_run_without_samples_leaves_no_file(tmp_path: Path) -> None:
+    with RecordingWriter(tmp_path / "run.csv"):
+        pass
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_recording_is_never_overwritten(tmp_path: Path) -> None:
+    (tmp_path / "run.csv").write_text("mine")
+    with (
+        pytest.raises(RecordingError, match="a recording is never overwritten"),
+        RecordingWriter(tmp_path / "run.csv"),
+    ):
+        pass
+    assert (tmp_path / "run.csv").read_text() == "mine"
+
+
+def test_the_rest_of_a_killed_run_is_not_overwritten(tmp_path: Path) -> None:
+    (tmp_path / "run.part.csv").write_text("theirs")
+    with (
+        pytest.raises(RecordingError, match="left by a run that was killed"),
+        RecordingWriter(tmp_path / "run.csv"),
+    ):
+        pass
+    assert (tmp_path / "run.part.csv").read_text() == "theirs"
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+def test_a_name_taken_during_the_run_costs_no_sample(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"run{suffix}"
+
+    def run() -> None:
+        with RecordingWriter(path) as writer:
+            for k in range(12):
+                writer.append(sample(k))
+            path.write_text("mine")
+
+    with pytest.raises(RecordingError, match="never overwritten"):
+        run()
+    assert path.read_text() == "mine"
+    check(tmp_path / "run.part.csv", 12)
+
+
+@pytest.mark.parametrize("name", ["run.mat", "run.xyz", "nowhere/run.csv"])
+def test_a_recording_that_cannot_be_made_is_refused_before_the_run(tmp_path: Path, name: str) -> None:
+    with pytest.raises(RecordingError, match="expected"), RecordingWriter(tmp_path / name):
+        pass
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_place_that_cannot_be_written_is_refused_before_the_run(tmp_path: Path) -> None:
+    with (
+        pytest.raises(RecordingError, match="expected a place to write, came: File name too long"),
+        RecordingWriter(tmp_path / f"{'x' * 249}.csv"),
+    ):
+        pass
+
+
+def test_a_closed_writer_takes_no_sample(tmp_path: Path) -> None:
+    writer = RecordingWriter(tmp_path / "run.csv")
+    with pytest.raises(RecordingError, match="expected an open writer"):
+        writer.append(sample(0))
+    writer.__exit__(None, None, None)
+    assert list(tmp_path.iterdir()) == []

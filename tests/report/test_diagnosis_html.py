@@ -1,0 +1,154 @@
+"""report.html: complete, self-contained, escaped, and of a size a mail takes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from estimator.diagnosis.result import Diagnosis, Mismatch, Trace, Verdict
+from hil.report.diagnosis_html import MOST_DRAWN, diagnosis_page
+
+VOID = {"meta", "br", "hr", "img", "input", "link"}
+
+
+class Reader(HTMLParser):
+    """Collect the page's text outside scripts, its headings, and everything it would fetch."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.text = ""
+        self.fetched: list[str] = []
+        self.sections: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        if tag not in VOID:
+            self.open.append(tag)
+        self.fetched += [f"{tag} {key}={value}" for key, value in attrs if key in ("src", "href", "data", "action")]
+        if tag == "h2":
+            self.sections.append("")
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        if "script" in self.open or "style" in self.open:
+            assert "@import" not in data
+            return
+        self.text += data
+        if self.open and self.open[-1] == "h2":
+            self.sections[-1] += data
+
+
+def read(page: str) -> Reader:
+    reader = Reader()
+    reader.feed(page)
+    reader.close()
+    assert reader.open == []
+    return reader
+
+
+def test_the_page_says_everything_from_the_verdict_down(diagnosis: Diagnosis) -> None:
+    reader = read(diagnosis_page(diagnosis))
+    assert reader.sections == [
+        "Fit",
+        "Where simulation and recording differ",
+        "The physics found",
+        "Recording run_1",
+        "Recording run_2",
+        "Recording unseen",
+        "Rivals, and why each lost",
+        "What these recordings can't tell",
+        "Parameters of the model",
+    ]
+    told = (
+        diagnosis.statement,  # holds characters that HTML has to escape
+        "✓ explained",
+        "Missing in the model: backlash in the shaft line and road grade",
+        "run_2 has 60 samples missing",
+        "1.41 rad/s",
+        "0.0521 rad/s",
+        "6.5 to 11 Hz",
+        "1.5 to 6.2 s, 17 to 22.1 s",
+        "T_S = k e + c",
+        "0.02 … 0.022",
+        "can't tell it from shaft_hysteresis",
+        "explains 48 % of what backlash explains",
+        "the speed never changes sign",
+        "kg m^2",
+        "-5.0 %",
+    )
+    assert [text for text in told if text not in reader.text] == []
+
+
+def test_the_page_fetches_nothing_and_holds_plotly_once(diagnosis: Diagnosis) -> None:
+    page = diagnosis_page(diagnosis)
+    assert read(page).fetched == []
+    assert page.count("plotly.js v") == 1
+    assert page.count('class="plotly-graph-div"') == 2 * len(diagnosis.traces) + 1
+
+
+def test_the_same_diagnosis_makes_the_same_page(diagnosis: Diagnosis) -> None:
+    assert diagnosis_page(diagnosis) == diagnosis_page(diagnosis)
+
+
+@pytest.mark.parametrize(
+    ("verdict", "headline"),
+    [
+        (Verdict.NO_MISMATCH, "Nothing is missing"),
+        (Verdict.UNEXPLAINED, "Something is missing that no entry of the catalogue explains"),
+    ],
+)
+def test_the_other_answers_are_pages_too(diagnosis: Diagnosis, verdict: Verdict, headline: str) -> None:
+    nan = float("nan")
+    bare = replace(
+        diagnosis,
+        verdict=verdict,
+        mismatch=Mismatch(False, None, {}, None, None, 0.4),
+        effects=(),
+        rejected=(),
+        untestable=(),
+        warnings=(),
+        fit=replace(diagnosis.fit, holdout_retuned=nan, holdout_augmented=nan, noise_floor=0.0),
+    )
+    reader = read(diagnosis_page(bare))
+    assert headline in reader.text
+    assert reader.sections[0] == "Fit"
+    assert reader.sections[-1] == "Parameters of the model"
+    assert "Where simulation and recording differ" not in reader.sections
+
+
+def test_effects_that_explain_only_a_part_are_told_as_such(diagnosis: Diagnosis) -> None:
+    assert "and more that no entry of the catalogue explains" in diagnosis_page(
+        replace(diagnosis, verdict=Verdict.UNEXPLAINED)
+    )
+
+
+def long_trace(number: int) -> Trace:
+    n = 4_000
+    rng = np.random.default_rng(number)
+    noise = rng.normal(size=(7, n))
+    scale = 1.0 if number else 1e-3
+    return Trace(
+        name=f"run_{number}",
+        time_s=0.01 * np.arange(n),
+        torque_nm=noise[:2].T,
+        measured=noise[2],
+        okay=np.ones(n, dtype=np.bool_),
+        nominal=noise[3],
+        retuned=noise[2] + scale * noise[4],
+        augmented=noise[5],
+        holdout=False,
+    )
+
+
+def test_many_long_recordings_stay_under_ten_megabytes(diagnosis: Diagnosis) -> None:
+    traces = tuple(long_trace(number) for number in range(MOST_DRAWN + 1))
+    page = diagnosis_page(replace(diagnosis, traces=traces))
+    assert len(page.encode()) < 10e6
+    sections = read(page).sections
+    assert [f"Recording run_{number}" in sections for number in range(MOST_DRAWN + 1)] == [False] + [True] * MOST_DRAWN
+    assert "1 more recordings, with smaller errors" in page

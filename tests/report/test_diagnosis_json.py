@@ -1,0 +1,115 @@
+"""diagnosis.json: the contract's keys, numbers kept, nothing JSON does not have."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from estimator.diagnosis.result import Diagnosis, Mismatch, Verdict
+from hil.report.diagnosis_json import diagnosis_json, diagnosis_text
+from hil.report.numbers import json_number
+
+
+def refuse_constant(name: str) -> Any:
+    raise AssertionError(f"{name} is not JSON")
+
+
+def test_the_text_is_strict_json_of_the_contract(diagnosis: Diagnosis) -> None:
+    content = json.loads(diagnosis_text(diagnosis), parse_constant=refuse_constant)
+    assert content == diagnosis_json(diagnosis)
+    assert list(content) == [
+        "schema",
+        "verdict",
+        "statement",
+        "mismatch",
+        "effects",
+        "rejected",
+        "untestable",
+        "fit",
+        "parameters",
+        "timing_s",
+        "warnings",
+    ]
+    assert content["schema"] == "hil.diagnosis/1"
+    assert content["verdict"] == "explained"
+    assert content["mismatch"] == {
+        "detected": True,
+        "element": "shaft",
+        "time_s": {"run_1": [[1.5, 6.2], [17.0, 22.1]]},
+        "band_hz": [6.5, 11.0],
+        "region": {"signal": "shaft torque", "low": -20.0, "high": 20.0},
+        "p_value": 0.0,
+    }
+    assert content["effects"][0] == {
+        "name": "backlash",
+        "element": "shaft",
+        "statement": "the shaft has a backlash of 0.021 rad in total",
+        "parameters": {
+            "gap_rad": {"value": 0.021, "ci95": [0.020, 0.022], "unit": "rad"},
+            "contact_rad": {"value": 0.0012, "ci95": [None, None], "unit": "rad"},
+        },
+        "time_s": {"run_1": [[1.5, 6.2]]},
+        "indistinguishable_from": ["shaft_hysteresis"],
+        "evidence": {
+            "delta_bic": 5321.0,
+            "holdout_rms_before": 0.41,
+            "holdout_rms_after": 0.052,
+            "p_value": 1e-12,
+        },
+    }
+    assert content["rejected"][1] == {
+        "name": "stribeck_friction",
+        "reason": "its interval holds the null",
+        "delta_bic": -17.2,
+    }
+    assert content["untestable"][0]["suggested_test"] == "reversal"
+    assert content["fit"] == {
+        "unit": "rad/s",
+        "nominal": 1.72,
+        "retuned": 1.41,
+        "augmented": 0.0521,
+        "holdout_retuned": 1.38,
+        "holdout_augmented": 0.0533,
+        "noise_floor": 0.0502,
+    }
+    assert content["parameters"]["b_L"] == {
+        "nominal": 0.9,
+        "value": 0.92,
+        "ci95": [0.8, None],
+        "unit": "Nm s/rad",
+    }
+    assert content["timing_s"] == {"total": 4.2}
+
+
+def test_a_profile_goes_with_its_effect(diagnosis: Diagnosis) -> None:
+    profile = diagnosis_json(diagnosis)["effects"][1]["profiles"]["run_1"]
+    assert profile["unit"] == "Nm"
+    assert [len(profile[key]) for key in ("time_s", "value", "low", "high")] == [16] * 4
+
+
+@pytest.mark.parametrize("verdict", list(Verdict))
+def test_what_is_not_known_is_null(diagnosis: Diagnosis, verdict: Verdict) -> None:
+    nothing = Mismatch(False, None, {}, None, None, math.nan)
+    content = diagnosis_json(replace(diagnosis, verdict=verdict, mismatch=nothing, effects=()))
+    assert content["verdict"] in ("explained", "unexplained", "no_mismatch")
+    assert content["mismatch"] == {
+        "detected": False,
+        "element": None,
+        "time_s": {},
+        "band_hz": None,
+        "region": None,
+        "p_value": None,
+    }
+
+
+@given(st.floats(allow_nan=False, allow_infinity=False))
+def test_rounding_keeps_nine_digits(value: float) -> None:
+    rounded = json_number(value)
+    assert rounded is not None
+    assert math.isclose(rounded, value, rel_tol=1e-9)

@@ -1,0 +1,167 @@
+"""The pieces reports are made of: numbers, thinned traces, terminal summaries, folders of results."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as st_numpy
+from rich.console import Console, RenderableType
+
+from estimator.diagnosis.result import Diagnosis
+from estimator.physics.catalogue import EFFECTS
+from estimator.physics.model import Motion
+from estimator.signals.record import OutputKind
+from hil.errors import UsageError
+from hil.report.catalogue import catalogue_table, effect_details, entries_text, select
+from hil.report.decimate import extremes
+from hil.report.diagnosis_text import diagnosis_summary
+from hil.report.figures import LONGEST_STRETCHES, input_lines, stretches_for
+from hil.report.numbers import shown, shown_interval, shown_p, shown_ratio
+from hil.report.outputs import publish, require_folder
+from hil.report.wording import listed, simulated_column
+
+NAN = float("nan")
+
+
+def rendered(piece: RenderableType, width: int = 120) -> str:
+    console = Console(width=width, color_system=None)
+    with console.capture() as capture:
+        console.print(piece)
+    return capture.get()
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(0.0210001, "0.021"), (4200.0, "4200"), (123456.7, "123457"), (1e-9, "1e-09"), (NAN, "–"), (0.0, "0")],
+)
+def test_numbers_are_shown_with_four_digits(value: float, text: str) -> None:
+    assert shown(value) == text
+
+
+def test_numbers_carry_their_unit_only_where_there_is_one() -> None:
+    assert shown(1.5, "Nm") == "1.5 Nm"
+    assert shown_interval((0.02, NAN)) == "0.02 … –"
+    assert [shown_p(0.0), shown_p(0.0123), shown_p(NAN)] == ["< 1e-300", "0.012", "–"]
+    assert [shown_ratio(0.5, 0.25), shown_ratio(0.5, 0.0), shown_ratio(NAN, 1.0)] == ["2 ×", "–", "–"]
+    assert [shown_ratio(1000.0, 1.0), shown_ratio(1001.0, 1.0)] == ["1e+03 ×", "> 1000 ×"]
+    assert [listed(["a"]), listed(["a", "b"]), listed(["a", "b", "c"])] == ["a", "a and b", "a, b and c"]
+
+
+@given(
+    st_numpy.arrays(np.float64, st.integers(1, 400), elements=st.floats(-1e6, 1e6) | st.just(NAN)),
+    st.integers(1, 50),
+)
+def test_a_thinned_trace_keeps_ends_order_and_extremes(y: np.ndarray, stretches: int) -> None:
+    kept = extremes(y, stretches)
+    assert (np.diff(kept) > 0).all()
+    assert kept[0] == 0
+    assert kept[-1] == y.size - 1
+    assert kept.size <= 2 * stretches + 2
+    if not np.isnan(y).all():
+        assert np.nanmax(y[kept]) == np.nanmax(y)
+        assert np.nanmin(y[kept]) == np.nanmin(y)
+
+
+def test_a_gap_stays_a_gap() -> None:
+    y = np.zeros(1000)
+    y[300:500] = NAN
+    kept = extremes(y, 20)
+    assert np.isnan(y[kept]).sum() == 4
+
+
+def test_a_short_trace_is_kept_whole() -> None:
+    assert extremes(np.zeros(10), 5).tolist() == list(range(10))
+
+
+def test_recordings_share_the_size_of_a_page() -> None:
+    assert stretches_for(0) == stretches_for(1) == LONGEST_STRETCHES
+    assert 20 * stretches_for(20) <= 11_000
+
+
+@pytest.mark.parametrize(
+    ("count", "names"), [(1, ["input"]), (2, ["T_M1", "T_M2"]), (3, ["input 1", "input 2", "input 3"])]
+)
+def test_inputs_are_named_by_their_number(count: int, names: list[str]) -> None:
+    assert [line.name for line in input_lines(np.zeros((4, count)))] == names
+
+
+@pytest.mark.parametrize(
+    ("kind", "motion", "column"),
+    [
+        (OutputKind.SPEED, Motion.ROTATION, "speed_sim_rad_s"),
+        (OutputKind.SPEED, Motion.TRANSLATION, "speed_sim_m_s"),
+        (OutputKind.POSITION, Motion.ROTATION, "position_sim_rad"),
+        (OutputKind.POSITION, Motion.TRANSLATION, "position_sim_m"),
+        (OutputKind.FORCE, Motion.ROTATION, "force_sim_nm"),
+        (OutputKind.FORCE, Motion.TRANSLATION, "force_sim_n"),
+    ],
+)
+def test_a_simulated_column_names_its_unit(kind: OutputKind, motion: Motion, column: str) -> None:
+    assert simulated_column(kind, motion) == column
+
+
+def test_the_terminal_tells_the_verdict_and_what_it_rests_on(diagnosis: Diagnosis) -> None:
+    text = rendered(diagnosis_summary(diagnosis))
+    told = ("✓ explained", diagnosis.statement, "[rad/s]", "gap_rad", "0.021 rad", "J_M", "1.51 … 1.53")
+    told += ("rejected: stiffness_nonlinearity", "can't tell: coulomb_friction_motor", "note: run_2")
+    assert [part for part in told if part not in text] == []
+
+
+def test_the_catalogue_lists_every_entry() -> None:
+    text = rendered(catalogue_table(select(None)))
+    assert [name for name in EFFECTS if name not in text] == []
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_an_entry_tells_law_parameters_excitation_and_rivals(name: str) -> None:
+    entry = EFFECTS[name]
+    text = " ".join(rendered(effect_details(select(name)[0]), width=400).split())
+    told = [entry.law, entry.excited_by, *entry.resembles, *(p.name for p in entry.parameters)]
+    assert [part for part in told if part not in text] == []
+    content = json.loads(entries_text([entry]))["effects"][0]
+    assert content["name"] == name
+    assert content["element"] == entry.element.value
+    assert list(content["parameters"]) == [p.name for p in entry.parameters]
+
+
+@pytest.mark.parametrize(("name", "hint"), [("backlsh", "Did you mean backlash?"), ("x", "hil effects")])
+def test_an_effect_that_does_not_exist_is_refused(name: str, hint: str) -> None:
+    with pytest.raises(UsageError, match="expected one of") as refusal:
+        select(name)
+    assert hint in str(refusal.value)
+
+
+def test_results_appear_together_and_replace_older_ones(tmp_path: Path) -> None:
+    folder = tmp_path / "deep" / "result"
+    for text in ("old", "new"):
+        publish(folder, {"a.txt": lambda path, t=text: path.write_text(t), "b.txt": lambda path: path.touch()})
+    assert {path.name: path.read_text() for path in folder.iterdir()} == {"a.txt": "new", "b.txt": ""}
+
+
+def test_a_result_that_fails_leaves_the_older_ones(tmp_path: Path) -> None:
+    publish(tmp_path, {"a.txt": lambda path: path.write_text("old")})
+
+    def fail(path: Path) -> None:
+        path.write_text("half")
+        raise OSError("disk full")
+
+    with pytest.raises(OSError, match="disk full"):
+        publish(tmp_path, {"a.txt": lambda path: path.write_text("new"), "b.txt": fail})
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"a.txt": "old"}
+
+
+@pytest.mark.parametrize("name", ["file", "file/deeper"])
+def test_a_file_is_no_folder_for_results(tmp_path: Path, name: str) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(UsageError, match="which is a file"):
+        require_folder(tmp_path / name)
+
+
+def test_a_read_only_folder_is_refused() -> None:
+    with pytest.raises(UsageError, match="which is read-only"):
+        require_folder(Path("/proc/1/result"))
