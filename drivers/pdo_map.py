@@ -1,0 +1,207 @@
+"""PDO communication and mapping parameters, and the frames they describe. No bus, no clock.
+
+A layout is read from objects 0x1400/0x1600 (RPDO) or 0x1800/0x1A00 (TPDO) wherever they are: the defaults of
+an EDS, a device over SDO, a simulated drive's own dictionary. One function reads all three, so they compare.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from drivers.errors import CommandRefused, ConfigMismatch, ProtocolViolation
+from drivers.scaling import IntegerType
+
+RPDO_COMMUNICATION = 0x1400
+RPDO_MAPPING = 0x1600
+TPDO_COMMUNICATION = 0x1800
+TPDO_MAPPING = 0x1A00
+
+COB_ID_INVALID = 1 << 31
+"""Bit of the COB-ID entry that switches a PDO off (CiA 301, 7.5.2.35)."""
+
+MAX_PDO_BYTES = 8
+
+ReadObject = Callable[[int, int], int]
+"""``read(index, subindex)``: the object's value, from wherever the caller has it."""
+
+_STRUCT_CODES = {
+    IntegerType.INTEGER8: "b",
+    IntegerType.INTEGER16: "h",
+    IntegerType.INTEGER32: "i",
+    IntegerType.UNSIGNED8: "B",
+    IntegerType.UNSIGNED16: "H",
+    IntegerType.UNSIGNED32: "I",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class MappedObject:
+    """One entry of a PDO mapping: index, subindex and length in bits."""
+
+    index: int
+    subindex: int
+    length_bits: int
+
+    @classmethod
+    def from_entry(cls, entry: int) -> MappedObject:
+        """Decode a mapping entry, ``0xIIIISSLL``."""
+        return cls(entry >> 16, entry >> 8 & 0xFF, entry & 0xFF)
+
+    @property
+    def entry(self) -> int:
+        """The mapping entry, ``0xIIIISSLL``."""
+        return self.index << 16 | self.subindex << 8 | self.length_bits
+
+    def __str__(self) -> str:
+        return f"0x{self.index:04X}:{self.subindex:02X} ({self.length_bits} bit)"
+
+
+@dataclass(frozen=True, slots=True)
+class PdoLayout:
+    """A PDO as its objects describe it.
+
+    Attributes
+    ----------
+    communication_index, mapping_index
+        Where its parameters are, for example 0x1800 and 0x1A00.
+    cob_id
+        CAN identifier, 11 bits.
+    valid
+        False if bit 31 of the COB-ID entry switches the PDO off.
+    transmission_type
+        1 to 240: at every n-th SYNC; 254, 255: event-driven.
+    objects
+        Mapped objects in the order of the frame.
+    """
+
+    communication_index: int
+    mapping_index: int
+    cob_id: int
+    valid: bool
+    transmission_type: int
+    objects: tuple[MappedObject, ...]
+
+    def __str__(self) -> str:
+        mapped = ", ".join(map(str, self.objects)) or "nothing"
+        state = "" if self.valid else " (switched off)"
+        return f"COB-ID 0x{self.cob_id:03X}{state}, transmission type {self.transmission_type}, maps {mapped}"
+
+
+def read_layout(read: ReadObject, communication_index: int, mapping_index: int) -> PdoLayout:
+    """Read one PDO's layout through ``read``."""
+    cob_id = read(communication_index, 1)
+    return PdoLayout(
+        communication_index=communication_index,
+        mapping_index=mapping_index,
+        cob_id=cob_id & 0x7FF,
+        valid=not cob_id & COB_ID_INVALID,
+        transmission_type=read(communication_index, 2),
+        objects=tuple(MappedObject.from_entry(read(mapping_index, n + 1)) for n in range(read(mapping_index, 0))),
+    )
+
+
+def configuration_writes(layout: PdoLayout) -> tuple[tuple[int, int, int], ...]:
+    """List the writes ``(index, subindex, value)`` that give a device this layout.
+
+    The order is that of CiA 301, 7.5.2.36: switch the PDO off, set the number of mapped objects to 0, map,
+    set the number, switch it on.
+    """
+    communication, mapping = layout.communication_index, layout.mapping_index
+    return (
+        (communication, 1, layout.cob_id | COB_ID_INVALID),
+        (communication, 2, layout.transmission_type),
+        (mapping, 0, 0),
+        *((mapping, n, mapped.entry) for n, mapped in enumerate(layout.objects, start=1)),
+        (mapping, 0, len(layout.objects)),
+        (communication, 1, layout.cob_id),
+    )
+
+
+class PdoCodec:
+    """Packs and unpacks the frames of one PDO.
+
+    Parameters
+    ----------
+    layout
+        The PDO.
+    types
+        Data type of each mapped object by ``(index, subindex)``, from the EDS.
+    where
+        Device or file, for messages.
+
+    Raises
+    ------
+    ConfigMismatch
+        If a mapped object is unknown, has another length than its type, or the frame is over 8 bytes.
+    """
+
+    def __init__(self, layout: PdoLayout, types: Mapping[tuple[int, int], IntegerType], where: str) -> None:
+        self.layout = layout
+        self._where = f"{where}: PDO 0x{layout.communication_index:04X} (COB-ID 0x{layout.cob_id:03X})"
+        self._types = tuple(self._type_of(mapped, types) for mapped in layout.objects)
+        self._struct = struct.Struct("<" + "".join(_STRUCT_CODES[kind] for kind in self._types))
+        if self._struct.size > MAX_PDO_BYTES:
+            raise ConfigMismatch(
+                f"{self._where} maps {self._struct.size} bytes, expected at most {MAX_PDO_BYTES}. "
+                f"Correct the mapping in 0x{layout.mapping_index:04X}."
+            )
+        self._positions = {mapped.index: n for n, mapped in enumerate(layout.objects)}
+
+    def _type_of(self, mapped: MappedObject, types: Mapping[tuple[int, int], IntegerType]) -> IntegerType:
+        kind = types.get((mapped.index, mapped.subindex))
+        if kind is None or kind.size_bytes * 8 != mapped.length_bits:
+            expected = "an integer object of the EDS" if kind is None else f"{kind.size_bytes * 8} bit ({kind.name})"
+            raise ConfigMismatch(
+                f"{self._where} maps {mapped}, expected {expected}. "
+                f"Correct the mapping in 0x{self.layout.mapping_index:04X} or the EDS."
+            )
+        return kind
+
+    def position(self, index: int) -> int:
+        """Place of an object among the unpacked values.
+
+        Raises
+        ------
+        ConfigMismatch
+            If this PDO does not carry the object.
+        """
+        if index not in self._positions:
+            raise ConfigMismatch(
+                f"{self._where} does not map 0x{index:04X}, which is needed; it {self.layout}. "
+                f"Map it in 0x{self.layout.mapping_index:04X} of the EDS."
+            )
+        return self._positions[index]
+
+    def pack(self, values: tuple[int, ...]) -> bytes:
+        """Build the frame's data from the objects' values, in mapping order.
+
+        Raises
+        ------
+        CommandRefused
+            If a value does not fit its object, or the number of values is not the number of objects.
+        """
+        try:
+            return self._struct.pack(*values)
+        except struct.error as error:
+            raise CommandRefused(
+                f"{self._where}: values {values} do not fit the objects "
+                f"{', '.join(map(str, self.layout.objects))} ({error}). Nothing was sent; correct the values."
+            ) from error
+
+    def unpack(self, data: bytes) -> tuple[int, ...]:
+        """Read the objects' values, in mapping order, from a frame's data.
+
+        Raises
+        ------
+        ProtocolViolation
+            If the frame has another length than the mapping gives it.
+        """
+        if len(data) != self._struct.size:
+            raise ProtocolViolation(
+                f"{self._where}: frame of {len(data)} bytes, expected {self._struct.size} from the mapping "
+                f"({', '.join(map(str, self.layout.objects))}). The device's mapping is not the EDS's; "
+                "configure it again."
+            )
+        return self._struct.unpack(data)

@@ -1,0 +1,120 @@
+"""CAN frames over a WebSocket to a ``python-can-remote`` server, with every wait bounded.
+
+The library's own client connects and shuts down without a time-out: a server that accepts and says nothing,
+or stops before it says goodbye, would hang the program that has drives to disarm.
+"""
+
+from __future__ import annotations
+
+import random
+import ssl
+import time
+from base64 import b64encode
+from http.client import HTTPConnection, HTTPException, HTTPSConnection
+from urllib.parse import urlsplit
+
+import can
+from can_remote.client import DEFAULT_SSL_CONTEXT, RemoteBus, RemoteClientProtocol
+from can_remote.protocol import RemoteError
+from can_remote.websocket import WebSocket, WebsocketClosed, get_accept_key
+
+_SUBPROTOCOLS = ("can.binary+json.v1", "can.json.v1")
+_TIMEOUT_S = 3.0
+
+
+class _BoundedWebSocket(WebSocket):  # type: ignore[misc]  # the library has no types
+    """A client WebSocket whose handshake, reads and writes end after ``_TIMEOUT_S``."""
+
+    def connect(
+        self,
+        protocols: tuple[str, ...],
+        headers: dict[str, str] | None = None,
+        ssl_context: ssl.SSLContext | None = None,
+    ) -> None:
+        address = urlsplit(self.url)
+        secure = address.scheme == "wss"
+        connection = (
+            HTTPSConnection(address.netloc, timeout=_TIMEOUT_S, context=ssl_context)
+            if secure
+            else HTTPConnection(address.netloc, timeout=_TIMEOUT_S)
+        )
+        key = b64encode(random.randbytes(16)).decode()
+        try:
+            self.protocol = _handshake(connection, address.path or "/", key, protocols, headers or {})
+        except BaseException:
+            connection.close()
+            raise
+        self.socket = connection.sock
+        self._ssl = secure
+
+
+def _handshake(
+    connection: HTTPConnection, path: str, key: str, protocols: tuple[str, ...], headers: dict[str, str]
+) -> str:
+    """Upgrade the connection to a WebSocket (RFC 6455, 4.1); return the subprotocol the server chose."""
+    upgrade = {
+        "Upgrade": "WebSocket",
+        "Connection": "Upgrade",
+        "Sec-WebSocket-Key": key,
+        "Sec-WebSocket-Version": "13",
+        "Sec-WebSocket-Protocol": ",".join(protocols),
+    }
+    connection.request("GET", path, headers={**headers, **upgrade})
+    answer = connection.getresponse()
+    chosen = answer.getheader("Sec-WebSocket-Protocol", "")
+    if answer.status != 101 or answer.getheader("Sec-WebSocket-Accept") != get_accept_key(key):
+        raise HTTPException(f"the server answered with HTTP status {answer.status}, not with a WebSocket")
+    if chosen not in protocols:
+        raise HTTPException(f"the server speaks {chosen or 'no subprotocol'!r}, not CAN frames")
+    return chosen
+
+
+class BoundedRemoteBus(RemoteBus):  # type: ignore[misc]  # the library has no types
+    """``can_remote.RemoteBus`` that never waits for ever.
+
+    Parameters
+    ----------
+    url
+        ``ws://host:port/`` or, with TLS, ``wss://host:port/``.
+
+    Raises
+    ------
+    OSError, HTTPException, can.CanError
+        If there is no such server.
+    """
+
+    def __init__(self, url: str) -> None:
+        websocket = _BoundedWebSocket(url, _SUBPROTOCOLS, ssl_context=DEFAULT_SSL_CONTEXT)
+        self.socket = websocket.socket
+        try:
+            self.remote_protocol = RemoteClientProtocol({}, websocket)
+        except (WebsocketClosed, OSError) as error:
+            self.socket.close()
+            raise RemoteError(f"the server opened no bus ({error})") from error
+        except BaseException:
+            self.socket.close()
+            raise
+        self.channel_info = self.remote_protocol.channel_info
+        self.channel = url
+        can.BusABC.__init__(self, url)
+
+    def shutdown(self) -> None:
+        """Say goodbye, wait for the answer no longer than ``_TIMEOUT_S``, close the socket."""
+        if self._is_shutdown:
+            return
+        can.BusABC.shutdown(self)
+        try:
+            self._part()
+        except (WebsocketClosed, OSError):
+            pass  # the server has gone first: there is nobody to say goodbye to
+        finally:
+            self.socket.close()
+
+    def _part(self) -> None:
+        self.remote_protocol.close()
+        deadline = time.monotonic() + _TIMEOUT_S
+        while (left := deadline - time.monotonic()) > 0:
+            try:
+                self.remote_protocol.recv(left)
+            except RemoteError:  # frames and complaints still under way are of no interest any more
+                continue

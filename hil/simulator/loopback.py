@@ -1,0 +1,88 @@
+"""Addresses a simulated rig may be served at: this machine's own, and no other.
+
+The CAN server has no authentication and a simulated PLC no certificates, so neither may be reached from
+outside.
+"""
+
+from __future__ import annotations
+
+import ipaddress
+from dataclasses import dataclass
+from urllib.parse import urlsplit
+
+from hil.errors import UsageError
+
+
+@dataclass(frozen=True, slots=True)
+class Address:
+    """A TCP address; port 0 lets the system choose a free one."""
+
+    host: str
+    port: int
+
+    def __str__(self) -> str:
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        return f"{host}:{self.port}"
+
+
+def host_port(text: str) -> Address:
+    """Read ``HOST:PORT``, on whatever machine.
+
+    Raises
+    ------
+    UsageError
+        If it is no such pair.
+    """
+    return _read(f"//{text}", text, "HOST:PORT, for example 127.0.0.1:5020")
+
+
+def modbus_address(text: str) -> Address:
+    """Read ``HOST:PORT`` of this machine.
+
+    Raises
+    ------
+    UsageError
+        If it is no such pair, or not on this machine.
+    """
+    return _on_this_machine(host_port(text), text)
+
+
+def bus_address(url: str) -> Address:
+    """Read ``ws://HOST:PORT/`` of this machine.
+
+    Raises
+    ------
+    UsageError
+        If it is no such URL, or not on this machine.
+    """
+    expected = "ws://HOST:PORT/, for example ws://127.0.0.1:0/"
+    if urlsplit(url).scheme != "ws":
+        raise UsageError(f"bus {url!r}: expected {expected}. Give it with --bus or in [can] of the rig file.")
+    return _on_this_machine(_read(url, url, expected), url)
+
+
+def _read(url: str, text: str, expected: str) -> Address:
+    try:
+        parts = urlsplit(url)
+        host, port = parts.hostname, parts.port
+    except ValueError as error:
+        raise UsageError(f"address {text!r}: {error}; expected {expected}.") from error
+    if host is None or port is None:
+        raise UsageError(f"address {text!r}: expected {expected}.")
+    return Address("127.0.0.1" if host == "localhost" else host, port)
+
+
+def _on_this_machine(address: Address, text: str) -> Address:
+    if _is_loopback(address.host):
+        return address
+    raise UsageError(
+        f"address {text!r}: a simulated rig is served on this machine only, without authentication; expected "
+        "a loopback address such as 127.0.0.1. To reach it from elsewhere, tunnel the port with SSH."
+    )
+
+
+def _is_loopback(host: str) -> bool:
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False

@@ -1,0 +1,109 @@
+"""Two simulated inverters and a plant on a bus, driven by SYNC: one SYNC is one period of simulated time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from types import TracebackType
+from typing import Self
+
+import can
+
+from drivers.can_link import SYNC_COB_ID, CanLink
+from hil.simulator.inverter_node import InverterNode
+from hil.simulator.inverter_settings import SimulatedInverter
+from hil.simulator.plant import Plant
+
+StepCallback = Callable[[float], None]
+"""``callback(time_s)``, called in the rig's own thread after each step."""
+
+
+class SimulatedRig:
+    """The slaves' end of a bus.
+
+    At each SYNC both inverters put the torque of their last RPDO into effect, both send their TPDO with the
+    speed and torque of this moment, then the plant runs for one period. The same seed and commands give the
+    same TPDOs, byte for byte.
+
+    Parameters
+    ----------
+    bus
+        An open ``python-can`` bus; it belongs to the rig from now on.
+    plant
+        What the inverters drive.
+    inverters
+        Inverters m1 and m2.
+    period_s
+        Simulated time of one SYNC [s].
+    seed
+        Of all reading noise.
+    """
+
+    def __init__(
+        self,
+        bus: can.BusABC,
+        plant: Plant,
+        inverters: tuple[SimulatedInverter, SimulatedInverter],
+        period_s: float = 0.01,
+        seed: int = 0,
+    ) -> None:
+        self._plant = plant
+        self._period_s = period_s
+        self._callbacks: list[StepCallback] = []
+        self._steps = 0
+        self._link = CanLink(bus)
+        m1, m2 = inverters
+        self._m1 = None if m1.faults.absent else InverterNode(self._link, m1, seed)
+        self._m2 = None if m2.faults.absent else InverterNode(self._link, m2, seed)
+        self._nodes = tuple(node for node in (self._m1, self._m2) if node is not None)
+        self._link.subscribe(SYNC_COB_ID, self._on_sync)
+
+    @property
+    def time_s(self) -> float:
+        """Simulated time since the start [s]."""
+        return self._steps * self._period_s
+
+    @property
+    def torque_nm(self) -> tuple[float, float]:
+        """Torques in effect now [Nm]; an absent inverter gives none."""
+        return (
+            0.0 if self._m1 is None else self._m1.torque_nm,
+            0.0 if self._m2 is None else self._m2.torque_nm,
+        )
+
+    def add_step_callback(self, callback: StepCallback) -> None:
+        """Have ``callback(time_s)`` called after each step, in the rig's own thread."""
+        self._callbacks.append(callback)
+
+    def close(self) -> None:
+        """Take the slaves off the bus and shut it down.
+
+        Raises
+        ------
+        Exception
+            What plant, slaves or a callback raised in the rig's thread: a defect, which stopped the rig.
+        """
+        for node in self._nodes:
+            node.close()
+        self._link.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        error_type: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def _on_sync(self, data: bytes, t_ns: int) -> None:
+        speed_rad_s = self._plant.speed_rad_s
+        for node in self._nodes:
+            node.step(speed_rad_s, self._period_s)
+        for node in self._nodes:
+            node.send_feedback()
+        self._plant.advance(self.torque_nm, self._period_s)
+        self._steps += 1
+        for callback in self._callbacks:
+            callback(self.time_s)

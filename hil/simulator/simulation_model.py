@@ -1,0 +1,64 @@
+"""The model behind the simulated rig, and the effects put into it; nothing that is compiled."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from estimator.physics.model import DrivelineModel, Parameter, Structure
+from hil.config.model_file import read_model
+from hil.config.rig_file import SimulationTable
+from hil.errors import UsageError
+
+DEFAULT_BUS = DrivelineModel(
+    structure=Structure.TWO_MASS,
+    parameters={
+        "J_M": Parameter(1.6, 0.2),
+        "J_L": Parameter(100.0, 0.2),
+        "k": Parameter(4200.0, 0.2),
+        "c": Parameter(9.0, 0.2),
+        "b_M": Parameter(0.35, 0.2),
+        "b_L": Parameter(0.9, 0.2),
+    },
+    gear_ratio=5.6,
+)
+"""A hybrid bus of 14 t, gear ratio 5.6, wheel radius 0.48 m, reflected to the motor shaft.
+
+Assumed, for the paper gives no parameter values: first resonance 8.2 Hz, inside the 5 to 50 Hz band it names.
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class EffectSpec:
+    """An effect put into the simulated rig: its name in the catalogue and the parameters given for it."""
+
+    name: str
+    parameters: Mapping[str, float]
+
+    @classmethod
+    def parse(cls, text: str) -> EffectSpec:
+        """Read ``NAME[:k=v,...]``.
+
+        Raises
+        ------
+        UsageError
+            If a parameter is no ``key=number``.
+        """
+        name, _, rest = text.partition(":")
+        pairs = (part.partition("=") for part in rest.split(",")) if rest else ()
+        return cls(name.strip(), {key.strip(): _number(text, key, value) for key, _, value in pairs})
+
+
+def simulation_model(table: SimulationTable) -> DrivelineModel:
+    """Model of the simulated driveline: the rig file's, or the default bus."""
+    return DEFAULT_BUS if table.model is None else read_model(table.model).model
+
+
+def _number(text: str, key: str, value: str) -> float:
+    try:
+        return float(value)
+    except ValueError as error:
+        raise UsageError(
+            f"effect {text!r}: expected key=number for {key.strip()!r}, came {value!r}. "
+            "Write NAME:key=number,key=number."
+        ) from error

@@ -1,0 +1,46 @@
+"""Emergency frames: decoded, described, refused when malformed."""
+
+from __future__ import annotations
+
+import pytest
+
+from drivers.emcy import Emergency, cause_of, decode
+from drivers.errors import ProtocolViolation
+
+
+def test_frame_survives_encoding_and_decoding() -> None:
+    emergency = Emergency(0x2310, 0x03, b"\x01\x02\x03\x04\x05")
+    assert emergency.encode() == bytes.fromhex("10 23 03 01 02 03 04 05")
+    assert decode(emergency.encode()) == emergency
+
+
+@pytest.mark.parametrize(
+    ("code", "cause"),
+    [
+        (0x2310, "continuous over-current, motor side"),
+        (0x2311, "continuous over-current"),
+        (0x2FFF, "current"),
+        (0x8130, "life guard or heartbeat error"),
+        (0x4310, "excess temperature of the drive"),
+        (0xFF01, "device specific"),
+        (0xB000, "a code outside CiA 301 and CiA 402"),
+    ],
+)
+def test_the_longest_known_code_names_the_cause(code: int, cause: str) -> None:
+    assert cause_of(code) == cause
+
+
+def test_message_shows_manufacturer_data_only_where_there_is_any() -> None:
+    assert str(Emergency(0x3220, 1, bytes(5))) == "EMCY 0x3220 DC link under-voltage (error register 0x01)"
+    assert "manufacturer data 0a 00 00 00 00" in str(Emergency(0x3220, 1, b"\x0a\0\0\0\0"))
+
+
+def test_only_code_00xx_is_a_reset() -> None:
+    assert Emergency(0x0000, 0, bytes(5)).is_reset
+    assert not Emergency(0x1000, 0, bytes(5)).is_reset
+
+
+@pytest.mark.parametrize("length", [0, 7, 9])
+def test_frame_of_another_length_is_refused(length: int) -> None:
+    with pytest.raises(ProtocolViolation, match=f"EMCY frame of {length} bytes.*expected 8"):
+        decode(bytes(length))

@@ -1,0 +1,111 @@
+"""Heartbeats: their loss, by times passed in, and their sending."""
+
+from __future__ import annotations
+
+import threading
+
+import pytest
+
+from drivers.errors import BusDown, DeviceFault, DeviceTimeout, ProtocolViolation
+from drivers.heartbeat import HeartbeatMonitor, HeartbeatProducer, NmtCommand, NmtState, nmt_frame
+from drivers.node_monitor import NodeMonitor
+
+MS = 1_000_000
+
+
+def test_node_that_never_comes_is_lost_after_the_timeout() -> None:
+    monitor = HeartbeatMonitor("node 5", timeout_ns=100 * MS, started_ns=1000 * MS)
+    monitor.raise_if_lost(1100 * MS)
+    with pytest.raises(DeviceTimeout, match="node 5: last heartbeat never, expected one every 100 ms"):
+        monitor.raise_if_lost(1100 * MS + 1)
+
+
+def test_node_that_stops_is_lost_after_the_timeout_and_found_again() -> None:
+    monitor = HeartbeatMonitor("node 5", timeout_ns=100 * MS, started_ns=0)
+    monitor.beat(NmtState.OPERATIONAL, 250 * MS)
+    monitor.raise_if_lost(350 * MS)
+    with pytest.raises(DeviceTimeout, match="last heartbeat 101 ms ago, in OPERATIONAL"):
+        monitor.raise_if_lost(351 * MS)
+    monitor.beat(NmtState.OPERATIONAL, 352 * MS)
+    monitor.raise_if_lost(452 * MS)
+
+
+def test_producer_sends_the_present_state_and_nothing_after_stop() -> None:
+    sent: list[tuple[int, bytes]] = []
+    enough = threading.Event()
+
+    def send(cob_id: int, data: bytes) -> None:
+        sent.append((cob_id, data))
+        if len(sent) == 3:
+            enough.set()
+
+    states = iter([NmtState.PRE_OPERATIONAL, *[NmtState.OPERATIONAL] * 10_000])
+    producer = HeartbeatProducer(send, 5, 0.001, lambda: next(states))
+    assert enough.wait(5.0)
+    producer.stop()
+    count = len(sent)
+    assert sent[:3] == [(0x705, b"\x7f"), (0x705, b"\x05"), (0x705, b"\x05")]
+    assert not producer._thread.is_alive()
+    assert len(sent) == count
+
+
+def test_producer_ends_with_its_bus() -> None:
+    def send(cob_id: int, data: bytes) -> None:
+        raise BusDown("gone")
+
+    producer = HeartbeatProducer(send, 5, 60.0, lambda: NmtState.OPERATIONAL)
+    producer._thread.join(5.0)
+    assert not producer._thread.is_alive()
+    producer.stop()
+
+
+def test_nmt_frame_is_command_and_node() -> None:
+    assert nmt_frame(NmtCommand.ENTER_PRE_OPERATIONAL, 5) == b"\x80\x05"
+
+
+def node_monitor(timeout_ms: int = 1_000_000) -> NodeMonitor:
+    return NodeMonitor("node 5", timeout_ms * MS)
+
+
+@pytest.mark.parametrize("data", [b"", b"\x05\x05", b"\x06"])
+def test_heartbeat_of_no_known_state_is_refused(data: bytes) -> None:
+    with pytest.raises(ProtocolViolation, match=r"node 5: heartbeat \[.*expected one byte"):
+        node_monitor().on_heartbeat(data, 0)
+
+
+def test_node_that_left_its_nmt_state_is_a_fault() -> None:
+    monitor = node_monitor()
+    monitor.expect(NmtState.OPERATIONAL)
+    with pytest.raises(DeviceFault, match="NMT state is nothing so far, expected OPERATIONAL"):
+        monitor.raise_if_unwell(0)
+    monitor.on_heartbeat(b"\x05", 0)
+    monitor.raise_if_unwell(0)
+    monitor.on_heartbeat(b"\x00", 0)
+    with pytest.raises(DeviceFault, match="NMT state is INITIALISING, expected OPERATIONAL"):
+        monitor.raise_if_unwell(0)
+
+
+def test_toggle_bit_of_node_guarding_is_no_state() -> None:
+    monitor = node_monitor()
+    monitor.expect(NmtState.OPERATIONAL)
+    monitor.on_heartbeat(b"\x85", 0)
+    monitor.raise_if_unwell(0)
+
+
+def test_awaited_state_that_does_not_come_names_the_one_seen() -> None:
+    monitor = node_monitor()
+    with pytest.raises(DeviceTimeout, match="reports nothing so far after 0 s, expected OPERATIONAL"):
+        monitor.await_state(NmtState.OPERATIONAL, 0.0)
+    monitor.on_heartbeat(b"\x7f", 0)
+    with pytest.raises(DeviceTimeout, match="reports PRE-OPERATIONAL after 0 s, expected OPERATIONAL"):
+        monitor.await_state(NmtState.OPERATIONAL, 0.0)
+
+
+def test_the_first_emergency_stays_until_it_is_reset() -> None:
+    monitor = node_monitor()
+    monitor.on_emergency(bytes.fromhex("10 23 01 00 00 00 00 00"), 0)
+    monitor.on_emergency(bytes.fromhex("20 32 01 00 00 00 00 00"), 0)
+    with pytest.raises(DeviceFault, match="EMCY 0x2310 continuous over-current, motor side"):
+        monitor.raise_if_unwell(0)
+    monitor.on_emergency(bytes(8), 0)
+    monitor.raise_if_unwell(0)

@@ -1,0 +1,197 @@
+"""The host's inverter against simulated ones with something wrong: each fault named, never passed over."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from drivers.cia402 import PowerState, TorqueMode
+from drivers.errors import BusDown, ConfigMismatch, DeviceFault, DeviceTimeout
+from hil.simulator.inverter_settings import FaultAtStep, InverterFaults
+from tests.drivers.can_bench import M1, SIMULATED_M1, Bench, bench, frame, guarded
+
+OVER_CURRENT = 0x2310
+
+
+def start(rig: Bench) -> None:
+    rig.m1.configure()
+    rig.m1.arm()
+
+
+@pytest.mark.parametrize(
+    ("settings", "faults", "what", "found", "expected"),
+    [
+        (M1, InverterFaults(identity=(0x9A, 0x402)), "vendor-ID 0x1018:01", "0x0000009A", "0x000003E7"),
+        (M1, InverterFaults(identity=(0x3E7, 7)), "product code 0x1018:02", "0x00000007", "0x00000402"),
+        (replace(M1, vendor_id=1), InverterFaults(), "vendor-ID 0x1018:01", "0x000003E7", "0x00000001"),
+        (replace(M1, product_code=1), InverterFaults(), "product code 0x1018:02", "0x00000402", "0x00000001"),
+        (replace(M1, rated_torque_nm=500.0), InverterFaults(), "motor rated torque 0x6076", "600 Nm", "500 Nm"),
+        (
+            M1,
+            InverterFaults(velocity_unit=0x00B44700),
+            "SI unit velocity 0x60A9",
+            "0x00B44700",
+            "0xFDB44700",
+        ),
+        (
+            replace(M1, torque_limit_nm=601.0),
+            InverterFaults(),
+            "max torque 0x6072",
+            "600 Nm",
+            "at least the torque limit of 601 Nm",
+        ),
+    ],
+)
+def test_device_that_is_another_is_found_and_refused(
+    settings: object, faults: InverterFaults, what: str, found: str, expected: str
+) -> None:
+    with bench(faults, settings=settings) as rig:
+        [difference] = rig.m1.check()
+        assert (difference.what, difference.found, difference.expected) == (what, found, expected)
+        with pytest.raises(ConfigMismatch, match=f"{what} is {found}, expected {expected}.*Correct the rig file"):
+            rig.m1.configure()
+
+
+def test_mode_that_is_not_supported_is_found_by_check_and_refused() -> None:
+    profile_only = replace(SIMULATED_M1, supported_modes=frozenset({TorqueMode.PROFILE_TORQUE}))
+    with bench(simulated=profile_only) as rig:
+        [difference] = rig.m1.check()
+        assert difference.what == "supported drive modes 0x6502"
+        assert difference.found == "0x00000008 with 4 (profile torque)"
+        with pytest.raises(ConfigMismatch, match=r"expected mode 10 \(cyclic synchronous torque\) among them"):
+            rig.m1.configure()
+        with pytest.raises(ConfigMismatch, match=r"mode of operation 10 .* refused, it stays at 0\. .*0x06090030"):
+            rig.m1.arm()
+
+
+def test_mode_that_does_not_come_is_refused_with_both_values() -> None:
+    with bench(InverterFaults(ignored_writes=frozenset({0x6060}))) as rig:
+        rig.m1.configure()
+        with pytest.raises(DeviceTimeout, match=r"mode of operation is 0 after 0\.05 s, expected 10 \(cyclic"):
+            rig.m1.arm()
+
+
+def test_state_machine_that_does_not_follow_is_refused_with_both_states() -> None:
+    with bench(InverterFaults(ignored_writes=frozenset({0x6040}))) as rig:
+        rig.m1.configure()
+        with pytest.raises(
+            DeviceTimeout, match=r"power state is switch on disabled after .* expected ready to switch on"
+        ):
+            rig.m1.arm()
+
+
+@pytest.mark.parametrize("index", [0x1400, 0x1600, 0x1800, 0x1A00, 0x1016, 0x1017])
+def test_configuration_that_does_not_hold_is_refused(index: int) -> None:
+    with bench(InverterFaults(ignored_writes=frozenset({index}))) as rig:
+        with pytest.raises(ConfigMismatch, match=rf"object 0x{index:04X}:.. reads .* after writing"):
+            rig.m1.configure()
+
+
+def test_changed_option_code_is_found_and_set_back() -> None:
+    with bench() as rig:
+        rig.m1._sdo.download(0x6007, 0, 0)
+        [difference] = rig.m1.check()
+        assert str(difference) == (
+            "inverter m1 (node 5): abort connection option code 0x6007:00 is 0, expected 2 (EDS)"
+        )
+        rig.m1.configure()
+        assert rig.m1.check() == ()
+
+
+def test_fault_in_operation_is_raised_with_its_cause_and_takes_the_torque_away() -> None:
+    with bench(InverterFaults(fault=FaultAtStep(3, OVER_CURRENT))) as rig:
+        start(rig)
+        for _ in range(2):
+            rig.cycle(guarded(120.0))
+            rig.m1.raise_if_faulted()
+        assert rig.cycle(guarded(120.0)).state is PowerState.FAULT
+        assert rig.rig.torque_nm[0] == 0.0
+        with pytest.raises(DeviceFault, match=r"EMCY 0x2310 continuous over-current, motor side \(error register 0x01"):
+            rig.m1.raise_if_faulted()
+        rig.m1.disarm()
+
+
+def test_fault_without_emergency_is_raised_with_its_error_code() -> None:
+    with bench(InverterFaults(fault=FaultAtStep(1, OVER_CURRENT))) as rig:
+        start(rig)
+        rig.cycle()
+        rig.m1._monitor.forget_emergency()
+        with pytest.raises(DeviceFault, match="power state is fault, error code 0x603F is 0x2310 continuous"):
+            rig.m1.raise_if_faulted()
+
+
+def test_drive_in_fault_is_not_armed_until_it_is_reset() -> None:
+    with bench(InverterFaults(fault=FaultAtStep(0, OVER_CURRENT))) as rig:
+        rig.m1.configure()
+        with pytest.raises(DeviceFault, match="power state is fault, error code 0x603F is 0x2310"):
+            rig.m1.arm()
+        rig.m1.reset_fault()
+        rig.m1.arm()
+        assert rig.cycle(guarded(60.0)).state is PowerState.OPERATION_ENABLED
+        rig.m1.raise_if_faulted()
+
+
+def test_fault_that_can_not_be_reset_is_refused() -> None:
+    faults = InverterFaults(fault=FaultAtStep(0, OVER_CURRENT), ignored_writes=frozenset({0x6040}))
+    with bench(faults) as rig:
+        rig.m1.configure()
+        with pytest.raises(DeviceTimeout, match=r"power state is fault after .* expected without fault"):
+            rig.m1.reset_fault()
+
+
+def test_drive_that_hangs_gives_no_feedback_then_loses_its_heartbeat() -> None:
+    with bench(InverterFaults(hang_at_step=3)) as rig:
+        start(rig)
+        for _ in range(2):
+            rig.cycle(guarded(120.0))
+        rig.m1.command(guarded(120.0))
+        assert rig.m1.await_feedback(rig.link.sync(), timeout_s=0.02) is None
+        assert rig.rig.torque_nm[0] == 0.0
+        with pytest.raises(DeviceTimeout, match=r"last heartbeat \d+ ms ago, in OPERATIONAL, expected one every 500"):
+            rig.until_raised()
+
+
+def test_drive_that_hangs_can_not_be_disarmed_and_every_step_is_told() -> None:
+    with bench(InverterFaults(hang_at_step=1)) as rig:
+        start(rig)
+        rig.m1.await_feedback(rig.link.sync(), timeout_s=0.02)
+        rig.m1._sdo._client.RESPONSE_TIMEOUT = 0.02
+        with pytest.raises(DeviceTimeout, match="no SDO answer for object 0x6071:00") as failed:
+            rig.m1.disarm()
+        [note] = failed.value.__notes__
+        assert "0x6040:00" in note
+
+
+def test_drive_that_ignores_the_controlword_is_taken_down_by_nmt() -> None:
+    """Confirmed by the statusword, not by the acknowledgement: the last resort is the network."""
+    with bench() as rig:
+        start(rig)
+        rig.cycle(guarded(120.0))
+        rig.rig._m1._ignored_writes = frozenset({0x6040})
+        rig.rig._m1._server._ignored_writes = frozenset({0x6040, 0x6071, 0x60B2})
+        with pytest.raises(DeviceTimeout, match=r"power state is operation enabled after .* expected without torque"):
+            rig.m1.disarm()
+        rig.m1._sdo.upload(0x6041)  # answered after the NMT command before it
+        assert rig.rig.torque_nm[0] == 0.0
+
+
+def test_drive_that_is_reset_by_somebody_is_a_fault() -> None:
+    with bench() as rig:
+        start(rig)
+        rig.cycle(guarded(120.0))
+        with rig.intruder() as bus:
+            bus.send(frame(0x000, b"\x81\x05"))
+        with pytest.raises(DeviceFault, match="NMT state is INITIALISING, expected OPERATIONAL"):
+            rig.until_raised()
+        assert rig.rig.torque_nm[0] == 0.0
+
+
+def test_bus_that_goes_away_is_raised_by_the_health_check() -> None:
+    with bench() as rig:
+        start(rig)
+        rig.link.close()
+        with pytest.raises(BusDown, match="is closed"):
+            rig.m1.raise_if_faulted()
+        with pytest.raises(BusDown, match="is closed"):
+            rig.m1.disarm()

@@ -1,0 +1,190 @@
+"""The simulated inverter on the bus: NMT, PDO configuration, EMCY, heartbeat, by frames."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import can
+import pytest
+
+from drivers.cia402 import PowerState
+from drivers.errors import ConfigMismatch, DeviceTimeout
+from drivers.heartbeat import NMT_COB_ID, NmtCommand, nmt_frame
+from drivers.sdo import SdoChannel
+from hil.simulator.inverter_settings import FaultAtStep, InverterFaults
+from tests.drivers.can_bench import M1, Bench, bench, frame, guarded
+
+
+@pytest.fixture
+def armed() -> Iterator[Bench]:
+    with bench() as rig:
+        for inverter in (rig.m1, rig.m2):
+            inverter.configure()
+        rig.m1.arm()
+        rig.cycle(guarded(120.0))
+        yield rig
+
+
+def answers(rig: Bench, syncs: int) -> int:
+    """How many TPDOs of m1 so many SYNCs bring; m2 answers after m1 and so ends the waiting."""
+    counted: list[bytes] = []
+    rig.link.subscribe(0x180 + M1.node_id, lambda data, t_ns: counted.append(data))
+    for _ in range(syncs):
+        if rig.m2.await_feedback(rig.link.sync(), timeout_s=5.0) is None:
+            raise AssertionError("no feedback of m2 in 5 s")
+    return len(counted)
+
+
+def objects(rig: Bench) -> SdoChannel:
+    return rig.m1._sdo
+
+
+def nmt(rig: Bench, command: NmtCommand, node_id: int = M1.node_id) -> None:
+    rig.link.send(NMT_COB_ID, nmt_frame(command, node_id))
+
+
+def received(bus: can.BusABC, cob_id: int) -> bytes:
+    """Next frame with an identifier."""
+    while (message := bus.recv(5.0)) is not None:
+        if message.arbitration_id == cob_id:
+            return bytes(message.data)
+    raise AssertionError(f"no frame 0x{cob_id:03X} in 5 s")
+
+
+@pytest.mark.parametrize("node_id", [M1.node_id, 0])
+@pytest.mark.parametrize("command", [command for command in NmtCommand if command is not NmtCommand.START])
+def test_leaving_nmt_operational_takes_the_torque_away(armed: Bench, command: NmtCommand, node_id: int) -> None:
+    assert armed.rig.torque_nm[0] == pytest.approx(120.0)
+    nmt(armed, command, node_id)
+    armed.m2.configure()  # where all nodes were meant, m2 too was stopped
+    assert answers(armed, syncs=1) == 0
+    assert armed.rig.torque_nm[0] == 0.0
+
+
+@pytest.mark.parametrize("data", [nmt_frame(NmtCommand.STOP, 99), b"", b"\x02", b"\x50\x05", b"\x02\x05\x00"])
+def test_nmt_for_others_or_of_no_sense_changes_nothing(armed: Bench, data: bytes) -> None:
+    with armed.intruder() as bus:
+        bus.send(frame(NMT_COB_ID, data))
+    assert armed.m1.await_feedback(armed.link.sync(), timeout_s=5.0) is not None
+    assert armed.rig.torque_nm[0] == pytest.approx(120.0)
+
+
+def test_command_waiting_for_sync_dies_with_nmt_operational(armed: Bench) -> None:
+    armed.m1.command(guarded(180.0))
+    nmt(armed, NmtCommand.ENTER_PRE_OPERATIONAL)
+    nmt(armed, NmtCommand.START)
+    assert armed.cycle().state is PowerState.SWITCH_ON_DISABLED
+    assert armed.rig.torque_nm[0] == 0.0
+
+
+def test_stopped_node_answers_no_sdo(armed: Bench) -> None:
+    nmt(armed, NmtCommand.STOP)
+    client = objects(armed)._client
+    client.RESPONSE_TIMEOUT = 0.02
+    with pytest.raises(DeviceTimeout):
+        objects(armed).upload(0x6041)
+    client.RESPONSE_TIMEOUT = M1.sdo_timeout_s
+    nmt(armed, NmtCommand.ENTER_PRE_OPERATIONAL)
+    objects(armed).upload(0x6041)
+
+
+def test_reset_node_boots_with_the_values_of_its_eds(armed: Bench) -> None:
+    objects(armed).download(0x6007, 0, 0)
+    with armed.intruder() as bus:
+        nmt(armed, NmtCommand.RESET_NODE)
+        assert received(bus, 0x700 + M1.node_id) == b"\x00"
+        assert objects(armed).upload(0x6007) == 2
+        assert objects(armed).upload(0x1017) == 0
+        assert objects(armed).upload(0x6071) == 0
+
+
+@pytest.mark.parametrize(
+    ("index", "subindex", "value", "reason"),
+    [
+        (0x1A00, 0, 2, "0x08000022"),  # while the PDO is on
+        (0x1A00, 1, 0x60770010, "0x08000022"),
+        (0x1800, 2, 0, "0x06090030"),
+        (0x1800, 2, 254, "0x06090030"),
+        (0x1400, 2, 255, "0x06090030"),
+    ],
+)
+def test_pdo_that_is_on_is_not_changed(index: int, subindex: int, value: int, reason: str) -> None:
+    with bench() as rig, pytest.raises(ConfigMismatch, match=reason):
+        objects(rig).download(index, subindex, value)
+
+
+@pytest.mark.parametrize(
+    ("entry", "reason"),
+    [
+        (0x60760020, "0x06040041"),  # not mappable
+        (0x20000010, "0x06040041"),  # not there
+        (0x60410020, "0x06040041"),  # another length
+    ],
+)
+def test_object_that_can_not_be_mapped_is_refused(entry: int, reason: str) -> None:
+    with bench() as rig:
+        sdo = objects(rig)
+        sdo.download(0x1800, 1, 0x185 | 1 << 31)
+        with pytest.raises(ConfigMismatch, match="0x08000022"):  # the number of objects is not 0 yet
+            sdo.download(0x1A00, 1, 0x60410010)
+        sdo.download(0x1A00, 0, 0)
+        with pytest.raises(ConfigMismatch, match=reason):
+            sdo.download(0x1A00, 1, entry)
+
+
+def test_mapping_over_eight_bytes_is_refused() -> None:
+    with bench() as rig:
+        sdo = objects(rig)
+        sdo.download(0x1800, 1, 0x185 | 1 << 31)
+        sdo.download(0x1A00, 0, 0)
+        sdo.download(0x1A00, 1, 0x606C0020)
+        sdo.download(0x1A00, 2, 0x606C0020)
+        with pytest.raises(ConfigMismatch, match="0x06040042"):
+            sdo.download(0x1A00, 0, 3)
+        sdo.download(0x1A00, 0, 2)
+
+
+def test_transmission_type_2_answers_every_second_sync(armed: Bench) -> None:
+    nmt(armed, NmtCommand.ENTER_PRE_OPERATIONAL)
+    objects(armed).download(0x1800, 2, 2)
+    nmt(armed, NmtCommand.START)
+    assert answers(armed, syncs=6) == 3
+
+
+def test_tpdo_that_is_switched_off_is_not_sent(armed: Bench) -> None:
+    nmt(armed, NmtCommand.ENTER_PRE_OPERATIONAL)
+    objects(armed).download(0x1800, 1, 0x185 | 1 << 31)
+    nmt(armed, NmtCommand.START)
+    assert answers(armed, syncs=1) == 0
+
+
+def test_rpdo_of_another_length_is_not_processed_and_told(armed: Bench) -> None:
+    with armed.intruder() as bus:
+        bus.send(frame(0x205, bytes(5)))
+        armed.cycle()
+        assert received(bus, 0x080 + M1.node_id)[:2] == b"\x10\x82"
+    assert armed.rig.torque_nm[0] == pytest.approx(120.0)
+
+
+def test_fault_from_power_on_is_told_after_the_boot_up() -> None:
+    with bench(InverterFaults(fault=FaultAtStep(0, 0x3220))) as rig, rig.intruder() as bus:
+        nmt(rig, NmtCommand.RESET_NODE)
+        assert received(bus, 0x700 + M1.node_id) == b"\x00"
+        assert received(bus, 0x080 + M1.node_id) == bytes.fromhex("20 32 01 00 00 00 00 00")
+
+
+def test_heartbeat_follows_its_object_and_the_nmt_state(armed: Bench) -> None:
+    with armed.intruder() as bus:
+        assert received(bus, 0x700 + M1.node_id) == b"\x05"
+        nmt(armed, NmtCommand.STOP)
+        while received(bus, 0x700 + M1.node_id) != b"\x04":
+            pass
+        nmt(armed, NmtCommand.ENTER_PRE_OPERATIONAL)
+        objects(armed).download(0x1017, 0, 0)
+        node = armed.rig._m1
+        assert node is not None
+        assert node._producer is None
+
+
+def test_controlword_over_sdo_and_rpdo_is_one_object(armed: Bench) -> None:
+    assert objects(armed).upload(0x6040) == 0x000F
