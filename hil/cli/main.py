@@ -95,8 +95,8 @@ def run(arguments: Sequence[str]) -> int:
     app, rest, name = _application(arguments)
     try:
         result = app(rest, prog_name=name, standalone_mode=False)
-    except typer.Abort:
-        return ExitStatus.INTERRUPTED
+    except typer.Abort:  # what typer makes of Ctrl-C
+        return _report(KeyboardInterrupt())
     except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001 - the one place that maps errors to statuses
         return _report(error)
     return result if isinstance(result, int) else ExitStatus.DONE

@@ -1,0 +1,69 @@
+"""``hil sim``: serve the simulated slaves until told to stop."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from hil.config.rig_file import Rig, read_rig
+from hil.rig.stop import StopRequest, stop_on_signals
+from hil.simulator.loopback import Address, modbus_address
+from hil.simulator.plant_factory import plant_for
+from hil.simulator.rig_server import RigServer
+from hil.simulator.simulation_model import EffectSpec
+
+LOOK_EVERY_S = 0.1
+"""How soon a signal is answered [s]."""
+
+app = typer.Typer(add_completion=False)
+
+
+@app.command(
+    epilog="Example: hil sim examples/rig.toml --bus ws://127.0.0.1:0/ --modbus 127.0.0.1:0"
+    " --effect backlash:gap_rad=0.02"
+)
+def sim(
+    rig: Annotated[Path, typer.Argument(help="Rig file with a table [simulation].")],
+    bus: Annotated[
+        str | None,
+        typer.Option(metavar="URL", help="Serve the CAN bus at ws://127.0.0.1:PORT/; else where RIG says."),
+    ] = None,
+    modbus: Annotated[
+        str | None,
+        typer.Option(metavar="HOST:PORT", help="Serve the PLC here; else where RIG says."),
+    ] = None,
+    effect: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME[:k=v,...]", help="Put an effect into the driveline; may be repeated."),
+    ] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="Of all that is random; else the rig file's.")] = None,
+) -> None:
+    """Serve two inverters, the PLC and the driveline to other programs on this machine.
+
+    Prints one line, `ready bus=... modbus=...`, and runs until SIGINT or SIGTERM. Port 0 takes a free one.
+    """
+    rig_file = read_rig(rig)
+    effects = [EffectSpec.parse(text) for text in effect or ()]
+    server = RigServer(
+        plant=plant_for(rig_file, effects),
+        rig=rig_file,
+        bus_url=rig_file.can.url if bus is None else bus,
+        modbus=_modbus(rig_file, modbus),
+        seed=seed,
+    )
+    _serve(server)
+
+
+def _modbus(rig: Rig, given: str | None) -> Address:
+    return modbus_address(str(Address(rig.plc.host, rig.plc.port)) if given is None else given)
+
+
+def _serve(server: RigServer) -> None:
+    stop = StopRequest()
+    with stop_on_signals(stop), server:
+        print(f"ready bus={server.bus_url} modbus={server.modbus}", flush=True)  # noqa: T201 - the contract's line
+        while not stop.requested:
+            time.sleep(LOOK_EVERY_S)

@@ -1,0 +1,81 @@
+"""Drives armed for the time of a block; at zero torque and disarmed after it, both, whatever happens."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from types import TracebackType
+from typing import Self
+
+from drivers.errors import CommandRefused
+from hil.errors import RunAborted
+from hil.rig.build import Devices
+from hil.rig.stop import StopRequest
+
+
+class ArmedDrives:
+    """Context manager: arm both drives, disarm both.
+
+    Parameters
+    ----------
+    devices
+        The opened rig, its inverters configured.
+    stop
+        Looked at before each drive is armed.
+
+    Raises
+    ------
+    RunAborted
+        On exit, if a drive could not be confirmed disarmed; in place of the error that ended the block,
+        which it names.
+    """
+
+    __slots__ = ("_devices", "_stop")
+
+    def __init__(self, devices: Devices, stop: StopRequest) -> None:
+        self._devices = devices
+        self._stop = stop
+
+    def __enter__(self) -> Self:
+        try:
+            for inverter in (self._devices.m1, self._devices.m2):
+                self._stop.raise_if_requested()
+                inverter.arm()
+        except BaseException as error:  # __exit__ is not called when __enter__ fails
+            self._disarm_all(error)
+            raise
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._disarm_all(error)
+
+    def _disarm_all(self, error: BaseException | None) -> None:
+        self._devices.guard.disable()
+        # A head start only: what counts is that each drive then confirms it is disarmed.
+        not_zeroed = _failures(self._zero_both)
+        not_disarmed = [*_failures(self._devices.m1.disarm), *_failures(self._devices.m2.disarm)]
+        if not_disarmed:
+            cause = "" if error is None else f" What ended the run: {error or type(error).__name__}"
+            raise RunAborted(
+                f"not every drive is confirmed disarmed: {'; '.join([*not_disarmed, *not_zeroed])}. Expected "
+                f"both to be; cut the power of the drive named before anyone goes near the shaft.{cause}"
+            ) from error
+
+    def _zero_both(self) -> None:
+        """Take both to zero with the next SYNC, so that neither waits for the other's disarming."""
+        for inverter, torque in zip((self._devices.m1, self._devices.m2), self._devices.guard.zero(), strict=True):
+            with suppress(CommandRefused):  # not armed yet, so it stands still
+                inverter.command(torque)
+        self._devices.link.sync()
+
+
+def _failures(step: Callable[[], None]) -> list[str]:
+    """Run one step and tell what went wrong with it; nothing may keep the steps after it from being tried."""
+    try:
+        step()
+    except Exception as error:  # noqa: BLE001 - also a defect of ours must not leave the other drive armed
+        reasons = [str(error) or type(error).__name__, *getattr(error, "__notes__", ())]
+        return ["; ".join(reason.rstrip(".") for reason in reasons)]
+    return []

@@ -1,0 +1,90 @@
+"""From the rig file to real devices: the only module that builds them.
+
+A simulated rig is reached by the same drivers over the same protocols; only the addresses differ.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from drivers.can_link import CanLink
+from drivers.cia402 import TorqueMode
+from drivers.inverter import Inverter
+from drivers.inverter_settings import InverterSettings
+from drivers.plc import Plc
+from drivers.register_map import load_register_map
+from drivers.resources import data_file
+from drivers.torque_guard import TorqueGuard
+from hil.config.rig_file import InverterTable, PlcTable, Rig
+from hil.rig.plc_loop import PlcLoop
+
+
+@dataclass(frozen=True, slots=True)
+class Devices:
+    """Everything a run drives or asks, opened."""
+
+    link: CanLink
+    m1: Inverter
+    m2: Inverter
+    guard: TorqueGuard
+    plc_loop: PlcLoop
+    plc: Plc
+
+
+@contextmanager
+def open_devices(rig: Rig) -> Iterator[Devices]:
+    """Open bus and PLC of a rig; both are closed at the end of the block. No device is changed.
+
+    Raises
+    ------
+    BusDown
+        If the CAN bus or the PLC's address is not there.
+    ConfigMismatch
+        If an EDS or the register map can't be used, or the PLC is another one.
+    DeviceTimeout
+        If the PLC does not answer.
+    """
+    with CanLink.open(rig.can.url) as link, PlcLoop() as loop:
+        m1 = Inverter(link, inverter_settings("m1", rig.inverters.m1))
+        m2 = Inverter(link, inverter_settings("m2", rig.inverters.m2))
+        with connected_plc(rig.plc, loop) as plc:
+            yield Devices(link, m1, m2, TorqueGuard(rig.guard_limits), loop, plc)
+
+
+@contextmanager
+def connected_plc(table: PlcTable, loop: PlcLoop) -> Iterator[Plc]:
+    """Connect to the PLC on its loop; disconnected at the end of the block.
+
+    Raises
+    ------
+    BusDown, DeviceTimeout, ConfigMismatch
+        See `open_devices`.
+    """
+    plc = Plc(table.host, table.port, load_register_map(table.map or data_file("plc.toml")))
+    loop.call(plc.connect())
+    try:
+        yield plc
+    finally:
+        loop.call(_close(plc))
+
+
+def inverter_settings(name: str, table: InverterTable) -> InverterSettings:
+    """Give the settings of one inverter as the drivers take them."""
+    return InverterSettings(
+        name=name,
+        node_id=table.node_id,
+        rated_torque_nm=table.rated_torque_nm,
+        torque_limit_nm=table.torque_limit_nm,
+        mode=TorqueMode[table.mode.name],
+        eds_path=table.eds,
+        vendor_id=table.vendor_id,
+        product_code=table.product_code,
+        heartbeat_ms=table.heartbeat_ms,
+    )
+
+
+async def _close(plc: Plc) -> None:
+    """Close in the loop's own thread: the connection belongs to it."""
+    plc.close()

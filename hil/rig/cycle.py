@@ -1,0 +1,176 @@
+"""The 10 ms cycle: guard, both inverters' commands, SYNC, both answers, one `Sample`.
+
+Time is the pacer's (`hil.rig.pacing.Tick`), so that a run that waits for nothing behaves as one on the wall
+clock: ages count from when a cycle really began, the guard's rate limit from when it was due, since a
+torque may change by so much per cycle. Only `CanLink.sync` stamps host time, where the frame leaves.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from drivers.can_link import CanLink
+from drivers.errors import DeviceTimeout
+from drivers.inverter import Inverter, InverterFeedback
+from drivers.torque_guard import GuardedTorque, TorqueGuard, TorqueRequest
+from hil.errors import RunAborted
+from hil.rig.pacing import NS_PER_S, Tick
+from hil.rig.sample import Sample, SampleFlag
+
+
+@dataclass(slots=True)
+class _Station:
+    """One inverter in the cycle: its last answer and the time of the cycle that got it."""
+
+    name: str
+    inverter: Inverter
+    stale: SampleFlag
+    torque_nm: float = math.nan
+    speed_rad_s: float = math.nan
+    answered_ns: int | None = None
+
+    def take(self, feedback: InverterFeedback | None, now_ns: int) -> SampleFlag:
+        """Keep an answer, or flag that there is none."""
+        if feedback is None:
+            return self.stale
+        self.torque_nm = feedback.torque_nm
+        self.speed_rad_s = feedback.speed_rad_s
+        self.answered_ns = now_ns
+        return SampleFlag.GOOD
+
+
+class Cycle:
+    """Everything that happens between two SYNC.
+
+    Parameters
+    ----------
+    link
+        The bus both inverters are on.
+    m1, m2
+        The inverters, configured. The resolver is read through m1.
+    guard
+        What every request has to pass.
+    period_ns
+        Time between two cycles [ns].
+    answer_timeout_s
+        How long the inverters may take to answer a SYNC [s].
+    """
+
+    __slots__ = ("_answer_timeout_s", "_first_ns", "_guard", "_link", "_m1", "_m2", "_period_ns")
+
+    def __init__(
+        self,
+        link: CanLink,
+        m1: Inverter,
+        m2: Inverter,
+        guard: TorqueGuard,
+        period_ns: int,
+        answer_timeout_s: float,
+    ) -> None:
+        self._link = link
+        self._m1 = _Station("m1", m1, SampleFlag.M1_STALE)
+        self._m2 = _Station("m2", m2, SampleFlag.M2_STALE)
+        self._guard = guard
+        self._period_ns = period_ns
+        self._answer_timeout_s = answer_timeout_s
+        self._first_ns: int | None = None
+
+    @property
+    def speed_rad_s(self) -> float:
+        """Latest resolver speed [rad/s]; NaN before the first answer."""
+        return self._m1.speed_rad_s
+
+    @property
+    def answered(self) -> bool:
+        """Whether both inverters have answered at least once."""
+        return self._m1.answered_ns is not None and self._m2.answered_ns is not None
+
+    def step(self, tick: Tick, request: TorqueRequest, time_s: float, flags: SampleFlag) -> Sample:
+        """Run one cycle.
+
+        Parameters
+        ----------
+        tick
+            The cycle's number and time.
+        request
+            What the experiment asks for.
+        time_s
+            Time of the sample in the recording [s].
+        flags
+            What is already known against the sample.
+
+        Raises
+        ------
+        CommandRefused
+            If the guard refuses the request.
+        DeviceFault
+            If an inverter reports a fault.
+        DeviceTimeout
+            If an inverter has not answered for as long as the guard's feedback time-out.
+        RunAborted
+            If this machine itself was late by as much.
+        """
+        self._refuse_if_unfit(tick)
+        command_m1, command_m2 = self._guard.check(request, tick.due_ns, self._age_ns(tick.now_ns))
+        sync_ns, flags_answer = self._exchange(command_m1, command_m2, tick.now_ns)
+        if 2 * tick.late_ns > self._period_ns:
+            flags |= SampleFlag.LATE
+        return self._sample(tick, request, time_s, sync_ns, flags | flags_answer)
+
+    def _exchange(self, to_m1: GuardedTorque, to_m2: GuardedTorque, now_ns: int) -> tuple[int, SampleFlag]:
+        self._m1.inverter.command(to_m1)
+        self._m2.inverter.command(to_m2)
+        sync_ns = self._link.sync()
+        flags = self._m1.take(self._m1.inverter.await_feedback(sync_ns, self._answer_timeout_s), now_ns)
+        # Both answer the same SYNC: while the host waited for m1 in vain, m2 had its time too.
+        patience_s = 0.0 if flags else self._answer_timeout_s
+        flags |= self._m2.take(self._m2.inverter.await_feedback(sync_ns, patience_s), now_ns)
+        return sync_ns, flags
+
+    def _refuse_if_unfit(self, tick: Tick) -> None:
+        if self._first_ns is None:
+            self._first_ns = tick.now_ns
+        for station in (self._m1, self._m2):
+            station.inverter.raise_if_faulted()
+            self._refuse_if_old(station, tick)
+
+    def _refuse_if_old(self, station: _Station, tick: Tick) -> None:
+        timeout_s = self._guard.limits.feedback_timeout_s
+        age_s = (tick.now_ns - self._last_ns(station)) / NS_PER_S
+        if age_s <= timeout_s:
+            return
+        if tick.late_ns > self._period_ns:
+            raise RunAborted(
+                f"cycle {tick.cycle} began {tick.late_ns / NS_PER_S:.3f} s late, so that its feedback is "
+                f"{age_s:.3f} s old, expected at most {timeout_s:g} s (feedback_timeout_s). This machine was "
+                "too busy: close other programs."
+            )
+        raise DeviceTimeout(
+            f"inverter {station.name}: no TPDO for {age_s:.3f} s, expected one per SYNC and none missing "
+            f"for more than {timeout_s:g} s (feedback_timeout_s). Check its supply and its cabling."
+        )
+
+    def _last_ns(self, station: _Station) -> int:
+        """Time of the cycle that got the last answer; of the first cycle while there is none [ns]."""
+        if station.answered_ns is not None:
+            return station.answered_ns
+        return 0 if self._first_ns is None else self._first_ns
+
+    def _age_ns(self, now_ns: int) -> int:
+        return now_ns - min(self._last_ns(self._m1), self._last_ns(self._m2))
+
+    def _sample(self, tick: Tick, request: TorqueRequest, time_s: float, sync_ns: int, flags: SampleFlag) -> Sample:
+        return Sample(
+            cycle=tick.cycle,
+            t_ns=sync_ns,
+            time_s=time_s,
+            torque_ref_m1_nm=request.total_m1_nm,
+            torque_ref_m2_nm=request.total_m2_nm,
+            prbs_nm=request.prbs_m1_nm + request.prbs_m2_nm,
+            torque_m1_nm=self._m1.torque_nm,
+            torque_m2_nm=self._m2.torque_nm,
+            speed_rad_s=self.speed_rad_s,
+            age_ns=self._age_ns(tick.now_ns),
+            flags=flags,
+        )

@@ -1,0 +1,157 @@
+"""The cycles of one run, between arming and disarming: who asks what of whom in each of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Protocol
+
+from hil.rig.cycle import Cycle
+from hil.rig.excitation import NO_TORQUE
+from hil.rig.experiments.base import Phase
+from hil.rig.pacing import NS_PER_S, Pacer, Tick
+from hil.rig.plan import Plan
+from hil.rig.plc_watch import PlcWatch
+from hil.rig.sample import Sample, SampleFlag
+from hil.rig.stop import StopRequest
+
+SLEPT_THROUGH = SampleFlag.LATE | SampleFlag.M1_STALE | SampleFlag.M2_STALE
+"""Flags of a cycle this machine was too late for: there was no SYNC, and the torque stood."""
+
+
+class Recorder(Protocol):
+    """Where the samples of the measured part go, one by one."""
+
+    def append(self, sample: Sample) -> None:
+        """Take the next sample."""
+        ...
+
+
+Progress = Callable[[Phase, float], None]
+"""Called once per cycle with the phase and the time since it began [s]."""
+
+
+@dataclass(slots=True)
+class RunSummary:
+    """What a run came to.
+
+    Attributes
+    ----------
+    cycles
+        Cycles driven, all phases.
+    recorded
+        Samples recorded.
+    flagged
+        Recorded samples that are not good.
+    most_late_ns
+        Latest beginning of a cycle [ns].
+    """
+
+    cycles: int = 0
+    recorded: int = 0
+    flagged: int = 0
+    most_late_ns: int = 0
+
+
+@dataclass(slots=True)
+class Drive:
+    """One experiment, cycle by cycle.
+
+    Attributes
+    ----------
+    plan
+        What to do; used up by the run.
+    cycle
+        One exchange with both inverters.
+    watch
+        The PLC's permission.
+    pacer
+        When each cycle begins.
+    recorder
+        Where samples go.
+    stop
+        Ends the run at the next cycle when requested.
+    progress
+        Told of every cycle.
+    """
+
+    plan: Plan
+    cycle: Cycle
+    watch: PlcWatch
+    pacer: Pacer
+    recorder: Recorder
+    stop: StopRequest
+    progress: Progress
+    _summary: RunSummary = field(default_factory=RunSummary)
+    _phase: Phase = Phase.APPROACH
+    _phase_from: int = 0
+    _last: Sample | None = None
+
+    def wake_up(self) -> None:
+        """Cycle at zero torque until both inverters have answered; the cycle itself ends a wait in vain."""
+        while not self.cycle.answered:
+            self._stand_still()
+
+    def run(self) -> RunSummary:
+        """Drive the experiment to its end; the torque guard is enabled.
+
+        Raises
+        ------
+        RunAborted, DriverError, KeyboardInterrupt
+            As `hil.rig.session.run_plan`.
+        """
+        first = self._stand_still().cycle + 1  # the guard counts its rate limit from a cycle at zero torque
+        self._phase_from = first
+        while self._phase is not Phase.DONE:
+            self._drive(first)
+        return self._summary
+
+    def _drive(self, first: int) -> None:
+        tick, flags = self._begin()
+        base = self.plan.experiment.torque(self._seconds(tick.cycle - first), self.cycle.speed_rad_s)
+        if base.phase is not self._phase:
+            self._phase, self._phase_from = base.phase, tick.cycle
+        time_s = self._seconds(tick.cycle - self._phase_from)
+        request = self.plan.split.request(base.torque_nm, self.plan.prbs_nm(base.phase))
+        sample = self.cycle.step(tick, request, time_s, flags)
+        if base.phase is Phase.MEASURE:
+            self._record(sample)
+        self.progress(base.phase, time_s)
+
+    def _stand_still(self) -> Tick:
+        tick, flags = self._begin()
+        self.cycle.step(tick, NO_TORQUE, 0.0, flags)
+        return tick
+
+    def _begin(self) -> tuple[Tick, SampleFlag]:
+        self.stop.raise_if_requested()
+        tick = self.pacer.next()
+        self._summary.cycles += 1
+        self._summary.most_late_ns = max(self._summary.most_late_ns, tick.late_ns)
+        return tick, self.watch.look(tick, self.cycle.speed_rad_s)
+
+    def _record(self, sample: Sample) -> None:
+        if self._last is not None:
+            for missing in range(self._last.cycle + 1, sample.cycle):
+                self._append(self._stand_in(self._last, missing))
+        self._append(sample)
+        self._last = sample
+
+    def _stand_in(self, last: Sample, cycle: int) -> Sample:
+        """Build the sample of a cycle that did not take place: the last values, flagged."""
+        return replace(
+            last,
+            cycle=cycle,
+            time_s=self._seconds(cycle - self._phase_from),
+            age_ns=last.age_ns + (cycle - last.cycle) * self.pacer.period_ns,
+            flags=last.flags | SLEPT_THROUGH,
+        )
+
+    def _append(self, sample: Sample) -> None:
+        self.recorder.append(sample)
+        self._summary.recorded += 1
+        self._summary.flagged += bool(sample.flags)
+
+    def _seconds(self, cycles: int) -> float:
+        """Time of a number of cycles [s]; one division, so that 7 times 10 ms is 0.07 exactly."""
+        return cycles * self.pacer.period_ns / NS_PER_S

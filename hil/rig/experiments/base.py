@@ -1,0 +1,83 @@
+"""What an experiment is: a base torque for every cycle, in four phases that always end at zero torque.
+
+::
+
+    APPROACH  bring the vehicle to the start speed; driven, not recorded
+    MEASURE   the experiment proper; recorded, PRBS superposed
+    RELEASE   ramp to zero torque; driven, not recorded
+    DONE      zero torque, nothing follows
+
+An experiment reads no clock and no bus: time and speed are arguments, so that the same plan runs on the
+rig, in a test and in a dry run.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import Protocol
+
+
+class Phase(Enum):
+    """Where in its course an experiment is."""
+
+    APPROACH = "approach"
+    MEASURE = "measure"
+    RELEASE = "release"
+    DONE = "done"
+
+
+@dataclass(frozen=True, slots=True)
+class BaseTorque:
+    """The torque an experiment asks of both inverters together, PRBS excluded [Nm], and its phase."""
+
+    torque_nm: float
+    phase: Phase
+
+
+class Experiment(Protocol):
+    """A plan that answers each cycle with a base torque."""
+
+    @property
+    def duration_s(self) -> float:
+        """Length of the measured part [s]."""
+        ...
+
+    def torque(self, time_s: float, speed_rad_s: float) -> BaseTorque:
+        """Ask for the torque of one cycle.
+
+        Parameters
+        ----------
+        time_s
+            Time since the first cycle of the experiment [s]; never runs backwards.
+        speed_rad_s
+            Latest motor speed [rad/s].
+
+        Raises
+        ------
+        RunAborted
+            If the vehicle does not come to the start speed.
+        """
+        ...
+
+
+class MeasureLaw(Protocol):
+    """The law that makes one kind of experiment: its torque during the measured part."""
+
+    @property
+    def start_speed_rad_s(self) -> float:
+        """Speed the vehicle must have when the measured part begins [rad/s]."""
+        ...
+
+    @property
+    def duration_s(self) -> float:
+        """Length of the measured part [s]."""
+        ...
+
+    def begin(self, torque_nm: float) -> None:
+        """Take over at the torque that holds the start speed [Nm]."""
+        ...
+
+    def torque_nm(self, time_s: float, speed_rad_s: float) -> float:
+        """Torque ``time_s`` after the beginning of the measured part [Nm]."""
+        ...

@@ -1,0 +1,61 @@
+"""From a table of the rig file to the experiment it describes: a new kind is one file and one case here."""
+
+from __future__ import annotations
+
+from hil.config.experiment_tables import AnyExperiment, CruiseTable, ReversalTable, TipTable
+from hil.config.rig_file import Rig
+from hil.errors import UsageError
+from hil.rig.experiments.approach import Approach
+from hil.rig.experiments.base import Experiment, MeasureLaw
+from hil.rig.experiments.cruise import Cruise
+from hil.rig.experiments.reversal import Reversal
+from hil.rig.experiments.staged import StagedExperiment, TorqueBounds
+from hil.rig.experiments.tip import Tip
+
+
+def experiment_table(rig: Rig, name: str) -> AnyExperiment:
+    """Look an experiment of the rig file up by name.
+
+    Raises
+    ------
+    UsageError
+        If the rig file has none of that name.
+    """
+    table = rig.experiments.get(name)
+    if table is None:
+        known = ", ".join(sorted(rig.experiments)) or "none"
+        raise UsageError(
+            f"experiment {name!r}: expected one of rig {rig.name!r} ({known}). "
+            f"Name one of these, or add [experiments.{name}] to the rig file."
+        )
+    return table
+
+
+def build_experiment(rig: Rig, name: str) -> Experiment:
+    """Build a fresh experiment; each run needs its own.
+
+    Raises
+    ------
+    UsageError
+        If the rig file has none of that name.
+    """
+    table = experiment_table(rig, name)
+    law = _law(table, rig.vehicle.inertia_kg_m2, rig.period_s)
+    approach = Approach(
+        speed_rad_s=law.start_speed_rad_s,
+        inertia_kg_m2=rig.vehicle.inertia_kg_m2,
+        torque_limit_nm=table.torque_nm,
+        period_s=rig.period_s,
+        timeout_s=table.approach_timeout_s,
+    )
+    return StagedExperiment(law, approach, TorqueBounds(table.torque_nm, table.slew_nm_per_s), rig.period_s)
+
+
+def _law(table: AnyExperiment, inertia_kg_m2: float, period_s: float) -> MeasureLaw:
+    match table:
+        case CruiseTable():
+            return Cruise(table.speed_rad_s, table.duration_s, inertia_kg_m2, table.torque_nm, period_s)
+        case ReversalTable():
+            return Reversal(table.turning_speed_rad_s, table.swing_nm, table.duration_s, period_s)
+        case TipTable():
+            return Tip(table.speed_rad_s, table.step_nm, table.step_s, table.duration_s)

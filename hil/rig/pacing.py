@@ -1,0 +1,152 @@
+"""When a cycle begins: by the wall clock on a rig, or as fast as the answers come on a simulated one.
+
+The cycle's time is what a `Pacer` says it is; nothing else in the cycle reads a clock. One code path serves
+both.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import Protocol
+
+NS_PER_S = 1_000_000_000
+
+
+def period_ns(period_s: float) -> int:
+    """Period in whole nanoseconds, as the pacers count it."""
+    return round(period_s * NS_PER_S)
+
+
+@dataclass(frozen=True, slots=True)
+class Tick:
+    """The beginning of one cycle.
+
+    ``due_ns`` is its planned time, always a whole number of periods after the first [ns]; ``late_ns`` is
+    how much later it really begins [ns].
+    """
+
+    cycle: int
+    due_ns: int
+    late_ns: int
+
+    @property
+    def now_ns(self) -> int:
+        """When it really begins [ns]."""
+        return self.due_ns + self.late_ns
+
+
+class Pacer(Protocol):
+    """Says when each cycle begins."""
+
+    @property
+    def period_ns(self) -> int:
+        """Time between two cycles [ns]."""
+        ...
+
+    @property
+    def answer_timeout_s(self) -> float:
+        """How long a device may take to answer a SYNC [s of the wall clock]."""
+        ...
+
+    @property
+    def poll_patience_s(self) -> float:
+        """How long a cycle may wait for an answer that is not part of it, such as the PLC's [s]."""
+        ...
+
+    def next(self) -> Tick:
+        """Return when the next cycle is due."""
+        ...
+
+
+class RealTimePacer:
+    """An absolute schedule on the monotonic clock: a late cycle does not delay those after it.
+
+    Parameters
+    ----------
+    period_ns
+        Time between two cycles [ns].
+
+    Notes
+    -----
+    When a cycle is late by more than half a period (a busy machine, a debugger), the cycles it ran into are
+    left out of the schedule and not caught up, so that two SYNC are never closer than half a period. The
+    numbers of the cycles left out are missing from the ticks; the cycle's caller records them as flagged
+    samples.
+    """
+
+    __slots__ = ("_due_ns", "_next_cycle", "_period_ns")
+
+    def __init__(self, period_ns: int) -> None:
+        self._period_ns = period_ns
+        self._next_cycle = 0
+        self._due_ns: int | None = None
+
+    @property
+    def period_ns(self) -> int:
+        """Time between two cycles [ns]."""
+        return self._period_ns
+
+    @property
+    def answer_timeout_s(self) -> float:
+        """Four fifths of a period: the rest is for what the host does with the answer [s]."""
+        return 0.8 * self._period_ns / NS_PER_S
+
+    @property
+    def poll_patience_s(self) -> float:
+        """No time at all [s]: the torque cycle waits for nothing."""
+        return 0.0
+
+    def next(self) -> Tick:
+        """Sleep until the next cycle is due."""
+        now_ns = time.monotonic_ns()
+        due_ns = now_ns if self._due_ns is None else self._due_ns
+        if due_ns > now_ns:
+            time.sleep((due_ns - now_ns) / NS_PER_S)
+            now_ns = time.monotonic_ns()
+        late_ns = now_ns - due_ns
+        tick = Tick(self._next_cycle, due_ns, late_ns)
+        used_up = 1 + (late_ns + self._period_ns // 2) // self._period_ns
+        self._due_ns = due_ns + used_up * self._period_ns
+        self._next_cycle += used_up
+        return tick
+
+
+class FreePacer:
+    """No waiting: simulated time, one period per cycle, however long the answers take.
+
+    Parameters
+    ----------
+    period_ns
+        Time between two cycles [ns].
+    answer_timeout_s
+        Patience with a device [s of the wall clock]. Simulated time stands still meanwhile, so that it only
+        decides how soon a dead device is noticed, not what a run looks like.
+    """
+
+    __slots__ = ("_answer_timeout_s", "_cycle", "_period_ns")
+
+    def __init__(self, period_ns: int, answer_timeout_s: float = 1.0) -> None:
+        self._period_ns = period_ns
+        self._answer_timeout_s = answer_timeout_s
+        self._cycle = -1
+
+    @property
+    def period_ns(self) -> int:
+        """Time between two cycles [ns]."""
+        return self._period_ns
+
+    @property
+    def answer_timeout_s(self) -> float:
+        """Patience with a device [s of the wall clock]."""
+        return self._answer_timeout_s
+
+    @property
+    def poll_patience_s(self) -> float:
+        """Patience with the PLC [s of the wall clock]."""
+        return self._answer_timeout_s
+
+    def next(self) -> Tick:
+        """Return the next cycle at once."""
+        self._cycle += 1
+        return Tick(self._cycle, self._cycle * self._period_ns, 0)

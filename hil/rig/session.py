@@ -1,0 +1,82 @@
+"""One run from the idle rig to the idle rig: prepare, arm, drive, and always disarm.
+
+::
+
+    prepare      configure both inverters, set the PLC's generator off, see that the vehicle is fit
+    arm          both drives, each step confirmed
+    wake up      zero torque until both have answered a SYNC; then the guard is enabled
+    drive        the experiment, cycle by cycle; its measured part goes to the recording
+    disarm       in `ArmedDrives`, on every way out
+"""
+
+from __future__ import annotations
+
+from drivers.plc_types import PlcStatus, PrbsSettings, PrbsSource
+from hil.errors import RunAborted
+from hil.rig.arming import ArmedDrives
+from hil.rig.build import Devices
+from hil.rig.cycle import Cycle
+from hil.rig.drive import Drive, Progress, Recorder, RunSummary
+from hil.rig.fitness import reasons_against
+from hil.rig.pacing import Pacer
+from hil.rig.plan import Plan
+from hil.rig.plc_watch import PlcWatch
+from hil.rig.stop import StopRequest
+
+GENERATOR_OFF = PrbsSettings(False, 0.0, 1, 1, PrbsSource.HOST)
+"""The host makes the PRBS: the PLC's own generator must not add another."""
+
+
+def run_plan(
+    devices: Devices,
+    plan: Plan,
+    pacer: Pacer,
+    recorder: Recorder,
+    stop: StopRequest,
+    progress: Progress,
+) -> RunSummary:
+    """Run a plan on an opened rig.
+
+    Parameters
+    ----------
+    devices
+        The rig, opened.
+    plan
+        What to do; used up by the run.
+    pacer
+        When each cycle begins.
+    recorder
+        Where samples go.
+    stop
+        Ends the run at the next cycle when requested.
+    progress
+        Told of every cycle.
+
+    Raises
+    ------
+    RunAborted
+        If the vehicle is not fit or no longer, or a drive can't be confirmed disarmed.
+    DriverError
+        What the devices raise; `CommandRefused` if the guard refused a torque.
+    KeyboardInterrupt
+        If `stop` was requested.
+    """
+    before = _prepare(devices, plan, stop)
+    with ArmedDrives(devices, stop):
+        cycle = Cycle(devices.link, devices.m1, devices.m2, devices.guard, pacer.period_ns, pacer.answer_timeout_s)
+        watch = PlcWatch(devices.plc_loop, devices.plc, before, plan.needs, pacer.poll_patience_s)
+        drive = Drive(plan, cycle, watch, pacer, recorder, stop, progress)
+        drive.wake_up()
+        devices.guard.enable()
+        return drive.run()
+
+
+def _prepare(devices: Devices, plan: Plan, stop: StopRequest) -> PlcStatus:
+    for inverter in (devices.m1, devices.m2):
+        stop.raise_if_requested()
+        inverter.configure()
+    devices.plc_loop.call(devices.plc.write_prbs(GENERATOR_OFF))
+    status = devices.plc_loop.call(devices.plc.read_status())
+    if reasons := list(reasons_against(status, plan.needs)):
+        raise RunAborted(f"PLC: {'; '.join(reasons)}. Nothing was armed; bring the vehicle into that state first.")
+    return status

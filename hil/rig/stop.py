@@ -1,0 +1,59 @@
+"""Ctrl-C and SIGTERM as a request that the run reads between two cycles.
+
+A signal that raised at an arbitrary line could tear a bus library's lock or a half-written row; here it
+only sets a flag. Every wait of a run is bounded, so the flag is read within one cycle, or at the end of the
+arming step under way.
+"""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+class StopRequest:
+    """Whether someone asked for the run to end."""
+
+    __slots__ = ("_requested",)
+
+    def __init__(self) -> None:
+        self._requested = False
+
+    @property
+    def requested(self) -> bool:
+        """Whether it was asked for."""
+        return self._requested
+
+    def request(self) -> None:
+        """Ask for the run to end; safe from a signal handler and from another thread."""
+        self._requested = True
+
+    def raise_if_requested(self) -> None:
+        """End the run here if that was asked for.
+
+        Raises
+        ------
+        KeyboardInterrupt
+            As if Ctrl-C had been pressed at this line.
+        """
+        if self._requested:
+            raise KeyboardInterrupt
+
+
+@contextmanager
+def stop_on_signals(stop: StopRequest) -> Iterator[None]:
+    """Turn SIGINT and SIGTERM into stop requests, for the time of the block; for the main thread only."""
+
+    def handle(signum: int, frame: FrameType | None) -> None:
+        stop.request()
+
+    before = {number: signal.signal(number, handle) for number in STOP_SIGNALS}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

@@ -1,0 +1,145 @@
+"""``hil run``: recordings, exit statuses, and drives that are disarmed however it ends."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from hil.cli.main import run
+from hil.config.rig_file import read_rig
+from hil.recording.formats import read_table
+from tests.rig.observer import assert_disarmed
+from tests.rig.serving import served
+
+NOWHERE = ("--bus", "ws://127.0.0.1:9/", "--modbus", "127.0.0.1:9")
+
+
+def test_records_from_another_process(
+    simulate: Callable[..., Any], short_rig: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    simulation = simulate(short_rig)
+    out = tmp_path / "run.csv"
+    command = ["run", str(short_rig), "reversal", "--out", str(out), "--pace", "fast", *simulation.addresses]
+    assert run([*command, "--json"]) == 0
+    printed = capsys.readouterr()
+    assert json.loads(printed.out)["recorded"] == 300
+    assert printed.err == ""  # no progress where there is no terminal
+    table = read_table(out)
+    assert table.columns["time_s"][-1] == 2.99
+    assert not table.columns["flags"].any()
+    assert abs(table.columns["speed_rad_s"]).max() > 0.5
+    assert_disarmed(simulation.bus, 1, 2)
+
+
+def test_recording_says_what_it_is(short_rig: Path, tmp_path: Path) -> None:
+    out = tmp_path / "run.parquet"
+    with served(read_rig(short_rig)) as (server, _):
+        addresses = ("--bus", server.bus_url, "--modbus", str(server.modbus))
+        assert run(["run", str(short_rig), "reversal", "--out", str(out), "--pace", "fast", *addresses]) == 0
+    table = read_table(out)
+    assert len(table.columns["time_s"]) == 300
+    metadata = table.metadata
+    assert metadata["experiment"] == "reversal"
+    assert metadata["rig_file"] == short_rig.read_text(encoding="utf-8")
+    assert len(metadata["eds_m1_sha256"]) == 64
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_signal_in_the_middle_keeps_the_recording_and_disarms(
+    spawn: Callable[..., subprocess.Popen[str]], short_rig: Path, tmp_path: Path, number: signal.Signals
+) -> None:
+    out = tmp_path / "run.csv"
+    with served(read_rig(short_rig), bus_url="ws://127.0.0.1:0/") as (server, _):
+        addresses = ("--bus", server.bus_url, "--modbus", str(server.modbus))
+        process = spawn("run", str(short_rig), "cruise", "--out", str(out), *addresses)
+        _await_rows(tmp_path / "run.part.csv", process)
+        process.send_signal(number)
+        _, complaints = process.communicate(timeout=20)
+        assert process.returncode == 130
+        assert_disarmed(server.bus_url, 1, 2)
+    times = read_table(out).columns["time_s"]
+    assert 0 < len(times) < 3000
+    assert f"holds the {len(times)} samples" in complaints
+    assert not (tmp_path / "run.part.csv").exists()
+
+
+def _await_rows(part: Path, process: subprocess.Popen[str]) -> None:
+    """Follow the file as it is written, until it has its first rows."""
+    while process.poll() is None:
+        if part.exists() and part.read_text(encoding="utf-8").count("\n") > 10:
+            return
+    raise AssertionError(process.communicate())
+
+
+def test_closing_clutch_is_a_device_problem(
+    short_rig: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with served(read_rig(short_rig)) as (server, _):
+        server.plc.close_clutch()
+        addresses = ("--bus", server.bus_url, "--modbus", str(server.modbus))
+        status = run(["run", str(short_rig), "cruise", "--out", str(tmp_path / "r.csv"), "--pace", "fast", *addresses])
+    assert status == 3
+    assert "clutch is closed" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == [short_rig]
+
+
+def test_bus_that_is_not_there(short_rig: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["run", str(short_rig), "cruise", "--out", str(tmp_path / "r.csv"), *NOWHERE]) == 3
+    assert "ws://127.0.0.1:9/" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == [short_rig]
+
+
+def test_unknown_experiment(short_rig: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["run", str(short_rig), "drift", "--out", str(tmp_path / "r.csv"), *NOWHERE]) == 2
+    assert "cruise, reversal, tip" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == [short_rig]
+
+
+def test_recording_is_never_overwritten(short_rig: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    kept = tmp_path / "r.csv"
+    kept.write_text("mine", encoding="utf-8")
+    assert run(["run", str(short_rig), "cruise", "--out", str(kept), *NOWHERE]) == 2
+    assert "r.csv" in capsys.readouterr().err
+    assert kept.read_text(encoding="utf-8") == "mine"
+
+
+def test_without_a_place_for_the_recording(short_rig: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["run", str(short_rig), "cruise"]) == 2
+    assert "--out" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("bus", ["socketcan:can0", "ws://10.0.0.1:54701/"])
+def test_fast_is_for_simulated_rigs_only(
+    short_rig: Path, tmp_path: Path, bus: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = str(tmp_path / "r.csv")
+    assert run(["run", str(short_rig), "cruise", "--out", out, "--pace", "fast", "--bus", bus]) == 2
+    assert bus in capsys.readouterr().err
+
+
+def test_dry_run_opens_no_bus_and_writes_nothing(
+    short_rig: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["run", str(short_rig), "tip", "--dry-run", *NOWHERE]) == 0
+    printed = capsys.readouterr().out
+    assert "30.0 s of it recorded" in printed
+    assert "speed in the recorded part" in printed
+    assert list(tmp_path.iterdir()) == [short_rig]
+
+
+def test_dry_run_as_json(short_rig: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["run", str(short_rig), "reversal", "--dry-run", "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["measured"] == 300
+    assert document["torque_nm"]["high"] <= 500.0
+
+
+def test_help_has_an_example(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["run", "--help"]) == 0
+    assert "hil run examples/rig.toml cruise" in capsys.readouterr().out

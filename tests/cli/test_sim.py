@@ -1,0 +1,67 @@
+"""``hil sim``: one line when ready, a clean end on a signal, and refusals."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from hil.cli.main import run
+from hil.simulator.can_bridge import CanBridge
+from hil.simulator.loopback import Address
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_serves_until_a_signal_and_prints_one_line(
+    simulate: Callable[..., Any], short_rig: Path, number: signal.Signals
+) -> None:
+    simulation = simulate(short_rig)
+    assert simulation.bus.startswith("ws://127.0.0.1:")
+    assert not simulation.bus.endswith(":0/")
+    simulation.process.send_signal(number)
+    rest, complaints = simulation.process.communicate(timeout=20)
+    assert simulation.process.returncode == 0
+    assert (rest, complaints) == ("", "")
+
+
+@pytest.mark.parametrize(
+    ("options", "named"),
+    [
+        (("--bus", "ws://0.0.0.0:0/"), "this machine only"),
+        (("--bus", "socketcan:can0"), "expected ws://HOST:PORT/"),
+        (("--modbus", "10.0.0.1:502"), "this machine only"),
+        (("--modbus", "nonsense"), "expected HOST:PORT"),
+        (("--effect", "backlash:gap"), "expected key=number"),
+        (("--effect", "gremlins"), "gremlins"),
+    ],
+)
+def test_refuses_what_it_can_t_serve(
+    short_rig: Path, options: tuple[str, ...], named: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["sim", str(short_rig), *options]) == 2
+    printed = capsys.readouterr()
+    assert named in printed.err
+    assert printed.out == ""
+
+
+def test_rig_file_of_a_real_rig_is_refused(short_rig: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = short_rig.read_text(encoding="utf-8")
+    short_rig.write_text(text[: text.index("\n[simulation]")], encoding="utf-8")
+    assert run(["sim", str(short_rig)]) == 2
+    assert "[simulation]" in capsys.readouterr().err
+
+
+def test_taken_port(short_rig: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with CanBridge(Address("127.0.0.1", 0), "taken") as taken:
+        assert run(["sim", str(short_rig), "--bus", taken.url, "--modbus", "127.0.0.1:0"]) == 3
+    printed = capsys.readouterr()
+    assert "can't serve" in printed.err
+    assert printed.out == ""
+
+
+def test_help_has_an_example(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["sim", "--help"]) == 0
+    assert "hil sim examples/rig.toml" in capsys.readouterr().out

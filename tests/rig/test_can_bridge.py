@@ -1,0 +1,52 @@
+"""The bridge carries frames between two processes' worth of buses, and leaves nothing behind."""
+
+from __future__ import annotations
+
+import threading
+import uuid
+
+import can
+import pytest
+
+from drivers.errors import BusDown
+from hil.simulator.can_bridge import CanBridge
+from hil.simulator.loopback import Address
+
+ANY_PORT = Address("127.0.0.1", 0)
+
+
+def remote(url: str) -> can.BusABC:
+    return can.Bus(interface="remote", channel=url)
+
+
+def test_carries_frames_both_ways_and_ends_every_thread() -> None:
+    channel = str(uuid.uuid4())
+    threads = threading.active_count()
+    with CanBridge(ANY_PORT, channel) as bridge, can.Bus(interface="virtual", channel=channel) as slave:
+        with remote(bridge.url) as host:
+            slave.send(can.Message(arbitration_id=0x181, data=[1, 2, 3], is_extended_id=False))
+            down = host.recv(5.0)
+            host.send(can.Message(arbitration_id=0x80, is_extended_id=False))
+            up = slave.recv(5.0)
+    assert down is not None
+    assert (down.arbitration_id, bytes(down.data)) == (0x181, b"\x01\x02\x03")
+    assert up is not None
+    assert up.arbitration_id == 0x80
+    assert threading.active_count() == threads
+
+
+def test_host_sees_the_bridge_close() -> None:
+    bridge = CanBridge(ANY_PORT, str(uuid.uuid4()))
+    with bridge:
+        host = remote(bridge.url)
+    with pytest.raises(Exception, match="Socket closed"):
+        host.recv(5.0)
+    host.socket.close()
+    host._is_shutdown = True  # the library's own shutdown can't end a connection that is already cut
+
+
+def test_taken_port_is_refused() -> None:
+    with CanBridge(ANY_PORT, "a") as first:
+        port = int(first.url.rstrip("/").rpartition(":")[2])
+        with pytest.raises(BusDown, match=r"can't serve at 127\.0\.0\.1"):
+            CanBridge(Address("127.0.0.1", port), "b")

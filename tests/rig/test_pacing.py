@@ -1,0 +1,52 @@
+"""The two clocks of a run, and what both promise."""
+
+from __future__ import annotations
+
+import itertools
+import time
+
+import pytest
+
+from hil.rig.pacing import FreePacer, RealTimePacer, Tick
+
+MS = 1_000_000
+
+
+def test_simulated_time_is_cycles_times_period() -> None:
+    pacer = FreePacer(10 * MS)
+    assert [pacer.next() for _ in range(3)] == [Tick(0, 0, 0), Tick(1, 10 * MS, 0), Tick(2, 20 * MS, 0)]
+
+
+def test_real_time_never_begins_a_cycle_before_it_is_due() -> None:
+    pacer = RealTimePacer(1 * MS)
+    ticks = [pacer.next() for _ in range(20)]
+    origin_ns = ticks[0].now_ns
+    for tick in ticks:
+        assert tick.now_ns - tick.late_ns == origin_ns + tick.cycle * MS
+        assert tick.late_ns >= 0
+
+
+def test_real_time_keeps_half_a_period_between_cycles() -> None:
+    pacer = RealTimePacer(1 * MS)
+    ticks = [pacer.next() for _ in range(20)]
+    for before, after in itertools.pairwise(ticks):
+        assert after.now_ns - before.now_ns >= MS // 2
+
+
+def test_cycles_the_host_slept_through_are_left_out_not_caught_up() -> None:
+    pacer = RealTimePacer(1 * MS)
+    first = pacer.next()
+    while time.monotonic_ns() < first.now_ns + 10 * MS:
+        pass
+    late = pacer.next()
+    after = pacer.next()
+    assert late.cycle == 1
+    assert late.late_ns >= 9 * MS
+    assert after.cycle >= 11
+    assert after.now_ns - after.late_ns == first.now_ns + after.cycle * MS
+
+
+@pytest.mark.parametrize("pacer", [FreePacer(10 * MS), RealTimePacer(10 * MS)])
+def test_answer_timeout_is_positive_and_period_is_kept(pacer: FreePacer | RealTimePacer) -> None:
+    assert pacer.period_ns == 10 * MS
+    assert pacer.answer_timeout_s > 0.0

@@ -1,0 +1,71 @@
+"""Plans from the rig file, and what a dry run says of them."""
+
+from __future__ import annotations
+
+import pytest
+
+from drivers.errors import CommandRefused
+from drivers.plc_types import PrbsSource
+from hil.config.rig_file import read_rig
+from hil.errors import RunAborted, UsageError
+from hil.rig.dry_run import dry_run
+from hil.rig.plan import plan_run
+from tests.rig.serving import EXAMPLE, changed, small_rig
+
+
+def test_needs_are_the_worst_case_of_one_inverter() -> None:
+    plan = plan_run(read_rig(EXAMPLE), "cruise")
+    assert plan.needs.torque_of_one_nm == 500.0 / 2 + 120.0 / 2
+
+
+def test_unknown_experiment_names_the_known_ones() -> None:
+    with pytest.raises(UsageError, match=r"'drift': expected one of .*cruise, reversal, tip"):
+        plan_run(read_rig(EXAMPLE), "drift")
+
+
+def test_rig_without_experiments_says_so() -> None:
+    bare = small_rig().model_copy(update={"experiments": {}})
+    with pytest.raises(UsageError, match=r"\(none\)"):
+        plan_run(bare, "cruise")
+
+
+def test_prbs_past_the_guard_is_refused() -> None:
+    with pytest.raises(UsageError, match=r"prbs\.source is 'plc', expected 'host'"):
+        plan_run(changed(small_rig(), {"prbs": {"source": PrbsSource.PLC}}), "cruise")
+
+
+@pytest.mark.parametrize("experiment", ["cruise", "reversal", "tip"])
+def test_example_can_be_driven(experiment: str) -> None:
+    rig = read_rig(EXAMPLE)
+    prediction = dry_run(rig, experiment)
+    table = rig.experiments[experiment]
+    assert prediction.measured * prediction.period_s == pytest.approx(table.duration_s)
+    assert prediction.cycles > prediction.measured
+    assert max(abs(prediction.torque_nm.low), abs(prediction.torque_nm.high)) <= table.torque_nm
+    for one in (prediction.torque_m1_nm, prediction.torque_m2_nm):
+        assert max(abs(one.low), abs(one.high)) <= rig.inverters.m1.torque_limit_nm
+
+
+def test_speed_is_predicted_from_the_simulation_model() -> None:
+    prediction = dry_run(read_rig(EXAMPLE), "cruise")
+    assert prediction.vehicle.inertia_kg_m2 == pytest.approx(101.6)
+    assert prediction.vehicle.friction_nm_s == pytest.approx(1.25)
+    assert prediction.speed_measured_rad_s.low == pytest.approx(60.0, rel=0.05)
+    assert prediction.speed_measured_rad_s.high == pytest.approx(60.0, rel=0.05)
+
+
+def test_without_simulation_the_resistance_is_unknown() -> None:
+    prediction = dry_run(read_rig(EXAMPLE).model_copy(update={"simulation": None}), "reversal")
+    assert prediction.vehicle.source == "[vehicle] inertia, resistance unknown"
+    assert prediction.vehicle.inertia_kg_m2 == 100.0
+
+
+def test_plan_the_guard_would_refuse_is_refused_on_paper() -> None:
+    with pytest.raises(CommandRefused, match="prbs_limit_nm"):
+        dry_run(changed(read_rig(EXAMPLE), {"guard": {"prbs_limit_nm": 50.0}}), "cruise")
+
+
+def test_speed_out_of_reach_is_seen_on_paper() -> None:
+    rig = changed(read_rig(EXAMPLE), {"experiments.cruise": {"speed_rad_s": 1e4, "approach_timeout_s": 5.0}})
+    with pytest.raises(RunAborted, match="approach"):
+        dry_run(rig, "cruise")

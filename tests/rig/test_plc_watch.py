@@ -1,0 +1,71 @@
+"""The PLC as the cycle sees it: polled beside it, aged in its time, judged in every cycle."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import pytest
+
+from hil.errors import RunAborted
+from hil.rig.build import open_devices
+from hil.rig.fitness import Needs
+from hil.rig.pacing import Tick
+from hil.rig.plc_watch import PlcWatch
+from hil.rig.sample import SampleFlag
+from hil.simulator.rig_server import RigServer
+from tests.rig.serving import served
+
+MS = 1_000_000
+
+
+@contextmanager
+def watch(patience_s: float) -> Iterator[tuple[RigServer, PlcWatch]]:
+    with served() as (server, rig), open_devices(rig) as devices:
+        before = devices.plc_loop.call(devices.plc.read_status())
+        yield server, PlcWatch(devices.plc_loop, devices.plc, before, Needs(0.0), patience_s)
+
+
+def at(time_ms: int) -> Tick:
+    return Tick(time_ms // 10, time_ms * MS, 0)
+
+
+def test_plc_that_answers_is_never_stale() -> None:
+    with watch(patience_s=5.0) as (_, plc_watch):
+        flags = {plc_watch.look(at(time_ms), 0.0) for time_ms in range(0, 2000, 10)}
+    assert flags == {SampleFlag.GOOD}
+
+
+def test_change_is_seen_at_the_next_poll_and_not_before() -> None:
+    with watch(patience_s=5.0) as (server, plc_watch):
+        plc_watch.look(at(0), 0.0)
+        server.plc.withdraw_permissive()
+        plc_watch.look(at(90), 0.0)
+        with pytest.raises(RunAborted, match="permissive is withdrawn"):
+            plc_watch.look(at(100), 0.0)
+
+
+def test_silent_plc_is_first_stale_then_the_end() -> None:
+    with watch(patience_s=0.0) as (server, plc_watch):
+        server.plc_server.pause()
+        assert plc_watch.look(at(0), 0.0) is SampleFlag.GOOD
+        assert plc_watch.look(at(200), 0.0) is SampleFlag.GOOD
+        assert plc_watch.look(at(210), 0.0) is SampleFlag.PLC_STALE
+        assert plc_watch.look(at(1000), 0.0) is SampleFlag.PLC_STALE
+        with pytest.raises(RunAborted, match=r"PLC: no answer for 1\.01 s, expected one every 0\.1 s"):
+            plc_watch.look(at(1010), 0.0)
+
+
+def test_poll_that_fails_ends_the_run_with_its_reason() -> None:
+    with watch(patience_s=5.0) as (server, plc_watch):
+        server.plc_server.pause()
+        with pytest.raises(RunAborted, match="PLC: expected its status, came: PLC at 127"):
+            plc_watch.look(at(0), 0.0)
+
+
+@pytest.mark.parametrize("speed_rad_s", [-320.1, 320.1])
+def test_speed_above_what_the_plc_permits(speed_rad_s: float) -> None:
+    with watch(patience_s=5.0) as (_, plc_watch):
+        plc_watch.look(at(0), 320.0 if speed_rad_s > 0 else -320.0)
+        with pytest.raises(RunAborted, match=r"320\.1 rad/s, expected at most 320 rad/s"):
+            plc_watch.look(at(10), speed_rad_s)

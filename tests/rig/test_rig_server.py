@@ -1,0 +1,132 @@
+"""Serving a simulated rig: addresses, what it needs of the rig file, and that nothing is left behind."""
+
+from __future__ import annotations
+
+import threading
+import uuid
+
+import pytest
+
+from drivers.can_link import CanLink
+from drivers.errors import BusDown
+from estimator.errors import BadModel
+from hil.errors import UsageError
+from hil.rig.addresses import with_addresses
+from hil.simulator.loopback import Address
+from hil.simulator.plant import RigidPlant
+from hil.simulator.plant_factory import plant_for
+from hil.simulator.rig_server import RigServer
+from hil.simulator.simulation_model import DEFAULT_BUS, EffectSpec, simulation_model
+from tests.rig.serving import ANY_PORT, Samples, run_once, small_rig
+
+ANY_BUS = "ws://127.0.0.1:0/"
+BIG_GAP = EffectSpec("backlash", {"gap_rad": 1.0})
+
+
+def server(bus_url: str = ANY_BUS, modbus: Address = ANY_PORT) -> RigServer:
+    return RigServer(RigidPlant(10.0, 0.5), small_rig(), bus_url, modbus)
+
+
+def test_run_over_tcp_and_nothing_left_behind() -> None:
+    before = threading.active_count()
+    samples = Samples()
+    with server() as served:
+        rig = with_addresses(small_rig(), served.bus_url, str(served.modbus))
+        run_once(rig, samples)
+    assert len(samples.rows) == 100
+    assert threading.active_count() == before
+
+
+def test_free_ports_are_told() -> None:
+    with server() as served:
+        assert served.modbus.port > 0
+        assert served.bus_url.startswith("ws://127.0.0.1:")
+        assert served.bus_url != ANY_BUS
+
+
+def test_taken_bus_port_leaves_nothing_behind() -> None:
+    with server() as first:
+        before = threading.active_count()
+        with pytest.raises(BusDown, match="can't serve"), server(bus_url=first.bus_url):
+            pass
+        assert threading.active_count() == before
+
+
+def test_taken_modbus_port_leaves_nothing_behind() -> None:
+    with server() as first:
+        before = threading.active_count()
+        with pytest.raises(BusDown, match="listen"), server(modbus=first.modbus):
+            pass
+        assert threading.active_count() == before
+
+
+def test_bus_elsewhere_is_refused() -> None:
+    with pytest.raises(UsageError, match="this machine only"):
+        server(bus_url="ws://0.0.0.0:0/")
+
+
+def test_rig_file_without_simulation_is_refused() -> None:
+    bare = small_rig().model_copy(update={"simulation": None})
+    with pytest.raises(UsageError, match=r"expected a table \[simulation\]"):
+        RigServer(RigidPlant(10.0, 0.5), bare, f"virtual:{uuid.uuid4()}", ANY_PORT)
+
+
+def test_host_sees_a_rig_that_goes_away() -> None:
+    with server() as served:
+        link = CanLink.open(served.bus_url)
+    with link, pytest.raises(BusDown):
+        _sync_until_it_fails(link)
+
+
+def _sync_until_it_fails(link: CanLink) -> None:
+    while True:
+        link.sync()
+
+
+def test_default_bus_stands_in_for_a_model_file() -> None:
+    simulation = small_rig().simulation
+    assert simulation is not None
+    assert simulation_model(simulation) is DEFAULT_BUS
+
+
+def test_effect_text_is_read() -> None:
+    assert EffectSpec.parse("backlash:gap_rad=0.02,offset=-1e-3") == EffectSpec(
+        "backlash", {"gap_rad": 0.02, "offset": -0.001}
+    )
+    assert EffectSpec.parse("backlash") == EffectSpec("backlash", {})
+
+
+@pytest.mark.parametrize("text", ["backlash:gap_rad", "backlash:gap_rad=", "backlash:gap_rad=wide"])
+def test_effect_parameter_that_is_no_number_is_refused(text: str) -> None:
+    with pytest.raises(UsageError, match="expected key=number for 'gap_rad'"):
+        EffectSpec.parse(text)
+
+
+def test_unknown_effect_is_refused() -> None:
+    with pytest.raises(BadModel, match="gremlins"):
+        plant_for(small_rig(), [EffectSpec("gremlins", {})])
+
+
+def test_effect_without_parameters_is_refused() -> None:
+    with pytest.raises(UsageError, match=r"'backlash': expected at least one of its parameters \(gap_rad"):
+        plant_for(small_rig(), [EffectSpec("backlash", {})])
+
+
+def test_unknown_parameter_is_refused() -> None:
+    with pytest.raises(BadModel, match=r"backlash\.width"):
+        plant_for(small_rig(), [EffectSpec("backlash", {"width": 1.0})])
+
+
+def test_effect_is_in_the_plant() -> None:
+    """A gap of 1 rad: the motor starts freely, with T / J_M, where the whole bus would hold it back."""
+    free, held = (plant_for(small_rig(), effects) for effects in ([BIG_GAP], []))
+    for plant in (free, held):
+        for _ in range(5):
+            plant.advance((50.0, 50.0), 0.01)
+    assert free.speed_rad_s == pytest.approx(100.0 / 1.6 * 0.05, rel=0.02)
+    assert held.speed_rad_s < 0.8 * free.speed_rad_s
+
+
+def test_plant_is_stepped_by_its_own_period_only() -> None:
+    with pytest.raises(ValueError, match=r"0\.02 s, expected the 0\.01 s"):
+        plant_for(small_rig()).advance((0.0, 0.0), 0.02)

@@ -1,0 +1,129 @@
+"""Whole runs on the real protocol stacks: what is recorded when nothing goes wrong."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimator.signals.prbs import prbs_nm
+from hil.config.rig_file import PrbsTarget
+from hil.rig.build import open_devices
+from hil.rig.experiments.base import Phase
+from hil.rig.pacing import RealTimePacer, period_ns
+from hil.rig.sample import SampleFlag
+from hil.rig.session import GENERATOR_OFF
+from tests.rig.observer import assert_disarmed
+from tests.rig.serving import (
+    DRAG_NM_S,
+    DURATION_S,
+    INERTIA_KG_M2,
+    Samples,
+    changed,
+    run,
+    run_once,
+    served,
+    small_rig,
+)
+
+HALF_COUNT_NM = 0.5 * 600.0 / 1000.0
+"""Half of an inverter's torque count: 0.1 % of 600 Nm."""
+
+
+@pytest.mark.parametrize("experiment", ["cruise", "reversal"])
+def test_records_the_measured_part_and_leaves_the_drives_disarmed(experiment: str) -> None:
+    samples = Samples()
+    with served() as (server, rig):
+        summary = run_once(rig, samples, experiment=experiment)
+        assert_disarmed(server.bus_url, 1, 2)
+    assert len(samples.rows) == summary.recorded == round(DURATION_S / rig.period_s)
+    assert summary.flagged == 0
+    assert samples.column("time_s") == [k / 100 for k in range(100)]
+    assert set(samples.column("flags")) == {SampleFlag.GOOD}
+    assert set(samples.column("age_ns")) == {0}
+
+
+def test_row_holds_the_torque_that_acts_from_its_time_on() -> None:
+    samples = Samples()
+    with served() as (_, rig):
+        run_once(rig, samples)
+    for inverter in ("m1", "m2"):
+        wanted = np.array(samples.column(f"torque_ref_{inverter}_nm"))
+        given = np.array(samples.column(f"torque_{inverter}_nm"))
+        # base and PRBS travel in one object each, so each is rounded to a count
+        assert np.abs(given - wanted).max() <= 2 * HALF_COUNT_NM + 1e-9
+    torque = np.array(samples.column("torque_m1_nm")) + np.array(samples.column("torque_m2_nm"))
+    speed = np.array(samples.column("speed_rad_s"))
+    step = rig.period_s * (torque - DRAG_NM_S * speed) / INERTIA_KG_M2
+    assert np.diff(speed) == pytest.approx(step[:-1], abs=1e-3)
+
+
+def test_prbs_is_the_one_of_the_rig_file() -> None:
+    samples = Samples()
+    with served() as (_, rig):
+        run_once(rig, samples)
+    table = rig.prbs
+    expected = prbs_nm(len(samples.rows), table.amplitude_nm, table.cells, table.clock_divider, table.seed)
+    assert samples.column("prbs_nm") == expected.tolist()
+
+
+@pytest.mark.parametrize(("target", "carrier"), [(PrbsTarget.M1, "torque_m1_nm"), (PrbsTarget.M2, "torque_m2_nm")])
+def test_prbs_rides_on_the_inverter_that_is_named(target: PrbsTarget, carrier: str) -> None:
+    samples = Samples()
+    rig = changed(small_rig(), {"prbs": {"target": target}})
+    with served(rig) as (_, rig):
+        run_once(rig, samples)
+    prbs = np.array(samples.column("prbs_nm"))
+    for column in ("torque_m1_nm", "torque_m2_nm"):
+        torque = np.array(samples.column(column))
+        share = np.polyfit(prbs, torque, 1)[0]
+        assert share == pytest.approx(1.0 if column == carrier else 0.0, abs=0.1)
+
+
+def test_same_rig_and_seed_give_the_same_recording() -> None:
+    noise = {"simulation": {"speed_noise_rad_s": 0.05, "torque_noise_permille": 1.0}}
+    runs = []
+    for _ in range(2):
+        samples = Samples()
+        with served(changed(small_rig(), noise)) as (_, rig):
+            run_once(rig, samples, experiment="reversal")
+        runs.append([replace(row, t_ns=0) for row in samples.rows])
+    assert runs[0] == runs[1]
+
+
+def test_two_runs_on_the_same_opened_rig() -> None:
+    first, second = Samples(), Samples()
+    with served() as (server, rig), open_devices(rig) as devices:
+        run(rig, devices, first)
+        run(rig, devices, second, experiment="reversal")
+        assert_disarmed(server.bus_url, 1, 2)
+    assert len(first.rows) == len(second.rows) == 100
+
+
+def test_plc_generator_is_switched_off_before_a_run() -> None:
+    with served() as (server, rig):
+        server.plc.write({"prbs_enable": True, "prbs_source": "plc", "prbs_amplitude": 50.0})
+        run_once(rig, Samples())
+        values = server.plc.values()
+    assert values["prbs_enable"] is False
+    assert values["prbs_source"] == GENERATOR_OFF.source.value
+
+
+def test_progress_sees_every_phase_in_order() -> None:
+    seen: list[Phase] = []
+    with served() as (_, rig):
+        run_once(rig, Samples(), progress=lambda phase, time_s: seen.append(phase))
+    assert list(dict.fromkeys(seen)) == [Phase.APPROACH, Phase.MEASURE, Phase.RELEASE, Phase.DONE]
+    assert seen.count(Phase.MEASURE) == 100
+
+
+def test_real_time_takes_the_same_path() -> None:
+    patient = changed(small_rig(), {"guard": {"feedback_timeout_s": 1.0}})
+    short = changed(patient, {"experiments.cruise": {"duration_s": 0.3, "speed_rad_s": 0.0}})
+    samples = Samples()
+    with served(short) as (server, rig):
+        run_once(rig, samples, pacer=RealTimePacer(period_ns(rig.period_s)))
+        assert_disarmed(server.bus_url, 1, 2)
+    assert samples.column("time_s")[:30] == [k / 100 for k in range(30)]
+    assert [row.cycle - samples.rows[0].cycle for row in samples.rows] == list(range(len(samples.rows)))

@@ -1,0 +1,216 @@
+"""Runs that something ends: the reason is named, the drives are disarmed, what was recorded stays."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from drivers.errors import BusDown, CommandRefused, ConfigMismatch, DeviceFault, DeviceTimeout, DriverError
+from drivers.plc_types import DriveMode
+from hil.errors import RunAborted
+from hil.rig.build import open_devices
+from hil.rig.drive import Progress
+from hil.rig.experiments.base import Phase
+from hil.rig.stop import StopRequest
+from hil.simulator.inverter_settings import FaultAtStep, InverterFaults
+from hil.simulator.plc_device import PlcDevice, PlcSetup
+from hil.simulator.rig_server import RigFaults, RigServer
+from tests.rig.observer import assert_disarmed
+from tests.rig.serving import Samples, changed, fast, run_once, served, small_rig
+
+STEP_WITHIN = 160
+"""A SYNC inside the measured part of the small rig's reversal, which is SYNC 100 to 200 or so."""
+
+
+def in_the_middle(action: Callable[[], None]) -> Progress:
+    """Do something half a second into the measured part."""
+
+    def show(phase: Phase, time_s: float) -> None:
+        if phase is Phase.MEASURE and time_s == 0.5:
+            action()
+
+    return show
+
+
+def close_clutch(server: RigServer) -> None:
+    server.plc.close_clutch()
+
+
+def withdraw_permissive(server: RigServer) -> None:
+    server.plc.withdraw_permissive()
+
+
+def go_electric(server: RigServer) -> None:
+    server.plc.write({"drive_mode_request": "electric"})
+
+
+def go_parallel(server: RigServer) -> None:
+    server.plc.write({"drive_mode_request": "parallel"})
+
+
+def hang_plc(server: RigServer) -> None:
+    server.plc_server.pause()
+
+
+@pytest.mark.parametrize(
+    ("happens", "named"),
+    [
+        (close_clutch, "clutch is closed, expected open"),
+        (withdraw_permissive, "permissive is withdrawn, expected present"),
+        (go_electric, "drive mode is electric, expected series as at the start"),
+        (go_parallel, "drive mode is parallel, expected series or electric; clutch is closed"),
+        (hang_plc, "PLC"),
+    ],
+)
+def test_vehicle_that_is_no_longer_fit_ends_the_run(happens: Callable[[RigServer], None], named: str) -> None:
+    samples = Samples()
+    with served() as (server, rig):
+        with pytest.raises(RunAborted, match=named):
+            run_once(rig, samples, progress=in_the_middle(lambda: happens(server)))
+        assert_disarmed(server.bus_url, 1, 2)
+    assert 50 < len(samples.rows) < 100
+
+
+def test_vehicle_faster_than_the_plc_permits_ends_the_run() -> None:
+    slow = PlcDevice(PlcSetup(speed_limit_rad_s=0.1))
+    with served(plc=slow) as (server, rig):
+        with pytest.raises(RunAborted, match=r"speed is -?[01]\.\d rad/s, expected at most 0\.1 rad/s"):
+            run_once(rig, Samples())
+        assert_disarmed(server.bus_url, 1, 2)
+
+
+@pytest.mark.parametrize(
+    ("plc", "named"),
+    [
+        (PlcDevice(PlcSetup(drive_mode=DriveMode.PARALLEL)), "drive mode is parallel"),
+        (PlcDevice(PlcSetup(torque_limit_nm=200.0)), r"torque limit of one inverter is 200 Nm.*310 Nm"),
+    ],
+)
+def test_vehicle_that_is_not_fit_is_not_armed(plc: PlcDevice, named: str) -> None:
+    samples = Samples()
+    with served(plc=plc) as (server, rig):
+        with pytest.raises(RunAborted, match=f"{named}.*Nothing was armed"):
+            run_once(rig, samples)
+        assert_disarmed(server.bus_url, 1, 2)
+    assert samples.rows == []
+
+
+@pytest.mark.parametrize(("hung", "other"), [("m1", 2), ("m2", 1)])
+def test_inverter_that_hangs_does_not_keep_the_other_armed(hung: str, other: int) -> None:
+    samples = Samples()
+    faults = RigFaults(**{hung: InverterFaults(hang_at_step=STEP_WITHIN)})
+    with served(faults=faults) as (server, rig):
+        with pytest.raises(RunAborted, match=rf"not every drive.*inverter {hung}.*What ended the run") as caught:
+            run_once(rig, samples, experiment="reversal", pacer=fast(rig, answer_timeout_s=0.1))
+        assert_disarmed(server.bus_url, other)
+    assert isinstance(caught.value.__cause__, DeviceTimeout)
+    stale = [row for row in samples.rows if row.flags]
+    assert stale
+    assert {row.flags.name for row in stale} == {f"{hung.upper()}_STALE"}
+    assert [row.age_ns for row in stale] == [10_000_000 * (k + 1) for k in range(len(stale))]
+
+
+def test_inverter_that_faults_ends_the_run() -> None:
+    samples = Samples()
+    overcurrent = FaultAtStep(step=STEP_WITHIN, emcy_code=0x2310)
+    with served(faults=RigFaults(m2=InverterFaults(fault=overcurrent))) as (server, rig):
+        with pytest.raises(DeviceFault, match=r"inverter m2.*2310"):
+            run_once(rig, samples, experiment="reversal")
+        assert_disarmed(server.bus_url, 1)
+    assert 0 < len(samples.rows) < 100
+
+
+@pytest.mark.parametrize(
+    "faults",
+    [
+        InverterFaults(ignored_writes=frozenset({0x6060})),  # the mode does not come
+        InverterFaults(ignored_writes=frozenset({0x6040})),  # the state machine is stuck
+    ],
+)
+def test_error_in_the_middle_of_arming_disarms_what_was_armed(faults: InverterFaults) -> None:
+    with served(faults=RigFaults(m2=faults)) as (server, rig):
+        with pytest.raises(DriverError, match="inverter m2"):
+            run_once(rig, Samples())
+        assert_disarmed(server.bus_url, 1, 2)
+
+
+@pytest.mark.parametrize(
+    ("faults", "error"),
+    [
+        (InverterFaults(absent=True), DeviceTimeout),
+        (InverterFaults(identity=(1, 2)), ConfigMismatch),
+    ],
+)
+def test_inverter_that_is_not_the_one_is_refused_before_arming(
+    faults: InverterFaults, error: type[DriverError]
+) -> None:
+    with served(faults=RigFaults(m2=faults)) as (server, rig):
+        with pytest.raises(error, match="inverter m2"):
+            run_once(rig, Samples())
+        assert_disarmed(server.bus_url, 1)
+
+
+def test_stop_request_ends_the_run_and_keeps_the_samples() -> None:
+    samples, stop = Samples(), StopRequest()
+    with served() as (server, rig):
+        with pytest.raises(KeyboardInterrupt):
+            run_once(rig, samples, stop=stop, progress=in_the_middle(stop.request))
+        assert_disarmed(server.bus_url, 1, 2)
+    assert len(samples.rows) == 51
+
+
+def test_interrupt_out_of_nowhere_disarms_too() -> None:
+    def interrupt() -> None:
+        raise KeyboardInterrupt
+
+    samples = Samples()
+    with served() as (server, rig):
+        with pytest.raises(KeyboardInterrupt):
+            run_once(rig, samples, progress=in_the_middle(interrupt))
+        assert_disarmed(server.bus_url, 1, 2)
+    assert len(samples.rows) == 51
+
+
+def test_stop_before_arming_arms_nothing() -> None:
+    stop = StopRequest()
+    stop.request()
+    with served() as (server, rig):
+        with pytest.raises(KeyboardInterrupt):
+            run_once(rig, Samples(), stop=stop)
+        assert_disarmed(server.bus_url, 1, 2)
+
+
+def test_torque_the_guard_refuses_ends_the_run() -> None:
+    samples = Samples()
+    tight = changed(small_rig(), {"guard": {"prbs_limit_nm": 50.0}})
+    with served(tight) as (server, rig):
+        with pytest.raises(CommandRefused, match="PRBS torque is"):
+            run_once(rig, samples)
+        assert_disarmed(server.bus_url, 1, 2)
+    assert samples.rows == []
+
+
+def test_recorder_that_fails_disarms_too() -> None:
+    class FullDisk(Samples):
+        def append(self, sample: object) -> None:
+            raise OSError(28, "No space left on device")
+
+    with served() as (server, rig):
+        with pytest.raises(OSError, match="No space left"):
+            run_once(rig, FullDisk())
+        assert_disarmed(server.bus_url, 1, 2)
+
+
+def test_bus_that_is_not_there() -> None:
+    with served() as (_, rig):
+        nowhere = changed(rig, {"can": {"url": "ws://127.0.0.1:9/"}})
+        with pytest.raises(BusDown, match="ws://127"), open_devices(nowhere):
+            pass
+
+
+def test_plc_that_is_not_there() -> None:
+    with served() as (_, rig):
+        nowhere = changed(rig, {"plc": {"port": 9}})
+        with pytest.raises(BusDown, match="PLC"), open_devices(nowhere):
+            pass
