@@ -31,7 +31,7 @@ def _errors(result: FitResult, index: int) -> FloatArray:
 
 
 def _window_power(errors: FloatArray, sample_time_s: float) -> FloatArray:
-    width = max(1, round(WINDOW_S / sample_time_s))
+    width = min(max(1, round(WINDOW_S / sample_time_s)), errors.size)
     smooth: FloatArray = np.convolve(errors**2, np.full(width, 1.0 / width), mode="same")
     return smooth
 

@@ -116,7 +116,7 @@ class Selector:
         superseded = {name for have in chosen for name in EFFECTS[have].contains}
         candidates = [name for name in self.names if name not in chosen and name not in superseded]
         for i, name in enumerate(candidates):
-            share = (round_number + i / len(candidates)) / (round_number + 2)
+            share = 0.9 * (1.0 - 0.5**round_number * (1.0 - 0.5 * i / len(candidates)))  # a round is half of the rest
             self.progress(f"testing {EFFECTS[name].title}", share)
             effects = with_effect(chosen, name)
             result = self.bench.fit(effects, current)

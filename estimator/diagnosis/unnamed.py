@@ -68,20 +68,22 @@ class _Projector:
         left: FloatArray = signal - self._basis @ (self._basis.T @ signal)
         return left
 
-    def answer(self, candidate: Candidate) -> FloatArray:
-        """Return what is left of a candidate's answer, at unit norm where anything is; shape (R,)."""
+    def answer(self, candidate: Candidate) -> tuple[FloatArray, float]:
+        """Return what is left of a candidate's answer, scaled to unit norm, and its norm; all 0 where nothing is."""
         stacked = np.concatenate([a[use] for a, use in zip(candidate.answers, self._use, strict=True)])
         left = self.rest(stacked)
         norm = float(np.linalg.norm(left))
         if norm**2 <= ALIKE * float(stacked @ stacked):
-            return np.zeros_like(left)
-        return left / norm
+            return np.zeros_like(left), 0.0
+        return left / norm, norm
 
 
 def _pursue(element: Element, pool: list[Candidate], projector: _Projector) -> UnnamedLaw | None:
     if not pool:
         return None
-    answers = np.array([projector.answer(candidate) for candidate in pool])
+    scaled = [projector.answer(candidate) for candidate in pool]
+    answers = np.array([answer for answer, _ in scaled])
+    norms = np.array([norm for _, norm in scaled])
     error = projector.error
     chosen: list[int] = []
     best: UnnamedLaw | None = None
@@ -94,7 +96,8 @@ def _pursue(element: Element, pool: list[Candidate], projector: _Projector) -> U
         chosen.append(int(match.argmax()))
         coefficients = np.linalg.lstsq(answers[chosen].T, error, rcond=None)[0]
         left = error - coefficients @ answers[chosen]
-        law = _law(element, [pool[i] for i in chosen], coefficients, error, left, projector, len(pool))
+        terms = [(pool[i].law, float(-c / norms[i])) for i, c in zip(chosen, coefficients, strict=True)]
+        law = _law(element, terms, error, left, projector, len(pool))
         if best is None or law.gain.delta_bic > best.gain.delta_bic:
             best = law
     return best
@@ -102,8 +105,7 @@ def _pursue(element: Element, pool: list[Candidate], projector: _Projector) -> U
 
 def _law(
     element: Element,
-    terms: list[Candidate],
-    coefficients: FloatArray,
+    terms: list[tuple[str, float]],
     error: FloatArray,
     left: FloatArray,
     projector: _Projector,
@@ -120,7 +122,7 @@ def _law(
     p_value = min(1.0, raw.p_value * math.comb(pool_size, len(terms)))
     return UnnamedLaw(
         element,
-        tuple((term.law, float(-c)) for term, c in zip(terms, coefficients, strict=True)),
+        tuple(terms),
         Gain(raw.delta_bic - choices, p_value, raw.n_effective),
         float(np.sqrt(np.mean(left**2))),
     )

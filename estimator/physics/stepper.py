@@ -8,7 +8,7 @@ from estimator.physics import kernel
 from estimator.physics.effects import transport_delay
 from estimator.physics.layout import flat, slot
 from estimator.physics.model import DrivelineModel, Structure
-from estimator.physics.simulate import RADIANS_PER_STEP, natural_frequency_rad_s
+from estimator.physics.simulate import substeps_for
 
 SIGN_WIDTH_RAD_S = 0.02
 """Dry friction of a simulated rig changes sign within this speed; its noise is larger."""
@@ -31,8 +31,7 @@ class Stepper:
         self._masses = 1 if model.structure is Structure.ONE_MASS else 2
         self._p = flat(model)
         self._period_s = period_s
-        angle = natural_frequency_rad_s(model.values()) * period_s
-        self._substeps = max(1, int(np.ceil(angle / RADIANS_PER_STEP)))
+        self._substeps = substeps_for(model.values(), period_s)
         history = int(np.ceil(self._p[slot(transport_delay.EFFECT.name, "delay_s")] / period_s)) + 2
         self._torque = np.zeros(history)
         self._load = np.full(history, load_torque_nm)
