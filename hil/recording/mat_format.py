@@ -37,13 +37,9 @@ def read(path: Path, hints: FormatHints) -> Table:
             path, "expected MATLAB version 4 to 7, came version 7.3 (HDF5). Save it again with -v7."
         ) from error
     except DAMAGED as error:
-        raise RecordingError(
-            path, f"expected a whole .mat file, came a damaged or truncated one ({error})"
-        ) from error
+        raise RecordingError(path, f"expected a whole .mat file, came a damaged or truncated one ({error})") from error
     numeric = {
-        name: value
-        for name, value in variables.items()
-        if isinstance(value, np.ndarray) and value.dtype.kind in "fiub"
+        name: value for name, value in variables.items() if isinstance(value, np.ndarray) and value.dtype.kind in "fiub"
     }
     vectors = {name: v.ravel() for name, v in numeric.items() if v.size > 1 and max(v.shape) == v.size}
     scalars = {name: repr(value.item()) for name, value in numeric.items() if value.size == 1}

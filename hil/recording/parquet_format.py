@@ -49,9 +49,7 @@ def write(table: Table, path: Path) -> None:
     for name, column in table.columns.items():
         array = pa.array(column, type=pa.string() if column.dtype == object else None)
         unit = table.units.get(name)
-        fields.append(
-            pa.field(name, array.type, metadata=None if unit is None else {UNIT_KEY: unit.encode()})
-        )
+        fields.append(pa.field(name, array.type, metadata=None if unit is None else {UNIT_KEY: unit.encode()}))
         arrays.append(array)
     schema = pa.schema(fields, metadata=dict(table.metadata) or None)
     pa.parquet.write_table(pa.Table.from_arrays(arrays, schema=schema), path)

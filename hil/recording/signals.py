@@ -59,9 +59,7 @@ def to_record(table: Table, signals: SignalsConfig) -> Record:
     time_s, period_s = time_base(table, signals.time)
     masks = {mask: _inside(numbers[mask.column], mask) for mask in signals.mask}
     flagged = _flagged(table, signals)
-    trusted = np.column_stack(
-        [_trusted(numbers[torque.column], torque.column, masks) & ~flagged for torque in torques]
-    )
+    trusted = np.column_stack([_trusted(numbers[torque.column], torque.column, masks) & ~flagged for torque in torques])
     torque_nm = np.column_stack([numbers[torque.column] * torque.scale for torque in torques])
     measured = numbers[output.column] * output.scale
     okay = trusted.all(axis=1) & np.isfinite(measured) & np.logical_and.reduce([~flagged, *masks.values()])

@@ -57,8 +57,7 @@ class Table:
         if not lengths or min(lengths.values()) == 0:
             raise RecordingError(
                 self.path,
-                "expected columns with at least one row, came none: the file is empty or truncated. "
-                "Record again.",
+                "expected columns with at least one row, came none: the file is empty or truncated. Record again.",
             )
         if len(set(lengths.values())) > 1:
             listed = ", ".join(f"{name} {length}" for name, length in lengths.items())

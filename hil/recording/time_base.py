@@ -67,9 +67,7 @@ def _require_uniform(table: Table, column: str, time: FloatArray) -> None:
     _refuse(table, column, time, window, np.abs(rates - period) > allowed, expected)
 
 
-def _refuse(
-    table: Table, column: str, time: FloatArray, span: int, wrong: NDArray[np.bool_], expected: str
-) -> None:
+def _refuse(table: Table, column: str, time: FloatArray, span: int, wrong: NDArray[np.bool_], expected: str) -> None:
     """Refuse the first span of rows that is wrong; the one that starts at row k leads to row k + span."""
     found = np.flatnonzero(wrong)
     if found.size:

@@ -77,9 +77,7 @@ class RecordingWriter:
             If the writer is not open.
         """
         if self._file is None:
-            raise RecordingError(
-                self.path, "expected an open writer, came one that is closed. Use it by 'with'."
-            )
+            raise RecordingError(self.path, "expected an open writer, came one that is closed. Use it by 'with'.")
         self._file.write(_row(sample))
         self.n_samples += 1
 

@@ -254,9 +254,7 @@ def models(draw: st.DrawFn) -> DrivelineModel:
     return DrivelineModel(
         structure=structure,
         motion=draw(st.sampled_from(Motion)),
-        parameters={
-            name: Parameter(draw(finite), draw(st.floats(0, 0.99))) for name in structure.parameter_names
-        },
+        parameters={name: Parameter(draw(finite), draw(st.floats(0, 0.99))) for name in structure.parameter_names},
         effects={
             name: {
                 parameter.name: EffectValue(draw(finite), draw(st.none() | pairs))
@@ -278,8 +276,7 @@ def signals_configs(draw: st.DrawFn) -> SignalsConfig:
         st.fixed_dictionaries(
             {},
             optional={
-                "time": st.fixed_dictionaries({"column": names})
-                | st.fixed_dictionaries({"sample_time_s": finite}),
+                "time": st.fixed_dictionaries({"column": names}) | st.fixed_dictionaries({"sample_time_s": finite}),
                 "torque": st.lists(scaled, min_size=1, max_size=3),
                 draw(st.sampled_from(["speed", "position", "force"])): scaled,
                 "mask": st.lists(st.fixed_dictionaries({"column": names, "min": finite}), max_size=2),

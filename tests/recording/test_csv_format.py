@@ -111,9 +111,7 @@ def test_every_faulty_column_is_named_at_once(tmp_path: Path) -> None:
     with pytest.raises(RecordingError) as refusal:
         read(tmp_path, "a,b\nx,2\n3,y\n").numeric(["a", "b", "c"])
     said = str(refusal.value).splitlines()
-    assert ["line 2, column a" in said[0], "line 3, column b" in said[1], "column c: missing" in said[2]] == [
-        True
-    ] * 3
+    assert ["line 2, column a" in said[0], "line 3, column b" in said[1], "column c: missing" in said[2]] == [True] * 3
 
 
 def test_a_column_nobody_asks_for_may_be_text(tmp_path: Path) -> None:

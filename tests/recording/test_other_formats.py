@@ -136,9 +136,7 @@ def test_suffixes_are_read_in_any_case(tmp_path: Path, own_table: Table) -> None
         ("nowhere/run.csv", "expected an existing folder"),
     ],
 )
-def test_a_recording_that_cannot_be_made_is_refused(
-    tmp_path: Path, own_table: Table, name: str, said: str
-) -> None:
+def test_a_recording_that_cannot_be_made_is_refused(tmp_path: Path, own_table: Table, name: str, said: str) -> None:
     (tmp_path / "taken.csv").write_text("mine")
     with pytest.raises(RecordingError) as refusal:
         write_table(own_table, tmp_path / name)

@@ -138,9 +138,7 @@ def test_a_time_that_does_not_go_on_evenly_is_refused_by_line(
 
 def test_a_row_left_out_is_refused_with_the_cure(changed: Changed) -> None:
     time_s = np.delete(np.arange(41) * 0.01, 17)
-    with pytest.raises(
-        RecordingError, match=r"line 19, .*a missing sample is a row with nan, not a row left out"
-    ):
+    with pytest.raises(RecordingError, match=r"line 19, .*a missing sample is a row with nan, not a row left out"):
         to_record(with_time(changed, time_s), SignalsConfig())
 
 
@@ -149,12 +147,9 @@ def test_a_rate_that_changes_is_refused(tmp_path: Path) -> None:
     n = steps.size
     table = Table(
         tmp_path / "run.csv",
-        {name: np.ones(n) for name in ("torque_m1_nm", "torque_m2_nm", "speed_rad_s")}
-        | {"time_s": np.cumsum(steps)},
+        {name: np.ones(n) for name in ("torque_m1_nm", "torque_m2_nm", "speed_rad_s")} | {"time_s": np.cumsum(steps)},
     )
-    with pytest.raises(
-        RecordingError, match=r"expected a constant rate, a mean step of 0\.01 s over 100 rows"
-    ):
+    with pytest.raises(RecordingError, match=r"expected a constant rate, a mean step of 0\.01 s over 100 rows"):
         to_record(table, SignalsConfig())
 
 
@@ -231,9 +226,7 @@ def test_one_faulty_recording_is_named(three_runs: list[Path]) -> None:
 def test_all_faulty_recordings_are_named(three_runs: list[Path]) -> None:
     three_runs[0].unlink()
     three_runs[2].write_text("time_s\n1\n2\n")
-    with pytest.raises(
-        InputError, match=r"(?s)run_0\.csv: .*No such file.*run_2\.csv: column torque_m1_nm: missing"
-    ):
+    with pytest.raises(InputError, match=r"(?s)run_0\.csv: .*No such file.*run_2\.csv: column torque_m1_nm: missing"):
         read_records(three_runs)
 
 
@@ -245,7 +238,5 @@ def test_two_recordings_of_one_name_are_refused(three_runs: list[Path]) -> None:
 def test_recordings_of_two_periods_are_refused(three_runs: list[Path], changed: Changed) -> None:
     three_runs[2].unlink()
     write_table(changed(time_s=np.arange(40) * 0.02), three_runs[2])
-    with pytest.raises(
-        RecordingError, match=r"run_2\.csv: expected the sampling period of .*run_0\.csv, 0\.01 s"
-    ):
+    with pytest.raises(RecordingError, match=r"run_2\.csv: expected the sampling period of .*run_0\.csv, 0\.01 s"):
         read_records(three_runs)

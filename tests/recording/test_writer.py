@@ -62,9 +62,7 @@ def test_parquet_carries_units_and_metadata(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("suffix", [".csv", ".parquet"])
 @pytest.mark.parametrize("error", [RuntimeError, KeyboardInterrupt])
-def test_an_interrupted_run_leaves_what_it_had(
-    tmp_path: Path, suffix: str, error: type[BaseException]
-) -> None:
+def test_an_interrupted_run_leaves_what_it_had(tmp_path: Path, suffix: str, error: type[BaseException]) -> None:
     path = tmp_path / f"run{suffix}"
 
     def run() -> None:
