@@ -1,0 +1,191 @@
+"""Each effect measured on the simulator as one would measure it on a bench."""
+
+import numpy as np
+import pytest
+
+from hil.proof.truth import laws
+from hil.proof.truth.driveline import TruthDriveline
+from hil.proof.truth.kernel import State
+
+
+def test_a_shaft_in_dry_friction_sticks_below_it_and_slides_above(plain, trace):
+    stuck = trace(plain._replace(friction_motor_nm=20.0), [10.0] * 300)  # near 20 LuGre bristles creep
+    assert np.abs(stuck[:, State.ANGLE_M]).max() < 2 * laws.PRESLIDING_RAD
+    assert abs(stuck[-1, State.SPEED_M]) < 1e-3
+    sliding = trace(plain._replace(friction_motor_nm=20.0), [40.0] * 300)
+    assert sliding[-1, State.SPEED_M] > 0.3
+
+
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+def test_sliding_friction_is_the_difference_of_two_coast_downs(plain, trace, direction):
+    free = trace(plain, [0.0] * 100, speed_rad_s=direction * 60.0)
+    rough = trace(plain._replace(friction_motor_nm=20.0), [0.0] * 100, speed_rad_s=direction * 60.0)
+    lost = (plain.J_M + plain.J_L) * (free[-1, State.SPEED_L] - rough[-1, State.SPEED_L])
+    assert lost == pytest.approx(direction * 20.0, rel=0.01)  # over one second
+
+
+def test_stribeck_friction_breaks_away_higher_than_it_slides(plain, trace):
+    p = plain._replace(friction_motor_nm=15.0, breakaway_motor_nm=40.0, stribeck_speed_rad_s=1.0)
+    states = trace(p, np.concatenate([np.arange(0.0, 60.0, 0.05), np.full(1500, 60.0)]))
+    held = p.friction_motor_nm * states[:, State.BRISTLE_M]
+    assert held.max() == pytest.approx(40.0, rel=0.03)
+    assert held[-1] == pytest.approx(15.0, rel=0.05)
+    assert laws.sliding_torque(15.0, 40.0, 1.0, 10.0) == pytest.approx(15.0)
+    assert laws.sliding_torque(15.0, 40.0, 1.0, 0.0) == pytest.approx(40.0)
+
+
+def test_friction_never_gives_energy(plain, trace):
+    """Over any motion that ends with relaxed bristles the work of friction is a loss."""
+    torque = 200.0 * np.sin(2 * np.pi * np.arange(2000) * 0.0037)
+    p = plain._replace(friction_motor_nm=20.0, b_M=0.0, b_L=0.0, c=0.0)
+    states = trace(p, torque)
+    speed = states[:, State.SPEED_M]
+    work = np.cumsum(0.5 * torque * (speed[1:] + speed[:-1])) * 0.01
+    shaft = 0.5 * p.k * (states[1:, State.ANGLE_M] - states[1:, State.ANGLE_L]) ** 2
+    held = shaft + 0.5 * (p.J_M * speed[1:] ** 2 + p.J_L * states[1:, State.SPEED_L] ** 2)
+    lost = work - held
+    assert lost[-1] > 20.0
+    assert np.diff(lost[::100]).min() > -0.2
+
+
+def test_the_play_is_traversed_without_torque(plain, trace, twist):
+    gap = 0.02
+    p = plain._replace(gap_rad=gap, b_M=0.0, b_L=0.0)
+    states = trace(p, [100.0] * 600 + [-100.0] * 100, period_s=0.001)
+    across = np.abs(twist(states)) < 0.5 * gap - 1e-4
+    acceleration = np.diff(states[:, State.SPEED_M]) / 0.001
+    inside = across[:-1] & across[1:]
+    late = np.arange(inside.size) >= 600
+    np.testing.assert_allclose(acceleration[inside & late], -100.0 / p.J_M, rtol=1e-6)
+    assert twist(states).max() - 100.0 / p.k > 0.5 * gap - 1e-3
+    assert twist(states).min() < -0.5 * gap
+
+
+def test_a_contact_presses_and_never_pulls(plain):
+    p = plain._replace(gap_rad=0.02)
+    for twist_rad in np.linspace(-0.05, 0.05, 41):
+        for rate in np.linspace(-50.0, 50.0, 41):
+            assert laws.shaft_torque(p, twist_rad, rate) * np.sign(twist_rad) >= 0.0
+
+
+def test_an_elastic_impact_keeps_its_energy(lossless, trace, twist):
+    p = lossless._replace(gap_rad=0.02)
+    states = trace(p, [60.0] * 20 + [0.0] * 500)[20:]
+    depth = np.maximum(np.abs(twist(states)) - 0.01, 0.0)
+    energy = 0.5 * (p.J_M * states[:, 2] ** 2 + p.J_L * states[:, 3] ** 2 + p.k * depth**2)
+    np.testing.assert_allclose(energy, energy[0], rtol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("field", "potential"),
+    [
+        ("hardening_twist_rad", lambda x: np.cosh(x) - 1.0),
+        ("softening_twist_rad", lambda x: x * np.arcsinh(x) - np.sqrt(1.0 + x**2) + 1.0),
+    ],
+)
+def test_a_nonlinear_shaft_is_conservative(lossless, trace, twist, field, potential):
+    p = lossless._replace(**{field: 0.05})
+    states = trace(p, [400.0] * 8 + [0.0] * 500)[8:]
+    elastic = p.k * 0.05**2 * potential(twist(states) / 0.05)
+    energy = elastic + 0.5 * (p.J_M * states[:, 2] ** 2 + p.J_L * states[:, 3] ** 2)
+    assert np.ptp(elastic) > 0.2 * energy[0] * p.J_M / p.J_L
+    np.testing.assert_allclose(energy, energy[0], rtol=2e-5)
+
+
+def test_hardening_is_stiffer_and_softening_softer_than_linear(plain):
+    linear = laws.characteristic(plain, 0.05)
+    assert laws.characteristic(plain._replace(hardening_twist_rad=0.05), 0.05) > 1.1 * linear
+    assert laws.characteristic(plain._replace(softening_twist_rad=0.05), 0.05) < 0.9 * linear
+    assert laws.characteristic(plain._replace(softening_twist_rad=0.05), 1e-5) == pytest.approx(plain.k * 1e-5)
+
+
+@pytest.mark.parametrize("delay_s", [0.004, 0.0137, 0.03])
+def test_the_delay_is_the_one_asked_for(plain, delay_s):
+    late, prompt = TruthDriveline(plain._replace(delay_s=delay_s)), TruthDriveline(plain)
+    late.advance((0.0, 0.0), delay_s)
+    rng = np.random.default_rng(3)
+    torques = rng.uniform(-100.0, 100.0, 100)
+    for torque in torques:
+        prompt.advance((torque, 0.0), 0.01)
+    # what went into the late one from 0 on comes out a delay later: its state then is the prompt one's
+    line = TruthDriveline(plain._replace(delay_s=delay_s))
+    for torque in torques:
+        line.advance((torque, 0.0), 0.01)
+    line.advance((0.0, 0.0), delay_s)
+    np.testing.assert_allclose(line.state[:4], prompt.state[:4], atol=1e-5)
+
+
+def test_the_current_loop_reaches_63_percent_after_its_time_constant(plain):
+    driveline = TruthDriveline(plain._replace(current_loop_time_s=0.012))
+    driveline.advance((60.0, 40.0), 0.012)
+    assert driveline.quantity(State.INVERTER_NM) == pytest.approx(100.0 * (1 - np.exp(-1)), rel=1e-9)
+
+
+def test_only_the_first_inverter_has_another_gain(plain):
+    p = plain._replace(gain_m1=0.9, k=0.0, c=0.0, b_M=0.0)
+    for torque, expected in (((100.0, 0.0), 90.0), ((0.0, 100.0), 100.0)):
+        driveline = TruthDriveline(p)
+        driveline.advance(torque, 0.1)
+        assert driveline.quantity(State.SPEED_M) == pytest.approx(expected * 0.1 / p.J_M, rel=1e-9)
+
+
+def test_the_brake_takes_its_torque_in_its_time_alone(plain, trace):
+    p = plain._replace(b_M=0.0, b_L=0.0, brake_nm=100.0, brake_from_s=2.0, brake_to_s=5.0)
+    states = trace(p, [0.0] * 800, speed_rad_s=60.0)
+    momentum = p.J_M * states[:, State.SPEED_M] + p.J_L * states[:, State.SPEED_L]
+    np.testing.assert_allclose(momentum[:201], momentum[0], rtol=1e-9)
+    np.testing.assert_allclose(momentum[501:], momentum[-1], rtol=1e-9)
+    assert momentum[0] - momentum[-1] == pytest.approx(100.0 * (3.0 - laws.BRAKE_RISE_S), rel=1e-3)
+
+
+def test_a_hill_gives_back_what_it_took(lossless, trace):
+    road = np.array([[0.8, 2 * np.pi / 90.0, 0.3], [0.3, 2 * np.pi / 50.0, 1.0]])
+    p = lossless._replace(road=road, metres_per_rad=0.0857, gravity_nm=8000.0)
+    states = trace(p, [0.0] * 2000, speed_rad_s=60.0)
+    x = p.metres_per_rad * states[:, State.ANGLE_L]
+    height = (road[:, 0] * np.sin(np.outer(x, road[:, 1]) + road[:, 2])).sum(axis=1)
+    twist = states[:, 0] - states[:, 1]
+    energy = 0.5 * (p.J_M * states[:, 2] ** 2 + p.J_L * states[:, 3] ** 2 + p.k * twist**2)
+    potential = p.gravity_nm / p.metres_per_rad * height
+    assert np.ptp(potential) > 1e4
+    # torque is m g sin(slope): what is driven along the slope, not along the map, rises by the height
+    np.testing.assert_allclose(energy + potential, energy[0] + potential[0], atol=0.004 * np.ptp(potential))
+
+
+@pytest.mark.parametrize(("field", "inertia"), [("quadratic_motor", "J_M"), ("quadratic_load", "J_L")])
+def test_quadratic_drag_quarters_at_half_the_speed(plain, field, inertia):
+    p = plain._replace(k=0.0, c=0.0, b_M=0.0, b_L=0.0, **{field: 0.02})
+    lost = []
+    for speed in (-80.0, 40.0, 80.0):
+        driveline = TruthDriveline(p, speed)
+        driveline.advance((0.0, 0.0), 1e-3)
+        which = State.SPEED_M if inertia == "J_M" else State.SPEED_L
+        lost.append((driveline.quantity(which) - speed) * getattr(p, inertia) / 1e-3)
+    np.testing.assert_allclose(lost, [128.0, -32.0, -128.0], rtol=2e-3)
+
+
+def test_the_resolver_error_returns_after_a_turn_and_has_its_amplitude(plain):
+    p = plain._replace(k=0.0, c=0.0, b_M=0.0, resolver_once_rad=0.01, resolver_twice_rad=0.004)
+    driveline = TruthDriveline(p, 10.0)
+    n = 2000
+    believed = np.empty(n)
+    for i in range(n):
+        believed[i] = driveline.speed_rad_s
+        driveline.advance((0.0, 0.0), 2 * np.pi / 10.0 / n)
+    spectrum = np.fft.rfft(believed) / n
+    assert spectrum[0].real == pytest.approx(10.0, rel=1e-9)
+    assert 2 * abs(spectrum[1]) == pytest.approx(10.0 * 0.01, rel=1e-6)
+    assert 2 * abs(spectrum[2]) == pytest.approx(10.0 * 2 * 0.004, rel=1e-6)
+
+
+def test_a_maxwell_branch_is_stiff_when_fast_and_gone_when_slow(plain, trace, twist):
+    p = plain._replace(maxwell_stiffness=2000.0, maxwell_time_s=0.02, b_M=0.0, b_L=0.0)
+    still = trace(p, [0.0] + [p.k * 0.02 * (p.J_M + p.J_L) / p.J_L] * 1500)
+    assert still[-1, State.MAXWELL_NM] == pytest.approx(0.0, abs=0.5)
+    assert twist(still)[-1] == pytest.approx(0.02, rel=0.02)
+    fast = p._replace(maxwell_time_s=1e3, c=0.0)
+    states = trace(fast, [400.0] * 5 + [0.0] * 2000, period_s=0.001)[5:]
+    speed = states[:, State.SPEED_M] - states[:, State.SPEED_L]
+    up = np.flatnonzero((speed[:-1] < 0) & (speed[1:] >= 0))
+    frequency = 2 * np.pi * (up.size - 1) / ((up[-1] - up[0]) * 0.001)
+    assert frequency == pytest.approx(np.sqrt(6200.0 * (1 / p.J_M + 1 / p.J_L)), rel=2e-3)
