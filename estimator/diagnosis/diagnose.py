@@ -22,6 +22,7 @@ from estimator.diagnosis.result import (
     Mismatch,
     RejectedEffect,
     Trace,
+    UnnamedLaw,
     UntestableEffect,
     Verdict,
 )
@@ -99,6 +100,7 @@ def _diagnose(
         effects=effects,
         rejected=_rejected(selection, believed, judgement),
         untestable=blind,
+        unnamed=_unnamed(selection, judgement),
         fit=figures,
         parameters=retuned_parameters(final, model),
         load_torque=load_torques(final, model),
@@ -151,6 +153,16 @@ def _element(selection: Selection, judgement: Judgement) -> Element | None:
         strongest = max(trials, key=lambda trial: trial.gain.delta_bic, default=None)
         return None if strongest is None else EFFECTS[strongest.name].element
     return judgement.unnamed.element
+
+
+def _unnamed(selection: Selection, judgement: Judgement) -> UnnamedLaw | None:
+    """Return the law without a name, of the whole mismatch or else of what rejected effects leave."""
+    if judgement.verdict is not Verdict.UNEXPLAINED:
+        return None
+    for law, before in ((judgement.unnamed, selection.retuned), (judgement.remaining, selection.result)):
+        if law is not None:
+            return UnnamedLaw(law.element, law.terms, before.rms, law.rms)
+    return None
 
 
 def _rejected(selection: Selection, believed: bool, judgement: Judgement) -> tuple[RejectedEffect, ...]:

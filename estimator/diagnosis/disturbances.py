@@ -94,7 +94,7 @@ LOAD_LAWS: Mapping[str, Law] = {
 }
 
 TORQUE_LAWS: Mapping[str, Law] = {
-    "dT/dt": lambda m: np.append(np.diff(m.torque), 0.0),
+    "dT/dt": lambda m: np.diff(m.torque, prepend=m.torque[0]),  # what a late torque still lacks, in each period
     "T |T|": lambda m: m.torque * np.abs(m.torque),
     "T": lambda m: m.torque,
     "T t": lambda m: m.torque * (m.time_s - m.time_s[0]),

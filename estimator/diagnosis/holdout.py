@@ -17,9 +17,9 @@ import numpy as np
 
 from estimator.diagnosis.hypotheses import Bench, Effects
 from estimator.physics.catalogue import EFFECTS
-from estimator.physics.fit import FitResult, Problem, fit, make_problem, outputs_at
+from estimator.physics.fit import FitResult
+from estimator.physics.free_run import simulate_foreign
 from estimator.physics.model import DrivelineModel
-from estimator.physics.simulate import Grid
 from estimator.signals.record import BoolArray, FloatArray, Record
 
 KEPT_OUT = 0.3
@@ -38,8 +38,9 @@ class HoldOut:
 
 
 def split(record: Record) -> tuple[Record, Record]:
-    """Cut a recording in two: what the fit sees, and its last part, a recording of its own."""
-    cut = round((1.0 - KEPT_OUT) * record.output.size)
+    """Cut a recording in two by its good samples: what the fit sees, and its last part, a recording of its own."""
+    good = np.flatnonzero(record.okay)
+    cut = int(good[round((1.0 - KEPT_OUT) * good.size)])
     return _part(record, slice(None, cut)), _part(record, slice(cut, None))
 
 
@@ -117,10 +118,10 @@ def foreign_outputs(
     profile: bool,
 ) -> tuple[FloatArray, ...]:
     """Simulate other recordings with a fit's parameters; only what is each recording's own is estimated."""
-    template = make_problem(model, records, (), profile=profile, use=use)
-    grid = Grid(template.grid.structure, template.grid.substeps, result.problem.grid.sign_width)
-    problem = Problem(grid, tuple(records), result.p, (), template.local, tuple(use))
-    return outputs_at(problem, fit(problem).x)
+    return tuple(
+        simulate_foreign(model, result.p, result.problem.grid, record, samples, profile)
+        for record, samples in zip(records, use, strict=True)
+    )
 
 
 def _rms(records: Sequence[Record], outputs: Sequence[FloatArray], where: Sequence[BoolArray]) -> float:

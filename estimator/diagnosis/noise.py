@@ -6,10 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from estimator.errors import NotExciting
 from estimator.signals.record import FloatArray, Record
 
 PREDICTOR_ORDER = 20
 """Past samples a one-step predictor sees: 0.2 s at 10 ms, more than a period of a driveline's first mode."""
+
+MOSTLY_GOOD = 0.75
+"""Share of good samples that a predictor's past must hold; the missing ones are interpolated."""
 
 
 def noise_floor(records: Sequence[Record]) -> float:
@@ -18,6 +22,11 @@ def noise_floor(records: Sequence[Record]) -> float:
     The floor is the RMS error of a linear one-step predictor that sees the last outputs and torques. A predictor
     follows whatever moves slowly, missing physics included, so what it leaves is the noise of the sensor [unit of
     the output].
+
+    Raises
+    ------
+    NotExciting
+        If so many samples are masked that no predictor can be fitted.
     """
     squares, count = 0.0, 0
     for record in records:
@@ -28,15 +37,21 @@ def noise_floor(records: Sequence[Record]) -> float:
 
 
 def _one_step_errors(record: Record) -> FloatArray:
-    y = np.where(record.okay, record.output, 0.0)
-    y = y - y[record.okay].mean()
+    good = np.flatnonzero(record.okay)
+    y = np.interp(np.arange(record.okay.size), good, record.output[good] - record.output[good].mean())
     u = record.total_torque_nm
     n = PREDICTOR_ORDER
     lags = range(1, n + 1)
     columns = [signal[n - lag : signal.size - lag] for signal in (y, u) for lag in lags]
     regressors = np.column_stack([*columns, np.ones(y.size - n)])
-    whole = np.lib.stride_tricks.sliding_window_view(record.okay, n + 1).all(axis=1)
-    a, b = regressors[whole], y[n:][whole]
+    seen = np.lib.stride_tricks.sliding_window_view(record.okay, n + 1).mean(axis=1)
+    usable = record.okay[n:] & (seen >= MOSTLY_GOOD)
+    if usable.sum() < 2 * regressors.shape[1]:
+        raise NotExciting(
+            f"recording {record.name}: {usable.sum()} samples follow {n} samples of which most are good, expected at "
+            f"least {2 * regressors.shape[1]} to estimate the noise. Too many are masked: check flags and mask."
+        )
+    a, b = regressors[usable], y[n:][usable]
     errors: FloatArray = b - a @ np.linalg.lstsq(a, b, rcond=None)[0]
     return errors
 
@@ -46,7 +61,9 @@ def correlation_length(errors: Sequence[FloatArray]) -> float:
 
     This is the factor by which the correlation of a Gaussian series inflates the variance of its mean square, and
     mean squares are what models are compared by (Bayley and Hammersley, J. R. Stat. Soc. Suppl. 8, 1946).
-    Correlations are summed to a quarter of the series, less what noise alone would add.
+    Correlations are summed to a quarter of the series, less what white noise would add. A correlated error's estimated
+    correlations scatter more than that (Bartlett's formula), so the length l errs upward, by up to 0.44 (l - 1): with
+    it the F test keeps its level on short series too, without it there are up to twice as many false alarms.
     """
     length = max(error.size for error in errors)
     size = 1 << int(np.ceil(np.log2(2 * length)))

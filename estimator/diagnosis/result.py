@@ -115,6 +115,25 @@ class UntestableEffect:
 
 
 @dataclass(frozen=True, slots=True)
+class UnnamedLaw:
+    """A law without a name for a mismatch that no entry explains.
+
+    Attributes
+    ----------
+    terms : tuple of (str, float)
+        Functions of what happens in the line, each with its coefficient: a torque [Nm] at motor, shaft, load or in the
+        torque path, an error of the reading [unit of the output] at the sensor.
+    rms_before, rms_after : float
+        Free-run error without it, and what it would leave to first order.
+    """
+
+    element: Element
+    terms: tuple[tuple[str, float], ...]
+    rms_before: float
+    rms_after: float
+
+
+@dataclass(frozen=True, slots=True)
 class Fit:
     """RMS of the free-run simulation error, in ``unit``; holdout on samples not used for that fit."""
 
@@ -144,7 +163,11 @@ class Trace:
 
 @dataclass(frozen=True, slots=True)
 class Diagnosis:
-    """The whole answer; ``load_torque`` is the constant load torque of each recording, by name."""
+    """The whole answer.
+
+    ``unnamed`` is given where there is a mismatch that no effect explains; ``load_torque`` is the constant load torque
+    of each recording, by name.
+    """
 
     verdict: Verdict
     statement: str
@@ -152,6 +175,7 @@ class Diagnosis:
     effects: tuple[FoundEffect, ...]
     rejected: tuple[RejectedEffect, ...]
     untestable: tuple[UntestableEffect, ...]
+    unnamed: UnnamedLaw | None
     fit: Fit
     parameters: Mapping[str, Retuned]
     load_torque: Mapping[str, Estimated]

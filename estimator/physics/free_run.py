@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimator.physics.fit import fit, make_problem, start_of
+from estimator.physics.fit import FitResult, Problem, fit, make_problem, start_of, start_vector
+from estimator.physics.layout import slot
 from estimator.physics.model import DrivelineModel
-from estimator.physics.simulate import Start
-from estimator.signals.record import FloatArray, Record
+from estimator.physics.simulate import Grid, Start
+from estimator.signals.record import BoolArray, FloatArray, Record
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,8 +42,52 @@ def free_run(model: DrivelineModel, record: Record) -> FreeRun:
         Where the model's structure does not have the recorded output.
     """
     problem = make_problem(model, [record], ())
-    result = fit(problem)
+    result = settle(problem)
     return FreeRun(result.outputs[0], result.rms, start_of(problem, result.x, 0))
+
+
+def settle(problem: Problem) -> FitResult:
+    """Estimate load torque and initial state of a problem of one recording without shared unknowns.
+
+    With a gap in the line the recording may begin on either flank or between them, and the error has an optimum near
+    each: every one is tried.
+    """
+    start = start_vector(problem)
+    twist, gap_rad = problem.local[0].twist_index, float(problem.p[slot("backlash", "gap_rad")])
+    starts = [start]
+    if twist is not None and gap_rad > 0.0:
+        for side in (-0.5, 0.5):
+            starts.append(start.copy())
+            starts[-1][twist] += side * gap_rad / problem.local[0].scale[twist]
+    results = [fit(problem, x0) for x0 in starts]
+    return min(results, key=lambda result: result.rms)
+
+
+def simulate_foreign(
+    model: DrivelineModel,
+    p: FloatArray,
+    grid: Grid,
+    record: Record,
+    use: BoolArray,
+    profile: bool = False,
+) -> FloatArray:
+    """Simulate a recording with a parameter vector that was fitted to others.
+
+    Parameters
+    ----------
+    p : ndarray, shape (layout.SIZE,)
+        Parameters.
+    use : ndarray of bool, shape (N,)
+        Samples from which what is the recording's own is estimated.
+    profile : bool
+        Whether a load profile over time belongs to it.
+
+    Returns
+    -------
+    ndarray, shape (N,)
+    """
+    own = make_problem(model, [record], (), profile=profile, use=[use], grid=grid)
+    return settle(replace(own, p=p)).outputs[0]
 
 
 def free_runs(model: DrivelineModel, records: Sequence[Record]) -> tuple[FloatArray, ...]:

@@ -25,12 +25,21 @@ def measured_speed(record: Record) -> FloatArray:
 
 def speed_scale(records: Sequence[Record]) -> float:
     """Return the largest typical speed of the recordings: the 99th percentile of its size."""
-    return max(float(np.nanpercentile(np.abs(measured_speed(record)), 99)) for record in records)
+    return max(_typical(measured_speed(record)) for record in records)
 
 
 def torque_scale(records: Sequence[Record]) -> float:
     """Return the largest typical torque of the recordings: the 99th percentile of its size."""
-    return max(float(np.percentile(np.abs(record.total_torque_nm), 99)) for record in records)
+    return max(_typical(record.total_torque_nm) for record in records)
+
+
+def _typical(signal: FloatArray) -> float:
+    """Return the 99th percentile of a signal's size.
+
+    Where it rests for all but a short pulse, its peak; where it rests throughout, 1: a scale must not be zero.
+    """
+    size = np.abs(signal)
+    return float(np.nanpercentile(size, 99)) or float(np.nanmax(size)) or 1.0
 
 
 def reverses(record: Record) -> bool:

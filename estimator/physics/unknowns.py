@@ -91,10 +91,17 @@ class LocalBasis:
         """Return the start state of scaled unknowns ``x``, shape (L,)."""
         values = x * self.scale
         angle = float(values[2]) if self.has_angle else 0.0
-        if self.structure is Structure.ONE_MASS:
+        i = self.twist_index
+        if i is None:
             return Start(float(values[0]), angle, float(values[1]))
-        i = 3 if self.has_angle else 2
         return Start(float(values[0]), angle, float(values[1]), float(values[i]), float(values[i + 1]))
+
+    @property
+    def twist_index(self) -> int | None:
+        """Where the initial twist stands among the unknowns; None for one mass."""
+        if self.structure is Structure.ONE_MASS:
+            return None
+        return 3 if self.has_angle else 2
 
     def extra_load(self, x: FloatArray) -> FloatArray | None:
         """Return the load profile of scaled unknowns, shape (N,) [Nm]; None without one."""

@@ -12,7 +12,7 @@ from html import escape
 
 import numpy as np
 
-from estimator.diagnosis.result import Diagnosis, FoundEffect, Interval, Trace
+from estimator.diagnosis.result import Diagnosis, FoundEffect, Interval, Trace, UnnamedLaw
 from estimator.physics.catalogue import EFFECTS
 from estimator.signals.record import FloatArray
 from hil.report import page as html
@@ -129,10 +129,24 @@ def _location(diagnosis: Diagnosis) -> str:
 
 
 def _found(diagnosis: Diagnosis) -> str:
+    if diagnosis.unnamed is not None:
+        return _unnamed(diagnosis.unnamed, diagnosis.fit.unit)
     if not diagnosis.effects:
         return ""
     pieces = [piece for effect in diagnosis.effects for piece in _effect(effect)]
     return html.section("The physics found", *pieces)
+
+
+def _unnamed(law: UnnamedLaw, unit: str) -> str:
+    rows = [(name, shown(coefficient)) for name, coefficient in law.terms]
+    return html.section(
+        "A law without a name",
+        html.paragraph(
+            f"At the {ELEMENTS[law.element]} these terms follow the mismatch best; to first order they bring the error "
+            f"from {shown(law.rms_before, unit)} to {shown(law.rms_after, unit)}. It is a description, not a cause."
+        ),
+        html.table(("term", "coefficient"), rows, numbers=(1,)),
+    )
 
 
 def _effect(effect: FoundEffect) -> list[str]:

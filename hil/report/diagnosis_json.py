@@ -1,6 +1,7 @@
 """``diagnosis.json`` (CONTRACT, schema ``hil.diagnosis/1``): a Diagnosis for scripts.
 
-Keys beyond the contract: ``warnings``, and ``profiles`` in an effect that was found as a course over time.
+Keys beyond the contract: ``warnings``, ``load_torque`` per recording, ``unnamed`` (the law without a name where nothing
+explains the mismatch), and ``profiles`` in an effect that was found as a course over time.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from estimator.diagnosis.result import (
     Profile,
     RejectedEffect,
     Retuned,
+    UnnamedLaw,
 )
 from hil.report.numbers import json_number
 
@@ -46,6 +48,7 @@ def diagnosis_json(diagnosis: Diagnosis) -> Json:
             {"name": entry.name, "reason": entry.reason, "suggested_test": entry.suggested_test}
             for entry in diagnosis.untestable
         ],
+        "unnamed": None if diagnosis.unnamed is None else _unnamed(diagnosis.unnamed),
         "fit": _fit(diagnosis.fit),
         "parameters": {name: _retuned(value) for name, value in diagnosis.parameters.items()},
         "load_torque": {name: _estimated(value) for name, value in diagnosis.load_torque.items()},
@@ -73,6 +76,15 @@ def _mismatch(mismatch: Mismatch) -> Json:
         if region is None
         else {"signal": region.signal, "low": json_number(region.low), "high": json_number(region.high)},
         "p_value": json_number(mismatch.p_value),
+    }
+
+
+def _unnamed(law: UnnamedLaw) -> Json:
+    return {
+        "element": law.element.value,
+        "terms": [{"law": name, "coefficient": json_number(value)} for name, value in law.terms],
+        "rms_before": json_number(law.rms_before),
+        "rms_after": json_number(law.rms_after),
     }
 
 

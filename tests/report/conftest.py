@@ -97,6 +97,7 @@ def diagnosis() -> Diagnosis:
                 "reversal",
             ),
         ),
+        unnamed=None,
         fit=Fit("rad/s", 1.72, 1.41, 0.0521, 1.38, 0.0533, 0.0502),
         parameters={
             "J_M": Retuned(1.6, 1.52, (1.51, 1.53), "kg m^2"),

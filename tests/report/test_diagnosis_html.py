@@ -8,7 +8,8 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from estimator.diagnosis.result import Diagnosis, Mismatch, Trace, Verdict
+from estimator.diagnosis.result import Diagnosis, Mismatch, Trace, UnnamedLaw, Verdict
+from estimator.physics.effect import Element
 from hil.report.diagnosis_html import MOST_DRAWN, diagnosis_page
 
 VOID = {"meta", "br", "hr", "img", "input", "link"}
@@ -152,3 +153,11 @@ def test_many_long_recordings_stay_under_ten_megabytes(diagnosis: Diagnosis) -> 
     sections = read(page).sections
     assert [f"Recording run_{number}" in sections for number in range(MOST_DRAWN + 1)] == [False] + [True] * MOST_DRAWN
     assert "1 more recordings, with smaller errors" in page
+
+
+def test_a_law_without_a_name_is_shown(diagnosis):
+    law = UnnamedLaw(Element.LOAD, (("w_L |w_L|", 0.0021),), 0.12, 0.051)
+    page = diagnosis_page(replace(diagnosis, unnamed=law, effects=()))
+    assert "A law without a name" in page
+    assert "w_L |w_L|" in page
+    assert "A law without a name" not in diagnosis_page(diagnosis)

@@ -11,7 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from estimator.diagnosis.result import Diagnosis, Mismatch, Verdict
+from estimator.diagnosis.result import Diagnosis, Mismatch, UnnamedLaw, Verdict
+from estimator.physics.effect import Element
 from hil.report.diagnosis_json import diagnosis_json, diagnosis_text
 from hil.report.numbers import json_number
 
@@ -31,8 +32,10 @@ def test_the_text_is_strict_json_of_the_contract(diagnosis: Diagnosis) -> None:
         "effects",
         "rejected",
         "untestable",
+        "unnamed",
         "fit",
         "parameters",
+        "load_torque",
         "timing_s",
         "warnings",
     ]
@@ -113,3 +116,14 @@ def test_rounding_keeps_nine_digits(value: float) -> None:
     rounded = json_number(value)
     assert rounded is not None
     assert math.isclose(rounded, value, rel_tol=1e-9)
+
+
+def test_a_law_without_a_name_is_written(diagnosis):
+    law = UnnamedLaw(Element.LOAD, (("w_L |w_L|", 0.0021), ("sign(w_L)", float("nan"))), 0.12, 0.051)
+    content = diagnosis_json(replace(diagnosis, unnamed=law))
+    assert content["unnamed"] == {
+        "element": "load",
+        "terms": [{"law": "w_L |w_L|", "coefficient": 0.0021}, {"law": "sign(w_L)", "coefficient": None}],
+        "rms_before": 0.12,
+        "rms_after": 0.051,
+    }

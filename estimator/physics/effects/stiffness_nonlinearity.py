@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from estimator.compiled import compiled
 from estimator.physics.effect import Effect, EffectParameter, Element, Untestable
-from estimator.physics.model import DrivelineModel, Motion, Structure
+from estimator.physics.model import DrivelineModel, Motion, Structure, unit
 from estimator.physics.motion import torque_scale
 from estimator.signals.record import Record
 
@@ -42,10 +42,11 @@ def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | N
 
 
 def sentence(values: Mapping[str, float], motion: Motion) -> str:
-    """Say what was found."""
-    hardening = values["hardening_per_rad2"]
-    kind = "hardens" if hardening > 0 else "softens"
-    return f"the shaft {kind} with twist: stiffness changes by {hardening:.3g} times the twist squared"
+    """Say what was found, as the twist at which the stiffness has changed by a tenth."""
+    hardening, shape = values["hardening_per_rad2"], values["shape"]
+    kind, changed = ("hardens", 1.1) if hardening > 0 else ("softens", 1.0 / 0.9)
+    twist = math.sqrt(shape * (math.pow(changed, 1.0 / shape) - 1.0) / abs(hardening))
+    return f"the shaft {kind} with twist: by a tenth of its stiffness at {twist:.3g} {unit('angle', motion)}"
 
 
 EFFECT = Effect(
