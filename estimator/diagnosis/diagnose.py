@@ -10,11 +10,11 @@ from threadpoolctl import threadpool_limits
 
 from estimator.diagnosis import locate
 from estimator.diagnosis.assemble import augmented_model, found_effects, load_torques, retuned_parameters
-from estimator.diagnosis.evidence import gain
+from estimator.diagnosis.evidence import gain, residuals_by_record
 from estimator.diagnosis.holdout import Examiner, foreign_outputs
 from estimator.diagnosis.hypotheses import NOTHING, Bench, Progress, everything, open_hypotheses
 from estimator.diagnosis.judgement import Judgement, judge
-from estimator.diagnosis.noise import noise_floor
+from estimator.diagnosis.noise import noise_floor, unpredictable
 from estimator.diagnosis.preconditions import check
 from estimator.diagnosis.result import (
     Diagnosis,
@@ -124,12 +124,17 @@ def _fit_figures(selection: Selection, examiner: Examiner, model: DrivelineModel
         augmented=final.rms,
         holdout_retuned=held.before,
         holdout_augmented=held.after,
-        noise_floor=min(floor, selection.result.rms),
+        noise_floor=_floor(selection, floor),
     )
 
 
+def _floor(selection: Selection, floor: float) -> float:
+    """Return the lower of the two estimates of the noise: of the reading, and of the best explanation's error."""
+    return min(floor, unpredictable(residuals_by_record(selection.result)))
+
+
 def _mismatch(selection: Selection, judgement: Judgement, floor: float) -> Mismatch:
-    floor = min(floor, selection.result.rms)
+    floor = _floor(selection, floor)
     if judgement.verdict is Verdict.NO_MISMATCH:
         return Mismatch(False, None, {}, None, None, 1.0)
     element = _element(selection, judgement)

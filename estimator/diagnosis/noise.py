@@ -56,6 +56,19 @@ def _one_step_errors(record: Record) -> FloatArray:
     return errors
 
 
+def unpredictable(errors: Sequence[FloatArray]) -> float:
+    """Return the RMS of what a set of simulation errors' own past does not foretell.
+
+    A second, often sharper view of the floor: once a model explains most of what happens, what its error leaves to a
+    linear predictor of itself is the noise of the reading.
+    """
+    n = PREDICTOR_ORDER
+    past = np.concatenate([np.lib.stride_tricks.sliding_window_view(error[:-1], n) for error in errors])
+    now = np.concatenate([error[n:] for error in errors])
+    left = now - past @ np.linalg.lstsq(past, now, rcond=None)[0]
+    return float(np.sqrt(left @ left / max(left.size - n, 1)))
+
+
 def correlation_length(errors: Sequence[FloatArray]) -> float:
     """Return how many samples of an error count as one: ``1 + 2 sum rho_k^2``.
 

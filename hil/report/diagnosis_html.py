@@ -26,7 +26,7 @@ from hil.report.figures import (
     stretches_for,
     time_figure,
 )
-from hil.report.numbers import shown, shown_interval, shown_p, shown_ratio, shown_times
+from hil.report.numbers import p_statement, shown, shown_interval, shown_ratio, shown_times
 from hil.report.wording import BADGES, ELEMENTS, headline, listed, location_rows, quantity, torque_axis
 
 MOST_DRAWN = 20
@@ -164,7 +164,7 @@ def _effect(effect: FoundEffect) -> list[str]:
         html.paragraph(
             f"Evidence: information criterion better by {shown(evidence.delta_bic)}; error on unseen data "
             f"{shown(evidence.holdout_rms_before)} → {shown(evidence.holdout_rms_after)}; "
-            f"p = {shown_p(evidence.p_value)}."
+            f"{p_statement(evidence.p_value)}."
         )
     )
     pieces += [

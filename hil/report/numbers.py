@@ -12,8 +12,8 @@ SHOWN_DIGITS = 4
 
 LARGEST_RATIO = 1000
 
-SMALLEST_P = 1e-300
-"""Below this a probability is a number that underflowed."""
+SMALLEST_P = 1e-100
+"""Below this the exact size of a probability means nothing to anybody."""
 
 
 def json_number(value: float) -> float | None:
@@ -46,6 +46,12 @@ def shown_p(value: float) -> str:
     if not math.isfinite(value):
         return "–"
     return f"< {SMALLEST_P:.0e}" if value < SMALLEST_P else f"{value:.2g}"
+
+
+def p_statement(value: float) -> str:
+    """Return a probability as a statement: ``p = 0.02`` or ``p < 1e-100``."""
+    shown = shown_p(value)
+    return f"p {shown}" if shown.startswith("<") else f"p = {shown}"
 
 
 def shown_ratio(value: float, reference: float) -> str:

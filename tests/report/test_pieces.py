@@ -21,7 +21,7 @@ from hil.report.catalogue import catalogue_table, effect_details, entries_text, 
 from hil.report.decimate import extremes
 from hil.report.diagnosis_text import diagnosis_summary
 from hil.report.figures import LONGEST_STRETCHES, input_lines, stretches_for
-from hil.report.numbers import shown, shown_interval, shown_p, shown_ratio
+from hil.report.numbers import p_statement, shown, shown_interval, shown_p, shown_ratio
 from hil.report.outputs import publish, require_folder
 from hil.report.wording import listed, simulated_column
 
@@ -165,3 +165,10 @@ def test_a_file_is_no_folder_for_results(tmp_path: Path, name: str) -> None:
 def test_a_read_only_folder_is_refused() -> None:
     with pytest.raises(UsageError, match="which is read-only"):
         require_folder(Path("/proc/1/result"))
+
+
+@pytest.mark.parametrize(
+    ("value", "expected"), [(0.02, "p = 0.02"), (1e-300, "p < 1e-100"), (0.0, "p < 1e-100"), (float("nan"), "p = –")]
+)
+def test_a_probability_is_stated_as_far_as_it_means_something(value: float, expected: str) -> None:
+    assert p_statement(value) == expected
