@@ -46,7 +46,7 @@ def test_numbers_are_shown_with_four_digits(value: float, text: str) -> None:
 def test_numbers_carry_their_unit_only_where_there_is_one() -> None:
     assert shown(1.5, "Nm") == "1.5 Nm"
     assert shown_interval((0.02, NAN)) == "0.02 … –"
-    assert [shown_p(0.0), shown_p(0.0123), shown_p(NAN)] == ["< 1e-300", "0.012", "–"]
+    assert [shown_p(0.0), shown_p(0.0123), shown_p(NAN)] == ["< 1e-100", "0.012", "–"]
     assert [shown_ratio(0.5, 0.25), shown_ratio(0.5, 0.0), shown_ratio(NAN, 1.0)] == ["2 ×", "–", "–"]
     assert [shown_ratio(1000.0, 1.0), shown_ratio(1001.0, 1.0)] == ["1e+03 ×", "> 1000 ×"]
     assert [listed(["a"]), listed(["a", "b"]), listed(["a", "b", "c"])] == ["a", "a and b", "a, b and c"]
