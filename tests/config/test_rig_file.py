@@ -59,7 +59,7 @@ class TestTheExample:
         assert rig.simulation.speed_noise_rad_s == 0.05
 
     def test_its_guard_limits(self) -> None:
-        assert read_rig(EXAMPLE).guard_limits == GuardLimits(400.0, 400.0, 120.0, 2000.0, 700.0, 0.05)
+        assert read_rig(EXAMPLE).guard_limits == GuardLimits(400.0, 400.0, 120.0, 2000.0, 700.0, 0.2)
 
     def test_it_has_one_experiment_of_each_kind(self) -> None:
         kinds = {name: type(table) for name, table in read_rig(EXAMPLE).experiments.items()}

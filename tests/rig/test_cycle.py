@@ -88,10 +88,10 @@ def test_value_that_never_came_is_nan() -> None:
 
 def test_answers_missing_for_the_feedback_timeout_end_the_run() -> None:
     pacer = FreePacer(PERIOD_NS)
-    with armed(syncs=20) as (_, cycle):
-        for _ in range(6):
+    with armed(syncs=40) as (_, cycle):
+        for _ in range(21):
             cycle.step(pacer.next(), NO_TORQUE, 0.0, SampleFlag.GOOD)
-        with pytest.raises(DeviceTimeout, match=r"inverter m2: no TPDO for 0\.060 s, .* more than 0\.05 s"):
+        with pytest.raises(DeviceTimeout, match=r"inverter m2: no TPDO for 0\.210 s, .* more than 0\.2 s"):
             cycle.step(pacer.next(), NO_TORQUE, 0.0, SampleFlag.GOOD)
 
 
