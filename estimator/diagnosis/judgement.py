@@ -62,7 +62,7 @@ def _objection(selection: Selection, floor: float, unnamed: UnnamedLaw | None, r
     if before**2 - after**2 < MOST * (before**2 - min(floor, after) ** 2):
         return f"{named} would leave most of the mismatch standing"
     profiles = [name for name in selection.chosen if EFFECTS[name].profile]
-    if profiles and remaining is not None:
+    if profiles and len(selection.chosen) == 1 and remaining is not None:  # an edge in what should be smooth
         return f"{named} would leave {remaining.terms[0][0]} at the {remaining.element.value} unexplained"
     if unnamed is None:
         return ""

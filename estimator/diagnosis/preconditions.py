@@ -61,9 +61,10 @@ def _excited(record: Record) -> None:
             f"recording {record.name}: {good} good samples, expected at least {FEWEST_SAMPLES}. Record longer."
         )
     for what, values in (("torque", record.total_torque_nm), ("output", record.output)):
-        if float(np.ptp(values[record.okay])) == 0.0:
+        seen = values[record.okay]
+        if float(np.ptp(seen)) == 0.0:
             raise NotExciting(
-                f"recording {record.name}: the {what} is constant at {values[0]:g}, expected it to vary. "
+                f"recording {record.name}: the {what} is constant at {seen[0]:g}, expected it to vary. "
                 "Excite the driveline (PRBS, reversal, tip-in) and check the channel.",
                 (record.name,),
             )

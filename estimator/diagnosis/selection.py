@@ -16,10 +16,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimator.diagnosis.evidence import VERY_STRONG, Gain, gain
+from estimator.diagnosis.evidence import VERY_STRONG, Gain, gain, residuals_by_record
 from estimator.diagnosis.holdout import Examiner, HoldOut
 from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects, Progress, with_effect
 from estimator.diagnosis.intervals import covariance, interval
+from estimator.diagnosis.noise import unpredictable
 from estimator.diagnosis.unnamed import UnnamedLaw, best_unnamed
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult
@@ -58,7 +59,7 @@ class Trial:
 
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """The outcome: the effects chosen, their fit, each one's trial, and the last trial of every other effect."""
+    """The outcome: the effects chosen, their fit, each one's last trial, and the first trial of every effect."""
 
     retuned: FitResult
     chosen: Effects
@@ -99,9 +100,11 @@ class Selector:
             for name, trial in trials.items():
                 first_trials.setdefault(name, trial)
             best = self._best(trials, current, retuned)
+            if best is None and not chosen:
+                best = self._behind_profile(retuned)
             if best is None:
                 break
-            accepted = {n: t for n, t in accepted.items() if n in best.effects} | {best.name: best}
+            accepted = {name: accepted.get(name, best) for name in best.effects} | {best.name: best}
             chosen, current = best.effects, best.result
             if counting_law(current) is None:
                 break
@@ -110,6 +113,19 @@ class Selector:
             name: self._final(name, chosen, current, trial) for name, trial in accepted.items() if name in chosen
         }
         return Selection(retuned, chosen, current, accepted, first_trials)
+
+    def _behind_profile(self, retuned: FitResult) -> Trial | None:
+        """Look for an effect behind a slow load that by itself hides it, where something stands but nothing passed.
+
+        A slow disturbance moves the free run by many times what a fast effect does; and alone it must pay for all its
+        knots out of an error that the fast effect keeps correlated. Both are judged again in the final set.
+        """
+        profiles = [name for name in self.names if EFFECTS[name].profile]
+        if not profiles or counting_law(retuned) is None:
+            return None
+        slow = frozenset(profiles[:1])
+        behind = self.bench.fit(slow, retuned)
+        return self._best(self._try_all(slow, behind, 0), behind, retuned)
 
     def _try_all(self, chosen: Effects, current: FitResult, round_number: int) -> dict[str, Trial]:
         trials = {}
@@ -142,7 +158,9 @@ class Selector:
         passing = [trial for trial in trials.values() if trial.failed is None]
         for trial in sorted(passing, key=lambda t: -t.gain.delta_bic):
             simpler = self._simpler(trial, trials, current)
-            if self._weighty(simpler.result, current, retuned) and self._holds_out(simpler, current):
+            if self._weighty(simpler.name, simpler.effects, simpler.result, current, retuned) and self._holds_out(
+                simpler, current
+            ):
                 return self._examined(simpler, current)
         return None
 
@@ -162,14 +180,23 @@ class Selector:
         return removed >= PART_FOR_DETAIL * (current.rms**2 - special.result.rms**2)
 
     def _visible(self, before: FitResult, after: FitResult) -> bool:
-        standing = max(before.rms**2 - self.floor**2, 0.0)
+        floor = min(self.floor, unpredictable(residuals_by_record(before)))
+        standing = max(before.rms**2 - floor**2, 0.0)
         removed = before.rms**2 - after.rms**2
         return before.rms >= VISIBLE * after.rms and removed >= 0.5 * standing
 
-    def _weighty(self, after: FitResult, before: FitResult, retuned: FitResult) -> bool:
+    def _weighty(self, name: str, effects: Effects, after: FitResult, before: FitResult, retuned: FitResult) -> bool:
+        """Tell whether an effect removes enough to count.
+
+        At an element of its own it may be small, if it can be seen. Beside another effect of the same element it must
+        be a real part of the mismatch: a law written another way leaves just such a small remainder.
+        """
         mismatch = max(retuned.rms**2 - self.floor**2, retuned.rms**2 - after.rms**2)
         removed = before.rms**2 - after.rms**2
-        return removed >= PART_OF_MISMATCH * mismatch or self._visible(before, after)
+        if removed >= PART_OF_MISMATCH * mismatch:
+            return True
+        neighbours = {EFFECTS[other].element for other in effects if other != name}
+        return EFFECTS[name].element not in neighbours and self._visible(before, after)
 
     def _examine(self, trial: Trial, before: FitResult) -> HoldOut:
         smaller = frozenset(shared.effect for shared in before.problem.shared if shared.effect)
@@ -199,13 +226,13 @@ class Selector:
         for name in sorted(chosen) if len(chosen) > 1 else ():
             without = self.bench.fit(chosen - {name}, current)
             gained = gain(without, current)
-            if gained.delta_bic < VERY_STRONG or not self._weighty(current, without, retuned):
+            if gained.delta_bic < VERY_STRONG or not self._weighty(name, chosen, current, without, retuned):
                 return self._drop_superfluous(chosen - {name}, without, retuned)
         return chosen, current
 
     def _final(self, name: str, chosen: Effects, current: FitResult, trial: Trial) -> Trial:
         """Judge an accepted effect once more, against the final set without it."""
-        if chosen == trial.effects:
+        if chosen == trial.effects and trial.name == name:
             return trial
         without = self.bench.fit(chosen - {name}, current)
         final = self._trial(name, chosen, without, current)

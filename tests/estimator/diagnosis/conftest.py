@@ -1,0 +1,13 @@
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+from threadpoolctl import threadpool_limits
+
+
+@pytest.fixture(autouse=True, scope="session")
+def one_blas_thread() -> Iterator[None]:
+    """As ``diagnose`` has it: on tall, thin matrices more threads only wait for each other."""
+    with threadpool_limits(1, user_api="blas"):
+        yield

@@ -1,0 +1,193 @@
+"""From a fit to the parts of a diagnosis: values with intervals and units, profiles, the augmented model."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimator.diagnosis.assemble import augmented_model, found_effects, load_torques, retuned_parameters
+from estimator.diagnosis.holdout import Examiner
+from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects, everything
+from estimator.diagnosis.result import FoundEffect
+from estimator.diagnosis.selection import Selection, Selector
+from estimator.physics.effect import Element
+from estimator.physics.free_run import free_run
+from estimator.physics.model import EffectValue, Motion
+from estimator.physics.simulate import Start
+from estimator.signals.record import FloatArray, Record
+from tests.estimator.diagnosis.planted import SIGMA, drive_torque, rubbing
+from tests.estimator.physics.bench import ONE_MASS, linear_record, model, scaled
+
+COULOMB = "coulomb_friction_motor"
+FRICTION_NM = 12.0
+NOMINAL = scaled(ONE_MASS, J_M=1.1, b_M=0.9)
+LINE = model(NOMINAL)
+
+
+def hill(time_s: FloatArray) -> FloatArray:
+    """Slope without a mean over the 12 s of a recording [Nm]."""
+    return 25.0 * np.sin(2 * np.pi * time_s / 6.0)
+
+
+def hilly() -> list[Record]:
+    return [
+        linear_record(
+            ONE_MASS,
+            drive_torque(seed, 1200),
+            Start(5.0, 0.0, 2.0),
+            sigma=SIGMA,
+            seed=seed,
+            name=f"run_{seed}",
+            extra_load_nm=hill(np.arange(1200) * 0.01),
+        )
+        for seed in (1, 2)
+    ]
+
+
+def assembled(records: list[Record], *names: str) -> tuple[Selection, Examiner]:
+    """A selection of these effects, each judged in the final set."""
+    chosen: Effects = frozenset(names)
+    bench, examiner = Bench(LINE, records, everything(records)), Examiner(LINE, records, ())
+    retuned = bench.fit(NOTHING)
+    result = bench.fit(chosen, retuned)
+    select = Selector(bench, examiner, names, SIGMA, lambda message, share: None)
+    trials = {}
+    for name in names:
+        without = bench.fit(chosen - {name}, result)
+        trials[name] = select._examined(select._trial(name, chosen, without, result), without)
+    return Selection(retuned, chosen, result, trials, trials), examiner
+
+
+@pytest.fixture(scope="module")
+def rubbed() -> tuple[Selection, Examiner]:
+    return assembled(rubbing(lambda speed: FRICTION_NM), COULOMB)
+
+
+@pytest.fixture(scope="module")
+def friction(rubbed: tuple[Selection, Examiner]) -> FoundEffect:
+    (found,) = found_effects(rubbed[0], LINE, rubbed[1])
+    return found
+
+
+@pytest.fixture(scope="module")
+def road() -> FoundEffect:
+    selection, examiner = assembled(hilly(), "road_grade")
+    (found,) = found_effects(selection, LINE, examiner)
+    return found
+
+
+class TestAnEffect:
+    def test_it_has_value_interval_and_unit(self, friction: FoundEffect) -> None:
+        (name,) = friction.parameters
+        found = friction.parameters[name]
+        assert (friction.name, friction.element, name, found.unit) == (COULOMB, Element.MOTOR, "friction_nm", "Nm")
+        assert found.value == pytest.approx(FRICTION_NM, rel=0.03)
+        assert found.ci95[0] < found.value < found.ci95[1]
+        assert found.ci95[1] - found.ci95[0] < 0.1 * FRICTION_NM
+
+    def test_it_is_said_in_words(self, friction: FoundEffect) -> None:
+        assert f"dry friction of {friction.parameters['friction_nm'].value:.3g} Nm" in friction.statement
+
+    def test_its_evidence_is_its_trials(self, friction: FoundEffect, rubbed: tuple[Selection, Examiner]) -> None:
+        trial = rubbed[0].accepted[COULOMB]
+        assert trial.holdout is not None
+        assert friction.evidence.delta_bic == trial.gain.delta_bic
+        assert friction.evidence.p_value == trial.p_value
+        assert friction.evidence.holdout_rms_before == trial.holdout.before
+        assert friction.evidence.holdout_rms_after == trial.holdout.after
+
+    def test_without_a_trial_on_unseen_data_the_whole_set_is_examined(self, rubbed: tuple[Selection, Examiner]) -> None:
+        selection, examiner = rubbed
+        bare = replace(selection, accepted={COULOMB: replace(selection.accepted[COULOMB], holdout=None)})
+        (found,) = found_effects(bare, LINE, examiner)
+        assert found.evidence.holdout_rms_before > 2.0 * found.evidence.holdout_rms_after > 0.0
+
+    def test_units_of_a_translation_are_newtons(self, rubbed: tuple[Selection, Examiner]) -> None:
+        (found,) = found_effects(rubbed[0], model(NOMINAL, motion=Motion.TRANSLATION), rubbed[1])
+        assert found.parameters["friction_nm"].unit == "N"
+
+    def test_the_strongest_comes_first_with_its_twins(self) -> None:
+        late = [
+            replace(rec, torque_nm=np.vstack([rec.torque_nm[1:], rec.torque_nm[-1:]]))
+            for rec in rubbing(lambda speed: FRICTION_NM)
+        ]
+        selection, examiner = assembled(late, "actuator_lag", COULOMB)
+        found = found_effects(selection, LINE, examiner)
+        assert [effect.name for effect in found] == [COULOMB, "actuator_lag"]
+        assert found[0].evidence.delta_bic > found[1].evidence.delta_bic
+        assert found[1].indistinguishable_from == ("speed_filter",)
+
+
+class TestAProfile:
+    def test_each_recording_has_its_own_over_time(self, road: FoundEffect) -> None:
+        assert set(road.profiles) == {"run_1", "run_2"}
+        for profile in road.profiles.values():
+            assert profile.unit == "Nm"
+            np.testing.assert_allclose(profile.time_s, np.arange(12.0))
+            assert profile.value.mean() == pytest.approx(0.0, abs=1e-9)
+
+    def test_it_is_the_road_that_was_driven_within_its_band(self, road: FoundEffect) -> None:
+        inside = []
+        for profile in road.profiles.values():
+            true = hill(profile.time_s)
+            assert np.max(np.abs(profile.value - true)[1:-1]) < 3.0
+            inside += list((profile.low <= true) & (true <= profile.high))
+        assert np.mean(inside) > 0.6  # a spline of 2 s knots follows a 6 s wave to about its noise
+
+    def test_its_size_is_the_rms_of_the_profile(self, road: FoundEffect) -> None:
+        found = road.parameters["grade_rms_nm"]
+        assert found.value == pytest.approx(25.0 / np.sqrt(2.0), rel=0.1)
+        assert 0.0 <= found.ci95[0] < found.value < found.ci95[1]
+        assert found.unit == "Nm"
+
+
+class TestParameters:
+    def test_before_and_after_with_interval_and_unit(self, rubbed: tuple[Selection, Examiner]) -> None:
+        parameters = retuned_parameters(rubbed[0].result, LINE)
+        assert list(parameters) == ["J_M", "b_M"]
+        inertia = parameters["J_M"]
+        assert (inertia.nominal, inertia.unit) == (NOMINAL["J_M"], "kg m^2")
+        assert inertia.value == pytest.approx(ONE_MASS["J_M"], rel=0.01)
+        assert inertia.ci95[0] < inertia.value < inertia.ci95[1]
+
+    def test_one_that_is_trusted_exactly_stays(self) -> None:
+        records = rubbing(lambda speed: 0.0)
+        exact = model(ONE_MASS, tolerance=0.0)
+        result = Bench(exact, records, everything(records)).fit(NOTHING)
+        for name, parameter in retuned_parameters(result, exact).items():
+            assert parameter.value == parameter.nominal == ONE_MASS[name]
+            assert parameter.ci95 == (ONE_MASS[name], ONE_MASS[name])
+
+    def test_each_recording_has_its_load_torque(self, rubbed: tuple[Selection, Examiner]) -> None:
+        torques = load_torques(rubbed[0].result, LINE)
+        assert list(torques) == ["run_1", "run_2"]
+        for torque in torques.values():
+            assert torque.value == pytest.approx(5.0, abs=0.5)
+            assert torque.ci95[0] < torque.value < torque.ci95[1]
+            assert torque.unit == "Nm"
+
+
+class TestAugmentedModel:
+    def test_it_has_the_new_values_and_the_effect(
+        self, rubbed: tuple[Selection, Examiner], friction: FoundEffect
+    ) -> None:
+        found = augmented_model(rubbed[0].result, LINE, [friction])
+        assert found.values()["J_M"] == pytest.approx(ONE_MASS["J_M"], rel=0.01)
+        assert found.parameters["J_M"].tolerance == LINE.parameters["J_M"].tolerance
+        estimate = friction.parameters["friction_nm"]
+        assert found.effects == {COULOMB: {"friction_nm": EffectValue(estimate.value, estimate.ci95)}}
+
+    def test_it_simulates_what_was_found(self, rubbed: tuple[Selection, Examiner], friction: FoundEffect) -> None:
+        """On a recording it has not seen the error is the noise."""
+        found = augmented_model(rubbed[0].result, LINE, [friction])
+        (unseen,) = rubbing(lambda speed: FRICTION_NM, seeds=(9,))
+        assert free_run(found, unseen).rms < 1.3 * SIGMA
+        assert free_run(LINE, unseen).rms > 3.0 * SIGMA
+
+    def test_effects_that_the_model_had_stay(self, rubbed: tuple[Selection, Examiner], friction: FoundEffect) -> None:
+        having = model(NOMINAL, effects={"transport_delay": {"delay_s": 0.01}})
+        found = augmented_model(rubbed[0].result, having, [friction])
+        assert set(found.effects) == {"transport_delay", COULOMB}
+        assert augmented_model(rubbed[0].result, having, []).effects == having.effects

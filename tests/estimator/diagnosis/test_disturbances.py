@@ -1,0 +1,176 @@
+"""The output's answer to a disturbance, against the exact response of a linear driveline."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimator.diagnosis.disturbances import (
+    LOAD_STEP_EVERY_S,
+    Candidate,
+    candidates,
+    motion_of,
+)
+from estimator.physics.effect import Element
+from estimator.physics.fit import FitResult, fit, make_problem
+from estimator.physics.simulate import Start
+from estimator.signals.record import FloatArray, OutputKind
+from tests.estimator.diagnosis.planted import drive_torque, nominal_fit, quiet
+from tests.estimator.physics.bench import (
+    ANGLE,
+    LOAD_SPEED,
+    ONE_MASS,
+    SPEED,
+    TWIST,
+    TWO_MASS,
+    exact_states,
+    linear_record,
+    model,
+    random_steps,
+)
+
+START = Start(5.0, 0.0, 2.0, 0.0, 2.0)
+REST = Start(0.0, 0.0, 0.0)
+
+
+@pytest.fixture(scope="module")
+def result() -> FitResult:
+    """The true model on two recordings without noise: the motion of the fit is the true one."""
+    records = [linear_record(TWO_MASS, drive_torque(seed), START, name=f"run_{seed}") for seed in (1, 2)]
+    return fit(make_problem(model(TWO_MASS), records, ()))
+
+
+@pytest.fixture(scope="module")
+def pool(result: FitResult) -> list[Candidate]:
+    return candidates(result)
+
+
+def response(drive: FloatArray, load: FloatArray) -> FloatArray:
+    """Motor speed of the linear driveline from rest under torques alone."""
+    return exact_states(TWO_MASS, drive, REST, extra_load_nm=load)[:, SPEED]
+
+
+def pick(pool: list[Candidate], element: Element, law: str) -> Candidate:
+    (found,) = [c for c in pool if (c.element, c.law) == (element, law)]
+    return found
+
+
+def test_the_motion_of_a_fit_is_the_motion_of_the_line(result: FitResult) -> None:
+    states = exact_states(TWO_MASS, drive_torque(2), START)
+    moved = motion_of(result, 1)
+    for found, state in ((moved.speed, SPEED), (moved.twist, TWIST), (moved.load_speed, LOAD_SPEED)):
+        assert np.max(np.abs(found - states[:, state])) < 1e-3 * np.ptp(states[:, state])
+    assert np.max(np.abs(moved.angle - states[:, ANGLE])) < 1e-3 * np.ptp(states[:, ANGLE])
+    np.testing.assert_array_equal(moved.torque, drive_torque(2))
+
+
+@pytest.mark.parametrize(
+    ("element", "law"),
+    [
+        (Element.TORQUE_PATH, "T |T|"),
+        (Element.TORQUE_PATH, "T t"),
+        (Element.MOTOR, "w_M |w_M|"),
+        (Element.SHAFT, "twist^3"),
+        (Element.LOAD, "w_L |w_L|"),
+    ],
+)
+def test_an_answer_is_the_exact_response_per_unit(pool: list[Candidate], element: Element, law: str) -> None:
+    states = exact_states(TWO_MASS, drive_torque(1), START)
+    torque, time_s = drive_torque(1), np.arange(1500) * 0.01
+    values = {
+        "T |T|": torque * np.abs(torque),
+        "T t": torque * time_s,
+        "w_M |w_M|": states[:, SPEED] * np.abs(states[:, SPEED]),
+        "twist^3": states[:, TWIST] ** 3,
+        "w_L |w_L|": states[:, LOAD_SPEED] * np.abs(states[:, LOAD_SPEED]),
+    }[law]
+    nothing = np.zeros_like(values)
+    expected = {
+        Element.TORQUE_PATH: response(values, nothing),
+        Element.MOTOR: response(-values, nothing),
+        Element.SHAFT: response(-values, -values),
+        Element.LOAD: response(nothing, values),
+    }[element]
+    answer = pick(pool, element, law).answers[0]
+    assert np.max(np.abs(answer - expected)) < 2e-3 * np.ptp(expected)
+
+
+def test_a_delay_of_one_period_is_minus_one_of_the_difference(pool: list[Candidate]) -> None:
+    torque = drive_torque(1)
+    late = np.concatenate([[torque[0]], torque[:-1]])
+    expected = response(late - torque, np.zeros_like(torque))
+    answer = pick(pool, Element.TORQUE_PATH, "dT/dt").answers[0]
+    assert np.max(np.abs(-answer - expected)) < 1e-3 * np.ptp(expected)
+
+
+def test_the_answer_to_an_error_of_the_reading_is_the_error(pool: list[Candidate]) -> None:
+    states = exact_states(TWO_MASS, drive_torque(1), START)
+    expected = states[:, SPEED] * np.sin(states[:, ANGLE])
+    answer = pick(pool, Element.SPEED_SENSOR, "sin(angle)").answers[0]
+    np.testing.assert_allclose(answer, expected, atol=2e-3 * np.ptp(expected))
+
+
+def test_load_steps_are_on_a_grid_each_in_one_recording(result: FitResult, pool: list[Candidate]) -> None:
+    steps = [c for c in pool if c.law.startswith("load step")]
+    per_recording = int(14.99 / LOAD_STEP_EVERY_S) - 1
+    assert len(steps) == 2 * per_recording
+    assert len({c.law for c in steps}) == len(steps)
+    in_second = [c for c in steps if c.law.endswith("in run_2")]
+    assert len(in_second) == per_recording
+    for i, candidate in enumerate(in_second, start=1):
+        assert candidate.element is Element.LOAD
+        moment = round(i * LOAD_STEP_EVERY_S / 0.01)
+        assert not candidate.answers[0].any()
+        assert not candidate.answers[1][: moment + 1].any()
+        load = np.where(np.arange(1500) >= moment, 1.0, 0.0)
+        expected = response(np.zeros(1500), load)
+        assert np.max(np.abs(candidate.answers[1] - expected)) < 5e-3 * np.ptp(expected)
+
+
+def test_every_input_but_the_last_may_count_more_than_its_reading() -> None:
+    shares = np.column_stack([0.3 * drive_torque(1), 0.7 * drive_torque(1) + 20.0, np.full(1500, -20.0)])
+    rec = replace(linear_record(TWO_MASS, drive_torque(1), START), torque_nm=shares)
+    pool = candidates(fit(make_problem(model(TWO_MASS), [rec], ())))
+    assert [c.law for c in pool if c.law.endswith("alone")] == ["T_1 alone", "T_2 alone"]
+    expected = response(shares[:, 1], np.zeros(1500))
+    answer = pick(pool, Element.TORQUE_PATH, "T_2 alone").answers[0]
+    assert np.max(np.abs(answer - expected)) < 1e-3 * np.ptp(expected)
+
+
+def test_one_mass_has_no_shaft_and_its_load_acts_at_the_motor() -> None:
+    rec = linear_record(ONE_MASS, random_steps(600, seed=3), REST)
+    pool = candidates(fit(make_problem(model(ONE_MASS), [rec], ())))
+    assert {c.element for c in pool} == {Element.TORQUE_PATH, Element.MOTOR, Element.SPEED_SENSOR}
+    assert {c.element for c in pool if c.law.startswith("load step")} == {Element.MOTOR}
+
+
+def test_a_position_has_no_error_of_the_speed_reading() -> None:
+    rec = linear_record(TWO_MASS, random_steps(600, seed=3), START, kind=OutputKind.POSITION)
+    pool = candidates(fit(make_problem(model(TWO_MASS), [rec], ())))
+    assert Element.SPEED_SENSOR not in {c.element for c in pool}
+    assert pool
+
+
+def test_a_law_that_is_zero_throughout_has_no_answer() -> None:
+    """The line stands still but for the noise of nothing: no speed, no friction."""
+    rec = linear_record(TWO_MASS, np.zeros(400), REST)
+    pool = candidates(fit(make_problem(model(TWO_MASS), [rec], ())))
+    assert not pick(pool, Element.TORQUE_PATH, "T |T|").answers[0].any()
+
+
+def test_a_profile_of_the_fit_goes_on_in_the_answers() -> None:
+    records = quiet()
+    line = model(TWO_MASS)
+    hill = [
+        linear_record(TWO_MASS, r.total_torque_nm, START, extra_load_nm=40.0 * np.sin(0.4 * r.time_s), name=r.name)
+        for r in records
+    ]
+    followed = fit(make_problem(line, hill, (), profile=True))
+    assert followed.rms < 0.02 * nominal_fit(hill).rms
+    moved = motion_of(followed, 0)
+    assert np.max(np.abs(moved.speed - hill[0].output)) < 0.01 * np.ptp(hill[0].output)
+    step = pick(candidates(followed), Element.LOAD, "load step at 5.0 s in run_1")
+    expected = response(np.zeros(1500), np.where(np.arange(1500) >= 500, 1.0, 0.0))
+    assert np.max(np.abs(step.answers[0] - expected)) < 1e-2 * np.ptp(expected)

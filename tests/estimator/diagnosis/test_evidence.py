@@ -1,0 +1,114 @@
+"""BIC and F test by hand, and their false alarms on regressions in which nothing is missing."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from estimator.diagnosis.evidence import SMALLEST_P, VERY_STRONG, Gain, gain, gain_from_squares, residuals_by_record
+from estimator.diagnosis.noise import effective_samples
+from tests.estimator.diagnosis.regression import autoregressive, regression
+
+
+def white(samples: int, seed: int) -> np.ndarray:
+    return np.random.default_rng(seed).standard_normal(samples)
+
+
+def test_bic_and_f_test_by_hand() -> None:
+    errors = [white(400, 1)]
+    n = effective_samples(errors)
+    found = gain_from_squares(500.0, 400.0, added=2, unknowns=5, errors=errors)
+    assert found.n_effective == n
+    assert found.delta_bic == pytest.approx(n * math.log(1.25) - 2 * math.log(n))
+    assert found.p_value == pytest.approx(stats.f.sf(0.25 * (n - 5) / 2, 2, n - 5))
+
+
+def test_correlated_errors_weigh_as_many_as_they_are_worth() -> None:
+    errors = [autoregressive(0.9, 4000, np.random.default_rng(2))]
+    found = gain_from_squares(500.0, 400.0, added=1, unknowns=5, errors=errors)
+    assert found.n_effective == effective_samples(errors)
+    assert found.n_effective < 800.0
+    assert found.delta_bic == pytest.approx(found.n_effective * math.log(1.25) - math.log(found.n_effective))
+
+
+@pytest.mark.parametrize("before", [400.0, 399.0])
+def test_no_gain_costs_the_parameters_and_may_be_chance(before: float) -> None:
+    errors = [white(400, 3)]
+    n = effective_samples(errors)
+    assert gain_from_squares(before, 400.0, 3, 7, errors) == Gain(-3 * math.log(n), 1.0, n)
+
+
+def test_an_overwhelming_gain_keeps_a_finite_p_value() -> None:
+    found = gain_from_squares(1e12, 1e-3, 1, 3, [white(2000, 4)])
+    assert found.p_value == SMALLEST_P
+    assert math.isfinite(found.delta_bic)
+
+
+def test_so_few_effective_samples_as_unknowns_still_leave_two_degrees_of_freedom() -> None:
+    drift = [np.linspace(-1.0, 1.0, 100)]
+    found = gain_from_squares(2.0, 1.0, 1, 50, drift)
+    assert found.n_effective == 52.0
+    assert found.p_value == pytest.approx(stats.f.sf(2.0, 1, 2.0))
+
+
+def test_a_fit_is_compared_by_its_residuals() -> None:
+    x, y = white(300, 5), white(300, 6)
+    design = np.column_stack([np.ones(300), x])
+    smaller, larger = regression([design[:, :1]], [y + 0.5 * x]), regression([design], [y + 0.5 * x])
+    before, after = float(smaller.residual @ smaller.residual), float(larger.residual @ larger.residual)
+    assert gain(smaller, larger) == gain_from_squares(before, after, 1, 2, [larger.residual])
+    assert gain(smaller, larger).delta_bic > VERY_STRONG
+
+
+def test_residuals_are_split_by_recording() -> None:
+    designs, outputs = [np.ones((30, 1)), np.ones((50, 1))], [white(30, 7), white(50, 8)]
+    result = regression(designs, outputs)
+    parts = residuals_by_record(result)
+    assert [part.size for part in parts] == [30, 50]
+    np.testing.assert_array_equal(np.concatenate(parts), result.residual)
+
+
+class TestFalseAlarms:
+    """A regressor that has nothing to do with the output, added to a constant."""
+
+    REPETITIONS = 400
+
+    def p_values(self, correlation: float) -> np.ndarray:
+        found = []
+        for seed in range(self.REPETITIONS):
+            rng = np.random.default_rng(seed)
+            y, x = (autoregressive(correlation, 600, rng) for _ in range(2))
+            design = np.column_stack([np.ones(600), x])
+            found.append(gain(regression([design[:, :1]], [y]), regression([design], [y])).p_value)
+        return np.array(found)
+
+    @staticmethod
+    def most(share: float, repetitions: int) -> int:
+        """Most alarms to be expected of a test of this level, with 99.9 %."""
+        return int(stats.binom.ppf(0.999, repetitions, share))
+
+    @pytest.mark.parametrize("correlation", [0.0, 0.5, 0.9])
+    @pytest.mark.parametrize("level", [0.05, 0.01])
+    def test_are_no_more_than_the_level(self, correlation: float, level: float) -> None:
+        alarms = int(np.sum(self.p_values(correlation) < level))
+        assert alarms <= self.most(level, self.REPETITIONS)
+
+    def test_without_the_correlation_taken_into_account_they_would_be_many(self) -> None:
+        """The test above can fail: with every sample counted as independent it does."""
+        found = []
+        for seed in range(self.REPETITIONS):
+            rng = np.random.default_rng(seed)
+            y, x = (autoregressive(0.9, 600, rng) for _ in range(2))
+            found.append(stats.pearsonr(x, y).pvalue)
+        assert np.sum(np.array(found) < 0.05) > 3 * self.most(0.05, self.REPETITIONS)
+
+    def test_a_very_strong_difference_is_rare(self) -> None:
+        """ΔBIC > 10 for one parameter and n samples is a likelihood ratio above 10 + ln n: p < 1e-4 at n = 600."""
+        for seed in range(self.REPETITIONS):
+            rng = np.random.default_rng(seed)
+            design = np.column_stack([np.ones(600), rng.standard_normal(600)])
+            y = rng.standard_normal(600)
+            assert gain(regression([design[:, :1]], [y]), regression([design], [y])).delta_bic < VERY_STRONG

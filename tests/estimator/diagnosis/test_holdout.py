@@ -1,0 +1,135 @@
+"""Hold-out: an effect that is there shows on unseen samples, one that is not does not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimator.diagnosis.holdout import BLOCK_S, EVERY_S, Examiner, blocks, foreign_outputs, split
+from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects, everything
+from estimator.physics.effects.road_grade import KNOT_SPACING_S
+from estimator.physics.fit import FitResult
+from estimator.physics.simulate import Start
+from estimator.signals.record import Record
+from tests.estimator.diagnosis.planted import SIGMA, drive_torque, quiet, rubbing
+from tests.estimator.physics.bench import ONE_MASS, linear_record, model, random_steps, record
+
+COULOMB: Effects = frozenset({"coulomb_friction_motor"})
+ROAD: Effects = frozenset({"road_grade"})
+LINE = model(ONE_MASS)
+SAMPLES = 1200
+
+
+def with_friction(seeds: tuple[int, ...] = (1, 2)) -> list[Record]:
+    return rubbing(lambda speed: 12.0, seeds, SAMPLES)
+
+
+def hilly(seeds: tuple[int, ...] = (1, 2)) -> list[Record]:
+    found = []
+    for seed in seeds:
+        torque = drive_torque(seed, SAMPLES)
+        hill = 30.0 * np.sin(2 * np.pi * np.arange(SAMPLES) * 0.01 / 11.0)
+        start = Start(5.0, 0.0, 2.0)
+        found.append(
+            linear_record(ONE_MASS, torque, start, sigma=SIGMA, seed=seed, name=f"run_{seed}", extra_load_nm=hill)
+        )
+    return found
+
+
+def fits(records: list[Record], effects: Effects) -> tuple[FitResult, FitResult]:
+    bench = Bench(LINE, records, everything(records))
+    return bench.fit(NOTHING), bench.fit(effects, bench.fit(NOTHING))
+
+
+class TestSplit:
+    def test_the_last_part_is_a_recording_of_its_own(self) -> None:
+        rec = record(random_steps(1000, 1), np.arange(1000.0))
+        first, last = split(rec)
+        assert (first.output.size, last.output.size) == (700, 300)
+        np.testing.assert_array_equal(np.concatenate([first.output, last.output]), rec.output)
+        assert last.time_s[0] == rec.time_s[700]
+        assert (last.name, last.kind, last.sample_time_s) == (rec.name, rec.kind, rec.sample_time_s)
+
+    def test_it_is_cut_by_its_good_samples(self) -> None:
+        """A reading that dies in the last third still leaves something to judge on."""
+        okay = np.arange(1000) < 500
+        first, last = split(record(random_steps(1000, 1), np.arange(1000.0), okay=okay))
+        assert (int(first.okay.sum()), int(last.okay.sum())) == (350, 150)
+
+    def test_blocks_are_kept_out_all_along_and_not_at_the_ends(self) -> None:
+        out = blocks(record(np.zeros(2000), np.zeros(2000)))
+        assert out.mean() == pytest.approx(BLOCK_S / EVERY_S, abs=0.01)
+        assert not out[:50].any()
+        assert not out[-50:].any()
+        assert BLOCK_S < KNOT_SPACING_S  # so that the profile on both sides can predict it
+
+
+class TestWithoutHoldOutRecordings:
+    def test_an_effect_that_is_there_shows_on_the_last_part(self) -> None:
+        records = with_friction()
+        before, after = fits(records, COULOMB)
+        held = Examiner(LINE, records, ()).compare(before, NOTHING, after, COULOMB)
+        assert held.before > 2.0 * SIGMA
+        assert held.after == pytest.approx(SIGMA, rel=0.15)
+
+    def test_an_effect_that_is_not_there_shows_nothing(self) -> None:
+        records = quiet(values=ONE_MASS, samples=SAMPLES)
+        before, after = fits(records, COULOMB)
+        held = Examiner(LINE, records, ()).compare(before, NOTHING, after, COULOMB)
+        assert held.after == pytest.approx(held.before, rel=0.03)
+
+    def test_the_fit_has_not_seen_the_last_part(self) -> None:
+        """Noise put on the last part alone raises both errors there and does not change what was fitted."""
+        records = with_friction()
+        noise = np.where(np.arange(SAMPLES) >= 840, 0.5 * np.random.default_rng(3).standard_normal(SAMPLES), 0.0)
+        spoilt = [replace(rec, output=rec.output + noise) for rec in records]
+        examiner = Examiner(LINE, spoilt, ())
+        held = examiner.compare(*_interleaved(fits(records, COULOMB)))
+        assert held.after == pytest.approx(np.hypot(0.5, SIGMA), rel=0.1)
+
+    def test_a_road_is_judged_on_blocks_that_its_neighbours_predict(self) -> None:
+        records = hilly()
+        before, after = fits(records, ROAD)
+        held = Examiner(LINE, records, ()).compare(before, NOTHING, after, ROAD)
+        assert held.before > 5.0 * SIGMA
+        assert held.after < 1.5 * SIGMA
+
+
+class TestWithHoldOutRecordings:
+    def test_an_effect_that_is_there_shows_on_them(self) -> None:
+        records = with_friction()
+        before, after = fits(records, COULOMB)
+        held = Examiner(LINE, records, with_friction((7,))).compare(before, NOTHING, after, COULOMB)
+        assert held.before > 2.0 * SIGMA
+        assert held.after == pytest.approx(SIGMA, rel=0.25)  # a little of the fit's own error comes along
+
+    def test_an_effect_that_they_do_not_have_hurts(self) -> None:
+        records = with_friction()
+        before, after = fits(records, COULOMB)
+        smooth = quiet((7,), ONE_MASS, SAMPLES)
+        held = Examiner(LINE, records, smooth).compare(before, NOTHING, after, COULOMB)
+        assert held.after > 2.0 * SIGMA
+
+    def test_a_road_of_their_own_is_predicted_in_blocks(self) -> None:
+        records = hilly()
+        before, after = fits(records, ROAD)
+        held = Examiner(LINE, records, hilly((9,))).compare(before, NOTHING, after, ROAD)
+        assert held.before > 5.0 * SIGMA
+        assert held.after < 1.5 * SIGMA
+
+
+def _interleaved(pair: tuple[FitResult, FitResult]) -> tuple[FitResult, Effects, FitResult, Effects]:
+    return pair[0], NOTHING, pair[1], COULOMB
+
+
+def test_foreign_recordings_get_their_own_load_and_start_and_nothing_else() -> None:
+    records = with_friction()
+    _, fitted = fits(records, COULOMB)
+    torque = drive_torque(11, SAMPLES)
+    elsewhere = linear_record(ONE_MASS, torque, Start(8.0, 0.0, -4.0), sigma=SIGMA, name="elsewhere")
+    (output,) = foreign_outputs(fitted, LINE, [elsewhere], [elsewhere.okay], profile=False)
+    (again,) = foreign_outputs(fitted, model(ONE_MASS, 0.9), [elsewhere], [elsewhere.okay], profile=False)
+    np.testing.assert_array_equal(output, again)
+    assert np.std(output - elsewhere.output) > 2.0 * SIGMA  # it has no friction, the fit has

@@ -1,0 +1,104 @@
+"""Coverage of the 95 % intervals, on white errors and on correlated ones."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from estimator.diagnosis.intervals import Z95, covariance, interval
+from tests.estimator.diagnosis.regression import autoregressive, regression
+
+REPETITIONS, SAMPLES = 200, 2000
+TRUE = np.array([1.0, 2.0, 3.0])
+
+
+def coverage(correlation: float) -> np.ndarray:
+    """Share of intervals that hold the truth: of a mean, of a regressor correlated like the error, of a white one."""
+    hits = np.zeros(3)
+    for seed in range(REPETITIONS):
+        rng = np.random.default_rng(seed)
+        regressors = [np.ones(SAMPLES), autoregressive(correlation, SAMPLES, rng), rng.standard_normal(SAMPLES)]
+        design = np.column_stack(regressors)
+        output = design @ TRUE + autoregressive(correlation, SAMPLES, rng)
+        half = SAMPLES // 2
+        result = regression([design[:half], design[half:]], [output[:half], output[half:]])
+        cov = covariance(result)
+        for i, true in enumerate(TRUE):
+            low, high = interval(result, cov, i)
+            hits[i] += low <= true <= high
+    return hits / REPETITIONS
+
+
+def least(share: float) -> float:
+    """Lowest share to be expected in the repetitions, with 99.9 %."""
+    return float(stats.binom.ppf(0.001, REPETITIONS, share)) / REPETITIONS
+
+
+def bartlett(correlation: float, window: int) -> float:
+    """Share of a first-order series' long-run variance that a Bartlett window sees."""
+    lags = np.arange(1, window)
+    seen = 1.0 + 2.0 * np.sum((1.0 - lags / window) * correlation**lags)
+    return float(seen * (1.0 - correlation) / (1.0 + correlation))
+
+
+def test_white_errors_are_covered_at_the_level() -> None:
+    for share in coverage(0.0):
+        assert least(0.95) <= share <= 0.995
+
+
+@pytest.mark.parametrize("correlation", [0.8, 0.9])
+def test_correlated_errors_are_covered_as_well_as_the_window_sees_them(correlation: float) -> None:
+    mean, alike, white = coverage(correlation)
+    window = int(4.0 * (1 + correlation**2) / (1 - correlation**2))
+    expected = 2.0 * stats.norm.cdf(Z95 * np.sqrt(bartlett(correlation, window))) - 1.0
+    assert expected > 0.9
+    assert mean >= least(expected)
+    assert alike >= least(expected)
+    assert white >= least(0.95)
+
+
+def test_taken_for_white_the_same_errors_would_be_covered_half_the_time() -> None:
+    """The variance of a mean of AR(0.9) errors is (1 + a) / (1 - a) = 19 times that of white ones."""
+    naive = 2.0 * stats.norm.cdf(Z95 / np.sqrt(19.0)) - 1.0
+    assert coverage(0.9)[0] > naive + 0.4
+
+
+def test_the_covariance_of_white_errors_is_the_textbooks() -> None:
+    rng = np.random.default_rng(1)
+    design = rng.standard_normal((50_000, 3)) * [1.0, 3.0, 0.2]
+    result = regression([design], [design @ TRUE + 0.5 * rng.standard_normal(50_000)])
+    expected = 0.25 * np.linalg.inv(design.T @ design)
+    np.testing.assert_allclose(np.diag(covariance(result)), np.diag(expected), rtol=0.06)
+
+
+def test_the_interval_is_in_the_parameters_unit() -> None:
+    rng = np.random.default_rng(2)
+    design, noise = rng.standard_normal((400, 1)), rng.standard_normal(400)
+    plain, large = (regression([design], [design[:, 0] + noise], scale=scale) for scale in (1.0, 50.0))
+    low, high = interval(plain, covariance(plain), 0)
+    assert low < 1.0 < high
+    assert interval(large, covariance(large), 0) == pytest.approx((50.0 * low, 50.0 * high))
+    assert 0.5 * (high - low) == pytest.approx(Z95 * np.sqrt(covariance(plain)[0, 0]))
+
+
+def test_an_unknown_at_its_bound_is_held_there() -> None:
+    rng = np.random.default_rng(3)
+    design = rng.standard_normal((400, 2))
+    result = regression([design], [design @ [0.2, 4.0] + rng.standard_normal(400)], bound=1.0)
+    cov = covariance(result)
+    assert result.x[1] == 1.0
+    np.testing.assert_array_equal(cov[1], [0.0, 0.0])
+    assert interval(result, cov, 1) == (1.0, 1.0)
+    assert cov[0, 0] > 0.0
+
+
+def test_recordings_are_not_correlated_across_their_ends() -> None:
+    """Cut in two where the errors jump together, the cross products over the cut fall away."""
+    rng = np.random.default_rng(4)
+    design, output = np.ones((600, 1)), autoregressive(0.9, 600, rng)
+    whole = covariance(regression([design], [output]))[0, 0]
+    halves = covariance(regression([design[:300], design[300:]], [output[:300], output[300:]]))[0, 0]
+    swapped = covariance(regression([design[300:], design[:300]], [output[300:], output[:300]]))[0, 0]
+    assert halves == pytest.approx(swapped)
+    assert halves != pytest.approx(whole)

@@ -1,0 +1,134 @@
+"""A mismatch planted at a known time, in a known band, in a known operating region is found there."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimator.diagnosis.locate import WINDOW_S, band_hz, intervals, region
+from estimator.physics.effect import Element
+from estimator.physics.fit import FitResult, fit, make_problem
+from estimator.physics.simulate import Start
+from estimator.signals.record import FloatArray, Record
+from tests.estimator.physics.bench import ONE_MASS, SPEED, TWIST, TWO_MASS, exact_states, linear_record, model, record
+
+SIGMA = 0.02
+TIME_S = np.arange(2000) * 0.01
+SWELL = 120.0 * np.sin(2 * np.pi * TIME_S / 10.0)
+START = Start(0.0, 0.0, -6.0, 0.0, -6.0)
+
+
+def drive(error: FloatArray, name: str = "run_1", seed: int = 1) -> Record:
+    """A slow swell through both signs of torque and speed, noise, and an error of the reading."""
+    rec = linear_record(TWO_MASS, SWELL, START, sigma=SIGMA, seed=seed, name=name)
+    return replace(rec, output=rec.output + error)
+
+
+def fitted(*records: Record) -> FitResult:
+    return fit(make_problem(model(TWO_MASS), records, ()))
+
+
+def burst(low_s: float, high_s: float, hz: float = 8.0, size: float = 0.3) -> FloatArray:
+    inside = (TIME_S >= low_s) & (TIME_S <= high_s)
+    return np.where(inside, size * np.sin(2 * np.pi * hz * TIME_S), 0.0)
+
+
+class TestTime:
+    def test_a_burst_is_found_when_it_was(self) -> None:
+        found = intervals(fitted(drive(burst(5.0, 8.0)), drive(np.zeros(2000), "run_2", 2)), SIGMA)
+        assert list(found) == ["run_1"]
+        ((low, high),) = found["run_1"]
+        assert low == pytest.approx(5.0, abs=WINDOW_S)
+        assert high == pytest.approx(8.0, abs=WINDOW_S)
+
+    def test_two_bursts_are_two_intervals_and_close_ones_are_one(self) -> None:
+        apart = intervals(fitted(drive(burst(3.0, 5.0) + burst(9.0, 12.0))), SIGMA)["run_1"]
+        close = intervals(fitted(drive(burst(3.0, 5.0) + burst(5.8, 8.0))), SIGMA)["run_1"]
+        assert [round(low) for low, _ in apart] == [3, 9]
+        assert len(close) == 1
+
+    def test_noise_is_no_mismatch(self) -> None:
+        assert intervals(fitted(drive(np.zeros(2000))), SIGMA) == {}
+
+    def test_masked_samples_hold_none(self) -> None:
+        rec = drive(burst(5.0, 8.0))
+        okay = (TIME_S < 4.9) | (TIME_S > 8.1)
+        assert intervals(fitted(replace(rec, okay=okay)), SIGMA) == {}
+
+    def test_a_mismatch_to_the_end_ends_with_the_recording(self) -> None:
+        ((_, high),) = intervals(fitted(drive(burst(15.0, 99.0))), SIGMA)["run_1"]
+        assert high == TIME_S[-1]
+
+    def test_a_recording_shorter_than_the_window_is_one_window(self) -> None:
+        """At 1 ms the shortest recording that is accepted, 200 samples, is shorter than the window of 0.5 s."""
+        n = 250
+        time_s = np.arange(n) * 1e-3
+        wave = np.sin(2 * np.pi * 40.0 * time_s)
+        rec = record(SWELL[:n], 5.0 + wave, sample_time_s=1e-3)
+        found = intervals(fit(make_problem(model(ONE_MASS), [rec], ())), SIGMA)
+        assert found == {"run": ((0.0, time_s[-1]),)}
+
+
+class TestBand:
+    @pytest.mark.parametrize("hz", [3.0, 8.0, 20.0])
+    def test_the_band_holds_the_frequency_and_little_else(self, hz: float) -> None:
+        band = band_hz(fitted(drive(burst(0.0, 20.0, hz))), SIGMA)
+        assert band is not None
+        assert band[0] <= hz <= band[1]
+        assert band[1] - band[0] < 1.0
+
+    def test_two_tones_span_a_band(self) -> None:
+        band = band_hz(fitted(drive(burst(0.0, 20.0, 5.0) + burst(0.0, 20.0, 15.0))), SIGMA)
+        assert band == pytest.approx((5.0, 15.0), abs=0.4)
+
+    def test_recordings_of_different_length_are_added_at_their_frequencies(self) -> None:
+        long = drive(burst(0.0, 20.0, 8.0))
+        short = replace(
+            long,
+            name="short",
+            time_s=TIME_S[:300],
+            torque_nm=long.torque_nm[:300],
+            output=long.output[:300],
+            okay=long.okay[:300],
+        )
+        for records in ((long, short), (short, long)):
+            band = band_hz(fitted(*records), SIGMA)
+            assert band == pytest.approx((8.0, 8.0), abs=0.7)
+
+    def test_without_power_above_the_floor_there_is_none(self) -> None:
+        assert band_hz(fitted(drive(np.zeros(2000))), 10 * SIGMA) is None
+
+
+class TestRegion:
+    def errors_where(self, signal: FloatArray, low: float, high: float) -> Record:
+        inside = (signal >= low) & (signal <= high)
+        return drive(np.where(inside, 0.3 * np.sin(2 * np.pi * 8.0 * TIME_S), 0.0))
+
+    @pytest.mark.parametrize(
+        ("element", "name", "share"),
+        [
+            (Element.SHAFT, "shaft torque", (0.5, 1.0)),
+            (Element.TORQUE_PATH, "torque", (-1.0, -0.5)),
+            (Element.MOTOR, "motor speed", (-1.0, -0.4)),
+            (Element.LOAD, "load speed", (0.3, 1.0)),
+            (Element.SPEED_SENSOR, "motor speed", (0.3, 1.0)),
+            (Element.ACQUISITION, "motor speed", (0.3, 1.0)),
+        ],
+    )
+    def test_it_is_the_range_of_the_elements_own_signal(
+        self, element: Element, name: str, share: tuple[float, float]
+    ) -> None:
+        states = exact_states(TWO_MASS, SWELL, START)
+        signal = {"shaft torque": TWO_MASS["k"] * states[:, TWIST], "torque": SWELL}.get(name, states[:, SPEED])
+        top = float(np.max(np.abs(signal)))
+        rec = self.errors_where(signal, share[0] * top, share[1] * top)
+        found = region(fitted(rec), element)
+        assert found.signal == name
+        assert share[0] * top - 0.15 * top <= found.low < found.high <= share[1] * top + 0.15 * top
+
+    def test_errors_everywhere_span_most_of_the_range(self) -> None:
+        found = region(fitted(drive(burst(0.0, 20.0))), Element.TORQUE_PATH)
+        assert found.low < -90.0
+        assert found.high > 90.0

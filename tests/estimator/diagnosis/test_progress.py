@@ -1,0 +1,56 @@
+"""Progress is told in rising shares, and raising from it cancels."""
+
+from __future__ import annotations
+
+import pytest
+
+from estimator.diagnosis import Verdict, diagnose
+from estimator.physics.catalogue import EFFECTS
+from tests.estimator.diagnosis.planted import quiet, rubbing
+from tests.estimator.physics.bench import ONE_MASS, model
+
+LINE = model(ONE_MASS)
+
+
+class Cancelled(Exception):
+    """The user has had enough."""
+
+
+@pytest.mark.parametrize("friction_nm", [0.0, 12.0])
+def test_shares_rise_from_none_to_all(friction_nm: float) -> None:
+    told: list[tuple[str, float]] = []
+    diagnose(rubbing(lambda speed: friction_nm), LINE, progress=lambda *what: told.append(what))
+    shares = [share for _, share in told]
+    assert shares == sorted(shares)
+    assert (shares[0], shares[-1]) == (0.0, 1.0)
+    assert told[0][0] == "fitting the nominal model"
+
+
+def test_every_effect_that_is_tested_is_named() -> None:
+    told: list[str] = []
+    diagnose(quiet(values=ONE_MASS, samples=1200), LINE, progress=lambda message, share: told.append(message))
+    titles = {EFFECTS[name].title for name in ("actuator_lag", "coulomb_friction_motor", "road_grade")}
+    assert {f"testing {title}" for title in titles} <= set(told)
+
+
+@pytest.mark.parametrize("after", [0.0, 0.2, 0.9, 1.0])
+def test_an_exception_from_it_cancels(after: float) -> None:
+    told: list[float] = []
+
+    def stop(message: str, share: float) -> None:
+        told.append(share)
+        if share >= after:
+            raise Cancelled
+
+    with pytest.raises(Cancelled):
+        diagnose(rubbing(lambda speed: 12.0), LINE, progress=stop)
+    assert [share for share in told if share >= after] == told[-1:]
+
+
+def test_without_anybody_listening_the_answer_is_the_same() -> None:
+    records = rubbing(lambda speed: 12.0)
+    heard = diagnose(records, LINE, progress=lambda message, share: None)
+    alone = diagnose(records, LINE)
+    assert alone.verdict is heard.verdict is Verdict.EXPLAINED
+    assert alone.statement == heard.statement
+    assert alone.fit == heard.fit

@@ -1,0 +1,244 @@
+"""The fit finds the truth of an independent linear simulation, and its machinery does what it says."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimator.physics import fit as module
+from estimator.physics.fit import (
+    BAD,
+    Problem,
+    best_fit,
+    bounds,
+    fit,
+    jacobian_at,
+    local_part,
+    make_problem,
+    outputs_at,
+    parameters,
+    residual_at,
+    start_of,
+    start_vector,
+)
+from estimator.physics.layout import flat, slot
+from estimator.physics.simulate import Start
+from estimator.physics.unknowns import Shared, effect_unknowns, nominal_unknowns
+from estimator.signals.record import Location, OutputKind, Record
+from tests.estimator.physics.bench import (
+    ONE_MASS,
+    TWO_MASS,
+    linear_record,
+    model,
+    random_steps,
+    scaled,
+)
+
+SIGMA = 0.05
+STARTS = {"first": Start(30.0, 0.0, 10.0, 0.01, 9.0), "second": Start(-20.0, 0.0, -4.0, -0.005, -4.0)}
+TRUE = scaled(TWO_MASS, J_M=1.08, J_L=0.93, k=1.07, c=0.9, b_M=1.1, b_L=0.95)
+
+
+def recordings(
+    values: Mapping[str, float] = TRUE, samples: int = 1200, **options: OutputKind | Location
+) -> list[Record]:
+    return [
+        linear_record(values, random_steps(samples, seed), start, sigma=SIGMA, seed=seed, name=name, **options)
+        for seed, (name, start) in enumerate(STARTS.items(), start=1)
+    ]
+
+
+def nominal_problem(records: list[Record], values: Mapping[str, float] = TWO_MASS) -> Problem:
+    line = model(values)
+    return make_problem(line, records, nominal_unknowns(line))
+
+
+class TestRecovery:
+    @pytest.mark.parametrize(
+        "options",
+        [{}, {"location": Location.LOAD}, {"kind": OutputKind.POSITION}],
+        ids=["speed", "load_speed", "position"],
+    )
+    def test_parameters_of_two_masses_within_four_standard_errors(
+        self, options: dict[str, OutputKind | Location]
+    ) -> None:
+        records = recordings(**options)
+        result = fit(nominal_problem(records))
+        assert result.converged
+        assert result.rms == pytest.approx(SIGMA, rel=0.04)  # 2400 samples: 1.4 % standard error
+        errors = SIGMA * np.sqrt(np.diag(np.linalg.inv(result.jacobian.T @ result.jacobian)))
+        for i, shared in enumerate(result.problem.shared):
+            assert abs(result.x[i] * shared.scale - TRUE[shared.name]) < 4.0 * errors[i] * shared.scale
+            assert result.value("", shared.name) == result.x[i] * shared.scale
+
+    def test_load_torque_and_initial_state_of_each_recording(self) -> None:
+        records = recordings()
+        result = fit(nominal_problem(records))
+        for i, true in enumerate(STARTS.values()):
+            found = start_of(result.problem, result.x, i)
+            assert found.load_torque_nm == pytest.approx(true.load_torque_nm, abs=1.0)
+            assert found.speed_rad_s == pytest.approx(true.speed_rad_s, abs=0.1)
+            assert found.load_speed_rad_s == pytest.approx(true.load_speed_rad_s, abs=0.2)
+            assert found.twist_rad == pytest.approx(true.twist_rad, abs=2e-3)
+
+    def test_one_mass_from_its_position(self) -> None:
+        true = scaled(ONE_MASS, J_M=0.9, b_M=1.15)
+        result = fit(nominal_problem(recordings(true, kind=OutputKind.POSITION), ONE_MASS))
+        assert result.value("", "J_M") == pytest.approx(true["J_M"], rel=0.01)
+        assert result.value("", "b_M") == pytest.approx(true["b_M"], rel=0.02)
+
+    def test_a_parameter_ends_at_the_edge_of_its_tolerance_and_is_told_pinned(self) -> None:
+        true = scaled(TWO_MASS, J_L=1.5)
+        result = fit(nominal_problem(recordings(true)))
+        names = [shared.name for shared in result.problem.shared]
+        assert result.value("", "J_L") == pytest.approx(1.2 * TWO_MASS["J_L"])
+        assert result.pinned[names.index("J_L")]
+        assert not result.pinned[names.index("k")]
+        assert not result.pinned[len(names) :].any()
+
+
+class TestJacobian:
+    def test_it_agrees_with_central_differences(self) -> None:
+        problem = nominal_problem(recordings(samples=300))
+        x = start_vector(problem) * 1.01
+        jacobian = jacobian_at(problem, x, outputs_at(problem, x))
+        step = 1e-4
+        for j, unit in enumerate(np.eye(x.size)):
+            ahead = residual_at(problem, outputs_at(problem, x + step * unit))
+            behind = residual_at(problem, outputs_at(problem, x - step * unit))
+            central = (ahead - behind) / (2 * step)
+            assert np.max(np.abs(jacobian[:, j] - central)) < 2e-3 * np.max(np.abs(central))
+
+    def test_at_the_upper_bound_the_difference_is_taken_inwards(self) -> None:
+        problem = nominal_problem(recordings(samples=300))
+        _, high = bounds(problem)
+        x = start_vector(problem)
+        at_bound = x.copy()
+        at_bound[0] = high[0]
+        inside = at_bound.copy()
+        inside[0] -= 1e-4
+        column, close = (jacobian_at(problem, at, outputs_at(problem, at))[:, 0] for at in (at_bound, inside))
+        np.testing.assert_allclose(column, close, atol=5e-3 * np.max(np.abs(column)))
+
+    def test_a_local_unknown_moves_its_own_recording_alone(self) -> None:
+        problem = nominal_problem(recordings(samples=300))
+        x = start_vector(problem)
+        jacobian = jacobian_at(problem, x, outputs_at(problem, x))
+        first, locals_each = len(problem.shared), 4
+        assert x.size == first + 2 * locals_each
+        assert not jacobian[300:, first : first + locals_each].any()
+        assert not jacobian[:300, first + locals_each :].any()
+        assert np.all(np.abs(jacobian[:300, first : first + locals_each]).max(axis=0) > 0)
+
+
+class TestMasks:
+    def test_what_a_masked_sample_holds_does_not_matter(self) -> None:
+        clean = recordings(samples=600)
+        rng = np.random.default_rng(3)
+        masked, spoilt = [], []
+        for rec in clean:
+            okay = rng.random(600) > 0.2
+            output = np.where(okay, rec.output, rng.choice([np.nan, 1e6, -3.0], size=600))
+            masked.append(replace(rec, okay=okay))
+            spoilt.append(replace(rec, okay=okay, output=output))
+        results = [fit(nominal_problem(records)) for records in (masked, spoilt)]
+        np.testing.assert_array_equal(results[0].x, results[1].x)
+        assert results[0].residual.size == sum(int(rec.okay.sum()) for rec in masked)
+
+    def test_a_fit_sees_only_the_samples_it_may_use(self) -> None:
+        records = recordings(samples=600)
+        line = model(TWO_MASS)
+        use = [np.arange(600) < 400 for _ in records]
+        changed = [
+            replace(rec, output=np.where(seen, rec.output, -rec.output)) for rec, seen in zip(records, use, strict=True)
+        ]
+        grid = nominal_problem(records).grid
+        problems = [make_problem(line, recs, nominal_unknowns(line), use=use, grid=grid) for recs in (records, changed)]
+        start = start_vector(problems[0])
+        np.testing.assert_array_equal(
+            fit(problems[0], start).residual, fit(replace(problems[1], local=problems[0].local), start).residual
+        )
+
+
+class TestStarts:
+    def test_the_vector_is_shared_then_each_recordings_own(self) -> None:
+        problem = nominal_problem(recordings(samples=300))
+        x = start_vector(problem)
+        np.testing.assert_array_equal(x[:6], np.ones(6))
+        np.testing.assert_array_equal(local_part(problem, x, 1), problem.local[1].guess)
+        np.testing.assert_array_equal(parameters(problem, x), flat(model(TWO_MASS)))
+        low, high = bounds(problem)
+        np.testing.assert_allclose(low[:6], 0.8)
+        np.testing.assert_allclose(high[:6], 1.2)
+        assert np.all(np.isinf(np.concatenate([low[6:], high[6:]])))
+
+    def test_of_several_starts_the_best_counts(self) -> None:
+        """Under a square wave of ten samples a delay of eight looks like two too early: small starts end at zero."""
+        torque = 100.0 * np.tile(np.repeat([1.0, -1.0], 5), 60)
+        late = np.concatenate([np.full(8, torque[0]), torque[:-8]])
+        rec = replace(linear_record(ONE_MASS, late, Start(0.0, 0.0, 0.0), sigma=0.01), torque_nm=torque[:, None])
+        line = model(ONE_MASS)
+        problems = [
+            make_problem(line, [rec], (*nominal_unknowns(line), *shared))
+            for shared in effect_unknowns("transport_delay", line, [rec])
+        ]
+        alone = [fit(problem).value("transport_delay", "delay_s") for problem in problems]
+        assert alone[0] == pytest.approx(0.0, abs=1e-9)
+        assert best_fit(problems).value("transport_delay", "delay_s") == pytest.approx(0.08, abs=1e-3)
+
+    def test_a_warm_start_begins_where_the_last_fit_ended(self) -> None:
+        records = recordings()
+        line = model(TWO_MASS)
+        warm = fit(nominal_problem(records))
+        delay = effect_unknowns("transport_delay", line, records)[0]
+        problem = make_problem(line, records, (*nominal_unknowns(line), *delay), profile=True)
+        x = module._warm_start(problem, warm)
+        p = parameters(problem, x)
+        for shared in warm.problem.shared:
+            assert p[shared.slot] == pytest.approx(warm.value("", shared.name))
+        assert p[slot("transport_delay", "delay_s")] == delay[0].start * delay[0].scale
+        for i in range(2):
+            assert start_of(problem, x, i) == start_of(warm.problem, warm.x, i)
+            assert not problem.local[i].extra_load(local_part(problem, x, i)).any()
+
+    def test_a_warm_start_from_other_recordings_keeps_values_not_scaled_unknowns(self) -> None:
+        """The scale of an effect's parameter is read off the recordings."""
+        line = model(TWO_MASS)
+        large = recordings()
+        small = [linear_record(TRUE, random_steps(400, 5, size_nm=10.0), STARTS["first"], sigma=SIGMA, name="small")]
+        shared = [(*nominal_unknowns(line), *effect_unknowns("backlash", line, recs)[1]) for recs in (large, small)]
+        assert shared[0][-1].scale == pytest.approx(10.0 * shared[1][-1].scale)
+        warm = fit(make_problem(line, large, shared[0]))
+        problem = make_problem(line, small, shared[1])
+        carried = parameters(problem, module._warm_start(problem, warm))
+        np.testing.assert_allclose(carried, warm.p)
+
+
+class TestRunaway:
+    """A stiffness that explodes with twist: the integration overflows."""
+
+    @staticmethod
+    def explosive(start: float) -> tuple[Shared, ...]:
+        return (Shared("stiffness_nonlinearity", "hardening_per_rad2", 1e9, 0.0, 1.0, start),)
+
+    def test_it_counts_as_very_wrong_but_finite(self) -> None:
+        records = recordings(samples=300)
+        problem = make_problem(model(TWO_MASS), records, self.explosive(1.0))
+        x = start_vector(problem)
+        outputs = outputs_at(problem, x)
+        assert all(np.isfinite(out).all() for out in outputs)
+        assert max(np.max(np.abs(out)) for out in outputs) == BAD * np.ptp(records[0].output)
+
+    def test_a_fit_keeps_away_from_it(self) -> None:
+        records = recordings(samples=300)
+        result = fit(make_problem(model(TRUE), records, self.explosive(1e-12)))
+        assert result.rms == pytest.approx(SIGMA, rel=0.1)
+
+    def test_a_fit_that_starts_there_ends_and_is_finite(self) -> None:
+        records = recordings(samples=300)
+        result = fit(make_problem(model(TRUE), records, self.explosive(1.0)))
+        assert np.isfinite(result.x).all()
+        assert np.isfinite(result.residual).all()

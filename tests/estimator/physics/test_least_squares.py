@@ -1,0 +1,180 @@
+"""The bounded least squares against scipy's on problems with a known difficulty."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+
+from estimator.physics.least_squares import CONVERGED, Solution, minimise
+from estimator.signals.record import FloatArray
+
+Function = Callable[[FloatArray], FloatArray]
+UNBOUNDED = np.full(3, np.inf)
+TIME = np.linspace(0.0, 4.0, 400)
+
+
+def decay(x: FloatArray) -> FloatArray:
+    return np.asarray(x[0] * np.exp(-x[1] * TIME) + x[2])
+
+
+def decay_jacobian(x: FloatArray) -> FloatArray:
+    fall = np.exp(-x[1] * TIME)
+    return np.column_stack([fall, -x[0] * TIME * fall, np.ones_like(TIME)])
+
+
+@pytest.fixture(scope="module")
+def measured() -> FloatArray:
+    return decay(np.array([3.0, 1.2, 0.5])) + 0.1 * np.random.default_rng(1).standard_normal(TIME.size)
+
+
+def both(
+    residual: Function, jacobian: Function, x0: FloatArray, low: FloatArray, high: FloatArray
+) -> tuple[Solution, FloatArray]:
+    """Solve by ours and by scipy's."""
+    theirs = least_squares(residual, x0, jacobian, bounds=(low, high), xtol=1e-12, ftol=1e-12, gtol=1e-12)
+    return minimise(residual, jacobian, x0, low, high), np.asarray(theirs.x)
+
+
+def likelihood_ratio(residual: Function, x: FloatArray, best: FloatArray) -> float:
+    """n (S - S_best) / S_best: how far from the optimum in the unit that ``CONVERGED`` is in."""
+    errors, least = residual(x), residual(best)
+    return float(errors.size * (errors @ errors - least @ least) / (least @ least))
+
+
+@pytest.mark.parametrize("x0", [(1.0, 0.3, 0.0), (10.0, 4.0, -2.0), (0.1, 0.01, 3.0)])
+def test_a_decay_is_fitted_as_scipy_does(measured: FloatArray, x0: tuple[float, ...]) -> None:
+    def residual(x: FloatArray) -> FloatArray:
+        return decay(x) - measured
+
+    low = np.array([-np.inf, -10.0, -np.inf])  # a faster growth overflows
+    ours, theirs = both(residual, decay_jacobian, np.array(x0), low, UNBOUNDED)
+    assert ours.converged
+    assert likelihood_ratio(residual, ours.x, theirs) < CONVERGED
+    np.testing.assert_array_equal(ours.residual, residual(ours.x))
+    np.testing.assert_array_equal(ours.jacobian, decay_jacobian(ours.x))
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "pressed"),
+    [
+        ((-np.inf, -np.inf, 0.8), (np.inf, np.inf, np.inf), 2),
+        ((-np.inf, -np.inf, -np.inf), (2.0, np.inf, np.inf), 0),
+        ((0.0, 2.0, 0.0), (10.0, 10.0, 10.0), 1),
+    ],
+)
+def test_an_active_bound_is_held_and_the_rest_solved(
+    measured: FloatArray, low: tuple[float, ...], high: tuple[float, ...], pressed: int
+) -> None:
+    def residual(x: FloatArray) -> FloatArray:
+        return decay(x) - measured
+
+    bounds = np.array(low), np.array(high)
+    ours, theirs = both(residual, decay_jacobian, np.clip([2.0, 3.0, 1.0], *bounds), *bounds)
+    assert ours.converged
+    assert ours.x[pressed] in (low[pressed], high[pressed])
+    np.testing.assert_allclose(ours.x, theirs, atol=5e-3)
+    assert likelihood_ratio(residual, ours.x, theirs) < CONVERGED
+
+
+def test_every_unknown_at_a_bound_that_it_presses_against_is_the_answer() -> None:
+    target = np.array([5.0, -5.0])
+    ours = minimise(lambda x: x - target, lambda x: np.eye(2), np.zeros(2), np.full(2, -1.0), np.full(2, 1.0))
+    np.testing.assert_array_equal(ours.x, [1.0, -1.0])
+    assert ours.converged
+
+
+def test_a_bound_is_left_again_when_the_optimum_lies_inside(measured: FloatArray) -> None:
+    low, high = np.array([0.0, 0.0, 0.0]), np.array([10.0, 10.0, 10.0])
+
+    def residual(x: FloatArray) -> FloatArray:
+        return decay(x) - measured
+
+    ours, theirs = both(residual, decay_jacobian, np.array([0.0, 10.0, 10.0]), low, high)
+    assert likelihood_ratio(residual, ours.x, theirs) < CONVERGED
+
+
+def test_a_start_outside_the_bounds_is_taken_inside() -> None:
+    ours = minimise(lambda x: x - 0.5, lambda x: np.eye(1), np.array([9.0]), np.zeros(1), np.ones(1))
+    assert ours.x == pytest.approx([0.5])
+
+
+def test_rosenbrocks_valley_is_followed_to_its_end() -> None:
+    """Zero residual at (1, 1); the classic start is (-1.2, 1)."""
+
+    def residual(x: FloatArray) -> FloatArray:
+        return np.array([10.0 * (x[1] - x[0] ** 2), 1.0 - x[0]])
+
+    def jacobian(x: FloatArray) -> FloatArray:
+        return np.array([[-20.0 * x[0], 10.0], [-1.0, 0.0]])
+
+    ours = minimise(residual, jacobian, np.array([-1.2, 1.0]), np.full(2, -5.0), np.full(2, 5.0))
+    np.testing.assert_allclose(ours.x, [1.0, 1.0], atol=1e-6)
+    assert ours.converged
+
+
+def test_badly_scaled_unknowns_do_not_matter(measured: FloatArray) -> None:
+    scale = np.array([1e-6, 1e3, 1.0])
+
+    def residual(x: FloatArray) -> FloatArray:
+        return decay(x * scale) - measured
+
+    ours, theirs = both(
+        residual, lambda x: decay_jacobian(x * scale) * scale, np.array([1.0, 0.3, 0.0]) / scale, -UNBOUNDED, UNBOUNDED
+    )
+    assert likelihood_ratio(residual, ours.x, theirs) < CONVERGED
+
+
+def test_an_unknown_without_any_influence_is_left_alone(measured: FloatArray) -> None:
+    def residual(x: FloatArray) -> FloatArray:
+        return decay(np.array([3.0, x[0], 0.5])) - measured
+
+    def jacobian(x: FloatArray) -> FloatArray:
+        return np.column_stack([decay_jacobian(np.array([3.0, x[0], 0.5]))[:, 1], np.zeros(TIME.size)])
+
+    ours = minimise(residual, jacobian, np.array([0.5, 7.0]), np.full(2, -np.inf), np.full(2, np.inf))
+    assert ours.converged
+    assert ours.x[0] == pytest.approx(1.2, abs=0.05)
+    assert ours.x[1] == pytest.approx(7.0, abs=1e-6)
+
+
+def test_a_step_over_a_cliff_is_shortened(measured: FloatArray) -> None:
+    """A free-run simulation that runs away is a cliff; the first full step from this start falls off it."""
+    fallen = []
+
+    def residual(x: FloatArray) -> FloatArray:
+        fallen.append(x[1] > 1.3)
+        return decay(x) - measured if x[1] <= 1.3 else np.full(TIME.size, 1e9)
+
+    ours = minimise(residual, decay_jacobian, np.array([1.0, 0.3, 0.0]), -UNBOUNDED, UNBOUNDED)
+    assert any(fallen)
+    np.testing.assert_allclose(ours.x, [3.0, 1.2, 0.5], atol=0.1)
+
+
+def test_running_out_of_iterations_is_told(measured: FloatArray) -> None:
+    ours = minimise(
+        lambda x: decay(x) - measured,
+        decay_jacobian,
+        np.array([10.0, 4.0, -2.0]),
+        -UNBOUNDED,
+        UNBOUNDED,
+        iterations=1,
+    )
+    assert not ours.converged
+    np.testing.assert_array_equal(ours.jacobian, decay_jacobian(ours.x))
+
+
+def test_a_start_at_the_optimum_costs_one_jacobian() -> None:
+    calls = []
+
+    def jacobian(x: FloatArray) -> FloatArray:
+        calls.append(x)
+        return np.ones((50, 1))
+
+    errors = np.random.default_rng(2).standard_normal(50)
+    mean = np.array([errors.mean()])
+    ours = minimise(lambda x: x[0] - errors, jacobian, mean, np.array([-9.0]), np.array([9.0]))
+    np.testing.assert_array_equal(ours.x, mean)
+    assert (len(calls), ours.converged) == (1, True)

@@ -1,0 +1,133 @@
+"""The model refuses what is missing, unknown or non-physical, every fault at once."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from estimator.errors import BadModel
+from estimator.physics.model import DrivelineModel, EffectValue, Motion, Parameter, Structure, parameter_unit, unit
+from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, model
+
+
+def one_mass(**parameters: Parameter) -> DrivelineModel:
+    nominal = {"J_M": Parameter(2.0, 0.1), "b_M": Parameter(0.5, 0.1)}
+    return DrivelineModel(Structure.ONE_MASS, nominal | parameters)
+
+
+def test_values_come_in_the_order_of_the_structure() -> None:
+    shuffled = dict(reversed(TWO_MASS.items()))
+    assert list(model(shuffled).values()) == ["J_M", "J_L", "k", "c", "b_M", "b_L"]
+    assert model(shuffled).values() == TWO_MASS
+
+
+def test_a_missing_parameter_is_named() -> None:
+    with pytest.raises(BadModel, match=r"^parameters.b_M: missing, one_mass needs J_M, b_M$"):
+        DrivelineModel(Structure.ONE_MASS, {"J_M": Parameter(2.0, 0.1)})
+
+
+def test_an_unknown_parameter_is_named() -> None:
+    with pytest.raises(BadModel, match=r"^parameters.k: unknown, one_mass has J_M, b_M$"):
+        one_mass(k=Parameter(4200.0, 0.1))
+
+
+@pytest.mark.parametrize("value", [0.0, -1.0, math.nan, math.inf])
+def test_an_inertia_must_be_positive(value: float) -> None:
+    with pytest.raises(BadModel, match=rf"parameters.J_M.value: expected a finite number greater than 0, came {value}"):
+        one_mass(J_M=Parameter(value, 0.1))
+
+
+@pytest.mark.parametrize("name", ["J_L", "k"])
+def test_so_must_load_inertia_and_stiffness(name: str) -> None:
+    with pytest.raises(BadModel, match=rf"parameters.{name}.value: expected a finite number greater than 0, came 0"):
+        model(TWO_MASS | {name: 0.0})
+
+
+@pytest.mark.parametrize("name", ["c", "b_M", "b_L"])
+def test_damping_may_be_zero_but_not_negative(name: str) -> None:
+    assert model(TWO_MASS | {name: 0.0}).values()[name] == 0.0
+    with pytest.raises(BadModel, match=rf"parameters.{name}.value: expected a finite number 0 or greater, came -0.1"):
+        model(TWO_MASS | {name: -0.1})
+
+
+@pytest.mark.parametrize("tolerance", [-0.1, 1.0, math.nan])
+def test_a_tolerance_is_a_share_below_one(tolerance: float) -> None:
+    with pytest.raises(BadModel, match=rf"parameters.J_M.tolerance: expected .* from 0 up to 1, came {tolerance}"):
+        one_mass(J_M=Parameter(2.0, tolerance))
+
+
+def test_every_fault_is_told_at_once() -> None:
+    with pytest.raises(BadModel) as refusal:
+        DrivelineModel(
+            Structure.ONE_MASS,
+            {"J_M": Parameter(-2.0, 3.0), "c": Parameter(1.0, 0.1)},
+            effects={"slipping_clutch": {}},
+        )
+    assert [line.split(":")[0] for line in str(refusal.value).splitlines()] == [
+        "parameters.b_M",
+        "parameters.c",
+        "parameters.J_M.value",
+        "parameters.J_M.tolerance",
+        "effects.slipping_clutch",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("effects", "message"),
+    [
+        ({"slipping_clutch": {}}, "effects.slipping_clutch: unknown effect, expected one of actuator_lag, "),
+        ({"transport_delay": {}}, "effects.transport_delay.delay_s: missing, expected delay_s"),
+        (
+            {"transport_delay": {"delay_s": 0.01, "tau": 1.0}},
+            "effects.transport_delay.tau: unknown parameter, expected delay_s",
+        ),
+        (
+            {"transport_delay": {"delay_s": math.nan}},
+            "transport_delay.delay_s.value: expected a finite number, came nan",
+        ),
+        ({"transport_delay": {"delay_s": -0.01}}, "delay_s.value: expected a number 0 or greater, came -0.01"),
+        (
+            {"backlash": {"gap_rad": -0.02}},
+            "effects.backlash.gap_rad.value: expected a number 0 or greater, came -0.02",
+        ),
+        (
+            {"stiffness_nonlinearity": {"hardening_per_rad2": 80.0, "shape": 0.0}},
+            "effects.stiffness_nonlinearity.shape.value: expected a number greater than 0, came 0.0",
+        ),
+    ],
+)
+def test_a_wrong_effect_is_refused(effects: dict[str, dict[str, float]], message: str) -> None:
+    with pytest.raises(BadModel, match=message):
+        model(TWO_MASS, effects=effects)
+
+
+def test_a_shaft_effect_makes_no_sense_without_a_shaft() -> None:
+    message = "effects.backlash: makes no sense in one_mass, expected two_mass"
+    with pytest.raises(BadModel, match=message):
+        model(ONE_MASS, effects={"backlash": {"gap_rad": 0.02, "contact_rad": 0.001}})
+
+
+def test_softening_is_a_negative_hardening_and_allowed() -> None:
+    line = model(TWO_MASS, effects={"stiffness_nonlinearity": {"hardening_per_rad2": -80.0, "shape": 0.5}})
+    assert line.effects["stiffness_nonlinearity"]["hardening_per_rad2"] == EffectValue(-80.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "rotation", "translation"),
+    [
+        ("J_M", "kg m^2", "kg"),
+        ("J_L", "kg m^2", "kg"),
+        ("k", "Nm/rad", "N/m"),
+        ("c", "Nm s/rad", "N s/m"),
+        ("b_M", "Nm s/rad", "N s/m"),
+        ("b_L", "Nm s/rad", "N s/m"),
+    ],
+)
+def test_units_of_the_contract(name: str, rotation: str, translation: str) -> None:
+    assert parameter_unit(name, Motion.ROTATION) == rotation
+    assert parameter_unit(name, Motion.TRANSLATION) == translation
+
+
+def test_a_unit_that_is_not_mechanical_is_its_own() -> None:
+    assert unit("s", Motion.TRANSLATION) == "s"

@@ -1,0 +1,81 @@
+"""What a recording says of the motion: speed from position, sizes, changes of sign."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from estimator.physics.motion import measured_speed, reverses, speed_scale, torque_reverses, torque_scale
+from estimator.signals.record import OutputKind
+from tests.estimator.physics.bench import record
+
+TIME_S = np.arange(500) * 0.01
+
+
+def test_a_measured_speed_is_passed_on_but_for_masked_samples() -> None:
+    okay = np.ones(500, dtype=bool)
+    okay[7:9] = False
+    speed = measured_speed(record(np.ones(500), TIME_S, okay=okay))
+    assert np.all(np.isnan(speed[7:9]))
+    np.testing.assert_array_equal(speed[okay], TIME_S[okay])
+
+
+@pytest.mark.parametrize("sample_time_s", [0.01, 0.001, 0.05])
+def test_the_speed_of_a_parabola_is_exact_inside(sample_time_s: float) -> None:
+    """A central difference is exact for a parabola, whatever its width."""
+    time_s = np.arange(500) * sample_time_s
+    rec = record(np.ones(500), 3.0 * time_s**2, kind=OutputKind.POSITION, sample_time_s=sample_time_s)
+    speed = measured_speed(rec)
+    inside = np.isfinite(speed)
+    half = max(1, round(0.01 / sample_time_s))
+    assert inside.sum() == 500 - 2 * half
+    np.testing.assert_allclose(speed[inside], 6.0 * time_s[inside], rtol=1e-9, atol=1e-9)
+
+
+def test_a_masked_position_leaves_no_speed_around_it() -> None:
+    okay = np.ones(500, dtype=bool)
+    okay[100] = False
+    speed = measured_speed(record(np.ones(500), TIME_S, kind=OutputKind.POSITION, okay=okay))
+    assert set(np.flatnonzero(np.isnan(speed))) == {0, 99, 101, 499}
+
+
+def test_scales_are_the_99th_percentile_of_the_largest_recording() -> None:
+    ramp = np.arange(1001) / 10.0
+    small, large = record(ramp, ramp, name="a"), record(np.column_stack([ramp, -3.0 * ramp]), -2.0 * ramp, name="b")
+    assert torque_scale([small, large]) == pytest.approx(198.0)
+    assert speed_scale([small, large]) == pytest.approx(198.0)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "expected"),
+    [(-5.0, 5.0, True), (0.0, 5.0, False), (-5.0, -0.1, False), (-0.04, 5.0, False), (-1.0, 5.0, True)],
+)
+def test_a_reversal_must_be_clear(low: float, high: float, expected: bool) -> None:
+    assert reverses(record(np.ones(500), np.linspace(low, high, 500))) is expected
+
+
+def test_a_few_samples_of_the_other_sign_are_no_reversal() -> None:
+    speed = np.full(500, 5.0)
+    speed[:9] = -5.0
+    assert not reverses(record(np.ones(500), speed))
+    speed[:10] = -5.0
+    assert reverses(record(np.ones(500), speed))
+
+
+def test_samples_that_do_not_count_are_no_reversal() -> None:
+    speed = np.full(500, 5.0)
+    speed[:50] = -5.0
+    assert not reverses(record(np.ones(500), speed, okay=speed > 0))
+
+
+@pytest.mark.parametrize(("low", "expected"), [(-100.0, True), (-9.0, False), (0.0, False), (-20.0, True)])
+def test_a_torque_reversal_must_be_a_tenth_of_the_torque(low: float, expected: bool) -> None:
+    assert torque_reverses(record(np.linspace(low, 100.0, 500))) is expected
+
+
+def test_a_short_pulse_is_measured_by_its_peak_and_rest_by_one() -> None:
+    torque = np.zeros(500)
+    assert torque_scale([record(torque)]) == 1.0
+    torque[100:103] = -400.0
+    assert torque_scale([record(torque)]) == 400.0
+    assert speed_scale([record(torque, torque)]) == 400.0

@@ -1,0 +1,94 @@
+"""The shaft's laws: stiffness at zero twist, hardening and softening, and what a gap does to them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from estimator.physics.effects.backlash import damping_share
+from estimator.physics.effects.stiffness_nonlinearity import factor
+from estimator.physics.kernel import shaft_torque
+from estimator.physics.laws import beyond_gap, smooth_sign
+from estimator.physics.layout import flat_values
+from estimator.signals.record import FloatArray
+from tests.estimator.physics.bench import TWO_MASS
+
+TWISTS = np.linspace(0.0, 0.2, 41)
+
+
+def torques(twists: FloatArray, hardening: float, shape: float) -> FloatArray:
+    p = flat_values(TWO_MASS, {"stiffness_nonlinearity": {"hardening_per_rad2": hardening, "shape": shape}})
+    return np.array([shaft_torque(twist, 0.0, p) for twist in twists])
+
+
+@pytest.mark.parametrize(("hardening", "shape"), [(80.0, 1.0), (80.0, 2.5), (-80.0, 0.5), (-80.0, 2.0)])
+def test_the_slope_at_zero_twist_is_the_stiffness(hardening: float, shape: float) -> None:
+    small = 1e-6
+    low, high = torques(np.array([-small, small]), hardening, shape)
+    assert (high - low) / (2 * small) == pytest.approx(TWO_MASS["k"], rel=1e-9)
+
+
+@pytest.mark.parametrize("shape", [0.5, 1.0, 3.0])
+def test_to_first_order_the_stiffness_changes_by_h_times_the_twist_squared(shape: float) -> None:
+    for sign in (1.0, -1.0):
+        assert (factor(1e-3, sign * 50.0, shape) - 1.0) / 1e-6 == pytest.approx(sign * 50.0, rel=1e-3)
+
+
+def test_hardening_of_shape_one_is_the_duffing_spring() -> None:
+    expected = TWO_MASS["k"] * TWISTS * (1.0 + 80.0 * TWISTS**2)
+    np.testing.assert_allclose(torques(TWISTS, 80.0, 1.0), expected, rtol=1e-12)
+
+
+def test_softening_of_shape_one_half_ends_in_a_constant_torque() -> None:
+    limit = TWO_MASS["k"] / np.sqrt(2.0 * 80.0)
+    carried = torques(np.array([0.1, 1.0, 100.0]), -80.0, 0.5)
+    assert np.all(np.diff(carried) > 0)
+    assert carried[-1] == pytest.approx(limit, rel=1e-4)
+    assert carried[-1] < limit
+
+
+@pytest.mark.parametrize("shape", [0.5, 1.0, 3.0])
+def test_hardening_carries_more_and_softening_less_than_the_straight_line(shape: float) -> None:
+    straight = TWO_MASS["k"] * TWISTS[1:]
+    hard, soft = torques(TWISTS[1:], 80.0, shape), torques(TWISTS[1:], -80.0, shape)
+    assert np.all(hard > straight)
+    assert np.all(np.diff(hard) > TWO_MASS["k"] * np.diff(TWISTS[1:]))
+    assert np.all(soft < straight)
+    assert np.all(soft > 0.0)
+
+
+def test_the_law_is_odd_in_the_twist() -> None:
+    np.testing.assert_array_equal(torques(-TWISTS, 80.0, 1.3), -torques(TWISTS, 80.0, 1.3))
+
+
+def test_inside_a_gap_neither_spring_nor_damper_acts() -> None:
+    p = flat_values(TWO_MASS, {"backlash": {"gap_rad": 0.04, "contact_rad": 1e-3}})
+    assert [shaft_torque(twist, 5.0, p) for twist in (-0.02, -0.01, 0.0, 0.02)] == [0.0] * 4
+
+
+def test_beyond_a_gap_the_spring_starts_at_its_edge() -> None:
+    p = flat_values(TWO_MASS, {"backlash": {"gap_rad": 0.04, "contact_rad": 1e-3}})
+    assert shaft_torque(0.05, 0.0, p) == pytest.approx(0.03 * TWO_MASS["k"])
+    assert shaft_torque(-0.05, 0.0, p) == pytest.approx(-0.03 * TWO_MASS["k"])
+
+
+def test_the_damper_engages_over_the_contact_depth() -> None:
+    p = flat_values(TWO_MASS, {"backlash": {"gap_rad": 0.04, "contact_rad": 2e-3}})
+    depth = 2e-3
+    damping = shaft_torque(0.02 + depth, 3.0, p) - shaft_torque(0.02 + depth, 0.0, p)
+    assert damping == pytest.approx(TWO_MASS["c"] * 3.0 * (1.0 - np.exp(-1.0)), rel=1e-9)
+
+
+@pytest.mark.parametrize(("twist", "share"), [(0.0, 0.0), (1e-9, 1.0), (-0.3, 1.0)])
+def test_without_a_contact_depth_the_damper_acts_at_first_touch(twist: float, share: float) -> None:
+    assert damping_share(twist, 0.0) == share
+
+
+@pytest.mark.parametrize(("twist", "beyond"), [(0.0, 0.0), (0.05, 0.0), (-0.05, 0.0), (0.08, 0.03), (-0.08, -0.03)])
+def test_what_lies_beyond_a_gap(twist: float, beyond: float) -> None:
+    assert beyond_gap(twist, 0.1) == pytest.approx(beyond, abs=1e-15)
+
+
+@pytest.mark.parametrize(("speed", "sign"), [(0.0, 0.0), (1.0, 1.0), (-1.0, -1.0), (0.02, np.tanh(1.0))])
+def test_the_rounded_sign(speed: float, sign: float) -> None:
+    assert smooth_sign(speed, 0.02) == pytest.approx(sign, abs=1e-12)

@@ -1,0 +1,112 @@
+"""Grid, outputs, and refusal of outputs that a structure does not have."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from estimator.errors import BadModel
+from estimator.physics import kernel
+from estimator.physics.layout import flat
+from estimator.physics.model import Structure
+from estimator.physics.simulate import (
+    SIGN_WIDTH,
+    Start,
+    grid_for,
+    natural_frequency_rad_s,
+    output_state,
+    simulate,
+    substeps_for,
+)
+from estimator.signals.record import Location, OutputKind
+from tests.estimator.physics.bench import ONE_MASS, SAMPLE_TIME_S, TWO_MASS, exact_states, model, random_steps, record
+
+
+def test_the_natural_frequency_is_that_of_two_free_masses() -> None:
+    values = {"J_M": 2.0, "J_L": 6.0, "k": 600.0, "c": 0.0, "b_M": 0.0, "b_L": 0.0}
+    assert natural_frequency_rad_s(values) == pytest.approx(20.0)  # sqrt(600 (1/2 + 1/6))
+    assert natural_frequency_rad_s(ONE_MASS) == 0.0
+
+
+def test_sub_steps_follow_the_natural_frequency() -> None:
+    values = {"J_M": 2.0, "J_L": 6.0, "k": 600.0, "c": 0.0, "b_M": 0.0, "b_L": 0.0}
+    assert substeps_for(values, 0.01) == 2  # 0.2 rad per period, 0.15 allowed
+    assert substeps_for(values, 0.001) == 1
+    assert substeps_for(ONE_MASS, 0.01) == 1
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        TWO_MASS | {"k": 100.0, "c": 700.0},  # c / J_M = 437 1/s: one step per period would be unstable
+        {"J_M": 0.01, "b_M": 4.0},
+    ],
+)
+def test_a_fast_decay_is_integrated_as_well_as_a_fast_oscillation(values: dict[str, float]) -> None:
+    torque = random_steps(200, seed=1)
+    start = Start(5.0, 0.0, 0.0)
+    line, rec = model(values), record(torque, np.ones(200))
+    speed = simulate(grid_for(line, [rec]), rec, flat(line), start)
+    exact = exact_states(values, torque, start)[:, 1]
+    assert np.max(np.abs(speed - exact)) < 1e-4 * np.ptp(exact)
+
+
+def test_dry_friction_changes_sign_within_a_share_of_the_top_speed_of_what_reverses() -> None:
+    slow = record(np.ones(401), np.linspace(-20.0, 20.0, 401), name="slow")
+    fast = record(np.ones(401), np.linspace(100.0, 200.0, 401), name="fast")
+    line = model(ONE_MASS)
+    assert grid_for(line, [slow, fast]).sign_width == pytest.approx(SIGN_WIDTH * 19.8)  # 99th percentile
+    assert grid_for(line, [fast]).sign_width == pytest.approx(SIGN_WIDTH * 199.0)
+
+
+@pytest.mark.parametrize(
+    ("kind", "location", "state"),
+    [
+        (OutputKind.SPEED, Location.MOTOR, kernel.SPEED),
+        (OutputKind.SPEED, Location.LOAD, kernel.LOAD_SPEED),
+        (OutputKind.POSITION, Location.MOTOR, kernel.ANGLE),
+    ],
+)
+def test_the_output_is_a_state(kind: OutputKind, location: Location, state: int) -> None:
+    assert output_state(record(np.ones(5), kind=kind, location=location), Structure.TWO_MASS) == state
+
+
+@pytest.mark.parametrize(
+    ("kind", "location", "structure"),
+    [
+        (OutputKind.SPEED, Location.LOAD, Structure.ONE_MASS),
+        (OutputKind.POSITION, Location.LOAD, Structure.TWO_MASS),
+        (OutputKind.FORCE, Location.MOTOR, Structure.TWO_MASS),
+    ],
+)
+def test_an_output_that_the_structure_lacks_is_refused(
+    kind: OutputKind, location: Location, structure: Structure
+) -> None:
+    rec = record(np.ones(5), name="bench_7", kind=kind, location=location)
+    message = f"bench_7: {kind.value} at the {location.value} is no output of {structure.value}. Expected speed"
+    with pytest.raises(BadModel, match=message):
+        output_state(rec, structure)
+
+
+def test_the_simulation_refuses_it_too() -> None:
+    rec = record(np.ones(5), np.arange(5.0), location=Location.LOAD)
+    line = model(ONE_MASS)
+    with pytest.raises(BadModel, match="speed at the load is no output of one_mass"):
+        simulate(grid_for(line, [rec]), rec, flat(line), Start(0.0, 0.0, 0.0))
+
+
+def test_inputs_are_summed_and_row_k_is_the_state_before_torque_k_acts() -> None:
+    torque = np.array([[3.0, 1.0], [0.0, 0.0], [0.0, 0.0]])
+    rec = record(torque, np.ones(3))
+    line = model({"J_M": 2.0, "b_M": 0.0})
+    speed = simulate(grid_for(line, [rec]), rec, flat(line), Start(0.0, 0.0, 1.0))
+    np.testing.assert_allclose(speed, [1.0, 1.0 + 2.0 * SAMPLE_TIME_S, 1.0 + 2.0 * SAMPLE_TIME_S])
+
+
+def test_the_record_and_the_parameters_are_left_alone() -> None:
+    rec = record(random_steps(50, seed=2), np.ones(50))
+    line = model(TWO_MASS)
+    p, torque = flat(line), rec.torque_nm.copy()
+    simulate(grid_for(line, [rec]), rec, p, Start(5.0, 0.0, 0.0), np.ones(50))
+    np.testing.assert_array_equal(p, flat(line))
+    np.testing.assert_array_equal(rec.torque_nm, torque)

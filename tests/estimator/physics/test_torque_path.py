@@ -1,0 +1,103 @@
+"""Delay and lag between torque reading and shaft, against closed formulas."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from estimator.physics import kernel
+from estimator.physics.effects.transport_delay import delayed_mean
+from estimator.physics.layout import flat
+from estimator.physics.simulate import Grid, Start, simulate
+from estimator.signals.record import FloatArray
+from tests.estimator.physics.bench import SAMPLE_TIME_S, model, random_steps, record
+
+REST = Start(0.0, 0.0, 0.0)
+INTEGRATOR = {"J_M": 2.0, "b_M": 0.0}
+
+
+def run(
+    effects: dict[str, dict[str, float]], torque: FloatArray, substeps: int, state: int = kernel.SPEED
+) -> FloatArray:
+    line = model(INTEGRATOR, effects=effects)
+    return simulate(Grid(line.structure, substeps, 1e-3), record(torque), flat(line), REST, output=state)
+
+
+def delayed(samples: float, torque: FloatArray, substeps: int = 4) -> FloatArray:
+    return run({"transport_delay": {"delay_s": samples * SAMPLE_TIME_S}}, torque, substeps)
+
+
+@pytest.mark.parametrize("samples", [1, 2, 5])
+def test_a_delay_of_whole_periods_is_the_shifted_torque(samples: int) -> None:
+    torque = random_steps(300, seed=1, hold=3)
+    shifted = np.concatenate([np.full(samples, torque[0]), torque[:-samples]])
+    np.testing.assert_array_equal(delayed(samples, torque), run({}, shifted, 4))
+
+
+@pytest.mark.parametrize("substeps", [1, 3, 4])
+@pytest.mark.parametrize("fraction", [0.25, 0.5, 0.9])
+def test_a_fractional_delay_of_an_integrator_lies_between_in_proportion(fraction: float, substeps: int) -> None:
+    torque = random_steps(300, seed=2, hold=3)
+    expected = (1.0 - fraction) * delayed(1, torque) + fraction * delayed(2, torque)
+    np.testing.assert_allclose(delayed(1 + fraction, torque, substeps), expected, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("start", "length", "mean"),
+    [
+        (0.0, 1.0, 1.0),
+        (0.25, 0.5, 1.0),
+        (0.5, 1.0, 1.5),  # half of 1 and half of 2
+        (1.75, 1.0, 3.5),  # a quarter of 2 and three quarters of 4
+        (1.9, 0.2, 3.0),
+        (-3.0, 1.0, 1.0),  # before the first sample it is held
+        (-0.5, 1.0, 1.0),
+        (2.5, 0.5, 4.0),
+    ],
+)
+def test_the_mean_of_a_held_torque(start: float, length: float, mean: float) -> None:
+    assert delayed_mean(np.array([1.0, 2.0, 4.0]), start, length) == pytest.approx(mean, rel=1e-12)
+
+
+def test_no_sub_step_reads_beyond_the_last_sample() -> None:
+    """The end of the last sub-step comes out one rounding error late for 11 sub-steps and 10 samples, for example."""
+    late = []
+    for samples in range(2, 40):
+        memory = np.full(samples + 1, np.nan)
+        memory[:samples] = 7.0
+        for substeps in range(1, 60):
+            start = samples - 1 + (substeps - 1) * (1.0 / substeps)
+            late.append(start + 1.0 / substeps > samples)
+            assert delayed_mean(memory[:samples], start, 1.0 / substeps) == 7.0
+    assert any(late)
+
+
+def test_a_lagged_step_is_the_exponential() -> None:
+    tau = 0.03
+    torque = np.concatenate([np.zeros(5), np.full(60, 40.0)])
+    lagged = run({"actuator_lag": {"time_constant_s": tau}}, torque, 3, kernel.LAGGED)
+    time_s = np.maximum(np.arange(65) - 5, 0) * SAMPLE_TIME_S
+    np.testing.assert_allclose(lagged, 40.0 * (1.0 - np.exp(-time_s / tau)), rtol=0, atol=1e-10)
+
+
+@pytest.mark.parametrize("tau", [1e-4, 0.03])
+def test_an_integrator_behind_a_lag_is_the_ramp_less_what_the_lag_holds_back(tau: float) -> None:
+    torque = np.concatenate([np.zeros(5), np.full(60, 40.0)])
+    speed = run({"actuator_lag": {"time_constant_s": tau}}, torque, 1)
+    time_s = np.maximum(np.arange(65) - 5, 0) * SAMPLE_TIME_S
+    expected = 40.0 / INTEGRATOR["J_M"] * (time_s - tau * (1.0 - np.exp(-time_s / tau)))
+    np.testing.assert_allclose(speed, expected, rtol=0, atol=1e-10)
+
+
+def test_a_lag_starts_settled_at_the_first_torque() -> None:
+    torque = np.full(50, 30.0)
+    speed = run({"actuator_lag": {"time_constant_s": 0.5}}, torque, 2)
+    np.testing.assert_allclose(speed, 15.0 * np.arange(50) * SAMPLE_TIME_S, rtol=1e-12)
+
+
+def test_delay_and_lag_add() -> None:
+    torque = random_steps(200, seed=3)
+    both = {"transport_delay": {"delay_s": 0.02}, "actuator_lag": {"time_constant_s": 0.03}}
+    shifted = np.concatenate([np.full(2, torque[0]), torque[:-2]])
+    lag_alone = run({"actuator_lag": {"time_constant_s": 0.03}}, shifted, 4)
+    np.testing.assert_array_equal(run(both, torque, 4), lag_alone)

@@ -1,0 +1,103 @@
+"""What a fit may change: bounds and scales of the shared unknowns, and what every recording has of its own."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from estimator.physics.effects import road_grade
+from estimator.physics.layout import slot
+from estimator.physics.model import DrivelineModel, Parameter, Structure
+from estimator.physics.simulate import Start
+from estimator.physics.unknowns import effect_unknowns, local_basis, nominal_unknowns
+from estimator.signals.record import OutputKind
+from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, linear_record, model, random_steps
+
+CRUISE = Start(40.0, 2.0, 30.0, 40.0 / TWO_MASS["k"], 30.0)
+
+
+def test_nominal_unknowns_stay_within_their_tolerance() -> None:
+    unknowns = {s.name: s for s in nominal_unknowns(model(TWO_MASS, tolerance=0.3))}
+    assert list(unknowns) == list(TWO_MASS)
+    for name, shared in unknowns.items():
+        assert shared.scale * shared.low == pytest.approx(0.7 * TWO_MASS[name])
+        assert shared.scale * shared.high == pytest.approx(1.3 * TWO_MASS[name])
+        assert shared.scale * shared.start == TWO_MASS[name]
+        assert shared.slot == slot("", name)
+
+
+def test_what_is_trusted_exactly_or_is_zero_is_no_unknown() -> None:
+    line = DrivelineModel(Structure.ONE_MASS, {"J_M": Parameter(2.0, 0.0), "b_M": Parameter(0.0, 0.5)})
+    assert nominal_unknowns(line) == ()
+
+
+def test_an_effect_has_unknowns_once_per_start() -> None:
+    rec = linear_record(TWO_MASS, random_steps(500, seed=1), CRUISE)
+    ladder = effect_unknowns("backlash", model(TWO_MASS), [rec])
+    assert len(ladder) == 3
+    assert len({shared[0].start for shared in ladder}) == 3
+    for shared in ladder:
+        assert [(s.effect, s.name) for s in shared] == [("backlash", "gap_rad"), ("backlash", "contact_rad")]
+        assert shared[0].scale == pytest.approx(0.2 * 100.0 / TWO_MASS["k"])
+
+
+def test_a_profile_has_no_shared_unknowns() -> None:
+    rec = linear_record(TWO_MASS, random_steps(500, seed=1), CRUISE)
+    assert effect_unknowns("road_grade", model(TWO_MASS), [rec]) == [()]
+
+
+@pytest.mark.parametrize("kind", [OutputKind.SPEED, OutputKind.POSITION])
+@pytest.mark.parametrize("values", [ONE_MASS, TWO_MASS])
+def test_unknowns_and_start_are_one_to_one(values: dict[str, float], kind: OutputKind) -> None:
+    rec = linear_record(values, random_steps(500, seed=2), CRUISE, kind=kind)
+    basis = local_basis(model(values), rec, profile=False)
+    two, position = "k" in values, kind is OutputKind.POSITION
+    assert basis.guess.size == 2 + position + 2 * two
+    seen = [basis.start(unit_x) for unit_x in np.eye(basis.guess.size)]
+    moved = [(s.load_torque_nm, s.angle_rad, s.speed_rad_s, s.twist_rad, s.load_speed_rad_s) for s in seen]
+    changed = [[i for i, value in enumerate(row) if value != 0.0] for row in moved]
+    assert changed == [[0], [2], *([[1]] if position else []), *([[3], [4]] if two else [])]
+    assert all(np.isfinite(basis.scale))
+    assert all(basis.scale > 0)
+
+
+def test_the_guess_is_read_off_a_steady_recording() -> None:
+    """At constant speed the load torque is the mean torque less viscous friction, whatever the model's inertia."""
+    torque = np.full(500, 0.0) + random_steps(500, seed=3, size_nm=1.0)
+    load = -(TWO_MASS["b_M"] + TWO_MASS["b_L"]) * 30.0
+    rec = linear_record(TWO_MASS, torque, Start(load, 0.0, 30.0, 0.0, 30.0))
+    basis = local_basis(model(TWO_MASS), rec, profile=False)
+    start = basis.start(basis.guess)
+    assert start.speed_rad_s == pytest.approx(30.0, abs=0.1)
+    assert start.load_speed_rad_s == pytest.approx(30.0, abs=0.1)
+    assert start.load_torque_nm == pytest.approx(load, abs=0.5)
+
+
+def test_the_guess_counts_the_acceleration() -> None:
+    rec = linear_record(ONE_MASS, np.full(500, 60.0) + random_steps(500, seed=4, size_nm=1.0), Start(20.0, 0.0, 0.0))
+    basis = local_basis(model(ONE_MASS), rec, profile=False)
+    assert basis.start(basis.guess).load_torque_nm == pytest.approx(20.0, abs=0.5)
+
+
+def test_masked_first_samples_are_not_guessed_from() -> None:
+    rec = linear_record(ONE_MASS, random_steps(500, seed=5), Start(0.0, 3.0, 10.0), kind=OutputKind.POSITION)
+    rec.okay[:20] = False
+    rec.output[:20] = np.nan
+    basis = local_basis(model(ONE_MASS), rec, profile=False)
+    start = basis.start(basis.guess)
+    assert start.angle_rad == pytest.approx(rec.output[20])
+    assert np.isfinite([start.speed_rad_s, start.load_torque_nm]).all()
+
+
+def test_a_profile_adds_a_load_over_time_and_nothing_else() -> None:
+    rec = linear_record(ONE_MASS, random_steps(1000, seed=6), Start(0.0, 0.0, 10.0))
+    plain = local_basis(model(ONE_MASS), rec, profile=False)
+    basis = local_basis(model(ONE_MASS), rec, profile=True)
+    splines = road_grade.basis(rec.time_s)
+    assert plain.extra_load(plain.guess) is None
+    assert basis.guess.size == plain.guess.size + splines.shape[0]
+    np.testing.assert_array_equal(basis.extra_load(basis.guess), np.zeros(1000))
+    x = basis.guess.copy()
+    x[-2] = 3.0
+    np.testing.assert_allclose(basis.extra_load(x), 3.0 * basis.scale[-2] * splines[-2])
+    assert basis.start(x) == plain.start(plain.guess)
