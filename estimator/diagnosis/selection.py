@@ -85,6 +85,7 @@ class Selector:
     names: Sequence[str]
     floor: float
     progress: Progress
+    _rounds: int = 0
 
     def run(self) -> Selection:
         """Add effects while one earns its place; then drop those that the others made superfluous.
@@ -95,8 +96,8 @@ class Selector:
         chosen, current = NOTHING, retuned
         first_trials: dict[str, Trial] = {}
         accepted: dict[str, Trial] = {}
-        for round_number in range(MOST_EFFECTS):
-            trials = self._try_all(chosen, current, round_number)
+        for _ in range(MOST_EFFECTS):
+            trials = self._try_all(chosen, current)
             for name, trial in trials.items():
                 first_trials.setdefault(name, trial)
             best = self._best(trials, current, retuned)
@@ -125,18 +126,21 @@ class Selector:
             return None
         slow = frozenset(profiles[:1])
         behind = self.bench.fit(slow, retuned)
-        return self._best(self._try_all(slow, behind, 0), behind, retuned)
+        if behind.rms**2 > 0.5 * retuned.rms**2:  # nothing slow dominates: there is nothing to look behind
+            return None
+        return self._best(self._try_all(slow, behind), behind, retuned)
 
-    def _try_all(self, chosen: Effects, current: FitResult, round_number: int) -> dict[str, Trial]:
+    def _try_all(self, chosen: Effects, current: FitResult) -> dict[str, Trial]:
         trials = {}
         superseded = {name for have in chosen for name in EFFECTS[have].contains}
         candidates = [name for name in self.names if name not in chosen and name not in superseded]
         for i, name in enumerate(candidates):
-            share = 0.9 * (1.0 - 0.5**round_number * (1.0 - 0.5 * i / len(candidates)))  # a round is half of the rest
+            share = 0.9 * (1.0 - 0.5**self._rounds * (1.0 - 0.5 * i / len(candidates)))  # a round is half of the rest
             self.progress(f"testing {EFFECTS[name].title}", share)
             effects = with_effect(chosen, name)
             result = self.bench.fit(effects, current)
             trials[name] = self._trial(name, effects, current, result)
+        self._rounds += 1
         return trials
 
     def _trial(self, name: str, effects: Effects, before: FitResult, after: FitResult) -> Trial:
@@ -189,14 +193,16 @@ class Selector:
         """Tell whether an effect removes enough to count.
 
         At an element of its own it may be small, if it can be seen. Beside another effect of the same element it must
-        be a real part of the mismatch: a law written another way leaves just such a small remainder.
+        be a real part of the mismatch: a law written another way leaves just such a small remainder. So must a profile,
+        which can take up any slow rest.
         """
         mismatch = max(retuned.rms**2 - self.floor**2, retuned.rms**2 - after.rms**2)
         removed = before.rms**2 - after.rms**2
         if removed >= PART_OF_MISMATCH * mismatch:
             return True
         neighbours = {EFFECTS[other].element for other in effects if other != name}
-        return EFFECTS[name].element not in neighbours and self._visible(before, after)
+        alike = EFFECTS[name].element in neighbours or EFFECTS[name].profile
+        return not alike and self._visible(before, after)
 
     def _examine(self, trial: Trial, before: FitResult) -> HoldOut:
         smaller = frozenset(shared.effect for shared in before.problem.shared if shared.effect)

@@ -137,6 +137,20 @@ class TestSeveralEffects:
         assert kept == {COULOMB}
         assert result is select.bench.fit(frozenset({COULOMB}))
 
+    def test_a_fast_effect_is_looked_for_behind_a_slow_load(self) -> None:
+        records = [
+            replace(rec, output=rec.output + 0.8 * np.sin(2 * np.pi * rec.time_s / 7.0)) for rec in rubbing(coulomb)
+        ]
+        select = selector(records)
+        behind = select._behind_profile(select.bench.fit(NOTHING))
+        assert behind is not None
+        assert behind.effects == {"road_grade", COULOMB}
+        assert behind.gain == gain(select.bench.fit(frozenset({"road_grade"})), behind.result)
+
+    def test_where_nothing_stands_nothing_is_looked_for(self) -> None:
+        select = selector(quiet(values=ONE_MASS, samples=1200))
+        assert select._behind_profile(select.bench.fit(NOTHING)) is None
+
     def test_there_is_an_end(self) -> None:
         assert 1 <= MOST_EFFECTS <= 6
 
@@ -148,6 +162,15 @@ class TestNothing:
         assert selection.chosen == NOTHING
         assert selection.result is selection.retuned
         assert selection.accepted == {}
+
+    def test_is_chosen_where_unseen_recordings_do_not_show_it(self) -> None:
+        """Friction in every recording of the fit and in none that was kept out."""
+        records = rubbing(coulomb)
+        select = selector(records)
+        select.examiner = Examiner(LINE, records, quiet((7,), ONE_MASS, 1200))
+        selection = select.run()
+        assert selection.trials[COULOMB].failed is None
+        assert COULOMB not in selection.chosen
 
     def test_the_reason_of_a_failure_names_the_number(self) -> None:
         selection = selector(quiet(values=ONE_MASS, samples=1200)).run()

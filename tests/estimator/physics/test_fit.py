@@ -113,15 +113,18 @@ class TestJacobian:
             assert np.max(np.abs(jacobian[:, j] - central)) < 2e-3 * np.max(np.abs(central))
 
     def test_at_the_upper_bound_the_difference_is_taken_inwards(self) -> None:
-        problem = nominal_problem(recordings(samples=300))
-        _, high = bounds(problem)
-        x = start_vector(problem)
-        at_bound = x.copy()
-        at_bound[0] = high[0]
-        inside = at_bound.copy()
-        inside[0] -= 1e-4
-        column, close = (jacobian_at(problem, at, outputs_at(problem, at))[:, 0] for at in (at_bound, inside))
-        np.testing.assert_allclose(column, close, atol=5e-3 * np.max(np.abs(column)))
+        """The output is linear in a delay within a period, with another slope in the next one."""
+        rec = linear_record(ONE_MASS, random_steps(300, 8, hold=2), Start(0.0, 0.0, 0.0))
+        delay = (Shared("transport_delay", "delay_s", 0.01, 0.0, 1.0, 1.0),)
+        problem = make_problem(model(ONE_MASS), [rec], delay)
+        at_bound = start_vector(problem)
+        assert at_bound[0] == bounds(problem)[1][0]
+        inside, beyond = at_bound.copy(), at_bound.copy()
+        inside[0], beyond[0] = 0.0, 2.0
+        here, back, ahead = (residual_at(problem, outputs_at(problem, x)) for x in (at_bound, inside, beyond))
+        column = jacobian_at(problem, at_bound, outputs_at(problem, at_bound))[:, 0]
+        np.testing.assert_allclose(column, here - back, atol=1e-6)
+        assert np.max(np.abs(column - (ahead - here))) > 0.01 * np.max(np.abs(column))
 
     def test_a_local_unknown_moves_its_own_recording_alone(self) -> None:
         problem = nominal_problem(recordings(samples=300))

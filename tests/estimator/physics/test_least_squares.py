@@ -86,13 +86,14 @@ def test_every_unknown_at_a_bound_that_it_presses_against_is_the_answer() -> Non
     assert ours.converged
 
 
-def test_a_bound_is_left_again_when_the_optimum_lies_inside(measured: FloatArray) -> None:
+@pytest.mark.parametrize("x0", [(0.0, 10.0, 10.0), (0.0, 1.0, 0.5), (10.0, 1.0, 0.0), (3.0, 1.2, 10.0)])
+def test_a_bound_is_left_again_when_the_optimum_lies_inside(measured: FloatArray, x0: tuple[float, ...]) -> None:
     low, high = np.array([0.0, 0.0, 0.0]), np.array([10.0, 10.0, 10.0])
 
     def residual(x: FloatArray) -> FloatArray:
         return decay(x) - measured
 
-    ours, theirs = both(residual, decay_jacobian, np.array([0.0, 10.0, 10.0]), low, high)
+    ours, theirs = both(residual, decay_jacobian, np.array(x0), low, high)
     assert likelihood_ratio(residual, ours.x, theirs) < CONVERGED
 
 

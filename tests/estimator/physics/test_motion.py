@@ -62,6 +62,13 @@ def test_a_few_samples_of_the_other_sign_are_no_reversal() -> None:
     assert reverses(record(np.ones(500), speed))
 
 
+@pytest.mark.parametrize(("creep", "expected"), [(-0.04, False), (-0.06, True)])
+def test_a_backward_creep_below_a_hundredth_of_the_speed_is_no_reversal(creep: float, expected: bool) -> None:
+    speed = np.full(500, 5.0)
+    speed[:50] = creep
+    assert reverses(record(np.ones(500), speed)) is expected
+
+
 def test_samples_that_do_not_count_are_no_reversal() -> None:
     speed = np.full(500, 5.0)
     speed[:50] = -5.0
