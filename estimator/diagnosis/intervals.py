@@ -17,10 +17,14 @@ def covariance(result: FitResult) -> FloatArray:
     """Return the covariance of the scaled unknowns, shape (U, U), by the sandwich formula.
 
     ``C = B M B`` with ``B = (J'J)^-1`` and ``M`` the long-run covariance of the scores ``J_k e_k``, Bartlett
-    weights over several correlation lengths of the error (Newey and West, Econometrica 55, 1987). An unknown at a
-    bound is held there: its variance is 0.
+    weights over several correlation lengths of the error (Newey and West, Econometrica 55, 1987). An effect's
+    parameter at a bound of its law is held there and has no variance. A nominal parameter at the edge of its tolerance
+    is not: the tolerance is a belief about it, and how well the data determine it does not change there.
     """
-    free = ~result.pinned
+    held = result.pinned
+    of_effects = np.array([bool(shared.effect) for shared in result.problem.shared], dtype=np.bool_)
+    held[: of_effects.size] &= of_effects
+    free = ~held
     j = result.jacobian[:, free]
     bread = np.linalg.pinv(j.T @ j, hermitian=True)
     full = np.zeros((result.x.size, result.x.size))
@@ -58,8 +62,11 @@ def _long_run(scores: FloatArray, lags: int) -> FloatArray:
 
 
 def interval(result: FitResult, cov: FloatArray, index: int) -> tuple[float, float]:
-    """Return the 95 % interval of a shared parameter in its unit, by its index among the unknowns."""
-    scale = result.problem.shared[index].scale
-    spread = Z95 * float(np.sqrt(max(cov[index, index], 0.0))) * scale
-    value = float(result.x[index]) * scale
-    return (value - spread, value + spread)
+    """Return the 95 % interval of a shared parameter in its unit, by its index among the unknowns.
+
+    It ends where the fit's bounds do: what the law allows, or the tolerance a nominal parameter is trusted to.
+    """
+    shared = result.problem.shared[index]
+    spread = Z95 * float(np.sqrt(max(cov[index, index], 0.0)))
+    x = float(result.x[index])
+    return (shared.scale * max(x - spread, shared.low), shared.scale * min(x + spread, shared.high))

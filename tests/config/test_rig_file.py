@@ -261,7 +261,7 @@ def test_simulation_and_experiments_may_be_left_out(tmp_path: Path) -> None:
 
 class TestFilesItNames:
     def test_they_are_looked_for_beside_it(self, tmp_path: Path) -> None:
-        (tmp_path / "drive.eds").write_text("[FileInfo]\n")
+        (tmp_path / "drive.eds").write_text(data_file("inverter.eds").read_text("utf-8"), "utf-8")
         (tmp_path / "map.toml").write_text(data_file("plc.toml").read_text("utf-8"), "utf-8")
         path = changed(tmp_path, (r'^# eds = "inverter.eds"', 'eds = "drive.eds"'), (r"^# map = .plc", 'map = "map'))
         rig = read_rig(path)

@@ -208,13 +208,20 @@ def test_a_logger_with_its_own_csv_is_read(tmp_path: Path) -> None:
 @pytest.fixture
 def three_runs(tmp_path: Path, own_table: Table) -> list[Path]:
     paths = [tmp_path / f"run_{k}.csv" for k in range(3)]
-    for path in paths:
-        write_table(own_table, path)
+    for k, path in enumerate(paths):
+        columns = {**own_table.columns, "speed_rad_s": own_table.columns["speed_rad_s"] + k}
+        write_table(Table(path, columns), path)
     return paths
 
 
 def test_recordings_are_read_in_order(three_runs: list[Path]) -> None:
     assert [record.name for record in read_records(three_runs)] == ["run_0", "run_1", "run_2"]
+
+
+def test_the_same_samples_under_two_names_are_refused(three_runs: list[Path]) -> None:
+    three_runs[2].write_bytes(three_runs[0].read_bytes())
+    with pytest.raises(UsageError, match=r"run_2\.csv: expected samples of its own, came those of .*run_0\.csv"):
+        read_records(three_runs)
 
 
 def test_one_faulty_recording_is_named(three_runs: list[Path]) -> None:

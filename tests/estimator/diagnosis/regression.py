@@ -22,12 +22,13 @@ def regression(
     *,
     bound: float = np.inf,
     scale: float = 1.0,
+    effect: str = "",
 ) -> FitResult:
     """Fit ``y = A x`` by least squares within ``|x| <= bound``; one design (N_i, U) and one output per recording."""
     a, y = np.vstack(list(designs)), np.concatenate(list(measured))
     x = np.clip(np.linalg.lstsq(a, y, rcond=None)[0], -bound, bound)
     records = tuple(record(np.zeros(part.size), part, name=f"run_{i}") for i, part in enumerate(measured))
-    shared = tuple(Shared("", name, scale, -bound, bound, 0.0) for name in NOMINAL[: x.size])
+    shared = tuple(Shared(effect, name, scale, -bound, bound, 0.0) for name in NOMINAL[: x.size])
     nothing = np.empty(0)
     local = tuple(
         LocalBasis(Structure.ONE_MASS, False, nothing, nothing, np.empty((0, r.output.size))) for r in records

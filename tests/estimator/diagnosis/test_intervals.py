@@ -82,10 +82,22 @@ def test_the_interval_is_in_the_parameters_unit() -> None:
     assert 0.5 * (high - low) == pytest.approx(Z95 * np.sqrt(covariance(plain)[0, 0]))
 
 
-def test_an_unknown_at_its_bound_is_held_there() -> None:
+def test_a_nominal_parameter_at_the_edge_of_its_tolerance_keeps_its_uncertainty() -> None:
     rng = np.random.default_rng(3)
     design = rng.standard_normal((400, 2))
-    result = regression([design], [design @ [0.2, 4.0] + rng.standard_normal(400)], bound=1.0)
+    result = regression([design], [design @ [0.2, 1.2] + rng.standard_normal(400)], bound=1.0)
+    cov = covariance(result)
+    assert result.x[1] == 1.0
+    low, high = interval(result, cov, 1)
+    assert low == pytest.approx(1.0 - Z95 * np.sqrt(cov[1, 1]))
+    assert low < 0.95
+    assert high == 1.0
+
+
+def test_an_effects_parameter_at_its_bound_is_held_there() -> None:
+    rng = np.random.default_rng(3)
+    design = rng.standard_normal((400, 2))
+    result = regression([design], [design @ [0.2, 4.0] + rng.standard_normal(400)], bound=1.0, effect="backlash")
     cov = covariance(result)
     assert result.x[1] == 1.0
     np.testing.assert_array_equal(cov[1], [0.0, 0.0])
