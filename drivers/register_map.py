@@ -138,9 +138,14 @@ def load_register_map(path: Path) -> RegisterMap:
 def _problems(cause: ValidationError) -> Iterator[str]:
     for detail in cause.errors():
         key = ".".join(map(str, detail["loc"])) or "the file"
-        expected = detail["msg"].removeprefix("Input should be ")
-        came = "a table" if isinstance(detail["input"], Mapping) else repr(detail["input"])
-        yield f"{key} | expected {expected} | came {came}"
+        if detail["type"] == "missing":
+            yield f"{key} | expected this key | came nothing: add it"
+        elif detail["type"] == "extra_forbidden":
+            yield f"{key} | expected no such key | came this unknown key: mend or remove it"
+        else:
+            expected = detail["msg"].removeprefix("Input should be ")
+            came = "a table" if isinstance(detail["input"], Mapping) else repr(detail["input"])
+            yield f"{key} | expected {expected} | came {came}"
 
 
 def _overlaps(registers: Mapping[str, Register]) -> Iterator[str]:

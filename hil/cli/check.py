@@ -21,7 +21,7 @@ app = typer.Typer(add_completion=False)
 
 @app.command(epilog="Example: hil check examples/rig.toml")
 def check(
-    rig: Annotated[Path, typer.Argument(help="Rig file.")],
+    rig: Annotated[Path, typer.Argument(metavar="RIG", help="Rig file.")],
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")] = False,
     bus: Annotated[str | None, typer.Option(metavar="URL", help="CAN bus in place of the rig file's.")] = None,
     modbus: Annotated[str | None, typer.Option(metavar="HOST:PORT", help="PLC in place of the rig file's.")] = None,

@@ -23,7 +23,7 @@ def compare(
     """
     from rich.console import Console
 
-    from hil.config.model_file import read_model
+    from hil.config.model_file import read_model_for_recordings
     from hil.recording import read_records
     from hil.report.comparison import compare_record, comparison_text
     from hil.report.comparison_html import comparison_page
@@ -32,7 +32,7 @@ def compare(
 
     if out is not None:
         require_folder(out)
-    file = read_model(model)
+    file = read_model_for_recordings(model)
     records = read_records(recordings, file.signals)
     comparisons = [compare_record(file.model, record) for record in records]
     text = comparison_text(comparisons)

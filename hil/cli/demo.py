@@ -5,14 +5,10 @@ from __future__ import annotations
 import json
 import secrets
 import shutil
-import signal
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
-from types import FrameType
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -56,7 +52,7 @@ def demo(
 
     require_folder(out)
     chosen = secrets.randbelow(SEEDS) if seed is None else seed
-    with _sigterm_as_interrupt(), tempfile.TemporaryDirectory(prefix="hil-demo-") as workshop:
+    with tempfile.TemporaryDirectory(prefix="hil-demo-") as workshop:
         _Demo(Console(), chosen, Path(workshop), out).run()
 
 
@@ -218,17 +214,3 @@ def _judgement_json(judgement: Judgement, seed: int) -> dict[str, Any]:
         "named": list(judgement.named),
         "sizes": [{**asdict(size), "inside": size.inside} for size in judgement.sizes],
     }
-
-
-@contextmanager
-def _sigterm_as_interrupt() -> Iterator[None]:
-    """Let SIGTERM end the demo the way Ctrl-C does: drives disarmed, rig process and temporary files gone."""
-
-    def interrupt(number: int, frame: FrameType | None) -> None:
-        raise KeyboardInterrupt
-
-    before = signal.signal(signal.SIGTERM, interrupt)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)

@@ -59,7 +59,7 @@ def diagnose(
     from rich.console import Console
 
     from estimator.diagnosis.diagnose import diagnose as diagnose_records
-    from hil.config.model_file import read_model, write_model
+    from hil.config.model_file import read_model_for_recordings, write_model
     from hil.recording import read_records
     from hil.report.diagnosis_html import diagnosis_page
     from hil.report.diagnosis_json import diagnosis_text
@@ -67,7 +67,7 @@ def diagnose(
     from hil.report.outputs import publish, require_folder
 
     require_folder(out)
-    file = read_model(model)
+    file = read_model_for_recordings(model)
     records = read_records([*recordings, *(holdout or ())], file.signals)
     training, kept_back = records[: len(recordings)], records[len(recordings) :]
     with progress_bar() as progress:

@@ -53,13 +53,13 @@ def identify(
     from rich.console import Console
 
     from estimator.identification.identify import Settings
-    from hil.config.model_file import read_model
+    from hil.config.model_file import read_model_for_recordings
     from hil.recording import read_records
     from hil.report.outputs import publish, require_folder
 
     require_folder(out)
     settings = Settings(sample_time_s=sample_time, samples=samples or None)
-    file = None if model is None else read_model(model)
+    file = None if model is None else read_model_for_recordings(model)
     records = read_records(recordings, None if file is None else file.signals)
     results = _identified(records, settings)
     nominal = None if file is None else nominal_resonance(file.model)

@@ -1,4 +1,8 @@
-"""The command line: one table of commands, each imported only when called, and one map to exit statuses."""
+"""The command line: one table of commands, each imported only when called, and one map to exit statuses.
+
+Whatever takes time to import is imported inside the functions: Ctrl-C during it is an interruption like any
+other, with its exit status and without a traceback.
+"""
 
 from __future__ import annotations
 
@@ -6,11 +10,14 @@ import importlib
 import sys
 from collections.abc import Callable, Sequence
 from enum import IntEnum
-
-import typer
+from typing import TYPE_CHECKING
 
 from hil import __version__
 from hil.errors import HilError, InputError
+from hil.rig.stop import interrupt_on_signals
+
+if TYPE_CHECKING:
+    import typer
 
 
 class ExitStatus(IntEnum):
@@ -39,6 +46,8 @@ COMMANDS: dict[str, str] = {
 
 def _overview() -> typer.Typer:
     """Build the group that prints help and refuses unknown names, without importing any command."""
+    import typer
+
     app = typer.Typer(
         no_args_is_help=True,
         add_completion=False,
@@ -79,6 +88,7 @@ def exit_status(error: BaseException) -> ExitStatus | None:
         (InputError, ExitStatus.BAD_INPUT),
         (EstimatorError, ExitStatus.BAD_INPUT),
         (HilError, ExitStatus.DEVICE_FAULT),
+        (OSError, ExitStatus.BAD_INPUT),  # the drivers' own are above: what is left is a file or a full disk
     )
     return next((status for family, status in families if isinstance(error, family)), None)
 
@@ -92,28 +102,42 @@ def run(arguments: Sequence[str]) -> int:
         The exit status; one line of cause and cure is on standard error where it is not 0. An error that is
         none of ours is a defect and is raised with its traceback.
     """
-    app, rest, name = _application(arguments)
     try:
-        result = app(rest, prog_name=name, standalone_mode=False)
-    except typer.Abort:  # what typer makes of Ctrl-C
-        return _report(KeyboardInterrupt())
+        return _run(arguments)
     except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001 - the one place that maps errors to statuses
         return _report(error)
+
+
+def _run(arguments: Sequence[str]) -> int:
+    app, rest, name = _application(arguments)
+    result = app(rest, prog_name=name, standalone_mode=False)
+    if result == ExitStatus.INTERRUPTED:  # what typer makes of Ctrl-C
+        raise KeyboardInterrupt
     return result if isinstance(result, int) else ExitStatus.DONE
 
 
 def _report(error: BaseException) -> int:
     status = exit_status(error)
     if status is not None:
-        typer.echo("interrupted" if isinstance(error, KeyboardInterrupt) else f"error: {error}", err=True)
+        _complain("interrupted" if isinstance(error, KeyboardInterrupt) else f"error: {error}")
         return status
     if hasattr(error, "format_message") and hasattr(error, "exit_code"):  # typer's own usage errors
         if message := error.format_message():  # empty where typer printed the help instead
-            typer.echo(f"error: {message}", err=True)
+            _complain(f"error: {message}{'' if message[-1] in '.?' else '.'}{_see_help(error)}")
         return int(error.exit_code)
     raise error
 
 
+def _see_help(error: BaseException) -> str:
+    context = getattr(error, "ctx", None)
+    return "" if context is None else f" See: {context.command_path} --help"
+
+
+def _complain(text: str) -> None:
+    print(text, file=sys.stderr)  # noqa: T201 - the one place that speaks of errors
+
+
 def main() -> None:
     """Entry point of the console script ``hil``."""
+    interrupt_on_signals()
     sys.exit(run(sys.argv[1:]))

@@ -40,8 +40,8 @@ class Pace(Enum):
     "First look at it: hil run examples/rig.toml cruise --dry-run"
 )
 def run(
-    rig: Annotated[Path, typer.Argument(help="Rig file.")],
-    experiment: Annotated[str, typer.Argument(help="Name of an experiment of the rig file.")],
+    rig: Annotated[Path, typer.Argument(metavar="RIG", help="Rig file.")],
+    experiment: Annotated[str, typer.Argument(metavar="EXPERIMENT", help="Name of an experiment of the rig file.")],
     out: Annotated[
         Path | None, typer.Option(metavar="REC", help="Recording to write, .csv or .parquet; a new file.")
     ] = None,
@@ -76,8 +76,8 @@ def _record(rig: Rig, experiment: str, out: Path, pacer: Pacer, metadata: dict[s
         with stop_on_signals(stop), recorder, open_devices(rig) as devices, RunProgress(plan) as progress:
             return run_plan(devices, plan, pacer, recorder, stop, progress.show)
     except BaseException:
-        if recorder.n_samples:
-            typer.echo(f"{out} holds the {recorder.n_samples} samples up to there", err=True)
+        if recorder.kept is not None:
+            typer.echo(f"{recorder.kept} holds the {recorder.n_samples} samples up to there", err=True)
         raise
 
 

@@ -10,6 +10,7 @@ import typer
 
 from hil.config.rig_file import Rig, read_rig
 from hil.rig.stop import StopRequest, stop_on_signals
+from hil.simulator.fault_spec import known_faults, rig_faults
 from hil.simulator.loopback import Address, modbus_address
 from hil.simulator.plant_factory import plant_for
 from hil.simulator.rig_server import RigServer
@@ -23,10 +24,10 @@ app = typer.Typer(add_completion=False)
 
 @app.command(
     epilog="Example: hil sim examples/rig.toml --bus ws://127.0.0.1:0/ --modbus 127.0.0.1:0"
-    " --effect backlash:gap_rad=0.02"
+    " --effect backlash:gap_rad=0.02 --fault plc.clutch_closes@5.0"
 )
 def sim(
-    rig: Annotated[Path, typer.Argument(help="Rig file with a table [simulation].")],
+    rig: Annotated[Path, typer.Argument(metavar="RIG", help=r"Rig file with a table \[simulation].")],
     bus: Annotated[
         str | None,
         typer.Option(metavar="URL", help="Serve the CAN bus at ws://127.0.0.1:PORT/; else where RIG says."),
@@ -38,6 +39,13 @@ def sim(
     effect: Annotated[
         list[str] | None,
         typer.Option(metavar="NAME[:k=v,...]", help="Put an effect into the driveline; may be repeated."),
+    ] = None,
+    fault: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="SPEC",
+            help=f"Let a device fail, where told after S seconds of simulated time: {known_faults()}. May be repeated.",
+        ),
     ] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="Of all that is random; else the rig file's.")] = None,
 ) -> None:
@@ -52,6 +60,7 @@ def sim(
         rig=rig_file,
         bus_url=rig_file.can.url if bus is None else bus,
         modbus=_modbus(rig_file, modbus),
+        faults=rig_faults(fault or (), rig_file.period_s),
         seed=seed,
     )
     _serve(server)

@@ -22,7 +22,7 @@ def simulate(
     """
     from estimator.physics.free_run import free_run
     from estimator.physics.model import unit
-    from hil.config.model_file import read_model
+    from hil.config.model_file import read_model_for_recordings
     from hil.errors import UsageError
     from hil.recording import Table, csv_format, read_record
     from hil.report.numbers import shown
@@ -34,7 +34,7 @@ def simulate(
     if out.exists() and recording.exists() and out.samefile(recording):
         raise UsageError(f"--out {out}: expected another file than the recording itself. Choose another name.")
     require_folder(out.parent)
-    file = read_model(model)
+    file = read_model_for_recordings(model)
     record = read_record(recording, file.signals)
     run = free_run(file.model, record)
     column = simulated_column(record.kind, file.model.motion)

@@ -23,6 +23,7 @@ from estimator.errors import BadModel
 from estimator.physics.model import DrivelineModel, EffectValue, Motion, Parameter, Structure, parameter_unit
 from hil.config.problems import Fault, problem_lines, read_toml, refuse
 from hil.errors import ModelFileError
+from hil.recording import columns
 from hil.recording.signals_config import SignalsConfig
 
 Kind = TypeVar("Kind", bound=Enum)
@@ -118,6 +119,26 @@ def read_model(path: Path | str) -> ModelFile:
     if document is None or model is None or problems:
         raise ModelFileError(path, *problems)
     return ModelFile(model, document.signals)
+
+
+def read_model_for_recordings(path: Path | str) -> ModelFile:
+    """Read a model file that recordings are to be held against.
+
+    Raises
+    ------
+    ModelFileError
+        As `read_model`; also if the model is of a translation and would be held against the motor speed of a
+        rig's own recording.
+    """
+    file = read_model(path)
+    names_output = file.signals is not None and file.signals.names_output
+    if file.model.motion is Motion.TRANSLATION and not names_output:
+        raise ModelFileError(
+            path,
+            f"motion | expected 'rotation', since recordings are read by their {columns.SPEED} where [signals] names "
+            "no speed, position or force | came 'translation': correct it, or name the column in [signals]",
+        )
+    return file
 
 
 def write_model(path: Path | str, model: DrivelineModel, signals: SignalsConfig | None = None) -> None:

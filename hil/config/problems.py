@@ -31,8 +31,19 @@ ACROSS_KEYS: Final = "across_keys"
 TOML_PLACE: Final = re.compile(r"^(?P<what>.*) \(at (?P<place>line \d+, column \d+|end of document)\)$", re.DOTALL)
 """How `tomllib` ends its messages; it has no attributes for the place before Python 3.14."""
 
+BYTE_ORDER_MARK: Final = "\ufeff"
+"""Some editors put it first; TOML 1.0 has no place for it, and a person can't see it."""
+
 LONGEST_VALUE: Final = 80
 """Characters of a wrong value that a message shows."""
+
+
+WORDS: Final[Mapping[str, str]] = {
+    "dict_type": "a table",
+    "list_type": "a list in [ ]",
+    "string_too_short": "a text that is not empty",
+}
+"""Errors of pydantic, by type, that a person who writes TOML would not understand."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +93,7 @@ def read_toml(path: Path, error: type[FileProblem]) -> dict[str, Any]:
     except OSError as cause:
         raise error(path, f"the file | expected a readable TOML file | came: {cause.strerror}") from cause
     try:
-        return tomllib.loads(content.decode("utf-8"))
+        return tomllib.loads(content.decode("utf-8").removeprefix(BYTE_ORDER_MARK))
     except UnicodeDecodeError as cause:
         line = content.count(b"\n", 0, cause.start) + 1
         byte = content[cause.start]
@@ -157,8 +168,8 @@ def _line(keys: Iterable[int | str], expected: str, came: str) -> str:
 
 
 def _expected(detail: ErrorDetails) -> str:
-    """Keep pydantic's own words, without the part that every one of its messages begins with."""
-    message = detail["msg"]
+    """Keep pydantic's own words but for `WORDS`, without the part that every one of its messages begins with."""
+    message = WORDS.get(detail["type"], detail["msg"])
     for opening in ("Input should be ", "Value error, "):
         message = message.removeprefix(opening)
     return message[:1].lower() + message[1:]

@@ -18,6 +18,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from drivers.eds_file import EdsFile
 from drivers.errors import ConfigMismatch
 from drivers.plc_map import require_usable
 from drivers.plc_types import PrbsSource
@@ -246,13 +247,24 @@ def read_rig(path: Path | str) -> Rig:
     Raises
     ------
     RigFileError
-        Naming every fault of the file, or of the register map it names: line or key, expected, came.
+        Naming every fault of the file, or of EDS and register map it names: line or key, expected, came.
     """
     file = Path(path)
     rig = validate(Rig, read_toml(file, RigFileError), file, RigFileError)
+    for name, table in (("m1", rig.inverters.m1), ("m2", rig.inverters.m2)):
+        if table.eds is not None:
+            _require_eds(file, f"inverters.{name}.eds", table.eds, table.node_id)
     if rig.plc.map is not None:
         _require_map(rig.plc.map)
     return rig
+
+
+def _require_eds(file: Path, key: str, eds: Path, node_id: int) -> None:
+    """See that a rig's own EDS can be read; whether the drive agrees with it is for the drive to say."""
+    try:
+        EdsFile(eds, node_id)
+    except ConfigMismatch as cause:
+        raise RigFileError(file, f"{key} | expected an EDS | came: {cause}") from cause
 
 
 def _require_map(path: Path) -> None:

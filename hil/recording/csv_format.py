@@ -11,7 +11,7 @@
 from __future__ import annotations
 
 import csv
-import io
+import re
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -25,7 +25,9 @@ from hil.recording.format_hints import FormatHints
 from hil.recording.table import Column, Table
 
 DELIMITERS = ",;\t|"
-"""Tried on the header where no hint is given, the most frequent wins."""
+"""Tried on the header where no hint is given, the most frequent outside quotes wins."""
+
+QUOTED = re.compile('"[^"]*"')
 
 BLOCK_BYTES = 1 << 22
 """pyarrow parses this much at once; also the longest line it can take."""
@@ -46,7 +48,7 @@ def read(path: Path, hints: FormatHints) -> Table:
     if not content:
         return Table(path, {})  # refuses: nothing in it
     header = content.split(b"\n", 1)[0].decode("utf-8")
-    delimiter = hints.delimiter or max(DELIMITERS, key=header.count)
+    delimiter = hints.delimiter or max(DELIMITERS, key=QUOTED.sub("", header).count)
     names = _column_names(path, header, delimiter)
     if b"\n" not in content:
         return Table(path, {})  # refuses: no rows
@@ -64,7 +66,7 @@ def write(table: Table, path: Path) -> None:
     """
     columns = [_cells(table, path, name) for name in table.columns]
     with path.open("w", encoding="utf-8", newline="") as file:
-        file.write(_header(table.columns))
+        file.write(",".join(map(_quoted, table.columns)) + "\n")
         file.writelines(",".join(row) + "\n" for row in zip(*columns, strict=True))
 
 
@@ -167,10 +169,5 @@ def _cells(table: Table, path: Path, name: str) -> Iterable[str]:
 
 
 def _quoted(text: str) -> str:
-    return '"' + text.replace('"', '""') + '"' if any(c in text for c in ',"') else text
-
-
-def _header(names: Iterable[str]) -> str:
-    line = io.StringIO()
-    csv.writer(line, lineterminator="\n").writerow(names)
-    return line.getvalue()
+    """Quote a text with anything in it that a reader could take for a delimiter."""
+    return '"' + text.replace('"', '""') + '"' if any(c in text for c in f'{DELIMITERS}"') else text

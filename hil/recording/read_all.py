@@ -17,7 +17,8 @@ def read_records(paths: Sequence[Path], signals: SignalsConfig | None = None) ->
     Raises
     ------
     UsageError
-        If two have the same name: results are told by it.
+        If two have the same name: results are told by it; or the same samples: they would count twice as
+        evidence, and held out they would prove nothing.
     RecordingError
         If one can't be read, or has another sampling period than the first.
     InputError
@@ -36,6 +37,7 @@ def read_records(paths: Sequence[Path], signals: SignalsConfig | None = None) ->
     if errors:
         raise InputError("\n".join(str(error) for error in errors))
     _require_one_period(paths, records)
+    _require_own_samples(paths, records)
     return tuple(records)
 
 
@@ -58,3 +60,15 @@ def _require_one_period(paths: Sequence[Path], records: Sequence[Record]) -> Non
                 f"expected the sampling period of {paths[0]}, {records[0].sample_time_s:g} s, "
                 f"came {record.sample_time_s:g} s. Give recordings of one period.",
             )
+
+
+def _require_own_samples(paths: Sequence[Path], records: Sequence[Record]) -> None:
+    known: dict[tuple[bytes, bytes], Path] = {}
+    for path, record in zip(paths, records, strict=True):
+        samples = (record.torque_nm.tobytes(), record.output.tobytes())
+        if samples in known:
+            raise UsageError(
+                f"{path}: expected samples of its own, came those of {known[samples]}, every one the same. "
+                "Give each recording once; hold out one that was not used."
+            )
+        known[samples] = path

@@ -115,6 +115,11 @@ class SignalsConfig(_Strict):
         """True where the torques are the contract's columns: then the contract's ``flags`` count too."""
         return not self.torque
 
+    @property
+    def names_output(self) -> bool:
+        """True where the output is not the contract's motor speed."""
+        return bool(self._outputs())
+
     def torques(self) -> list[TorqueSignal]:
         """Return the inputs, the contract's where none are named."""
         own = [TorqueSignal(column=name) for name in (columns.TORQUE_M1, columns.TORQUE_M2)]

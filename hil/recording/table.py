@@ -6,6 +6,7 @@ may carry columns nobody asks for; it is refused, with its place, when such a co
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,6 +19,9 @@ from hil.errors import RecordingError
 
 Column = NDArray[Any]
 FloatArray = NDArray[np.float64]
+
+LARGEST = 1e30
+"""Magnitude beyond which a number is no measurement, in whatever unit; its fourth power still is a float."""
 
 LONGEST_CELL = 40
 """Characters of a wrong cell that a message shows."""
@@ -83,7 +87,8 @@ class Table:
         Raises
         ------
         RecordingError
-            With one line for each column that is missing or holds a cell that is no finite number or NaN.
+            With one line for each column that is missing or holds a cell that is no finite number of at most
+            `LARGEST`, or NaN.
         """
         wanted = list(dict.fromkeys(names))
         problems = [problem for name in wanted if (problem := self._problem(name))]
@@ -104,19 +109,29 @@ class Table:
             return None
         cell = str(column[row])
         shown = repr(cell[:LONGEST_CELL]) if cell else "an empty cell"
-        return f"{self.place(row)}, column {name}: expected a finite number or nan, came {shown}"
+        return f"{self.place(row)}, column {name}: expected a finite number or nan, came {shown}{_hint(cell)}"
 
 
 def _first_bad(column: Column) -> int | None:
-    """Find the first cell that is neither a finite number nor NaN; None where all are."""
+    """Find the first cell that is neither a number of at most `LARGEST` nor NaN; None where all are."""
     if column.dtype == object:
-        return next((row for row, cell in enumerate(column) if not _is_number(cell)), None)
-    infinite = np.flatnonzero(np.isinf(column)) if column.dtype.kind == "f" else np.empty(0)
-    return int(infinite[0]) if infinite.size else None
+        return next((row for row, cell in enumerate(column) if not _is_measurement(cell)), None)
+    too_large = np.flatnonzero(np.abs(column) > LARGEST) if column.dtype.kind == "f" else np.empty(0)
+    return int(too_large[0]) if too_large.size else None
 
 
-def _is_number(cell: str) -> bool:
+def _is_measurement(cell: str) -> bool:
     try:
-        return not np.isinf(float(cell))
+        return not abs(float(cell)) > LARGEST
     except ValueError:
         return False
+
+
+def _hint(cell: str) -> str:
+    """Say what to do about a bad cell whose cause can be told."""
+    if _is_measurement(cell.replace(",", ".", 1)):
+        return ". Write decimals with a point"
+    try:
+        return "" if math.isinf(float(cell)) else f". Beyond {LARGEST:g} nothing is a measurement: check its unit"
+    except ValueError:
+        return ""

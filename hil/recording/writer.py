@@ -51,6 +51,7 @@ class RecordingWriter:
         self.n_samples = 0
         self._metadata = dict(metadata or {})
         self._file: TextIO | None = None
+        self._torn = False
 
     def __enter__(self) -> Self:
         writer_for(self.path)
@@ -68,17 +69,30 @@ class RecordingWriter:
         self._file.write(",".join(columns.UNITS) + "\n")
         return self
 
+    @property
+    def kept(self) -> Path | None:
+        """The file that holds what was appended, once the writer is closed; None where nothing was."""
+        return next((path for path in (self.path, self.part_path) if self.n_samples and path.exists()), None)
+
     def append(self, sample: Sample) -> None:
         """Write one sample.
 
         Raises
         ------
         RecordingError
-            If the writer is not open.
+            If the writer is not open, or the disk does not take the sample.
         """
         if self._file is None:
             raise RecordingError(self.path, "expected an open writer, came one that is closed. Use it by 'with'.")
-        self._file.write(_row(sample))
+        try:
+            self._file.write(_row(sample))
+        except OSError as error:
+            self._torn = True
+            raise RecordingError(
+                self.path,
+                f"expected room for sample {self.n_samples + 1}, came: {error.strerror}. Those before it are kept; "
+                "make room and run again.",
+            ) from error
         self.n_samples += 1
 
     def __exit__(
@@ -87,12 +101,25 @@ class RecordingWriter:
         """Make the recording of what has been appended, however the run ended."""
         if self._file is None:
             return
-        self._file.close()
+        self._close(self._file)
         self._file = None
         if self.n_samples == 0:
             self.part_path.unlink()
         else:
             self._publish()
+
+    def _close(self, file: TextIO) -> None:
+        try:
+            file.close()
+        except OSError:  # it tries once more to write what did not fit
+            if not self._torn:
+                raise
+        if self._torn:
+            self._cut_torn_line()
+
+    def _cut_torn_line(self) -> None:
+        with self.part_path.open("rb+") as file:
+            file.truncate(file.read().rfind(b"\n") + 1)
 
     def _publish(self) -> None:
         if self.path.suffix.lower() == CSV:
@@ -100,7 +127,14 @@ class RecordingWriter:
             self.part_path.rename(self.path)
             return
         rows = read_table(self.part_path)
-        write_table(Table(self.path, rows.columns, columns.UNITS, self._metadata), self.path)
+        try:
+            write_table(Table(self.path, rows.columns, columns.UNITS, self._metadata), self.path)
+        except OSError as error:
+            raise RecordingError(
+                self.path,
+                f"expected room for the recording, came: {error.strerror or error}. Its samples are in "
+                f"{self.part_path}, a recording itself: rename it to keep it, or remove it.",
+            ) from error
         self.part_path.unlink()
 
 

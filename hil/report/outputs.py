@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -21,8 +20,11 @@ def require_folder(folder: Path) -> None:
     existing = next(parent for parent in (folder, *folder.absolute().parents) if parent.exists())
     if not existing.is_dir():
         raise UsageError(f"{folder}: expected a folder to write into, came {existing}, which is a file")
-    if not os.access(existing, os.W_OK):
-        raise UsageError(f"{folder}: expected a folder to write into, came {existing}, which is read-only")
+    try:
+        with tempfile.TemporaryFile(dir=existing):
+            pass  # permissions alone don't tell: the disk may be full, or mounted read-only
+    except OSError as error:
+        raise _unwritable(folder, error) from error
 
 
 def publish(folder: Path, files: Mapping[str, Callable[[Path], object]]) -> None:
@@ -34,11 +36,30 @@ def publish(folder: Path, files: Mapping[str, Callable[[Path], object]]) -> None
         Made where it is not there.
     files
         File name to what writes it, given the path to write to.
+
+    Raises
+    ------
+    UsageError
+        If the folder, or the disk it is on, does not take them.
     """
     require_folder(folder)
+    try:
+        _publish(folder, files)
+    except OSError as error:
+        raise _unwritable(folder, error) from error
+
+
+def _publish(folder: Path, files: Mapping[str, Callable[[Path], object]]) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=folder, prefix=".unfinished-") as workshop:
         for name, write in files.items():
             write(Path(workshop) / name)
         for name in files:
             (Path(workshop) / name).replace(folder / name)
+
+
+def _unwritable(folder: Path, error: OSError) -> UsageError:
+    return UsageError(
+        f"{folder}: expected a folder to write into, came: {error.strerror or error}. Make room there, or choose "
+        "another with --out."
+    )

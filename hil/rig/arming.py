@@ -55,11 +55,16 @@ class ArmedDrives:
         self._devices.guard.disable()
         # A head start only: what counts is that each drive then confirms it is disarmed.
         not_zeroed = _failures(self._zero_both)
-        not_disarmed = [*_failures(self._devices.m1.disarm), *_failures(self._devices.m2.disarm)]
+        not_disarmed: dict[str, list[str]] = {}
+        for name, inverter in (("m1", self._devices.m1), ("m2", self._devices.m2)):
+            for reason in _failures(inverter.disarm):
+                not_disarmed.setdefault(reason, []).append(name)
         if not_disarmed:
             cause = "" if error is None else f" What ended the run: {error or type(error).__name__}"
+            reasons = [f"{' and '.join(names)}: {reason}" for reason, names in not_disarmed.items()]
+            reasons += [reason for reason in not_zeroed if reason not in not_disarmed]
             raise RunAborted(
-                f"not every drive is confirmed disarmed: {'; '.join([*not_disarmed, *not_zeroed])}. Expected "
+                f"not every drive is confirmed disarmed: {'; '.join(reasons)}. Expected "
                 f"both to be; cut the power of the drive named before anyone goes near the shaft.{cause}"
             ) from error
 
@@ -72,10 +77,10 @@ class ArmedDrives:
 
 
 def _failures(step: Callable[[], None]) -> list[str]:
-    """Run one step and tell what went wrong with it; nothing may keep the steps after it from being tried."""
+    """Run one step and tell what went wrong, each reason once; nothing may keep the steps after it from being tried."""
     try:
         step()
     except Exception as error:  # noqa: BLE001 - also a defect of ours must not leave the other drive armed
         reasons = [str(error) or type(error).__name__, *getattr(error, "__notes__", ())]
-        return ["; ".join(reason.rstrip(".") for reason in reasons)]
+        return list(dict.fromkeys(reason.rstrip(".") for reason in reasons))
     return []

@@ -148,7 +148,8 @@ class Cycle:
             )
         raise DeviceTimeout(
             f"inverter {station.name}: no TPDO for {age_s:.3f} s, expected one per SYNC and none missing "
-            f"for more than {timeout_s:g} s (feedback_timeout_s). Check its supply and its cabling."
+            f"for more than {timeout_s:g} s (feedback_timeout_s). Check its supply and its cabling; a simulated one "
+            "answers late on a busy machine."
         )
 
     def _last_ns(self, station: _Station) -> int:

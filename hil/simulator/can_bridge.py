@@ -1,7 +1,9 @@
 """Serve a virtual CAN channel to other processes: python-can-remote's WebSocket server, made closable.
 
 The library's own server never ends the connections it holds: closing it would leave threads and sockets
-behind. Here each connection is remembered, cut when the bridge closes, and its thread waited for.
+behind. Here each connection is remembered, cut when the bridge closes, and its thread waited for. A host that
+dies in the middle of a frame is no defect either: the library's thread would print a traceback and leave its
+end of the virtual bus open.
 """
 
 from __future__ import annotations
@@ -14,6 +16,8 @@ from types import TracebackType
 from typing import Any, Self
 
 from can_remote import RemoteServer
+from can_remote.server import ClientRequestHandler, RemoteServerProtocol
+from can_remote.websocket import WebSocket, get_accept_key
 
 from drivers.errors import BusDown
 from hil.simulator.loopback import Address
@@ -22,6 +26,36 @@ LOGGER = logging.getLogger(__name__)
 
 POLL_S = 0.05
 """How often the accepting thread looks whether it should end [s]."""
+
+
+BINARY, JSON = "can.binary+json.v1", "can.json.v1"
+"""The library's two subprotocols; the first is the quick one."""
+
+
+class _Connection(RemoteServerProtocol):  # type: ignore[misc]  # the library carries no types
+    """One host, whose end of the virtual bus is closed however its connection ends."""
+
+    def _send_to_client(self) -> None:
+        try:
+            super()._send_to_client()
+        except OSError:
+            LOGGER.info("a host ended its connection in the middle of a frame", exc_info=True)
+        finally:
+            self.bus.shutdown()
+
+
+class _Handler(ClientRequestHandler):  # type: ignore[misc]  # the library carries no types
+    """Meets a host: upgrades its HTTP request to a WebSocket (RFC 6455, 4.2.2) and serves it."""
+
+    def start_websocket(self) -> None:
+        protocol = BINARY if BINARY in self.headers.get("Sec-WebSocket-Protocol", "") else JSON
+        self.send_response(101)
+        self.send_header("Upgrade", "WebSocket")
+        self.send_header("Connection", "Upgrade")
+        self.send_header("Sec-WebSocket-Accept", get_accept_key(self.headers["Sec-WebSocket-Key"]))
+        self.send_header("Sec-WebSocket-Protocol", protocol)
+        self.end_headers()
+        _Connection(self.server.config, WebSocket(None, protocol, sock=self.request)).run()
 
 
 class _ClosableServer(RemoteServer):  # type: ignore[misc]  # the library carries no types
@@ -33,6 +67,7 @@ class _ClosableServer(RemoteServer):  # type: ignore[misc]  # the library carrie
         self._connections: set[socket.socket] = set()
         self._lock = threading.Lock()
         super().__init__(address.host, address.port, interface="virtual", channel=channel)
+        self.RequestHandlerClass = _Handler
 
     def process_request(self, request: socket.socket, client_address: Any) -> None:
         with self._lock:

@@ -13,17 +13,19 @@ from typing import Any
 import canopen
 from canopen.sdo.exceptions import SdoAbortedError
 
-from drivers.can_link import CanLink
+from drivers.can_link import CanLink, FrameCallback
 from drivers.eds_file import EdsFile
 from drivers.emcy import EMCY_COB_ID, Emergency
 from drivers.errors import ProtocolViolation
 from drivers.heartbeat import HEARTBEAT_COB_ID, NMT_COB_ID, HeartbeatProducer, NmtCommand, NmtState
 from drivers.pdo_map import PdoCodec
+from hil.simulator.heartbeat_consumer import HeartbeatConsumer
 from hil.simulator.inverter_device import PARAMETERS, InverterDevice, ObjectRefused
 from hil.simulator.inverter_settings import SimulatedInverter
 from hil.simulator.pdo_objects import PdoObjects
 
 _SDO_REQUEST_COB_ID = 0x600
+_CONSUMER_HEARTBEAT_TIME = (0x1016, 1)
 _PRODUCER_HEARTBEAT_TIME = 0x1017
 _PDO_LENGTH_ERROR = 0x8210
 
@@ -102,6 +104,7 @@ class InverterNode:
         self._heard: set[int] = set()
         self._syncs = 0
         self._state = NmtState.INITIALISING
+        self._host = HeartbeatConsumer()
         link.subscribe(_SDO_REQUEST_COB_ID + self._node_id, self._on_sdo_request)
         link.subscribe(NMT_COB_ID, self._on_nmt)
         self._boot()
@@ -130,6 +133,13 @@ class InverterNode:
             self._stop_heartbeat()
         else:
             self._send_emergencies()
+
+    def look_for_host(self, now_ns: int) -> None:
+        """Leave OPERATIONAL, without torque, if the host's heartbeat is lost at ``now_ns``."""
+        if self._state is NmtState.OPERATIONAL and self._host.lost(now_ns):
+            self._device.lose_bus()
+            self._pending.clear()
+            self._state = NmtState.PRE_OPERATIONAL
 
     def send_feedback(self) -> None:
         """Send the TPDOs that are due at this SYNC, with the values `step` sampled."""
@@ -176,14 +186,22 @@ class InverterNode:
         self._stop_heartbeat()
         self._server.data_store.clear()
         self._device.reset()
+        self._host = HeartbeatConsumer()
         self._boot()
 
     def _start_pdos(self) -> None:
         self._tpdos = self._pdo_objects.tpdos()
         self._rpdos = {rpdo.layout.cob_id: rpdo for rpdo in self._pdo_objects.rpdos()}
-        for cob_id in self._rpdos.keys() - self._heard:
-            self._link.subscribe(cob_id, partial(self._on_rpdo, cob_id))
+        for cob_id in self._rpdos:
+            self._hear(cob_id, partial(self._on_rpdo, cob_id))
+
+    def _hear(self, cob_id: int, callback: FrameCallback) -> None:
+        if cob_id not in self._heard:
+            self._link.subscribe(cob_id, callback)
             self._heard.add(cob_id)
+
+    def _on_heartbeat(self, data: bytes, t_ns: int) -> None:
+        self._host.beat(t_ns)
 
     def _on_rpdo(self, cob_id: int, data: bytes, t_ns: int) -> None:
         if self._state is NmtState.OPERATIONAL and cob_id in self._rpdos:
@@ -200,6 +218,7 @@ class InverterNode:
                 self._device.write(mapped.index, value)
 
     def _on_sdo_request(self, data: bytes, t_ns: int) -> None:
+        self.look_for_host(t_ns)
         if not self._device.hung and self._state is not NmtState.STOPPED:
             self._server.answer(data, t_ns)
             self._send_emergencies()
@@ -216,6 +235,9 @@ class InverterNode:
             raise SdoAbortedError(refusal.abort_code) from refusal
         if index == _PRODUCER_HEARTBEAT_TIME:
             self._start_heartbeat(value / 1000.0)
+        elif (index, subindex) == _CONSUMER_HEARTBEAT_TIME:
+            self._host = HeartbeatConsumer.from_object(value)
+            self._hear(self._host.cob_id, self._on_heartbeat)
 
     def _value(self, index: int, subindex: int) -> int:
         value = self._device.read(index, subindex)

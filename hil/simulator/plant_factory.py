@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from estimator.physics.catalogue import EFFECTS
-from estimator.physics.model import DrivelineModel, EffectValue
+from estimator.physics.model import DrivelineModel, EffectValue, Motion
 from hil.config.rig_file import Rig
 from hil.errors import UsageError
 from hil.simulator.driveline_plant import DrivelinePlant
@@ -23,16 +23,25 @@ def plant_for(rig: Rig, effects: Sequence[EffectSpec] = ()) -> Plant:
     rig
         The rig file, with a table ``[simulation]``.
     effects
-        Effects put in on top of those of its model, or in place of one of the same name.
+        Effects put in on top of those of its model, or in place of one of the same name; each once.
 
     Raises
     ------
     UsageError
-        If the rig file has no ``[simulation]``, or an effect comes without any parameter.
+        If the rig file has no ``[simulation]``, its model is of a translation, or an effect comes twice or
+        without any parameter.
     BadModel
         If an effect is none of the catalogue, or has no such parameter.
     """
     model = simulation_model(required_simulation(rig))
+    if model.motion is not Motion.ROTATION:
+        raise UsageError(
+            f"rig {rig.name!r}, simulation.model: expected motion = 'rotation', came {model.motion.value!r}: "
+            "its inverters turn a shaft. Name another model."
+        )
+    names = [effect.name for effect in effects]
+    if twice := sorted({name for name in names if names.count(name) > 1}):
+        raise UsageError(f"effect {twice[0]!r}: expected once, came twice. Give all its parameters in one --effect.")
     return DrivelinePlant(_with(model, effects), rig.period_s)
 
 

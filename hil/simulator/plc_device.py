@@ -71,12 +71,18 @@ class PlcFaults:
         The clutch closes by itself and stays closed.
     permissive_withdrawn_at_s : float
         The permissive goes and stays away.
+    mode_changes_at_s : float
+        The driver selects electric mode.
+    hangs_at_s : float
+        The PLC keeps its connections and answers nothing; for whoever serves it to carry out.
     refused_modes : frozenset of DriveMode
         The PLC takes the request and does not follow it.
     """
 
     clutch_closes_at_s: float = math.inf
     permissive_withdrawn_at_s: float = math.inf
+    mode_changes_at_s: float = math.inf
+    hangs_at_s: float = math.inf
     refused_modes: frozenset[DriveMode] = frozenset()
 
 
@@ -139,6 +145,7 @@ class PlcDevice:
             "prbs_seed": 1,
             "prbs_source": PrbsSource.HOST.value,
         }
+        self._fail()
 
     @property
     def clutch(self) -> ClutchState:
@@ -232,6 +239,8 @@ class PlcDevice:
     def _fail(self) -> None:
         if self._time_s >= self._faults.clutch_closes_at_s:
             self._clutch = ClutchState.CLOSED
+        if self._time_s >= self._faults.mode_changes_at_s:
+            self._drive_mode = DriveMode.ELECTRIC
         silent_s = self._time_s - self._seen_s
         if self._time_s >= self._faults.permissive_withdrawn_at_s or silent_s > self._setup.host_timeout_s:
             self._permissive = False

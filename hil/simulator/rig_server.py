@@ -98,8 +98,8 @@ class RigServer:
 
     def __enter__(self) -> Self:
         with ExitStack() as stack:
+            self._serve_plc(stack)  # before there is a SYNC that steps it
             self._serve_bus(stack)
-            self._serve_plc(stack)
             self._stack = stack.pop_all()
         return self
 
@@ -113,7 +113,7 @@ class RigServer:
         bus = can.Bus(interface="virtual", channel=channel, ignore_config=True)
         slaves = SimulatedRig(bus, self._plant, self._inverters(), self._rig.period_s, self._seed)
         stack.enter_context(slaves)
-        slaves.add_step_callback(lambda time_s: self.plc.step(self._rig.period_s))
+        slaves.add_step_callback(self._step_plc)
         if self._bridged is not None:
             self._bus_url = stack.enter_context(CanBridge(self._bridged, channel)).url
 
@@ -122,6 +122,15 @@ class RigServer:
         self.plc_server = PlcServer(self.plc, register_map, self._modbus.host, self._modbus.port)
         stack.enter_context(self.plc_server)
         self._modbus = Address(self._modbus.host, self.plc_server.port)
+        self._hang_plc_if_due(0.0)
+
+    def _step_plc(self, time_s: float) -> None:
+        self.plc.step(self._rig.period_s)
+        self._hang_plc_if_due(time_s)
+
+    def _hang_plc_if_due(self, time_s: float) -> None:
+        if time_s >= self._faults.plc.hangs_at_s:
+            self.plc_server.pause()
 
     def _inverters(self) -> tuple[SimulatedInverter, SimulatedInverter]:
         tables = self._rig.inverters

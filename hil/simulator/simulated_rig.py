@@ -100,6 +100,7 @@ class SimulatedRig:
     def _on_sync(self, data: bytes, t_ns: int) -> None:
         speed_rad_s = self._plant.speed_rad_s
         for node in self._nodes:
+            node.look_for_host(t_ns)
             node.step(speed_rad_s, self._period_s)
         for node in self._nodes:
             node.send_feedback()

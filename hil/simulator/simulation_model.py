@@ -42,11 +42,18 @@ class EffectSpec:
         Raises
         ------
         UsageError
-            If a parameter is no ``key=number``.
+            If there is no name, or a parameter is no ``key=number`` or comes twice.
         """
         name, _, rest = text.partition(":")
-        pairs = (part.partition("=") for part in rest.split(",")) if rest else ()
-        return cls(name.strip(), {key.strip(): _number(text, key, value) for key, _, value in pairs})
+        if not name.strip():
+            raise UsageError(f"effect {text!r}: expected NAME:key=number, came no name. List them by: hil effects")
+        parameters: dict[str, float] = {}
+        for part in rest.split(",") if rest else ():
+            key, value = _parameter(text, part)
+            if key in parameters:
+                raise UsageError(f"effect {text!r}: expected {key!r} once, came twice. Leave one out.")
+            parameters[key] = value
+        return cls(name.strip(), parameters)
 
 
 def simulation_model(table: SimulationTable) -> DrivelineModel:
@@ -54,11 +61,11 @@ def simulation_model(table: SimulationTable) -> DrivelineModel:
     return DEFAULT_BUS if table.model is None else read_model(table.model).model
 
 
-def _number(text: str, key: str, value: str) -> float:
+def _parameter(text: str, part: str) -> tuple[str, float]:
+    key, _, value = part.partition("=")
     try:
-        return float(value)
+        return key.strip(), float(value)
     except ValueError as error:
         raise UsageError(
-            f"effect {text!r}: expected key=number for {key.strip()!r}, came {value!r}. "
-            "Write NAME:key=number,key=number."
+            f"effect {text!r}: expected key=number, came {part!r}. Write NAME:key=number,key=number."
         ) from error

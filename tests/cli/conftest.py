@@ -54,8 +54,8 @@ def spawn() -> Iterator[Callable[..., subprocess.Popen[str]]]:
 def simulate(spawn: Callable[..., subprocess.Popen[str]]) -> Callable[..., Simulation]:
     """Start ``hil sim`` on free ports and wait until it is ready."""
 
-    def start(rig: Path) -> Simulation:
-        process = spawn("sim", str(rig), *ANY_ADDRESS)
+    def start(rig: Path, *options: str) -> Simulation:
+        process = spawn("sim", str(rig), *ANY_ADDRESS, *options)
         assert process.stdout is not None
         word, bus, modbus = process.stdout.readline().split()
         assert word == "ready"
@@ -79,3 +79,11 @@ def short_rig(tmp_path: Path) -> Path:
     path = tmp_path / "rig.toml"
     path.write_text(text, encoding="utf-8")
     return path
+
+
+def await_rows(part: Path, process: subprocess.Popen[str]) -> None:
+    """Follow the file as it is written, until it has its first rows."""
+    while process.poll() is None:
+        if part.exists() and part.read_text(encoding="utf-8").count("\n") > 10:
+            return
+    raise AssertionError(process.communicate())

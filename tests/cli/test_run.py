@@ -14,6 +14,7 @@ import pytest
 from hil.cli.main import run
 from hil.config.rig_file import read_rig
 from hil.recording.formats import read_table
+from tests.cli.conftest import await_rows
 from tests.rig.observer import assert_disarmed
 from tests.rig.serving import served
 
@@ -50,7 +51,7 @@ def test_recording_says_what_it_is(short_rig: Path, tmp_path: Path) -> None:
     assert len(metadata["eds_m1_sha256"]) == 64
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_signal_in_the_middle_keeps_the_recording_and_disarms(
     spawn: Callable[..., subprocess.Popen[str]], short_rig: Path, tmp_path: Path, number: signal.Signals
 ) -> None:
@@ -58,7 +59,7 @@ def test_signal_in_the_middle_keeps_the_recording_and_disarms(
     with served(read_rig(short_rig), bus_url="ws://127.0.0.1:0/") as (server, _):
         addresses = ("--bus", server.bus_url, "--modbus", str(server.modbus))
         process = spawn("run", str(short_rig), "cruise", "--out", str(out), *addresses)
-        _await_rows(tmp_path / "run.part.csv", process)
+        await_rows(tmp_path / "run.part.csv", process)
         process.send_signal(number)
         _, complaints = process.communicate(timeout=20)
         assert process.returncode == 130
@@ -67,14 +68,6 @@ def test_signal_in_the_middle_keeps_the_recording_and_disarms(
     assert 0 < len(times) < 3000
     assert f"holds the {len(times)} samples" in complaints
     assert not (tmp_path / "run.part.csv").exists()
-
-
-def _await_rows(part: Path, process: subprocess.Popen[str]) -> None:
-    """Follow the file as it is written, until it has its first rows."""
-    while process.poll() is None:
-        if part.exists() and part.read_text(encoding="utf-8").count("\n") > 10:
-            return
-    raise AssertionError(process.communicate())
 
 
 def test_closing_clutch_is_a_device_problem(

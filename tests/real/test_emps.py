@@ -1,7 +1,8 @@
 """A real linear drive whose nominal model leaves out dry friction: what the tool says of it, end to end.
 
 The published identification is of Janot, Gautier and Brunot, "Data set and reference models of EMPS", Workshop on
-Nonlinear System Identification Benchmarks, 2019; it appears here alone. Tolerances and the 2.6 mm are the requirement's.
+Nonlinear System Identification Benchmarks, 2019; it appears here alone. Tolerances and the 2.6 mm are the
+requirement's.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hil.errors import RecordingError
-from hil.recording import Table, csv_format
+from hil.recording import Table, csv_format, read_table, write_table
 from hil.recording.format_hints import FormatHints
 
 
@@ -144,3 +144,9 @@ def test_delimiters_that_could_be_data_are_refused(delimiter: str) -> None:
 def test_an_unknown_encoding_is_refused() -> None:
     with pytest.raises(ValueError, match="such as 'utf-8' or 'latin-1'"):
         FormatHints(encoding="klingon")
+
+
+@pytest.mark.parametrize("name", ["|", "a;b;c", "one\ttwo", 'say "a|b|c"', "a,b"])
+def test_a_column_name_with_a_delimiter_in_it_reads_back(tmp_path: Path, name: str) -> None:
+    write_table(Table(Path("a.csv"), {name: np.arange(3)}), tmp_path / "a.csv")
+    assert list(read_table(tmp_path / "a.csv").columns) == [name]

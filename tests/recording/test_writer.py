@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from pathlib import Path
 
 import pytest
@@ -150,3 +151,22 @@ def test_a_closed_writer_takes_no_sample(tmp_path: Path) -> None:
         writer.append(sample(0))
     writer.__exit__(None, None, None)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_recording_there_is_no_room_for_stays_in_the_part_file(tmp_path: Path) -> None:
+    """A folder stands where Parquet is written to before it gets its name: the write fails, as on a full disk."""
+    path = tmp_path / "run.parquet"
+    (tmp_path / f".run.parquet.{os.getpid()}.part").mkdir()
+    writer = RecordingWriter(path)
+    with pytest.raises(RecordingError, match=r"run\.parquet: expected room for the recording, came: .*run\.part\.csv"):
+        with writer:
+            writer.append(sample(1))
+    assert writer.kept == tmp_path / "run.part.csv"
+    assert read_table(writer.kept).n_rows == 1
+
+
+def test_what_is_kept_is_known_when_the_run_is_over(tmp_path: Path) -> None:
+    with RecordingWriter(tmp_path / "run.csv") as writer:
+        assert writer.kept is None
+        writer.append(sample(1))
+    assert writer.kept == tmp_path / "run.csv"

@@ -150,7 +150,7 @@ def test_a_result_that_fails_leaves_the_older_ones(tmp_path: Path) -> None:
         path.write_text("half")
         raise OSError("disk full")
 
-    with pytest.raises(OSError, match="disk full"):
+    with pytest.raises(UsageError, match="expected a folder to write into, came: disk full"):
         publish(tmp_path, {"a.txt": lambda path: path.write_text("new"), "b.txt": fail})
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"a.txt": "old"}
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import socket
+import struct
 import threading
 import uuid
 
@@ -43,6 +45,21 @@ def test_host_sees_the_bridge_close() -> None:
         host.recv(5.0)
     host.socket.close()
     host._is_shutdown = True  # the library's own shutdown can't end a connection that is already cut
+
+
+def test_host_that_dies_in_the_middle_of_frames_is_no_defect() -> None:
+    """Its connection is reset while frames are under way; a traceback of the library's thread fails the test."""
+    channel = str(uuid.uuid4())
+    threads = threading.active_count()
+    frame = can.Message(arbitration_id=0x181, data=bytes(8), is_extended_id=False)
+    with CanBridge(ANY_PORT, channel) as bridge, can.Bus(interface="virtual", channel=channel) as slave:
+        host = remote(bridge.url)
+        host.socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))  # close() then resets
+        host.socket.close()
+        host._is_shutdown = True  # it died: it says no goodbye
+        while threading.active_count() > threads + 1:  # the thread that accepts stays
+            slave.send(frame)
+    assert threading.active_count() == threads
 
 
 def test_taken_port_is_refused() -> None:

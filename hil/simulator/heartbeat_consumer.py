@@ -1,0 +1,48 @@
+"""What a simulated node does with the host's heartbeat (CiA 301, object 1016h): notice that it has ended.
+
+Time is passed in with the frames a node receives; nothing here reads a clock. A node that receives nothing
+does nothing either, for its torque is put into effect by SYNC alone.
+"""
+
+from __future__ import annotations
+
+from typing import Self
+
+from drivers.heartbeat import HEARTBEAT_COB_ID
+
+NS_PER_MS = 1_000_000
+
+
+class HeartbeatConsumer:
+    """Watches one heartbeat, from the first that comes; off by default.
+
+    Parameters
+    ----------
+    node_id
+        Whose heartbeat it is.
+    timeout_ms
+        Longest time between two [ms]; 0 for no watching.
+    """
+
+    __slots__ = ("_last_ns", "_timeout_ns", "cob_id")
+
+    def __init__(self, node_id: int = 0, timeout_ms: int = 0) -> None:
+        self.cob_id = HEARTBEAT_COB_ID + node_id
+        self._timeout_ns = timeout_ms * NS_PER_MS
+        self._last_ns: int | None = None
+
+    @classmethod
+    def from_object(cls, value: int) -> Self:
+        """Read the object: node id in bits 16 to 22, time in bits 0 to 15 [ms]."""
+        return cls(value >> 16 & 0x7F, value & 0xFFFF)
+
+    def beat(self, t_ns: int) -> None:
+        """Take one heartbeat."""
+        self._last_ns = t_ns
+
+    def lost(self, now_ns: int) -> bool:
+        """Whether the heartbeat has ended; once, then watching starts anew with the next one."""
+        if self._timeout_ns == 0 or self._last_ns is None or now_ns - self._last_ns <= self._timeout_ns:
+            return False
+        self._last_ns = None
+        return True

@@ -1,0 +1,43 @@
+"""Effects that do not exist, or not so: in the catalogue and put into the simulated rig."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.bad_input.conftest import Refused
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("gremlins", "effect 'gremlins': expected one of"),
+        ("", "effect '': expected one of"),
+        ("Backlash", "Did you mean backlash?"),
+    ],
+)
+def test_the_catalogue_names_what_it_has(refused: Refused, name: str, said: str) -> None:
+    complaint = refused("effects", name)
+    assert said in complaint
+    assert "coulomb_friction_motor" in complaint
+
+
+@pytest.mark.parametrize(
+    ("effects", "said"),
+    [
+        (["gremlins:size=1"], "effects.gremlins: unknown effect, expected one of"),
+        (["backlash"], "effect 'backlash': expected at least one of its parameters (gap_rad"),
+        (["backlash:gap=0.1"], "effects.backlash.gap: unknown parameter, expected gap_rad"),
+        (["backlash:gap_rad"], "effect 'backlash:gap_rad': expected key=number, came 'gap_rad'"),
+        (["backlash:gap_rad=wide"], "expected key=number, came 'gap_rad=wide'"),
+        (["backlash:gap_rad=-1"], "effects.backlash.gap_rad.value: expected a number 0 or greater, came -1.0"),
+        (["backlash:gap_rad=nan"], "effects.backlash.gap_rad.value: expected a finite number, came nan"),
+        (["backlash:gap_rad=1,gap_rad=2"], "expected 'gap_rad' once, came twice"),
+        (["backlash:gap_rad=1", "backlash:gap_rad=2"], "effect 'backlash': expected once, came twice"),
+        ([""], "effect '': expected NAME:key=number, came no name"),
+    ],
+)
+def test_the_simulated_rig_refuses_them(refused: Refused, short_rig: Path, effects: list[str], said: str) -> None:
+    options = [word for effect in effects for word in ("--effect", effect)]
+    assert said in refused("sim", short_rig, "--bus", "ws://127.0.0.1:0/", "--modbus", "127.0.0.1:0", *options)

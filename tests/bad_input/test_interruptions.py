@@ -1,0 +1,88 @@
+"""Signals while a command works: status 130, no traceback, nothing half written, no drive left enabled."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import signal
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NoReturn
+
+import pytest
+
+from drivers.cia402 import PowerState
+from hil.cli.main import run
+from tests.cli.conftest import await_rows
+from tests.rig.observer import power_state
+
+Spawn = Callable[..., subprocess.Popen[str]]
+
+SIGNALS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
+
+
+def opened_by(process: subprocess.Popen[str], pipe: Path) -> int:
+    """Wait until a process opens a named pipe to read; give the end to write to."""
+    while process.poll() is None:
+        try:
+            return os.open(pipe, os.O_WRONLY | os.O_NONBLOCK)
+        except OSError:  # nobody reads yet
+            continue
+    raise AssertionError(process.communicate())
+
+
+@pytest.mark.parametrize("number", SIGNALS)
+@pytest.mark.parametrize("command", ["identify PIPE --out OUT", "diagnose PIPE --model MODEL --out OUT"])
+def test_while_it_reads(spawn: Spawn, drive: Path, command: str, number: signal.Signals) -> None:
+    """The recording is a named pipe with nothing in it: the command is at it, and stays there."""
+    pipe, out = drive / "pipe.csv", drive / "out"
+    os.mkfifo(pipe)
+    words = {"PIPE": str(pipe), "MODEL": str(drive / "drive.toml"), "OUT": str(out)}
+    process = spawn(*(words.get(word, word) for word in command.split()))
+    writing = opened_by(process, pipe)
+    process.send_signal(number)
+    printed, complaint = process.communicate(timeout=20)
+    os.close(writing)
+    assert (process.returncode, printed, complaint) == (130, "", "interrupted\n")
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("number", SIGNALS)
+def test_while_it_computes(spawn: Spawn, drive: Path, number: signal.Signals) -> None:
+    """The model is whole as soon as the pipe has been emptied and closed; the fit takes far longer."""
+    pipe, out = drive / "pipe.toml", drive / "out"
+    os.mkfifo(pipe)
+    process = spawn("diagnose", str(drive / "run_1.csv"), "--model", str(pipe), "--out", str(out))
+    writing = opened_by(process, pipe)
+    os.write(writing, (drive / "drive.toml").read_bytes())
+    os.close(writing)
+    process.send_signal(number)
+    printed, complaint = process.communicate(timeout=20)
+    assert (process.returncode, printed, complaint) == (130, "", "interrupted\n")
+    assert not out.exists()
+
+
+def test_while_it_imports(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    def interrupt(name: str) -> NoReturn:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(importlib, "import_module", interrupt)
+    assert run(["effects"]) == 130
+    assert capsys.readouterr().err == "interrupted\n"
+
+
+def test_a_host_that_is_killed_leaves_no_drive_enabled_and_the_rig_up(
+    spawn: Spawn, simulate: Callable[..., Any], short_rig: Path, tmp_path: Path
+) -> None:
+    """Nothing of ours can act on SIGKILL: it is the drives that miss the host's heartbeat."""
+    simulation = simulate(short_rig)
+    process = spawn("run", str(short_rig), "cruise", "--out", str(tmp_path / "run.csv"), *simulation.addresses)
+    await_rows(tmp_path / "run.part.csv", process)
+    process.kill()
+    process.wait()
+    while any(power_state(simulation.bus, node_id) is PowerState.OPERATION_ENABLED for node_id in (1, 2)):
+        assert simulation.process.poll() is None
+    simulation.process.send_signal(signal.SIGTERM)
+    assert simulation.process.communicate(timeout=20) == ("", "")
+    assert simulation.process.returncode == 0

@@ -1,0 +1,74 @@
+"""Model files with faults, read by the commands that take one; and one that is good, but of another motion."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.bad_input.conftest import Refused, with_changes
+from tests.cli import bench
+
+EFFECTS = "\n[effects.gremlins]\nx = { value = 1 }\n[effects.coulomb_friction_motor]\nhaste = { value = 1 }\n"
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ([("[parameters]", "[parameters")], ["line 5, column 12 | expected TOML"]),
+        ([("hil.model/1", "hil.model/9")], ["schema | expected 'hil.model/1' | came 'hil.model/9'"]),
+        ([("one_mass", "four_mass")], ["structure | expected 'one_mass' or 'two_mass' | came 'four_mass'"]),
+        ([("b_M", "# b_M")], ["parameters.b_M: missing, one_mass needs J_M, b_M"]),
+        ([("value = 2.0", "value = -2.0")], ["parameters.J_M.value: expected a finite number greater than 0"]),
+        (
+            [("J_M", "J_X"), ("motion =", "motio =")],
+            ["motio | expected one of the known keys", "parameters.J_M: missing", "parameters.J_X: unknown"],
+        ),
+        (
+            [("[parameters]", "[signals]\nspeed = { column = 'v', scale = 0.0 }\nfoo = 1\n[parameters]")],
+            ["signals.speed.scale | expected a number other than 0", "signals.foo | expected one of the known keys"],
+        ),
+        (
+            [("\n[parameters]", f"{EFFECTS}\n[parameters]")],
+            ["effects.gremlins: unknown effect, expected one of", "effects.coulomb_friction_motor.haste: unknown"],
+        ),
+        (
+            [("\n[parameters]", "\neffects.backlash = 3\n[parameters]")],
+            ["effects.backlash | expected a table | came 3"],
+        ),
+    ],
+)
+def test_each_fault_is_named_and_nothing_is_written(
+    refused: Refused, drive: Path, changes: list[tuple[str, str]], said: list[str]
+) -> None:
+    model = drive / "drive.toml"
+    model.write_text(with_changes(bench.MODEL, changes), encoding="utf-8")
+    complaint = refused("simulate", "--model", model, "--input", drive / "run_1.csv", "--out", drive / "simulated.csv")
+    assert all(f"{model}: {each}" in complaint for each in said), complaint
+    assert not (drive / "simulated.csv").exists()
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "simulate --model MODEL --input REC --out OUT.csv",
+        "compare MODEL REC --out OUT",
+        "diagnose REC --model MODEL --out OUT",
+        "identify REC --model MODEL --out OUT",
+    ],
+)
+def test_a_translation_is_not_held_against_a_motor_speed(refused: Refused, drive: Path, command: str) -> None:
+    model = drive / "drive.toml"
+    model.write_text(bench.MODEL.replace("rotation", "translation"), encoding="utf-8")
+    words = {"MODEL": str(model), "REC": str(drive / "run_1.csv"), "OUT": str(drive / "out")}
+    complaint = refused(*(words.get(word, word.replace("OUT", words["OUT"])) for word in command.split()))
+    assert f"{model}: motion | expected 'rotation'" in complaint
+    assert "[signals]" in complaint
+    assert sorted(path.name for path in drive.iterdir()) == ["drive.toml", "run_1.csv"]
+
+
+def test_a_translation_turns_no_shaft_of_a_simulated_rig(refused: Refused, tmp_path: Path, rig_text: str) -> None:
+    (tmp_path / "slide.toml").write_text(bench.MODEL.replace("rotation", "translation"), encoding="utf-8")
+    rig = tmp_path / "rig.toml"
+    rig.write_text(with_changes(rig_text, [('# model = "model.toml"', 'model = "slide.toml"')]), encoding="utf-8")
+    assert "simulation.model: expected motion = 'rotation', came 'translation'" in refused("sim", rig)

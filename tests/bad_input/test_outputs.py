@@ -1,0 +1,101 @@
+"""Places that can't be written to: refused before the work where that can be seen, and never half written."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from hil.config.rig_file import read_rig
+from hil.recording import read_table
+from tests.bad_input.conftest import Refused
+from tests.rig.observer import assert_disarmed
+from tests.rig.serving import served
+
+LITTLE_ROOM = 'ulimit -f 20 && exec "$@"'
+"""Lets a process write files of 10 or 20 KiB, by shell; the short rig's reversal makes 31 KiB of CSV."""
+
+NOWHERE = ("--bus", "ws://127.0.0.1:9/", "--modbus", "127.0.0.1:9")
+
+COMMANDS = [
+    "diagnose REC --model MODEL --out",
+    "identify REC --out",
+    "compare MODEL REC --out",
+    "demo --seed 1 --out",
+]
+
+
+def words(command: str, drive: Path) -> list[str]:
+    places = {"MODEL": str(drive / "drive.toml"), "REC": str(drive / "run_1.csv")}
+    return [places.get(word, word) for word in command.split()]
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize(("place", "said"), [("drive.toml", "which is a file"), ("run_1.csv/sub", "which is a file")])
+def test_a_file_is_no_folder(refused: Refused, drive: Path, command: str, place: str, said: str) -> None:
+    before = (drive / place.partition("/")[0]).read_bytes()
+    complaint = refused(*words(command, drive), drive / place)
+    assert f"{drive / place}: expected a folder to write into" in complaint
+    assert said in complaint
+    assert (drive / place.partition("/")[0]).read_bytes() == before
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_place_where_nothing_can_be_made(refused: Refused, drive: Path, command: str) -> None:
+    assert "/proc/result: expected a folder to write into, came: " in refused(*words(command, drive), "/proc/result")
+
+
+def test_a_simulation_has_no_place_either(refused: Refused, drive: Path) -> None:
+    model, recording = drive / "drive.toml", drive / "run_1.csv"
+    complaint = refused("simulate", "--model", model, "--input", recording, "--out", "/proc/simulated.csv")
+    assert "/proc: expected a folder to write into, came: " in complaint
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("run.mat", "expected a name that ends in one of .csv, .parquet"),
+        ("rig.toml/run.csv", "expected an existing folder"),
+        ("none/run.csv", "expected an existing folder"),
+    ],
+)
+def test_a_run_is_not_started_without_a_place(refused: Refused, short_rig: Path, name: str, said: str) -> None:
+    out = short_rig.parent / name
+    assert f"{out}: {said}" in refused("run", short_rig, "cruise", "--out", out, *NOWHERE)
+    assert list(short_rig.parent.iterdir()) == [short_rig]
+
+
+def test_a_run_is_not_started_where_nothing_can_be_made(refused: Refused, short_rig: Path) -> None:
+    assert "expected a place to write" in refused("run", short_rig, "cruise", "--out", "/proc/run.csv", *NOWHERE)
+
+
+@pytest.mark.parametrize("name", ["run.csv", "run.parquet"])
+def test_a_full_disk_ends_the_run_disarmed_and_keeps_what_fitted(short_rig: Path, name: str) -> None:
+    folder = short_rig.parent
+    with served(read_rig(short_rig), bus_url="ws://127.0.0.1:0/") as (server, _):
+        command = ["run", str(short_rig), "reversal", "--out", str(folder / name), "--pace", "fast"]
+        addresses = ["--bus", server.bus_url, "--modbus", str(server.modbus)]
+        done = subprocess.run(
+            ["sh", "-c", LITTLE_ROOM, "sh", sys.executable, "-m", "hil", *command, *addresses],
+            capture_output=True,
+            text=True,
+        )
+        assert_disarmed(server.bus_url, 1, 2)
+    assert done.returncode == 2, done.stderr
+    assert f"{folder / name}: expected room for " in done.stderr
+    assert "Traceback" not in done.stderr
+    (kept,) = (path for path in folder.iterdir() if path != short_rig)
+    samples = len(read_table(kept).columns["time_s"])
+    assert f"{kept} holds the {samples} samples up to there" in done.stderr
+
+
+@pytest.mark.parametrize("options", [[], ["--json"]])
+def test_standard_output_that_takes_nothing(options: list[str]) -> None:
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "hil", "effects", *options], stdout=full, stderr=subprocess.PIPE, text=True
+        )
+    assert done.returncode == 2
+    assert done.stderr == "error: [Errno 28] No space left on device\n"

@@ -1,0 +1,61 @@
+"""A drive that misses its host: when it counts as lost, and what the drive does then."""
+
+from __future__ import annotations
+
+import time
+
+import pytest
+
+from drivers.cia402 import PowerState
+from drivers.errors import DeviceFault
+from drivers.heartbeat import HEARTBEAT_COB_ID
+from hil.simulator.heartbeat_consumer import NS_PER_MS, HeartbeatConsumer
+from tests.drivers.can_bench import bench, guarded
+
+LONG_NS = 3600 * 1_000_000_000
+
+
+def test_watching_begins_with_the_first_heartbeat() -> None:
+    consumer = HeartbeatConsumer(127, timeout_ms=500)
+    assert not consumer.lost(LONG_NS)
+    consumer.beat(LONG_NS)
+    assert not consumer.lost(LONG_NS + 500 * NS_PER_MS)
+    assert consumer.lost(LONG_NS + 500 * NS_PER_MS + 1)
+
+
+def test_a_loss_counts_once_until_the_heartbeat_is_back() -> None:
+    consumer = HeartbeatConsumer(127, timeout_ms=500)
+    consumer.beat(0)
+    assert consumer.lost(LONG_NS)
+    assert not consumer.lost(LONG_NS)
+    consumer.beat(LONG_NS)
+    assert consumer.lost(2 * LONG_NS)
+
+
+def test_a_time_of_zero_is_no_watching() -> None:
+    consumer = HeartbeatConsumer()
+    consumer.beat(0)
+    assert not consumer.lost(LONG_NS)
+
+
+def test_the_object_holds_node_and_time() -> None:
+    consumer = HeartbeatConsumer.from_object(0x007F_01F4)
+    assert consumer.cob_id == HEARTBEAT_COB_ID + 127
+    consumer.beat(0)
+    assert not consumer.lost(500 * NS_PER_MS)
+    assert consumer.lost(501 * NS_PER_MS)
+
+
+def test_a_drive_without_its_host_gives_no_torque_and_leaves_operation() -> None:
+    with bench() as rig:
+        for inverter in (rig.m1, rig.m2):
+            inverter.configure()
+        rig.m1.arm()
+        rig.cycle(guarded(120.0))
+        assert rig.rig.torque_nm[0] == pytest.approx(120.0)
+        for node in rig.rig._nodes:
+            node.look_for_host(time.monotonic_ns() + LONG_NS)
+        assert rig.rig.torque_nm == (0.0, 0.0)
+        assert rig.rig._nodes[0]._device.state is PowerState.SWITCH_ON_DISABLED
+        with pytest.raises(DeviceFault, match="NMT state is PRE-OPERATIONAL, expected OPERATIONAL"):
+            rig.until_raised()
