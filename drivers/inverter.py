@@ -131,7 +131,7 @@ class Inverter:
         self._start_heartbeats()
         self._feedback.start_anew()
         self._send_nmt(NmtCommand.START)
-        self._monitor.await_state(NmtState.OPERATIONAL, self.settings.heartbeat_timeout_ms / 1000.0)
+        self._monitor.await_state(NmtState.OPERATIONAL, self.settings.state_timeout_s)
         self._monitor.expect(NmtState.OPERATIONAL)
 
     def arm(self) -> None:

@@ -46,7 +46,7 @@ class InverterSettings:
     product_code: int | None = None
     heartbeat_ms: int = 100
     sdo_timeout_s: float = 0.5
-    state_timeout_s: float = 1.0
+    state_timeout_s: float = 2.0
 
     @property
     def heartbeat_timeout_ms(self) -> int:
