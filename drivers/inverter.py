@@ -104,6 +104,20 @@ class Inverter:
             *configurable_differences(self._sdo, self._eds, self.settings, self._layouts),
         )
 
+    def fault(self) -> str | None:
+        """Tell what fault the drive is in: power state, error code in words, what to do; None without fault.
+
+        Reads objects, writes none.
+
+        Raises
+        ------
+        DeviceTimeout
+            If the node does not answer.
+        ProtocolViolation
+            If its statusword is none of CiA 402.
+        """
+        return self._power.fault()
+
     def configure(self) -> None:
         """Give the device the EDS's PDO layout and option codes, start heartbeats and NMT operation.
 

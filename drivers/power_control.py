@@ -141,12 +141,19 @@ class PowerControl:
             If ``state`` is FAULT or FAULT_REACTION_ACTIVE.
         """
         if state in FAULT_STATES:
-            code = self._sdo.upload(0x603F)
-            raise DeviceFault(
-                f"{self._where}: power state is {state.value}, error code 0x603F is 0x{code:04X} "
-                f"{cause_of(code)}, expected a drive without fault. Mend the cause at the drive, "
-                "reset the fault."
-            )
+            raise DeviceFault(f"{self._where}: {self._fault_of(state)}")
+
+    def fault(self) -> str | None:
+        """Read whether the drive is in a fault state: state, cause and cure in words, or None. Nothing is written."""
+        state = self._state()
+        return self._fault_of(state) if state in FAULT_STATES else None
+
+    def _fault_of(self, state: PowerState) -> str:
+        code = self._sdo.upload(0x603F)
+        return (
+            f"power state is {state.value}, error code 0x603F is 0x{code:04X} {cause_of(code)}, expected a drive "
+            "without fault. Mend the cause at the drive, reset the fault."
+        )
 
     def _poll(self, read: Callable[[], T], accept: Callable[[T], bool]) -> T:
         """Read until accepted or out of time; the last value either way."""

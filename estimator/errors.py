@@ -5,6 +5,7 @@
     EstimatorError
      +-- BadShape     (ValueError)   arrays of the wrong shape, or not finite
      +-- BadModel     (ValueError)   a model whose parameters are missing, unknown or non-physical
+     +-- BadSetting   (ValueError)   a setting its algorithm can't work with
      +-- NotExciting                 the data do not determine what was asked
 
 Inside a sample loop nothing raises: there a status says what is wrong with the estimate.
@@ -23,6 +24,14 @@ class BadShape(EstimatorError, ValueError):
 
 class BadModel(EstimatorError, ValueError):
     """A model names unknown parameters or effects, misses some, or is non-physical."""
+
+
+class BadSetting(EstimatorError, ValueError):
+    """A setting is outside what its algorithm can work with: the caller is at fault.
+
+    Examples: a shift register that starts at zero, a sampling period that does not divide the wanted one.
+    To do: give a value of the kind the message names.
+    """
 
 
 class NotExciting(EstimatorError):

@@ -20,7 +20,7 @@ from enum import Enum
 
 import numpy as np
 
-from estimator.errors import NotExciting
+from estimator.errors import BadSetting, NotExciting
 from estimator.identification.adaptation import Adaptation, DecreasingThenConstantTrace
 from estimator.identification.excitation import SAMPLES_PER_PARAMETER
 from estimator.identification.linear_model import LinearModel, Orders
@@ -31,7 +31,7 @@ from estimator.identification.recursive import Estimate, Trajectory
 from estimator.identification.spectral import SpectralEstimate, spectral_estimate
 from estimator.signals.decimate import decimate
 from estimator.signals.record import FloatArray, Record
-from estimator.signals.settings import BadSetting, Requirement, is_positive, require
+from estimator.signals.settings import Requirement, is_positive, require
 
 
 class FilterPart(Enum):

@@ -7,11 +7,11 @@ is compiled into the one kernel (``estimator.physics.kernel``); everything else 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 
 from estimator.physics.model import DrivelineModel, Motion, Structure, unit
-from estimator.signals.record import Record
+from estimator.signals.record import OutputKind, Record
 
 
 class Element(Enum):
@@ -43,6 +43,9 @@ class EffectParameter:
         One line for people.
     optional : bool
         True where a model file may leave it out; it is then at ``null``.
+    own : bool
+        True where every recording has its own value (the phase of an angle, the moments of an event): it is estimated
+        with the recording's initial state and belongs to no model.
     """
 
     name: str
@@ -52,10 +55,18 @@ class EffectParameter:
     high: float
     meaning: str
     optional: bool = False
+    own: bool = False
 
     def unit(self, motion: Motion) -> str:
         """Return the parameter's unit in a kind of motion."""
         return unit(self.dimension, motion)
+
+
+@dataclass(frozen=True, slots=True)
+class Held:
+    """A start value that the fit keeps: a discrete choice, such as the order of a ripple."""
+
+    value: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +78,8 @@ class Untestable:
 
 
 Scales = Callable[[DrivelineModel, Sequence[Record]], tuple[float, ...]]
-Starts = Callable[[DrivelineModel, Sequence[Record]], list[tuple[float, ...]]]
+Start = tuple[float | Held, ...]
+Starts = Callable[[DrivelineModel, Sequence[Record]], list[Start]]
 Testable = Callable[[DrivelineModel, Sequence[Record]], Untestable | None]
 
 
@@ -97,15 +109,24 @@ class Effect:
     contains : tuple[str, ...]
         Effects that are special cases of this one.
     scales : callable
-        Model and records to a typical size of each parameter (positive).
+        Model and records to a typical size of each parameter that all recordings share (positive).
     starts : callable
-        Model and records to start points of the fit, in units of the scales.
+        Model and records to start points of the fit, in units of the scales, one value per parameter that all
+        recordings share; ``Held`` values are not fitted.
     testable : callable
         Model and records to None, or to the reason why they can't tell.
     sentence : callable
         Parameter values to the statement a driveline engineer would write.
+    kinds : frozenset[OutputKind]
+        Measured outputs it makes sense with.
     profile : bool
         True where the parameters are a profile over each recording's own time (road grade) and not constants.
+    event : bool
+        True where it acts during an interval of each recording, from its own ``from_s`` to its own ``to_s``.
+    phases : mapping of str to str
+        Own phase to the shared amplitude that it belongs to, for effects periodic in an angle.
+    recognised : bool
+        True where it is recognised in the raw data before any fit (repeated, lost, quantised samples).
     """
 
     name: str
@@ -123,4 +144,18 @@ class Effect:
     starts: Starts
     testable: Testable
     sentence: Callable[[Mapping[str, float], Motion], str]
+    kinds: frozenset[OutputKind] = frozenset(OutputKind)
     profile: bool = False
+    event: bool = False
+    phases: Mapping[str, str] = field(default_factory=dict)
+    recognised: bool = False
+
+    @property
+    def shared_parameters(self) -> tuple[EffectParameter, ...]:
+        """Parameters that all recordings share, in order."""
+        return tuple(parameter for parameter in self.parameters if not parameter.own)
+
+    @property
+    def own_parameters(self) -> tuple[EffectParameter, ...]:
+        """Parameters that every recording has of its own, in order."""
+        return tuple(parameter for parameter in self.parameters if parameter.own)

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-
-import numpy as np
 
 from estimator.physics.fit import FitResult, Problem, fit, make_problem, start_of, start_vector
 from estimator.physics.layout import slot
@@ -88,8 +85,3 @@ def simulate_foreign(
     """
     own = make_problem(model, [record], (), profile=profile, use=[use], grid=grid)
     return settle(replace(own, p=p)).outputs[0]
-
-
-def free_runs(model: DrivelineModel, records: Sequence[Record]) -> tuple[FloatArray, ...]:
-    """Simulate several recordings with a model; each as ``free_run`` does."""
-    return tuple(np.asarray(free_run(model, record).output) for record in records)

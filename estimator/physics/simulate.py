@@ -18,6 +18,13 @@ RADIANS_PER_STEP = 0.15
 """Integration step in radians of the line's natural frequency, or its fastest decay: fourth order leaves 1e-6 of
 amplitude per step."""
 
+FASTEST_IN_NYQUIST = 30.0
+"""Fastest mode that is simulated, in multiples of the Nyquist frequency of the sample time.
+
+A line that stiff differs from a rigid one by 1 / 30^2, a thousandth, at the highest frequency a recording holds:
+simulating a faster mode takes ever more integration steps and changes nothing that can be seen.
+"""
+
 SIGN_WIDTH = 0.01
 """Dry friction changes sign within this share of the top speed of recordings that pass through standstill.
 
@@ -62,11 +69,38 @@ def natural_frequency_rad_s(values: Mapping[str, float]) -> float:
 
 
 def substeps_for(values: Mapping[str, float], period_s: float) -> int:
-    """Return the integration steps per period that the line's natural frequency, or its fastest decay, needs."""
+    """Return the integration steps per period that the line's natural frequency, or its fastest decay, needs.
+
+    Raises
+    ------
+    BadModel
+        Where that is beyond `FASTEST_IN_NYQUIST`.
+    """
     motor = (values["b_M"] + values.get("c", 0.0)) / values["J_M"]
     load = (values["b_L"] + values["c"]) / values["J_L"] if "k" in values else 0.0
-    angle = max(natural_frequency_rad_s(values), motor + load) * period_s
-    return max(1, math.ceil(angle / RADIANS_PER_STEP))
+    fastest = max(natural_frequency_rad_s(values), motor + load)
+    if fastest * period_s > FASTEST_IN_NYQUIST * math.pi:
+        raise BadModel(_too_fast(values, fastest, period_s))
+    return max(1, math.ceil(fastest * period_s / RADIANS_PER_STEP))
+
+
+def _too_fast(values: Mapping[str, float], fastest_rad_s: float, period_s: float) -> str:
+    """Say which mode is too fast, and for which parameters to look: the largest part of it and what it acts on."""
+    if natural_frequency_rad_s(values) == fastest_rad_s:
+        mode, law = "natural frequency", "k"
+    else:
+        parts = {"b_M": values["b_M"] / values["J_M"]}
+        if "k" in values:
+            parts |= {"b_L": values["b_L"] / values["J_L"], "c": values["c"] / min(values["J_M"], values["J_L"])}
+        mode, law = "fastest decay", max(parts, key=parts.__getitem__)
+    both = [name for name in ("J_M", "J_L") if name in values]
+    inertia = {"b_M": "J_M", "b_L": "J_L"}.get(law) or min(both, key=values.__getitem__)
+    return (
+        f"parameters.{law} = {values[law]:g} with parameters.{inertia} = {values[inertia]:g}: the line's {mode} is "
+        f"{fastest_rad_s / (2.0 * math.pi):.4g} Hz, expected at most {0.5 * FASTEST_IN_NYQUIST / period_s:.4g} Hz at "
+        f"a sample time of {period_s:g} s ({FASTEST_IN_NYQUIST:g} times what it can show). Check both values and "
+        "their units; a line that is rigid is structure = 'one_mass'."
+    )
 
 
 def grid_for(model: DrivelineModel, records: Sequence[Record]) -> Grid:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimator.physics.catalogue import EFFECTS
+from estimator.physics.effect import EffectParameter, Held
 from estimator.physics.effects import road_grade
 from estimator.physics.layout import slot
 from estimator.physics.model import DrivelineModel, Structure
@@ -56,11 +57,17 @@ def effect_unknowns(name: str, model: DrivelineModel, records: Sequence[Record])
     scales = entry.scales(model, records)
     return [
         tuple(
-            Shared(name, parameter.name, scale, parameter.low, parameter.high, x)
-            for parameter, scale, x in zip(entry.parameters, scales, start, strict=True)
+            _unknown(name, parameter, scale, x)
+            for parameter, scale, x in zip(entry.shared_parameters, scales, start, strict=True)
         )
         for start in entry.starts(model, records)
     ]
+
+
+def _unknown(effect: str, parameter: EffectParameter, scale: float, x: float | Held) -> Shared:
+    if isinstance(x, Held):
+        return Shared(effect, parameter.name, scale, x.value, x.value, x.value)
+    return Shared(effect, parameter.name, scale, parameter.low, parameter.high, x)
 
 
 LOAD_TORQUE = 0

@@ -10,15 +10,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from estimator.errors import EstimatorError
-
-
-class BadSetting(EstimatorError, ValueError):
-    """A setting is outside what its algorithm can work with: the caller is at fault.
-
-    Examples: a shift register that starts at zero, a sampling period that does not divide the wanted one.
-    To do: give a value of the kind the message names.
-    """
+from estimator.errors import BadSetting
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,8 +16,9 @@ from enum import Enum
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
+from drivers.cia402 import TorqueMode
 from drivers.eds_file import EdsFile
 from drivers.errors import ConfigMismatch
 from drivers.plc_map import require_usable
@@ -30,13 +31,6 @@ from hil.config.table import ExistingFile, NotNegative, Positive, Table, TcpPort
 from hil.errors import RigFileError
 
 
-class TorqueMode(Enum):
-    """CiA 402 modes of operation this program drives an inverter in."""
-
-    CYCLIC_SYNCHRONOUS_TORQUE = "cyclic_synchronous_torque"
-    PROFILE_TORQUE = "profile_torque"
-
-
 class PrbsTarget(Enum):
     """Which inverter carries the PRBS."""
 
@@ -44,6 +38,14 @@ class PrbsTarget(Enum):
     M1 = "m1"
     M2 = "m2"
     SHARED = "shared"
+
+
+def _mode_by_name(value: object) -> TorqueMode:
+    """Read a mode of operation by its name; its number would say nothing to a person."""
+    names = {mode.name.lower(): mode for mode in sorted(TorqueMode, key=lambda mode: mode.name)}
+    if not isinstance(value, str) or value not in names:
+        raise ValueError(" or ".join(map(repr, names)))
+    return names[value]
 
 
 class CanTable(Table):
@@ -63,7 +65,7 @@ class InverterTable(Table):
     product_code: Unsigned32
     rated_torque_nm: Positive
     torque_limit_nm: Positive
-    mode: Annotated[TorqueMode, Field(strict=False)]
+    mode: Annotated[TorqueMode, BeforeValidator(_mode_by_name)]
     heartbeat_ms: Annotated[int, Field(ge=10, le=65535)]
     eds: ExistingFile | None = None
 

@@ -10,7 +10,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 from drivers.can_link import CanLink
-from drivers.cia402 import TorqueMode
 from drivers.inverter import Inverter
 from drivers.inverter_settings import InverterSettings
 from drivers.plc import Plc
@@ -77,7 +76,7 @@ def inverter_settings(name: str, table: InverterTable) -> InverterSettings:
         node_id=table.node_id,
         rated_torque_nm=table.rated_torque_nm,
         torque_limit_nm=table.torque_limit_nm,
-        mode=TorqueMode[table.mode.name],
+        mode=table.mode,
         eds_path=table.eds,
         vendor_id=table.vendor_id,
         product_code=table.product_code,

@@ -75,8 +75,10 @@ def _can(rig: Rig) -> tuple[Finding, ...]:
 
 def _inverter(link: CanLink, name: str, table: InverterTable) -> Finding:
     def compare() -> Finding:
-        differences = Inverter(link, inverter_settings(name, table)).check()
-        return Finding(name, address, Verdict.DIFFERS if differences else Verdict.AGREES, differences)
+        inverter = Inverter(link, inverter_settings(name, table))
+        differences, fault = inverter.check(), inverter.fault()
+        verdict = Verdict.DIFFERS if differences else Verdict.AGREES
+        return Finding(name, address, verdict, differences, () if fault is None else (fault,))
 
     address = _node(table)
     return _or_failed(name, address, compare)

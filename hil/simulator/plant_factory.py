@@ -10,6 +10,7 @@ from estimator.physics.model import DrivelineModel, EffectValue, Motion
 from hil.config.rig_file import Rig
 from hil.errors import UsageError
 from hil.simulator.driveline_plant import DrivelinePlant
+from hil.simulator.effect_bounds import out_of_bounds
 from hil.simulator.plant import Plant
 from hil.simulator.rig_server import required_simulation
 from hil.simulator.simulation_model import EffectSpec, simulation_model
@@ -28,10 +29,11 @@ def plant_for(rig: Rig, effects: Sequence[EffectSpec] = ()) -> Plant:
     Raises
     ------
     UsageError
-        If the rig file has no ``[simulation]``, its model is of a translation, or an effect comes twice or
-        without any parameter.
+        If the rig file has no ``[simulation]``, its model is of a translation, or an effect comes twice,
+        without any parameter, with one outside the catalogue's bounds, or as a profile over time.
     BadModel
-        If an effect is none of the catalogue, or has no such parameter.
+        If an effect is none of the catalogue, lacks a parameter or has another, or the line has a mode too fast to
+        simulate at the rig's period.
     """
     model = simulation_model(required_simulation(rig))
     if model.motion is not Motion.ROTATION:
@@ -42,21 +44,38 @@ def plant_for(rig: Rig, effects: Sequence[EffectSpec] = ()) -> Plant:
     names = [effect.name for effect in effects]
     if twice := sorted({name for name in names if names.count(name) > 1}):
         raise UsageError(f"effect {twice[0]!r}: expected once, came twice. Give all its parameters in one --effect.")
-    return DrivelinePlant(_with(model, effects), rig.period_s)
-
-
-def _with(model: DrivelineModel, effects: Sequence[EffectSpec]) -> DrivelineModel:
-    return replace(model, effects={**model.effects, **{effect.name: _values(effect) for effect in effects}})
+    for effect in effects:
+        _require_parameters(effect)
+    changed = replace(model, effects={**model.effects, **{effect.name: _values(effect) for effect in effects}})
+    _refuse_profiles(changed)
+    faults = [fault for effect in effects for fault in out_of_bounds(rig, changed, effect.name, effect.parameters)]
+    if faults:
+        raise UsageError("\n".join(f"{fault}. Check its unit: hil effects NAME has the law." for fault in faults))
+    return DrivelinePlant(changed, rig.period_s)
 
 
 def _values(effect: EffectSpec) -> dict[str, EffectValue]:
-    """Take the parameters given; those left out are at their null, where they do nothing."""
+    return {key: EffectValue(value) for key, value in effect.parameters.items()}
+
+
+def _require_parameters(effect: EffectSpec) -> None:
     entry = EFFECTS.get(effect.name)
-    if entry is not None and not effect.parameters:
-        known = ", ".join(parameter.name for parameter in entry.parameters)
-        raise UsageError(
-            f"effect {effect.name!r}: expected at least one of its parameters ({known}), came none, which does "
-            f"nothing. Write {effect.name}:{entry.parameters[0].name}=..."
-        )
-    nulls = {} if entry is None else {parameter.name: parameter.null for parameter in entry.parameters}
-    return {key: EffectValue(value) for key, value in {**nulls, **effect.parameters}.items()}
+    if entry is None or effect.parameters:
+        return
+    known = ", ".join(parameter.name for parameter in entry.parameters)
+    raise UsageError(
+        f"effect {effect.name!r}: expected at least one of its parameters ({known}), came none, which does "
+        f"nothing. Write {effect.name}:{entry.parameters[0].name}=..."
+    )
+
+
+def _refuse_profiles(model: DrivelineModel) -> None:
+    """Refuse what is not a number but a course over time, which this plant has no place for."""
+    for name in model.effects:
+        if EFFECTS[name].profile:
+            raise UsageError(
+                f"effect {name!r}: expected an effect with a constant law, came one that is a profile over each "
+                f"recording's own time ({EFFECTS[name].law}): the simulated rig would drive without it. Take it "
+                f"out of --effect, or [effects.{name}] out of simulation.model. A recording that has it: "
+                f"python -m hil.proof.make_case --effect {name} --seed 1 --out DIR"
+            )

@@ -35,6 +35,12 @@ def test_the_catalogue_names_what_it_has(refused: Refused, name: str, said: str)
         (["backlash:gap_rad=nan"], "effects.backlash.gap_rad.value: expected a finite number, came nan"),
         (["backlash:gap_rad=1,gap_rad=2"], "expected 'gap_rad' once, came twice"),
         (["backlash:gap_rad=1", "backlash:gap_rad=2"], "effect 'backlash': expected once, came twice"),
+        (["transport_delay:delay_s=100"], "effect 'transport_delay': delay_s is 100, expected 0 to 0.2 s, the cat"),
+        (["stiffness_nonlinearity:hardening_per_rad2=-1e6"], "hardening_per_rad2 is -1e+06, expected -1.44e+03 to"),
+        (["stiffness_nonlinearity:hardening_per_rad2=1,shape=9"], "shape is 9, expected 0.1 to 3, the catalogue's"),
+        (["road_grade:grade_rms_nm=20"], "effect 'road_grade': expected an effect with a constant law, came one that"),
+        (["stribeck_friction:excess_nm=20"], "effects.stribeck_friction.stribeck_rad_s: missing, expected"),
+        (["stribeck_friction:excess_nm=20,coulomb_nm=5,stribeck_rad_s=0"], "stribeck_rad_s is 0, expected 0.32 to 320"),
         ([""], "effect '': expected NAME:key=number, came no name"),
     ],
 )

@@ -9,6 +9,8 @@ import pytest
 from tests.bad_input.conftest import Refused, with_changes
 from tests.cli import bench
 
+STIFF = {"J_M": 1.6, "J_L": 95.0, "k": 4.2e12, "c": 9.0, "b_M": 0.35, "b_L": 0.9}
+
 EFFECTS = "\n[effects.gremlins]\nx = { value = 1 }\n[effects.coulomb_friction_motor]\nhaste = { value = 1 }\n"
 
 
@@ -45,6 +47,18 @@ def test_each_fault_is_named_and_nothing_is_written(
     model.write_text(with_changes(bench.MODEL, changes), encoding="utf-8")
     complaint = refused("simulate", "--model", model, "--input", drive / "run_1.csv", "--out", drive / "simulated.csv")
     assert all(f"{model}: {each}" in complaint for each in said), complaint
+    assert not (drive / "simulated.csv").exists()
+
+
+def test_a_line_too_stiff_for_the_sample_time_is_refused_at_once(refused: Refused, drive: Path) -> None:
+    """It took minutes before: the integration steps per sample grow with the line's natural frequency."""
+    model = drive / "drive.toml"
+    two_mass = "".join(f"{name} = {{ value = {value}, tolerance = 0.2 }}\n" for name, value in STIFF.items())
+    head, _, _ = bench.MODEL.replace("one_mass", "two_mass").partition("J_M")
+    model.write_text(head + two_mass, encoding="utf-8")
+    complaint = refused("simulate", "--model", model, "--input", drive / "run_1.csv", "--out", drive / "simulated.csv")
+    assert "parameters.k = 4.2e+12 with parameters.J_M = 1.6: the line's natural frequency is 2.6" in complaint
+    assert "expected at most 1500 Hz at a sample time of 0.01 s" in complaint
     assert not (drive / "simulated.csv").exists()
 
 

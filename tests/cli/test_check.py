@@ -11,7 +11,7 @@ import pytest
 
 from hil.cli.main import run
 from hil.config.rig_file import read_rig
-from hil.simulator.inverter_settings import InverterFaults
+from hil.simulator.inverter_settings import FaultAtStep, InverterFaults
 from hil.simulator.rig_server import RigFaults
 from tests.rig.serving import served
 
@@ -45,6 +45,17 @@ def test_json(short_rig: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert m2["differences"][0]["expected"] == "0x000003E7"
     assert m2["differences"][0]["found"] == "0x00000001"
     assert "m2" in printed.err
+
+
+@pytest.mark.parametrize("options", [(), ("--json",)])
+def test_drive_in_fault_is_noted(short_rig: Path, options: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
+    with rig_with(RigFaults(m1=InverterFaults(fault=FaultAtStep(0, 0x2310))), short_rig) as command:
+        assert run([*command, *options]) == 0
+    printed = capsys.readouterr().out
+    notes = json.loads(printed)["devices"][1]["notes"] if options else [" ".join(printed.split())]
+    assert len(notes) == 1
+    assert "power state is fault, error code 0x603F is 0x2310 continuous over-current, motor side" in notes[0]
+    assert "Mend the cause at the drive, reset the fault." in notes[0]
 
 
 def test_missing_inverter(short_rig: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -7,11 +7,12 @@ from pathlib import Path
 
 import pytest
 
+from drivers.cia402 import TorqueMode
 from drivers.plc_types import PrbsSource
 from drivers.resources import data_file
 from drivers.torque_guard import GuardLimits
 from hil.config.experiment_tables import CruiseTable, ReversalTable, TipTable
-from hil.config.rig_file import PrbsTarget, TorqueMode, read_rig
+from hil.config.rig_file import PrbsTarget, read_rig
 from hil.errors import RigFileError
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "rig.toml"
@@ -100,8 +101,9 @@ WRONG = [
     ),
     (
         ("inverters.m1", "mode", '"speed"'),
-        "inverters.m1.mode | expected 'cyclic_synchronous_torque' or 'profile_",
+        "inverters.m1.mode | expected 'cyclic_synchronous_torque' or 'profile_torque' | came 'speed'",
     ),
+    (("inverters.m1", "mode", "10"), "inverters.m1.mode | expected 'cyclic_synchronous_torque' or"),
     (
         ("inverters.m1", "heartbeat_ms", "1"),
         "inverters.m1.heartbeat_ms | expected greater than or equal to 10",

@@ -53,6 +53,14 @@ def test_device_that_is_another_is_found_and_refused(
             rig.m1.configure()
 
 
+def test_fault_is_told_without_anything_being_written() -> None:
+    with bench(InverterFaults(fault=FaultAtStep(0, OVER_CURRENT))) as rig:
+        assert str(rig.m1.fault()).startswith("power state is fault, error code 0x603F is 0x2310 continuous over-curr")
+        assert rig.m1.fault() is not None  # reading it is no reset
+        rig.m1.reset_fault()
+        assert rig.m1.fault() is None
+
+
 def test_mode_that_is_not_supported_is_found_by_check_and_refused() -> None:
     profile_only = replace(SIMULATED_M1, supported_modes=frozenset({TorqueMode.PROFILE_TORQUE}))
     with bench(simulated=profile_only) as rig:

@@ -6,7 +6,7 @@ import pytest
 
 from drivers.cia402 import PowerState
 from hil.rig.check import Verdict, check_rig
-from hil.simulator.inverter_settings import InverterFaults
+from hil.simulator.inverter_settings import FaultAtStep, InverterFaults
 from hil.simulator.rig_server import RigFaults
 from tests.rig.observer import power_state
 from tests.rig.serving import changed, served
@@ -53,6 +53,21 @@ def test_missing_plc() -> None:
     with served() as (_, rig):
         findings = check_rig(changed(rig, {"plc": {"port": 9}}))
     assert [finding.verdict for finding in findings] == [*[Verdict.AGREES] * 3, Verdict.FAILED]
+
+
+def test_drive_in_fault_is_a_note_not_a_difference() -> None:
+    """It is the drive the rig file describes; but before the next run someone has to see to it."""
+    faults = InverterFaults(fault=FaultAtStep(0, 0x4310))
+    with served(faults=RigFaults(m2=faults)) as (server, rig):
+        findings = {finding.device: finding for finding in check_rig(rig)}
+        state = power_state(server.bus_url, 2)
+    assert findings["m2"].verdict is Verdict.AGREES
+    assert findings["m2"].notes == (
+        "power state is fault, error code 0x603F is 0x4310 excess temperature of the drive, expected a drive without "
+        "fault. Mend the cause at the drive, reset the fault.",
+    )
+    assert findings["m1"].notes == ()
+    assert state is PowerState.FAULT
 
 
 def test_vehicle_that_is_not_fit_is_a_note_not_a_fault() -> None:

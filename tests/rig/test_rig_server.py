@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import threading
 import uuid
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
 from drivers.can_link import CanLink
 from drivers.errors import BusDown
 from estimator.errors import BadModel
+from estimator.physics.model import EffectValue, Parameter
+from hil.config.model_file import write_model
 from hil.errors import UsageError
 from hil.rig.addresses import with_addresses
 from hil.simulator.loopback import Address
@@ -17,10 +21,10 @@ from hil.simulator.plant import RigidPlant
 from hil.simulator.plant_factory import plant_for
 from hil.simulator.rig_server import RigServer
 from hil.simulator.simulation_model import DEFAULT_BUS, EffectSpec, simulation_model
-from tests.rig.serving import ANY_PORT, Samples, run_once, small_rig
+from tests.rig.serving import ANY_PORT, Samples, changed, run_once, small_rig
 
 ANY_BUS = "ws://127.0.0.1:0/"
-BIG_GAP = EffectSpec("backlash", {"gap_rad": 1.0})
+BIG_GAP = EffectSpec("backlash", {"gap_rad": 0.5})
 
 
 def server(bus_url: str = ANY_BUS, modbus: Address = ANY_PORT) -> RigServer:
@@ -118,13 +122,63 @@ def test_unknown_parameter_is_refused() -> None:
 
 
 def test_effect_is_in_the_plant() -> None:
-    """A gap of 1 rad: the motor starts freely, with T / J_M, where the whole bus would hold it back."""
+    """A gap of half a radian: the motor starts freely, with T / J_M, where the whole bus would hold it back."""
     free, held = (plant_for(small_rig(), effects) for effects in ([BIG_GAP], []))
     for plant in (free, held):
         for _ in range(5):
             plant.advance((50.0, 50.0), 0.01)
     assert free.speed_rad_s == pytest.approx(100.0 / 1.6 * 0.05, rel=0.02)
     assert held.speed_rad_s < 0.8 * free.speed_rad_s
+
+
+def test_every_bound_of_the_catalogue_is_itself_let_in() -> None:
+    """The bounds are those of the rig at hand: at them an effect is taken, a little beyond it is not."""
+    at_limit = EffectSpec("transport_delay", {"delay_s": 20 * small_rig().period_s})
+    assert plant_for(small_rig(), [at_limit]).speed_rad_s == 0.0
+    with pytest.raises(UsageError, match=r"delay_s is 0\.201, expected 0 to 0\.2 s"):
+        plant_for(small_rig(), [EffectSpec("transport_delay", {"delay_s": 0.201})])
+
+
+def test_an_optional_parameter_may_be_at_its_null() -> None:
+    """No contact depth is below the bounds of a fit, and a law of its own: the damping acts at first touch."""
+    plant_for(small_rig(), [EffectSpec("backlash", {"gap_rad": 0.02, "contact_rad": 0.0})])
+
+
+def test_bounds_without_any_experiment_to_go_by() -> None:
+    rig = small_rig().model_copy(update={"experiments": {}})
+    with pytest.raises(UsageError, match="gap_rad is 3, expected 0 to"):
+        plant_for(rig, [EffectSpec("backlash", {"gap_rad": 3.0})])
+
+
+def test_stribeck_friction_holds_the_motor_below_its_breakaway_torque() -> None:
+    """40 Nm at both inverters do not break away 60 + 40 Nm; without the excess they do."""
+    friction = {"coulomb_nm": 60.0, "stribeck_rad_s": 2.0}
+    stuck, sliding = (
+        plant_for(small_rig(), [EffectSpec("stribeck_friction", friction | {"excess_nm": excess_nm})])
+        for excess_nm in (40.0, 0.0)
+    )
+    for plant in (stuck, sliding):
+        for _ in range(500):
+            plant.advance((40.0, 40.0), 0.01)
+    assert sliding.speed_rad_s == pytest.approx(20.0 / 101.6 * 5.0, rel=0.1)  # (80 - 60) Nm on the whole bus
+    assert abs(stuck.speed_rad_s) < 0.2 * sliding.speed_rad_s  # it creeps: friction changes sign over a little speed
+
+
+def test_model_file_with_a_profile_is_refused(tmp_path: Path) -> None:
+    model = tmp_path / "hills.toml"
+    profile = {"road_grade": {"grade_rms_nm": EffectValue(20.0)}}
+    write_model(model, replace(DEFAULT_BUS, effects=profile))
+    rig = changed(small_rig(), {"simulation": {"model": model}})
+    with pytest.raises(UsageError, match=r"'road_grade'.*Take it out of --effect, or \[effects\.road_grade\] out of"):
+        plant_for(rig)
+
+
+def test_model_too_stiff_to_simulate_is_refused(tmp_path: Path) -> None:
+    model = tmp_path / "stiff.toml"
+    stiff = {**DEFAULT_BUS.parameters, "k": Parameter(4.2e12, 0.2)}
+    write_model(model, replace(DEFAULT_BUS, parameters=stiff))
+    with pytest.raises(BadModel, match=r"parameters\.k = 4\.2e\+12 .* expected at most"):
+        plant_for(changed(small_rig(), {"simulation": {"model": model}}))
 
 
 def test_plant_is_stepped_by_its_own_period_only() -> None:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from estimator.compiled import compiled
-from estimator.physics.effect import Effect, EffectParameter, Element, Untestable
+from estimator.physics.effect import Effect, EffectParameter, Element, Start, Untestable
 from estimator.physics.model import DrivelineModel, Motion, Structure
 from estimator.signals.record import Record
 
@@ -29,7 +29,7 @@ def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...
     return (min(record.sample_time_s for record in records),)
 
 
-def starts(model: DrivelineModel, records: Sequence[Record]) -> list[tuple[float, ...]]:
+def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
     """Return a start below and one above a sampling period."""
     return [(0.3,), (2.0,)]
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from estimator.compiled import compiled
-from estimator.physics.effect import Effect, EffectParameter, Element, Untestable
+from estimator.physics.effect import Effect, EffectParameter, Element, Start, Untestable
 from estimator.physics.model import DrivelineModel, Motion, Structure, unit
 from estimator.physics.motion import torque_reverses, torque_scale
 from estimator.signals.record import Record
@@ -30,7 +30,7 @@ def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...
     return (0.2 * twist, 0.01 * twist)
 
 
-def starts(model: DrivelineModel, records: Sequence[Record]) -> list[tuple[float, ...]]:
+def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
     """Return a ladder of gap sizes: a gap that is too large or too small is a local optimum."""
     return [(0.1, 1.0), (0.4, 1.0), (1.2, 1.0)]
 

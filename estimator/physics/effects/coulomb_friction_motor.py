@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from estimator.compiled import compiled
-from estimator.physics.effect import Effect, EffectParameter, Element, Untestable
+from estimator.physics.effect import Effect, EffectParameter, Element, Start, Untestable
 from estimator.physics.laws import smooth_sign
 from estimator.physics.model import DrivelineModel, Motion, Structure, unit
 from estimator.physics.motion import reverses, torque_scale
@@ -23,7 +23,7 @@ def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...
     return (0.05 * torque_scale(records),)
 
 
-def starts(model: DrivelineModel, records: Sequence[Record]) -> list[tuple[float, ...]]:
+def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
     """Return one start: the problem is convex in the friction torque."""
     return [(0.5,)]
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from scipy.interpolate import BSpline
 
-from estimator.physics.effect import Effect, EffectParameter, Element, Untestable
+from estimator.physics.effect import Effect, EffectParameter, Element, Start, Untestable
 from estimator.physics.model import DrivelineModel, Motion, Structure, unit
 from estimator.physics.motion import torque_scale
 from estimator.signals.record import FloatArray, Record
@@ -51,7 +51,7 @@ def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...
     return (0.05 * torque_scale(records),)
 
 
-def starts(model: DrivelineModel, records: Sequence[Record]) -> list[tuple[float, ...]]:
+def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
     """Return one start, a flat road: the problem is linear in the profile."""
     return [(0.0,)]
 

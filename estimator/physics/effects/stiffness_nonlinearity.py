@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from estimator.compiled import compiled
-from estimator.physics.effect import Effect, EffectParameter, Element, Untestable
+from estimator.physics.effect import Effect, EffectParameter, Element, Start, Untestable
 from estimator.physics.model import DrivelineModel, Motion, Structure, unit
 from estimator.physics.motion import torque_scale
 from estimator.signals.record import Record
@@ -31,7 +31,7 @@ def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...
     return (0.2 / twist**2, 1.0)
 
 
-def starts(model: DrivelineModel, records: Sequence[Record]) -> list[tuple[float, ...]]:
+def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
     """Return a hardening and a softening start."""
     return [(0.5, 1.0), (-0.5, 0.5)]
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from estimator.compiled import compiled
-from estimator.physics.effect import Effect, EffectParameter, Element, Untestable
+from estimator.physics.effect import Effect, EffectParameter, Element, Start, Untestable
 from estimator.physics.effects import coulomb_friction_motor
 from estimator.physics.laws import smooth_sign
 from estimator.physics.model import DrivelineModel, Motion, Structure, unit
@@ -29,7 +29,7 @@ def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...
     return (torque, torque, 0.05 * speed_scale(records))
 
 
-def starts(model: DrivelineModel, records: Sequence[Record]) -> list[tuple[float, ...]]:
+def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
     """Return starts at a narrow and a wide Stribeck range: the fit is not convex in its width."""
     return [(0.5, 0.3, 0.6), (0.5, 0.3, 3.0)]
 

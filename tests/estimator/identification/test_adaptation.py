@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from estimator.errors import BadSetting
 from estimator.identification.adaptation import (
     Adaptation,
     ConstantForgetting,
@@ -18,7 +19,6 @@ from estimator.identification.adaptation import (
 from estimator.identification.linear_model import Orders
 from estimator.identification.oefo import Oefo
 from estimator.signals.record import FloatArray
-from estimator.signals.settings import BadSetting
 
 MOVING_AVERAGE = Orders(na=0, nb=3, nk=1)  # no outputs in the regressor: phi is known beforehand
 

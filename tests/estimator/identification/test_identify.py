@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.errors import NotExciting
+from estimator.errors import BadSetting, NotExciting
 from estimator.identification.identify import (
     FilterPart,
     Identification,
@@ -18,7 +18,6 @@ from estimator.identification.identify import (
 from estimator.identification.linear_model import LinearModel, Orders
 from estimator.identification.recursive import Status
 from estimator.signals.decimate import Decimator
-from estimator.signals.settings import BadSetting
 from tests.estimator.identification.driveline import Cruise, cruise
 
 

@@ -3,9 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from estimator.errors import BadModel, BadShape
+from estimator.errors import BadModel, BadSetting, BadShape
 from estimator.identification.linear_model import LinearModel, Orders
-from estimator.signals.settings import BadSetting
 
 MODEL = LinearModel(a=(-1.5, 0.7), b=(0.4, -0.1, 0.3), nk=2, sample_time_s=0.02)
 

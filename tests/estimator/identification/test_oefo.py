@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from estimator.errors import BadModel, BadShape
+from estimator.errors import BadModel, BadSetting, BadShape
 from estimator.identification.adaptation import (
     Adaptation,
     ConstantForgetting,
@@ -18,7 +18,6 @@ from estimator.identification.oefo import Filtering, Oefo
 from estimator.identification.recursive import Reason, RecursiveEstimator, Status
 from estimator.signals.prbs import prbs_nm
 from estimator.signals.record import BoolArray, FloatArray
-from estimator.signals.settings import BadSetting
 
 TRUTH = LinearModel(a=(-1.2, 0.85), b=(0.5, 0.3), nk=1, sample_time_s=0.02)
 ORDERS = TRUTH.orders

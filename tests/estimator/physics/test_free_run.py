@@ -9,7 +9,7 @@ import pytest
 
 from estimator.errors import BadModel
 from estimator.physics.fit import fit, make_problem
-from estimator.physics.free_run import free_run, free_runs
+from estimator.physics.free_run import free_run
 from estimator.physics.layout import flat
 from estimator.physics.simulate import Start, grid_for, simulate
 from estimator.signals.record import Location, OutputKind
@@ -61,16 +61,6 @@ def test_masked_samples_are_simulated_but_not_judged() -> None:
     run = free_run(model(ONE_MASS), holed)
     assert run.rms == pytest.approx(0.05, rel=0.1)
     assert np.isfinite(run.output).all()
-
-
-def test_several_recordings_are_run_each_on_its_own() -> None:
-    records = [
-        linear_record(TWO_MASS, random_steps(400, seed), replace(START, speed_rad_s=3.0 * seed), name=f"run_{seed}")
-        for seed in (6, 7)
-    ]
-    together = free_runs(model(TWO_MASS), records)
-    for output, rec in zip(together, records, strict=True):
-        np.testing.assert_array_equal(output, free_run(model(TWO_MASS), rec).output)
 
 
 def test_an_output_that_the_structure_lacks_is_refused() -> None:

@@ -10,6 +10,7 @@ from estimator.physics import kernel
 from estimator.physics.layout import flat
 from estimator.physics.model import Structure
 from estimator.physics.simulate import (
+    FASTEST_IN_NYQUIST,
     SIGN_WIDTH,
     Start,
     grid_for,
@@ -33,6 +34,34 @@ def test_sub_steps_follow_the_natural_frequency() -> None:
     assert substeps_for(values, 0.01) == 2  # 0.2 rad per period, 0.15 allowed
     assert substeps_for(values, 0.001) == 1
     assert substeps_for(ONE_MASS, 0.01) == 1
+
+
+@pytest.mark.parametrize(
+    ("changes", "named"),
+    [
+        ({"k": 4.2e12}, "parameters.k = 4.2e+12 with parameters.J_M = 2: the line's natural frequency is"),
+        ({"J_L": 1e-9}, "parameters.k = 600 with parameters.J_L = 1e-09: the line's natural frequency is"),
+        ({"c": 1e9}, "parameters.c = 1e+09 with parameters.J_M = 2: the line's fastest decay is"),
+        ({"b_M": 1e9}, "parameters.b_M = 1e+09 with parameters.J_M = 2: the line's fastest decay is"),
+        ({"b_L": 1e9}, "parameters.b_L = 1e+09 with parameters.J_L = 6: the line's fastest decay is"),
+    ],
+)
+def test_a_mode_too_fast_for_the_sample_time_is_refused_with_its_parameter(
+    changes: dict[str, float], named: str
+) -> None:
+    values = {"J_M": 2.0, "J_L": 6.0, "k": 600.0, "c": 0.0, "b_M": 0.0, "b_L": 0.0} | changes
+    with pytest.raises(BadModel) as refusal:
+        substeps_for(values, 0.01)
+    assert str(refusal.value).startswith(named)
+    assert "Hz, expected at most 1500 Hz at a sample time of 0.01 s" in str(refusal.value)
+
+
+def test_the_limit_on_modes_is_a_multiple_of_the_nyquist_frequency() -> None:
+    values = {"J_M": 0.01, "b_M": 4.0}  # decays at 400 1/s
+    longest_s = FASTEST_IN_NYQUIST * np.pi / 400.0
+    assert substeps_for(values, 0.999 * longest_s) > 600
+    with pytest.raises(BadModel, match=r"fastest decay is 63\.66 Hz, expected at most 63\.6 Hz"):
+        substeps_for(values, 1.001 * longest_s)
 
 
 @pytest.mark.parametrize(

@@ -3,10 +3,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from estimator.errors import BadShape
+from estimator.errors import BadSetting, BadShape
 from estimator.signals.decimate import HALF_LENGTH, Decimated, Decimator, decimate, low_pass_taps
 from estimator.signals.record import FloatArray, Record
-from estimator.signals.settings import BadSetting
 
 SAMPLE_TIME_S = 0.01
 

@@ -3,8 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from estimator.errors import BadSetting
 from estimator.signals.prbs import TAPS, Prbs, prbs_nm, shift
-from estimator.signals.settings import BadSetting
 
 
 @pytest.mark.parametrize("cells", sorted(TAPS))
