@@ -7,6 +7,7 @@
      +-- BadModel     (ValueError)   a model whose parameters are missing, unknown or non-physical
      +-- BadSetting   (ValueError)   a setting its algorithm can't work with
      +-- NotExciting                 the data do not determine what was asked
+     +-- Implausible  (ValueError)   recordings in other units, or of another sign, than the model
 
 Inside a sample loop nothing raises: there a status says what is wrong with the estimate.
 """
@@ -46,3 +47,11 @@ class NotExciting(EstimatorError):
     def __init__(self, message: str, names: tuple[str, ...] = ()) -> None:
         super().__init__(message)
         self.names = names
+
+
+class Implausible(EstimatorError, ValueError):
+    """Recordings and model contradict each other as only a wrong unit, scale or sign makes them.
+
+    Examples: a speed in rpm where rad/s are expected, a torque of the wrong sign. To do: correct the scale in
+    ``[signals]``, or the model.
+    """

@@ -3,18 +3,43 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from estimator.physics.effects import (
     actuator_lag,
+    aerodynamic_drag,
     backlash,
+    brake_drag,
+    cardan_second_order,
+    clock_drift,
+    coulomb_friction_load,
     coulomb_friction_motor,
+    extra_torsional_mode,
+    generator_coupled,
+    inertia_change,
+    inverter_gain_mismatch,
+    load_imbalance,
+    lost_samples,
+    quadratic_friction,
+    resolver_error,
     road_grade,
+    sample_jitter,
+    shaft_hysteresis,
+    speed_filter,
+    speed_quantisation,
+    speed_sign_blind,
+    stale_samples,
+    stiffness_change,
     stiffness_nonlinearity,
     stribeck_friction,
+    torque_derating,
+    torque_ripple,
+    torque_saturation,
     transport_delay,
+    tyre_slip,
+    warming_friction,
 )
 
 if TYPE_CHECKING:
@@ -22,17 +47,53 @@ if TYPE_CHECKING:
     from estimator.physics.model import DrivelineModel, EffectValue
 
 _ENTRIES = (
+    inverter_gain_mismatch.EFFECT,
+    torque_derating.EFFECT,
+    torque_saturation.EFFECT,
     actuator_lag.EFFECT,
     transport_delay.EFFECT,
+    torque_ripple.EFFECT,
     coulomb_friction_motor.EFFECT,
     stribeck_friction.EFFECT,
+    quadratic_friction.EFFECT,
+    generator_coupled.EFFECT,
     backlash.EFFECT,
     stiffness_nonlinearity.EFFECT,
+    stiffness_change.EFFECT,
+    shaft_hysteresis.EFFECT,
+    cardan_second_order.EFFECT,
+    extra_torsional_mode.EFFECT,
+    coulomb_friction_load.EFFECT,
+    aerodynamic_drag.EFFECT,
     road_grade.EFFECT,
+    brake_drag.EFFECT,
+    tyre_slip.EFFECT,
+    load_imbalance.EFFECT,
+    inertia_change.EFFECT,
+    warming_friction.EFFECT,
+    resolver_error.EFFECT,
+    speed_filter.EFFECT,
+    speed_sign_blind.EFFECT,
+    speed_quantisation.EFFECT,
+    stale_samples.EFFECT,
+    lost_samples.EFFECT,
+    sample_jitter.EFFECT,
+    clock_drift.EFFECT,
 )
 
-EFFECTS: Mapping[str, Effect] = MappingProxyType({entry.name: entry for entry in _ENTRIES})
-"""Name to entry, along the chain from torque command to load."""
+BUILT_IN: Mapping[str, Effect] = MappingProxyType({entry.name: entry for entry in _ENTRIES})
+"""The entries that the kernel has."""
+
+_entries = dict(BUILT_IN)
+
+EFFECTS: Mapping[str, Effect] = MappingProxyType(_entries)
+"""Name to entry, along the chain from torque command to load; a user's own laws behind them."""
+
+
+def add(entries: Sequence[Effect]) -> None:
+    """Make these the entries behind the built-in ones, in place of those before (``own_law.install``)."""
+    _entries.clear()
+    _entries.update(BUILT_IN, **{entry.name: entry for entry in entries})
 
 
 def effect_problems(name: str, values: Mapping[str, EffectValue], model: DrivelineModel) -> list[str]:

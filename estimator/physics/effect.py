@@ -25,6 +25,18 @@ class Element(Enum):
     ACQUISITION = "acquisition"
 
 
+EVERY_LINE = frozenset({Structure.ONE_MASS, Structure.TWO_MASS, Structure.THREE_MASS})
+"""Structures with at least one inertia: every driveline."""
+
+EVERY_STRUCTURE = frozenset(Structure)
+
+WITH_SHAFT = frozenset({Structure.TWO_MASS, Structure.THREE_MASS})
+"""Structures with a shaft between inertias."""
+
+WITH_SPRING = WITH_SHAFT | {Structure.JOINT}
+"""Structures with a shaft, between inertias or alone on a bench."""
+
+
 @dataclass(frozen=True, slots=True)
 class EffectParameter:
     """One parameter of an effect's law.
@@ -83,6 +95,23 @@ Starts = Callable[[DrivelineModel, Sequence[Record]], list[Start]]
 Testable = Callable[[DrivelineModel, Sequence[Record]], Untestable | None]
 
 
+def always_plausible(_model: DrivelineModel, _records: Sequence[Record], _values: Mapping[str, float]) -> str:
+    """Find nothing to object to."""
+    return ""
+
+
+def long_enough(key: str) -> Callable[[DrivelineModel, Sequence[Record], Mapping[str, float]], str]:
+    """Return a check that a time is at least a tenth of the sampling period: shorter ones can't be told."""
+
+    def check(_model: DrivelineModel, records: Sequence[Record], values: Mapping[str, float]) -> str:
+        least = 0.1 * min(record.sample_time_s for record in records)
+        if values[key] >= least:
+            return ""
+        return f"{key} = {values[key]:.2g} s is less than a tenth of the sampling period"
+
+    return check
+
+
 @dataclass(frozen=True, slots=True)
 class Effect:
     """An entry of the catalogue.
@@ -125,6 +154,8 @@ class Effect:
         True where it acts during an interval of each recording, from its own ``from_s`` to its own ``to_s``.
     phases : mapping of str to str
         Own phase to the shared amplitude that it belongs to, for effects periodic in an angle.
+    implausible : callable
+        Model, records and parameter values to the reason why such values are no case of this effect, or "".
     recognised : bool
         True where it is recognised in the raw data before any fit (repeated, lost, quantised samples).
     """
@@ -148,6 +179,7 @@ class Effect:
     profile: bool = False
     event: bool = False
     phases: Mapping[str, str] = field(default_factory=dict)
+    implausible: Callable[[DrivelineModel, Sequence[Record], Mapping[str, float]], str] = always_plausible
     recognised: bool = False
 
     @property

@@ -6,30 +6,33 @@ recording only, so one simulation of every recording gives a column of the Jacob
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
-from typing import TypeVar
 
 import numpy as np
 
 from estimator.physics.layout import flat
 from estimator.physics.least_squares import minimise
 from estimator.physics.model import DrivelineModel
+from estimator.physics.parallel import concurrently
 from estimator.physics.simulate import Grid, Start, grid_for, simulate
-from estimator.physics.unknowns import LocalBasis, Shared, local_basis
+from estimator.physics.unknowns import LocalBasis, Shared, local_basis, own_unknowns
 from estimator.signals.record import BoolArray, FloatArray, Record
 
 STEP = 1e-5
 """Finite-difference step in scaled unknowns: the simulation is smooth to about 1e-10 of its size."""
 
-WORKERS = 2
+ITERATIONS = 50
+"""Jacobians at most; a fit that needs more is not converged."""
+
+HEAT = 3
+"""Jacobians that each of several starts gets before only the best ones go on."""
+
+CLOSE = 1.1
+"""Squared error, over the best start's, up to which a start goes on."""
+
 BAD = 1e3
 """A simulation that runs away counts as this many times the output's range wrong."""
-
-Item = TypeVar("Item")
-Result = TypeVar("Result")
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +81,11 @@ class FitResult:
     converged: bool
 
     @property
+    def squares(self) -> float:
+        """Sum of the squared errors of the samples that count."""
+        return float(self.residual @ self.residual)
+
+    @property
     def rms(self) -> float:
         """RMS of the free-run error over the samples that count."""
         return float(np.sqrt(np.mean(self.residual**2)))
@@ -91,11 +99,24 @@ class FitResult:
     def pinned(self) -> BoolArray:
         """Which unknowns ended at a bound, shape (U,)."""
         low, high = bounds(self.problem)
-        return (self.x - low < 1e-6) | (high - self.x < 1e-6)
+        fixed = low == high  # at infinity, too
+        down, up = (np.subtract(self.x, bound, out=np.zeros_like(self.x), where=~fixed) for bound in (low, high))
+        ended: BoolArray = fixed | (down < 1e-6) | (-up < 1e-6)
+        return ended
+
+    @property
+    def free_count(self) -> int:
+        """How many unknowns the fit could change."""
+        low, high = bounds(self.problem)
+        return int(np.sum(low < high))
 
     def value(self, effect: str, name: str) -> float:
         """Fitted value of a parameter (``effect`` empty for a nominal one)."""
         return float(self.p[next(s.slot for s in self.problem.shared if (s.effect, s.name) == (effect, name))])
+
+    def p_of(self, index: int) -> FloatArray:
+        """Parameter vector of one recording, its own parameters among them; shape (layout.SIZE,)."""
+        return self.problem.local[index].parameters(self.p, self.local_of(index))
 
     def local_of(self, index: int) -> FloatArray:
         """Scaled unknowns of one recording."""
@@ -107,17 +128,23 @@ def make_problem(
     records: Sequence[Record],
     shared: Sequence[Shared],
     *,
+    own: Sequence[tuple[Shared, ...]] | None = None,
     profile: bool = False,
     use: Sequence[BoolArray] | None = None,
     grid: Grid | None = None,
 ) -> Problem:
-    """Set up a fit of ``shared`` and every recording's own unknowns, from a model's values and effects."""
+    """Set up a fit of ``shared`` and every recording's own unknowns, from a model's values and effects.
+
+    ``own`` holds the own parameters of effects for each recording; by default those of the model's effects.
+    """
+    if own is None:
+        own = [own_unknowns(model.effects, record) for record in records]
     return Problem(
         grid or grid_for(model, records),
         tuple(records),
         flat(model),
         tuple(shared),
-        tuple(local_basis(model, record, profile) for record in records),
+        tuple(local_basis(model, record, profile, mine) for record, mine in zip(records, own, strict=True)),
         tuple(record.okay for record in records) if use is None else tuple(use),
     )
 
@@ -138,9 +165,8 @@ def local_part(problem: Problem, x: FloatArray, index: int) -> FloatArray:
 
 def bounds(problem: Problem) -> tuple[FloatArray, FloatArray]:
     """Return lower and upper bounds of the scaled unknowns."""
-    free = sum(basis.guess.size for basis in problem.local)
-    low = np.array([s.low for s in problem.shared] + [-np.inf] * free)
-    high = np.array([s.high for s in problem.shared] + [np.inf] * free)
+    low = np.concatenate([np.array([s.low for s in problem.shared]), *(basis.low for basis in problem.local)])
+    high = np.concatenate([np.array([s.high for s in problem.shared]), *(basis.high for basis in problem.local)])
     return low, high
 
 
@@ -155,6 +181,11 @@ def outputs_at(problem: Problem, x: FloatArray) -> tuple[FloatArray, ...]:
     return tuple(_simulate_one(problem, p, local_part(problem, x, i), i) for i in range(len(problem.records)))
 
 
+def output_of(problem: Problem, x: FloatArray, index: int) -> FloatArray:
+    """Simulate one recording at scaled unknowns ``x``."""
+    return _simulate_one(problem, parameters(problem, x), local_part(problem, x, index), index)
+
+
 def start_of(problem: Problem, x: FloatArray, index: int) -> Start:
     """Return load torque and initial state of one recording."""
     return problem.local[index].start(local_part(problem, x, index))
@@ -162,7 +193,8 @@ def start_of(problem: Problem, x: FloatArray, index: int) -> Start:
 
 def _simulate_one(problem: Problem, p: FloatArray, local: FloatArray, index: int) -> FloatArray:
     record, basis = problem.records[index], problem.local[index]
-    out = simulate(problem.grid, record, p, basis.start(local), basis.extra_load(local))
+    filled = basis.parameters(p, local)
+    out = simulate(problem.grid, record, filled, basis.start(local), basis.extra_load(local))
     if np.isfinite(out).all():
         return out
     worst = BAD * float(np.ptp(record.output[record.okay]))
@@ -178,23 +210,15 @@ def residual_at(problem: Problem, outputs: Sequence[FloatArray]) -> FloatArray:
     return _stack(problem, [out - record.output for out, record in zip(outputs, problem.records, strict=True)])
 
 
-@cache
-def _pool() -> ThreadPoolExecutor:
-    """Return the threads that simulate; the compiled kernel holds no interpreter lock."""
-    return ThreadPoolExecutor(WORKERS, thread_name_prefix="driveline")
-
-
-def _parallel(function: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
-    return list(_pool().map(function, items))
-
-
 def jacobian_at(problem: Problem, x: FloatArray, outputs: Sequence[FloatArray]) -> FloatArray:
     """Return the derivative of the errors by the scaled unknowns, shape (R, U), by differences inside the bounds."""
     base = _stack(problem, outputs)
-    _, high = bounds(problem)
+    low, high = bounds(problem)
     n_shared = len(problem.shared)
 
     def shared_column(j: int) -> FloatArray:
+        if low[j] == high[j]:
+            return np.zeros_like(base)
         step = STEP if x[j] + STEP <= high[j] else -STEP
         moved = x.copy()
         moved[j] += step
@@ -203,31 +227,34 @@ def jacobian_at(problem: Problem, x: FloatArray, outputs: Sequence[FloatArray]) 
 
     rows = np.cumsum([0, *(int(use.sum()) for use in problem.use)])
     jacobian = np.zeros((base.size, x.size))
-    jacobian[:, :n_shared] = np.array(_parallel(shared_column, range(n_shared))).T.reshape(base.size, n_shared)
+    jacobian[:, :n_shared] = np.array(concurrently(shared_column, range(n_shared))).T.reshape(base.size, n_shared)
     p = parameters(problem, x)
 
     def local_block(i: int) -> FloatArray:
-        local = local_part(problem, x, i)
-        columns = []
-        for step in STEP * np.eye(local.size):
-            moved = _simulate_one(problem, p, local + step, i)
-            columns.append((moved - outputs[i])[problem.use[i]] / STEP)
+        local, basis = local_part(problem, x, i), problem.local[i]
+        steps = np.where(local + STEP <= basis.high, STEP, -STEP)
+        columns = [
+            (_simulate_one(problem, p, local + step * unit, i) - outputs[i])[problem.use[i]] / step
+            for step, unit in zip(steps, np.eye(local.size), strict=True)
+        ]
         return np.array(columns).T
 
     first = n_shared
-    for i, block in enumerate(_parallel(local_block, range(len(problem.records)))):
+    for i, block in enumerate(concurrently(local_block, range(len(problem.records)))):
         jacobian[rows[i] : rows[i + 1], first : first + block.shape[1]] = block
         first += block.shape[1]
     return jacobian
 
 
-def fit(problem: Problem, x0: FloatArray | None = None) -> FitResult:
+def fit(problem: Problem, x0: FloatArray | None = None, iterations: int = ITERATIONS) -> FitResult:
     """Minimise the squared free-run error from one start.
 
     Parameters
     ----------
     x0 : ndarray, shape (U,), optional
         Scaled start; ``start_vector`` by default.
+    iterations : int
+        Jacobians at most.
     """
     low, high = bounds(problem)
     seen: dict[bytes, tuple[FloatArray, ...]] = {}
@@ -245,14 +272,28 @@ def fit(problem: Problem, x0: FloatArray | None = None) -> FitResult:
         start_vector(problem) if x0 is None else x0,
         low,
         high,
+        iterations,
     )
     return FitResult(problem, solution.x, outputs(solution.x), solution.residual, solution.jacobian, solution.converged)
 
 
-def best_fit(problems: Sequence[Problem], warm: FitResult | None = None) -> FitResult:
-    """Fit from several starts and return the best; nominal and local unknowns start where ``warm`` ended."""
-    results = [fit(problem, None if warm is None else _warm_start(problem, warm)) for problem in problems]
-    return min(results, key=lambda result: float(result.residual @ result.residual))
+def best_fit(problems: Sequence[Problem], warm: FitResult | None = None, iterations: int = ITERATIONS) -> FitResult:
+    """Fit from several starts and return the best; nominal and local unknowns start where ``warm`` ended.
+
+    Every start gets a few steps; those that are then close to the best go on.
+    """
+    starts = [start_vector(problem) if warm is None else _warm_start(problem, warm) for problem in problems]
+    if len(problems) == 1:
+        return fit(problems[0], starts[0], iterations)
+    heat = [fit(problem, x0, min(HEAT, iterations)) for problem, x0 in zip(problems, starts, strict=True)]
+    least = min(result.squares for result in heat)
+    finals = [converge(result, iterations) for result in heat if result.squares <= CLOSE * least]
+    return min(finals, key=lambda result: result.squares)
+
+
+def converge(result: FitResult, iterations: int = ITERATIONS) -> FitResult:
+    """Go on with a fit that its iteration limit ended."""
+    return result if result.converged or iterations <= HEAT else fit(result.problem, result.x, iterations)
 
 
 def _warm_start(problem: Problem, warm: FitResult) -> FloatArray:
@@ -260,11 +301,18 @@ def _warm_start(problem: Problem, warm: FitResult) -> FloatArray:
         (s.effect, s.name): s.scale * x for s, x in zip(warm.problem.shared, warm.x, strict=False)
     }
     shared = np.array([known.get((s.effect, s.name), s.scale * s.start) / s.scale for s in problem.shared])
-    local = []
-    for i, basis in enumerate(problem.local):
-        x = basis.guess.copy()
-        old = warm.local_of(i)
-        common = min(old.size, x.size)
-        x[:common] = old[:common] * warm.problem.local[i].scale[:common] / basis.scale[:common]
-        local.append(x)
-    return np.concatenate([shared, *local])
+    return np.concatenate([shared, *(_warm_local(problem, warm, i) for i in range(len(problem.local)))])
+
+
+def _warm_local(problem: Problem, warm: FitResult, index: int) -> FloatArray:
+    """Return a recording's own unknowns where a fit left them; what that fit lacks, at its guess."""
+    basis, old, ended = problem.local[index], warm.problem.local[index], warm.local_of(index)
+    x = basis.guess.copy()
+    state = slice(0, min(basis.own_rows.start, old.own_rows.start))
+    x[state] = ended[state] * old.scale[state] / basis.scale[state]
+    known = {(s.effect, s.name): value for s, value in zip(old.own, ended[old.own_rows], strict=True)}
+    x[basis.own_rows] = [known.get((s.effect, s.name), s.start) for s in basis.own]
+    if basis.profile.shape == old.profile.shape:
+        rows = basis.profile_rows
+        x[rows] = ended[old.profile_rows] * old.scale[old.profile_rows] / basis.scale[rows]
+    return x

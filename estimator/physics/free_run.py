@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
+import numpy as np
+
+from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult, Problem, fit, make_problem, start_of, start_vector
 from estimator.physics.layout import slot
 from estimator.physics.model import DrivelineModel
-from estimator.physics.simulate import Grid, Start
+from estimator.physics.own_scan import cells, scan, waves
+from estimator.physics.projector import Projector
+from estimator.physics.simulate import Grid, Start, simulate
+from estimator.physics.unknowns import own_unknowns
 from estimator.signals.record import BoolArray, FloatArray, Record
 
 
@@ -33,23 +40,27 @@ class FreeRun:
 def free_run(model: DrivelineModel, record: Record) -> FreeRun:
     """Simulate one recording with a model from its measured torques.
 
+    Beside load torque and initial state, what the model's effects leave to every recording is estimated from it: phases
+    of angles, moments of events, the load profile of a road.
+
     Raises
     ------
     BadModel
         Where the model's structure does not have the recorded output.
     """
-    problem = make_problem(model, [record], ())
+    profile = any(EFFECTS[name].profile for name in model.effects)
+    problem = make_problem(model, [record], (), profile=profile)
     result = settle(problem)
     return FreeRun(result.outputs[0], result.rms, start_of(problem, result.x, 0))
 
 
 def settle(problem: Problem) -> FitResult:
-    """Estimate load torque and initial state of a problem of one recording without shared unknowns.
+    """Estimate what is its own in a problem of one recording without shared unknowns.
 
     With a gap in the line the recording may begin on either flank or between them, and the error has an optimum near
-    each: every one is tried.
+    each: every one is tried. Phases and moments start where a scan finds them.
     """
-    start = start_vector(problem)
+    start = _with_own(problem) if problem.local[0].own else start_vector(problem)
     twist, gap_rad = problem.local[0].twist_index, float(problem.p[slot("backlash", "gap_rad")])
     starts = [start]
     if twist is not None and gap_rad > 0.0:
@@ -60,13 +71,56 @@ def settle(problem: Problem) -> FitResult:
     return min(results, key=lambda result: result.rms)
 
 
+def _with_own(problem: Problem) -> FloatArray:
+    """Return a start with phases and moments found by a scan around the fit without their effects."""
+    basis, record, use = problem.local[0], problem.records[0], problem.use[0]
+    names = sorted({u.effect for u in basis.own if EFFECTS[u.effect].event or EFFECTS[u.effect].phases})
+    sizes = {name: _sizes(problem.p, name) for name in names}
+    silent = problem.p.copy()
+    for name in names:
+        for parameter in sizes[name]:
+            silent[slot(name, parameter)] = 0.0
+    still = fit(replace(problem, p=silent))
+    rest = Projector(still)
+    begin, extra = start_of(still.problem, still.x, 0), basis.extra_load(still.x)
+
+    def run(p: FloatArray) -> FloatArray:
+        return simulate(problem.grid, record, p, begin, extra)[use]
+
+    found: dict[tuple[str, str], float] = {}
+    for name in names:
+        entry = EFFECTS[name]
+        alone = silent.copy()
+        for parameter, size in sizes[name].items():
+            alone[slot(name, parameter)] = size
+        if entry.event:
+            grid = cells(entry, alone, basis.own, sizes[name], run)
+            stretch = scan(rest.rest(grid.answers), rest.error).best(next(iter(sizes[name].values())))
+            found[name, "from_s"] = float(grid.moments_s[stretch.first])
+            found[name, "to_s"] = float(grid.moments_s[stretch.last])
+            continue
+        for wave in waves(entry, alone, sizes[name], run):
+            along, across = -np.linalg.lstsq(rest.rest(wave.answers).T, rest.error, rcond=None)[0]
+            found[name, wave.phase] = float(np.arctan2(across, along))
+    x = still.x.copy()
+    x[basis.own_rows] = [found.get((unknown.effect, unknown.name), unknown.start) for unknown in basis.own]
+    return x
+
+
+def _sizes(p: FloatArray, name: str) -> dict[str, float]:
+    """Return the sizes of an effect whose phases or moments are sought: its amplitudes, or what an event changes."""
+    entry = EFFECTS[name]
+    names = list(entry.phases.values()) if entry.phases else [entry.shared_parameters[0].name]
+    return {parameter: float(p[slot(name, parameter)]) for parameter in names}
+
+
 def simulate_foreign(
     model: DrivelineModel,
     p: FloatArray,
     grid: Grid,
     record: Record,
     use: BoolArray,
-    profile: bool = False,
+    effects: Iterable[str] = (),
 ) -> FloatArray:
     """Simulate a recording with a parameter vector that was fitted to others.
 
@@ -76,12 +130,16 @@ def simulate_foreign(
         Parameters.
     use : ndarray of bool, shape (N,)
         Samples from which what is the recording's own is estimated.
-    profile : bool
-        Whether a load profile over time belongs to it.
+    effects : iterable of str
+        Effects that were fitted beside the model's: what they leave to every recording is estimated too.
 
     Returns
     -------
     ndarray, shape (N,)
     """
-    own = make_problem(model, [record], (), profile=profile, use=[use], grid=grid)
-    return settle(replace(own, p=p)).outputs[0]
+    names = {*model.effects, *effects}
+    profile = any(EFFECTS[name].profile for name in names)
+    problem = make_problem(
+        model, [record], (), own=[own_unknowns(names, record)], profile=profile, use=[use], grid=grid
+    )
+    return settle(replace(problem, p=p)).outputs[0]

@@ -6,11 +6,25 @@ import math
 
 from estimator.compiled import compiled
 
+BEYOND = 20.0
+"""From here on the hyperbolic tangent is 1 to the last bit; most speeds are beyond, and need no tangent."""
+
 
 @compiled
 def smooth_sign(speed: float, width: float) -> float:
     """Return the sign of a speed, rounded within ``width`` [same unit] so that a sticking mass can be integrated."""
-    return math.tanh(speed / width)
+    ratio = speed / width
+    if abs(ratio) > BEYOND:
+        return math.copysign(1.0, ratio)
+    return math.tanh(ratio)
+
+
+@compiled
+def dry_friction(speed: float, friction: float, width: float) -> float:
+    """Return the torque ``T_c sign(w)`` against a speed [rad/s], rounded within ``width``."""
+    if friction == 0.0:
+        return 0.0
+    return friction * smooth_sign(speed, width)
 
 
 @compiled
@@ -22,3 +36,30 @@ def beyond_gap(twist: float, gap: float) -> float:
     if twist < -half:
         return twist + half
     return 0.0
+
+
+@compiled
+def share_inside(start: float, length: float, low: float, high: float) -> float:
+    """Return which share of ``[start, start + length]`` lies in ``[low, high]``: smooth in both, as a fit needs."""
+    inside = min(start + length, high) - max(start, low)
+    return inside / length if inside > 0.0 else 0.0
+
+
+@compiled
+def inertia_while(inertia: float, extra: float, share: float) -> float:
+    """Return the inertia that answers to a torque as one with ``extra`` on it for a ``share`` of the time does.
+
+    Accelerations add up over time, not inertias: it is the harmonic mean. Without a share it is ``inertia``, exactly.
+    """
+    if share == 0.0:
+        return inertia
+    whole = inertia + extra
+    return inertia * (whole / (whole - share * extra))
+
+
+@compiled
+def wave(amplitude: float, angle: float, phase: float) -> float:
+    """Return ``A cos(angle + phase)``; 0 without an amplitude, at no cost."""
+    if amplitude == 0.0:
+        return 0.0
+    return amplitude * math.cos(angle + phase)

@@ -2,31 +2,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from estimator.physics.catalogue import EFFECTS
+from estimator.physics.catalogue import BUILT_IN, EFFECTS
+from estimator.physics.effect import Effect
 from estimator.physics.model import DrivelineModel, Structure
 from estimator.signals.record import FloatArray
 
-NOMINAL = Structure.TWO_MASS.parameter_names
+NOMINAL = Structure.THREE_MASS.parameter_names
 """The largest structure's parameters; a smaller structure leaves the rest at zero."""
 
 _SLOTS: dict[tuple[str, str], int] = {}
 for _name in NOMINAL:
     _SLOTS["", _name] = len(_SLOTS)
-for _entry in EFFECTS.values():
+for _entry in BUILT_IN.values():
     for _parameter in _entry.parameters:
         _SLOTS[_entry.name, _parameter.name] = len(_SLOTS)
 
 SIZE = len(_SLOTS)
-"""Length of the flat vector."""
+"""Length of the flat vector, without a user's own laws."""
+
+_OWN_SLOTS: dict[tuple[str, str], int] = {}
+
+
+def add(entries: Sequence[Effect]) -> None:
+    """Place the parameters of these behind all others, in place of those before (``own_law.install``)."""
+    _OWN_SLOTS.clear()
+    for entry in entries:
+        for parameter in entry.parameters:
+            _OWN_SLOTS[entry.name, parameter.name] = SIZE + len(_OWN_SLOTS)
 
 
 def slot(effect: str, parameter: str) -> int:
     """Index of an effect's parameter; of a nominal one where ``effect`` is empty."""
-    return _SLOTS[effect, parameter]
+    key = effect, parameter
+    return _SLOTS[key] if key in _SLOTS else _OWN_SLOTS[key]
 
 
 def flat(model: DrivelineModel) -> FloatArray:
@@ -36,7 +48,7 @@ def flat(model: DrivelineModel) -> FloatArray:
 
 def flat_values(nominal: Mapping[str, float], effects: Mapping[str, Mapping[str, float]]) -> FloatArray:
     """Return the kernel's parameter vector from plain values, shape (SIZE,)."""
-    vector = np.zeros(SIZE)
+    vector = np.zeros(SIZE + len(_OWN_SLOTS))
     for entry in EFFECTS.values():
         for parameter in entry.parameters:
             vector[slot(entry.name, parameter.name)] = parameter.null

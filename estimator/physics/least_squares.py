@@ -81,7 +81,9 @@ def _step(
     high: FloatArray,
 ) -> FloatArray:
     """Return the damped Gauss-Newton step, cut at the bounds; unknowns that meet one are held and the rest solved."""
-    held = ((x <= low) & (gradient > 0)) | ((x >= high) & (gradient < 0))
+    fixed = low == high
+    held = fixed | ((x <= low) & (gradient > 0)) | ((x >= high) & (gradient < 0))
+    down, up = (np.subtract(bound, x, out=np.zeros_like(x), where=~fixed) for bound in (low, high))  # may be infinite
     step = np.zeros_like(x)
     diagonal = np.diag(curvature)
     scale = damping * np.maximum(diagonal, 1e-12 * diagonal.max())
@@ -89,7 +91,7 @@ def _step(
         free = ~held
         right = -gradient[free] - curvature[np.ix_(free, held)] @ step[held]
         step[free] = np.linalg.solve(curvature[np.ix_(free, free)] + np.diag(scale[free]), right)
-        cut = np.clip(step, low - x, high - x)
+        cut = np.clip(step, down, up)
         outside = free & (cut != step)
         step = cut
         if not outside.any():

@@ -6,6 +6,10 @@ Equations of motion, reflected to the motor shaft (translation: read kg, N, m, N
                J_L dw_L/dt = T_S - b_L w_L - T_0
                T_S = k (phi_M - phi_L) + c (w_M - w_L)
 
+    three_mass a mass J_2 between shaft and load, and a second shaft k_2, c_2 from it to the load
+
+    joint      T = k phi + c dphi/dt - T_0: the twist phi is imposed, the torque T is measured
+
 ``T_0`` is the constant load torque; it and the initial state are unknown in every recording.
 """
 
@@ -16,14 +20,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 
+import numpy as np
+
 from estimator.errors import BadModel
+from estimator.signals.record import FloatArray
 
 
 class Structure(Enum):
-    """How many inertias the driveline has; the value is the name in the model file."""
+    """How many inertias the driveline has, a joint none; the value is the name in the model file."""
 
     ONE_MASS = "one_mass"
     TWO_MASS = "two_mass"
+    THREE_MASS = "three_mass"
+    JOINT = "joint"
 
     @property
     def parameter_names(self) -> tuple[str, ...]:
@@ -34,9 +43,11 @@ class Structure(Enum):
 _PARAMETER_NAMES = {
     Structure.ONE_MASS: ("J_M", "b_M"),
     Structure.TWO_MASS: ("J_M", "J_L", "k", "c", "b_M", "b_L"),
+    Structure.THREE_MASS: ("J_M", "J_2", "J_L", "k", "c", "k_2", "c_2", "b_M", "b_L"),
+    Structure.JOINT: ("k", "c"),
 }
 
-STRICTLY_POSITIVE = frozenset({"J_M", "J_L", "k"})
+STRICTLY_POSITIVE = frozenset({"J_M", "J_2", "J_L", "k", "k_2"})
 """Parameters that can't be zero; the others can't be negative."""
 
 
@@ -56,6 +67,8 @@ _UNITS = {
         "angle": "rad",
         "speed": "rad/s",
         "per_angle_squared": "1/rad^2",
+        "quadratic_drag": "Nm s^2/rad^2",
+        "per_torque": "1/Nm",
     },
     Motion.TRANSLATION: {
         "inertia": "kg",
@@ -65,14 +78,19 @@ _UNITS = {
         "angle": "m",
         "speed": "m/s",
         "per_angle_squared": "1/m^2",
+        "quadratic_drag": "N s^2/m^2",
+        "per_torque": "1/N",
     },
 }
 
 _DIMENSIONS = {
     "J_M": "inertia",
+    "J_2": "inertia",
     "J_L": "inertia",
     "k": "stiffness",
     "c": "damping",
+    "k_2": "stiffness",
+    "c_2": "damping",
     "b_M": "damping",
     "b_L": "damping",
 }
@@ -162,6 +180,25 @@ class DrivelineModel:
     def values(self) -> dict[str, float]:
         """Nominal parameter values alone."""
         return {name: self.parameters[name].value for name in self.structure.parameter_names}
+
+
+def natural_frequencies_rad_s(values: Mapping[str, float]) -> FloatArray:
+    """Return the undamped natural frequencies of the line, lowest first [rad/s]; a single 0 without two masses."""
+    if "J_L" not in values:
+        return np.zeros(1)
+    chain = [("J_M", "k"), ("J_2", "k_2"), ("J_L", "")] if "J_2" in values else [("J_M", "k"), ("J_L", "")]
+    stiffness = np.zeros((len(chain), len(chain)))
+    for i, (_, spring) in enumerate(chain[:-1]):
+        stiffness[i : i + 2, i : i + 2] += values[spring] * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    root = np.sqrt([values[name] for name, _ in chain])
+    squares = np.linalg.eigvalsh(stiffness / np.outer(root, root))
+    frequencies: FloatArray = np.sqrt(np.maximum(squares[1:], 0.0))
+    return frequencies
+
+
+def load_inertia(model: DrivelineModel) -> str:
+    """Return the name of the inertia that the load's mass is part of."""
+    return "J_M" if model.structure is Structure.ONE_MASS else "J_L"
 
 
 def _value_problems(name: str, parameter: Parameter) -> list[str]:

@@ -13,9 +13,12 @@ SPEED_WINDOW_S = 0.02
 
 
 def measured_speed(record: Record) -> FloatArray:
-    """Return the speed of a recording: measured, or the slope of the position; shape (N,), NaN where masked."""
-    output = np.where(record.okay, record.output, np.nan)
-    if record.kind is not OutputKind.POSITION:
+    """Return the speed of a recording: measured, or the slope of the position; shape (N,), NaN where masked.
+
+    An imposed motion is a position, known throughout.
+    """
+    output = np.where(record.okay, record.output, np.nan) if record.imposed is None else record.imposed
+    if record.imposed is None and record.kind is not OutputKind.POSITION:
         return output
     half = max(1, round(0.5 * SPEED_WINDOW_S / record.sample_time_s))
     slope = np.full_like(output, np.nan)
@@ -57,3 +60,38 @@ def torque_reverses(record: Record) -> bool:
     torque = record.total_torque_nm
     threshold = 0.1 * float(np.percentile(np.abs(torque), 99))
     return bool(np.sum(torque > threshold) >= 10 and np.sum(torque < -threshold) >= 10)
+
+
+def largest_torque(records: Sequence[Record]) -> float:
+    """Return the largest typical torque of one input: the 99th percentile of its size."""
+    return max(_typical(column) for record in records for column in record.torque_nm.T)
+
+
+SHARES_DIFFER = 0.03
+"""Least spread of the first input's share of the torque between recordings that tells the inputs apart."""
+
+
+def shares_differ(records: Sequence[Record]) -> bool:
+    """Tell whether the first torque input's share of the sum differs between recordings, or within one."""
+    shares = []
+    for record in records:
+        first, total = record.torque_nm[:, 0], record.total_torque_nm
+        third = max(first.size // 3, 1)
+        for rows in (slice(0, third), slice(third, 2 * third), slice(2 * third, None)):
+            power = float(total[rows] @ total[rows])
+            if power > 0.0:
+                shares.append(float(first[rows] @ total[rows]) / power)
+    return bool(shares) and max(shares) - min(shares) > SHARES_DIFFER
+
+
+def speeds_differ(records: Sequence[Record]) -> bool:
+    """Tell whether the speeds of the recordings spread by more than a tenth of the top one."""
+    speeds = np.concatenate([measured_speed(record) for record in records])
+    low, high = np.nanpercentile(speeds, [5, 95])
+    return bool(high - low > 0.1 * speed_scale(records))
+
+
+def speed_sweeps(record: Record) -> bool:
+    """Tell whether the speed of a recording changes by more than half of its top value."""
+    low, high = np.nanpercentile(measured_speed(record), [2, 98])
+    return bool(high - low > 0.5 * speed_scale([record]))

@@ -9,14 +9,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimator.errors import BadModel
-from estimator.physics import kernel
-from estimator.physics.model import DrivelineModel, Structure
+from estimator.physics import joint, kernel, own_law, own_law_run
+from estimator.physics.model import DrivelineModel, Structure, natural_frequencies_rad_s
 from estimator.physics.motion import reverses, speed_scale
+from estimator.physics.torque_path import shaft_torque
 from estimator.signals.record import FloatArray, Location, OutputKind, Record
 
-RADIANS_PER_STEP = 0.15
-"""Integration step in radians of the line's natural frequency, or its fastest decay: fourth order leaves 1e-6 of
-amplitude per step."""
+RADIANS_PER_STEP = 0.2
+"""Integration step in radians of the line's natural frequency, or its fastest decay. Fourth order would allow more; a
+torque that steps within a step of the integration, as one delayed by a part of a period does, would not."""
 
 FASTEST_IN_NYQUIST = 30.0
 """Fastest mode that is simulated, in multiples of the Nyquist frequency of the sample time.
@@ -32,7 +33,8 @@ Real contacts give way a little before they slip; and a sharper edge makes the e
 parameters: on a real drive fits from different starts then ended up to 10 % apart in friction, with this width not.
 """
 
-_MASSES = {Structure.ONE_MASS: 1, Structure.TWO_MASS: 2}
+MASSES = {Structure.ONE_MASS: 1, Structure.TWO_MASS: 2, Structure.THREE_MASS: 3}
+"""How many inertias the kernel has for a structure."""
 
 _OUTPUT_STATE = {
     (OutputKind.SPEED, Location.MOTOR): kernel.SPEED,
@@ -59,13 +61,8 @@ class Start:
     speed_rad_s: float
     twist_rad: float = 0.0
     load_speed_rad_s: float = 0.0
-
-
-def natural_frequency_rad_s(values: Mapping[str, float]) -> float:
-    """Return the undamped natural frequency of the line, sqrt(k (1/J_M + 1/J_L)) [rad/s]; 0 for one mass."""
-    if "k" not in values:
-        return 0.0
-    return math.sqrt(values["k"] * (1.0 / values["J_M"] + 1.0 / values["J_L"]))
+    middle_twist_rad: float = 0.0
+    middle_speed_rad_s: float = 0.0
 
 
 def substeps_for(values: Mapping[str, float], period_s: float) -> int:
@@ -76,9 +73,11 @@ def substeps_for(values: Mapping[str, float], period_s: float) -> int:
     BadModel
         Where that is beyond `FASTEST_IN_NYQUIST`.
     """
+    if "J_M" not in values:
+        return 1
     motor = (values["b_M"] + values.get("c", 0.0)) / values["J_M"]
     load = (values["b_L"] + values["c"]) / values["J_L"] if "k" in values else 0.0
-    fastest = max(natural_frequency_rad_s(values), motor + load)
+    fastest = max(float(natural_frequencies_rad_s(values)[-1]), motor + load)
     if fastest * period_s > FASTEST_IN_NYQUIST * math.pi:
         raise BadModel(_too_fast(values, fastest, period_s))
     return max(1, math.ceil(fastest * period_s / RADIANS_PER_STEP))
@@ -86,7 +85,7 @@ def substeps_for(values: Mapping[str, float], period_s: float) -> int:
 
 def _too_fast(values: Mapping[str, float], fastest_rad_s: float, period_s: float) -> str:
     """Say which mode is too fast, and for which parameters to look: the largest part of it and what it acts on."""
-    if natural_frequency_rad_s(values) == fastest_rad_s:
+    if natural_frequencies_rad_s(values)[-1] == fastest_rad_s:
         mode, law = "natural frequency", "k"
     else:
         parts = {"b_M": values["b_M"] / values["J_M"]}
@@ -122,6 +121,14 @@ def output_state(record: Record, structure: Structure) -> int:
     BadModel
         Where the structure has no such output.
     """
+    if (record.imposed is not None) != (structure is Structure.JOINT):
+        came = "an imposed motion" if record.imposed is not None else f"{record.kind.value} as the output"
+        raise BadModel(
+            f"recording {record.name}: came {came}, expected the torque under an imposed motion for a joint, and a "
+            f"measured motion for every other structure; the model is a {structure.value}. Correct the structure."
+        )
+    if structure is Structure.JOINT:
+        return joint.TORQUE
     index = _OUTPUT_STATE.get((record.kind, record.location))
     if index is None or (structure is Structure.ONE_MASS and record.location is Location.LOAD):
         raise BadModel(
@@ -139,39 +146,119 @@ def simulate(
     extra_load_nm: FloatArray | None = None,
     output: int | None = None,
 ) -> FloatArray:
-    """Simulate the recorded output from the recorded torque.
+    """Simulate the recorded output, as its sensor shows it, from the recorded torque.
 
     Parameters
     ----------
     p : ndarray, shape (layout.SIZE,)
-        Parameters of the superset model.
+        Parameters of the superset model, the recording's own among them.
     extra_load_nm : ndarray, shape (N,), optional
         Load torque over time, beside the constant one.
     output : int, optional
-        State to return (``kernel.SPEED`` ...); the recorded output by default.
+        State to return (``kernel.SPEED`` ...), without the sensor; the recorded output by default.
 
     Returns
     -------
     ndarray, shape (N,)
         In the unit of ``record.output``.
     """
-    torque = record.total_torque_nm
+    if grid.structure is Structure.JOINT:
+        load = start.load_torque_nm + (0.0 if extra_load_nm is None else extra_load_nm)
+        wanted = output_state(record, grid.structure) if output is None else output
+        return joint.simulate(record, p, np.broadcast_to(load, record.output.shape), start.twist_rad, wanted)
+    since_start_s = record.since_start_s
+    torque = shaft_torque(record.torque_nm, since_start_s, p)
     load = np.full(torque.shape, start.load_torque_nm)
     if extra_load_nm is not None:
         load += extra_load_nm
-    state = np.array([start.angle_rad, start.speed_rad_s, start.twist_rad, start.load_speed_rad_s, torque[0]])
+    angle = motor_angle(record) if np.any(p[PERIODIC]) else np.zeros_like(torque)
+    recorded = output is None
+    state = output_state(record, grid.structure) if output is None else output
+    jitter = record.offset_s if recorded else None
+    begin = initial_state(start, torque[0], angle[0], p)
+    masses, substeps, sample_time_s = MASSES[grid.structure], grid.substeps, record.sample_time_s
+    laws = own_law.active(p)
+    every = 1
+    if laws:  # their torques are held over an integration step: every step is a sample then
+        run = own_law_run.Run.of(masses, substeps, grid.sign_width, record, torque, load, angle, p).under(laws, begin)
+        torque, load, angle, sample_time_s = run.torque, run.load, run.angle, run.step_s
+        every, substeps = substeps, 1
+    slopes = np.zeros((2, 0 if jitter is None else torque.size))
     out = np.empty_like(torque)
     kernel.integrate(
-        _MASSES[grid.structure],
-        record.sample_time_s,
-        grid.substeps,
+        masses,
+        sample_time_s,
+        substeps,
         grid.sign_width,
         0,
+        since_start_s[0],
         torque,
         load,
+        angle,
         p,
+        begin.copy(),
         state,
-        output_state(record, grid.structure) if output is None else output,
+        recorded and state != kernel.ANGLE,
         out,
+        slopes,
     )
+    if laws and recorded:
+        out += run.misread(laws, begin)
+    out, slopes = out[::every], slopes[:, ::every]
+    if jitter is not None:
+        out += np.where(jitter < 0.0, slopes[0], slopes[1]) * jitter
     return out
+
+
+PERIODIC = np.array(
+    [
+        kernel.RIPPLE,
+        kernel.RIPPLE_SHARE,
+        kernel.CARDAN,
+        kernel.CARDAN_ANGLE,
+        kernel.CARDAN_SHARE,
+        kernel.IMBALANCE,
+        kernel.RESOLVER_ONCE,
+        kernel.RESOLVER_TWICE,
+    ]
+)
+"""Amplitudes of the laws that are periodic in the motor's angle."""
+
+
+def initial_state(start: Start, torque_nm: float, angle_rad: float, p: FloatArray) -> FloatArray:
+    """Return the kernel's state at the start: what is not unknown follows from the rest as if it were steady."""
+    return np.array(
+        [
+            *kernel.State(
+                angle=start.angle_rad,
+                speed=start.speed_rad_s,
+                twist=start.twist_rad,
+                load_speed=start.load_speed_rad_s,
+                loading=0.0,
+                vehicle_speed=start.load_speed_rad_s,
+                branch_twist=0.0,
+                branch_speed=start.speed_rad_s,
+                middle_twist=start.middle_twist_rad,
+                middle_speed=start.middle_speed_rad_s,
+                traction=start.load_torque_nm,
+            ),
+            torque_nm + p[kernel.LAGGED_BEFORE],
+            kernel.reading(start.speed_rad_s, angle_rad, p) + p[kernel.FILTERED_BEFORE],
+        ]
+    )
+
+
+def motor_angle(record: Record) -> FloatArray:
+    """Return the motor angle by the record's own output, from 0 at its start; shape (N,) [rad].
+
+    Laws that are periodic in the angle take their phase from it. A simulated angle would drift off by whole radians
+    while a fit is still on its way.
+    """
+    good = np.flatnonzero(record.okay)
+    output = np.interp(record.time_s, record.time_s[good], record.output[good])
+    if record.imposed is not None:
+        return np.asarray(record.imposed - record.imposed[0])
+    if record.kind is OutputKind.POSITION:
+        return np.asarray(output - output[0])
+    step = 0.5 * record.sample_time_s * (output[1:] + output[:-1])
+    return np.concatenate([[0.0], np.cumsum(step)])

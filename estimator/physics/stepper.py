@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from estimator.physics import kernel
+from estimator.errors import BadModel
+from estimator.physics import kernel, own_law
 from estimator.physics.effects import transport_delay
 from estimator.physics.layout import flat, slot
-from estimator.physics.model import DrivelineModel, Structure
-from estimator.physics.simulate import substeps_for
+from estimator.physics.model import DrivelineModel
+from estimator.physics.simulate import MASSES, Start, initial_state, substeps_for
+from estimator.physics.torque_path import shaft_torque
 
 SIGN_WIDTH_RAD_S = 0.02
 """Dry friction of a simulated rig changes sign within this speed; its noise is larger."""
+
+FINER = 2
+"""A rig is stepped once and not thousands of times as in a fit: finer steps let friction stick closer to standstill."""
 
 
 class Stepper:
@@ -28,40 +33,59 @@ class Stepper:
     """
 
     def __init__(self, model: DrivelineModel, period_s: float, load_torque_nm: float = 0.0) -> None:
-        self._masses = 1 if model.structure is Structure.ONE_MASS else 2
+        self._masses = MASSES[model.structure]
         self._p = flat(model)
+        if laws := own_law.active(self._p):
+            raise BadModel(
+                f"effects.{laws[0].name}: expected effects of the catalogue, came a law of your own, which a simulated "
+                "rig can't have. Take it out of the model file."
+            )
         self._period_s = period_s
-        self._substeps = substeps_for(model.values(), period_s)
+        self._substeps = FINER * substeps_for(model.values(), period_s)
         history = int(np.ceil(self._p[slot(transport_delay.EFFECT.name, "delay_s")] / period_s)) + 2
+        self._steps = 0
         self._torque = np.zeros(history)
         self._load = np.full(history, load_torque_nm)
+        self._angle = np.zeros(history)
         self._out = np.zeros(history)
-        self._state = np.zeros(kernel.STATES)
+        self._slopes = np.zeros((2, 0))
+        self._state = initial_state(Start(load_torque_nm, 0.0, 0.0), 0.0, 0.0, self._p)
 
     @property
     def speed_rad_s(self) -> float:
-        """Motor speed now [rad/s]."""
-        return float(self._state[kernel.SPEED])
+        """Motor speed now, as the sensor shows it [rad/s]."""
+        state = self._state
+        read = kernel.reading(state[kernel.SPEED], state[kernel.ANGLE], self._p)
+        return float(kernel.shown(read, state[kernel.FILTERED], self._p))
 
     @property
     def angle_rad(self) -> float:
         """Motor angle now [rad]."""
         return float(self._state[kernel.ANGLE])
 
-    def step(self, torque_nm: float) -> None:
-        """Let a torque [Nm] act for one period."""
+    def step(self, *torque_nm: float) -> None:
+        """Let the torque of each input [Nm] act for one period."""
+        now = np.array([self._steps * self._period_s])
         self._torque[:-1] = self._torque[1:]
-        self._torque[-1] = torque_nm
+        self._torque[-1] = shaft_torque(np.array([torque_nm]), now, self._p)[0]
+        self._angle[-1] = self._state[kernel.ANGLE]
+        self._angle[-2] = self._angle[-1] - self._state[kernel.SPEED] * self._period_s  # the kernel goes straight on
+        last = self._torque.size - 1
         kernel.integrate(
             self._masses,
             self._period_s,
             self._substeps,
             SIGN_WIDTH_RAD_S,
-            self._torque.size - 1,
+            last,
+            (self._steps - last) * self._period_s,
             self._torque,
             self._load,
+            self._angle,
             self._p,
             self._state,
             kernel.SPEED,
+            False,
             self._out,
+            self._slopes,
         )
+        self._steps += 1

@@ -5,18 +5,18 @@ The vector of unknowns is ``[shared ..., local of record 0 ..., local of record 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from estimator.physics.catalogue import EFFECTS
-from estimator.physics.effect import EffectParameter, Held
+from estimator.physics.effect import Effect, EffectParameter, Held
 from estimator.physics.effects import road_grade
 from estimator.physics.layout import slot
-from estimator.physics.model import DrivelineModel, Structure
+from estimator.physics.model import DrivelineModel, Structure, natural_frequencies_rad_s
 from estimator.physics.motion import measured_speed, speed_scale, torque_scale
-from estimator.physics.simulate import Start, natural_frequency_rad_s
+from estimator.physics.simulate import Start, motor_angle
 from estimator.signals.record import FloatArray, OutputKind, Record
 
 
@@ -49,19 +49,40 @@ def nominal_unknowns(model: DrivelineModel) -> tuple[Shared, ...]:
     )
 
 
-def effect_unknowns(name: str, model: DrivelineModel, records: Sequence[Record]) -> list[tuple[Shared, ...]]:
-    """Return an effect's parameters as unknowns, once per start point; a profile has no shared ones."""
+@dataclass(frozen=True, slots=True)
+class Release:
+    """One start point of one effect: what all recordings share, and what each has of its own."""
+
+    shared: tuple[Shared, ...]
+    own: tuple[tuple[Shared, ...], ...]
+
+
+def effect_unknowns(name: str, model: DrivelineModel, records: Sequence[Record]) -> list[Release]:
+    """Return an effect's parameters as unknowns, once per start point; a profile has no shared ones.
+
+    What recordings have of their own starts at its null: phases and moments are found by a scan
+    (``estimator.diagnosis.screening``).
+    """
     entry = EFFECTS[name]
+    own = tuple(_own_unknowns(entry, record) for record in records)
     if entry.profile:
-        return [()]
+        return [Release((), own)]
     scales = entry.scales(model, records)
     return [
-        tuple(
-            _unknown(name, parameter, scale, x)
-            for parameter, scale, x in zip(entry.shared_parameters, scales, start, strict=True)
+        Release(
+            tuple(
+                _unknown(name, parameter, scale, x)
+                for parameter, scale, x in zip(entry.shared_parameters, scales, start, strict=True)
+            ),
+            own,
         )
         for start in entry.starts(model, records)
     ]
+
+
+def own_unknowns(names: Iterable[str], record: Record) -> tuple[Shared, ...]:
+    """Return the own parameters that a set of effects has in a recording, at their nulls."""
+    return tuple(unknown for name in sorted(names) for unknown in _own_unknowns(EFFECTS[name], record))
 
 
 def _unknown(effect: str, parameter: EffectParameter, scale: float, x: float | Held) -> Shared:
@@ -70,13 +91,25 @@ def _unknown(effect: str, parameter: EffectParameter, scale: float, x: float | H
     return Shared(effect, parameter.name, scale, parameter.low, parameter.high, x)
 
 
+def _own_unknowns(entry: Effect, record: Record) -> tuple[Shared, ...]:
+    """Return a recording's own parameters of an effect: moments within the recording, other ones as they are."""
+    since = record.since_start_s
+    first, last = float(since[0]), float(since[-1]) + record.sample_time_s
+    return tuple(
+        Shared(entry.name, parameter.name, 1.0, first, last, first)
+        if entry.event
+        else Shared(entry.name, parameter.name, 1.0, parameter.low, parameter.high, parameter.null)
+        for parameter in entry.own_parameters
+    )
+
+
 LOAD_TORQUE = 0
 """Where the constant load torque stands among a recording's own unknowns."""
 
 
 @dataclass(frozen=True, slots=True)
 class LocalBasis:
-    """The unknowns of one recording: load torque, initial state and, where asked, a load profile.
+    """The unknowns of one recording: load torque, initial state, own parameters of effects, a load profile.
 
     Attributes
     ----------
@@ -84,43 +117,85 @@ class LocalBasis:
         Size of each unknown, in its unit.
     guess : ndarray, shape (L,)
         Where a fit starts, in units of ``scale``.
+    own : tuple of Shared
+        Own parameters of effects, O of them; they stand behind the load torque and the initial state.
     profile : ndarray, shape (K, N)
-        Basis of the load profile; K = 0 without one.
+        Basis of the load profile, whose K unknowns stand last; K = 0 without one.
     """
 
     structure: Structure
     has_angle: bool
     scale: FloatArray
     guess: FloatArray
+    own: tuple[Shared, ...]
     profile: FloatArray
+
+    @property
+    def low(self) -> FloatArray:
+        """Lower bounds of the scaled unknowns, shape (L,)."""
+        return self._bounds([s.low for s in self.own], -np.inf)
+
+    @property
+    def high(self) -> FloatArray:
+        """Upper bounds of the scaled unknowns, shape (L,)."""
+        return self._bounds([s.high for s in self.own], np.inf)
+
+    def _bounds(self, of_own: Sequence[float], free: float) -> FloatArray:
+        bounds = np.full(self.guess.size, free)
+        bounds[self.own_rows] = of_own
+        return bounds
+
+    @property
+    def own_rows(self) -> slice:
+        """Where the own parameters stand."""
+        last = self.guess.size - self.profile.shape[0]
+        return slice(last - len(self.own), last)
+
+    @property
+    def profile_rows(self) -> slice:
+        """Where the profile stands."""
+        return slice(self.guess.size - self.profile.shape[0], self.guess.size)
 
     def start(self, x: FloatArray) -> Start:
         """Return the start state of scaled unknowns ``x``, shape (L,)."""
         values = x * self.scale
+        if self.structure is Structure.JOINT:
+            return Start(float(values[0]), 0.0, 0.0, float(values[1]))
         angle = float(values[2]) if self.has_angle else 0.0
         i = self.twist_index
-        if i is None:
-            return Start(float(values[0]), angle, float(values[1]))
-        return Start(float(values[0]), angle, float(values[1]), float(values[i]), float(values[i + 1]))
+        state = () if i is None else (float(value) for value in values[i : self.own_rows.start])
+        return Start(float(values[0]), angle, float(values[1]), *state)
 
     @property
     def twist_index(self) -> int | None:
         """Where the initial twist stands among the unknowns; None for one mass."""
         if self.structure is Structure.ONE_MASS:
             return None
+        if self.structure is Structure.JOINT:
+            return 1
         return 3 if self.has_angle else 2
+
+    def parameters(self, p: FloatArray, x: FloatArray) -> FloatArray:
+        """Return the kernel's parameter vector with the recording's own parameters in it; ``p`` where it has none."""
+        if not self.own:
+            return p
+        filled = p.copy()
+        for unknown, value in zip(self.own, x[self.own_rows], strict=True):
+            filled[unknown.slot] = unknown.scale * value
+        return filled
 
     def extra_load(self, x: FloatArray) -> FloatArray | None:
         """Return the load profile of scaled unknowns, shape (N,) [Nm]; None without one."""
-        count = self.profile.shape[0]
-        if count == 0:
+        if self.profile.shape[0] == 0:
             return None
-        load: FloatArray = (x[-count:] * self.scale[-count:]) @ self.profile
+        load: FloatArray = (x[self.profile_rows] * self.scale[self.profile_rows]) @ self.profile
         return load
 
 
-def local_basis(model: DrivelineModel, record: Record, profile: bool) -> LocalBasis:
+def local_basis(model: DrivelineModel, record: Record, profile: bool, own: tuple[Shared, ...] = ()) -> LocalBasis:
     """Set up the unknowns of one recording, with a start read off its first samples."""
+    if model.structure is Structure.JOINT:
+        return _joint_basis(record, own)
     speed = measured_speed(record)
     v_scale, t_scale = speed_scale([record]), torque_scale([record])
     first = speed[np.flatnonzero(np.isfinite(speed))[:3]].mean()
@@ -131,21 +206,33 @@ def local_basis(model: DrivelineModel, record: Record, profile: bool) -> LocalBa
         y = record.output[record.okay]
         scale.append(max(0.01 * float(np.ptp(y)), np.finfo(float).tiny))
         guess.append(float(y[0]))
-    if model.structure is Structure.TWO_MASS:
-        values = model.values()
-        swing = t_scale / (values["J_M"] * natural_frequency_rad_s(values))
-        scale += [0.1 * t_scale / values["k"], 0.1 * swing]
-        guess += [load / values["k"], first]
+    values = model.values()
+    for spring in ("k", "k_2"):
+        if spring in values:
+            swing = t_scale / (values["J_M"] * float(natural_frequencies_rad_s(values)[0]))
+            scale += [0.1 * t_scale / values[spring], 0.1 * swing]
+            guess += [load / values[spring], first]
     shape = road_grade.basis(record.time_s) if profile else np.empty((0, record.time_s.size))
     count = shape.shape[0]
-    all_scales = np.array(scale + [0.05 * t_scale] * count)
-    return LocalBasis(model.structure, has_angle, all_scales, np.array(guess + [0.0] * count) / all_scales, shape)
+    all_scales = np.array(scale + [1.0] * len(own) + [0.05 * t_scale] * count)
+    all_guesses = np.array(guess + [unknown.start for unknown in own] + [0.0] * count)
+    return LocalBasis(model.structure, has_angle, all_scales, all_guesses / all_scales, own, shape)
+
+
+def _joint_basis(record: Record, own: tuple[Shared, ...]) -> LocalBasis:
+    """Set up the constant torque of a joint and its twist at the start, which is none until the fit knows better."""
+    twist = max(0.1 * float(np.ptp(motor_angle(record))), np.finfo(float).tiny)
+    scale = np.array([0.1 * torque_scale([record]), twist, *[1.0] * len(own)])
+    load = -float(record.output[record.okay].mean())
+    guess = np.array([load, 0.0, *(unknown.start for unknown in own)])
+    nothing = np.empty((0, record.time_s.size))
+    return LocalBasis(Structure.JOINT, False, scale, guess / scale, own, nothing)
 
 
 def _mean_load(model: DrivelineModel, record: Record, speed: FloatArray) -> float:
     """Return the mean torque left after viscous friction and acceleration of the whole line [Nm]."""
     values = model.values()
-    inertia = values["J_M"] + values.get("J_L", 0.0)
+    inertia = values["J_M"] + values.get("J_2", 0.0) + values.get("J_L", 0.0)
     viscous = values["b_M"] + values.get("b_L", 0.0)
     good = np.flatnonzero(np.isfinite(speed))
     duration = record.time_s[good[-1]] - record.time_s[good[0]]

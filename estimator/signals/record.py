@@ -50,6 +50,15 @@ class Record:
         False where the sample must not be used; time goes on there.
     kind, location
         What the output is, and where it is measured.
+    began_s : float, optional
+        When the recording began that this one is a part of [s]: laws over time count from there. None: at its start.
+    torque_okay : ndarray of bool, shape (N, M) or (N,), optional
+        False where a torque was not read, or not to be trusted, and ``torque_nm`` holds a stand-in. None: all read.
+    imposed : ndarray, shape (N,), optional
+        Motion that a bench imposes on a joint [rad; translation m]; the output is then the torque it takes, which
+        ``torque_nm`` holds too. None: the torque acts and the motion is measured.
+    offset_s : ndarray, shape (N,), optional
+        True sampling instant of the output less ``time_s`` [s]. None: on time.
     """
 
     name: str
@@ -60,10 +69,16 @@ class Record:
     okay: BoolArray
     kind: OutputKind = OutputKind.SPEED
     location: Location = Location.MOTOR
+    began_s: float | None = None
+    torque_okay: BoolArray | None = None
+    offset_s: FloatArray | None = None
+    imposed: FloatArray | None = None
 
     def __post_init__(self) -> None:
         n = self.time_s.shape[0]
         shapes = {"torque_nm": self.torque_nm.shape[:1], "output": self.output.shape, "okay": self.okay.shape}
+        optional = {"offset_s": self.offset_s, "imposed": self.imposed}
+        shapes |= {name: values.shape for name, values in optional.items() if values is not None}
         for name, shape in shapes.items():
             if shape != (n,):
                 raise BadShape(
@@ -80,6 +95,35 @@ class Record:
                 f"recording {self.name}: torque or unmasked output holds NaN or infinity. "
                 "Mask such samples with okay = False and hold the last torque."
             )
+        if self.imposed is not None and not np.isfinite(self.imposed).all():
+            raise BadShape(
+                f"recording {self.name}: the imposed motion holds NaN or infinity. "
+                "Mask such samples with okay = False and bridge the motion."
+            )
+        if self.torque_okay is not None and self.torque_okay.shape not in ((n,), self.torque_nm.shape):
+            raise BadShape(
+                f"recording {self.name}: torque_okay has shape {self.torque_okay.shape}, expected ({n},) or "
+                f"{self.torque_nm.shape}. Give one value per sample, or one per sample and torque input."
+            )
+        if self.offset_s is not None and not np.isfinite(self.offset_s).all():
+            raise BadShape(
+                f"recording {self.name}: offset_s holds NaN or infinity. Give 0 where the instant is not known."
+            )
+
+    @property
+    def torque_trusted(self) -> BoolArray:
+        """Where each torque was read and is to be trusted; shape (N, M)."""
+        if self.torque_okay is None:
+            return np.ones(self.torque_nm.shape, dtype=np.bool_)
+        by_row = self.torque_okay if self.torque_okay.ndim == 2 else self.torque_okay[:, np.newaxis]
+        return np.broadcast_to(by_row, self.torque_nm.shape)
+
+    @property
+    def since_start_s(self) -> FloatArray:
+        """Time since the recording began, shape (N,) [s]."""
+        began = self.time_s[0] if self.began_s is None else self.began_s
+        since: FloatArray = self.time_s - began
+        return since
 
     @property
     def total_torque_nm(self) -> FloatArray:

@@ -54,12 +54,17 @@ def identify(
 
     from estimator.identification.identify import Settings
     from hil.config.model_file import read_model_for_recordings
+    from hil.errors import ModelFileError
     from hil.recording import read_records
     from hil.report.outputs import publish, require_folder
 
     require_folder(out)
     settings = Settings(sample_time_s=sample_time, samples=samples or None)
     file = None if model is None else read_model_for_recordings(model)
+    if model is not None and file is not None and file.on_bench:
+        raise ModelFileError(
+            model, "structure | expected a driveline, which torque moves | came 'joint': diagnose or simulate it"
+        )
     records = read_records(recordings, None if file is None else file.signals)
     results = _identified(records, settings)
     nominal = None if file is None else nominal_resonance(file.model)

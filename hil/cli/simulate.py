@@ -18,9 +18,10 @@ def simulate(
 ) -> None:
     """Simulate the output from the measured torques, nothing fed back.
 
-    Only the initial state and the constant load torque are estimated from REC.
+    Only what is REC's own is estimated from it: the initial state and the constant load torque; where the model has
+    such effects, also phases of angles, moments of events and the profile of the road.
     """
-    from estimator.physics.free_run import free_run
+    from estimator.diagnosis.chain import replay
     from estimator.physics.model import unit
     from hil.config.model_file import read_model_for_recordings
     from hil.errors import UsageError
@@ -35,8 +36,8 @@ def simulate(
         raise UsageError(f"--out {out}: expected another file than the recording itself. Choose another name.")
     require_folder(out.parent)
     file = read_model_for_recordings(model)
-    record = read_record(recording, file.signals)
-    run = free_run(file.model, record)
+    record = read_record(recording, file.signals, file.on_bench)
+    run = replay(file.model, record)
     column = simulated_column(record.kind, file.model.motion)
     table = Table(out, {"time_s": record.time_s, column: run.output})
     publish(out.parent, {out.name: lambda path: csv_format.write(table, path)})

@@ -9,18 +9,19 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, TypeVar
 
 import tomlkit
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 from tomlkit.items import InlineTable, Table
 
 from estimator.errors import BadModel
 from estimator.physics.model import DrivelineModel, EffectValue, Motion, Parameter, Structure, parameter_unit
+from hil.config.laws import LawTable, install_laws, moved
 from hil.config.problems import Fault, problem_lines, read_toml, refuse
 from hil.errors import ModelFileError
 from hil.recording import columns
@@ -30,9 +31,6 @@ Kind = TypeVar("Kind", bound=Enum)
 Default = TypeVar("Default", float, None)
 
 SCHEMA = "hil.model/1"
-
-NOT_YET = ("three_mass", "joint")
-"""Structures of the contract that the estimator does not have yet."""
 
 NEUTRAL = 1.0
 """Stands for a number of the wrong type while the rest is checked: allowed for every parameter."""
@@ -78,26 +76,26 @@ class _Document(_Strict):
     parameters: dict[str, _ParameterEntry]
     geometry: _Geometry | None = None
     effects: dict[str, dict[str, _EffectEntry]] = {}
+    laws: dict[str, LawTable] = {}
     signals: SignalsConfig | None = None
-
-    @field_validator("structure", mode="before")
-    @classmethod
-    def _is_supported(cls, value: object) -> object:
-        if value in NOT_YET:
-            raise ValueError("one_mass or two_mass: this structure is not supported yet")
-        return value
 
 
 @dataclass(frozen=True, slots=True)
 class ModelFile:
-    """A model and, where the file has one, the way its recordings are read."""
+    """A model and, where the file has them, the way its recordings are read and a user's own laws."""
 
     model: DrivelineModel
     signals: SignalsConfig | None = None
+    laws: Mapping[str, LawTable] = field(default_factory=dict)
+
+    @property
+    def on_bench(self) -> bool:
+        """True for a joint: its recordings are of an imposed motion and the torque it takes."""
+        return self.model.structure is Structure.JOINT
 
 
 def read_model(path: Path | str) -> ModelFile:
-    """Read a model file.
+    """Read a model file; its own laws become those of this process, in place of any before (``own_law.install``).
 
     Raises
     ------
@@ -112,13 +110,15 @@ def read_model(path: Path | str) -> ModelFile:
         document = _Document.model_validate(content)
     except ValidationError as error:
         problems += problem_lines(_Document, error)
+    install_laws(path, {} if document is None else document.laws)
+    known = {} if document is not None else _table(content.get("laws"))
     try:
-        model = _model(content)
+        model = _model(content, without=known)
     except BadModel as error:
         problems += str(error).splitlines()
     if document is None or model is None or problems:
         raise ModelFileError(path, *problems)
-    return ModelFile(model, document.signals)
+    return ModelFile(model, document.signals, moved(document.laws, path))
 
 
 def read_model_for_recordings(path: Path | str) -> ModelFile:
@@ -128,9 +128,17 @@ def read_model_for_recordings(path: Path | str) -> ModelFile:
     ------
     ModelFileError
         As `read_model`; also if the model is of a translation and would be held against the motor speed of a
-        rig's own recording.
+        rig's own recording, or of a joint whose imposed motion is not named.
     """
     file = read_model(path)
+    if file.on_bench:
+        if file.signals is None or not file.signals.names_bench:
+            raise ModelFileError(
+                path,
+                "signals | expected position (the imposed motion) and torque or force (what it takes) for a joint | "
+                "came neither or one of them: name both columns in [signals]",
+            )
+        return file
     names_output = file.signals is not None and file.signals.names_output
     if file.model.motion is Motion.TRANSLATION and not names_output:
         raise ModelFileError(
@@ -141,7 +149,12 @@ def read_model_for_recordings(path: Path | str) -> ModelFile:
     return file
 
 
-def write_model(path: Path | str, model: DrivelineModel, signals: SignalsConfig | None = None) -> None:
+def write_model(
+    path: Path | str,
+    model: DrivelineModel,
+    signals: SignalsConfig | None = None,
+    laws: Mapping[str, LawTable] | None = None,
+) -> None:
     """Write a model file, whole or not at all; one that is there is replaced.
 
     An interval that is not finite is left out: a model file holds finite numbers only.
@@ -149,14 +162,17 @@ def write_model(path: Path | str, model: DrivelineModel, signals: SignalsConfig 
     path = Path(path)
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        part.write_text(_as_toml(model, signals), encoding="utf-8")
+        part.write_text(_as_toml(model, signals, laws or {}), encoding="utf-8")
         part.replace(path)
     finally:
         part.unlink(missing_ok=True)
 
 
-def _model(content: Mapping[str, Any]) -> DrivelineModel | None:
-    """Build the model from what is usable of a file's tables; None where not even the structure is known."""
+def _model(content: Mapping[str, Any], without: Collection[str] = ()) -> DrivelineModel | None:
+    """Build the model from what is usable of a file's tables; None where not even the structure is known.
+
+    ``without`` names effects that can't be checked, since the laws they are of could not be read.
+    """
     structure = _member(Structure, content.get("structure"))
     if structure is None:
         return None
@@ -170,6 +186,7 @@ def _model(content: Mapping[str, Any]) -> DrivelineModel | None:
         effects={
             name: {key: _effect_value(entry) for key, entry in _table(values).items()}
             for name, values in _table(content.get("effects")).items()
+            if name not in without
         },
         gear_ratio=_number(content.get("geometry"), "gear_ratio", None),
     )
@@ -198,7 +215,7 @@ def _effect_value(entry: object) -> EffectValue:
     return EffectValue(_number(entry, "value", NEUTRAL))
 
 
-def _as_toml(model: DrivelineModel, signals: SignalsConfig | None) -> str:
+def _as_toml(model: DrivelineModel, signals: SignalsConfig | None, laws: Mapping[str, LawTable]) -> str:
     document = tomlkit.document()
     document["schema"] = SCHEMA
     document["structure"] = model.structure.value
@@ -213,6 +230,8 @@ def _as_toml(model: DrivelineModel, signals: SignalsConfig | None) -> str:
         document["geometry"] = {"gear_ratio": float(model.gear_ratio)}
     if model.effects:
         document["effects"] = _effects_table(model)
+    if laws:
+        document["laws"] = _laws_table(laws)
     if signals is not None:
         document["signals"] = _signals_table(signals)
     return tomlkit.dumps(document)
@@ -229,6 +248,16 @@ def _effects_table(model: DrivelineModel) -> Table:
             effect[key] = _inline(entry)
         effects[name] = effect
     return effects
+
+
+def _laws_table(laws: Mapping[str, LawTable]) -> Table:
+    tables = tomlkit.table(is_super_table=True)
+    for name, law in laws.items():
+        table = tomlkit.table()
+        table.update({"function": law.function, "element": law.element, "folder": law.folder})
+        table["parameters"] = {key: _inline(parameter.model_dump()) for key, parameter in law.parameters.items()}
+        tables[name] = table
+    return tables
 
 
 def _signals_table(signals: SignalsConfig) -> Table:

@@ -11,8 +11,10 @@ from hil.recording.signals import read_record
 from hil.recording.signals_config import SignalsConfig
 
 
-def read_records(paths: Sequence[Path], signals: SignalsConfig | None = None) -> tuple[Record, ...]:
-    """Read recordings that are to be explained by one model.
+def read_records(
+    paths: Sequence[Path], signals: SignalsConfig | None = None, on_bench: bool = False
+) -> tuple[Record, ...]:
+    """Read recordings that are to be explained by one model; see :func:`read_record` for the arguments.
 
     Raises
     ------
@@ -29,7 +31,7 @@ def read_records(paths: Sequence[Path], signals: SignalsConfig | None = None) ->
     errors: list[RecordingError] = []
     for path in paths:
         try:
-            records.append(read_record(path, signals))
+            records.append(read_record(path, signals, on_bench))
         except RecordingError as error:
             errors.append(error)
     if len(errors) == 1:

@@ -4,16 +4,20 @@ A row is a missing sample (``okay`` False) where torque or output is NaN, where 
 mask says so. Time goes on there, so the simulation needs a torque: the last good value is held where the
 reading is not to be trusted (NaN, flagged, outside a mask on that very column). A mask on another column says
 that the model does not hold there, not that the torque was misread; the torque stays as recorded.
+
+``torque_okay`` tells only what the acquisition lost (NaN, flagged). Rows that a mask takes out are the choice of
+whoever wrote the model file, and no fault of the acquisition that a diagnosis could find.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.signals.record import Record
+from estimator.signals.record import OutputKind, Record
 from hil.errors import RecordingError
 from hil.recording import columns
 from hil.recording.formats import read_table
@@ -25,7 +29,7 @@ FEWEST_SAMPLES = 10
 """A recording with fewer usable samples can't carry a constant load, an initial state and anything beside."""
 
 
-def read_record(path: Path | str, signals: SignalsConfig | None = None) -> Record:
+def read_record(path: Path | str, signals: SignalsConfig | None = None, on_bench: bool = False) -> Record:
     """Read a recording as the estimator takes it.
 
     Parameters
@@ -34,6 +38,8 @@ def read_record(path: Path | str, signals: SignalsConfig | None = None) -> Recor
         The recording; its stem names it.
     signals : SignalsConfig, optional
         Of the model file; the contract's columns without it.
+    on_bench : bool
+        Whether the model is a joint on a bench: the position is imposed, and the torque it takes is the output.
 
     Returns
     -------
@@ -46,7 +52,8 @@ def read_record(path: Path | str, signals: SignalsConfig | None = None) -> Recor
         If the file is at fault, with every fault of a kind, by name and line.
     """
     signals = signals or SignalsConfig()
-    return to_record(read_table(path, signals.format), signals)
+    record = to_record(read_table(path, signals.format), signals)
+    return under_imposed_motion(record) if on_bench else record
 
 
 def to_record(table: Table, signals: SignalsConfig) -> Record:
@@ -59,7 +66,8 @@ def to_record(table: Table, signals: SignalsConfig) -> Record:
     time_s, period_s = time_base(table, signals.time)
     masks = {mask: _inside(numbers[mask.column], mask) for mask in signals.mask}
     flagged = _flagged(table, signals)
-    trusted = np.column_stack([_trusted(numbers[torque.column], torque.column, masks) & ~flagged for torque in torques])
+    read = np.column_stack([np.isfinite(numbers[torque.column]) & ~flagged for torque in torques])
+    trusted = read & np.column_stack([_inside_own(numbers[torque.column], torque.column, masks) for torque in torques])
     torque_nm = np.column_stack([numbers[torque.column] * torque.scale for torque in torques])
     measured = numbers[output.column] * output.scale
     okay = trusted.all(axis=1) & np.isfinite(measured) & np.logical_and.reduce([~flagged, *masks.values()])
@@ -73,6 +81,22 @@ def to_record(table: Table, signals: SignalsConfig) -> Record:
         okay=okay,
         kind=kind,
         location=output.at,
+        torque_okay=None if read.all() else read,
+    )
+
+
+def under_imposed_motion(record: Record) -> Record:
+    """Return a recording of torque and position as that of a joint: the position imposed, the torque its answer.
+
+    Across missing samples the motion is bridged by a straight line; a torque that was not read is only not compared.
+    """
+    good = np.flatnonzero(record.okay)
+    return replace(
+        record,
+        output=record.total_torque_nm,
+        kind=OutputKind.FORCE,
+        imposed=np.interp(record.time_s, record.time_s[good], record.output[good]),
+        torque_okay=None,
     )
 
 
@@ -90,10 +114,10 @@ def _flagged(table: Table, signals: SignalsConfig) -> NDArray[np.bool_]:
     return flagged
 
 
-def _trusted(values: FloatArray, column: str, masks: dict[MaskRange, NDArray[np.bool_]]) -> NDArray[np.bool_]:
+def _inside_own(values: FloatArray, column: str, masks: dict[MaskRange, NDArray[np.bool_]]) -> NDArray[np.bool_]:
     own = [inside for mask, inside in masks.items() if mask.column == column]
-    trusted: NDArray[np.bool_] = np.logical_and.reduce([np.isfinite(values), *own])
-    return trusted
+    inside: NDArray[np.bool_] = np.logical_and.reduce([np.ones(values.shape, dtype=np.bool_), *own])
+    return inside
 
 
 def _held(torque_nm: FloatArray, trusted: NDArray[np.bool_]) -> FloatArray:

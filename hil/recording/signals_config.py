@@ -82,7 +82,8 @@ class SignalsConfig(_Strict):
     torque
         The inputs; empty for the contract's two.
     speed, position, force
-        The output: one of them; none for the contract's motor speed.
+        The output: one of them; none for the contract's motor speed. For a joint on a bench ``position`` is the imposed
+        motion, and the output is ``force`` or, without it, the sum of ``torque``.
     mask
         Rows that count only inside these ranges.
     """
@@ -98,8 +99,9 @@ class SignalsConfig(_Strict):
     @model_validator(mode="after")
     def _has_one_output(self) -> Self:
         given = [kind.value for kind, _ in self._outputs()]
-        if len(given) > 1:
-            refuse([Fault("", "one of speed, position, force", " and ".join(given))])
+        if len(given) > 1 and given != ["position", "force"]:
+            expected = "one of speed, position, force (position and force together: an imposed motion)"
+            refuse([Fault("", expected, " and ".join(given))])
         return self
 
     def _outputs(self) -> list[tuple[OutputKind, OutputSignal]]:
@@ -120,8 +122,15 @@ class SignalsConfig(_Strict):
         """True where the output is not the contract's motor speed."""
         return bool(self._outputs())
 
+    @property
+    def names_bench(self) -> bool:
+        """True where an imposed motion is named, and the torque or force that it takes."""
+        return self.position is not None and (self.force is not None or bool(self.torque))
+
     def torques(self) -> list[TorqueSignal]:
-        """Return the inputs, the contract's where none are named."""
+        """Return the inputs, the contract's where none are named; on a bench, what is measured."""
+        if self.names_bench and self.force is not None:
+            return [TorqueSignal(column=self.force.column, scale=self.force.scale)]
         own = [TorqueSignal(column=name) for name in (columns.TORQUE_M1, columns.TORQUE_M2)]
         return self.torque or own
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from estimator.signals.time_stamps import uniform_period_s
 from hil.errors import RecordingError
 from hil.recording.signals_config import TimeSignal
 from hil.recording.table import FloatArray, Table
@@ -21,9 +22,6 @@ RATE = 0.02
 
 WINDOW_STEPS = 100
 """Long enough that jitter of the window's two ends, up to half a period each, is within 1 % of its length."""
-
-PERIOD_DIGITS = 9
-"""Digits the period is rounded to, so that 0.01 s is 0.01 s in every recording of a rig."""
 
 
 def time_base(table: Table, signal: TimeSignal) -> tuple[FloatArray, float]:
@@ -49,8 +47,7 @@ def time_base(table: Table, signal: TimeSignal) -> tuple[FloatArray, float]:
     time = table.numeric([column])[column]
     time *= signal.scale
     _require_uniform(table, column, time)
-    mean_step = float(time[-1] - time[0]) / (time.size - 1)
-    return time, float(f"{mean_step:.{PERIOD_DIGITS}g}")
+    return time, uniform_period_s(time)
 
 
 def _require_uniform(table: Table, column: str, time: FloatArray) -> None:

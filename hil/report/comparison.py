@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimator.physics.free_run import free_run
+from estimator.diagnosis.chain import replay
 from estimator.physics.model import DrivelineModel
 from estimator.signals.record import FloatArray, Record
 from hil.report.numbers import json_number
@@ -50,7 +50,7 @@ class Comparison:
 
 def compare_record(model: DrivelineModel, record: Record) -> Comparison:
     """Simulate a recording and measure the error."""
-    run = free_run(model, record)
+    run = replay(model, record)
     simulated = run.output
     okay = record.okay
     error = record.output[okay] - simulated[okay]

@@ -9,8 +9,8 @@ from estimator.physics.stepper import Stepper
 class DrivelinePlant:
     """A driveline with its effects, stepped by the estimator's own simulation.
 
-    Both inverters turn one shaft, so that only the sum of their torques counts. This plant shares its
-    physics with what is fitted: it is for trying things out, the proof has a plant of its own.
+    Both inverters turn one shaft. This plant shares its physics with what is fitted: it is for trying things out, the
+    proof has a plant of its own.
 
     Parameters
     ----------
@@ -45,8 +45,8 @@ class DrivelinePlant:
                 f"driveline: asked for a step of {duration_s:g} s, expected the {self._period_s:g} s it was made "
                 "for. Make the plant with the rig's own period_s."
             )
-        self._stepper.step(sum(torque_nm))
+        self._stepper.step(*torque_nm)
 
     def _compile(self) -> None:
         """Step once at rest, where nothing moves: the compiler must not run in the first SYNC."""
-        self._stepper.step(0.0)
+        self._stepper.step(0.0, 0.0)

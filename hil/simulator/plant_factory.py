@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from estimator.physics.catalogue import EFFECTS
+from estimator.physics.effect import Effect, Element
 from estimator.physics.model import DrivelineModel, EffectValue, Motion
 from hil.config.rig_file import Rig
 from hil.errors import UsageError
@@ -47,7 +48,7 @@ def plant_for(rig: Rig, effects: Sequence[EffectSpec] = ()) -> Plant:
     for effect in effects:
         _require_parameters(effect)
     changed = replace(model, effects={**model.effects, **{effect.name: _values(effect) for effect in effects}})
-    _refuse_profiles(changed)
+    _refuse_absent(changed)
     faults = [fault for effect in effects for fault in out_of_bounds(rig, changed, effect.name, effect.parameters)]
     if faults:
         raise UsageError("\n".join(f"{fault}. Check its unit: hil effects NAME has the law." for fault in faults))
@@ -69,13 +70,24 @@ def _require_parameters(effect: EffectSpec) -> None:
     )
 
 
-def _refuse_profiles(model: DrivelineModel) -> None:
-    """Refuse what is not a number but a course over time, which this plant has no place for."""
-    for name in model.effects:
-        if EFFECTS[name].profile:
+def _refuse_absent(model: DrivelineModel) -> None:
+    """Refuse what this plant has no place for: a course over time, an acquisition, an event without moments."""
+    for name, values in model.effects.items():
+        if reason := _reason_absent(EFFECTS[name], values):
             raise UsageError(
-                f"effect {name!r}: expected an effect with a constant law, came one that is a profile over each "
-                f"recording's own time ({EFFECTS[name].law}): the simulated rig would drive without it. Take it "
-                f"out of --effect, or [effects.{name}] out of simulation.model. A recording that has it: "
-                f"python -m hil.proof.make_case --effect {name} --seed 1 --out DIR"
+                f"effect {name!r}: {reason}. Take it out of --effect, or [effects.{name}] out of simulation.model. A "
+                f"recording that has it: python -m hil.proof.make_case --effect {name} --seed 1 --out DIR"
             )
+
+
+def _reason_absent(entry: Effect, values: Mapping[str, EffectValue]) -> str:
+    if entry.profile:
+        return (
+            "expected an effect with a constant law, came one that is a profile over each recording's own time "
+            f"({entry.law}): the simulated rig would drive without it"
+        )
+    if entry.element is Element.ACQUISITION:
+        return "expected an effect of the driveline or its sensor, came one of the acquisition (see --fault)"
+    if entry.event and not {"from_s", "to_s"} <= set(values):
+        return "expected from_s and to_s too, the moments between which it acts, came none"
+    return ""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from estimator.physics.model import DrivelineModel, Parameter, Structure
 from hil.config.model_file import read_model
 from hil.config.rig_file import SimulationTable
-from hil.errors import UsageError
+from hil.errors import ModelFileError, UsageError
 
 DEFAULT_BUS = DrivelineModel(
     structure=Structure.TWO_MASS,
@@ -58,7 +58,12 @@ class EffectSpec:
 
 def simulation_model(table: SimulationTable) -> DrivelineModel:
     """Model of the simulated driveline: the rig file's, or the default bus."""
-    return DEFAULT_BUS if table.model is None else read_model(table.model).model
+    if table.model is None:
+        return DEFAULT_BUS
+    file = read_model(table.model)
+    if file.on_bench:
+        raise ModelFileError(table.model, "structure | expected a driveline for a rig to drive | came 'joint'")
+    return file.model
 
 
 def _parameter(text: str, part: str) -> tuple[str, float]:

@@ -19,7 +19,10 @@ EFFECTS = "\n[effects.gremlins]\nx = { value = 1 }\n[effects.coulomb_friction_mo
     [
         ([("[parameters]", "[parameters")], ["line 5, column 12 | expected TOML"]),
         ([("hil.model/1", "hil.model/9")], ["schema | expected 'hil.model/1' | came 'hil.model/9'"]),
-        ([("one_mass", "four_mass")], ["structure | expected 'one_mass' or 'two_mass' | came 'four_mass'"]),
+        (
+            [("one_mass", "four_mass")],
+            ["structure | expected 'one_mass', 'two_mass', 'three_mass' or 'joint' | came 'four_mass'"],
+        ),
         ([("b_M", "# b_M")], ["parameters.b_M: missing, one_mass needs J_M, b_M"]),
         ([("value = 2.0", "value = -2.0")], ["parameters.J_M.value: expected a finite number greater than 0"]),
         (

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.model import DrivelineModel, EffectValue, Motion, Parameter, Structure
 from estimator.signals.record import Location, OutputKind
-from hil.config.model_file import read_model, write_model
+from hil.config.model_file import read_model, read_model_for_recordings, write_model
 from hil.errors import ModelFileError
 from hil.recording import SignalsConfig
 
@@ -85,6 +85,25 @@ def test_signals_say_how_a_recording_is_read(tmp_path: Path) -> None:
     assert (signals.format.delimiter, signals.format.encoding) == (";", "latin-1")
 
 
+def test_the_example_of_the_joint_names_motion_and_force() -> None:
+    file = read_model_for_recordings(Path(__file__).parents[2] / "examples" / "joint.toml")
+    assert file.on_bench
+    assert file.model.parameters.keys() == {"k", "c"}
+    assert file.model.effects == {}
+
+
+@pytest.mark.parametrize(
+    "signals", ["", "[signals]\nposition = { column = 'x' }", "[signals]\ntorque = [{ column = 'f' }]"]
+)
+def test_a_joint_needs_both_its_motion_and_what_it_takes(tmp_path: Path, signals: str) -> None:
+    path = tmp_path / "joint.toml"
+    parameters = "k = { value = 1, tolerance = 0.2 }\nc = { value = 1, tolerance = 0.2 }"
+    path.write_text(f'schema = "hil.model/1"\nstructure = "joint"\n[parameters]\n{parameters}\n{signals}\n')
+    with pytest.raises(ModelFileError, match=r"signals \| expected position .* and torque or force"):
+        read_model_for_recordings(path)
+    assert read_model(path).on_bench
+
+
 def test_the_example_of_the_linear_drive_is_a_nominal_model() -> None:
     file = read_model(Path(__file__).parents[2] / "examples" / "emps.toml")
     assert file.model.structure is Structure.ONE_MASS
@@ -98,16 +117,11 @@ def test_the_example_of_the_linear_drive_is_a_nominal_model() -> None:
     ("line", "said"),
     [
         ('schema = "hil.model/2"', "schema | expected 'hil.model/1' | came 'hil.model/2'"),
-        ('structure = "four_mass"', "structure | expected 'one_mass' or 'two_mass' | came 'four_mass'"),
         (
-            'structure = "three_mass"',
-            "structure | expected one_mass or two_mass: this structure is not supported yet",
+            'structure = "four_mass"',
+            "structure | expected 'one_mass', 'two_mass', 'three_mass' or 'joint' | came 'four_mass'",
         ),
-        (
-            'structure = "joint"',
-            "structure | expected one_mass or two_mass: this structure is not supported yet",
-        ),
-        ("structure = [1]", "structure | expected 'one_mass' or 'two_mass' | came [1]"),
+        ("structure = [1]", "structure | expected 'one_mass', 'two_mass', 'three_mass' or 'joint' | came [1]"),
         ('motion = "sideways"', "motion | expected 'rotation' or 'translation' | came 'sideways'"),
         (
             "J_M = { value = '1', tolerance = 0.2 }",
@@ -156,7 +170,7 @@ def test_a_wrong_line_is_refused_by_its_key(tmp_path: Path, line: str, said: str
         ("[effects.gremlins]\nsize = { value = 1 }", "effects.gremlins: unknown effect, expected one of"),
         (
             "[effects.backlash]\ngap_rad = { value = 1 }",
-            "effects.backlash: makes no sense in one_mass, expected two_mass",
+            "effects.backlash: makes no sense in one_mass, expected joint, three_mass, two_mass",
         ),
         ("[effects.coulomb_friction_motor]", "effects.coulomb_friction_motor.friction_nm: missing"),
         (

@@ -64,6 +64,8 @@ def test_missing_and_flagged_samples_hold_the_last_good_torque(changed: Changed)
     expected[[0, 1, 5, 6, 10]] = [2, 2, 4, 4, 9]
     np.testing.assert_array_equal(record.torque_nm[:, 0], expected)
     assert np.flatnonzero(~record.okay).tolist() == [0, 1, 5, 6, 10, 20]
+    assert np.flatnonzero(~record.torque_trusted[:, 0]).tolist() == [0, 1, 5, 6, 10]
+    assert np.flatnonzero(~record.torque_trusted[:, 1]).tolist() == [10]
 
 
 def test_flags_of_a_foreign_recording_mean_nothing(changed: Changed) -> None:
@@ -79,6 +81,7 @@ def test_a_mask_takes_rows_out_and_keeps_their_torque(changed: Changed, own_tabl
     throttle[30] = np.nan
     record = to_record(changed(throttle=throttle), signals(mask=[{"column": "throttle", "min": 2.0}]))
     assert np.flatnonzero(~record.okay).tolist() == [7, 8, 9, 10, 11, 30]
+    assert record.torque_okay is None
     np.testing.assert_array_equal(record.torque_nm[:, 0], own_table.columns["torque_m1_nm"])
 
 
@@ -90,6 +93,7 @@ def test_a_mask_on_a_torque_holds_it_where_it_is_outside(changed: Changed) -> No
     )
     assert record.torque_nm[8:11, 0].tolist() == [8.0, 8.0, 10.0]
     assert np.flatnonzero(~record.okay).tolist() == [9]
+    assert record.torque_okay is None
 
 
 def test_missing_columns_are_named_together(changed: Changed) -> None:
@@ -247,3 +251,25 @@ def test_recordings_of_two_periods_are_refused(three_runs: list[Path], changed: 
     write_table(changed(time_s=np.arange(40) * 0.02), three_runs[2])
     with pytest.raises(RecordingError, match=r"run_2\.csv: expected the sampling period of .*run_0\.csv, 0\.01 s"):
         read_records(three_runs)
+
+
+def bench_table(tmp_path: Path) -> Table:
+    rows = np.arange(20.0)
+    force, motion = 10.0 * rows, 0.5 * rows
+    force[4], motion[7] = np.nan, np.nan
+    return Table(tmp_path / "bench.csv", {"t": 0.1 * rows, "f": force, "x": motion})
+
+
+@pytest.mark.parametrize(
+    "named", [{"torque": [{"column": "f", "scale": 2.0}]}, {"force": {"column": "f", "scale": 2.0}}]
+)
+def test_on_a_bench_the_position_is_imposed_and_the_torque_is_the_output(tmp_path: Path, named: dict[str, Any]) -> None:
+    config = signals(time={"column": "t"}, position={"column": "x", "scale": 3.0}, **named)
+    write_table(bench_table(tmp_path), tmp_path / "bench.csv")
+    record = read_record(tmp_path / "bench.csv", config, on_bench=True)
+    assert record.kind is OutputKind.FORCE
+    assert record.imposed == pytest.approx(1.5 * np.arange(20.0))  # bridged where it is missing
+    assert np.flatnonzero(~record.okay).tolist() == [4, 7]
+    assert record.output[record.okay] == pytest.approx((20.0 * np.arange(20.0))[record.okay])
+    assert record.torque_trusted.all()
+    assert read_records([tmp_path / "bench.csv"], config, True)[0].imposed is not None

@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 
 from estimator.compiled import compiled
-from estimator.physics.effect import Effect, EffectParameter, Element, Start, Untestable
-from estimator.physics.model import DrivelineModel, Motion, Structure
+from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start, Untestable, long_enough
+from estimator.physics.model import DrivelineModel, Motion
 from estimator.signals.record import Record
 
 FASTEST_S = 1e-9
@@ -49,15 +49,28 @@ EFFECT = Effect(
     element=Element.TORQUE_PATH,
     title="lag of the torque",
     law="tau dT/dt + T = T_read",
-    source="first-order model of a closed current loop: Leonhard, Control of Electrical Drives, 3rd ed., chapter 12",
+    source="first-order model of a closed current loop: Leonhard, Control of Electrical Drives, 3rd ed., Springer 2001",
     excited_by="torque steps: PRBS, tip-in and tip-out",
-    parameters=(EffectParameter("time_constant_s", "s", 0.0, 0.0, 50.0, "time constant tau"),),
-    structures=frozenset({Structure.ONE_MASS, Structure.TWO_MASS}),
-    resembles=("transport_delay", "speed_filter"),
+    parameters=(
+        EffectParameter("time_constant_s", "s", 0.0, 0.0, 50.0, "time constant tau"),
+        EffectParameter(
+            "before_nm",
+            "torque",
+            0.0,
+            -math.inf,
+            math.inf,
+            "torque as a recording begins, less its reading",
+            True,
+            True,
+        ),
+    ),
+    structures=EVERY_LINE,
+    resembles=("transport_delay", "extra_torsional_mode", "speed_filter"),
     equivalent=("speed_filter",),
     contains=(),
     scales=scales,
     starts=starts,
     testable=testable,
     sentence=sentence,
+    implausible=long_enough("time_constant_s"),
 )

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from estimator.compiled import compiled
-from estimator.physics.effect import Effect, EffectParameter, Element, Start, Untestable
+from estimator.physics.effect import WITH_SPRING, Effect, EffectParameter, Element, Held, Start, Untestable
 from estimator.physics.model import DrivelineModel, Motion, Structure, unit
 from estimator.physics.motion import torque_reverses, torque_scale
 from estimator.signals.record import Record
@@ -31,8 +31,12 @@ def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...
 
 
 def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
-    """Return a ladder of gap sizes: a gap that is too large or too small is a local optimum."""
-    return [(0.1, 1.0), (0.4, 1.0), (1.2, 1.0)]
+    """Return a ladder of gap sizes: a gap that is too large or too small is a local optimum.
+
+    On a bench nothing can bounce, and the damping engages at once.
+    """
+    contact: float | Held = Held(0.0) if model.structure is Structure.JOINT else 1.0
+    return [(0.1, contact), (0.4, contact), (1.2, contact)]
 
 
 def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
@@ -58,8 +62,14 @@ EFFECT = Effect(
         EffectParameter("gap_rad", "angle", 0.0, 0.0, 20.0, "total gap"),
         EffectParameter("contact_rad", "angle", 0.0, 0.02, 20.0, "depth over which the damping engages: e_c", True),
     ),
-    structures=frozenset({Structure.TWO_MASS}),
-    resembles=("stiffness_nonlinearity", "coulomb_friction_motor", "shaft_hysteresis"),
+    structures=WITH_SPRING,
+    resembles=(
+        "coulomb_friction_motor",
+        "stribeck_friction",
+        "stiffness_nonlinearity",
+        "stiffness_change",
+        "shaft_hysteresis",
+    ),
     equivalent=(),
     contains=(),
     scales=scales,

@@ -4,18 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from estimator.compiled import compiled
-from estimator.physics.effect import Effect, EffectParameter, Element, Start, Untestable
-from estimator.physics.laws import smooth_sign
-from estimator.physics.model import DrivelineModel, Motion, Structure, unit
+from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start, Untestable
+from estimator.physics.model import DrivelineModel, Motion, unit
 from estimator.physics.motion import reverses, torque_scale
 from estimator.signals.record import Record
-
-
-@compiled
-def law(speed: float, friction: float, width: float) -> float:
-    """Return the friction torque ``T_c sign(w)`` against the motion."""
-    return friction * smooth_sign(speed, width)
 
 
 def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
@@ -46,11 +38,11 @@ EFFECT = Effect(
     element=Element.MOTOR,
     title="dry friction at the motor",
     law="T_f = T_c sign(w_M)",
-    source="Armstrong-Helouvry, Dupont, Canudas de Wit: Automatica 30(7), 1994, section 3",
+    source="Armstrong-Hélouvry, Dupont, Canudas de Wit: Automatica 30(7), 1994",
     excited_by="motion in both directions, through standstill",
     parameters=(EffectParameter("friction_nm", "torque", 0.0, 0.0, 40.0, "friction torque T_c"),),
-    structures=frozenset({Structure.ONE_MASS, Structure.TWO_MASS}),
-    resembles=("stribeck_friction", "coulomb_friction_load", "backlash"),
+    structures=EVERY_LINE,
+    resembles=("stribeck_friction", "quadratic_friction", "backlash", "shaft_hysteresis", "coulomb_friction_load"),
     equivalent=(),
     contains=(),
     scales=scales,

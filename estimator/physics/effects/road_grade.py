@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from scipy.interpolate import BSpline
 
-from estimator.physics.effect import Effect, EffectParameter, Element, Start, Untestable
-from estimator.physics.model import DrivelineModel, Motion, Structure, unit
+from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start, Untestable
+from estimator.physics.model import DrivelineModel, Motion, unit
 from estimator.physics.motion import torque_scale
 from estimator.signals.record import FloatArray, Record
 
@@ -77,11 +77,18 @@ EFFECT = Effect(
     element=Element.LOAD,
     title="road grade",
     law="T_load = T_0 + g(t), g a cubic spline over time",
-    source="gravity on a slope, m g sin(grade): Gillespie, Fundamentals of Vehicle Dynamics, chapter 4",
+    source="gravity on a slope, m g sin(grade): Gillespie, Fundamentals of Vehicle Dynamics, SAE 1992",
     excited_by="driving on a road that is not level",
     parameters=(EffectParameter("grade_rms_nm", "torque", 0.0, 0.0, float("inf"), "size of the profile: its rms"),),
-    structures=frozenset({Structure.ONE_MASS, Structure.TWO_MASS}),
-    resembles=("brake_drag", "warming_friction", "aerodynamic_drag"),
+    structures=EVERY_LINE,
+    resembles=(
+        "torque_derating",
+        "aerodynamic_drag",
+        "brake_drag",
+        "load_imbalance",
+        "inertia_change",
+        "warming_friction",
+    ),
     equivalent=(),
     contains=(),
     scales=scales,

@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 
 from estimator.compiled import compiled
-from estimator.physics.effect import Effect, EffectParameter, Element, Start, Untestable
-from estimator.physics.model import DrivelineModel, Motion, Structure, unit
+from estimator.physics.effect import WITH_SPRING, Effect, EffectParameter, Element, Start, Untestable
+from estimator.physics.model import DrivelineModel, Motion, unit
 from estimator.physics.motion import torque_scale
 from estimator.signals.record import Record
 
@@ -58,10 +58,10 @@ EFFECT = Effect(
     excited_by="large and small shaft torques in the same set of tests",
     parameters=(
         EffectParameter("hardening_per_rad2", "per_angle_squared", 0.0, -200.0, 200.0, "relative stiffness change h"),
-        EffectParameter("shape", "1", 1.0, 0.1, 3.0, "how the change goes on at large twist: m", True),
+        EffectParameter("shape", "", 1.0, 0.1, 3.0, "how the change goes on at large twist: m", True),
     ),
-    structures=frozenset({Structure.TWO_MASS}),
-    resembles=("backlash", "shaft_hysteresis"),
+    structures=WITH_SPRING,
+    resembles=("torque_saturation", "backlash", "stiffness_change", "shaft_hysteresis", "extra_torsional_mode"),
     equivalent=(),
     contains=(),
     scales=scales,

@@ -6,10 +6,10 @@ import math
 from collections.abc import Mapping, Sequence
 
 from estimator.compiled import compiled
-from estimator.physics.effect import Effect, EffectParameter, Element, Start, Untestable
+from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start, Untestable
 from estimator.physics.effects import coulomb_friction_motor
 from estimator.physics.laws import smooth_sign
-from estimator.physics.model import DrivelineModel, Motion, Structure, unit
+from estimator.physics.model import DrivelineModel, Motion, unit
 from estimator.physics.motion import speed_scale, torque_scale
 from estimator.signals.record import Record
 
@@ -54,15 +54,15 @@ EFFECT = Effect(
     element=Element.MOTOR,
     title="Stribeck friction at the motor",
     law="T_f = (T_c + T_x exp(-(w_M/w_s)^2)) sign(w_M)",
-    source="Armstrong-Helouvry, Dupont, Canudas de Wit: Automatica 30(7), 1994, equation 5",
+    source="Armstrong-Hélouvry, Dupont, Canudas de Wit: Automatica 30(7), 1994",
     excited_by="slow motion in both directions, several passes through standstill",
     parameters=(
         EffectParameter("excess_nm", "torque", 0.0, 0.0, 40.0, "breakaway torque above T_c: T_x"),
         EffectParameter("coulomb_nm", "torque", 0.0, 0.0, 40.0, "friction torque at speed: T_c"),
         EffectParameter("stribeck_rad_s", "speed", 0.0, 0.02, 20.0, "speed range of the fall: w_s"),
     ),
-    structures=frozenset({Structure.ONE_MASS, Structure.TWO_MASS}),
-    resembles=("coulomb_friction_motor", "backlash"),
+    structures=EVERY_LINE,
+    resembles=("coulomb_friction_motor", "backlash", "coulomb_friction_load"),
     equivalent=(),
     contains=("coulomb_friction_motor",),
     scales=scales,

@@ -6,26 +6,28 @@ import math
 from collections.abc import Mapping, Sequence
 
 from estimator.compiled import compiled
-from estimator.physics.effect import Effect, EffectParameter, Element, Start, Untestable
-from estimator.physics.model import DrivelineModel, Motion, Structure
+from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start, Untestable, long_enough
+from estimator.physics.model import DrivelineModel, Motion
 from estimator.signals.record import FloatArray, Record
 
 
 @compiled
-def delayed_mean(torque: FloatArray, start: float, length: float) -> float:
+def delayed_mean(torque: FloatArray, before: float, start: float, length: float) -> float:
     """Return the mean of a zero-order-held torque over ``[start, start + length]`` [samples]; length at most 1.
 
-    Before the first sample the torque is held at it, after the last at that one: the end of the last period may
-    come out one rounding error late. The mean is continuous in ``start``, which a fit needs.
+    Until the first sample the torque is ``before`` [Nm], after the last it is held at that one: the end of the last
+    period may come out one rounding error late. The mean is continuous in ``start``, which a fit needs.
     """
     end = start + length
-    first = math.floor(start)
-    last = min(math.floor(end), torque.size - 1)
-    before = float(torque[max(first, 0)])
+    last_row = torque.size - 1
+    first = min(math.floor(start), last_row)
+    last = min(math.floor(end), last_row)
+    earlier = torque[first] if first >= 0 else before
     share = (end - last) / length
     if last == first or share <= 0.0:
-        return before
-    return before + (float(torque[max(last, 0)]) - before) * share
+        return float(earlier)
+    later = torque[last] if last >= 0 else before
+    return float(earlier + (later - earlier) * share)
 
 
 def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
@@ -53,15 +55,21 @@ EFFECT = Effect(
     element=Element.TORQUE_PATH,
     title="delay of the torque",
     law="T(t) = T_read(t - t_d)",
-    source="dead time of bus and inverter: Leonhard, Control of Electrical Drives, 3rd ed., chapter 12",
+    source="dead time of bus and inverter: Leonhard, Control of Electrical Drives, 3rd ed., Springer 2001",
     excited_by="torque steps: PRBS, tip-in and tip-out",
-    parameters=(EffectParameter("delay_s", "s", 0.0, 0.0, 20.0, "dead time t_d"),),
-    structures=frozenset({Structure.ONE_MASS, Structure.TWO_MASS}),
-    resembles=("actuator_lag", "speed_filter", "stale_samples"),
+    parameters=(
+        EffectParameter("delay_s", "s", 0.0, 0.0, 20.0, "dead time t_d"),
+        EffectParameter(
+            "before_nm", "torque", 0.0, -math.inf, math.inf, "torque before a recording, less its first", True, True
+        ),
+    ),
+    structures=EVERY_LINE,
+    resembles=("actuator_lag", "speed_filter", "stale_samples", "clock_drift"),
     equivalent=(),
     contains=(),
     scales=scales,
     starts=starts,
     testable=testable,
     sentence=sentence,
+    implausible=long_enough("delay_s"),
 )

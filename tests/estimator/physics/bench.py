@@ -15,6 +15,7 @@ SAMPLE_TIME_S = 0.01
 
 TWO_MASS = {"J_M": 1.6, "J_L": 40.0, "k": 4200.0, "c": 9.0, "b_M": 0.35, "b_L": 0.9}
 ONE_MASS = {"J_M": 20.0, "b_M": 4.0}
+THREE_MASS = TWO_MASS | {"J_2": 0.9, "k": 9000.0, "c": 7.0, "k_2": 6000.0, "c_2": 11.0}
 
 ANGLE, SPEED, TWIST, LOAD_SPEED = range(4)
 """States of the matrices below."""

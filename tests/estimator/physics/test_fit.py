@@ -185,8 +185,8 @@ class TestStarts:
         rec = replace(linear_record(ONE_MASS, late, Start(0.0, 0.0, 0.0), sigma=0.01), torque_nm=torque[:, None])
         line = model(ONE_MASS)
         problems = [
-            make_problem(line, [rec], (*nominal_unknowns(line), *shared))
-            for shared in effect_unknowns("transport_delay", line, [rec])
+            make_problem(line, [rec], (*nominal_unknowns(line), *release.shared))
+            for release in effect_unknowns("transport_delay", line, [rec])
         ]
         alone = [fit(problem).value("transport_delay", "delay_s") for problem in problems]
         assert alone[0] == pytest.approx(0.0, abs=1e-9)
@@ -196,7 +196,7 @@ class TestStarts:
         records = recordings()
         line = model(TWO_MASS)
         warm = fit(nominal_problem(records))
-        delay = effect_unknowns("transport_delay", line, records)[0]
+        delay = effect_unknowns("transport_delay", line, records)[0].shared
         problem = make_problem(line, records, (*nominal_unknowns(line), *delay), profile=True)
         x = module._warm_start(problem, warm)
         p = parameters(problem, x)
@@ -212,7 +212,8 @@ class TestStarts:
         line = model(TWO_MASS)
         large = recordings()
         small = [linear_record(TRUE, random_steps(400, 5, size_nm=10.0), STARTS["first"], sigma=SIGMA, name="small")]
-        shared = [(*nominal_unknowns(line), *effect_unknowns("backlash", line, recs)[1]) for recs in (large, small)]
+        gaps = [effect_unknowns("backlash", line, recs)[1].shared for recs in (large, small)]
+        shared = [(*nominal_unknowns(line), *gap) for gap in gaps]
         assert shared[0][-1].scale == pytest.approx(10.0 * shared[1][-1].scale)
         warm = fit(make_problem(line, large, shared[0]))
         problem = make_problem(line, small, shared[1])

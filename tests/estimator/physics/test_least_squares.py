@@ -179,3 +179,13 @@ def test_a_start_at_the_optimum_costs_one_jacobian() -> None:
     ours = minimise(lambda x: x[0] - errors, jacobian, mean, np.array([-9.0]), np.array([9.0]))
     np.testing.assert_array_equal(ours.x, mean)
     assert (len(calls), ours.converged) == (1, True)
+
+
+def test_an_unknown_held_at_infinity_is_left_there() -> None:
+    """A limit that is none: the others are fitted as if it were not there."""
+    errors = np.random.default_rng(2).standard_normal(50)
+    jacobian = np.column_stack([np.ones(50), np.zeros(50)])
+    low, high = np.array([-9.0, np.inf]), np.array([9.0, np.inf])
+    ours = minimise(lambda x: x[0] - errors, lambda x: jacobian, np.array([3.0, np.inf]), low, high)
+    assert ours.x[0] == pytest.approx(errors.mean(), abs=0.02)  # a seventh of its standard error
+    assert ours.x[1] == np.inf

@@ -76,11 +76,11 @@ def test_every_fault_is_told_at_once() -> None:
 @pytest.mark.parametrize(
     ("effects", "message"),
     [
-        ({"slipping_clutch": {}}, "effects.slipping_clutch: unknown effect, expected one of actuator_lag, "),
-        ({"transport_delay": {}}, "effects.transport_delay.delay_s: missing, expected delay_s"),
+        ({"slipping_clutch": {}}, "effects.slipping_clutch: unknown effect, expected one of inverter_gain_mismatch, "),
+        ({"transport_delay": {}}, "effects.transport_delay.delay_s: missing, expected delay_s, before_nm"),
         (
             {"transport_delay": {"delay_s": 0.01, "tau": 1.0}},
-            "effects.transport_delay.tau: unknown parameter, expected delay_s",
+            "effects.transport_delay.tau: unknown parameter, expected delay_s, before_nm",
         ),
         (
             {"transport_delay": {"delay_s": math.nan}},
@@ -103,7 +103,7 @@ def test_a_wrong_effect_is_refused(effects: dict[str, dict[str, float]], message
 
 
 def test_a_shaft_effect_makes_no_sense_without_a_shaft() -> None:
-    message = "effects.backlash: makes no sense in one_mass, expected two_mass"
+    message = "effects.backlash: makes no sense in one_mass, expected joint, three_mass, two_mass"
     with pytest.raises(BadModel, match=message):
         model(ONE_MASS, effects={"backlash": {"gap_rad": 0.02, "contact_rad": 0.001}})
 

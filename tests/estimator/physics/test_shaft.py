@@ -5,15 +5,20 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from estimator.physics import kernel
 from estimator.physics.effects.backlash import damping_share
+from estimator.physics.effects.shaft_hysteresis import loading_rate
 from estimator.physics.effects.stiffness_nonlinearity import factor
-from estimator.physics.kernel import shaft_torque
-from estimator.physics.laws import beyond_gap, smooth_sign
+from estimator.physics.laws import beyond_gap, inertia_while, share_inside, smooth_sign
 from estimator.physics.layout import flat_values
 from estimator.signals.record import FloatArray
 from tests.estimator.physics.bench import TWO_MASS
 
 TWISTS = np.linspace(0.0, 0.2, 41)
+
+
+def shaft_torque(twist: float, rate: float, p: FloatArray, loading: float = 0.0) -> float:
+    return kernel.shaft_torque(twist, rate, loading, p, p[kernel.K])
 
 
 def torques(twists: FloatArray, hardening: float, shape: float) -> FloatArray:
@@ -89,6 +94,38 @@ def test_what_lies_beyond_a_gap(twist: float, beyond: float) -> None:
     assert beyond_gap(twist, 0.1) == pytest.approx(beyond, abs=1e-15)
 
 
-@pytest.mark.parametrize(("speed", "sign"), [(0.0, 0.0), (1.0, 1.0), (-1.0, -1.0), (0.02, np.tanh(1.0))])
+@pytest.mark.parametrize(
+    ("speed", "sign"), [(0.0, 0.0), (1.0, 1.0), (-1.0, -1.0), (0.02, np.tanh(1.0)), (-0.38, -np.tanh(19.0))]
+)
 def test_the_rounded_sign(speed: float, sign: float) -> None:
     assert smooth_sign(speed, 0.02) == pytest.approx(sign, abs=1e-12)
+
+
+def test_the_slider_of_a_hysteresis_adds_its_torque_by_its_loading() -> None:
+    p = flat_values(TWO_MASS, {"shaft_hysteresis": {"friction_nm": 30.0}})
+    assert [shaft_torque(0.0, 0.0, p, loading) for loading in (-1.0, 0.0, 0.5)] == [-30.0, 0.0, 15.0]
+
+
+@pytest.mark.parametrize(("loading", "rate"), [(1.0, 2.0), (-1.0, -2.0), (0.3, 0.0)])
+def test_a_slider_that_slides_or_rests_loads_no_further(loading: float, rate: float) -> None:
+    assert loading_rate(loading, rate, 1e-3, 600.0) == 0.0
+
+
+def test_a_slider_loads_by_the_twist_and_not_by_time() -> None:
+    slow, fast = (loading_rate(0.2, rate, 0.05, 1e9) for rate in (0.1, 1.0))
+    assert fast == pytest.approx(10.0 * slow)
+    assert slow == pytest.approx((0.1 - 0.1 * 0.2) / 0.05)
+    assert loading_rate(0.2, -0.1, 0.05, 1e9) == pytest.approx((-0.1 - 0.1 * 0.2) / 0.05)
+    assert loading_rate(0.2, 1.0, 1e-9, 600.0) == pytest.approx(600.0 * 0.8)
+
+
+@pytest.mark.parametrize(("share", "inertia"), [(0.0, 2.0), (1.0, 8.0), (0.5, 3.2)])
+def test_an_inertia_for_part_of_the_time_is_the_harmonic_mean(share: float, inertia: float) -> None:
+    assert inertia_while(2.0, 6.0, share) == pytest.approx(inertia)  # half the time each: 2 / (1/2 + 1/8)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "share"), [(0.0, 9.0, 1.0), (2.0, 9.0, 0.0), (1.25, 9.0, 0.75), (1.25, 1.5, 0.25), (0.0, 1.5, 0.5)]
+)
+def test_how_much_of_a_step_lies_in_an_event(low: float, high: float, share: float) -> None:
+    assert share_inside(1.0, 1.0, low, high) == pytest.approx(share)

@@ -8,13 +8,13 @@ import pytest
 from estimator.errors import BadModel
 from estimator.physics import kernel
 from estimator.physics.layout import flat
-from estimator.physics.model import Structure
+from estimator.physics.model import Structure, natural_frequencies_rad_s
 from estimator.physics.simulate import (
     FASTEST_IN_NYQUIST,
+    RADIANS_PER_STEP,
     SIGN_WIDTH,
     Start,
     grid_for,
-    natural_frequency_rad_s,
     output_state,
     simulate,
     substeps_for,
@@ -25,14 +25,20 @@ from tests.estimator.physics.bench import ONE_MASS, SAMPLE_TIME_S, TWO_MASS, exa
 
 def test_the_natural_frequency_is_that_of_two_free_masses() -> None:
     values = {"J_M": 2.0, "J_L": 6.0, "k": 600.0, "c": 0.0, "b_M": 0.0, "b_L": 0.0}
-    assert natural_frequency_rad_s(values) == pytest.approx(20.0)  # sqrt(600 (1/2 + 1/6))
-    assert natural_frequency_rad_s(ONE_MASS) == 0.0
+    assert natural_frequencies_rad_s(values) == pytest.approx([20.0])  # sqrt(600 (1/2 + 1/6))
+    assert natural_frequencies_rad_s(ONE_MASS) == 0.0
+
+
+def test_the_natural_frequencies_of_a_symmetric_chain() -> None:
+    """Equal springs, masses 1, 2, 1: the ends against each other, then both against the middle."""
+    values = {"J_M": 1.0, "J_2": 2.0, "J_L": 1.0, "k": 400.0, "k_2": 400.0}
+    assert natural_frequencies_rad_s(values) == pytest.approx([20.0, 20.0 * np.sqrt(2.0)])
 
 
 def test_sub_steps_follow_the_natural_frequency() -> None:
     values = {"J_M": 2.0, "J_L": 6.0, "k": 600.0, "c": 0.0, "b_M": 0.0, "b_L": 0.0}
-    assert substeps_for(values, 0.01) == 2  # 0.2 rad per period, 0.15 allowed
-    assert substeps_for(values, 0.001) == 1
+    assert substeps_for(values, 2.5 * RADIANS_PER_STEP / 20.0) == 3  # 20 rad/s
+    assert substeps_for(values, 0.5 * RADIANS_PER_STEP / 20.0) == 1
     assert substeps_for(ONE_MASS, 0.01) == 1
 
 
@@ -59,7 +65,7 @@ def test_a_mode_too_fast_for_the_sample_time_is_refused_with_its_parameter(
 def test_the_limit_on_modes_is_a_multiple_of_the_nyquist_frequency() -> None:
     values = {"J_M": 0.01, "b_M": 4.0}  # decays at 400 1/s
     longest_s = FASTEST_IN_NYQUIST * np.pi / 400.0
-    assert substeps_for(values, 0.999 * longest_s) > 600
+    assert substeps_for(values, 0.999 * longest_s) > 0.99 * FASTEST_IN_NYQUIST * np.pi / RADIANS_PER_STEP
     with pytest.raises(BadModel, match=r"fastest decay is 63\.66 Hz, expected at most 63\.6 Hz"):
         substeps_for(values, 1.001 * longest_s)
 

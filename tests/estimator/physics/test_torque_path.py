@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from estimator.physics import kernel
+from estimator.physics.effects.actuator_lag import step
 from estimator.physics.effects.transport_delay import delayed_mean
 from estimator.physics.layout import flat
 from estimator.physics.simulate import Grid, Start, simulate
@@ -16,11 +16,9 @@ REST = Start(0.0, 0.0, 0.0)
 INTEGRATOR = {"J_M": 2.0, "b_M": 0.0}
 
 
-def run(
-    effects: dict[str, dict[str, float]], torque: FloatArray, substeps: int, state: int = kernel.SPEED
-) -> FloatArray:
+def run(effects: dict[str, dict[str, float]], torque: FloatArray, substeps: int) -> FloatArray:
     line = model(INTEGRATOR, effects=effects)
-    return simulate(Grid(line.structure, substeps, 1e-3), record(torque), flat(line), REST, output=state)
+    return simulate(Grid(line.structure, substeps, 1e-3), record(torque), flat(line), REST)
 
 
 def delayed(samples: float, torque: FloatArray, substeps: int = 4) -> FloatArray:
@@ -50,13 +48,14 @@ def test_a_fractional_delay_of_an_integrator_lies_between_in_proportion(fraction
         (0.5, 1.0, 1.5),  # half of 1 and half of 2
         (1.75, 1.0, 3.5),  # a quarter of 2 and three quarters of 4
         (1.9, 0.2, 3.0),
-        (-3.0, 1.0, 1.0),  # before the first sample it is held
-        (-0.5, 1.0, 1.0),
+        (-3.0, 1.0, 7.0),  # before the first sample
+        (-0.5, 1.0, 4.0),  # half of 7 and half of 1
         (2.5, 0.5, 4.0),
+        (5.5, 0.5, 4.0),  # after the last
     ],
 )
 def test_the_mean_of_a_held_torque(start: float, length: float, mean: float) -> None:
-    assert delayed_mean(np.array([1.0, 2.0, 4.0]), start, length) == pytest.approx(mean, rel=1e-12)
+    assert delayed_mean(np.array([1.0, 2.0, 4.0]), 7.0, start, length) == pytest.approx(mean, rel=1e-12)
 
 
 def test_no_sub_step_reads_beyond_the_last_sample() -> None:
@@ -68,16 +67,34 @@ def test_no_sub_step_reads_beyond_the_last_sample() -> None:
         for substeps in range(1, 60):
             start = samples - 1 + (substeps - 1) * (1.0 / substeps)
             late.append(start + 1.0 / substeps > samples)
-            assert delayed_mean(memory[:samples], start, 1.0 / substeps) == 7.0
+            assert delayed_mean(memory[:samples], 0.0, start, 1.0 / substeps) == 7.0
     assert any(late)
 
 
-def test_a_lagged_step_is_the_exponential() -> None:
+@pytest.mark.parametrize("length_s", [0.001, 0.02, 5.0])
+def test_a_lagged_step_is_the_exponential(length_s: float) -> None:
     tau = 0.03
-    torque = np.concatenate([np.zeros(5), np.full(60, 40.0)])
-    lagged = run({"actuator_lag": {"time_constant_s": tau}}, torque, 3, kernel.LAGGED)
-    time_s = np.maximum(np.arange(65) - 5, 0) * SAMPLE_TIME_S
-    np.testing.assert_allclose(lagged, 40.0 * (1.0 - np.exp(-time_s / tau)), rtol=0, atol=1e-10)
+    decay = np.exp(-length_s / tau)
+    mean, end = step(40.0, 10.0, tau, length_s)
+    assert end == pytest.approx(40.0 - 30.0 * decay)
+    assert mean == pytest.approx(40.0 - 30.0 * tau / length_s * (1.0 - decay))
+
+
+def test_what_came_before_a_recording_is_delayed_into_it() -> None:
+    """The reading is 30 Nm from its first sample on; 50 Nm acted before, and still act for as long as the delay."""
+    torque = np.full(50, 30.0)
+    speed = run({"transport_delay": {"delay_s": 0.055, "before_nm": 20.0}}, torque, 4)
+    time_s = np.arange(50) * SAMPLE_TIME_S
+    expected = (30.0 * time_s + 20.0 * np.minimum(time_s, 0.055)) / INTEGRATOR["J_M"]
+    np.testing.assert_allclose(speed, expected, rtol=0, atol=1e-10)
+
+
+def test_what_came_before_a_recording_lags_into_it() -> None:
+    tau = 0.03
+    speed = run({"actuator_lag": {"time_constant_s": tau, "before_nm": 20.0}}, np.full(50, 30.0), 4)
+    time_s = np.arange(50) * SAMPLE_TIME_S
+    expected = (30.0 * time_s + 20.0 * tau * (1.0 - np.exp(-time_s / tau))) / INTEGRATOR["J_M"]
+    np.testing.assert_allclose(speed, expected, rtol=0, atol=1e-10)
 
 
 @pytest.mark.parametrize("tau", [1e-4, 0.03])

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import astuple, replace
+
 import numpy as np
 import pytest
 
 from estimator.physics.effects import road_grade
-from estimator.physics.layout import slot
+from estimator.physics.effects.torque_ripple import ORDERS
+from estimator.physics.layout import flat, slot
 from estimator.physics.model import DrivelineModel, Parameter, Structure
 from estimator.physics.simulate import Start
-from estimator.physics.unknowns import effect_unknowns, local_basis, nominal_unknowns
+from estimator.physics.unknowns import Release, effect_unknowns, local_basis, nominal_unknowns, own_unknowns
 from estimator.signals.record import OutputKind
 from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, linear_record, model, random_steps
 
@@ -35,15 +38,64 @@ def test_an_effect_has_unknowns_once_per_start() -> None:
     rec = linear_record(TWO_MASS, random_steps(500, seed=1), CRUISE)
     ladder = effect_unknowns("backlash", model(TWO_MASS), [rec])
     assert len(ladder) == 3
-    assert len({shared[0].start for shared in ladder}) == 3
-    for shared in ladder:
+    assert len({release.shared[0].start for release in ladder}) == 3
+    for release in ladder:
+        shared = release.shared
+        assert release.own == ((),)
         assert [(s.effect, s.name) for s in shared] == [("backlash", "gap_rad"), ("backlash", "contact_rad")]
         assert shared[0].scale == pytest.approx(0.2 * 100.0 / TWO_MASS["k"])
 
 
 def test_a_profile_has_no_shared_unknowns() -> None:
     rec = linear_record(TWO_MASS, random_steps(500, seed=1), CRUISE)
-    assert effect_unknowns("road_grade", model(TWO_MASS), [rec]) == [()]
+    assert effect_unknowns("road_grade", model(TWO_MASS), [rec]) == [Release((), ((),))]
+
+
+def test_moments_and_phases_are_every_recordings_own() -> None:
+    line = model(TWO_MASS)
+    first = linear_record(TWO_MASS, random_steps(500, seed=1), CRUISE)
+    second = replace(linear_record(TWO_MASS, random_steps(300, seed=2), CRUISE), began_s=-7.0)
+    (brake,) = effect_unknowns("brake_drag", line, [first, second])
+    assert [s.name for s in brake.shared] == ["brake_nm"]
+    spans = [[(s.name, s.low, s.high) for s in own] for own in brake.own]
+    assert spans[0] == [("from_s", 0.0, pytest.approx(5.0)), ("to_s", 0.0, pytest.approx(5.0))]
+    assert spans[1] == [("from_s", 7.0, pytest.approx(10.0)), ("to_s", 7.0, pytest.approx(10.0))]
+    ripples = effect_unknowns("torque_ripple", line, [first, second])
+    orders = [next(s for s in release.shared if s.name == "order") for release in ripples]
+    assert {order.start for order in orders} == set(map(float, ORDERS))
+    for order, release in zip(orders, ripples, strict=True):
+        assert order.low == order.start == order.high
+        assert [[s.name for s in own] for own in release.own] == [["phase_rad", "share_phase_rad"]] * 2
+
+
+def test_own_parameters_are_put_into_their_recordings_vector_alone() -> None:
+    rec = linear_record(TWO_MASS, random_steps(500, seed=1), CRUISE)
+    own = own_unknowns(["brake_drag"], rec)
+    basis = local_basis(model(TWO_MASS), rec, profile=False, own=own)
+    plain = local_basis(model(TWO_MASS), rec, profile=False)
+    x = basis.guess.copy()
+    x[basis.own_rows] = [1.5, 3.5]
+    p = flat(model(TWO_MASS))
+    filled = basis.parameters(p, x)
+    assert filled[slot("brake_drag", "from_s")] == 1.5
+    assert filled[slot("brake_drag", "to_s")] == 3.5
+    assert p[slot("brake_drag", "from_s")] == 0.0
+    assert plain.parameters(p, plain.guess) is p
+    assert basis.start(x) == plain.start(plain.guess)
+    np.testing.assert_array_equal(basis.low[basis.own_rows], [0.0, 0.0])
+    np.testing.assert_allclose(basis.high[basis.own_rows], [5.0, 5.0])
+    assert np.isinf(basis.low[: basis.own_rows.start]).all()
+
+
+def test_three_masses_start_with_two_twists() -> None:
+    values = TWO_MASS | {"J_2": 0.8, "k_2": 9000.0, "c_2": 4.0}
+    line = DrivelineModel(
+        Structure.THREE_MASS, {name: Parameter(values[name], 0.2) for name in Structure.THREE_MASS.parameter_names}
+    )
+    rec = linear_record(TWO_MASS, random_steps(500, seed=2), CRUISE)
+    basis = local_basis(line, rec, profile=False)
+    start = basis.start(np.arange(1.0, 7.0) / basis.scale)
+    np.testing.assert_allclose(astuple(start), [1.0, 0.0, 2.0, 3.0, 4.0, 5.0, 6.0])
 
 
 @pytest.mark.parametrize("kind", [OutputKind.SPEED, OutputKind.POSITION])

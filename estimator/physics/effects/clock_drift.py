@@ -1,0 +1,48 @@
+"""Torque and speed are stamped by clocks that run at different rates."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start, Untestable
+from estimator.physics.model import DrivelineModel, Motion
+from estimator.signals.record import Record
+
+
+def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+    """Return a thousandth."""
+    return (1e-3,)
+
+
+def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
+    """Return starts on both sides: the error is not convex in the rate."""
+    return [(-1.0,), (-0.25,), (0.25,), (1.0,)]
+
+
+def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
+    """Any recording of some length in which the torque steps will do."""
+    return None
+
+
+def sentence(values: Mapping[str, float], motion: Motion) -> str:
+    """Say what was found."""
+    return f"the torque's clock runs {1e6 * values['rate']:+.0f} ppm off the speed's"
+
+
+EFFECT = Effect(
+    name="clock_drift",
+    element=Element.ACQUISITION,
+    title="drift of the clocks",
+    law="T(t) = T_read((1 + r) t)",
+    source="free-running node clocks: CiA 301 (SYNC, TIME); Mills, Computer Network Time Synchronization, 2011",
+    excited_by="long recordings with torque steps",
+    parameters=(EffectParameter("rate", "", 0.0, -20.0, 20.0, "relative difference of the rates: r"),),
+    structures=EVERY_LINE,
+    resembles=("transport_delay", "sample_jitter"),
+    equivalent=(),
+    contains=(),
+    scales=scales,
+    starts=starts,
+    testable=testable,
+    sentence=sentence,
+)

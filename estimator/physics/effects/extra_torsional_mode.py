@@ -1,0 +1,70 @@
+"""One more inertia on a spring: a second resonance that the model does not have."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from estimator.physics.effect import WITH_SHAFT, Effect, EffectParameter, Element, Start, Untestable
+from estimator.physics.model import DrivelineModel, Motion, natural_frequencies_rad_s, unit
+from estimator.signals.record import Record
+
+MOST_DAMPING = 0.15
+"""Steel shafts and their rubber couplings stay below this damping ratio."""
+
+
+def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+    """Return a tenth of the motor's inertia, the line's own frequency, and a usual damping."""
+    frequency = float(natural_frequencies_rad_s(model.values())[0]) / (2.0 * math.pi)
+    return (0.1 * model.parameters["J_M"].value, frequency, 0.05)
+
+
+def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
+    """Return modes below, around and above the first resonance, as close as they are narrow."""
+    return [(0.2, float(ratio), 1.0) for ratio in np.geomspace(0.3, 5.0, 24)]
+
+
+def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
+    """Any recording with a PRBS will do."""
+    return None
+
+
+def sentence(values: Mapping[str, float], motion: Motion) -> str:
+    """Say what was found."""
+    return (
+        f"the line has one more torsional mode: {values['inertia_kg_m2']:.3g} {unit('inertia', motion)} on a spring, "
+        f"{values['frequency_hz']:.3g} Hz by itself with damping ratio {values['damping_ratio']:.2g}"
+    )
+
+
+def implausible(model: DrivelineModel, records: Sequence[Record], values: Mapping[str, float]) -> str:
+    """Object to a branch that is damped so much that it has no resonance of its own to speak of."""
+    if values["damping_ratio"] <= MOST_DAMPING:
+        return ""
+    return f"a branch with damping ratio {values['damping_ratio']:.2g} is no mode"
+
+
+EFFECT = Effect(
+    name="extra_torsional_mode",
+    element=Element.SHAFT,
+    title="one more torsional mode",
+    law="J_X dw_X/dt = k_X (phi_M - phi_X) + c_X (w_M - w_X), reacting on the motor; k_X = J_X (2 pi f)^2",
+    source="an inertia on a spring beside the main one: Den Hartog, Mechanical Vibrations, 4th ed., 1956",
+    excited_by="PRBS that reaches the mode's frequency",
+    parameters=(
+        EffectParameter("inertia_kg_m2", "inertia", 0.0, 0.0, 50.0, "inertia J_X"),
+        EffectParameter("frequency_hz", "Hz", 1.0, 0.05, 5.0, "its frequency with the motor held: f"),
+        EffectParameter("damping_ratio", "", 0.05, 0.02, 4.0, "its damping ratio: c_X / (2 sqrt(k_X J_X))"),
+    ),
+    structures=WITH_SHAFT,
+    resembles=("actuator_lag", "stiffness_nonlinearity", "tyre_slip", "speed_filter"),
+    equivalent=(),
+    contains=(),
+    scales=scales,
+    starts=starts,
+    testable=testable,
+    sentence=sentence,
+    implausible=implausible,
+)

@@ -1,0 +1,55 @@
+"""The clutch to the generator is not open: its inertia turns with the motor for a while."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start, Untestable
+from estimator.physics.model import DrivelineModel, Motion, unit
+from estimator.signals.record import Record
+
+
+def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+    """Return half of the motor's inertia."""
+    return (0.5 * model.parameters["J_M"].value,)
+
+
+def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
+    """Return a small and a large generator."""
+    return [(0.3,), (1.5,)]
+
+
+def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
+    """Any recording in which the torque changes will do."""
+    return None
+
+
+def sentence(values: Mapping[str, float], motion: Motion) -> str:
+    """Say what was found."""
+    inertia = unit("inertia", motion)
+    return f"an extra inertia of {values['inertia_kg_m2']:.3g} {inertia} turns with the motor: clutch not open"
+
+
+EFFECT = Effect(
+    name="generator_coupled",
+    element=Element.MOTOR,
+    title="generator coupled",
+    law="J_M becomes J_M + J_G from t_1 to t_2 of a recording",
+    source="hybrid bus whose coupling to the generator opens: Nevaranta, Montonen, Lindh, EPE'18, 2018",
+    excited_by="PRBS or torque steps while the clutch is closed",
+    parameters=(
+        EffectParameter("inertia_kg_m2", "inertia", 0.0, 0.0, 20.0, "inertia that is coupled: J_G"),
+        EffectParameter("from_s", "s", 0.0, 0.0, math.inf, "moment it is coupled: t_1, of each recording", True, True),
+        EffectParameter("to_s", "s", 0.0, 0.0, math.inf, "moment it is released: t_2, of each recording", True, True),
+    ),
+    structures=EVERY_LINE,
+    resembles=("stiffness_change", "brake_drag", "inertia_change"),
+    equivalent=(),
+    contains=(),
+    event=True,
+    scales=scales,
+    starts=starts,
+    testable=testable,
+    sentence=sentence,
+)

@@ -1,0 +1,54 @@
+"""The payload steps: people get on or off."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start, Untestable
+from estimator.physics.model import DrivelineModel, Motion, load_inertia, unit
+from estimator.signals.record import Record
+
+
+def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+    """Return a tenth of the load's inertia."""
+    return (0.1 * model.parameters[load_inertia(model)].value,)
+
+
+def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
+    """Return a lighter and a heavier load."""
+    return [(-1.0,), (1.0,)]
+
+
+def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
+    """Any recording in which the speed changes will do."""
+    return None
+
+
+def sentence(values: Mapping[str, float], motion: Motion) -> str:
+    """Say what was found."""
+    return f"the load's inertia changes by {values['change_kg_m2']:+.3g} {unit('inertia', motion)} at a moment"
+
+
+EFFECT = Effect(
+    name="inertia_change",
+    element=Element.LOAD,
+    title="step of the payload",
+    law="J_L becomes J_L + delta from t_1 to t_2 of a recording",
+    source="the vehicle's mass at the wheel, m r^2: Gillespie, Fundamentals of Vehicle Dynamics, SAE 1992",
+    excited_by="acceleration before and after the change",
+    parameters=(
+        EffectParameter("change_kg_m2", "inertia", 0.0, -9.0, 40.0, "change of the inertia: delta"),
+        EffectParameter("from_s", "s", 0.0, 0.0, math.inf, "moment of the change: t_1, of each recording", True, True),
+        EffectParameter("to_s", "s", 0.0, 0.0, math.inf, "moment it is undone: t_2, of each recording", True, True),
+    ),
+    structures=EVERY_LINE,
+    resembles=("generator_coupled", "road_grade"),
+    equivalent=(),
+    contains=(),
+    event=True,
+    scales=scales,
+    starts=starts,
+    testable=testable,
+    sentence=sentence,
+)

@@ -1,0 +1,56 @@
+"""An unbalanced wheel: a load torque once per wheel turn."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Held, Start, Untestable
+from estimator.physics.model import DrivelineModel, Motion, unit
+from estimator.physics.motion import torque_scale
+from estimator.signals.record import Record
+
+
+def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+    """Return a twentieth of the torque in use, and 1."""
+    return (0.05 * torque_scale(records), 1.0)
+
+
+def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
+    """Return one start: the problem is linear in amplitude and phase together."""
+    return [(0.5, Held(model.gear_ratio or 1.0))]
+
+
+def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
+    """Need the gear ratio, and motion."""
+    if model.gear_ratio is None:
+        return Untestable("the model file has no [geometry] gear_ratio: the wheel's angle is unknown", "reversal")
+    return None
+
+
+def sentence(values: Mapping[str, float], motion: Motion) -> str:
+    """Say what was found."""
+    return f"the load torque swings by {values['amplitude_nm']:.3g} {unit('torque', motion)} once per wheel turn"
+
+
+EFFECT = Effect(
+    name="load_imbalance",
+    element=Element.LOAD,
+    title="imbalance of the load",
+    law="T_load = T_0 + A cos(phi_M / i + alpha)",
+    source="Genta, Dynamics of Rotating Systems, Springer 2005",
+    excited_by="speeds at which the wheel's turn is felt",
+    parameters=(
+        EffectParameter("amplitude_nm", "torque", 0.0, 0.0, 100.0, "amplitude A"),
+        EffectParameter("motor_turns_per_turn", "", 1.0, 0.01, 100.0, "motor turns per turn of the load: i", True),
+        EffectParameter("phase_rad", "rad", 0.0, -10.0, 10.0, "phase alpha, of each recording", True, True),
+    ),
+    structures=EVERY_LINE,
+    resembles=("torque_ripple", "cardan_second_order", "road_grade"),
+    equivalent=(),
+    contains=(),
+    phases={"phase_rad": "amplitude_nm"},
+    scales=scales,
+    starts=starts,
+    testable=testable,
+    sentence=sentence,
+)

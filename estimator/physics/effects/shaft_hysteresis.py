@@ -1,0 +1,68 @@
+"""Dry friction inside the shaft line: the torque lags the twist whatever the speed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from estimator.compiled import compiled
+from estimator.physics.effect import WITH_SPRING, Effect, EffectParameter, Element, Start, Untestable
+from estimator.physics.model import DrivelineModel, Motion, unit
+from estimator.physics.motion import torque_scale
+from estimator.signals.record import Record
+
+
+@compiled
+def loading_rate(loading: float, rate: float, yield_twist: float, fastest: float) -> float:
+    """Return how fast the slider loads [1/s] at a twist rate: towards 1 against the motion, and no further.
+
+    A slider that yields within one integration step is held to the ``fastest`` decay [1/s] the step can follow.
+    """
+    return min(abs(rate) / yield_twist, fastest) * (math.copysign(1.0, rate) - loading)
+
+
+def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+    """Return a twentieth of the torque in use, and a fiftieth of the twist that it gives."""
+    torque = torque_scale(records)
+    return (0.05 * torque, 0.02 * torque / model.parameters["k"].value)
+
+
+def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
+    """Return a sharp and a round slider."""
+    return [(0.5, 0.5), (1.0, 4.0)]
+
+
+def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
+    """Need a twist rate of both signs, which every torque step gives."""
+    return None
+
+
+def sentence(values: Mapping[str, float], motion: Motion) -> str:
+    """Say what was found."""
+    torque = unit("torque", motion)
+    return (
+        f"the shaft line has dry friction inside: {values['friction_nm']:.3g} {torque}, "
+        f"yielding over {values['yield_rad']:.3g} {unit('angle', motion)}"
+    )
+
+
+EFFECT = Effect(
+    name="shaft_hysteresis",
+    element=Element.SHAFT,
+    title="hysteresis of the shaft",
+    law="T_S = k twist + c d twist/dt + T_h z, dz/dt = (r - |r| z) / y, r = d twist/dt",
+    source="Dahl, AIAA J. 14(12), 1976; Bouc-Wen with exponent 1: Wen, J. Eng. Mech. Div. ASCE 102, 1976",
+    excited_by="torque of both signs, small and large amplitudes",
+    parameters=(
+        EffectParameter("friction_nm", "torque", 0.0, 0.0, 40.0, "friction torque of the slider: T_h"),
+        EffectParameter("yield_rad", "angle", 1.0, 0.1, 100.0, "twist over which it yields: y"),
+    ),
+    structures=WITH_SPRING,
+    resembles=("coulomb_friction_motor", "backlash", "stiffness_nonlinearity"),
+    equivalent=(),
+    contains=(),
+    scales=scales,
+    starts=starts,
+    testable=testable,
+    sentence=sentence,
+)

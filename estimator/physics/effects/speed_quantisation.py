@@ -1,0 +1,53 @@
+"""Speed quantisation: the speed is read in steps that are not small against its noise.
+
+It is recognised in the raw recordings (``estimator.diagnosis.acquisition``) and compensated there; no fit releases it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start, Untestable
+from estimator.physics.model import DrivelineModel, Motion, unit
+from estimator.signals.record import OutputKind, Record
+
+
+def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+    """Return one: a step is found, not fitted."""
+    return (1.0,)
+
+
+def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
+    """Return none: it is not fitted."""
+    return []
+
+
+def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
+    """Any recording of a speed that changes will do."""
+    return None
+
+
+def sentence(values: Mapping[str, float], motion: Motion) -> str:
+    """Say what was found."""
+    return f"the speed is read in steps of {values['step_rad_s']:.3g} {unit('speed', motion)}"
+
+
+EFFECT = Effect(
+    name="speed_quantisation",
+    element=Element.SPEED_SENSOR,
+    title="coarse resolution of the speed",
+    law="w_read = q round(w / q)",
+    source="Widrow, Kollar: Quantization Noise, Cambridge 2008",
+    excited_by="a speed that passes many steps",
+    parameters=(EffectParameter("step_rad_s", "speed", 0.0, 0.0, float("inf"), "step q"),),
+    structures=EVERY_LINE,
+    resembles=(),
+    equivalent=(),
+    contains=(),
+    scales=scales,
+    starts=starts,
+    testable=testable,
+    sentence=sentence,
+    kinds=frozenset({OutputKind.SPEED}),
+    recognised=True,
+)

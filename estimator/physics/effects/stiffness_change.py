@@ -1,0 +1,54 @@
+"""The shaft's stiffness steps at a moment, as when it cracks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from estimator.physics.effect import WITH_SPRING, Effect, EffectParameter, Element, Start, Untestable
+from estimator.physics.model import DrivelineModel, Motion
+from estimator.signals.record import Record
+
+
+def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+    """Return 1: the change is a share of the stiffness."""
+    return (1.0,)
+
+
+def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
+    """Return a softer and a stiffer shaft."""
+    return [(-0.2,), (0.2,)]
+
+
+def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
+    """Any recording that excites the resonance will do."""
+    return None
+
+
+def sentence(values: Mapping[str, float], motion: Motion) -> str:
+    """Say what was found."""
+    return f"the shaft's stiffness changes by {values['change']:+.1%} at a moment"
+
+
+EFFECT = Effect(
+    name="stiffness_change",
+    element=Element.SHAFT,
+    title="step of the shaft's stiffness",
+    law="k becomes k (1 + delta) from t_1 to t_2 of a recording",
+    source="breathing crack held open: Dimarogonas, Engineering Fracture Mechanics 55(5), 1996",
+    excited_by="PRBS around the resonance before and after the change",
+    parameters=(
+        EffectParameter("change", "", 0.0, -0.95, 5.0, "relative change of the stiffness: delta"),
+        EffectParameter("from_s", "s", 0.0, 0.0, math.inf, "moment of the change: t_1, of each recording", True, True),
+        EffectParameter("to_s", "s", 0.0, 0.0, math.inf, "moment it is undone: t_2, of each recording", True, True),
+    ),
+    structures=WITH_SPRING,
+    resembles=("generator_coupled", "backlash", "stiffness_nonlinearity"),
+    equivalent=(),
+    contains=(),
+    event=True,
+    scales=scales,
+    starts=starts,
+    testable=testable,
+    sentence=sentence,
+)

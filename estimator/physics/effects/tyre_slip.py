@@ -1,0 +1,103 @@
+"""The tyre slips: the wheel's inertia is coupled to the vehicle's by creep and no longer rigidly."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from estimator.compiled import compiled
+from estimator.physics.effect import WITH_SHAFT, Effect, EffectParameter, Element, Held, Start, Untestable
+from estimator.physics.model import DrivelineModel, Motion, unit
+from estimator.physics.motion import speed_scale, torque_scale
+from estimator.signals.record import Record
+
+
+@compiled
+def coupling(
+    vehicle: float, slip_per_nm: float, creep_speed: float, wheel_share: float, steepest: float
+) -> tuple[float, float]:
+    """Return the torque per slide [Nm s/rad] at a vehicle speed, and the share of the inertia on the wheel's side.
+
+    A light wheel on a steep curve follows faster than an integration step can. There it is made heavier at the
+    vehicle's cost, by as much as the step needs: so near to rigid the split changes next to nothing. ``steepest`` is
+    the load's inertia times the fastest decay the step can follow [Nm s/rad].
+    """
+    slope = 1.0 / (slip_per_nm * (abs(vehicle) + creep_speed))
+    needed = slope / steepest
+    if wheel_share * (1.0 - wheel_share) >= needed:
+        return slope, wheel_share
+    if needed >= 0.25:
+        return 0.25 * steepest, 0.5
+    return slope, 0.5 + math.copysign(math.sqrt(0.25 - needed), wheel_share - 0.5)
+
+
+@compiled
+def build_up(
+    slide: float,
+    roll: float,
+    traction: float,
+    slip_per_nm: float,
+    relaxation: float,
+    wheel_inertia: float,
+    fastest: float,
+) -> float:
+    """Return how fast the traction builds up [Nm/s]: over the angle that the tyre has to roll.
+
+    The relaxation is lengthened to what the integration step can follow: ``fastest`` is the fastest decay [1/s].
+    """
+    least = max(roll / fastest, 1.0 / (slip_per_nm * wheel_inertia * fastest * fastest))
+    return (slide / slip_per_nm - roll * traction) / max(relaxation, least)
+
+
+def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+    """Return the compliance of a per cent of slip at the torque in use, 1, a tenth of the top speed, and a radian."""
+    return (0.01 / torque_scale(records), 1.0, 0.1 * speed_scale(records), 1.0)
+
+
+def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
+    """Return creep from small to large, at once or after rolling, for a light and a heavy wheel."""
+    return [
+        (slip, wheel, creep, relaxation)
+        for slip in (0.3, 1.5)
+        for wheel in (0.05, 0.15)
+        for creep, relaxation in ((1.0, Held(0.0)), (0.3, 2.0))
+    ]
+
+
+def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
+    """Any recording in which the torque changes will do."""
+    return None
+
+
+def sentence(values: Mapping[str, float], motion: Motion) -> str:
+    """Say what was found."""
+    torque = unit("torque", motion)
+    return (
+        f"the tyre slips by {values['slip_per_nm']:.3g} per {torque}: {values['wheel_share']:.1%} of the load's "
+        f"inertia is the wheel's, the rest follows by creep"
+    )
+
+
+EFFECT = Effect(
+    name="tyre_slip",
+    element=Element.LOAD,
+    title="slip of the tyre",
+    law="J_W dw_W/dt = T_S - T_x, J_V dw_V/dt = T_x - b_L w_V - T_load, "
+    "T_x = (w_W - w_V) / (s (|w_V| + w_0)), or l dT_x/dt + sqrt(w_V^2 + w_0^2) T_x = (w_W - w_V) / s",
+    source="linear range of the slip curve, relaxation length: Pacejka, Tire and Vehicle Dynamics, 3rd ed., 2012",
+    excited_by="large torque changes: tip-in, tip-out, PRBS",
+    parameters=(
+        EffectParameter("slip_per_nm", "per_torque", 0.0, 0.0, 100.0, "slip per torque: s"),
+        EffectParameter("wheel_share", "", 0.05, 0.005, 0.7, "share of J_L that is the wheel's: J_W / J_L", True),
+        EffectParameter("creep_rad_s", "speed", 1.0, 0.1, 100.0, "speed below which slip is a slide: w_0", True),
+        EffectParameter("relaxation_rad", "angle", 0.0, 0.05, 100.0, "motor angle over which traction builds up", True),
+    ),
+    structures=WITH_SHAFT,
+    resembles=("extra_torsional_mode",),
+    equivalent=(),
+    contains=(),
+    scales=scales,
+    starts=starts,
+    testable=testable,
+    sentence=sentence,
+)

@@ -1,0 +1,150 @@
+"""What a recording has of its own of an effect, found by a scan: phases of an angle, moments of an event.
+
+Neither is convex: a fit that starts half a period or a few seconds off ends in the wrong place. Around the state
+without the effect the output answers to a small one in proportion, so that phases follow from the answers to a cosine
+and a sine, and moments from the answers to the effect in every cell of a grid over time.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from estimator.physics.effect import Effect
+from estimator.physics.layout import slot
+from estimator.physics.unknowns import Shared
+from estimator.signals.record import FloatArray
+
+Simulate = Callable[[FloatArray], FloatArray]
+"""Parameter vector to the simulated samples that count, shape (R,)."""
+
+MOST_CELLS = 40
+SHORTEST_CELL_S = 0.5
+"""Grid of the moments of an event: half a second, or a fortieth of a longer recording; a fit moves them from there."""
+
+SMALL = 0.1
+"""Answers are taken at this share of an effect's size, where they are in proportion to it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Wave:
+    """Answers to one amplitude of a periodic effect at phase 0 and a quarter turn on, per unit of it; shape (2, R)."""
+
+    phase: str
+    amplitude: str
+    answers: FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class Cells:
+    """Answers to an event of unit size from the first moment of a grid to each of its moments.
+
+    Attributes
+    ----------
+    moments_s : ndarray, shape (M,)
+        Time since the recording began [s].
+    answers : ndarray, shape (M, R)
+        The first row is 0: no event.
+    """
+
+    moments_s: FloatArray
+    answers: FloatArray
+
+
+def waves(entry: Effect, p: FloatArray, sizes: Mapping[str, float], run: Simulate) -> list[Wave]:
+    """Return the answers of one recording to each amplitude of a periodic effect."""
+    silent = p.copy()
+    for amplitude in entry.phases.values():
+        silent[slot(entry.name, amplitude)] = 0.0
+    still = run(silent)
+    found = []
+    for phase, amplitude in entry.phases.items():
+        if sizes[amplitude] == 0.0:
+            continue
+        size = SMALL * sizes[amplitude]
+        answers = []
+        for angle in (0.0, 0.5 * math.pi):
+            moved = silent.copy()
+            moved[slot(entry.name, amplitude)] = size
+            moved[slot(entry.name, phase)] = angle
+            answers.append((run(moved) - still) / size)
+        found.append(Wave(phase, amplitude, np.array(answers)))
+    return found
+
+
+def cells(entry: Effect, p: FloatArray, own: tuple[Shared, ...], sizes: Mapping[str, float], run: Simulate) -> Cells:
+    """Return the answers of one recording to an event in every cell of a grid over its time, summed from the first."""
+    begin, end = (next(u for u in own if (u.effect, u.name) == (entry.name, name)) for name in ("from_s", "to_s"))
+    count = min(MOST_CELLS, max(4, round((begin.high - begin.low) / SHORTEST_CELL_S)))
+    moments = np.linspace(begin.low, begin.high, count + 1)
+    silent = p.copy()
+    silent[begin.slot] = silent[end.slot] = begin.low
+    size_name, size = next(iter(sizes.items()))
+    still = run(silent)
+    total = np.zeros_like(still)
+    sums = [total]
+    for low, high in pairwise(moments):
+        moved = silent.copy()
+        moved[slot(entry.name, size_name)] = SMALL * size
+        moved[begin.slot], moved[end.slot] = low, high
+        total = total + (run(moved) - still) / (SMALL * size)
+        sums.append(total)
+    return Cells(moments, np.array(sums))
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """The best interval for an event in one recording: rows of the grid, and what an event of a size takes away there.
+
+    ``taken`` is the fall of the squared error; 0 with an empty interval where no interval takes anything away.
+    """
+
+    first: int
+    last: int
+    taken: float
+    match: float
+    power: float
+
+
+@dataclass(frozen=True, slots=True)
+class Scan:
+    """What a grid of answers and an error have to say to each other, for every interval of the grid at once.
+
+    Attributes
+    ----------
+    along : ndarray, shape (M, M)
+        Product of the error with the answer from row a to row b.
+    power : ndarray, shape (M, M)
+        Squared norm of that answer.
+    """
+
+    along: FloatArray
+    power: FloatArray
+
+    def best(self, size: float) -> Stretch:
+        """Return the interval in which an event of a size takes most away."""
+        taken = np.triu(-2.0 * size * self.along - size**2 * self.power, 1)
+        first, last = np.unravel_index(int(taken.argmax()), taken.shape)
+        if taken[first, last] <= 0.0:
+            return Stretch(0, 0, 0.0, 0.0, 0.0)
+        along, power = float(self.along[first, last]), float(self.power[first, last])
+        return Stretch(int(first), int(last), float(taken[first, last]), along, power)
+
+
+def scan(answers: FloatArray, error: FloatArray) -> Scan:
+    """Prepare the search of all intervals of a grid.
+
+    Parameters
+    ----------
+    answers : ndarray, shape (M, R)
+        Summed answers, as ``Cells`` has them, with what is explained otherwise projected out.
+    error : ndarray, shape (R,)
+        Simulated less measured.
+    """
+    gram, match = answers @ answers.T, answers @ error
+    power = np.maximum(np.diag(gram)[:, None] - 2.0 * gram + np.diag(gram)[None, :], 0.0)
+    return Scan(match[None, :] - match[:, None], power)

@@ -1,0 +1,55 @@
+"""What is left of a signal once everything that re-tuning could explain, to first order, has been taken out."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import lsq_linear
+
+from estimator.physics.fit import FitResult, bounds
+from estimator.signals.record import FloatArray
+
+
+class Projector:
+    """Takes out of stacked signals what the unknowns of a fit could explain, to first order.
+
+    Attributes
+    ----------
+    error : ndarray, shape (R,)
+        What is left of the fit's own error once the unknowns that are not at a bound have moved freely.
+    """
+
+    def __init__(self, result: FitResult) -> None:
+        low, high = bounds(result.problem)
+        movable = low < high
+        self._free = np.linalg.qr(result.jacobian[:, ~result.pinned])[0]
+        self._all, self._triangle = np.linalg.qr(result.jacobian[:, movable])
+        self._room = (low - result.x)[movable], (high - result.x)[movable]
+        self._residual = result.residual
+        self.error = self.rest(result.residual)
+
+    def rest(self, signals: FloatArray) -> FloatArray:
+        """Return what is left of stacked signals, shape (..., R)."""
+        left: FloatArray = signals - (signals @ self._free) @ self._free.T
+        return left
+
+    def promise(self, direction: FloatArray, low: float, high: float) -> tuple[float, float]:
+        """Return how far to go along a direction, within bounds, and by how much the squared error falls.
+
+        The unknowns move along within their own bounds, so that one that was pressed against a bound can come back.
+        """
+        along, across = self._all.T @ direction, 0.0
+        rest = direction - self._all @ along
+        across = float(np.linalg.norm(rest))
+        if across == 0.0:
+            return 0.0, 0.0
+        target = -np.append(self._all.T @ self._residual, float(rest @ self._residual) / across)
+        corner = np.append(np.zeros(self._triangle.shape[1]), across)
+        matrix = np.vstack([np.column_stack([self._triangle, along]), corner])
+        lowest, highest = np.append(self._room[0], low), np.append(self._room[1], high)
+        solution = lsq_linear(matrix, target, (np.minimum(lowest, 0.0), np.maximum(highest, 0.0) + TINY), method="bvls")
+        fall = float(target @ target) - 2.0 * float(solution.cost)
+        return float(solution.x[-1]), fall
+
+
+TINY = 1e-12
+"""Room that a bound always leaves: an interval of no length is none."""

@@ -1,0 +1,61 @@
+"""From the inverters' readings to the torque on the motor shaft: gains, limits and derating, before delay and lag."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from estimator.physics.effects import torque_saturation
+from estimator.physics.layout import slot
+from estimator.signals.record import FloatArray
+
+_GAIN_M1 = slot("inverter_gain_mismatch", "gain_m1")
+_GAIN_M2 = slot("inverter_gain_mismatch", "gain_m2")
+_LIMIT_M1 = slot("torque_saturation", "limit_m1_nm")
+_LIMIT_M2 = slot("torque_saturation", "limit_m2_nm")
+_SHARPNESS = slot("torque_saturation", "sharpness")
+_LIMIT_SUM = slot("torque_saturation", "limit_sum_nm")
+_DEPTH = slot("torque_derating", "depth")
+_DERATING_TIME = slot("torque_derating", "time_constant_s")
+
+
+def limited(torque: FloatArray, limit: float, sharpness: float) -> FloatArray:
+    """Return a torque that stops at a limit [Nm], at an edge or in a knee: ``T / (1 + |T/L|^n)^(1/n)``."""
+    if not np.isfinite(limit):
+        return torque
+    if sharpness >= torque_saturation.EDGE:
+        return np.clip(torque, -limit, limit)
+    ratio = np.abs(torque) / limit
+    small, large = np.minimum(ratio, 1.0), np.maximum(ratio, 1.0)
+    size = np.where(
+        ratio <= 1.0,
+        small / (1.0 + small**sharpness) ** (1.0 / sharpness),
+        (1.0 + large**-sharpness) ** (-1.0 / sharpness),
+    )
+    return np.asarray(np.copysign(limit * size, torque))
+
+
+def shaft_torque(torque_nm: FloatArray, since_start_s: FloatArray, p: FloatArray) -> FloatArray:
+    """Return the torque on the motor shaft, shape (N,) [Nm].
+
+    Parameters
+    ----------
+    torque_nm : ndarray, shape (N, M)
+        Reading of each input; gains other than 1 apply to the first two.
+    since_start_s : ndarray, shape (N,)
+        Time since the recording began [s].
+    p : ndarray, shape (layout.SIZE,)
+        Parameters of the superset model.
+    """
+    gains = p[[_GAIN_M1, _GAIN_M2]]
+    if np.any(gains != 1.0):
+        torque_nm = torque_nm.copy()
+        count = min(torque_nm.shape[1], gains.size)
+        torque_nm[:, :count] *= gains[:count]
+    limits = p[[_LIMIT_M1, _LIMIT_M2]][: torque_nm.shape[1]]
+    if np.any(np.isfinite(limits)):
+        columns = [limited(torque, limit, p[_SHARPNESS]) for torque, limit in zip(torque_nm.T, limits, strict=False)]
+        torque_nm = np.column_stack([*columns, torque_nm[:, limits.size :]])
+    total: FloatArray = limited(torque_nm.sum(axis=1), p[_LIMIT_SUM], p[_SHARPNESS])
+    if p[_DEPTH] != 0.0:
+        total = total * (1.0 + p[_DEPTH] * np.expm1(-since_start_s / p[_DERATING_TIME]))
+    return total

@@ -1,0 +1,156 @@
+"""A joint on a bench: its torque under an imposed motion, against answers worked out by hand."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimator.errors import BadModel, BadShape
+from estimator.physics import joint, kernel
+from estimator.physics.fit import fit, make_problem
+from estimator.physics.layout import flat_values
+from estimator.physics.model import DrivelineModel, Parameter, Structure, natural_frequencies_rad_s, parameter_unit
+from estimator.physics.simulate import Start, grid_for, motor_angle, output_state, simulate
+from estimator.physics.unknowns import nominal_unknowns
+from estimator.signals.record import FloatArray, OutputKind, Record
+
+STIFFNESS, DAMPING = 1000.0, 5.0
+PERIOD_S = 0.001
+REST = Start(0.0, 0.0, 0.0)
+MODEL = DrivelineModel(Structure.JOINT, {"k": Parameter(STIFFNESS, 0.5), "c": Parameter(DAMPING, 0.5)})
+
+
+def recording(twist: FloatArray, torque: FloatArray | None = None) -> Record:
+    output = np.sin(np.arange(twist.size)) if torque is None else torque
+    time_s = PERIOD_S * np.arange(float(twist.size))
+    okay = np.ones(twist.size, dtype=np.bool_)
+    return Record("bench", PERIOD_S, time_s, output[:, None], output, okay, OutputKind.FORCE, imposed=twist)
+
+
+def up_and_down(amplitude: float, rows: int = 4001, rounds: int = 2) -> FloatArray:
+    """A triangle: from 0 to the amplitude, to its negative and back."""
+    corners = np.linspace(0.0, rounds, 4 * rounds + 1)
+    values = amplitude * np.sin(0.5 * np.pi * np.arange(4 * rounds + 1))
+    return np.asarray(np.interp(np.linspace(0.0, rounds, rows), corners, values))
+
+
+def torque(
+    twist: FloatArray, effects: dict[str, dict[str, float]], damping: float = 0.0, start: Start = REST
+) -> FloatArray:
+    record = recording(twist)
+    p = flat_values({"k": STIFFNESS, "c": damping}, effects)
+    return simulate(grid_for(MODEL, [record]), record, p, start)
+
+
+def test_spring_and_damper_answer_to_twist_and_rate() -> None:
+    phase = 2.0 * np.pi * np.arange(3000) * PERIOD_S
+    found = torque(0.1 * np.sin(phase), {}, DAMPING, Start(3.0, 0.0, 0.0, 0.02))
+    expected = STIFFNESS * (0.1 * np.sin(phase) + 0.02) + DAMPING * 0.2 * np.pi * np.cos(phase) - 3.0
+    assert found[20:-20] == pytest.approx(expected[20:-20], abs=0.01)  # the rate is a slope over 20 samples
+
+
+def test_no_torque_inside_a_gap_and_a_spring_behind_it() -> None:
+    twist = up_and_down(0.1)
+    found = torque(twist, {"backlash": {"gap_rad": 0.06}})
+    expected = STIFFNESS * np.sign(twist) * np.maximum(np.abs(twist) - 0.03, 0.0)
+    assert found == pytest.approx(expected, abs=1e-6)
+
+
+def test_damping_acts_where_the_faces_touch_only() -> None:
+    twist = up_and_down(0.1)
+    gap = {"backlash": {"gap_rad": 0.06}}
+    damping = torque(twist, gap, DAMPING) - torque(twist, gap)
+    open_gap = np.abs(twist) < 0.029
+    assert damping[open_gap] == pytest.approx(0.0, abs=1e-9)
+    assert np.abs(damping[(np.abs(twist) > 0.031) & (np.abs(twist) < 0.095)]) == pytest.approx(DAMPING * 0.2)
+
+
+def test_a_slider_follows_its_law_and_forgets_where_it_began() -> None:
+    twist, yield_rad, friction = up_and_down(0.1), 0.02, 40.0
+    slider = {"shaft_hysteresis": {"friction_nm": friction, "yield_rad": yield_rad}}
+    found = torque(twist, slider) - STIFFNESS * twist
+    rising = slice(0, 501)  # the first quarter: z = 1 - exp(-x / y) from rest
+    assert found[rising] == pytest.approx(friction * (1.0 - np.exp(-twist[rising] / yield_rad)), abs=1e-9)
+    forgotten = friction * np.exp(-0.2 / yield_rad)  # by the first turn, and over one stroke more
+    assert found[3000:4000] == pytest.approx(found[1000:2000], abs=forgotten)
+
+
+def test_a_gap_in_series_with_a_slider_moves_with_it() -> None:
+    """At every turn the torque falls to nothing, the gap is crossed at no torque, wherever the slider has got to."""
+    gap, yield_rad, friction = 0.03, 1e-4, 500.0
+    record = recording(up_and_down(0.1, 20001) + 0.4)
+    p = flat_values(
+        {"k": 1e-3, "c": 0.0},
+        {"backlash": {"gap_rad": gap}, "shaft_hysteresis": {"friction_nm": friction, "yield_rad": yield_rad}},
+    )
+    found = simulate(grid_for(MODEL, [record]), record, p, Start(0.0, 0.0, 0.0))
+    assert record.imposed is not None
+    travelled = np.abs(np.diff(record.imposed, prepend=record.imposed[0]))
+    silent = np.abs(found) < 1e-3 * friction
+    turns = [2500, 7500, 12500]
+    for begin, end in zip(turns, [*turns[1:], 17500], strict=True):
+        crossing = silent[begin:end]
+        assert float(travelled[begin:end][crossing].sum()) == pytest.approx(gap, abs=2e-4)
+        assert float(np.abs(found[end - 10])) == pytest.approx(friction, rel=1e-3)
+
+
+def test_a_hardening_spring_and_one_that_cracks() -> None:
+    twist = up_and_down(0.1)
+    hard = torque(twist, {"stiffness_nonlinearity": {"hardening_per_rad2": 50.0}})
+    assert hard == pytest.approx(STIFFNESS * twist * (1.0 + 50.0 * twist**2), abs=1e-9)
+    cracked = torque(twist, {"stiffness_change": {"change": -0.4, "from_s": 1.0, "to_s": 9.0}})
+    late = PERIOD_S * np.arange(twist.size) >= 1.0
+    assert cracked == pytest.approx(STIFFNESS * twist * np.where(late, 0.6, 1.0), abs=1e-9)
+
+
+def test_motion_is_what_was_imposed() -> None:
+    record = recording(0.3 + up_and_down(0.1))
+    grid, p = grid_for(MODEL, [record]), flat_values(MODEL.values(), {})
+    start = Start(0.0, 0.0, 0.0, 0.02)
+    assert simulate(grid, record, p, start, output=kernel.TWIST) == pytest.approx(up_and_down(0.1) + 0.02)
+    assert simulate(grid, record, p, start, output=kernel.ANGLE) == pytest.approx(motor_angle(record))
+    assert np.all(simulate(grid, record, p, start, output=kernel.LOAD_SPEED) == 0.0)
+    speed = simulate(grid, record, p, start, output=kernel.SPEED)
+    assert speed[100:400] == pytest.approx(np.full(300, 0.2), rel=1e-6)
+
+
+def test_a_fit_finds_spring_damper_gap_and_offset_again() -> None:
+    phase = np.arange(4000) * PERIOD_S
+    twist = 0.1 * np.sin(2.0 * np.pi * phase) * (1.0 + phase) / 4.0
+    true = DrivelineModel(Structure.JOINT, {"k": Parameter(1200.0, 0.0), "c": Parameter(6.0, 0.0)})
+    clean = simulate(
+        grid_for(true, [recording(twist)]), recording(twist), flat_values(true.values(), {}), Start(7.0, 0.0, 0.0, 0.0)
+    )
+    noise = 0.1 * np.random.default_rng(5).standard_normal(clean.size)
+    found = fit(make_problem(MODEL, [recording(twist, clean + noise)], nominal_unknowns(MODEL)))
+    assert found.value("", "k") == pytest.approx(1200.0, rel=1e-3)
+    assert found.value("", "c") == pytest.approx(6.0, rel=1e-2)
+    assert found.rms == pytest.approx(0.1, rel=0.05)
+
+
+def test_a_joint_has_a_spring_and_a_damper_and_no_mode() -> None:
+    assert Structure.JOINT.parameter_names == ("k", "c")
+    assert [parameter_unit(name, MODEL.motion) for name in ("k", "c")] == ["Nm/rad", "Nm s/rad"]
+    assert natural_frequencies_rad_s(MODEL.values()).tolist() == [0.0]
+    assert output_state(recording(up_and_down(0.1)), Structure.JOINT) == joint.TORQUE
+
+
+def test_structure_and_recording_must_agree() -> None:
+    bench = recording(up_and_down(0.1))
+    with pytest.raises(BadModel, match=r"came an imposed motion, expected .* the model is a two_mass"):
+        output_state(bench, Structure.TWO_MASS)
+    with pytest.raises(BadModel, match="came force as the output, expected the torque under an imposed motion"):
+        output_state(replace(bench, imposed=None), Structure.JOINT)
+    with pytest.raises(ValueError, match="imposed motion, came none"):
+        joint.simulate(replace(bench, imposed=None), flat_values(MODEL.values(), {}), bench.output, 0.0)
+
+
+def test_an_imposed_motion_is_known_throughout() -> None:
+    with pytest.raises(BadShape, match="imposed has shape"):
+        replace(recording(up_and_down(0.1)), imposed=np.zeros(3))
+    broken = up_and_down(0.1)
+    broken[5] = np.nan
+    with pytest.raises(BadShape, match="imposed motion holds NaN"):
+        recording(broken)

@@ -1,0 +1,204 @@
+"""Effects at the load, against the reference."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimator.physics.layout import flat_values
+from estimator.physics.simulate import Grid, Start, simulate
+from estimator.signals.record import FloatArray
+from tests.estimator.physics import reference
+from tests.estimator.physics.bench import SAMPLE_TIME_S, TWO_MASS, model
+from tests.estimator.physics.law_bench import (
+    SIGN_WIDTH,
+    START,
+    SUBSTEPS,
+    TIME_S,
+    TORQUE,
+    assert_law,
+    assert_same,
+    kernel_output,
+    measured,
+    solved,
+    start_vector,
+    two_mass,
+)
+from tests.estimator.physics.reference import Held, lasting
+
+
+def sign(speed: float) -> float:
+    """The sign of a speed as the kernel rounds it."""
+    return float(np.tanh(speed / SIGN_WIDTH))
+
+
+def test_dry_friction_at_the_load_is_against_the_loads_motion() -> None:
+    line = two_mass(drag=lambda t, w: 30.0 * sign(w))
+    assert_law({"coulomb_friction_load": {"friction_nm": 30.0}}, solved(line))
+
+
+def test_air_drag_grows_with_the_square_of_the_loads_speed() -> None:
+    line = two_mass(drag=lambda t, w: 15.0 * w * abs(w))
+    assert_law({"aerodynamic_drag": {"drag_nm_s2": 15.0}}, solved(line))
+
+
+@pytest.mark.parametrize(("from_s", "to_s"), [(0.5, 1.6), (0.5037, 1.7012), (0.9, 9.0)])
+def test_a_dragging_brake_is_dry_friction_for_a_while(from_s: float, to_s: float) -> None:
+    torque = lasting(60.0, from_s, to_s)
+    line = two_mass(drag=lambda t, w: torque(t) * sign(w))
+    effects = {"brake_drag": {"brake_nm": 60.0, "from_s": from_s, "to_s": to_s}}
+    assert_law(effects, solved(line, (from_s, to_s)), tolerance=3e-4)
+
+
+@pytest.mark.parametrize("change", [-25.0, 60.0])
+@pytest.mark.parametrize(("from_s", "to_s"), [(0.5037, 1.7012), (0.9, 9.0)])
+def test_a_payload_changes_the_loads_inertia(change: float, from_s: float, to_s: float) -> None:
+    line = two_mass(more_load=lasting(change, from_s, to_s))
+    effects = {"inertia_change": {"change_kg_m2": change, "from_s": from_s, "to_s": to_s}}
+    assert_law(effects, solved(line, (from_s, to_s)), tolerance=3e-4)
+
+
+def test_warming_oil_loses_viscous_friction() -> None:
+    cold, tau = 25.0, 0.7
+    line = two_mass(drag=lambda t, w: cold * np.exp(-t / tau) * w)
+    assert_law({"warming_friction": {"cold_nm_s": cold, "time_constant_s": tau}}, solved(line))
+
+
+def test_in_a_part_of_a_recording_time_counts_from_its_beginning() -> None:
+    cold, tau = 40.0, 0.7
+    line = two_mass(drag=lambda t, w: cold * np.exp(-(t + 0.6) / tau) * w)
+    effects = {"warming_friction": {"cold_nm_s": cold, "time_constant_s": tau}}
+    assert_law(effects, solved(line), replace(measured(), began_s=-0.6))
+    brake = lasting(60.0, 0.5, 1.6)
+    line = two_mass(drag=lambda t, w: brake(t) * sign(w))
+    effects = {"brake_drag": {"brake_nm": 60.0, "from_s": 1.1, "to_s": 2.2}}
+    assert_law(effects, solved(line, (0.5, 1.6)), replace(measured(), began_s=-0.6), tolerance=3e-4)
+
+
+@pytest.mark.parametrize("motor_turns", [1.0, 3.3])
+def test_an_unbalanced_wheel_swings_the_load_once_per_its_turn(motor_turns: float) -> None:
+    turning = 15.0 + 6.0 * np.cos(2.1 * TIME_S)
+    angle = np.concatenate([[0.0], np.cumsum(0.5 * SAMPLE_TIME_S * (turning[1:] + turning[:-1]))])
+    line = two_mass(drag=lambda t, w: 40.0 * np.cos(np.interp(t, TIME_S, angle) / motor_turns + 1.1))
+    values = {"amplitude_nm": 40.0, "motor_turns_per_turn": motor_turns, "phase_rad": 1.1}
+    assert_law({"load_imbalance": values}, solved(line), measured(turning))
+
+
+@pytest.mark.parametrize(("slip", "share", "creep"), [(2e-3, 0.1, 2.0), (5e-4, 0.4, 5.0)])
+def test_a_slipping_tyre_couples_wheel_and_vehicle_by_creep(slip: float, share: float, creep: float) -> None:
+    """The wheel has a share of J_L, the vehicle the rest; its own drag and the road's load act on the vehicle."""
+    v = TWO_MASS
+
+    def rhs(t: float, x: FloatArray, torque: float) -> FloatArray:
+        _, w_M, twist, w_W, w_V = x
+        T_S = v["k"] * twist + v["c"] * (w_M - w_W)
+        T_x = (w_W - w_V) / (slip * (abs(w_V) + creep))
+        drag = v["b_L"] * w_V + START.load_torque_nm
+        return np.array(
+            [
+                w_M,
+                (torque - v["b_M"] * w_M - T_S) / v["J_M"],
+                w_M - w_W,
+                (T_S - T_x) / (share * v["J_L"]),
+                (T_x - drag) / ((1.0 - share) * v["J_L"]),
+            ]
+        )
+
+    start = np.append(start_vector(), START.load_speed_rad_s)
+    expected = reference.solve(rhs, start, Held.of(TORQUE, SAMPLE_TIME_S), TIME_S)[:, reference.SPEED]
+    values = {"slip_per_nm": slip, "wheel_share": share, "creep_rad_s": creep}
+    assert_law({"tyre_slip": values}, expected)
+
+
+@pytest.mark.parametrize(("slip", "roll"), [(2e-3, 0.5), (5e-4, 3.0)])
+def test_the_traction_of_a_tyre_may_build_up_as_it_rolls(slip: float, roll: float) -> None:
+    v, share, creep = TWO_MASS, 0.15, 2.0
+
+    def rhs(t: float, x: FloatArray, torque: float) -> FloatArray:
+        _, w_M, twist, w_W, w_V, T_x = x
+        T_S = v["k"] * twist + v["c"] * (w_M - w_W)
+        drag = v["b_L"] * w_V + START.load_torque_nm
+        return np.array(
+            [
+                w_M,
+                (torque - v["b_M"] * w_M - T_S) / v["J_M"],
+                w_M - w_W,
+                (T_S - T_x) / (share * v["J_L"]),
+                (T_x - drag) / ((1.0 - share) * v["J_L"]),
+                ((w_W - w_V) / slip - np.hypot(w_V, creep) * T_x) / roll,
+            ]
+        )
+
+    start = np.array([*start_vector(), START.load_speed_rad_s, START.load_torque_nm])  # it carries the constant load
+    expected = reference.solve(rhs, start, Held.of(TORQUE, SAMPLE_TIME_S), TIME_S)[:, reference.SPEED]
+    values = {"slip_per_nm": slip, "wheel_share": share, "creep_rad_s": creep, "relaxation_rad": roll}
+    assert_law({"tyre_slip": values}, expected)
+
+
+@pytest.mark.parametrize("share", [0.005, 0.05, 0.35, 0.7])
+def test_a_tyre_that_hardly_slips_is_a_rigid_one(share: float) -> None:
+    """Its coupling is far too stiff for the step then: what is made of it may neither run away nor damp the line."""
+    values = {"slip_per_nm": 1e-9, "wheel_share": share, "creep_rad_s": 1.0}
+    grid = Grid(model(TWO_MASS).structure, 4, SIGN_WIDTH)
+    out, rigid = (
+        simulate(grid, measured(), flat_values(TWO_MASS, effects), START) for effects in ({"tyre_slip": values}, {})
+    )
+    assert np.max(np.abs(out - rigid)) < 0.01 * np.ptp(rigid)
+
+
+@pytest.mark.parametrize("share", [0.02, 0.3, 0.7])
+@pytest.mark.parametrize("slip", [1e-5, 1e-4, 1e-3])
+def test_a_stiff_tyre_in_large_steps_still_shows_its_slip(slip: float, share: float) -> None:
+    """A vehicle on the move: steps of 2.5 ms leave half of the slip's effect wrong at most, or a 500th of all."""
+    start = Start(12.0, 0.0, 20.0, 0.0, 20.0)
+    values = {"slip_per_nm": slip, "wheel_share": share, "creep_rad_s": 1.0}
+    coarse, fine, rigid = (
+        simulate(
+            Grid(model(TWO_MASS).structure, substeps, SIGN_WIDTH), measured(), flat_values(TWO_MASS, effects), start
+        )
+        for substeps, effects in ((4, {"tyre_slip": values}), (100, {"tyre_slip": values}), (100, {}))
+    )
+    effect = np.max(np.abs(fine - rigid))
+    assert np.max(np.abs(coarse - fine)) < max(0.5 * effect, 0.002 * np.ptp(rigid))
+
+
+def test_friction_brakes_the_wheel_and_air_the_vehicle() -> None:
+    """Behind a slipping tyre the two loads act at different places."""
+    v, slip, share, creep = TWO_MASS, 2e-3, 0.2, 2.0
+
+    def rhs(t: float, x: FloatArray, torque: float) -> FloatArray:
+        _, w_M, twist, w_W, w_V = x
+        T_S = v["k"] * twist + v["c"] * (w_M - w_W)
+        T_x = (w_W - w_V) / (slip * (abs(w_V) + creep))
+        drag = v["b_L"] * w_V + 15.0 * w_V * abs(w_V) + START.load_torque_nm
+        return np.array(
+            [
+                w_M,
+                (torque - v["b_M"] * w_M - T_S) / v["J_M"],
+                w_M - w_W,
+                (T_S - T_x - 30.0 * sign(w_W)) / (share * v["J_L"]),
+                (T_x - drag) / ((1.0 - share) * v["J_L"]),
+            ]
+        )
+
+    start = np.append(start_vector(), START.load_speed_rad_s)
+    expected = reference.solve(rhs, start, Held.of(TORQUE, SAMPLE_TIME_S), TIME_S)[:, reference.SPEED]
+    tyre = {"slip_per_nm": slip, "wheel_share": share, "creep_rad_s": creep}
+    effects = {
+        "tyre_slip": tyre,
+        "coulomb_friction_load": {"friction_nm": 30.0},
+        "aerodynamic_drag": {"drag_nm_s2": 15.0},
+    }
+    assert_same(kernel_output(effects, measured()), expected, kernel_output({"tyre_slip": tyre}, measured()))
+
+
+def test_a_road_acts_beside_the_constant_load() -> None:
+    profile = 40.0 * np.sin(2.0 * np.pi * TIME_S / 1.5)
+    steps = Held.of(profile, SAMPLE_TIME_S)
+    line = two_mass(drag=lambda t, w: steps.at(t))
+    expected = solved(line, tuple(TIME_S[1:-1]))
+    grid = Grid(model(TWO_MASS).structure, SUBSTEPS, SIGN_WIDTH)
+    out = simulate(grid, measured(), flat_values(TWO_MASS, {}), START, profile)
+    assert_same(out, expected, kernel_output({}, measured()))

@@ -1,0 +1,135 @@
+"""Effects in the shaft, against the reference."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from estimator.signals.record import FloatArray
+from tests.estimator.physics import reference
+from tests.estimator.physics.bench import SAMPLE_TIME_S, TWO_MASS
+from tests.estimator.physics.law_bench import (
+    SAMPLES,
+    SUBSTEPS,
+    TIME_S,
+    TORQUE,
+    assert_law,
+    kernel_output,
+    measured,
+    solved,
+    start_vector,
+    two_mass,
+)
+from tests.estimator.physics.reference import Held, lasting
+
+K, C = TWO_MASS["k"], TWO_MASS["c"]
+
+
+def test_backlash_is_a_spring_and_a_damper_beyond_the_gap() -> None:
+    gap, depth = 0.02, 2e-3
+
+    def shaft(t: float, twist: float, rate: float) -> float:
+        beyond = np.sign(twist) * max(abs(twist) - 0.5 * gap, 0.0)
+        return float(K * beyond + C * (1.0 - np.exp(-abs(beyond) / depth)) * rate)
+
+    assert_law({"backlash": {"gap_rad": gap, "contact_rad": depth}}, solved(two_mass(shaft=shaft)), tolerance=3e-4)
+
+
+@pytest.mark.parametrize(("hardening", "shape"), [(900.0, 1.0), (900.0, 2.0), (-600.0, 0.5)])
+def test_the_stiffness_changes_with_the_twist(hardening: float, shape: float) -> None:
+    power = shape if hardening > 0 else -shape
+
+    def shaft(t: float, twist: float, rate: float) -> float:
+        return float(K * twist * (1.0 + abs(hardening) * twist**2 / shape) ** power + C * rate)
+
+    effects = {"stiffness_nonlinearity": {"hardening_per_rad2": hardening, "shape": shape}}
+    assert_law(effects, solved(two_mass(shaft=shaft)))
+
+
+@pytest.mark.parametrize(("from_s", "to_s"), [(0.5, 1.6), (0.5037, 1.7012), (0.9, 9.0)])
+def test_a_crack_takes_stiffness_from_a_moment_on(from_s: float, to_s: float) -> None:
+    lost = lasting(-0.3, from_s, to_s)
+    line = two_mass(shaft=lambda t, twist, rate: K * (1.0 + lost(t)) * twist + C * rate)
+    effects = {"stiffness_change": {"change": -0.3, "from_s": from_s, "to_s": to_s}}
+    assert_law(effects, solved(line, (from_s, to_s)), tolerance=3e-4)
+
+
+def test_hysteresis_is_a_slider_beside_the_spring() -> None:
+    friction, give = 25.0, 5e-3
+
+    def rhs(t: float, x: FloatArray, torque: float) -> FloatArray:
+        line = two_mass(shaft=lambda t, twist, rate: K * twist + C * rate + friction * x[4])
+        rate = x[reference.SPEED] - x[reference.LOAD_SPEED]
+        return np.append(line(t, x[:4], torque), (rate - abs(rate) * x[4]) / give)
+
+    held = Held.of(TORQUE, SAMPLE_TIME_S)
+    expected = reference.solve(rhs, np.append(start_vector(), 0.0), held, TIME_S)[:, reference.SPEED]
+    assert_law({"shaft_hysteresis": {"friction_nm": friction, "yield_rad": give}}, expected)
+
+
+@pytest.mark.parametrize("friction_nm", [5.0, 200.0])
+@pytest.mark.parametrize("yield_rad", [1e-3, 1e-5, 1e-9])
+def test_a_slider_that_yields_at_once_stays_dry_friction(friction_nm: float, yield_rad: float) -> None:
+    """Its own equation is far too stiff for the step then; the slider's torque may not leave its bounds for that."""
+    effects = {"shaft_hysteresis": {"friction_nm": friction_nm, "yield_rad": yield_rad}}
+    soft = {"shaft_hysteresis": {"friction_nm": friction_nm, "yield_rad": 1e-3}}
+    out, without, gentle = (kernel_output(each, measured()) for each in (effects, {}, soft))
+    assert np.isfinite(out).all()
+    assert np.sqrt(np.mean((out - gentle) ** 2)) <= 0.25 * np.sqrt(np.mean((out - without) ** 2))
+
+
+def test_cardan_joints_turn_the_shaft_twice_per_measured_turn() -> None:
+    turning = 9.0 + 4.0 * np.cos(2.1 * TIME_S)
+    angle = np.concatenate([[0.0], np.cumsum(0.5 * SAMPLE_TIME_S * (turning[1:] + turning[:-1]))])
+
+    def shaft(t: float, twist: float, rate: float) -> float:
+        return float(K * twist + C * rate + 20.0 * np.cos(2.0 * np.interp(t, TIME_S, angle) - 0.4))
+
+    effects = {"cardan_second_order": {"amplitude_nm": 20.0, "phase_rad": -0.4}}
+    assert_law(effects, solved(two_mass(shaft=shaft)), measured(turning))
+
+
+def test_cardan_joints_may_pass_on_a_share_of_the_shafts_torque() -> None:
+    def shaft(t: float, twist: float, rate: float) -> float:
+        return float((K * twist + C * rate) * (1.0 + 0.3 * np.cos(2.0 * 10.0 * t - 0.4)))
+
+    effects = {"cardan_second_order": {"share": 0.3, "share_phase_rad": -0.4}}
+    assert_law(effects, solved(two_mass(shaft=shaft)), measured(np.full(SAMPLES, 10.0)))
+
+
+def test_cardan_joints_may_twist_the_shaft_by_their_angle() -> None:
+    """The phase is the measured angle's, the rate is the motor's own speed."""
+    size = 5e-3
+
+    def rhs(t: float, x: FloatArray, torque: float) -> FloatArray:
+        angle = 2.0 * 10.0 * t - 0.4
+        bent = size * np.cos(angle)
+        turning = -2.0 * size * np.sin(angle) * x[reference.SPEED]
+        line = two_mass(shaft=lambda t, twist, rate: K * (twist + bent) + C * (rate + turning))
+        return line(t, x, torque)
+
+    effects = {"cardan_second_order": {"angle_rad": size, "angle_phase_rad": -0.4}}
+    assert_law(effects, solved(rhs), measured(np.full(SAMPLES, 10.0)))
+
+
+@pytest.mark.parametrize("frequency_hz", [4.0, 9.0, 25.0])
+def test_an_extra_mode_is_an_inertia_on_a_spring_at_the_motor(frequency_hz: float) -> None:
+    inertia, ratio = 0.4, 0.06
+    k_X = inertia * (2.0 * np.pi * frequency_hz) ** 2
+    c_X = 2.0 * ratio * np.sqrt(k_X * inertia)
+
+    def rhs(t: float, x: FloatArray, torque: float) -> FloatArray:
+        twist, rate = x[reference.ANGLE] - x[4], x[reference.SPEED] - x[5]
+        spring = k_X * twist + c_X * rate
+        return np.concatenate([two_mass()(t, x[:4], torque - spring), [x[5], spring / inertia]])
+
+    start = np.concatenate([start_vector(), [0.0, start_vector()[reference.SPEED]]])
+    held = Held.of(TORQUE, SAMPLE_TIME_S)
+    expected = reference.solve(rhs, start, held, TIME_S)[:, reference.SPEED]
+    values = {"inertia_kg_m2": inertia, "frequency_hz": frequency_hz, "damping_ratio": ratio}
+    assert_law({"extra_torsional_mode": values}, expected)
+
+
+def test_the_bench_is_fine_enough_for_what_it_compares() -> None:
+    assert SAMPLE_TIME_S / SUBSTEPS * 2.0 * np.pi * 25.0 < 0.1
+    assert TIME_S.size == SAMPLES

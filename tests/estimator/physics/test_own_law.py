@@ -1,0 +1,200 @@
+"""A user's own law: tried before it is used, and simulated as the same law inside the kernel is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+from estimator.errors import BadModel
+from estimator.physics import own_law
+from estimator.physics.catalogue import EFFECTS
+from estimator.physics.effect import Element
+from estimator.physics.layout import SIZE, flat_values, slot
+from estimator.physics.model import Structure
+from estimator.physics.own_law import TRIAL, OwnLaw, OwnParameter
+from estimator.physics.simulate import Grid, Start, simulate
+from estimator.physics.stepper import Stepper
+from estimator.signals.record import FloatArray
+from tests.estimator.physics import bench
+
+GRID = Grid(Structure.TWO_MASS, 4, 0.02)
+START = Start(0.0, 0.0, 30.0, 0.0, 30.0)
+SIZE_OF_IT = (OwnParameter("size", "", 0.0, 0.0, 1e4, 1.0),)
+
+
+def square(time_s: Any, motor_speed: Any, load_speed: Any, twist: Any, torque: Any, size: float) -> Any:
+    return size * motor_speed * abs(motor_speed)
+
+
+def square_by_cases(
+    time_s: float, motor_speed: float, load_speed: float, twist: float, torque: float, size: float
+) -> float:
+    return size * motor_speed**2 if motor_speed > 0 else -size * motor_speed**2
+
+
+def air(time_s: Any, motor_speed: Any, load_speed: Any, twist: Any, torque: Any, size: float) -> Any:
+    return size * load_speed * abs(load_speed)
+
+
+def cubic(time_s: Any, motor_speed: Any, load_speed: Any, twist: Any, torque: Any, size: float) -> Any:
+    return bench.TWO_MASS["k"] * size * twist**3
+
+
+def bent(time_s: Any, motor_speed: Any, load_speed: Any, twist: Any, torque: Any, size: float) -> Any:
+    return size * time_s + size * motor_speed**2
+
+
+@pytest.fixture(autouse=True)
+def nothing_installed() -> Iterator[None]:
+    yield
+    own_law.install(())
+
+
+def law(function: Callable[..., object], element: Element = Element.MOTOR, name: str = "mine") -> OwnLaw:
+    return OwnLaw(name, function, element, SIZE_OF_IT, "laws:it")
+
+
+def simulated(effects: dict[str, dict[str, float]], values: dict[str, float] = bench.TWO_MASS) -> FloatArray:
+    grid = GRID if "k" in values else Grid(Structure.ONE_MASS, 4, 0.02)
+    return simulate(grid, bench.record(bench.random_steps(1500, 1)), flat_values(values, effects), START)
+
+
+@pytest.mark.parametrize(
+    ("function", "element", "size", "built_in", "closeness"),
+    [
+        (square, Element.MOTOR, 0.01, {"quadratic_friction": {"quadratic_nm_s2": 0.01}}, 1e-3),
+        (square_by_cases, Element.MOTOR, 0.01, {"quadratic_friction": {"quadratic_nm_s2": 0.01}}, 1e-3),
+        (air, Element.LOAD, 0.01, {"aerodynamic_drag": {"drag_nm_s2": 0.01}}, 1e-3),
+        (cubic, Element.SHAFT, 300.0, {"stiffness_nonlinearity": {"hardening_per_rad2": 300.0, "shape": 1.0}}, 0.01),
+    ],
+)
+def test_it_acts_as_the_same_law_of_the_kernel_does(
+    function: Callable[..., object],
+    element: Element,
+    size: float,
+    built_in: dict[str, dict[str, float]],
+    closeness: float,
+) -> None:
+    own_law.install([law(function, element)])
+    mine, known, without = simulated({"mine": {"size": size}}), simulated(built_in), simulated({})
+    assert np.abs(mine - known).max() < closeness * np.abs(known - without).max()
+    assert np.array_equal(simulated({"mine": {"size": 0.0}}), without)
+
+
+def test_one_mass_has_a_motor_for_it() -> None:
+    own_law.install([law(square)])
+    known = simulated({"quadratic_friction": {"quadratic_nm_s2": 0.01}}, bench.ONE_MASS)
+    without = simulated({}, bench.ONE_MASS)
+    mine = simulated({"mine": {"size": 0.01}}, bench.ONE_MASS)
+    assert np.abs(mine - known).max() < 1e-3 * np.abs(known - without).max()
+
+
+def test_an_error_of_the_reading_is_added_to_it() -> None:
+    own_law.install([law(bent, Element.SPEED_SENSOR)])
+    without = simulated({})
+    time_s = bench.SAMPLE_TIME_S * np.arange(without.size)
+    assert simulated({"mine": {"size": 0.02}}) == pytest.approx(without + 0.02 * time_s + 0.02 * without**2, rel=1e-9)
+
+
+def test_the_output_is_smooth_enough_to_differentiate() -> None:
+    own_law.install([law(square)])
+    at = {step: simulated({"mine": {"size": 0.01 * (1.0 + step)}}) for step in (-1e-5, 0.0, 1e-5, 1e-2, -1e-2)}
+    fine = (at[1e-5] - at[-1e-5]) / 2e-5
+    coarse = (at[1e-2] - at[-1e-2]) / 2e-2
+    assert fine == pytest.approx(coarse, abs=1e-3 * np.abs(coarse).max())
+
+
+def test_a_law_steeper_than_the_line_can_follow_is_no_solution() -> None:
+    own_law.install([law(lambda t, w, load, twist, torque, size: 1e9 * size * np.tanh(w / 1e-3))])
+    assert np.isnan(simulated({"mine": {"size": 1.0}})).any()
+
+
+def test_it_stands_in_catalogue_and_layout_until_others_are_installed() -> None:
+    own_law.install([law(square), law(air, Element.LOAD, "other")])
+    assert EFFECTS["mine"].element is Element.MOTOR
+    assert Structure.ONE_MASS not in EFFECTS["other"].structures
+    assert (slot("mine", "size"), slot("other", "size")) == (SIZE, SIZE + 1)
+    own_law.install([law(air, Element.LOAD, "other")])
+    assert "mine" not in EFFECTS
+    assert slot("other", "size") == SIZE
+    own_law.install(())
+    assert "other" not in EFFECTS
+    assert flat_values({}, {}).size == SIZE
+
+
+@pytest.mark.parametrize("names", [["backlash"], ["mine", "mine"]])
+def test_a_name_that_is_taken_is_refused(names: list[str]) -> None:
+    with pytest.raises(BadModel, match="not in the catalogue and comes once"):
+        own_law.install([law(square, name=name) for name in names])
+
+
+@pytest.mark.parametrize(
+    ("function", "said"),
+    [
+        (lambda motor_speed, size: size, r"expected a function of \(time_s, .*, size\), came one that does not fit"),
+        (lambda t, w, load, twist, torque, other: 0.0, "does not fit"),
+        (
+            lambda t, w, load, twist, torque, size: size * float("nan"),
+            "expected a finite number, came nan at time_s = ",
+        ),
+        (
+            lambda t, w, load, twist, torque, size: size / w,
+            "expected a finite number, came inf|failed with ZeroDivisionError",
+        ),
+        (lambda t, w, load, twist, torque, size: size * math.log(w), "failed with ValueError"),
+        (lambda t, w, load, twist, torque, size: "much", "failed with ValueError"),
+        (lambda t, w, load, twist, torque, size: 1.0 + size, "expected 0 where size is 0 .* came 1"),
+    ],
+)
+def test_a_function_that_can_not_be_used_is_refused(function: Callable[..., object], said: str) -> None:
+    with pytest.raises(BadModel, match=f"laws.mine.function laws:it: .*({said})"):
+        law(function)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "element", "said"),
+    [
+        ((), Element.MOTOR, "parameters: expected at least one"),
+        (
+            SIZE_OF_IT,
+            Element.TORQUE_PATH,
+            "element: expected one of motor, shaft, load, speed_sensor, came torque_path",
+        ),
+        ((OwnParameter("size", "", 0.0, 2.0, 1.0, 1.0),), Element.MOTOR, "expected low <= start <= high"),
+        ((OwnParameter("size", "", 0.0, 0.0, math.inf, 1.0),), Element.MOTOR, "expected finite numbers"),
+        ((OwnParameter("size", "", 0.0, 0.0, 1.0, 0.0),), Element.MOTOR, "a start other than it"),
+        ((OwnParameter("size", "", 0.0, 1.0, 2.0, 1.0),), Element.MOTOR, "a null inside its bounds"),
+    ],
+)
+def test_a_definition_without_sense_is_refused(
+    parameters: tuple[OwnParameter, ...], element: Element, said: str
+) -> None:
+    with pytest.raises(BadModel, match=said):
+        OwnLaw("mine", square, element, parameters)
+
+
+def test_functions_of_arrays_are_told_from_functions_of_numbers() -> None:
+    assert law(square).takes_arrays
+    assert not law(square_by_cases).takes_arrays
+    for function in (square, square_by_cases):
+        assert law(function)(TRIAL, {"size": 2.0}) == pytest.approx(2.0 * TRIAL[1] * np.abs(TRIAL[1]))
+
+
+def test_what_it_says_of_itself() -> None:
+    entry = law(square).effect()
+    assert (
+        entry.sentence({"size": 0.5}, bench.model(bench.ONE_MASS).motion)
+        == "the law mine acts at the motor (size = 0.5)"
+    )
+    assert entry.law == "Python function laws:it"
+
+
+def test_a_simulated_rig_can_not_have_it() -> None:
+    own_law.install([law(square)])
+    with pytest.raises(BadModel, match=r"effects.mine: expected effects of the catalogue"):
+        Stepper(bench.model(bench.TWO_MASS, effects={"mine": {"size": 0.1}}), 0.01)
+    Stepper(bench.model(bench.TWO_MASS, effects={"mine": {"size": 0.0}}), 0.01)

@@ -1,0 +1,121 @@
+"""Phases and moments by a scan: what it answers is the effect itself, and what it chooses is the best there is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+
+from estimator.physics.catalogue import EFFECTS
+from estimator.physics.layout import SIZE, slot
+from estimator.physics.own_scan import MOST_CELLS, SHORTEST_CELL_S, Stretch, cells, scan, waves
+from estimator.physics.unknowns import own_unknowns
+from estimator.signals.record import FloatArray
+from tests.estimator.physics.bench import record
+
+BRAKE, IMBALANCE, RESOLVER = EFFECTS["brake_drag"], EFFECTS["load_imbalance"], EFFECTS["resolver_error"]
+
+
+class TestBestStretch:
+    @staticmethod
+    def by_trying(answers: FloatArray, error: FloatArray, size: float) -> tuple[float, int, int]:
+        """Fall of the squared error of every interval; the largest with its rows."""
+        falls = [
+            (float(error @ error - np.sum((error + size * (answers[b] - answers[a])) ** 2)), a, b)
+            for a in range(len(answers))
+            for b in range(a + 1, len(answers))
+        ]
+        return max(falls)
+
+    @pytest.mark.parametrize("seed", range(8))
+    @pytest.mark.parametrize("size", [0.3, -1.0, 2.5])
+    def test_it_is_what_trying_every_interval_finds(self, seed: int, size: float) -> None:
+        rng = np.random.default_rng(seed)
+        answers = np.vstack([np.zeros(200), np.cumsum(rng.standard_normal((12, 200)), axis=0)])
+        first, last = sorted(rng.choice(13, 2, replace=False))
+        error = rng.standard_normal(200) - size * (answers[last] - answers[first])
+        found = scan(answers, error).best(size)
+        taken, *rows = self.by_trying(answers, error, size)
+        assert [found.first, found.last] == rows == [first, last]
+        assert found.taken == pytest.approx(taken)
+
+    def test_the_best_size_there_follows_from_match_and_power(self) -> None:
+        """By regression on the answer of that interval alone."""
+        rng = np.random.default_rng(1)
+        answers = np.vstack([np.zeros(200), np.cumsum(rng.standard_normal((12, 200)), axis=0)])
+        error = rng.standard_normal(200) - 2.0 * (answers[9] - answers[4])
+        found = scan(answers, error).best(1.5)
+        answer = answers[found.last] - answers[found.first]
+        assert found.power == pytest.approx(answer @ answer)
+        assert -found.match / found.power == pytest.approx(-(answer @ error) / (answer @ answer))
+        assert -found.match / found.power == pytest.approx(2.0, abs=0.1)
+
+    def test_where_no_interval_takes_anything_there_is_none(self) -> None:
+        answers = np.cumsum(np.eye(6, 50), axis=0) - np.eye(1, 50)
+        assert scan(answers, answers[-1]).best(1.0) == Stretch(0, 0, 0.0, 0.0, 0.0)
+        assert scan(answers, -answers[-1]).best(1.0).taken > 0.0
+
+
+class TestCells:
+    TIME_S = np.arange(1200) * 0.01
+
+    def run(self, p: FloatArray) -> FloatArray:
+        """An effect that shows at once, while it lasts and in proportion, on top of something else."""
+        begin, end = p[slot("brake_drag", "from_s")], p[slot("brake_drag", "to_s")]
+        lasting = (self.TIME_S >= begin - 1e-9) & (self.TIME_S < end - 1e-9)
+        return np.sin(self.TIME_S) + p[slot("brake_drag", "brake_nm")] * lasting
+
+    def test_sums_of_answers_are_the_event_between_two_moments(self) -> None:
+        own = own_unknowns(["brake_drag"], record(np.zeros(1200)))
+        grid = cells(BRAKE, np.zeros(SIZE), own, {"brake_nm": 8.0}, self.run)
+        assert (grid.moments_s[0], grid.moments_s[-1]) == (0.0, pytest.approx(12.0))
+        for a, b in ((0, 24), (3, 4), (5, 19)):
+            lasting = (self.TIME_S >= grid.moments_s[a] - 1e-9) & (self.TIME_S < grid.moments_s[b] - 1e-9)
+            np.testing.assert_allclose(grid.answers[b] - grid.answers[a], lasting, atol=1e-9)
+
+    @pytest.mark.parametrize(
+        ("samples", "count"),
+        [(150, 4), (1200, 24), (6000, MOST_CELLS)],
+        ids=["at least four", "half a second each", "no more than so many"],
+    )
+    def test_cells_are_as_fine_as_they_may_be(self, samples: int, count: int) -> None:
+        own = own_unknowns(["brake_drag"], record(np.zeros(samples)))
+        grid = cells(BRAKE, np.zeros(SIZE), own, {"brake_nm": 8.0}, lambda p: np.zeros(samples))
+        assert SHORTEST_CELL_S == 0.5
+        assert grid.moments_s.size == count + 1 == grid.answers.shape[0]
+        np.testing.assert_array_equal(grid.answers[0], 0.0)
+
+
+class TestWaves:
+    ANGLE = np.linspace(0.0, 40.0, 500)
+
+    def test_answers_are_a_cosine_and_a_quarter_turn_on(self) -> None:
+        def run(p: FloatArray) -> FloatArray:
+            amplitude, phase = (p[slot("load_imbalance", name)] for name in ("amplitude_nm", "phase_rad"))
+            return 3.0 + amplitude * np.cos(self.ANGLE + phase)
+
+        (wave,) = waves(IMBALANCE, np.zeros(SIZE), {"amplitude_nm": 6.0, "motor_turns_per_turn": 5.6}, run)
+        assert (wave.phase, wave.amplitude) == ("phase_rad", "amplitude_nm")
+        np.testing.assert_allclose(wave.answers, [np.cos(self.ANGLE), -np.sin(self.ANGLE)], atol=1e-9)
+
+    @pytest.mark.parametrize(("sizes", "found"), [({"once_rad": 0.1, "twice_rad": 0.0}, ["once_phase_rad"])])
+    def test_an_amplitude_that_is_not_tried_has_no_wave(self, sizes: Mapping[str, float], found: list[str]) -> None:
+        answers = waves(RESOLVER, np.zeros(SIZE), sizes, lambda p: np.zeros(3))
+        assert [wave.phase for wave in answers] == found
+
+    def test_every_amplitude_answers_with_the_others_silent(self) -> None:
+        """Whatever sizes the parameter vector came with."""
+
+        def run(p: FloatArray) -> FloatArray:
+            once, twice = (p[slot("resolver_error", name)] for name in ("once_rad", "twice_rad"))
+            phases = [p[slot("resolver_error", name)] for name in ("once_phase_rad", "twice_phase_rad")]
+            ripple = once * np.cos(self.ANGLE + phases[0]) + twice * np.cos(2.0 * self.ANGLE + phases[1])
+            return ripple + 50.0 * once * twice
+
+        p = np.zeros(SIZE)
+        p[slot("resolver_error", "once_rad")] = p[slot("resolver_error", "twice_rad")] = 0.4
+        once, twice = waves(RESOLVER, p, {"once_rad": 0.1, "twice_rad": 0.1}, run)
+        np.testing.assert_allclose(once.answers[0], np.cos(self.ANGLE), atol=1e-9)
+        np.testing.assert_allclose(twice.answers[1], np.cos(2.0 * self.ANGLE + 0.5 * math.pi), atol=1e-9)
