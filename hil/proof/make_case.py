@@ -16,42 +16,55 @@ import numpy as np
 
 from hil.errors import UsageError
 from hil.proof.nominal_file import model_toml
+from hil.proof.truth.bus import NOMINAL_ERROR
 from hil.proof.truth.case import Case, TruthRecording, make_case
 from hil.proof.truth.registry import EFFECTS
 
 _COLUMNS = (
-    ("time_s", "%.3f"),
+    ("time_s", "%.6f"),
     ("torque_ref_nm", "%.3f"),
     ("torque_m1_nm", "%.3f"),
     ("torque_m2_nm", "%.3f"),
     ("speed_rad_s", "%.5f"),
+    ("flags", "%d"),
 )
 
 
 def write_recording(path: Path, recording: TruthRecording) -> None:
-    """Write the columns a tool may see as CSV."""
-    table = np.column_stack([getattr(recording, name) for name, _ in _COLUMNS])
+    """Write the columns a tool may see as CSV; ``flags`` only where the recorder has given any."""
+    columns = [(name, number) for name, number in _COLUMNS if getattr(recording, name) is not None]
     np.savetxt(
         path,
-        table,
-        fmt=[number for _, number in _COLUMNS],
+        np.column_stack([getattr(recording, name) for name, _ in columns]),
+        fmt=[number for _, number in columns],
         delimiter=",",
-        header=",".join(name for name, _ in _COLUMNS),
+        header=",".join(name for name, _ in columns),
         comments="",
     )
 
 
-def write_case(case: Case, folder: Path) -> None:
-    """Write ``case/`` and ``sealed/`` into a folder, which is made where it is missing."""
-    shown, sealed = folder / "case", folder / "sealed"
-    for room in (shown, sealed):
-        room.mkdir(parents=True, exist_ok=True)
-    (shown / "model.toml").write_text(model_toml(case.specimen), encoding="utf-8")
-    (sealed / "truth.json").write_text(json.dumps(case.truth(), indent=1) + "\n", encoding="utf-8")
+def write_shown(case: Case, folder: Path) -> None:
+    """Write what the tool gets into a folder, which is made where it is missing."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "model.toml").write_text(model_toml(case.specimen), encoding="utf-8")
     for number, recording in enumerate(case.recordings, start=1):
-        write_recording(shown / f"run_{number}.csv", recording)
+        write_recording(folder / f"run_{number}.csv", recording)
+
+
+def write_sealed(case: Case, folder: Path) -> None:
+    """Write what judges the tool into a folder, which is made where it is missing."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "truth.json").write_text(json.dumps(case.truth(), indent=1) + "\n", encoding="utf-8")
     for number, recording in enumerate(case.fresh, start=1):
-        write_recording(sealed / f"fresh_{number}.csv", recording)
+        write_recording(folder / f"fresh_{number}.csv", recording)
+
+
+def _share(text: str) -> float:
+    """Read an option that is a share no larger than the nominal model's tolerance allows."""
+    share = float(text)
+    if not 0.0 <= share <= NOMINAL_ERROR:
+        raise argparse.ArgumentTypeError(f"expected 0 to {NOMINAL_ERROR}, came {text}")
+    return share
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -62,12 +75,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--effect", required=True, help=f"{', '.join(EFFECTS)}; several joined by +")
     parser.add_argument("--seed", required=True, type=int, help="what everything is drawn from, 0 or more")
     parser.add_argument("--out", required=True, type=Path, help="folder that gets case/ and sealed/")
+    parser.add_argument(
+        "--nominal-error",
+        type=_share,
+        default=NOMINAL_ERROR,
+        help="share by which each value of the nominal model is off at most (default: %(default)s)",
+    )
     options = parser.parse_args(arguments)
     try:
-        case = make_case(options.effect, options.seed)
+        case = make_case(options.effect, options.seed, options.nominal_error)
     except UsageError as error:
         parser.error(str(error))
-    write_case(case, options.out)
+    write_shown(case, options.out / "case")
+    write_sealed(case, options.out / "sealed")
     sys.stdout.write(f"{options.out}/case {options.out}/sealed\n")
     return 0
 

@@ -8,8 +8,8 @@ from estimator.physics.model import DrivelineModel, Parameter, Structure
 from estimator.physics.simulate import Start, grid_for, simulate
 from estimator.signals.record import Record
 from hil.proof.truth.driver import bring_to_speed
-from hil.proof.truth.kernel import State
 from hil.proof.truth.physics import Physics
+from hil.proof.truth.state import State
 
 NOMINAL = {"J_M": 1.7, "J_L": 95.0, "k": 4200.0, "c": 11.0, "b_M": 0.35, "b_L": 0.9}
 LOAD_NM = 50.0
@@ -18,9 +18,19 @@ SPEED_RAD_S = 3.0
 
 SAME = [
     ({}, {}, 1e-3),
-    ({"current_loop_time_s": 0.012}, {"actuator_lag": {"time_constant_s": 0.012}}, 5e-3),
+    ({"derating": 0.3, "derating_time_s": 2.0}, {"torque_derating": {"depth": 0.3, "time_constant_s": 2.0}}, 1e-3),
+    (
+        {"limit_total_nm": 150.0, "limit_knee": 8.0},
+        {"torque_saturation": {"limit_sum_nm": 150.0, "sharpness": 8.0}},
+        1e-3,
+    ),
+    ({"current_loop_time_s": 0.012}, {"actuator_lag": {"time_constant_s": 0.012}}, 7e-3),
     ({"delay_s": 0.013}, {"transport_delay": {"delay_s": 0.013}}, 5e-3),
     ({"friction_motor_nm": 20.0}, {"coulomb_friction_motor": {"friction_nm": 20.0}}, 0.05),
+    ({"friction_load_nm": 20.0}, {"coulomb_friction_load": {"friction_nm": 20.0}}, 4e-3),
+    ({"quadratic_motor": 0.3}, {"quadratic_friction": {"quadratic_nm_s2": 0.3}}, 1e-3),
+    ({"quadratic_load": 0.3}, {"aerodynamic_drag": {"drag_nm_s2": 0.3}}, 1e-3),
+    ({"filter_time_s": 0.012}, {"speed_filter": {"time_constant_s": 0.012}}, 7e-3),
     # the two contact laws differ in how damping sets in at the first touch
     ({"gap_rad": 0.02}, {"backlash": {"gap_rad": 0.02, "contact_rad": 1e-4}}, 0.15),
 ]

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from hil.proof.make_case import main
+from hil.proof.truth.specimen import draw_specimen
+from hil.recording import read_record
 
 
 @pytest.fixture(scope="module")
@@ -55,3 +57,43 @@ def test_an_unknown_effect_is_wrong_use(tmp_path, capsys):
     assert exit_.value.code == 2
     assert "effect 'rust': expected one of" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+def test_lost_samples_are_written_as_nan_with_a_column_of_flags(tmp_path):
+    specimens = (draw_specimen("lost_samples", seed) for seed in range(50))
+    seed = next(s.seed for s in specimens if s.sizes["lost_samples"]["m2"] and not s.sizes["lost_samples"]["as_zero"])
+    assert main(["--effect", "lost_samples", "--seed", str(seed), "--out", str(tmp_path)]) == 0
+    table = np.genfromtxt(tmp_path / "case" / "run_1.csv", delimiter=",", names=True)
+    assert table.dtype.names[-1] == "flags"
+    assert table.size == 3000
+    lost = np.isnan(table["torque_m2_nm"])
+    assert lost.any()
+    assert np.all(table["flags"][lost] > 0)
+    assert read_record(tmp_path / "case" / "run_1.csv").okay.sum() == np.count_nonzero(table["flags"] == 0)
+
+
+@pytest.mark.parametrize("effect", ["clock_drift", "stale_samples"])
+def test_a_spoilt_recording_can_still_be_read(tmp_path, effect):
+    assert main(["--effect", effect, "--seed", "2", "--out", str(tmp_path)]) == 0
+    for path in tmp_path.rglob("*.csv"):
+        assert read_record(path).time_s.size == 3000
+
+
+def test_told_stamps_are_written_to_the_microsecond(tmp_path):
+    told = (draw_specimen("sample_jitter", seed) for seed in range(50))
+    seed = next(s.seed for s in told if s.sizes["sample_jitter"]["stamps_told"])
+    main(["--effect", "sample_jitter", "--seed", str(seed), "--out", str(tmp_path)])
+    record = read_record(tmp_path / "case" / "run_1.csv")
+    deviation = record.time_s - 0.01 * np.arange(3000)
+    assert 0.0005 < np.abs(deviation).max() < 0.0025
+    assert record.sample_time_s == pytest.approx(0.01, rel=1e-4)
+
+
+def test_a_right_data_sheet_can_be_asked_for_and_a_worse_one_not(tmp_path):
+    assert main(["--effect", "none", "--seed", "4", "--nominal-error", "0", "--out", str(tmp_path)]) == 0
+    model = tomllib.loads((tmp_path / "case" / "model.toml").read_text())
+    true = json.loads((tmp_path / "sealed" / "truth.json").read_text())["true"]
+    for name, entry in model["parameters"].items():
+        assert entry["value"] == pytest.approx(true[name], rel=1e-5)
+    with pytest.raises(SystemExit):
+        main(["--effect", "none", "--seed", "4", "--nominal-error", "0.3", "--out", str(tmp_path)])

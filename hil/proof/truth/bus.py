@@ -71,6 +71,7 @@ class Bus:
             load_torque_nm=self.load_torque_nm,
             metres_per_rad=self.metres_per_rad,
             gravity_nm=self.gravity_nm,
+            gear_ratio=self.gear_ratio,
         )
 
 
@@ -89,7 +90,7 @@ def draw_bus(rng: np.random.Generator) -> Bus:
     )
 
 
-def draw_nominal(bus: Bus, rng: np.random.Generator) -> dict[str, float]:
-    """Return the six values of the nominal model, each a little wrong."""
+def draw_nominal(bus: Bus, rng: np.random.Generator, error: float = NOMINAL_ERROR) -> dict[str, float]:
+    """Return the six values of the nominal model, each off by up to a share of the true one."""
     names = ("J_M", "J_L", "k", "c", "b_M", "b_L")
-    return {name: getattr(bus, name) * (1.0 + rng.uniform(-NOMINAL_ERROR, NOMINAL_ERROR)) for name in names}
+    return {name: getattr(bus, name) * (1.0 + rng.uniform(-error, error)) for name in names}

@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from hil.proof.truth import laws
+from hil.proof.truth.acquisition import Acquisition
+from hil.proof.truth.bus import NOMINAL_ERROR
+from hil.proof.truth.driveline import TruthDriveline
 from hil.proof.truth.driver import bring_to_speed
 from hil.proof.truth.experiments import PERIOD_S, Plan, Test, draw_plan, sample_times_s
-from hil.proof.truth.kernel import State
+from hil.proof.truth.hidden import Interval
+from hil.proof.truth.laws_in_angle import gravity_torque
+from hil.proof.truth.laws_in_time import brake_torque
 from hil.proof.truth.physics import FloatArray, Physics
-from hil.proof.truth.sensors import speed_reading, torque_reading
+from hil.proof.truth.readings import sampling_instants_s, speed_as_read
+from hil.proof.truth.rows import IntArray, Rows, as_recorded
+from hil.proof.truth.sensors import torque_reading
 from hil.proof.truth.specimen import Specimen, Stream, draw_specimen, stream
+from hil.proof.truth.state import State
 
 TESTS = tuple(Test)
 
@@ -22,10 +30,10 @@ PROFILE_STRIDE = 25
 
 @dataclass(frozen=True, slots=True)
 class TruthRecording:
-    """One recording. Arrays of shape (N,); the first five are the columns of the contract.
+    """One recording. Arrays of shape (N,); the first five and ``flags``, where there are any, are the contract's.
 
-    ``speed_true_rad_s`` and ``disturbance_nm``, the torque of hill and brake against the load every 0.25 s,
-    are the truth and go into no recording file.
+    ``speed_true_rad_s`` (the sensor's speed without noise), ``disturbance_nm`` (the torque of hill and brake against
+    the load every 0.25 s) and ``events`` (when what took place) are the truth and go into no recording file.
     """
 
     time_s: FloatArray
@@ -35,6 +43,8 @@ class TruthRecording:
     speed_rad_s: FloatArray
     speed_true_rad_s: FloatArray
     disturbance_nm: FloatArray
+    flags: IntArray | None = None
+    events: Mapping[str, Sequence[Interval]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,9 +59,26 @@ class Case:
         """Return what is sealed: JSON types only."""
         return {
             **self.specimen.truth(),
+            "events": self._events(),
             "disturbance_period_s": PROFILE_STRIDE * PERIOD_S,
             "disturbance_nm": _disturbances(self.recordings),
             "disturbance_fresh_nm": _disturbances(self.fresh),
+        }
+
+    def named_recordings(self) -> dict[str, TruthRecording]:
+        """Return all recordings by the names of their files: ``run_1`` and on, ``fresh_1`` and on."""
+        names = [f"{kind}_{number}" for kind in ("run", "fresh") for number in range(1, len(TESTS) + 1)]
+        return dict(zip(names, (*self.recordings, *self.fresh), strict=True))
+
+    def _events(self) -> dict[str, dict[str, list[list[float]]]]:
+        """When each event takes place, by effect and recording."""
+        return {
+            effect.name: {
+                name: [list(interval) for interval in recording.events[effect.name]]
+                for name, recording in self.named_recordings().items()
+            }
+            for effect in self.specimen.effects
+            if effect.when is not None
         }
 
 
@@ -59,15 +86,15 @@ def _disturbances(recordings: tuple[TruthRecording, ...]) -> list[list[float]]:
     return [recording.disturbance_nm.round(3).tolist() for recording in recordings]
 
 
-def make_case(effect: str, seed: int) -> Case:
-    """Draw a bus, hide an effect in it, record it.
+def make_case(effect: str, seed: int, nominal_error: float = NOMINAL_ERROR) -> Case:
+    """Draw a bus, hide an effect in it, record it; see `draw_specimen`.
 
     Raises
     ------
     UsageError
-        If the effect is not registered.
+        If an effect is not registered or two can't be in one bus, or the seed is negative.
     """
-    specimen = draw_specimen(effect, seed)
+    specimen = draw_specimen(effect, seed, nominal_error)
     recordings = tuple(record(specimen, number) for number in range(2 * len(TESTS)))
     return Case(specimen, recordings[: len(TESTS)], recordings[len(TESTS) :])
 
@@ -75,33 +102,64 @@ def make_case(effect: str, seed: int) -> Case:
 def record(specimen: Specimen, number: int) -> TruthRecording:
     """Draw and drive the specimen's recording of a number from 0; the kinds of `TESTS` take turns."""
     rng = stream(specimen.seed, Stream.RECORDING, number)
-    plan = draw_plan(TESTS[number % len(TESTS)], rng)
-    rng_sensors, rng_effect = rng.spawn(2)
-    return _drive(specimen.physics(rng_effect), plan, rng_sensors)
+    test = number % len(TESTS)
+    plan = draw_plan(TESTS[test], rng)
+    rng_sensors, rng_effect, rng_acquisition = rng.spawn(3)
+    physics = specimen.physics(rng_effect, test)
+    recording = _drive(physics, plan, specimen.acquisition(test), rng_sensors, rng_acquisition)
+    return replace(recording, events=specimen.events(physics, test))
 
 
-def _drive(physics: Physics, plan: Plan, rng: np.random.Generator) -> TruthRecording:
+def _drive(
+    physics: Physics,
+    plan: Plan,
+    acquisition: Acquisition,
+    rng_sensors: np.random.Generator,
+    rng_acquisition: np.random.Generator,
+) -> TruthRecording:
     rolling = bring_to_speed(physics, plan.speed_rad_s, plan.share_m1)
-    bus = rolling.driveline
     torque = rolling.torque_nm + plan.torque_nm
     m1, m2 = plan.share_m1 * torque, (1.0 - plan.share_m1) * torque
-    speed, disturbance = np.empty(torque.size), np.empty(torque.size)
-    for row in range(torque.size):
-        speed[row] = bus.speed_rad_s
-        disturbance[row] = _disturbance_nm(physics, bus.state)
-        bus.advance((m1[row], m2[row]), PERIOD_S)
+    time_s = sample_times_s()
+    instants_s = sampling_instants_s(time_s, acquisition, rng_acquisition)
+    speed, disturbance = _sample(rolling.driveline, m1, m2, instants_s)
+    m1_read, m2_read = torque_reading(m1, rng_sensors), torque_reading(m2, rng_sensors)
+    read = Rows(m1_read, m2_read, speed_as_read(speed, acquisition, rng_sensors))
+    rows = as_recorded(read, acquisition, rng_acquisition)
     return TruthRecording(
-        time_s=sample_times_s(),
+        time_s=instants_s if acquisition.stamps_told else time_s,
         torque_ref_nm=torque,
-        torque_m1_nm=torque_reading(m1, rng),
-        torque_m2_nm=torque_reading(m2, rng),
-        speed_rad_s=speed_reading(speed, rng),
+        torque_m1_nm=rows.torque_m1_nm,
+        torque_m2_nm=rows.torque_m2_nm,
+        speed_rad_s=rows.speed_rad_s,
         speed_true_rad_s=speed,
         disturbance_nm=disturbance[::PROFILE_STRIDE],
+        flags=rows.flags,
     )
+
+
+def _sample(
+    bus: TruthDriveline, m1_nm: FloatArray, m2_nm: FloatArray, instants_s: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Drive with torques that change every period; return speed and load disturbance at other instants.
+
+    The last torque stays on: a clock may ask for a speed after the last period.
+    """
+    speed, disturbance = np.empty(instants_s.size), np.empty(instants_s.size)
+    now_s, held = 0.0, 0
+    for row, instant_s in enumerate(instants_s):
+        while held + 1 < m1_nm.size and (held + 1) * PERIOD_S <= instant_s:
+            bus.advance((m1_nm[held], m2_nm[held]), (held + 1) * PERIOD_S - now_s)
+            held += 1
+            now_s = held * PERIOD_S
+        if instant_s > now_s:
+            bus.advance((m1_nm[held], m2_nm[held]), instant_s - now_s)
+            now_s = instant_s
+        speed[row] = bus.speed_rad_s
+        disturbance[row] = _disturbance_nm(bus.physics, bus.state)
+    return speed, disturbance
 
 
 def _disturbance_nm(physics: Physics, state: FloatArray) -> float:
     """Torque against the load beyond the constant one: hill and brake."""
-    hill = laws.gravity_torque(physics, state[State.ANGLE_L])
-    return hill + laws.brake_torque(physics, state[State.TIME_S])
+    return float(gravity_torque(physics, state[State.ANGLE_L]) + brake_torque(physics, state[State.TIME_S]))

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from hil.proof.truth import kernel
 from hil.proof.truth.delay_line import DelayLine
-from hil.proof.truth.kernel import State
+from hil.proof.truth.inverters import true_torque
+from hil.proof.truth.laws_in_angle import resolver_speed
 from hil.proof.truth.physics import FloatArray, Physics
+from hil.proof.truth.state import SPEEDS, STATES, State
 
 
 class TruthDriveline:
@@ -26,19 +26,19 @@ class TruthDriveline:
     def __init__(self, physics: Physics, speed_rad_s: float = 0.0) -> None:
         self._physics = physics
         self._delay = DelayLine(physics.delay_s)
-        self._state = np.zeros(len(State))
-        self._state[[State.SPEED_M, State.SPEED_L]] = speed_rad_s
+        self._state = np.zeros(STATES)
+        self._state[list(SPEEDS)] = speed_rad_s
 
     def advance(self, torque_nm: tuple[float, float], duration_s: float) -> None:
         """Hold both inverters' torque [Nm] for a time [s]."""
-        total_nm = self._physics.gain_m1 * torque_nm[0] + torque_nm[1]
+        total_nm = true_torque(self._physics, torque_nm, float(self._state[State.TIME_S]))
         for piece in self._delay.push(total_nm, duration_s):
             kernel.advance(self._state, self._physics, piece.torque_nm, piece.duration_s)
 
     def go_on_with(self, physics: Physics) -> None:
         """Change the physics under way: motion and twist go on, clock and distance start again at zero."""
         self._physics = physics
-        self._state[State.ANGLE_M] -= self._state[State.ANGLE_L]
+        self._state[[State.ANGLE_M, State.ANGLE_X]] -= self._state[State.ANGLE_L]
         self._state[[State.TIME_S, State.ANGLE_L]] = 0.0
 
     def quantity(self, which: State) -> float:
@@ -47,7 +47,7 @@ class TruthDriveline:
 
     @property
     def state(self) -> FloatArray:
-        """Copy of the true state, shape (9,), in the order of `State`."""
+        """Copy of the true state, shape (STATES,), in the order of `State`."""
         return self._state.copy()
 
     @property
@@ -57,9 +57,8 @@ class TruthDriveline:
 
     @property
     def speed_rad_s(self) -> float:
-        """Motor speed as the resolver gives it: the rate of the angle it believes in [rad/s]."""
+        """Motor speed as the resolver gives it, behind its filter where it has one [rad/s]."""
         p = self._physics
-        angle = self._state[State.ANGLE_M]
-        slope = p.resolver_once_rad * math.cos(angle + p.resolver_once_phase_rad)
-        slope += 2.0 * p.resolver_twice_rad * math.cos(2.0 * angle + p.resolver_twice_phase_rad)
-        return float(self._state[State.SPEED_M] * (1.0 + slope))
+        if p.filter_time_s > 0.0 or p.filter_rad_s > 0.0:
+            return float(self._state[State.FILTERED])
+        return float(resolver_speed(p, self._state[State.ANGLE_M], self._state[State.SPEED_M]))

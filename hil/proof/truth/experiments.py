@@ -12,6 +12,7 @@ from hil.proof.truth.physics import FloatArray
 
 PERIOD_S = 0.01
 SAMPLES = 3000
+DURATION_S = SAMPLES * PERIOD_S
 
 
 class Test(Enum):

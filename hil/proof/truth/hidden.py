@@ -8,6 +8,7 @@ from enum import Enum
 
 import numpy as np
 
+from hil.proof.truth.acquisition import Acquisition
 from hil.proof.truth.bus import Bus
 from hil.proof.truth.physics import Physics
 
@@ -16,6 +17,25 @@ Sizes = Mapping[str, float]
 
 Draw = Callable[[np.random.Generator, Bus], Sizes]
 Apply = Callable[[Physics, Sizes, np.random.Generator], Physics]
+Corrupt = Callable[[Acquisition, Sizes], Acquisition]
+Interval = tuple[float, float]
+When = Callable[[Physics], Interval]
+
+ABSENT_IN = "absent_in"
+"""Size that says in which of the three tests (0, 1, 2) an event does not take place."""
+
+ONLY_IN = "only_in"
+"""Size that says in which of the three tests alone it does."""
+
+
+def same_physics(physics: Physics, sizes: Sizes, rng: np.random.Generator) -> Physics:
+    """Leave the physics as they are: for what happens to a recording alone."""
+    return physics
+
+
+def same_recording(acquisition: Acquisition, sizes: Sizes) -> Acquisition:
+    """Leave the recording as it is: for what happens in the driveline."""
+    return acquisition
 
 
 class Place(Enum):
@@ -26,6 +46,7 @@ class Place(Enum):
     SHAFT = "shaft"
     LOAD = "load"
     SPEED_SENSOR = "speed_sensor"
+    ACQUISITION = "acquisition"
     NOWHERE = "nowhere"
 
 
@@ -46,15 +67,40 @@ class HiddenEffect:
     apply : callable
         Physics, sizes and the generator of one recording (start on the road, time of an event) to the physics
         with the effect.
+    corrupt : callable
+        Acquisition and sizes to the acquisition with the effect.
+    when : callable, optional
+        Physics with an event to when it begins and ends [s]; None for what is always there.
     """
 
     name: str
     place: Place
     catalogued: bool
     draw: Draw
-    apply: Apply
+    apply: Apply = same_physics
+    corrupt: Corrupt = same_recording
+    when: When | None = None
+
+    def happens_in(self, test: int, sizes: Sizes) -> bool:
+        """Say whether the effect takes place in one of the three tests, counted from 0."""
+        return test == sizes.get(ONLY_IN, test) and test != sizes.get(ABSENT_IN)
 
 
 def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
     """Draw a size so that every factor between moderate and well visible is as likely as any other."""
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
+
+
+def draw_absence(rng: np.random.Generator) -> Sizes:
+    """Draw whether an event is in every test or, one time in three, missing in one of them."""
+    return {ABSENT_IN: float(rng.integers(3))} if rng.random() < 1 / 3 else {}
+
+
+def draw_presence(rng: np.random.Generator) -> Sizes:
+    """Draw whether a lasting change is in every test, missing in one, or in one alone; each as likely."""
+    return [{}, {ABSENT_IN: float(rng.integers(3))}, {ONLY_IN: float(rng.integers(3))}][rng.integers(3)]
+
+
+def either(rng: np.random.Generator, size: float) -> float:
+    """Give a size one of both signs."""
+    return size if rng.random() < 0.5 else -size

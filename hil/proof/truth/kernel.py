@@ -1,17 +1,19 @@
 """Time integration by Strang splitting, second order and symplectic where nothing is lost.
 
 Half a drift (angles, bristles, relaxing torques: each solved exactly at constant speed), a kick (speeds under
-the torques at fixed angles, midpoint rule for what depends on speed), half a drift.
+the torques at fixed angles, midpoint rule for what depends on speed), half a drift. The generator's clutch acts as
+an impulse at the end of a step (Moreau's time stepping), the speed filter as the recursion of its firmware.
 """
 
 from __future__ import annotations
 
 import math
-from enum import IntEnum
 
-from hil.proof.truth import laws
+from hil.proof.truth import iwan, laws, laws_in_angle, laws_in_time, tyre
 from hil.proof.truth.compiled import compiled
+from hil.proof.truth.line import accelerations, breakaway_limit, disturbance, shaft_ends, shaft_twist, speeds_of
 from hil.proof.truth.physics import FloatArray, Physics
+from hil.proof.truth.state import STATES, State
 
 MAX_STEP_S = 1e-4
 """The shaft mode (51 rad/s) moves by 0.005 rad of phase in it: relative error of its period 1e-6. Against the
@@ -19,41 +21,41 @@ closed solution the speed is right to 0.0002 rad/s, against a stiff reference of
 twentieth of the sensor's noise."""
 
 
-class State(IntEnum):
-    """Where each quantity stands in the state array."""
-
-    ANGLE_M = 0
-    ANGLE_L = 1
-    SPEED_M = 2
-    SPEED_L = 3
-    BRISTLE_M = 4
-    BRISTLE_L = 5
-    MAXWELL_NM = 6
-    INVERTER_NM = 7
-    TIME_S = 8
+@compiled
+def _turn(state: FloatArray, p: Physics, h: float) -> None:
+    """Move the angles, and what follows them directly."""
+    before, _ = shaft_twist(state, p)
+    state[State.ANGLE_M] += state[State.SPEED_M] * h
+    state[State.ANGLE_X] += state[State.SPEED_X] * h
+    state[State.ANGLE_L] += state[State.SPEED_L] * h
+    if p.hysteresis_stiffness > 0.0:
+        behind, _ = shaft_twist(state, p)
+        change = laws.beyond_gap(p, behind) - laws.beyond_gap(p, before)
+        iwan.follow(state[State.SLIDERS : STATES], p, change)
 
 
 @compiled
-def _limit(p: Physics, speed: float) -> float:
-    if p.breakaway_motor_nm <= p.friction_motor_nm:
-        return 1.0
-    sliding = laws.sliding_torque(p.friction_motor_nm, p.breakaway_motor_nm, p.stribeck_speed_rad_s, speed)
-    return sliding / p.friction_motor_nm
+def _relax(state: FloatArray, p: Physics, h: float) -> None:
+    """Move what approaches a value that the speeds set."""
+    speed_m, speed_l = state[State.SPEED_M], state[State.SPEED_L]
+    if p.friction_motor_nm > 0.0:
+        limit = breakaway_limit(p, speed_m)
+        state[State.BRISTLE_M] = laws.bristle_after(state[State.BRISTLE_M], speed_m, limit, h)
+    if p.brake_nm > 0.0 or p.friction_load_nm > 0.0:
+        state[State.BRISTLE_L] = laws.bristle_after(state[State.BRISTLE_L], speed_l, 1.0, h)
+    if p.maxwell_stiffness > 0.0:
+        driving, driven = shaft_ends(p, speed_m, state[State.SPEED_X], speed_l)
+        steady = p.maxwell_stiffness * p.maxwell_time_s * (driving - driven)
+        state[State.MAXWELL_NM] = steady + (state[State.MAXWELL_NM] - steady) * math.exp(-h / p.maxwell_time_s)
+    if p.wheel_inertia > 0.0:
+        state[State.SLIP] = tyre.slip_after(state[State.SLIP], p, speed_l, state[State.SPEED_V], h)
 
 
 @compiled
 def _drift(state: FloatArray, p: Physics, command_nm: float, h: float) -> None:
-    speed_m, speed_l = state[State.SPEED_M], state[State.SPEED_L]
-    state[State.ANGLE_M] += speed_m * h
-    state[State.ANGLE_L] += speed_l * h
+    _turn(state, p, h)
+    _relax(state, p, h)
     state[State.TIME_S] += h
-    if p.friction_motor_nm > 0.0:
-        state[State.BRISTLE_M] = laws.bristle_after(state[State.BRISTLE_M], speed_m, _limit(p, speed_m), h)
-    if p.brake_nm > 0.0:
-        state[State.BRISTLE_L] = laws.bristle_after(state[State.BRISTLE_L], speed_l, 1.0, h)
-    if p.maxwell_stiffness > 0.0:
-        steady = p.maxwell_stiffness * p.maxwell_time_s * (speed_m - speed_l)
-        state[State.MAXWELL_NM] = steady + (state[State.MAXWELL_NM] - steady) * math.exp(-h / p.maxwell_time_s)
     if p.current_loop_time_s > 0.0:
         error = state[State.INVERTER_NM] - command_nm
         state[State.INVERTER_NM] = command_nm + error * math.exp(-h / p.current_loop_time_s)
@@ -62,41 +64,46 @@ def _drift(state: FloatArray, p: Physics, command_nm: float, h: float) -> None:
 
 
 @compiled
-def _load_disturbance(state: FloatArray, p: Physics) -> float:
-    """Torque against the load that depends on place and time alone."""
-    disturbance_nm: float = p.load_torque_nm + laws.gravity_torque(p, state[State.ANGLE_L])
-    return disturbance_nm
+def _kick(state: FloatArray, p: Physics, h: float) -> None:
+    outer = disturbance(state, p)
+    motor, extra, load, vehicle = speeds_of(state)
+    half = 0.5 * h
+    of_m, of_x, of_l, of_v = accelerations(state, p, outer, (motor, extra, load, vehicle))
+    middle = (motor + half * of_m, extra + half * of_x, load + half * of_l, vehicle + half * of_v)
+    of_m, of_x, of_l, of_v = accelerations(state, p, outer, middle)
+    state[State.SPEED_M] = motor + h * of_m
+    state[State.SPEED_X] = extra + h * of_x
+    state[State.SPEED_L] = load + h * of_l
+    state[State.SPEED_V] = vehicle + h * of_v
 
 
 @compiled
-def _motor_torque(state: FloatArray, p: Physics, speed: float) -> float:
-    """Torque on the motor inertia without the shaft's."""
-    torque: float = state[State.INVERTER_NM] - p.b_M * speed - p.quadratic_motor * speed * abs(speed)
-    if p.friction_motor_nm > 0.0:
-        limit = _limit(p, speed)
-        torque -= laws.friction_torque(p.friction_motor_nm, limit, state[State.BRISTLE_M], speed)
-    return torque
+def _couple_generator(state: FloatArray, p: Physics, h: float) -> None:
+    """Bring motor and generator together as far as the clutch holds; the impulse that would is exact.
+
+    With the clutch open the generator is kept near the motor's speed by its own control.
+    """
+    clutch_nm = laws_in_time.clutch_torque(p, state[State.TIME_S])
+    motor, generator = state[State.SPEED_M], state[State.SPEED_G]
+    if clutch_nm <= 0.0:
+        state[State.SPEED_G] = (1.0 - p.generator_lag) * motor
+        return
+    together = (motor - generator) * p.J_M * p.generator_inertia / (p.J_M + p.generator_inertia)
+    impulse = min(clutch_nm * h, max(-clutch_nm * h, together))
+    state[State.SPEED_M] = motor - impulse / p.J_M
+    state[State.SPEED_G] = generator + impulse / p.generator_inertia
 
 
 @compiled
-def _load_torque(state: FloatArray, p: Physics, speed: float) -> float:
-    """Torque on the load inertia without the shaft's and without the disturbance."""
-    torque = -p.b_L * speed - p.quadratic_load * speed * abs(speed)
-    if p.brake_nm > 0.0:
-        held = laws.brake_torque(p, state[State.TIME_S])
-        torque -= laws.friction_torque(held, 1.0, state[State.BRISTLE_L], speed)
-    return torque
-
-
-@compiled
-def _accelerations(
-    state: FloatArray, p: Physics, disturbance_nm: float, speed_m: float, speed_l: float
-) -> tuple[float, float]:
-    twist = state[State.ANGLE_M] - state[State.ANGLE_L]
-    shaft = laws.shaft_torque(p, twist, speed_m - speed_l) + state[State.MAXWELL_NM]
-    motor = _motor_torque(state, p, speed_m) - shaft
-    load = _load_torque(state, p, speed_l) + shaft - disturbance_nm
-    return motor / p.J_M, load / p.J_L
+def _filter_speed(state: FloatArray, p: Physics, h: float) -> None:
+    """One cycle of the speed filter: backward Euler (first order), semi-implicit Euler (second order)."""
+    speed = laws_in_angle.resolver_speed(p, state[State.ANGLE_M], state[State.SPEED_M])
+    if p.filter_time_s > 0.0:
+        state[State.FILTERED] += h / (p.filter_time_s + h) * (speed - state[State.FILTERED])
+    else:
+        pull = speed - state[State.FILTERED] - 2.0 * p.filter_damping * state[State.FILTERED_RATE]
+        state[State.FILTERED_RATE] += h * p.filter_rad_s * pull
+        state[State.FILTERED] += h * p.filter_rad_s * state[State.FILTERED_RATE]
 
 
 @compiled
@@ -105,7 +112,7 @@ def advance(state: FloatArray, p: Physics, command_nm: float, duration_s: float)
 
     Parameters
     ----------
-    state : ndarray, shape (9,)
+    state : ndarray, shape (STATES,)
         In the order of `State`; changed in place.
     p : Physics
         The driveline.
@@ -118,13 +125,11 @@ def advance(state: FloatArray, p: Physics, command_nm: float, duration_s: float)
     if steps < 1:
         return
     h = duration_s / steps
-    half = 0.5 * h
     for _ in range(steps):
-        _drift(state, p, command_nm, half)
-        outer = _load_disturbance(state, p)
-        speed_m, speed_l = state[State.SPEED_M], state[State.SPEED_L]
-        acc_m, acc_l = _accelerations(state, p, outer, speed_m, speed_l)
-        acc_m, acc_l = _accelerations(state, p, outer, speed_m + half * acc_m, speed_l + half * acc_l)
-        state[State.SPEED_M] = speed_m + h * acc_m
-        state[State.SPEED_L] = speed_l + h * acc_l
-        _drift(state, p, command_nm, half)
+        _drift(state, p, command_nm, 0.5 * h)
+        _kick(state, p, h)
+        _drift(state, p, command_nm, 0.5 * h)
+        if p.generator_inertia > 0.0:
+            _couple_generator(state, p, h)
+        if p.filter_time_s > 0.0 or p.filter_rad_s > 0.0:
+            _filter_speed(state, p, h)

@@ -1,4 +1,4 @@
-"""The laws: what torque acts between and on the two inertias."""
+"""The laws of friction and of the shaft: what torque follows from speed and twist."""
 
 from __future__ import annotations
 
@@ -13,9 +13,6 @@ PRESLIDING_RAD = 1e-3
 MICRO_DAMPING_S = 1e-2
 MICRO_DAMPING_SPEED_RAD_S = 0.1
 """Bristle damping dies away with speed, or LuGre friction overshoots several times at a fast reversal."""
-
-BRAKE_RISE_S = 0.15
-"""Time a brake pad takes to come on and off."""
 
 
 @compiled
@@ -58,34 +55,28 @@ def characteristic(p: Physics, twist: float) -> float:
 
 
 @compiled
-def shaft_torque(p: Physics, twist: float, twist_rate: float) -> float:
+def beyond_gap(p: Physics, twist: float) -> float:
+    """Return the part of a twist that loads the shaft."""
+    if abs(twist) <= 0.5 * p.gap_rad:
+        return 0.0
+    return twist - math.copysign(0.5 * p.gap_rad, twist)
+
+
+@compiled
+def shaft_torque(
+    p: Physics, twist: float, twist_rate: float, stiffness_over_k: float = 1.0, hysteresis_nm: float = 0.0
+) -> float:
     """Return the torque through the shaft [Nm]; a gap has two contacts that can press and never pull."""
+    loaded = beyond_gap(p, twist)
+    torque = stiffness_over_k * characteristic(p, loaded) + p.c * twist_rate + hysteresis_nm
     if p.gap_rad <= 0.0:
-        return characteristic(p, twist) + p.c * twist_rate
-    depth = abs(twist) - 0.5 * p.gap_rad
-    if depth <= 0.0:
-        return 0.0
-    side = math.copysign(1.0, twist)
-    return side * max(0.0, characteristic(p, depth) + p.c * twist_rate * side)
+        return torque
+    side = (loaded > 0.0) - (loaded < 0.0)
+    return side * max(0.0, side * torque)
 
 
 @compiled
-def brake_torque(p: Physics, time_s: float) -> float:
-    """Return what the brake can hold at a time [Nm]: a trapezoid in every period."""
-    if p.brake_nm <= 0.0:
-        return 0.0
-    t = time_s % p.brake_period_s
-    rise = (t - p.brake_from_s) / BRAKE_RISE_S
-    fall = (p.brake_to_s - t) / BRAKE_RISE_S
-    return p.brake_nm * min(1.0, max(0.0, min(rise, fall)))
-
-
-@compiled
-def gravity_torque(p: Physics, angle_load: float) -> float:
-    """Return the torque of the hill the vehicle stands on [Nm], positive uphill."""
-    slope = 0.0
-    x = p.road_start_m + p.metres_per_rad * angle_load
-    for wave in range(p.road.shape[0]):
-        number = p.road[wave, 1]
-        slope += p.road[wave, 0] * number * math.cos(number * x + p.road[wave, 2])
-    return p.gravity_nm * slope / math.sqrt(1.0 + slope * slope)
+def eddy_torque(p: Physics, speed: float) -> float:
+    """Return the drag of eddy currents [Nm]: it is greatest at one speed and falls beyond."""
+    over = speed / p.eddy_speed_rad_s
+    return p.eddy_nm * 2.0 * over / (1.0 + over * over)

@@ -32,6 +32,8 @@ class Physics(NamedTuple):
     friction_motor_nm, breakaway_motor_nm, stribeck_speed_rad_s : float
         Dry friction on the motor shaft: sliding at speed, at the point of breaking away, and the speed over
         which one goes over into the other.
+    friction_load_nm : float
+        Dry friction on the load at any time.
     brake_nm, brake_from_s, brake_to_s, brake_period_s : float
         Dry friction on the load that is on during an interval of every period.
     quadratic_motor, quadratic_load : float
@@ -40,20 +42,60 @@ class Physics(NamedTuple):
         Free play of the shaft, from contact to contact.
     hardening_twist_rad, softening_twist_rad : float
         Twist scale of a sinh (hardening) or asinh (softening) characteristic; 0 is a linear shaft.
+    stiffness_step, stiffness_step_at_s, stiffness_step_rise_s : float
+        Change of the shaft's stiffness over ``k`` from a moment on, and the time it takes.
+    stiffness_speed_share, stiffness_speed_rad_s : float
+        Change of the stiffness over ``k`` that a fast turning shaft tends to, and the speed of half of it.
+    hysteresis_stiffness, hysteresis_slip_rad : float
+        Shaft branch of springs in series with dry sliders: stiffness before any slides [Nm/rad], and the twist at
+        which the last one does.
     maxwell_stiffness, maxwell_time_s : float
         Second shaft branch, spring in series with damper: stiffness [Nm/rad] and relaxation time.
+    joint_angle_rad, joint_phase_rad : float
+        Bend of a Cardan joint at the driving end of the shaft, and the motor angle of its fork.
+    extra_inertia, extra_stiffness, extra_damping : float
+        One more inertia [kg m^2] and the spring [Nm/rad] and damper [Nm s/rad] that put it in line.
+    extra_at_motor : bool
+        Whether that is between motor and shaft; otherwise between shaft and load.
     gain_m1 : float
         True torque of inverter m1 over its reading.
+    derating, derating_time_s : float
+        Share of the torque that is lost in the end; its time constant, or 0 for a loss that grows evenly with time
+        up to `TIME_TO_DERATE_S`.
+    limit_m1_nm, limit_m2_nm, limit_total_nm, limit_knee : float
+        What inverter m1, m2, and both together can give [Nm], 0 for no limit; the knee's sharpness.
+    deadband_nm : float
+        Reading of each inverter below which it gives no torque, and which is missing above.
+    ripple_nm, ripple_share, ripple_order, ripple_phase_rad : float
+        Torque periodic in the motor angle: cogging [Nm], and over the torque given; periods per turn, phase.
     current_loop_time_s : float
         Time constant of the current loop of both inverters.
     delay_s : float
         Time from the torque reading to the torque.
+    generator_inertia, generator_lag : float
+        Inertia that a clutch can put on the motor shaft [kg m^2], and by which share of the motor's speed it is
+        slower before.
+    clutch_nm, clutch_rise_s, clutch_from_s, clutch_to_s : float
+        What the clutch holds when closed [Nm], the time it takes to close, and when it does and opens again.
+    eddy_nm, eddy_speed_rad_s : float
+        Eddy-current drag on the motor: the greatest [Nm], and the speed of it.
+    wheel_inertia, slip_stiffness_nm, grip_nm, relaxation_rad : float
+        Tyre: part of ``J_L`` that turns with the wheels [kg m^2], 0 for a tyre that can't slip; torque per slip,
+        greatest torque [Nm]; motor angle over which a slip builds up.
+    imbalance_nm, imbalance_twice_nm, imbalance_phase_rad, gear_ratio : float
+        Torque against the load at once and twice per wheel turn [Nm], phase of it; motor turns per wheel turn.
+    payload_share, payload_at_s, payload_rise_s : float
+        Change of the load's inertia over ``J_L`` from a moment on, and the time it takes.
+    cold_factor, warming_time_s : float
+        Viscous friction of the load over ``b_L`` with cold oil, and the time constant of its warming.
     road : ndarray, shape (M, 3)
         Height profile, sum of M waves: height [m], wave number [rad/m], phase [rad].
     road_start_m, metres_per_rad, gravity_nm : float
         Where on the road the recording starts; distance per motor angle; load torque per unit of slope.
     resolver_once_rad, resolver_twice_rad, resolver_once_phase_rad, resolver_twice_phase_rad : float
         Angle error of the resolver at once and twice per turn.
+    filter_time_s, filter_rad_s, filter_damping : float
+        Speed filter of first order: its time constant, or of second order: its corner frequency and damping ratio.
     """
 
     J_M: float
@@ -66,6 +108,7 @@ class Physics(NamedTuple):
     friction_motor_nm: float = 0.0
     breakaway_motor_nm: float = 0.0
     stribeck_speed_rad_s: float = 1.0
+    friction_load_nm: float = 0.0
     brake_nm: float = 0.0
     brake_from_s: float = 0.0
     brake_to_s: float = 0.0
@@ -75,11 +118,56 @@ class Physics(NamedTuple):
     gap_rad: float = 0.0
     hardening_twist_rad: float = 0.0
     softening_twist_rad: float = 0.0
+    stiffness_step: float = 0.0
+    stiffness_step_at_s: float = 0.0
+    stiffness_step_rise_s: float = 0.01
+    stiffness_speed_share: float = 0.0
+    stiffness_speed_rad_s: float = 1.0
+    hysteresis_stiffness: float = 0.0
+    hysteresis_slip_rad: float = 1.0
     maxwell_stiffness: float = 0.0
     maxwell_time_s: float = 1.0
+    joint_angle_rad: float = 0.0
+    joint_phase_rad: float = 0.0
+    extra_inertia: float = 0.0
+    extra_stiffness: float = 0.0
+    extra_damping: float = 0.0
+    extra_at_motor: bool = True
     gain_m1: float = 1.0
+    derating: float = 0.0
+    derating_time_s: float = 0.0
+    limit_m1_nm: float = 0.0
+    limit_m2_nm: float = 0.0
+    limit_total_nm: float = 0.0
+    limit_knee: float = 8.0
+    deadband_nm: float = 0.0
+    ripple_nm: float = 0.0
+    ripple_share: float = 0.0
+    ripple_order: float = 1.0
+    ripple_phase_rad: float = 0.0
     current_loop_time_s: float = 0.0
     delay_s: float = 0.0
+    generator_inertia: float = 0.0
+    generator_lag: float = 0.0
+    clutch_nm: float = 0.0
+    clutch_rise_s: float = 0.1
+    clutch_from_s: float = 0.0
+    clutch_to_s: float = 0.0
+    eddy_nm: float = 0.0
+    eddy_speed_rad_s: float = 1.0
+    wheel_inertia: float = 0.0
+    slip_stiffness_nm: float = 0.0
+    grip_nm: float = 1.0
+    relaxation_rad: float = 1.0
+    imbalance_nm: float = 0.0
+    imbalance_twice_nm: float = 0.0
+    imbalance_phase_rad: float = 0.0
+    gear_ratio: float = 1.0
+    payload_share: float = 0.0
+    payload_at_s: float = 0.0
+    payload_rise_s: float = 0.5
+    cold_factor: float = 1.0
+    warming_time_s: float = 1.0
     road: FloatArray = FLAT_ROAD
     road_start_m: float = 0.0
     metres_per_rad: float = 0.0
@@ -88,3 +176,6 @@ class Physics(NamedTuple):
     resolver_twice_rad: float = 0.0
     resolver_once_phase_rad: float = 0.0
     resolver_twice_phase_rad: float = 0.0
+    filter_time_s: float = 0.0
+    filter_rad_s: float = 0.0
+    filter_damping: float = 1.0

@@ -14,8 +14,9 @@ from enum import IntEnum
 import numpy as np
 
 from hil.errors import UsageError
-from hil.proof.truth.bus import Bus, draw_bus, draw_nominal
-from hil.proof.truth.hidden import HiddenEffect, Sizes
+from hil.proof.truth.acquisition import FAULTLESS, Acquisition
+from hil.proof.truth.bus import NOMINAL_ERROR, Bus, draw_bus, draw_nominal
+from hil.proof.truth.hidden import HiddenEffect, Interval, Sizes
 from hil.proof.truth.physics import Physics
 from hil.proof.truth.registry import find
 
@@ -71,12 +72,33 @@ class Specimen:
         """The hidden effects."""
         return find(self.effect)
 
-    def physics(self, rng: np.random.Generator) -> Physics:
-        """Return the driveline for one drive; ``rng`` draws where on the road and when an event."""
+    def physics(self, rng: np.random.Generator, test: int = 0) -> Physics:
+        """Return the driveline for one drive; ``rng`` draws where on the road and when an event.
+
+        ``test`` counts the three tests from 0: an event may be missing in one of them.
+        """
         physics = self.bus.physics()
-        for effect in self.effects:
+        for effect in self._in(test):
             physics = effect.apply(physics, self.sizes[effect.name], rng)
         return physics
+
+    def acquisition(self, test: int = 0) -> Acquisition:
+        """Return the chain from sensor to file in one of the three tests."""
+        acquisition = FAULTLESS
+        for effect in self._in(test):
+            acquisition = effect.corrupt(acquisition, self.sizes[effect.name])
+        return acquisition
+
+    def events(self, physics: Physics, test: int) -> dict[str, list[Interval]]:
+        """Return when each event of a drive takes place; empty lists for those that don't."""
+        return {
+            effect.name: [effect.when(physics)] if effect in self._in(test) else []
+            for effect in self.effects
+            if effect.when is not None
+        }
+
+    def _in(self, test: int) -> list[HiddenEffect]:
+        return [effect for effect in self.effects if effect.happens_in(test, self.sizes[effect.name])]
 
     def truth(self) -> dict[str, object]:
         """Return what is sealed: JSON types only."""
@@ -91,22 +113,55 @@ class Specimen:
         }
 
 
-def draw_specimen(effect: str, seed: int) -> Specimen:
+def draw_specimen(effect: str, seed: int, nominal_error: float = NOMINAL_ERROR) -> Specimen:
     """Draw a bus and hide an effect in it.
+
+    Parameters
+    ----------
+    effect
+        Name, or names joined by ``+``.
+    seed
+        What everything is drawn from, 0 or more.
+    nominal_error
+        Share by which each nominal value is off at most; 0 for a data sheet that is right.
 
     Raises
     ------
     UsageError
-        If the effect is not registered, or the seed is negative.
+        If an effect is not registered or two can't be in one bus, or the seed is negative.
     """
     bus = draw_bus(stream(seed, Stream.BUS))
-    return Specimen(
+    specimen = Specimen(
         effect=effect,
         seed=seed,
         bus=bus,
-        nominal=draw_nominal(bus, stream(seed, Stream.NOMINAL)),
+        nominal=draw_nominal(bus, stream(seed, Stream.NOMINAL), nominal_error),
         sizes={hidden.name: hidden.draw(_size_stream(seed, hidden), bus) for hidden in find(effect)},
     )
+    _refuse_rivals(specimen)
+    return specimen
+
+
+def _refuse_rivals(specimen: Specimen) -> None:
+    """Refuse effects that set the same thing: the last would take the place of the first."""
+    setter: dict[str, str] = {}
+    for effect in specimen.effects:
+        for name in _what_is_set_by(effect, specimen):
+            if name in setter:
+                raise UsageError(
+                    f"effect {specimen.effect!r}: expected effects of different physics, but {setter[name]} and "
+                    f"{effect.name} both set {name}. Hide them in different buses."
+                )
+            setter[name] = effect.name
+
+
+def _what_is_set_by(effect: HiddenEffect, specimen: Specimen) -> list[str]:
+    sizes = specimen.sizes[effect.name]
+    before, chain = specimen.bus.physics(), asdict(FAULTLESS)
+    after = effect.apply(before, sizes, stream(specimen.seed, Stream.SIZES))
+    physics = [name for name in Physics._fields if getattr(after, name) is not getattr(before, name)]
+    corrupted = asdict(effect.corrupt(FAULTLESS, sizes))
+    return physics + [name for name in chain if corrupted[name] != chain[name]]
 
 
 def choose_effect(names: Sequence[str], seed: int) -> str:

@@ -2,14 +2,17 @@
 
 import subprocess
 import sys
+from collections import Counter
+from itertools import combinations
 
 import numpy as np
 import pytest
 
 from hil.errors import UsageError
+from hil.proof.truth.acquisition import FAULTLESS
 from hil.proof.truth.bus import NOMINAL_ERROR, NOMINAL_TOLERANCE
 from hil.proof.truth.case import TESTS, make_case, record
-from hil.proof.truth.hidden import Place
+from hil.proof.truth.hidden import ABSENT_IN, Place, same_physics, same_recording
 from hil.proof.truth.registry import EFFECTS, find
 from hil.proof.truth.sensors import SPEED_NOISE_RAD_S, TORQUE_QUANTUM_NM
 from hil.proof.truth.specimen import draw_specimen
@@ -39,13 +42,32 @@ def test_every_effect_shows_in_the_recordings_and_changes_nothing_else(nothing, 
     specimen = draw_specimen(name, SEED)
     assert specimen.bus == nothing.specimen.bus
     assert specimen.nominal == nothing.specimen.nominal
-    recordings = [record(specimen, number) for number in range(len(TESTS))]
-    moved = [
-        np.std(with_it.speed_true_rad_s - without.speed_true_rad_s)
-        for with_it, without in zip(recordings, nothing.recordings, strict=True)
-    ]
-    assert max(moved) > SPEED_NOISE_RAD_S
-    assert all(np.abs(recording.speed_true_rad_s).max() < 150.0 for recording in recordings)
+    assert any(_shows(record(specimen, test), nothing.recordings[test]) for test in range(len(TESTS)))
+
+
+def _shows(recording, without):
+    """Say whether an effect can be seen; the driver must have done the same all the while."""
+    np.testing.assert_allclose(np.diff(recording.torque_ref_nm), np.diff(without.torque_ref_nm), atol=1e-9)
+    assert np.abs(recording.speed_true_rad_s).max() < 150.0
+    return _change(recording, without) > 0.5 * SPEED_NOISE_RAD_S
+
+
+def _change(recording, without):
+    """RMS change of the speed, or the rows that are gone."""
+    gone = np.count_nonzero(~np.isfinite(recording.speed_rad_s + recording.torque_m1_nm + recording.torque_m2_nm))
+    return np.sqrt(np.nanmean((recording.speed_rad_s - without.speed_rad_s) ** 2)) + gone
+
+
+@pytest.mark.parametrize("name", [name for name, effect in EFFECTS.items() if effect.corrupt is not same_recording])
+def test_what_spoils_a_recording_leaves_the_driveline(name):
+    specimen = draw_specimen(name, SEED)
+    assert specimen.physics(np.random.default_rng(1)) == draw_specimen("none", SEED).physics(np.random.default_rng(1))
+    assert specimen.acquisition() != FAULTLESS
+
+
+def test_an_effect_is_of_the_driveline_or_of_the_recording():
+    for name, effect in EFFECTS.items():
+        assert (effect.apply is same_physics) is (effect.corrupt is not same_recording), name
 
 
 def test_a_pair_holds_both():
@@ -55,6 +77,71 @@ def test_a_pair_holds_both():
     assert pair.truth()["element"] == ["shaft", "torque_path"]
     physics = pair.physics(np.random.default_rng(1))
     assert physics.gap_rad > 0.0 < physics.current_loop_time_s
+
+
+def test_a_pair_joins_physics_and_recording():
+    pair = draw_specimen("stale_samples+backlash", SEED)
+    assert pair.physics(np.random.default_rng(1)).gap_rad > 0.0
+    assert pair.acquisition() == draw_specimen("stale_samples", SEED).acquisition()
+
+
+def test_any_two_effects_of_different_physics_can_be_hidden_together():
+    refused = set()
+    for one, other in combinations(EFFECTS, 2):
+        try:
+            draw_specimen(f"{one}+{other}", SEED).physics(np.random.default_rng(1))
+        except UsageError:
+            refused.add((one, other))
+    assert refused == {("coulomb_friction_motor", "stribeck_friction"), ("road_grade", "corrugated_road")}
+
+
+def test_two_effects_of_one_place_are_refused_with_what_both_set():
+    with pytest.raises(UsageError, match=r"coulomb_friction_motor and stribeck_friction both set friction_motor_nm"):
+        draw_specimen("coulomb_friction_motor+stribeck_friction", SEED)
+    with pytest.raises(UsageError, match="both set gap_rad"):
+        draw_specimen("backlash+backlash", SEED)
+
+
+EVENTS = [name for name, effect in EFFECTS.items() if effect.when is not None]
+
+
+@pytest.mark.parametrize("name", EVENTS)
+def test_the_truth_has_the_times_of_an_event_in_each_recording(name):
+    case = make_case(name, SEED)
+    told = case.truth()["events"][name]
+    assert list(told) == ["run_1", "run_2", "run_3", "fresh_1", "fresh_2", "fresh_3"]
+    for intervals in told.values():
+        assert all(3.0 < begin < end <= 30.0 for begin, end in intervals)
+    absent = [test for test in range(3) if not case.specimen.effects[0].happens_in(test, case.specimen.sizes[name])]
+    assert [test for test, intervals in enumerate(list(told.values())[:3]) if not intervals] == absent
+
+
+@pytest.mark.parametrize("name", EVENTS)
+def test_an_event_is_sometimes_absent_from_one_recording_and_never_from_all(name):
+    effect, present = EFFECTS[name], Counter()
+    for seed in range(60):
+        sizes = draw_specimen(name, seed).sizes[name]
+        present[sum(effect.happens_in(test, sizes) for test in range(3))] += 1
+    assert present[3] > 10 < present[2]
+    assert present[0] == 0
+
+
+def test_a_recording_without_its_event_is_one_of_a_faultless_bus(nothing):
+    seed = next(seed for seed in range(100) if ABSENT_IN in draw_specimen("brake_drag", seed).sizes["brake_drag"])
+    braked, free = draw_specimen("brake_drag", seed), draw_specimen("none", seed)
+    absent = int(braked.sizes["brake_drag"][ABSENT_IN])
+    with_it, without = record(braked, absent), record(free, absent)
+    np.testing.assert_array_equal(with_it.speed_rad_s, without.speed_rad_s)
+
+
+def test_what_is_not_an_event_has_no_times(nothing):
+    assert nothing.truth()["events"] == {}
+    assert make_case("backlash", SEED).truth()["events"] == {}
+
+
+def test_a_data_sheet_can_be_right():
+    specimen = draw_specimen("none", SEED, nominal_error=0.0)
+    assert all(value == getattr(specimen.bus, name) for name, value in specimen.nominal.items())
 
 
 def test_sensors_have_the_resolution_and_noise_they_state(nothing):
@@ -95,7 +182,8 @@ def test_no_nominal_value_is_outside_its_tolerance(nothing):
 
 
 def test_the_truth_knows_where_the_load_was_disturbed():
-    braked = draw_specimen("brake_drag", SEED)
+    seed = next(seed for seed in range(100) if len(draw_specimen("brake_drag", seed).sizes["brake_drag"]) == 1)
+    braked = draw_specimen("brake_drag", seed)
     disturbance_nm = record(braked, 0).disturbance_nm
     assert disturbance_nm[0] == 0.0
     assert disturbance_nm.max() == pytest.approx(braked.sizes["brake_drag"]["brake_nm"], abs=1e-3)
@@ -116,8 +204,26 @@ def test_an_unknown_effect_is_refused_with_the_known_ones():
 
 def test_what_is_outside_the_catalogue_says_so():
     outside = {name for name, effect in EFFECTS.items() if not effect.catalogued}
-    assert outside == {"maxwell_shaft"}
+    assert {EFFECTS[name].place for name in outside} == set(Place) - {Place.NOWHERE}
     assert EFFECTS["none"].place is Place.NOWHERE
+
+
+CONTRACT = {
+    "torque_path": "inverter_gain_mismatch torque_derating torque_saturation actuator_lag transport_delay "
+    "torque_ripple",
+    "motor": "coulomb_friction_motor stribeck_friction quadratic_friction generator_coupled",
+    "shaft": "backlash stiffness_nonlinearity stiffness_change shaft_hysteresis cardan_second_order "
+    "extra_torsional_mode",
+    "load": "coulomb_friction_load aerodynamic_drag road_grade brake_drag tyre_slip load_imbalance inertia_change "
+    "warming_friction",
+    "speed_sensor": "resolver_error speed_filter speed_sign_blind speed_quantisation",
+    "acquisition": "stale_samples lost_samples sample_jitter clock_drift",
+}
+
+
+def test_every_name_of_the_contract_can_be_hidden_at_its_element():
+    hidden = {name: effect.place.value for name, effect in EFFECTS.items() if effect.catalogued and name != "none"}
+    assert hidden == {name: element for element, names in CONTRACT.items() for name in names.split()}
 
 
 def test_the_simulator_does_not_load_the_estimator():

@@ -3,7 +3,7 @@
 import pytest
 
 from hil.proof.truth.driver import bring_to_speed
-from hil.proof.truth.kernel import State
+from hil.proof.truth.state import State
 
 EFFECTS = {
     "nothing": {},

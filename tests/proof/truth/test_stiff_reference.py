@@ -1,10 +1,11 @@
-"""The splitting against scipy's stiff integrator with error control, all laws at once."""
+"""The splitting against scipy's stiff integrator with error control, many laws at once."""
 
 import numpy as np
+import pytest
 from scipy.integrate import solve_ivp
 
-from hil.proof.truth import laws
-from hil.proof.truth.kernel import State
+from hil.proof.truth import laws, laws_in_angle, laws_in_time, tyre
+from hil.proof.truth.state import State
 
 
 def _rates(_, y, p, torque):
@@ -24,7 +25,7 @@ def _rates(_, y, p, torque):
     ]
 
 
-def test_agrees_with_a_stiff_integration_of_all_laws_at_once(plain, trace):
+def test_agrees_with_a_stiff_integration_of_two_masses_and_all_their_laws(plain, trace):
     p = plain._replace(
         load_torque_nm=40.0,
         friction_motor_nm=15.0,
@@ -46,3 +47,81 @@ def test_agrees_with_a_stiff_integration_of_all_laws_at_once(plain, trace):
         speeds.append(y[2])
     assert np.any(np.diff(np.sign(speeds)))  # the friction did reverse
     np.testing.assert_allclose(states[1:, State.SPEED_M], speeds, atol=0.002)  # noise is 0.05 rad/s
+
+
+def _longer_rates(time_s, y, p, torque):
+    motor, extra, load = y[:3]
+    w_m, w_x, w_l, w_v, slip, bristle, filtered, rate = y[3:]
+    before, behind, first, last = (motor, extra, w_m, w_x) if p.extra_at_motor else (extra, load, w_x, w_l)
+    link = p.extra_stiffness * (before - behind) + p.extra_damping * (first - last)
+    driving, driven, fast, slow = (extra, load, w_x, w_l) if p.extra_at_motor else (motor, extra, w_m, w_x)
+    angle, slope = laws_in_angle.through_joint(p, driving)
+    stiffness = laws_in_time.stiffness_over_k(p, time_s, fast)
+    shaft = laws.shaft_torque(p, angle - driven, slope * fast - slow, stiffness)
+    on_motor, on_extra, on_load = (
+        (-link, link - slope * shaft, shaft) if p.extra_at_motor else (-slope * shaft, shaft - link, link)
+    )
+    given = torque + laws_in_angle.ripple_torque(p, motor, torque)
+    rolling = tyre.torque(p, slip, w_l, w_v)
+    held = laws.friction_torque(p.friction_load_nm, 1.0, bristle, w_l)
+    axle = p.b_L * laws_in_time.viscosity_over_warm(p, time_s) * w_l + laws_in_angle.imbalance_torque(p, load)
+    vehicle = p.J_L * laws_in_time.mass_over_empty(p, time_s) - p.wheel_inertia
+    return [
+        w_m,
+        w_x,
+        w_l,
+        (given - p.b_M * w_m - laws.eddy_torque(p, w_m) + on_motor) / p.J_M,
+        on_extra / p.extra_inertia,
+        (on_load - axle - held - rolling) / p.wheel_inertia,
+        (rolling - p.load_torque_nm - p.quadratic_load * w_v * abs(w_v)) / vehicle,
+        (w_l - w_v - abs(w_v) * slip) / p.relaxation_rad,
+        (w_l - abs(w_l) * bristle) / laws.PRESLIDING_RAD,
+        p.filter_rad_s * rate,
+        p.filter_rad_s * (w_m - filtered - 2.0 * p.filter_damping * rate),
+    ]
+
+
+@pytest.mark.parametrize("at_motor", [True, False])
+def test_agrees_with_a_stiff_integration_of_four_masses_and_their_laws(plain, trace, at_motor):
+    p = plain._replace(
+        load_torque_nm=40.0,
+        extra_at_motor=at_motor,
+        extra_inertia=0.6,
+        extra_stiffness=15000.0,
+        extra_damping=4.0,
+        joint_angle_rad=0.2,
+        stiffness_step=-0.2,
+        stiffness_step_at_s=0.2,
+        stiffness_step_rise_s=0.05,
+        ripple_nm=15.0,
+        ripple_order=4.0,
+        eddy_nm=20.0,
+        eddy_speed_rad_s=5.0,
+        wheel_inertia=4.0,
+        slip_stiffness_nm=3e4,
+        grip_nm=900.0,
+        relaxation_rad=4.0,
+        imbalance_nm=60.0,
+        gear_ratio=5.6,
+        friction_load_nm=20.0,
+        quadratic_load=0.05,
+        cold_factor=2.0,
+        payload_share=-0.3,
+        payload_at_s=0.1,
+        payload_rise_s=0.3,
+        filter_rad_s=120.0,
+        filter_damping=0.8,
+    )
+    rng = np.random.default_rng(5)
+    torques = 180.0 * rng.choice([-1.0, 1.0], 60) + 40.0
+    states = trace(p, torques)
+    y = np.zeros(11)
+    followed = []
+    for row, torque in enumerate(torques):
+        span = (0.01 * row, 0.01 * (row + 1))
+        y = solve_ivp(_longer_rates, span, y, method="Radau", args=(p, torque), rtol=1e-7, atol=1e-9).y[:, -1]
+        followed.append([y[3], y[6], y[9]])
+    read = states[1:, [State.SPEED_M, State.SPEED_V, State.FILTERED]]
+    assert np.any(np.diff(np.sign(read[:, 1])))  # the vehicle did reverse
+    np.testing.assert_allclose(read[:, :2], np.array(followed)[:, :2], atol=0.004)  # noise is 0.05 rad/s
+    np.testing.assert_allclose(read[:, 2], np.array(followed)[:, 2], atol=0.03)  # 0.1 ms of 250 rad/s^2

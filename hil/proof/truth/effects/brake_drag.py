@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from hil.proof.truth.bus import Bus
-from hil.proof.truth.hidden import HiddenEffect, Place, Sizes, log_uniform
+from hil.proof.truth.hidden import HiddenEffect, Interval, Place, Sizes, draw_absence, log_uniform
 from hil.proof.truth.physics import Physics
 
 
 def _draw(rng: np.random.Generator, bus: Bus) -> Sizes:
-    return {"brake_nm": log_uniform(rng, 30.0, 120.0)}
+    return {"brake_nm": log_uniform(rng, 30.0, 120.0), **draw_absence(rng)}
 
 
 def _apply(physics: Physics, sizes: Sizes, rng: np.random.Generator) -> Physics:
@@ -18,4 +18,8 @@ def _apply(physics: Physics, sizes: Sizes, rng: np.random.Generator) -> Physics:
     return physics._replace(brake_nm=sizes["brake_nm"], brake_from_s=from_s, brake_to_s=from_s + rng.uniform(5.0, 12.0))
 
 
-EFFECT = HiddenEffect("brake_drag", Place.LOAD, True, _draw, _apply)
+def _when(physics: Physics) -> Interval:
+    return physics.brake_from_s, physics.brake_to_s
+
+
+EFFECT = HiddenEffect("brake_drag", Place.LOAD, True, _draw, _apply, when=_when)

@@ -1,4 +1,7 @@
-"""The resolver believes in an angle that is off once (eccentricity) and twice (gain) per turn."""
+"""The resolver believes in an angle that is off once (eccentricity) and twice (gain) per turn.
+
+Each recording begins at another angle.
+"""
 
 from __future__ import annotations
 
@@ -20,11 +23,12 @@ def _draw(rng: np.random.Generator, bus: Bus) -> Sizes:
 
 
 def _apply(physics: Physics, sizes: Sizes, rng: np.random.Generator) -> Physics:
+    start_rad = rng.uniform(0.0, 2.0 * np.pi)
     return physics._replace(
         resolver_once_rad=sizes["resolver_once_rad"],
         resolver_twice_rad=sizes["resolver_twice_rad"],
-        resolver_once_phase_rad=sizes["resolver_once_phase_rad"],
-        resolver_twice_phase_rad=sizes["resolver_twice_phase_rad"],
+        resolver_once_phase_rad=sizes["resolver_once_phase_rad"] + start_rad,
+        resolver_twice_phase_rad=sizes["resolver_twice_phase_rad"] + 2.0 * start_rad,
     )
 
 

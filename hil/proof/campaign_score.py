@@ -1,0 +1,135 @@
+"""The score of one case: name, element, time, sizes, and how the augmented model does on fresh recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from estimator.physics.catalogue import EFFECTS as CATALOGUE
+from hil.proof.campaign_case import Answer
+from hil.proof.campaign_kinds import NOTHING, Group, Kind
+from hil.proof.campaign_sizes import compare
+from hil.proof.campaign_statistics import ABSTAINED, NO_MISMATCH, finite
+from hil.proof.judge import Outcome, judge
+
+Json = Mapping[str, Any]
+Intervals = Sequence[Sequence[float]]
+
+ALIKE = "alike"
+"""Outcome beside those of `Outcome`: right, by way of an effect declared to be the same to torque and speed."""
+
+FAILED = "failed"
+"""Outcome beside those of `Outcome`: a command gave no result."""
+
+RESOLUTION_S = 0.01
+"""Intervals are compared on a grid of one sample."""
+
+RECORDING_S = 30.0
+
+
+def score(kind: Kind, seed: int, truth: Json, answer: Answer) -> dict[str, Any]:
+    """Return the row of one case in ``results.jsonl``; JSON types only."""
+    row: dict[str, Any] = {
+        "kind": kind.name,
+        "group": kind.group.value,
+        "seed": seed,
+        "outcome": FAILED,
+        "success": False,
+        "fault": answer.fault,
+        "diagnose_s": round(answer.diagnose_s, 2),
+        "simulate_s": round(answer.simulate_s, 2),
+        "fresh_over_floor": [finite(value) for value in answer.fresh_over_floor],
+        "hidden": truth["hidden"],
+    }
+    if answer.diagnosis is None:
+        return row
+    diagnosis = _with_all_equivalents(answer.diagnosis)
+    outcome = _outcome(diagnosis, truth)
+    return {
+        **row,
+        "outcome": outcome,
+        "success": is_success(kind.group, outcome),
+        "verdict": diagnosis["verdict"],
+        "named": [effect["name"] for effect in diagnosis["effects"]],
+        "element": diagnosis["mismatch"]["element"],
+        "element_right": _element_right(diagnosis, truth),
+        "event_iou": _event_ious(diagnosis, truth),
+        "sizes": [{**asdict(size), "inside": size.inside} for size in compare(diagnosis, truth)],
+        "fit": dict(diagnosis["fit"]),
+    }
+
+
+def is_success(group: Group, outcome: str) -> bool:
+    """Say whether an outcome is what a group's cases should end in."""
+    if group is Group.OUTSIDE:
+        return outcome == _name(Outcome.ABSTAINED)
+    return outcome in (_name(Outcome.RIGHT), ALIKE)
+
+
+def right_columns(planted: Kind) -> set[str]:
+    """Return the columns of the confusion matrix that are right for a kind."""
+    if planted.group in (Group.NONE, Group.OFF):
+        return {NO_MISMATCH}
+    if planted.group is Group.OUTSIDE:
+        return {ABSTAINED}
+    return {planted.name, *(name for name, entry in CATALOGUE.items() if planted.name in entry.equivalent)}
+
+
+def _name(outcome: Outcome) -> str:
+    return outcome.name.lower()
+
+
+def _with_all_equivalents(diagnosis: Json) -> dict[str, Any]:
+    """Declare effects alike in both directions: that one lists the other is enough."""
+    effects = []
+    for effect in diagnosis["effects"]:
+        name = effect["name"]
+        listing = [other for other, entry in CATALOGUE.items() if name in entry.equivalent]
+        alike = list(dict.fromkeys([*effect["indistinguishable_from"], *listing]))
+        effects.append({**effect, "indistinguishable_from": alike})
+    return {**diagnosis, "effects": effects}
+
+
+def _outcome(diagnosis: Json, truth: Json) -> str:
+    judgement = judge(diagnosis, {**truth, "hidden": {}})
+    if judgement.outcome is Outcome.RIGHT and set(judgement.named) != set(judgement.hidden):
+        return ALIKE
+    return _name(judgement.outcome)
+
+
+def _element_right(diagnosis: Json, truth: Json) -> bool | None:
+    """Compare elements: of the strongest mismatch, and of all that was named; None where nothing is hidden."""
+    if truth["effect"] == NOTHING:
+        return None
+    elements = set(truth["element"])
+    named = {effect["element"] for effect in diagnosis["effects"]}
+    return diagnosis["mismatch"]["element"] in elements and named <= elements
+
+
+def _event_ious(diagnosis: Json, truth: Json) -> dict[str, float]:
+    """Mean over the recordings of intersection over union, for each event that was named and given times."""
+    given = {effect["name"]: effect["time_s"] for effect in diagnosis["effects"] if effect["time_s"]}
+    ious = {}
+    for name, recordings in truth["events"].items():
+        if name in given:
+            runs = [run for run in recordings if run.startswith("run_")]
+            ious[name] = float(np.mean([iou(given[name].get(run, []), recordings[run]) for run in runs]))
+    return ious
+
+
+def iou(found: Intervals, true: Intervals) -> float:
+    """Return the time in both sets of intervals over the time in either; 1 where both are empty."""
+    time_s = np.arange(0.5 * RESOLUTION_S, RECORDING_S, RESOLUTION_S)
+    a, b = _inside(time_s, found), _inside(time_s, true)
+    either = np.count_nonzero(a | b)
+    return 1.0 if either == 0 else float(np.count_nonzero(a & b) / either)
+
+
+def _inside(time_s: np.ndarray[Any, Any], intervals: Intervals) -> np.ndarray[Any, Any]:
+    inside = np.zeros(time_s.shape, dtype=np.bool_)
+    for begin, end in intervals:
+        inside |= (time_s >= begin) & (time_s <= end)
+    return inside

@@ -1,0 +1,124 @@
+"""What may act at the wheels: friction, slip, heavy spots, payload, cold oil."""
+
+import numpy as np
+import pytest
+
+from hil.proof.truth import laws_in_time, tyre
+from hil.proof.truth.driveline import TruthDriveline
+from hil.proof.truth.state import State
+
+
+def test_dry_friction_at_the_load_holds_it_and_then_slides(plain, trace):
+    p = plain._replace(friction_load_nm=30.0)
+    held = trace(p, [20.0] * 300)
+    assert abs(held[-1, State.SPEED_L]) < 1e-3
+    free, rough = (trace(q, [0.0] * 100, speed_rad_s=60.0)[-1, State.SPEED_L] for q in (plain, p))
+    assert (p.J_M + p.J_L) * (free - rough) == pytest.approx(30.0, rel=0.01)  # over one second
+
+
+def test_a_brake_comes_on_top_of_dry_friction(plain, trace):
+    p = plain._replace(b_M=0.0, b_L=0.0, friction_load_nm=30.0, brake_nm=50.0, brake_from_s=0.0, brake_to_s=40.0)
+    states = trace(p, [0.0] * 300, speed_rad_s=60.0)
+    momentum = p.J_M * states[:, State.SPEED_M] + p.J_L * states[:, State.SPEED_L]
+    assert momentum[100] - momentum[200] == pytest.approx(80.0, rel=1e-3)
+
+
+@pytest.fixture
+def slipping(plain):
+    return plain._replace(
+        b_M=0.0, b_L=0.0, wheel_inertia=4.0, slip_stiffness_nm=2e4, grip_nm=1500.0, relaxation_rad=4.0
+    )
+
+
+def test_a_small_torque_slips_by_itself_over_the_slip_stiffness(slipping, trace):
+    torque = 40.0
+    states = trace(slipping, [torque] * 500, speed_rad_s=60.0)
+    wheels, vehicle = states[-1, State.SPEED_L], states[-1, State.SPEED_V]
+    inertia = slipping.J_M + slipping.J_L
+    to_vehicle = torque * (slipping.J_L - slipping.wheel_inertia) / inertia
+    assert (wheels - vehicle) / vehicle == pytest.approx(to_vehicle / slipping.slip_stiffness_nm, rel=0.02)
+
+
+def test_the_slip_builds_up_over_the_relaxation_length(slipping):
+    """After rolling one relaxation length at a constant slip speed, 63 % of the steady slip is there."""
+    at_once = tyre.slip_after(0.0, slipping, 51.0, 50.0, slipping.relaxation_rad / 50.0)
+    assert at_once == pytest.approx(0.02 * (1.0 - np.exp(-1.0)))
+    in_steps = 0.0
+    for _ in range(100):
+        in_steps = tyre.slip_after(in_steps, slipping, 51.0, 50.0, slipping.relaxation_rad / 5000.0)
+    assert in_steps == pytest.approx(at_once)
+
+
+def test_a_tyre_gives_no_more_than_its_grip(slipping):
+    torques = np.array([tyre.torque(slipping, slip, 60.0, 60.0) for slip in np.linspace(-1.0, 1.0, 401)])
+    assert torques.max() == pytest.approx(slipping.grip_nm, rel=1e-3)
+    assert torques.min() == -torques.max()
+    assert abs(torques[0]) < 0.95 * slipping.grip_nm  # and less when it spins
+    small = tyre.torque(slipping, 1e-4, 60.0, 60.0)
+    assert small == pytest.approx(1e-4 * slipping.slip_stiffness_nm, rel=1e-3)
+
+
+def test_a_tyre_that_hardly_slips_is_a_rigid_one(plain, slipping, trace):
+    rng = np.random.default_rng(4)
+    torques = 200.0 * rng.choice([-1.0, 1.0], 300)
+    stiff = slipping._replace(slip_stiffness_nm=2e7, grip_nm=1e6, relaxation_rad=1.0, b_M=plain.b_M, b_L=plain.b_L)
+    rigid, rolling = (trace(p, torques, speed_rad_s=60.0) for p in (plain, stiff))
+    np.testing.assert_allclose(rolling[:, State.SPEED_M], rigid[:, State.SPEED_M], atol=0.03)  # of 5 rad/s
+
+
+def test_a_slipping_tyre_keeps_the_momentum(slipping, trace):
+    states = trace(slipping, [300.0] * 100 + [0.0] * 200)[100:]
+    inertia = [slipping.J_M, slipping.wheel_inertia, slipping.J_L - slipping.wheel_inertia]
+    momentum = states[:, [State.SPEED_M, State.SPEED_L, State.SPEED_V]] @ inertia
+    np.testing.assert_allclose(momentum, momentum[0], rtol=1e-9)
+
+
+def test_a_heavy_spot_returns_with_each_turn_of_the_wheel(plain):
+    p = plain._replace(b_M=0.0, b_L=0.0, imbalance_nm=50.0, imbalance_twice_nm=20.0, gear_ratio=5.6)
+    driveline = TruthDriveline(p, 40.0)
+    n, turn_s = 2000, 2 * np.pi * 5.6 / 40.0
+    speed = np.empty(n)
+    for i in range(n):
+        speed[i] = driveline.quantity(State.SPEED_L)
+        driveline.advance((0.0, 0.0), turn_s / n)
+    amplitude = 2 * np.abs(np.fft.rfft(speed - np.linspace(speed[0], speed[-1], n))) / n
+    per_turn = 40.0 / 5.6
+    assert amplitude[1] == pytest.approx(50.0 / ((p.J_M + p.J_L) * per_turn), rel=0.05)
+    assert amplitude[2] == pytest.approx(20.0 / ((p.J_M + p.J_L) * 2 * per_turn), rel=0.15)
+
+
+def test_a_payload_that_goes_leaves_the_speed_and_quickens_the_bus(lossless, trace):
+    p = lossless._replace(payload_share=-0.3, payload_at_s=2.0, payload_rise_s=0.2)
+    coasting = trace(p, [0.0] * 400, speed_rad_s=40.0)
+    np.testing.assert_allclose(coasting[:, State.SPEED_M], 40.0, rtol=1e-9)
+    driven = trace(p._replace(c=60.0), [100.0] * 600)
+    momentum_m, momentum_l = p.J_M * driven[:, State.SPEED_M], driven[:, State.SPEED_L]
+    first, last = slice(100, 200), slice(400, 600)
+    for part, share in ((first, 1.0), (last, 0.7)):
+        rate = np.gradient(momentum_m[part] + share * p.J_L * momentum_l[part], 0.01)
+        assert rate.mean() == pytest.approx(100.0, rel=0.01)
+
+
+def test_a_heavier_bus_is_pulled_more_by_a_hill(lossless, trace):
+    road = np.array([[100.0, 0.001, 0.0]])  # a tenth uphill for hundreds of metres
+    p = lossless._replace(road=road, metres_per_rad=0.0857, gravity_nm=8000.0, payload_share=0.5, payload_rise_s=1e-3)
+    light, heavy = (
+        trace(q, [0.0] * 200, speed_rad_s=60.0)[-1, State.SPEED_L] for q in (p._replace(payload_share=0), p)
+    )
+    # weight and inertia grow alike; the motor's inertia, which helps the bus along, does not
+    assert 0.0 < light - heavy < 0.02 * (60.0 - light)
+
+
+def test_cold_oil_warms_to_the_data_sheet(plain):
+    p = plain._replace(cold_factor=3.0, warming_time_s=5.0)
+    factors = [laws_in_time.viscosity_over_warm(p, time_s) for time_s in (0.0, 5.0, 100.0)]
+    np.testing.assert_allclose(factors, [3.0, 3.0 ** np.exp(-1.0), 1.0], rtol=1e-6)
+    assert laws_in_time.viscosity_over_warm(plain, 0.0) == 1.0
+
+
+def test_cold_oil_brakes_by_its_factor(plain):
+    p = plain._replace(k=0.0, c=0.0, cold_factor=3.0, warming_time_s=5.0)
+    driveline = TruthDriveline(p, 50.0)
+    driveline.advance((0.0, 0.0), 1e-3)
+    lost = (50.0 - driveline.quantity(State.SPEED_L)) * p.J_L / 1e-3
+    assert lost == pytest.approx(3.0 * p.b_L * 50.0, rel=1e-3)

@@ -1,0 +1,171 @@
+"""What happens between the sensor and the file, measured on the recording."""
+
+import numpy as np
+import pytest
+
+from hil.proof.truth.acquisition import FAULTLESS, Acquisition
+from hil.proof.truth.case import _sample
+from hil.proof.truth.driveline import TruthDriveline
+from hil.proof.truth.readings import CURVATURE_SPEED_RAD_S, sampling_instants_s, speed_as_read
+from hil.proof.truth.rows import FLAG_M1, FLAG_M2, Rows, as_recorded, runs
+from hil.proof.truth.sensors import SPEED_NOISE_RAD_S
+
+N = 3000
+TIME_S = np.arange(N) * 0.01
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(12)
+
+
+@pytest.fixture
+def rows(rng):
+    """Three columns in which no value comes twice."""
+    return Rows(rng.normal(100.0, 10.0, N), rng.normal(80.0, 10.0, N), rng.normal(50.0, 5.0, N))
+
+
+def test_a_faultless_chain_changes_no_row_and_samples_in_time(rows, rng):
+    assert as_recorded(rows, FAULTLESS, rng) is rows
+    np.testing.assert_array_equal(sampling_instants_s(TIME_S, FAULTLESS, rng), TIME_S)
+
+
+@pytest.mark.parametrize("tau", [0.004, 0.02])
+def test_a_first_order_filter_reaches_63_percent_after_its_time_constant(plain, tau):
+    p = plain._replace(k=0.0, c=0.0, b_M=0.0, filter_time_s=tau)
+    driveline = TruthDriveline(p, 0.0)
+    driveline.advance((1.6e5, 0.0), 1e-4)  # 10 rad/s in one step
+    driveline.advance((0.0, 0.0), tau)
+    assert driveline.speed_rad_s == pytest.approx(10.0 * (1.0 - np.exp(-1.0)), rel=0.02)
+
+
+def test_a_second_order_filter_has_its_corner_and_no_gain_at_rest(plain):
+    p = plain._replace(k=0.0, c=0.0, b_M=0.0, filter_rad_s=100.0, filter_damping=0.7)
+    driveline = TruthDriveline(p, 30.0)
+    driveline.advance((0.0, 0.0), 1.0)
+    assert driveline.speed_rad_s == pytest.approx(30.0)
+    omega, read = 100.0, []
+    for step in range(4000):
+        driveline.advance((1.6 * 50.0 * np.cos(omega * step * 5e-4), 0.0), 5e-4)
+        read.append(driveline.speed_rad_s)
+    swing = np.ptp(read[-1000:]) / 2
+    assert swing == pytest.approx(50.0 / omega / (2 * 0.7), rel=0.01)  # 1 / (2 zeta) at the corner
+
+
+def test_a_blind_sensor_reads_the_magnitude(rng):
+    read = speed_as_read(np.linspace(-40.0, 40.0, N), Acquisition(sign_blind=True), rng)
+    np.testing.assert_allclose(read, np.abs(np.linspace(-40.0, 40.0, N)), atol=6 * SPEED_NOISE_RAD_S)
+    assert read.min() >= 0.0
+
+
+def test_a_coarse_number_has_its_step_and_no_offset(rng):
+    true = np.linspace(10.0, 70.0, N)
+    read = speed_as_read(true, Acquisition(grid_rad_s=0.5), rng)
+    np.testing.assert_allclose(read / 0.5, np.round(read / 0.5), atol=1e-9)
+    assert np.std(read - true) == pytest.approx(np.hypot(0.5 / np.sqrt(12), SPEED_NOISE_RAD_S), rel=0.05)
+    assert abs(np.mean(read - true)) < 0.02
+
+
+def test_counts_of_an_encoder_come_in_whole_ones_and_are_right_on_average(rng):
+    true = np.linspace(-30.0, 70.0, N)
+    read = speed_as_read(true, Acquisition(count_rad=5e-4, count_time_s=1e-3), rng)
+    counts = read * 1e-3 / 5e-4
+    np.testing.assert_allclose(counts, np.round(counts), atol=1e-9)
+    assert abs(np.mean(read - true)) < 0.02
+    assert np.abs(read - true).max() < 0.5 + 6 * SPEED_NOISE_RAD_S
+
+
+def test_a_curved_sensor_misses_its_share_at_the_stated_speed(rng):
+    read = speed_as_read(np.full(N, CURVATURE_SPEED_RAD_S), Acquisition(curvature=0.05), rng)
+    assert read.mean() == pytest.approx(0.95 * CURVATURE_SPEED_RAD_S, abs=0.01)
+    backwards = speed_as_read(np.full(N, -0.5 * CURVATURE_SPEED_RAD_S), Acquisition(curvature=0.05), rng)
+    assert backwards.mean() == pytest.approx(-0.975 * 0.5 * CURVATURE_SPEED_RAD_S, abs=0.01)
+
+
+def test_jitter_stays_within_its_size_and_a_clock_runs_away(rng):
+    deviation = sampling_instants_s(TIME_S, Acquisition(jitter_s=0.002), rng) - TIME_S
+    assert 0.0019 < np.abs(deviation).max() <= 0.002
+    assert np.std(deviation) == pytest.approx(0.002 / np.sqrt(3), rel=0.05)
+    drifting = sampling_instants_s(TIME_S, Acquisition(clock_error=-0.001), rng)
+    np.testing.assert_allclose(drifting, 0.999 * TIME_S)
+
+
+def test_a_speed_sampled_late_is_the_speed_of_that_moment(plain, rng):
+    """Off-grid sampling is exact: a driveline stopped at each instant anew has the same speeds."""
+    torques = 100.0 * rng.choice([-1.0, 1.0], 40)
+    instants = np.sort(rng.uniform(0.0, 0.45, 40))  # the last ones after the last torque has begun
+    speeds, _ = _sample(TruthDriveline(plain, 20.0), torques, 0.5 * torques, instants)
+    for instant, speed in list(zip(instants, speeds, strict=True))[::5]:
+        fresh, whole = TruthDriveline(plain, 20.0), min(int(instant / 0.01), 39)
+        for torque in torques[:whole]:
+            fresh.advance((torque, 0.5 * torque), 0.01)
+        fresh.advance((torques[whole], 0.5 * torques[whole]), instant - 0.01 * whole)
+        assert speed == pytest.approx(fresh.speed_rad_s, abs=1e-4)
+
+
+def test_stale_speeds_repeat_the_last_good_one_and_leave_the_torques(rows, rng):
+    stale = as_recorded(rows, Acquisition(stale_share=0.05, stale_most=3), rng)
+    repeated = np.flatnonzero(np.diff(stale.speed_rad_s) == 0.0) + 1
+    assert 0.05 * N < repeated.size < 0.15 * N
+    kept = np.setdiff1d(np.arange(N), repeated)
+    np.testing.assert_array_equal(stale.speed_rad_s[kept], rows.speed_rad_s[kept])
+    assert stale.torque_m1_nm is rows.torque_m1_nm
+    assert stale.flags is None
+
+
+def test_rows_can_be_stale_as_a_whole_and_in_a_beat(rows, rng):
+    stale = as_recorded(rows, Acquisition(stale_every=20, stale_rows=True), rng)
+    for before, after in zip(
+        (rows.torque_m1_nm, rows.torque_m2_nm, rows.speed_rad_s),
+        (stale.torque_m1_nm, stale.torque_m2_nm, stale.speed_rad_s),
+        strict=True,
+    ):
+        repeated = np.flatnonzero(np.diff(after) == 0.0) + 1
+        np.testing.assert_array_equal(repeated, np.arange(19, N, 20))
+        np.testing.assert_array_equal(after[repeated], before[repeated - 1])
+
+
+def test_lost_samples_are_nan_and_flagged_in_their_row(rows, rng):
+    lost = as_recorded(rows, Acquisition(lost_share=0.02, lost_most=10, lost_m2=True, lost_speed=True), rng)
+    gone = np.isnan(lost.torque_m2_nm)
+    assert 0.05 * N < gone.sum() < 0.2 * N
+    np.testing.assert_array_equal(gone, np.isnan(lost.speed_rad_s))
+    assert np.isfinite(lost.torque_m1_nm).all()
+    np.testing.assert_array_equal(lost.flags, np.where(gone, FLAG_M1 + FLAG_M2, 0))
+    only_m2 = as_recorded(rows, Acquisition(lost_share=0.02, lost_m2=True), rng)
+    assert set(np.unique(only_m2.flags)) == {0, FLAG_M2}
+
+
+def test_a_lost_sample_may_be_a_zero_that_nobody_flagged(rows, rng):
+    lost = as_recorded(rows, Acquisition(lost_share=0.02, lost_m1=True, lost_as_zero=True), rng)
+    assert lost.flags is None
+    assert 0.01 * N < np.count_nonzero(lost.torque_m1_nm == 0.0) < 0.03 * N
+    assert np.isfinite(lost.torque_m1_nm).all()
+
+
+def test_wrong_bits_hit_single_speeds_and_hit_them_hard(rows, rng):
+    spiked = as_recorded(rows, Acquisition(spike_share=0.01, spike_rad_s=6.0), rng)
+    error = np.abs(spiked.speed_rad_s - rows.speed_rad_s)
+    assert 0.004 * N < np.count_nonzero(error) < 0.02 * N
+    assert error[error > 0.0].min() >= 0.3 * 6.0
+    assert error.max() <= 6.0
+
+
+def test_losses_come_last(rows, rng):
+    """What was lost is lost: nothing repeats it, and nothing is added to it."""
+    everything = Acquisition(
+        stale_share=0.05, lost_share=0.05, lost_speed=True, lost_as_zero=True, spike_share=0.5, spike_rad_s=9.0
+    )
+    lost = as_recorded(rows, everything, rng).speed_rad_s == 0.0
+    assert np.count_nonzero(lost) == pytest.approx(0.05 * N, rel=0.3)
+
+
+def test_runs_have_no_more_than_their_most_and_spare_the_first_sample():
+    for seed in range(20):
+        hit = runs(N, 0.3, 1, np.random.default_rng(seed))
+        assert not hit[0]
+    sparse = runs(200_000, 1e-3, 4, np.random.default_rng(1))
+    edges = np.flatnonzero(np.diff(sparse.astype(int)))
+    lengths = edges[1::2] - edges[::2]
+    assert set(lengths) >= {1, 2, 3, 4}
+    assert np.median(lengths) <= 4

@@ -1,0 +1,139 @@
+"""What a shaft may be beyond a spring: cracked, stiffened by speed, hysteretic, bent at a joint, or two shafts."""
+
+import numpy as np
+import pytest
+
+from hil.proof.truth import iwan, laws_in_angle
+from hil.proof.truth.driveline import TruthDriveline
+from hil.proof.truth.state import State
+
+
+def _ringing_rad_s(states, period_s):
+    """Angular frequency at which motor and load swing against each other."""
+    speed = states[:, State.SPEED_M] - states[:, State.SPEED_L]
+    up = np.flatnonzero((speed[:-1] < 0) & (speed[1:] >= 0))
+    crossing = (up - speed[up] / (speed[up + 1] - speed[up])) * period_s
+    return 2 * np.pi * (up.size - 1) / (crossing[-1] - crossing[0])
+
+
+def test_a_crack_changes_the_frequency_from_its_moment_on(lossless, trace):
+    p = lossless._replace(stiffness_step=-0.3, stiffness_step_at_s=2.0, stiffness_step_rise_s=0.05)
+    states = trace(p, [400.0] * 5 + [0.0] * 3995, period_s=0.001)
+    free = np.sqrt(p.k * (1 / p.J_M + 1 / p.J_L))
+    assert _ringing_rad_s(states[5:2000], 0.001) == pytest.approx(free, rel=1e-4)
+    assert _ringing_rad_s(states[2051:], 0.001) == pytest.approx(free * np.sqrt(0.7), rel=1e-4)
+
+
+def test_a_shaft_stiffened_by_speed_rings_higher_when_it_turns(lossless, trace):
+    p = lossless._replace(stiffness_speed_share=0.4, stiffness_speed_rad_s=30.0)
+    free = np.sqrt(p.k * (1 / p.J_M + 1 / p.J_L))
+    for speed, factor in ((0.0, 1.0), (30.0, 1.2), (3000.0, 1.4)):
+        states = trace(p, [40.0] * 5 + [0.0] * 2000, period_s=0.001, speed_rad_s=speed)
+        assert _ringing_rad_s(states[5:], 0.001) == pytest.approx(free * np.sqrt(factor), rel=2e-3)
+
+
+@pytest.fixture
+def sliding(plain):
+    return plain._replace(hysteresis_stiffness=1600.0, hysteresis_slip_rad=0.04)
+
+
+def _along(p, twists):
+    deflections, torques = np.zeros(iwan.ELEMENTS), []
+    for change in np.diff(twists, prepend=0.0):
+        iwan.follow(deflections, p, change)
+        torques.append(iwan.torque(deflections, p))
+    return np.array(torques)
+
+
+def test_sliders_are_stiff_for_small_twists_and_give_way_to_large_ones(sliding):
+    torque = _along(sliding, np.array([0.004, 0.02, 0.04, 0.08]))
+    assert torque[0] == pytest.approx(1600.0 * 0.004)
+    assert torque[1] < 0.9 * 1600.0 * 0.02
+    limits = 0.04 * np.arange(1, iwan.ELEMENTS + 1) / iwan.ELEMENTS
+    assert torque[2] == pytest.approx(torque[3]) == pytest.approx(1600.0 * limits.mean())
+
+
+def test_a_cycle_of_large_twist_loses_four_times_limit_by_what_slides(sliding):
+    """Each element slides by 2 (A - limit) in each direction under stiffness times limit."""
+    A = 0.06
+    there_and_back = np.concatenate([np.linspace(A, -A, 4001), np.linspace(-A, A, 4001)[1:]])
+    torque = _along(sliding, np.concatenate([[A], there_and_back]))[1:]
+    lost = np.sum(0.5 * (torque[1:] + torque[:-1]) * np.diff(there_and_back))
+    limits = 0.04 * np.arange(1, iwan.ELEMENTS + 1) / iwan.ELEMENTS
+    assert lost == pytest.approx(np.sum(1600.0 / iwan.ELEMENTS * limits * 4 * (A - limits)), rel=1e-3)
+
+
+def test_hysteresis_damps_a_large_swing_and_leaves_a_small_one(lossless, trace, twist):
+    p = lossless._replace(k=3000.0, hysteresis_stiffness=1200.0, hysteresis_slip_rad=0.04)
+    peaks = []
+    for torque in (1.0, 400.0):
+        swing = np.abs(twist(trace(p, [torque] * 50 + [0.0] * 1500, period_s=0.001)))[50:]
+        peaks.append(swing[-300:].max() / swing[:300].max())
+    assert peaks[0] == pytest.approx(1.0, abs=0.01)
+    assert peaks[1] < 0.6
+
+
+def test_an_open_gap_carries_no_hysteresis(plain, trace, twist):
+    p = plain._replace(gap_rad=0.02, hysteresis_stiffness=1600.0, hysteresis_slip_rad=0.03, b_M=0.0)
+    states = trace(p, [100.0] * 600 + [-100.0] * 100, period_s=0.001)
+    across = np.abs(twist(states)) < 0.5 * p.gap_rad - 1e-4
+    inside = across[:-1] & across[1:] & (np.arange(across.size - 1) >= 600)
+    assert inside.any()
+    np.testing.assert_allclose(np.diff(states[:, State.SPEED_M])[inside] / 0.001, -100.0 / p.J_M, rtol=1e-6)
+
+
+def test_a_bent_joint_leads_and_lags_twice_per_turn(plain):
+    bend = 0.2
+    p = plain._replace(joint_angle_rad=bend)
+    angles = np.linspace(0.0, 2 * np.pi, 721)
+    behind, slope = np.array([laws_in_angle.through_joint(p, angle) for angle in angles]).T
+    np.testing.assert_allclose(np.tan(behind[1:80]), np.cos(bend) * np.tan(angles[1:80]), rtol=1e-12)
+    np.testing.assert_allclose(np.gradient(behind, angles)[1:-1], slope[1:-1], atol=2e-5)
+    assert slope.max() == pytest.approx(1 / np.cos(bend))
+    assert slope.min() == pytest.approx(np.cos(bend))
+    lead = 2 * np.abs(np.fft.rfft((behind - angles)[:-1])) / 720
+    assert np.argmax(lead) == 2
+    assert lead[2] == pytest.approx(bend**2 / 4, rel=0.02)
+
+
+def test_a_joint_takes_and_gives_no_energy(lossless, trace):
+    p = lossless._replace(joint_angle_rad=0.2, joint_phase_rad=0.4)
+    states = trace(p, [300.0] * 10 + [0.0] * 500, speed_rad_s=20.0)[10:]
+    behind = np.array([laws_in_angle.through_joint(p, angle)[0] for angle in states[:, State.ANGLE_M]])
+    elastic = 0.5 * p.k * (behind - states[:, State.ANGLE_L]) ** 2
+    energy = elastic + 0.5 * (p.J_M * states[:, State.SPEED_M] ** 2 + p.J_L * states[:, State.SPEED_L] ** 2)
+    assert np.ptp(elastic) > 1.0
+    np.testing.assert_allclose(energy, energy[0], atol=2e-3 * np.ptp(elastic))
+
+
+@pytest.mark.parametrize("at_motor", [True, False])
+def test_three_masses_ring_at_the_eigenfrequencies_of_three_masses(lossless, at_motor):
+    p = lossless._replace(extra_inertia=0.5, extra_stiffness=15000.0, extra_at_motor=at_motor)
+    first, second = (p.extra_stiffness, p.k) if at_motor else (p.k, p.extra_stiffness)
+    K = np.array([[first, -first, 0], [-first, first + second, -second], [0, -second, second]])
+    squares = np.linalg.eigvals(K / np.array([[p.J_M], [p.extra_inertia], [p.J_L]]))
+    expected = np.sqrt(np.sort(squares.real)[1:])
+    driveline = TruthDriveline(p)
+    driveline.advance((400.0, 0.0), 0.002)
+    n = 40_000
+    speed = np.empty(n)
+    for i in range(n):
+        speed[i] = driveline.quantity(State.SPEED_M)
+        driveline.advance((0.0, 0.0), 0.001)
+    power = np.abs(np.fft.rfft((speed - speed.mean()) * np.hanning(n)))
+    peaks = np.flatnonzero((power[1:-1] > power[:-2]) & (power[1:-1] > power[2:])) + 1
+    strongest = np.sort(peaks[np.argsort(power[peaks])[-2:]]) * 2 * np.pi / (n * 0.001)
+    np.testing.assert_allclose(strongest, expected, atol=2 * np.pi / (n * 0.001))
+
+
+@pytest.mark.parametrize("at_motor", [True, False])
+def test_an_extra_inertia_keeps_momentum_and_energy(lossless, trace, at_motor):
+    p = lossless._replace(extra_inertia=0.5, extra_stiffness=15000.0, extra_at_motor=at_motor)
+    states = trace(p, [300.0] * 10 + [0.0] * 500)[10:]
+    inertia = np.array([p.J_M, p.extra_inertia, p.J_L])
+    speed = states[:, [State.SPEED_M, State.SPEED_X, State.SPEED_L]]
+    angle = states[:, [State.ANGLE_M, State.ANGLE_X, State.ANGLE_L]]
+    np.testing.assert_allclose(speed @ inertia, (speed @ inertia)[0], rtol=1e-9)
+    springs = np.array([p.extra_stiffness, p.k] if at_motor else [p.k, p.extra_stiffness])
+    energy = 0.5 * (speed**2 @ inertia + np.diff(angle, axis=1) ** 2 @ springs)
+    np.testing.assert_allclose(energy, energy[0], rtol=1e-4)
