@@ -1,0 +1,10 @@
+"""Faults of the acquisition, recognised in the raw recordings and compensated, so that mechanics can be judged."""
+
+from estimator.diagnosis.acquisition.as_read import as_read
+from estimator.diagnosis.acquisition.compensate import compensate
+from estimator.diagnosis.acquisition.finding import OUTPUT, Finding, Sized
+from estimator.diagnosis.acquisition.hidden_jitter import hidden_jitter
+from estimator.diagnosis.acquisition.recognise import recognise
+from estimator.diagnosis.acquisition.repair import Misfit, repaired
+
+__all__ = ["OUTPUT", "Finding", "Misfit", "Sized", "as_read", "compensate", "hidden_jitter", "recognise", "repaired"]

@@ -1,0 +1,198 @@
+"""Sample jitter that no stamp tells of, from the errors of a converged simulation.
+
+A reading taken ``tau`` off its time is off by ``slope * tau``. So the error's variance follows the slope::
+
+    var e = s^2 + sigma_t^2 slope^2
+
+Missing mechanics leaves errors that are large where the slope is large, too. But such an error goes on from one row to
+the next and follows the motion, while jitter changes from row to row at random. What the error's own past and the
+slopes around explain is taken off first; of the rest it is asked whether its square follows the squared slope, in the
+many and not in a few rows only, and whether neighbours are independent.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from scipy import optimize, stats
+
+from estimator.diagnosis.acquisition.finding import OUTPUT, Finding, Sized
+from estimator.diagnosis.acquisition.limits import LEVEL, SMALLEST_P
+from estimator.signals.record import BoolArray, FloatArray, Record
+
+PAST = 8
+"""Past errors that may explain an error: most of a period of a driveline's first mode at 10 ms."""
+
+AROUND = 3
+"""Slopes before and after that may explain it: a delay, a lag or a wrong inertia show as a mix of them."""
+
+LEAST_GAIN = 0.05
+"""Share of the error's variance that jitter must account for, on average: less changes no fit."""
+
+MOST_OF_IT = 0.5
+"""Share of the error's variance beyond the noise that must be jitter: where other things leave more, the model has not
+converged, and what is left of their error may follow the slope in ways that nothing here accounts for."""
+
+OF_THE_MANY = 0.4
+"""Jitter seen in the median must be this share of that seen in the mean. Between Gaussian and uniform jitter it is 1 to
+1.6; a few wild rows (stale samples, a clunk) leave nothing in the median."""
+
+NEIGHBOURS = 0.25
+"""Correlation of neighbouring errors, weighed by slope, up to which they count as independent."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Rest:
+    """What is left of the errors of all recordings, with slopes, and the same of the row after; shape (n,)."""
+
+    error: FloatArray
+    slope: FloatArray
+    next_error: FloatArray
+    next_slope: FloatArray
+
+
+def hidden_jitter(
+    records: Sequence[Record], errors: Sequence[FloatArray], slopes: Sequence[FloatArray], okay: Sequence[BoolArray]
+) -> Finding | None:
+    """Recognise jitter in the errors of a simulation that explains everything else.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        Name the recordings.
+    errors : sequence of ndarray, shape (N,)
+        Recorded less simulated output, per recording.
+    slopes : sequence of ndarray, shape (N,)
+        Rate of the simulated output [its unit per second].
+    okay : sequence of ndarray of bool, shape (N,)
+        Rows that count.
+
+    Returns
+    -------
+    Finding or None
+        ``sample_jitter`` with its standard deviation; None where the errors don't show any.
+    """
+    rests = [rest for data in zip(errors, slopes, okay, strict=True) if (rest := _rest(*data)) is not None]
+    if not rests:
+        return None
+    fields = ("error", "slope", "next_error", "next_slope")
+    rest = _Rest(*(np.concatenate([getattr(one, name) for one in rests]) for name in fields))
+    p_value = _score_p_value(rest.error, rest.slope)
+    if p_value > LEVEL:
+        return None
+    found = _likeliest(rest.error, rest.slope)
+    if found is None or not (_of_the_many(rest, found) and _independent(rest)):
+        return None
+    whole = np.concatenate([error[good] - error[good].mean() for error, good in zip(errors, okay, strict=True)])
+    if found.jitter_s**2 * np.mean(rest.slope**2) < MOST_OF_IT * (np.mean(whole**2) - found.noise**2):
+        return None
+    jitter_s, ci95 = found.jitter_s, found.ci95
+    return Finding(
+        name="sample_jitter",
+        parameters={"jitter_s": Sized(jitter_s, ci95, "s")},
+        cells=_outputs(records, okay),
+        p_value=max(p_value, SMALLEST_P),
+        statement=f"the samples were taken off their time by {1e3 * jitter_s:.2g} ms (rms), which no stamp tells",
+    )
+
+
+def _outputs(records: Sequence[Record], okay: Sequence[BoolArray]) -> Mapping[str, BoolArray]:
+    cells = {}
+    for record, good in zip(records, okay, strict=True):
+        cells[record.name] = np.zeros((record.output.size, 1 + record.torque_nm.shape[1]), dtype=np.bool_)
+        cells[record.name][:, OUTPUT] = good
+    return cells
+
+
+def _rest(error: FloatArray, slope: FloatArray, okay: BoolArray) -> _Rest | None:
+    """Take off what past errors and the slopes around explain; rows whose surroundings are not okay are left out."""
+    filled = np.where(okay, error, 0.0)
+    width = 2 * AROUND + 1
+    first, last = PAST, error.size - AROUND
+    if last - first < 10 * (PAST + width):
+        return None
+    past = sliding_window_view(filled, PAST)[: last - first]
+    around = sliding_window_view(slope, width)[first - AROUND : last - AROUND]
+    usable = sliding_window_view(okay, PAST + 1)[: last - first].all(axis=1)
+    if usable.sum() < 5 * (PAST + width):
+        return None
+    regressors = np.column_stack([past, around, np.ones(last - first)])[usable]
+    now = filled[first:last][usable]
+    left = np.full(last - first, np.nan)
+    left[usable] = now - regressors @ np.linalg.lstsq(regressors, now, rcond=None)[0]
+    pairs = np.isfinite(left[:-1]) & np.isfinite(left[1:])
+    inner = slope[first:last]
+    return _Rest(left[:-1][pairs], inner[:-1][pairs], left[1:][pairs], inner[1:][pairs])
+
+
+def _score_p_value(error: FloatArray, slope: FloatArray) -> float:
+    """Test whether the squared error follows the squared slope.
+
+    Breusch and Pagan's score test in Koenker's studentised form (J. Econometrics 17, 1981), one-sided.
+    """
+    power, drive = error**2 - np.mean(error**2), slope**2 - np.mean(slope**2)
+    scale = float(np.sqrt((power**2).mean() * (drive**2).mean()))
+    if scale <= 0.0:
+        return 1.0
+    correlation = float((power * drive).mean()) / scale
+    return float(stats.norm.sf(correlation * np.sqrt(error.size)))
+
+
+@dataclass(frozen=True, slots=True)
+class _Jitter:
+    jitter_s: float
+    ci95: tuple[float, float]
+    noise: float
+
+
+def _likeliest(error: FloatArray, slope: FloatArray) -> _Jitter | None:
+    """Fit both variances by maximum likelihood; the interval is that of the likelihood ratio. None if too small."""
+
+    def cost(logs: FloatArray, jitter: float | None = None) -> float:
+        variance = np.exp(2.0 * logs[0]) + (np.exp(2.0 * logs[1]) if jitter is None else jitter**2) * slope**2
+        return float(np.sum(np.log(variance) + error**2 / variance))
+
+    size, steep = float(np.std(error)), float(np.sqrt(np.mean(slope**2)))
+    start = np.array([np.log(size), np.log(0.5 * size / steep)])
+    best = optimize.minimize(cost, start, method="Nelder-Mead", options={"xatol": 1e-5, "fatol": 1e-4})
+    noise, jitter = (float(value) for value in np.exp(best.x))
+    if (jitter * steep) ** 2 < LEAST_GAIN * size**2:
+        return None
+
+    def excess(log_jitter: float) -> float:
+        """Likelihood lost at a jitter, the noise fitted again, less what 95 % allow."""
+        bounds = (np.log(size) - 5.0, np.log(size) + 1.0)
+        again = optimize.minimize_scalar(
+            lambda log_noise: cost(np.array([log_noise, log_jitter])), bounds=bounds, method="bounded"
+        )
+        return float(again.fun) - float(best.fun) - float(stats.chi2.ppf(0.95, 1))
+
+    centre = float(best.x[1])
+    low, high = (_crossing(excess, centre, centre + side) for side in (-2.0, 2.0))
+    return _Jitter(jitter, (float(np.exp(low)), float(np.exp(high))), noise)
+
+
+def _crossing(excess: Callable[[float], float], inside: float, outside: float) -> float:
+    """Return where the likelihood has fallen by what 95 % allow; the outer end where it has not by then."""
+    if excess(outside) <= 0.0:
+        return outside
+    return float(optimize.brentq(excess, min(inside, outside), max(inside, outside), xtol=1e-4))
+
+
+def _of_the_many(rest: _Rest, found: _Jitter) -> bool:
+    """Tell whether the typical row shows the jitter, by the median absolute error of the steep half of the rows."""
+    steep = np.abs(rest.slope) > np.median(np.abs(rest.slope))
+    mad_to_sigma = 1.0 / float(stats.norm.ppf(0.75))
+    typical = (mad_to_sigma * np.median(np.abs(rest.error[steep]))) ** 2
+    expected = found.noise**2 + found.jitter_s**2 * float(np.median(rest.slope[steep] ** 2))
+    return bool(typical - found.noise**2 > OF_THE_MANY * (expected - found.noise**2))
+
+
+def _independent(rest: _Rest) -> bool:
+    """Tell whether errors in a row, weighed by slope, are independent: those of a clunk or a lag are not."""
+    now, after = rest.error * rest.slope, rest.next_error * rest.next_slope
+    scale = float(np.sqrt((now**2).sum() * (after**2).sum()))
+    return scale > 0.0 and abs(float(now @ after)) < NEIGHBOURS * scale

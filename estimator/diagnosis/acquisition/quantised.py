@@ -1,0 +1,137 @@
+"""Quantised speed: readings on a coarse lattice, found by the regularity of their values.
+
+The values' characteristic function ``R(q) = |mean exp(2 pi i x / q)|`` is 1 where all are multiples of q and falls to
+``exp(-2 (pi s / q)^2)`` under noise s that came after the rounding. For values that lie anywhere, n R^2 is
+exponentially distributed with mean 1 (Rayleigh's test of uniformity).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimator.diagnosis.acquisition.finding import OUTPUT, Finding, Sized, no_cells
+from estimator.diagnosis.acquisition.lattice import lattice_step
+from estimator.diagnosis.acquisition.limits import LEVEL, SMALLEST_P
+from estimator.diagnosis.acquisition.predictor import predict
+from estimator.signals.record import FloatArray, OutputKind, Record
+
+NOISE_PER_STEP = 1.0
+"""A lattice matters from a step of this many standard deviations of the one-step error: below that its rounding adds
+under 1/12, 4 % of the error's size."""
+
+BINS_PER_STEP = 8
+"""Fineness of the histogram whose spectrum is searched: it takes 3 % off the finest step's R."""
+
+PADDING = 4
+"""Points of the spectrum per resolution cell, so that no peak falls between two."""
+
+LEVELS = 6
+"""A lattice must be visited on this many levels within the spread of a recording; fewer are lumps, no lattice."""
+
+HARMONIC = 0.8
+"""Lattices of q/2, q/3 ... fit as well as q: the coarsest that is this share of the best is taken."""
+
+REGULAR = 0.2
+"""Smallest R of a lattice: noise of 0.29 steps came after the rounding, as much as the rounding's own error."""
+
+SMOOTHING = 25
+"""Samples of a moving mean that wipes out a lattice, and leaves the lumps of a drive that keeps to a few speeds."""
+
+ABOVE_LUMPS = 3.0
+"""R of the readings must be this many times that of their moving mean."""
+
+
+def speed_quantisation(records: Sequence[Record]) -> Finding | None:
+    """Recognise a speed lattice that is not small against the noise; None where there is none."""
+    records = [record for record in records if record.kind is OutputKind.SPEED]
+    noise = [_one_step_error(record) for record in records]
+    known = [sigma for sigma in noise if sigma is not None and sigma > 0.0]
+    read = [record.output[np.isfinite(record.output)] for record in records]
+    moving = [values[1:][np.diff(values) != 0.0] for values in read]  # rest says nothing of a lattice
+    if not known or not any(values.size for values in moving):
+        return None
+    sigma = float(np.median(known))
+    step = _step(moving, sigma)
+    if step is None:
+        return None
+    cells = {}
+    for record in records:
+        cells[record.name] = no_cells(record)
+        cells[record.name][:, OUTPUT] = np.isfinite(record.output)
+    return Finding(
+        name="speed_quantisation",
+        parameters={"step_rad_s": Sized(step.value, step.ci95, "rad/s")},
+        cells=cells,
+        p_value=step.p_value,
+        statement=f"the speed is read in steps of {step.value:.4g} rad/s, {step.value / sigma:.1f} times its noise",
+    )
+
+
+def _one_step_error(record: Record) -> float | None:
+    prediction = predict(record, record.okay & np.isfinite(record.output))
+    return None if prediction is None else prediction.sigma
+
+
+@dataclass(frozen=True, slots=True)
+class _Step:
+    value: float
+    ci95: tuple[float, float]
+    p_value: float
+
+
+def _step(moving: Sequence[FloatArray], sigma: float) -> _Step | None:
+    values = np.concatenate(moving)
+    spread = float(np.median([np.ptp(one) for one in moving if one.size]))
+    finest, coarsest = NOISE_PER_STEP * sigma, spread / LEVELS
+    candidates = [lattice_step(values), _by_spectrum(values, finest, coarsest)]
+    fits = [_refined(values, q) for q in candidates if q is not None and finest <= q <= coarsest]
+    best = max(fits, key=lambda fit: fit[1], default=None)
+    if best is None:
+        return None
+    q, regularity, error = best
+    lumps = _regularity(np.concatenate([_smooth(one) for one in moving if one.size > SMOOTHING]), q)
+    p_value = float(np.exp(-values.size * regularity**2)) * PADDING * float(np.ptp(values)) / finest
+    if p_value > LEVEL or regularity < max(REGULAR, ABOVE_LUMPS * lumps):
+        return None
+    return _Step(q, (q - 1.96 * error, q + 1.96 * error), max(p_value, SMALLEST_P))
+
+
+def _by_spectrum(values: FloatArray, finest: float, coarsest: float) -> float | None:
+    """Return the coarsest step whose lattice the values keep to best; None where there is none to choose from."""
+    width = finest / BINS_PER_STEP
+    bins = np.floor((values - values.min()) / width).astype(np.intp)
+    size = 1 << int(np.ceil(np.log2(PADDING * (int(bins.max()) + 1))))
+    regularity = np.abs(np.fft.rfft(np.bincount(bins).astype(np.float64), size)) / values.size
+    first, last = int(np.ceil(size * width / coarsest)), int(size * width / finest)
+    searched = regularity[first : last + 1]
+    if searched.size == 0:
+        return None
+    lowest = int(np.argmax(searched >= HARMONIC * searched.max()))
+    peak = lowest + int(np.argmax(searched[lowest : lowest + 2 * PADDING]))
+    return size * width / (first + peak)
+
+
+def _refined(values: FloatArray, step: float) -> tuple[float, float, float]:
+    """Return the step by least squares of the values on their counts, its R, and its standard error."""
+    error = 0.0
+    for _ in range(3):
+        phase = float(np.angle(np.mean(np.exp(2j * np.pi * values / step)))) / (2.0 * np.pi)
+        counts = np.round(values / step - phase)
+        centred = counts - counts.mean()
+        power = float(centred @ centred)
+        step = float(centred @ values) / power
+        left = values - values.mean() - step * centred
+        error = float(np.sqrt(left @ left / (values.size - 2) / power))
+    return step, _regularity(values, step), error
+
+
+def _regularity(values: FloatArray, step: float) -> float:
+    return float(np.abs(np.mean(np.exp(2j * np.pi * values / step)))) if values.size else 0.0
+
+
+def _smooth(values: FloatArray) -> FloatArray:
+    mean: FloatArray = np.convolve(values, np.full(SMOOTHING, 1.0 / SMOOTHING), mode="valid")
+    return mean

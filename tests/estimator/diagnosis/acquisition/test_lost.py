@@ -1,0 +1,80 @@
+"""Lost samples: flagged, NaN, or recorded as zero; not what a mask takes out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimator.diagnosis.acquisition import Finding, recognise
+from estimator.signals.record import BoolArray, Record
+from tests.estimator.diagnosis.acquisition.bench import healthy, random_rows
+
+
+def only(records: list[Record]) -> Finding:
+    (finding,) = recognise(records)
+    assert finding.name == "lost_samples"
+    return finding
+
+
+def rows_of(seed: int, share: float, burst: float = 1.0) -> list[BoolArray]:
+    return [random_rows(np.random.default_rng([seed, k]), share, burst) for k in range(3)]
+
+
+def speed_missing(record: Record, rows: BoolArray) -> Record:
+    return replace(record, okay=~rows, output=np.where(rows, np.nan, record.output))
+
+
+def torque_missing(record: Record, rows: BoolArray) -> Record:
+    read = np.ones(record.torque_nm.shape, dtype=bool)
+    read[:, 1] = ~rows
+    return replace(record, okay=~rows, torque_okay=read)
+
+
+def row_flagged(record: Record, rows: BoolArray) -> Record:
+    return replace(record, okay=~rows, torque_okay=~rows)
+
+
+@pytest.mark.parametrize(
+    ("lose", "cells"),
+    [(speed_missing, [True, False, False]), (torque_missing, [False, False, True]), (row_flagged, [True, True, True])],
+)
+@pytest.mark.parametrize(("share", "burst"), [(0.01, 1.0), (0.05, 1.0), (0.05, 6.0)])
+def test_what_the_recording_says_is_lost(lose, cells: list[bool], share: float, burst: float) -> None:
+    rows = rows_of(1, share, burst)
+    records = [lose(record, where) for record, where in zip(healthy(1), rows, strict=True)]
+    finding = only(records)
+    found = finding.parameters["share"]
+    assert found.value == pytest.approx(np.mean(rows))
+    assert found.ci95[0] < found.value < found.ci95[1]
+    assert "missing or flagged" in finding.statement
+    for record, where in zip(records, rows, strict=True):
+        np.testing.assert_array_equal(finding.touched(record), where[:, None] & np.array(cells))
+        np.testing.assert_array_equal(finding.rows(record), where)
+
+
+def test_bursts_are_worth_fewer_samples() -> None:
+    def width(burst: float) -> float:
+        rows = rows_of(2, 0.05, burst)
+        ci95 = only([row_flagged(r, w) for r, w in zip(healthy(2), rows, strict=True)]).parameters["share"].ci95
+        return ci95[1] - ci95[0]
+
+    assert width(6.0) > 2.0 * width(1.0)
+
+
+@pytest.mark.parametrize("channels", [(0,), (1, 2), (0, 1, 2)])
+@pytest.mark.parametrize(("share", "burst"), [(0.02, 1.0), (0.05, 4.0)])
+def test_zeros_without_a_flag_are_lost(channels: tuple[int, ...], share: float, burst: float) -> None:
+    rows = rows_of(3, share, burst)
+    records = []
+    for record, where in zip(healthy(3, 3), rows, strict=True):
+        values = np.column_stack([record.output, record.torque_nm])
+        values[np.ix_(where, channels)] = 0.0
+        records.append(replace(record, output=values[:, 0], torque_nm=values[:, 1:]))
+    finding = only(records)
+    assert "recorded as zero" in finding.statement
+    assert finding.parameters["share"].value == pytest.approx(np.mean(rows), rel=0.2)
+    for record, where in zip(records, rows, strict=True):
+        assert not finding.rows(record)[~where].any()
+        assert not np.delete(finding.touched(record), channels, axis=1).any()

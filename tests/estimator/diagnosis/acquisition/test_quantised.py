@@ -1,0 +1,62 @@
+"""A coarse speed lattice is recognised whatever its step, a fine one is left alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimator.diagnosis.acquisition import recognise
+from estimator.signals.record import FloatArray, OutputKind
+from tests.estimator.diagnosis.acquisition.bench import KINDS, NOISE, PERIOD_S, drives, healthy
+
+ENCODER_COUNT = 2.0 * np.pi / 2048 / PERIOD_S
+"""Speed of one count per period of an encoder with 2048 counts a turn [rad/s]."""
+
+
+def step_found(make, seed: int = 1) -> tuple[float, tuple[float, float]]:
+    (finding,) = recognise([replace(record, output=make(record.output)) for record in healthy(seed)])
+    assert finding.name == "speed_quantisation"
+    return finding.parameters["step_rad_s"].value, finding.parameters["step_rad_s"].ci95
+
+
+@pytest.mark.parametrize("step", [0.1, 0.2, ENCODER_COUNT, 1.0, 2.0])
+@pytest.mark.parametrize("rounding", [np.round, np.floor, np.trunc])
+def test_the_step_is_found(step: float, rounding) -> None:
+    value, ci95 = step_found(lambda speed: rounding(speed / step) * step)
+    assert value == pytest.approx(step, rel=1e-6)
+    assert ci95[0] <= value <= ci95[1]
+
+
+@pytest.mark.parametrize("step", [0.37, ENCODER_COUNT])
+def test_the_step_is_found_behind_rounded_values(step: float) -> None:
+    value, _ = step_found(lambda speed: np.round(np.round(speed / step) * step, 2))
+    assert value == pytest.approx(step, rel=1e-3)
+
+
+@pytest.mark.parametrize("step", [4.0 * NOISE, 10.0 * NOISE])
+@pytest.mark.parametrize("seed", range(4))
+def test_the_step_is_found_behind_noise(step: float, seed: int) -> None:
+    """The lattice is that of the true speed; the noise comes on top."""
+    records = [
+        truth.record(kind, speed=np.round(truth.speed() / step) * step)
+        for kind, truth in zip(KINDS, drives(seed), strict=True)
+    ]
+    (finding,) = recognise(records)
+    assert finding.parameters["step_rad_s"].value == pytest.approx(step, rel=0.02)
+
+
+def finely(speed: FloatArray) -> FloatArray:
+    return np.round(speed / (0.4 * NOISE)) * 0.4 * NOISE
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_fine_lattice_is_no_finding(seed: int) -> None:
+    assert recognise([replace(record, output=finely(record.output)) for record in healthy(seed)]) == ()
+
+
+@pytest.mark.parametrize("kind", [OutputKind.POSITION, OutputKind.FORCE])
+def test_only_speeds_are_looked_at(kind: OutputKind) -> None:
+    records = [replace(record, output=np.round(record.output), kind=kind) for record in healthy(1)]
+    assert "speed_quantisation" not in [finding.name for finding in recognise(records)]
