@@ -7,9 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from estimator.diagnosis.chain import Chain
+from estimator.diagnosis.evidence import gain_from_squares
 from estimator.diagnosis.holdout import Examiner
 from estimator.diagnosis.intervals import Z95, covariance, interval
-from estimator.diagnosis.result import Estimated, Evidence, FoundEffect, Profile, Retuned
+from estimator.diagnosis.result import Estimated, Evidence, FoundEffect, Interval, Profile, Retuned
 from estimator.diagnosis.selection import Selection, Trial
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effects import road_grade
@@ -33,6 +35,8 @@ def _found(
     trial: Trial, selection: Selection, cov: FloatArray, model: DrivelineModel, examiner: Examiner
 ) -> FoundEffect:
     entry = EFFECTS[trial.name]
+    nulls = {parameter.name: parameter.null for parameter in entry.parameters}
+    twins = selection.lookalikes.get(trial.name, ())
     profiles = _profiles(selection.result, cov, model) if entry.profile else {}
     parameters = (
         _profile_size(selection.result, cov, model)
@@ -46,21 +50,76 @@ def _found(
     return FoundEffect(
         name=entry.name,
         element=entry.element,
-        statement=entry.sentence({name: p.value for name, p in parameters.items()}, model.motion),
+        statement=entry.sentence(nulls | {name: p.value for name, p in parameters.items()}, model.motion),
         parameters=parameters,
-        time_s={},
-        indistinguishable_from=entry.equivalent,
+        time_s=_moments(trial.name, selection.result) if entry.event else {},
+        indistinguishable_from=twins,
         evidence=Evidence(trial.gain.delta_bic, held.before, held.after, trial.p_value),
         profiles=profiles,
     )
 
 
+def _moments(name: str, result: FitResult) -> dict[str, tuple[Interval, ...]]:
+    """Return when an event lasts in each recording that has it, on the recording's own time [s]."""
+    found: dict[str, tuple[Interval, ...]] = {}
+    for i, (record, basis) in enumerate(zip(result.problem.records, result.problem.local, strict=True)):
+        own = zip(basis.own, result.local_of(i)[basis.own_rows], strict=True)
+        values = {unknown.name: float(value) for unknown, value in own if unknown.effect == name}
+        began = float(record.time_s[0] - record.since_start_s[0])
+        if values["to_s"] - values["from_s"] > record.sample_time_s:
+            found[record.name] = ((began + values["from_s"], began + values["to_s"]),)
+    return found
+
+
+def acquired_effects(
+    chain: Chain, before: Sequence[FloatArray], after: Sequence[FloatArray]
+) -> tuple[FoundEffect, ...]:
+    """Return what was recognised of the acquisition as effects.
+
+    Parameters
+    ----------
+    before, after : sequence of ndarray
+        Errors of the samples that were read, without and with the faults compensated, per recording.
+    """
+    gained = gain_from_squares(_squares(before), _squares(after), 1, 1, after)
+    seen = [slice(int(0.7 * error.size), None) for error in after]
+    held = [rms_of([e[rows] for e, rows in zip(errors, seen, strict=True)]) for errors in (before, after)]
+    return tuple(
+        FoundEffect(
+            name=finding.name,
+            element=EFFECTS[finding.name].element,
+            statement=finding.statement,
+            parameters={name: Estimated(*sized) for name, sized in finding.parameters.items()},
+            time_s={},
+            indistinguishable_from=(),
+            evidence=Evidence(gained.delta_bic, held[0], held[1], finding.p_value),
+        )
+        for finding in chain.findings
+    )
+
+
+def _squares(errors: Sequence[FloatArray]) -> float:
+    return float(sum(error @ error for error in errors))
+
+
+def rms_of(errors: Sequence[FloatArray]) -> float:
+    """Return the RMS of the errors of several recordings together."""
+    return float(np.sqrt(_squares(errors) / sum(error.size for error in errors)))
+
+
 def _parameters(name: str, result: FitResult, cov: FloatArray, model: DrivelineModel) -> dict[str, Estimated]:
     units = {parameter.name: parameter.unit(model.motion) for parameter in EFFECTS[name].parameters}
+    nulls = {parameter.name: parameter.null for parameter in EFFECTS[name].parameters}
     return {
         shared.name: Estimated(float(result.x[i]) * shared.scale, interval(result, cov, i), units[shared.name])
         for i, shared in enumerate(result.problem.shared)
-        if shared.effect == name
+        if shared.effect == name and shared.low < shared.high
+    } | {
+        shared.name: Estimated(value, (value, value), units[shared.name])
+        for i, shared in enumerate(result.problem.shared)
+        if shared.effect == name and shared.low == shared.high
+        for value in [float(result.x[i]) * shared.scale]
+        if value != nulls[shared.name]
     }
 
 

@@ -2,23 +2,36 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
 from estimator.diagnosis import locate
-from estimator.diagnosis.assemble import augmented_model, found_effects, load_torques, retuned_parameters
-from estimator.diagnosis.evidence import gain, residuals_by_record
+from estimator.diagnosis.assemble import (
+    acquired_effects,
+    augmented_model,
+    found_effects,
+    load_torques,
+    retuned_parameters,
+    rms_of,
+)
+from estimator.diagnosis.chain import Chain, mechanical, read_through
+from estimator.diagnosis.discrepancy import discrepancy
+from estimator.diagnosis.evidence import Gain, gain, residuals_by_record
 from estimator.diagnosis.holdout import Examiner, foreign_outputs
-from estimator.diagnosis.hypotheses import NOTHING, Bench, Progress, everything, open_hypotheses
+from estimator.diagnosis.hypotheses import NOTHING, Bench, Progress, effects_of, everything, open_hypotheses
 from estimator.diagnosis.judgement import Judgement, judge
 from estimator.diagnosis.noise import noise_floor, unpredictable
-from estimator.diagnosis.preconditions import check
+from estimator.diagnosis.preconditions import prepare
 from estimator.diagnosis.result import (
     Diagnosis,
+    Discrepancy,
     Fit,
+    FoundEffect,
     Mismatch,
     RejectedEffect,
     Trace,
@@ -26,11 +39,11 @@ from estimator.diagnosis.result import (
     UntestableEffect,
     Verdict,
 )
-from estimator.diagnosis.selection import Selection, Selector
+from estimator.diagnosis.selection import VISIBLE, Selection, Selector
+from estimator.diagnosis.unnamed import UnnamedLaw as Nameless
 from estimator.diagnosis.wording import rejection, statement
-from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
-from estimator.physics.fit import fit, make_problem
+from estimator.physics.fit import FitResult, fit, make_problem
 from estimator.physics.model import DrivelineModel, unit
 from estimator.signals.record import FloatArray, OutputKind, Record
 
@@ -69,59 +82,102 @@ def diagnose(
         Where the recordings are too short, constant or otherwise determine nothing.
     BadShape
         Where recordings do not belong together.
+    Implausible
+        Where torque, output or time is off by a factor or in sign.
     """
     with threadpool_limits(1, user_api="blas"):  # on tall, thin matrices more threads only wait for each other
-        return _diagnose(records, model, holdout, progress)
+        ready = prepare(records, model, holdout)
+        return ready.finished(_diagnose(ready.records, model, ready.holdout, progress))
 
 
 def _diagnose(
     records: Sequence[Record], model: DrivelineModel, holdout: Sequence[Record], progress: Progress
 ) -> Diagnosis:
     began = time.perf_counter()
-    check(records, model, holdout)
     progress("fitting the nominal model", 0.0)
-    floor = noise_floor(records)
-    names, untestable = open_hypotheses(model, records)
-    bench = Bench(model, records, everything(records))
-    examiner = Examiner(model, records, holdout)
-    selection = Selector(bench, examiner, names, floor, progress).run()
+    line = mechanical(model)
+    chain, unseen = read_through(records), read_through(holdout)
+    bench = Bench(line, chain.records, everything(chain.records))
+    if chain.torque_is_unknown:
+        chain = chain.with_torques_from(bench.fit(NOTHING))
+        bench = Bench(line, chain.records, everything(chain.records))
+    floor = noise_floor(chain.records)
+    names, untestable = open_hypotheses(line, chain.records)
+    examiner = Examiner(line, chain.records, unseen.records)
+    selection = Selector(bench, examiner, names, floor, progress, VISIBLE if chain.torque_is_unknown else 1.0).run()
     progress("weighing the verdict", 0.9)
-    judgement = judge(selection, floor)
+    chain = chain.with_jitter_in(selection.result)
+    judgement = judge(selection, floor, chain.findings)
     believed = judgement.verdict is Verdict.EXPLAINED
     final = selection.result if believed else selection.retuned
-    figures = _fit_figures(selection, examiner, model, floor, believed)
-    effects = found_effects(selection, model, examiner) if believed else ()
+    seen = None
+    if judgement.verdict is not Verdict.NO_MISMATCH:
+        seen = discrepancy(selection.retuned, final, _floor(selection, floor), line.motion)
+        judgement = _located(judgement, seen)
+    before = _raw_fit(chain, line, bench, final)
+    figures = _fit_figures(chain, before, selection, examiner, line, floor, believed)
+    acquired = acquired_effects(chain, residuals_by_record(before), chain.errors(final.outputs))
+    effects = (*(found_effects(selection, line, examiner) if believed else ()), *acquired)
     blind = tuple(UntestableEffect(n, u.reason, u.suggested_test) for n, u in untestable.items())
     progress("done", 1.0)
     return Diagnosis(
         verdict=judgement.verdict,
         statement=statement(judgement, effects, figures, blind),
-        mismatch=_mismatch(selection, judgement, floor),
+        mismatch=_mismatch(selection, judgement, floor, effects),
         effects=effects,
         rejected=_rejected(selection, believed, judgement),
         untestable=blind,
         unnamed=_unnamed(selection, judgement),
         fit=figures,
-        parameters=retuned_parameters(final, model),
-        load_torque=load_torques(final, model),
+        parameters=retuned_parameters(final, line),
+        load_torque=load_torques(final, line),
         timing_s={"total": time.perf_counter() - began},
         augmented=augmented_model(final, model, effects),
-        traces=_traces(selection, model, holdout, believed),
+        traces=_traces(chain, selection, line, unseen.records, believed),
+        warnings=judgement.unconverged,
+        discrepancy=seen,
     )
 
 
-def _fit_figures(selection: Selection, examiner: Examiner, model: DrivelineModel, floor: float, believed: bool) -> Fit:
-    records = selection.retuned.problem.records
-    dimension = "speed" if records[0].kind is OutputKind.SPEED else "angle"
+def _located(judgement: Judgement, seen: Discrepancy) -> Judgement:
+    """Return an abstention with the law that was looked for in all rounds: the first can name the wrong place."""
+    if judgement.verdict is not Verdict.UNEXPLAINED or not seen.laws:
+        return judgement
+    best = seen.laws[0]
+    law = Nameless(best.element, best.terms, Gain(best.delta_bic, best.p_value, math.nan), best.rms)
+    return replace(judgement, unnamed=law)
+
+
+def _raw_fit(chain: Chain, model: DrivelineModel, bench: Bench, final: FitResult) -> FitResult:
+    """Return the fit of the final hypothesis to the recordings as they were read, faults of the acquisition and all."""
+    if not chain.findings:
+        return final
+    return Bench(model, chain.raw, everything(chain.raw)).fit(effects_of(final), final)
+
+
+def _fit_figures(
+    chain: Chain,
+    before: FitResult,
+    selection: Selection,
+    examiner: Examiner,
+    model: DrivelineModel,
+    floor: float,
+    believed: bool,
+) -> Fit:
+    records = chain.raw
+    dimension = {OutputKind.SPEED: "speed", OutputKind.POSITION: "angle", OutputKind.FORCE: "torque"}[records[0].kind]
     nominal = fit(make_problem(model, records, (), grid=selection.retuned.problem.grid))
     chosen = selection.chosen if believed else NOTHING
     final = selection.result if believed else selection.retuned
     held = examiner.compare(selection.retuned, NOTHING, final, chosen)
+    retuned = selection.retuned
+    if chain.findings:
+        retuned = Bench(model, chain.raw, everything(chain.raw)).fit(NOTHING) if chosen else before
     return Fit(
         unit=unit(dimension, model.motion),
         nominal=nominal.rms,
-        retuned=selection.retuned.rms,
-        augmented=final.rms,
+        retuned=retuned.rms,
+        augmented=rms_of(chain.errors(final.outputs)),
         holdout_retuned=held.before,
         holdout_augmented=held.after,
         noise_floor=_floor(selection, floor),
@@ -133,30 +189,30 @@ def _floor(selection: Selection, floor: float) -> float:
     return min(floor, unpredictable(residuals_by_record(selection.result)))
 
 
-def _mismatch(selection: Selection, judgement: Judgement, floor: float) -> Mismatch:
+def _mismatch(selection: Selection, judgement: Judgement, floor: float, effects: Sequence[FoundEffect]) -> Mismatch:
     floor = _floor(selection, floor)
     if judgement.verdict is Verdict.NO_MISMATCH:
         return Mismatch(False, None, {}, None, None, 1.0)
-    element = _element(selection, judgement)
+    element = _element(selection, judgement, effects)
     p_value = judgement.unnamed.gain.p_value if judgement.unnamed is not None else 1.0
     if selection.chosen:
         p_value = min(p_value, gain(selection.retuned, selection.result).p_value)
+    p_value = min([p_value, *(effect.evidence.p_value for effect in effects)])
     return Mismatch(
         detected=True,
         element=element,
         time_s=locate.intervals(selection.retuned, floor),
         band_hz=locate.band_hz(selection.retuned, floor),
-        region=None if element is None else locate.region(selection.retuned, element),
+        region=None if element is None else locate.region(selection.retuned, element, floor),
         p_value=p_value,
     )
 
 
-def _element(selection: Selection, judgement: Judgement) -> Element | None:
+def _element(selection: Selection, judgement: Judgement, effects: Sequence[FoundEffect]) -> Element | None:
     """Return where the mismatch is: at the strongest effect, or where the best law without a name acts."""
     if judgement.verdict is Verdict.EXPLAINED or judgement.unnamed is None:
-        trials = selection.accepted.values()
-        strongest = max(trials, key=lambda trial: trial.gain.delta_bic, default=None)
-        return None if strongest is None else EFFECTS[strongest.name].element
+        strongest = max(effects, key=lambda effect: effect.evidence.delta_bic, default=None)
+        return None if strongest is None else strongest.element
     return judgement.unnamed.element
 
 
@@ -184,27 +240,31 @@ def _rejected(selection: Selection, believed: bool, judgement: Judgement) -> tup
             else trial.gain.delta_bic
         )
         rivals.append(RejectedEffect(name, rejection(trial, selection), delta))
+    for name, share in selection.dismissed.items():
+        if name not in selection.trials:
+            explained = gain(selection.retuned, final).delta_bic if selection.chosen else 0.0
+            reason = f"a first look explains {share:.0%} of the error: too little next to others for a fit"
+            rivals.append(RejectedEffect(name, reason, -explained))
     return tuple(sorted(rivals, key=lambda rival: -rival.delta_bic))
 
 
 def _traces(
-    selection: Selection, model: DrivelineModel, holdout: Sequence[Record], believed: bool
+    chain: Chain, selection: Selection, model: DrivelineModel, holdout: Sequence[Record], believed: bool
 ) -> tuple[Trace, ...]:
-    records = selection.retuned.problem.records
     grid = selection.retuned.problem.grid
-    nominal = fit(make_problem(model, records, (), grid=grid)).outputs
+    nominal = fit(make_problem(model, chain.records, (), grid=grid)).outputs
     final = selection.result if believed else selection.retuned
     traces = [
         _trace(record, simulated, False)
-        for record, *simulated in zip(records, nominal, selection.retuned.outputs, final.outputs, strict=True)
+        for record, *simulated in zip(chain.raw, nominal, selection.retuned.outputs, final.outputs, strict=True)
     ]
     if holdout:
         use = everything(holdout)
-        profile = believed and any(EFFECTS[name].profile for name in selection.chosen)
+        chosen = selection.chosen if believed else NOTHING
         runs = (
             fit(make_problem(model, holdout, (), grid=grid)).outputs,
-            foreign_outputs(selection.retuned, model, holdout, use, False),
-            foreign_outputs(final, model, holdout, use, profile),
+            foreign_outputs(selection.retuned, model, holdout, use, NOTHING),
+            foreign_outputs(final, model, holdout, use, chosen),
         )
         traces += [_trace(record, simulated, True) for record, *simulated in zip(holdout, *runs, strict=True)]
     return tuple(traces)

@@ -49,8 +49,8 @@ def gain(smaller: FitResult, larger: FitResult) -> Gain:
     return gain_from_squares(
         float(smaller.residual @ smaller.residual),
         float(larger.residual @ larger.residual),
-        larger.x.size - smaller.x.size,
-        larger.x.size,
+        max(larger.free_count - smaller.free_count, 1),
+        larger.free_count,
         residuals_by_record(larger),
     )
 

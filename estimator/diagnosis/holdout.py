@@ -4,8 +4,8 @@ Parameters are fitted on one part of the data; on the other only what is every r
 torque, initial state, a profile where the hypothesis has one), as the contract has it for any recording. The other part
 is the recordings kept out for it or, without any, the last part of each recording taken as a recording of its own.
 
-A profile over time can't be carried to another time. A hypothesis that has one is judged on short blocks kept out all
-along, which the profile on both sides must predict.
+A profile over time, or an event, can't be carried to another time. A hypothesis that has one is judged on short blocks
+kept out all along, which what is on both sides must predict.
 """
 
 from __future__ import annotations
@@ -27,6 +27,10 @@ KEPT_OUT = 0.3
 
 BLOCK_S, EVERY_S = 0.6, 2.0
 """Blocks kept out for a profile: shorter than its knot spacing, so that its neighbours predict it."""
+
+
+SHOWS = 1.05
+"""Ratio of errors above which unseen stretches show a difference between two hypotheses."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +55,10 @@ def _part(record: Record, rows: slice) -> Record:
         torque_nm=record.torque_nm[rows],
         output=record.output[rows],
         okay=record.okay[rows],
+        began_s=float(record.time_s[0]) if record.began_s is None else record.began_s,
+        torque_okay=None if record.torque_okay is None else record.torque_okay[rows],
+        offset_s=None if record.offset_s is None else record.offset_s[rows],
+        imposed=None if record.imposed is None else record.imposed[rows],
     )
 
 
@@ -83,14 +91,16 @@ class Examiner:
         self._between = Bench(self.model, self.records, [r.okay & ~blocks(r) for r in self.records])
 
     def compare(self, before: FitResult, smaller: Effects, after: FitResult, larger: Effects) -> HoldOut:
-        """Compare two hypotheses on unseen samples; ``before`` and ``after`` are their fits of everything."""
-        judge = self._error_in_blocks if _has_profile(larger) else self._error_on_unseen
-        return HoldOut(judge(before, smaller), judge(after, larger))
+        """Compare two hypotheses on unseen samples; ``before`` and ``after`` are their fits of everything.
+
+        Where a stretch with its own load torque and initial state shows no difference, blocks all along judge.
+        """
+        return HoldOut(self._error_in_blocks(before, smaller), self._error_in_blocks(after, larger))
 
     def _error_on_unseen(self, full: FitResult, effects: Effects) -> float:
         fitted = full if self._seen is None else self._seen.fit(effects, full)
         use = [record.okay for record in self._unseen]
-        return _rms(self._unseen, foreign_outputs(fitted, self.model, self._unseen, use, False), use)
+        return _rms(self._unseen, foreign_outputs(fitted, self.model, self._unseen, use, effects), use)
 
     def _error_in_blocks(self, full: FitResult, effects: Effects) -> float:
         if not self.holdout:
@@ -98,12 +108,12 @@ class Examiner:
             return _rms(self.records, self._between.fit(effects, full).outputs, kept_out)
         kept_out = [blocks(record) & record.okay for record in self.holdout]
         use = [record.okay & ~out for record, out in zip(self.holdout, kept_out, strict=True)]
-        outputs = foreign_outputs(full, self.model, self.holdout, use, _has_profile(effects))
+        outputs = foreign_outputs(full, self.model, self.holdout, use, effects)
         return _rms(self.holdout, outputs, kept_out)
 
 
-def _has_profile(effects: Effects) -> bool:
-    return any(EFFECTS[name].profile for name in effects)
+def _belongs_to_time(effects: Effects) -> bool:
+    return any(EFFECTS[name].profile or EFFECTS[name].event for name in effects)
 
 
 def _all_of(records: Sequence[Record]) -> tuple[Sequence[Record], Sequence[BoolArray]]:
@@ -115,11 +125,11 @@ def foreign_outputs(
     model: DrivelineModel,
     records: Sequence[Record],
     use: Sequence[BoolArray],
-    profile: bool,
+    effects: Effects,
 ) -> tuple[FloatArray, ...]:
     """Simulate other recordings with a fit's parameters; only what is each recording's own is estimated."""
     return tuple(
-        simulate_foreign(model, result.p, result.problem.grid, record, samples, profile)
+        simulate_foreign(model, result.p, result.problem.grid, record, samples, effects)
         for record, samples in zip(records, use, strict=True)
     )
 

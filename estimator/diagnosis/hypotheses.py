@@ -7,16 +7,21 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from estimator.diagnosis.screening import Screen
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Untestable
-from estimator.physics.fit import FitResult, best_fit, make_problem
-from estimator.physics.model import DrivelineModel
+from estimator.physics.fit import HEAT, ITERATIONS, FitResult, best_fit, converge, make_problem
+from estimator.physics.model import DrivelineModel, Motion
+from estimator.physics.moments import polished, without_idle
 from estimator.physics.simulate import grid_for
-from estimator.physics.unknowns import Shared, effect_unknowns, nominal_unknowns
+from estimator.physics.unknowns import Release, nominal_unknowns, own_unknowns
 from estimator.signals.record import BoolArray, Record
 
 Effects = frozenset[str]
 NOTHING: Effects = frozenset()
+
+STARTS = 2
+"""Start points of an effect that are fitted, the most promising of its list."""
 
 Progress = Callable[[str, float], None]
 """Called with what is being done and the share of the work behind it; raise from it to cancel."""
@@ -42,34 +47,80 @@ class Bench:
     use: Sequence[BoolArray]
     _fits: dict[Effects, FitResult] = field(default_factory=dict)
 
-    def fit(self, effects: Effects, warm: FitResult | None = None) -> FitResult:
+    def fit(self, effects: Effects, warm: FitResult | None = None, releases: Sequence[Release] = ()) -> FitResult:
         """Fit the nominal parameters, within their tolerances, together with a set of effects.
 
         Parameters
         ----------
         warm : FitResult, optional
-            A fit whose values the common unknowns start from; effects that it lacks start at each of their own
-            start points, and the best result counts.
+            A fit whose values the common unknowns start from.
+        releases : sequence of Release, optional
+            Start points of the one effect that ``warm`` lacks; by default where a first look places them.
         """
-        if effects not in self._fits:
-            self._fits[effects] = self._fit(effects, warm)
+        known = self._fits.get(effects)
+        if known is None or not known.converged:
+            result = self._fit(effects, warm, releases) if known is None else polished(converge(known))
+            self._fits[effects] = result
         return self._fits[effects]
 
-    def _fit(self, effects: Effects, warm: FitResult | None) -> FitResult:
-        known = set() if warm is None else {shared.effect for shared in warm.problem.shared}
-        starts: list[tuple[Shared, ...]] = [nominal_unknowns(self.model)]
-        for name in sorted(effects):
-            choices = effect_unknowns(name, self.model, self.records)
-            if name in known:
-                choices = choices[:1]
-            starts = [start + choice for start in starts for choice in choices]
+    def rough_fit(self, effects: Effects, warm: FitResult, releases: Sequence[Release]) -> FitResult:
+        """Fit as ``fit`` does, a few steps only; ``fit`` goes on from there."""
+        if effects not in self._fits:
+            self._fits[effects] = self._fit(effects, warm, releases, HEAT)
+        return self._fits[effects]
+
+    def settle(self, effects: Effects) -> FitResult:
+        """Take events that do nothing out of single recordings; the set's fit is that one from now on."""
+        self._fits[effects] = without_idle(self._fits[effects])
+        return self._fits[effects]
+
+    def _fit(
+        self, effects: Effects, warm: FitResult | None, releases: Sequence[Release], iterations: int = ITERATIONS
+    ) -> FitResult:
         grid = grid_for(self.model, self.records)
         profile = any(EFFECTS[name].profile for name in effects)
+        had = NOTHING if warm is None else effects_of(warm)
+        kept = _kept(warm, effects, self) if warm is not None else self._nominal()
+        new = sorted(name for name in effects - had if not EFFECTS[name].profile)
+        if new and not releases:
+            if warm is None:
+                raise ValueError("a set of effects is fitted from a fit without them, came none")
+            releases = [look.release for look in Screen(warm, self.model).looks(new[0])[:STARTS]]
         problems = [
-            make_problem(self.model, self.records, shared, profile=profile, use=self.use, grid=grid)
-            for shared in starts
+            make_problem(
+                self.model,
+                self.records,
+                (*kept.shared, *release.shared),
+                own=[(*old, *mine) for old, mine in zip(kept.own, release.own, strict=True)],
+                profile=profile,
+                use=self.use,
+                grid=grid,
+            )
+            for release in (releases or [Release((), ((),) * len(self.records))])
         ]
-        return best_fit(problems, warm)
+        result = best_fit(problems, warm, iterations)
+        return polished(result, iterations) if any(EFFECTS[name].event for name in effects) else result
+
+    def _nominal(self) -> Release:
+        """Return the nominal parameters, and what the model's own effects leave to every recording."""
+        own = tuple(own_unknowns(self.model.effects, record) for record in self.records)
+        return Release(nominal_unknowns(self.model), own)
+
+
+def effects_of(result: FitResult) -> Effects:
+    """Return the effects that a fit had released."""
+    shared = {unknown.effect for unknown in result.problem.shared if unknown.effect}
+    profiles = {name for name in EFFECTS if EFFECTS[name].profile and result.problem.local[0].profile.size}
+    return frozenset(shared | profiles)
+
+
+def _kept(warm: FitResult, effects: Effects, bench: Bench) -> Release:
+    """Return the unknowns of a fit that another set of effects has too."""
+    wanted = {"", *effects, *bench.model.effects}
+    return Release(
+        tuple(unknown for unknown in warm.problem.shared if unknown.effect in wanted),
+        tuple(tuple(unknown for unknown in basis.own if unknown.effect in wanted) for basis in warm.problem.local),
+    )
 
 
 def open_hypotheses(model: DrivelineModel, records: Sequence[Record]) -> tuple[tuple[str, ...], dict[str, Untestable]]:
@@ -79,7 +130,9 @@ def open_hypotheses(model: DrivelineModel, records: Sequence[Record]) -> tuple[t
     """
     testable, untestable = [], {}
     for name, entry in EFFECTS.items():
-        if model.structure not in entry.structures or name in model.effects:
+        fits = model.structure in entry.structures and all(record.kind in entry.kinds for record in records)
+        turns = model.motion is Motion.ROTATION or not entry.phases
+        if not (fits and turns) or name in model.effects or entry.recognised:
             continue
         obstacle = entry.testable(model, records)
         if obstacle is None:

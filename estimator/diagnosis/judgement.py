@@ -2,17 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-from estimator.diagnosis.evidence import VERY_STRONG, gain
+from estimator.diagnosis.acquisition import Finding
+from estimator.diagnosis.convergence import unconverged
+from estimator.diagnosis.evidence import VERY_STRONG, gain, residuals_by_record
+from estimator.diagnosis.noise import unpredictable
 from estimator.diagnosis.result import Verdict
-from estimator.diagnosis.selection import Selection, counting_law
+from estimator.diagnosis.selection import Selection
 from estimator.diagnosis.unnamed import UnnamedLaw
 from estimator.physics.catalogue import EFFECTS
 from estimator.signals.record import OutputKind
 
-MOST = 0.5
-"""An explanation that leaves more of the mismatch's power standing than this is not one."""
+MOST = 0.8
+"""Share of the mismatch's power, above the noise floor, that an explanation must take away."""
+
+MOST_OF_POSITION = 0.5
+"""The same where a position is read, whose error has no floor to speak of."""
+
+NEAR_FLOOR = 1.5
+"""Error over the noise floor that an explanation may leave: another way to write the same law leaves that much."""
+
+NEAR_FLOOR_PROFILE = 1.15
+"""The same for a profile over time, which follows whatever is slow: what it leaves is something else."""
 
 ABOVE_FLOOR = 1.25
 """A re-tuned nominal model whose error is above the floor by this factor does not explain a speed recording: the
@@ -31,37 +44,65 @@ class Judgement:
         The best one for what the chosen effects leave, where it counts.
     objection : str
         Why chosen effects are not believed; empty where they are, or where there are none.
+    unconverged : tuple of str
+        What there is to say of fits that did not converge.
     """
 
     verdict: Verdict
     unnamed: UnnamedLaw | None
     remaining: UnnamedLaw | None
     objection: str = ""
+    unconverged: tuple[str, ...] = ()
 
 
-def judge(selection: Selection, floor: float) -> Judgement:
-    """Weigh the selection against laws without a name and against the noise floor."""
-    unnamed = counting_law(selection.retuned)
+def judge(selection: Selection, floor: float, findings: Sequence[Finding] = ()) -> Judgement:
+    """Weigh the selection against laws without a name and against the noise floor.
+
+    ``findings`` are faults of the acquisition, already compensated: with nothing else missing they are the explanation.
+    """
+    unnamed = selection.unnamed
     if not selection.chosen:
-        standing = _above_floor(selection, floor) or unnamed is not None
-        return Judgement(Verdict.UNEXPLAINED if standing else Verdict.NO_MISMATCH, unnamed, None)
-    remaining = counting_law(selection.result)
+        shaken = any(finding.name == "sample_jitter" for finding in findings)
+        standing = (_above_floor(selection, floor) and not shaken) or unnamed is not None
+        clean = Verdict.EXPLAINED if findings else Verdict.NO_MISMATCH
+        return Judgement(Verdict.UNEXPLAINED if standing else clean, unnamed, None, "", unconverged(selection))
+    remaining = selection.remaining
     objection = _objection(selection, floor, unnamed, remaining)
     verdict = Verdict.UNEXPLAINED if objection else Verdict.EXPLAINED
-    return Judgement(verdict, unnamed, remaining, objection)
+    return Judgement(verdict, unnamed, remaining, objection, unconverged(selection))
 
 
 def _above_floor(selection: Selection, floor: float) -> bool:
-    speed = all(record.kind is OutputKind.SPEED for record in selection.retuned.problem.records)
-    return speed and selection.retuned.rms > ABOVE_FLOOR * floor
+    return _reads_speed(selection) and selection.retuned.rms > ABOVE_FLOOR * floor
+
+
+def _leaves_too_much(selection: Selection, floor: float, profile_alone: bool) -> str:
+    """Say how much an explanation leaves, where that is too much; "" where it is not.
+
+    Near to the noise is asked of a speed only: a free-running position drifts away from any model.
+    """
+    before, after = selection.retuned.rms, selection.result.rms
+    level = min(floor, unpredictable(residuals_by_record(selection.result)))
+    share = (before**2 - after**2) / (before**2 - min(level, after) ** 2)
+    if not _reads_speed(selection):
+        return f"{1.0 - share:.0%} of the mismatch" if share < MOST_OF_POSITION else ""
+    most = NEAR_FLOOR_PROFILE if profile_alone else NEAR_FLOOR
+    if share < MOST or after > most * level:
+        return f"{1.0 - share:.0%} of the mismatch, {after / level:.2g} times the noise"
+    return ""
+
+
+def _reads_speed(selection: Selection) -> bool:
+    return all(record.kind is OutputKind.SPEED for record in selection.retuned.problem.records)
 
 
 def _objection(selection: Selection, floor: float, unnamed: UnnamedLaw | None, remaining: UnnamedLaw | None) -> str:
-    before, after = selection.retuned.rms, selection.result.rms
     named = " and ".join(EFFECTS[name].title for name in sorted(selection.chosen))
-    if before**2 - after**2 < MOST * (before**2 - min(floor, after) ** 2):
-        return f"{named} would leave most of the mismatch standing"
+    if unconverged(selection):
+        return f"{named} rests on a fit that did not converge"
     profiles = [name for name in selection.chosen if EFFECTS[name].profile]
+    if leaves := _leaves_too_much(selection, floor, bool(profiles) and len(selection.chosen) == 1):
+        return f"{named} would leave {leaves}"
     if profiles and len(selection.chosen) == 1 and remaining is not None:  # an edge in what should be smooth
         return f"{named} would leave {remaining.terms[0][0]} at the {remaining.element.value} unexplained"
     if unnamed is None:

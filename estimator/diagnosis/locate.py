@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy import signal
+from scipy import signal, stats
 
-from estimator.diagnosis.disturbances import Motion, motion_of
+from estimator.diagnosis.blocks import Motion, motion_of
 from estimator.diagnosis.result import Interval, Region
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
@@ -17,11 +17,17 @@ from estimator.signals.record import FloatArray
 WINDOW_S = 0.5
 """Errors are averaged over this time before they are called a mismatch."""
 
-TIMES_FLOOR = 2.0
-"""Mean square, in floors, above which a window holds a mismatch: 50 samples of noise alone reach 1.6 at 3 sigma."""
+FALSE_ALARM = 0.01
+"""Probability that noise alone is called a mismatch anywhere in a recording."""
+
+SMALLEST_RATIO = 1.2
+"""Mean square, in floors, that a window must reach at least: the floor itself is known to about a tenth."""
 
 CENTRAL = 0.8
 """Share of the mismatch's power that band and region hold."""
+
+LONGEST_SEGMENT = 512
+"""Samples of a segment of Welch's average."""
 
 
 def _errors(result: FitResult, index: int) -> FloatArray:
@@ -30,30 +36,48 @@ def _errors(result: FitResult, index: int) -> FloatArray:
     return errors
 
 
-def _window_power(errors: FloatArray, sample_time_s: float) -> FloatArray:
-    width = min(max(1, round(WINDOW_S / sample_time_s)), errors.size)
-    smooth: FloatArray = np.convolve(errors**2, np.full(width, 1.0 / width), mode="same")
-    return smooth
+def _window_power(result: FitResult, index: int) -> tuple[FloatArray, FloatArray]:
+    """Return the mean square error around each sample, and from how many good samples it is; shapes (N,)."""
+    record = result.problem.records[index]
+    width = min(max(1, round(WINDOW_S / record.sample_time_s)), record.okay.size)
+    window = np.ones(width)
+    count = np.convolve(record.okay.astype(float), window, mode="same")
+    power = np.convolve(_errors(result, index) ** 2, window, mode="same") / np.maximum(count, 1.0)
+    return power, np.rint(count).astype(np.float64)
+
+
+def excess(result: FitResult, index: int, floor: float) -> FloatArray:
+    """Return the mean square error above the floor around each sample, shape (N,); 0 where noise could be all."""
+    power, count = _window_power(result, index)
+    windows = max(power.size / max(float(count.max()), 1.0), 1.0)
+    degrees, where = np.unique(np.maximum(count, 1.0), return_inverse=True)
+    ratio = np.maximum(stats.chi2.isf(FALSE_ALARM / windows, degrees) / degrees, SMALLEST_RATIO)[where]
+    stands: FloatArray = np.where(power > ratio * floor**2, power - floor**2, 0.0)
+    return stands
 
 
 def intervals(result: FitResult, floor: float) -> dict[str, tuple[Interval, ...]]:
-    """Return, per recording that has any, the times in which the error stands above the floor [s]."""
+    """Return, per recording that has any, the times in which the error stands above the floor [s].
+
+    An error that is clearly there raises every window it is in; what is seen for less than half a window is left out.
+    """
     found = {}
     for i, record in enumerate(result.problem.records):
-        power = _window_power(_errors(result, i), record.sample_time_s)
-        above = power > TIMES_FLOOR * floor**2
+        above = excess(result, i, floor) > 0.0
         edges = np.flatnonzero(np.diff(np.concatenate([[0], above.astype(int), [0]])))
         spans = [(float(record.time_s[a]), float(record.time_s[b - 1])) for a, b in edges.reshape(-1, 2)]
-        if spans:
-            found[record.name] = tuple(_merged(spans))
+        shortest = 0.5 * min(WINDOW_S, float(record.time_s[-1] - record.time_s[0]))
+        kept = [span for span in _merged(spans) if span[1] - span[0] >= shortest]
+        if kept:
+            found[record.name] = tuple(kept)
     return found
 
 
 def _merged(spans: Sequence[Interval]) -> list[Interval]:
     """Join intervals that are closer than a window."""
-    joined = [spans[0]]
-    for low, high in spans[1:]:
-        if low - joined[-1][1] < WINDOW_S:
+    joined: list[Interval] = []
+    for low, high in spans:
+        if joined and low - joined[-1][1] < WINDOW_S:
             joined[-1] = (joined[-1][0], high)
         else:
             joined.append((low, high))
@@ -65,7 +89,7 @@ def band_hz(result: FitResult, floor: float) -> Interval | None:
     totals = []
     for i, record in enumerate(result.problem.records):
         errors = _errors(result, i)
-        frequency, density = signal.welch(errors, 1.0 / record.sample_time_s, nperseg=min(512, errors.size))
+        frequency, density = signal.welch(errors, 1.0 / record.sample_time_s, nperseg=min(LONGEST_SEGMENT, errors.size))
         white = 2.0 * floor**2 * record.sample_time_s
         totals.append((frequency, np.maximum(density - white, 0.0)))
     frequency = totals[0][0]
@@ -76,13 +100,15 @@ def band_hz(result: FitResult, floor: float) -> Interval | None:
     return (low, high)
 
 
-def region(result: FitResult, element: Element) -> Region:
-    """Return the range of the element's own signal that holds the central part of the error's power."""
+def region(result: FitResult, element: Element, floor: float = 0.0) -> Region:
+    """Return the range of the element's own signal that holds the central part of the error's power above the floor."""
     values, weights = [], []
-    for i, record in enumerate(result.problem.records):
+    for i in range(len(result.problem.records)):
         values.append(_signal(element, motion_of(result, i), result))
-        weights.append(_window_power(_errors(result, i), record.sample_time_s))
+        weights.append(excess(result, i, floor))
     x, w = np.concatenate(values), np.concatenate(weights)
+    if not w.any():  # nowhere clearly above the floor: the power of all there is
+        w = np.concatenate([_window_power(result, i)[0] for i in range(len(result.problem.records))])
     order = np.argsort(x)
     low, high = _central(x[order], w[order])
     return Region(_SIGNAL_NAMES[element], low, high)

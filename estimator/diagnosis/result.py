@@ -162,11 +162,149 @@ class Trace:
 
 
 @dataclass(frozen=True, slots=True)
+class Course:
+    """An estimate over the time of one recording with its 95 % band; arrays of shape (B,)."""
+
+    time_s: FloatArray
+    value: FloatArray
+    low: FloatArray
+    high: FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class Equivalent:
+    """The input at one place that by itself would explain the re-tuned model's error.
+
+    Attributes
+    ----------
+    place : str
+        ``motor`` (torque that drives it), ``shaft`` (torque it carries beyond its law), ``load`` (torque against it) or
+        ``sensor`` (error of the reading).
+    unit : str
+    courses : mapping of str to Course
+        Per recording.
+    log_likelihood : float
+        Of the error, if a random walk acts at this place: the higher, the simpler an input explains it.
+    plausible : bool
+        Whether no other place is more likely by a factor that matters (``VERY_STRONG`` in BIC).
+    """
+
+    place: str
+    unit: str
+    courses: Mapping[str, Course]
+    log_likelihood: float
+    plausible: bool
+
+
+@dataclass(frozen=True, slots=True)
+class BandTest:
+    """Power of an error in a band: how many times the floor's, and how probable that is by chance, all bands tried."""
+
+    low_hz: float
+    high_hz: float
+    ratio: float
+    p_value: float
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorSpectrum:
+    """Amplitude spectral density of the error over all recordings [unit of the output per root hertz]; shapes (M,)."""
+
+    frequency_hz: FloatArray
+    before: FloatArray
+    after: FloatArray
+    floor: float
+    bands: tuple[BandTest, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Response:
+    """Size of the response from torque to output in one recording, without a model and of the models; shapes (M,).
+
+    ``low`` and ``high`` bound the 95 % band of the estimate; ``p_before`` and ``p_after`` are the probabilities that it
+    differs so much from the re-tuned and from the augmented model by chance.
+    """
+
+    frequency_hz: FloatArray
+    measured: FloatArray
+    low: FloatArray
+    high: FloatArray
+    before: FloatArray
+    after: FloatArray
+    p_before: float
+    p_after: float
+
+
+@dataclass(frozen=True, slots=True)
+class LawPicture:
+    """A law over the signal it depends on, with the data: both are averages over bins; arrays of shape (K,).
+
+    Attributes
+    ----------
+    name : str
+        The effect, or the law without a name.
+    signal, signal_unit, unit : str
+        What it is drawn over, and the unit of torque or reading.
+    x : ndarray
+        Mean of the signal in each bin.
+    data, low, high : ndarray
+        What the recordings ask for where the law acts, found without knowing it, and its 95 % interval.
+    law : ndarray
+        The law, seen in the same way.
+    explained : float
+        Share of the law's power over time that is a function of this signal.
+    """
+
+    name: str
+    element: Element
+    signal: str
+    signal_unit: str
+    unit: str
+    x: FloatArray
+    data: FloatArray
+    low: FloatArray
+    high: FloatArray
+    law: FloatArray
+    explained: float
+
+
+@dataclass(frozen=True, slots=True)
+class RankedLaw:
+    """The best law without a name at one element, and what it gains over the re-tuned model."""
+
+    element: Element
+    terms: tuple[tuple[str, float], ...]
+    rms: float
+    delta_bic: float
+    p_value: float
+
+
+@dataclass(frozen=True, slots=True)
+class Discrepancy:
+    """What the re-tuned model lacks: as an input at every place, over time, frequency and operating region.
+
+    Attributes
+    ----------
+    element : Element or None
+        Where the best law without a name acts; None where no law gains anything.
+    laws : tuple of RankedLaw
+        Best law of each element, strongest first.
+    """
+
+    element: Element | None
+    laws: tuple[RankedLaw, ...]
+    equivalents: tuple[Equivalent, ...]
+    spectrum: ErrorSpectrum
+    responses: Mapping[str, Response]
+    pictures: tuple[LawPicture, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Diagnosis:
     """The whole answer.
 
     ``unnamed`` is given where there is a mismatch that no effect explains; ``load_torque`` is the constant load torque
-    of each recording, by name.
+    of each recording, by name; ``discrepancy`` is what the report draws of the mismatch.
     """
 
     verdict: Verdict
@@ -183,3 +321,4 @@ class Diagnosis:
     augmented: DrivelineModel
     traces: tuple[Trace, ...]
     warnings: tuple[str, ...] = ()
+    discrepancy: Discrepancy | None = None

@@ -11,24 +11,47 @@ An effect earns its place when
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from estimator.diagnosis.evidence import VERY_STRONG, Gain, gain, residuals_by_record
 from estimator.diagnosis.holdout import Examiner, HoldOut
-from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects, Progress, with_effect
+from estimator.diagnosis.hypotheses import NOTHING, STARTS, Bench, Effects, Progress, effects_of, with_effect
 from estimator.diagnosis.intervals import covariance, interval
 from estimator.diagnosis.noise import unpredictable
+from estimator.diagnosis.screening import Look, Screen
 from estimator.diagnosis.unnamed import UnnamedLaw, best_unnamed
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult
+from estimator.physics.own_scan import MOST_CELLS
+from estimator.physics.parallel import concurrently
+from estimator.signals.record import FloatArray
 
 SIGNIFICANT = 0.01
 """Probability of a false claim that is accepted per diagnosis, all hypotheses together."""
 
 MOST_EFFECTS = 4
+
+WORTH_FITTING = 0.2
+"""Share of the best first look's promise below which an effect is not fitted."""
+
+MOST_FITS = 10
+"""Effects that are fitted in a round, the most promising ones."""
+
+WORTH_FINISHING = 0.5
+"""Share of the best rough fit's gain below which a rival's fit is not finished."""
+
+PROMISING = 0.5
+"""Share of the best start's promise below which another start of the same effect is not tried."""
+
+SAME_PROMISE = 0.5
+"""Share of what an effect explains that a first look must promise of its look-alike."""
+
+NEARLY = 1.5
+"""Squared error of a rival's rough fit, over the chosen one's, beyond which it is no look-alike."""
 
 PART_OF_MISMATCH = 0.05
 """Share of the first mismatch's power that a further effect must remove, or else
@@ -59,13 +82,35 @@ class Trial:
 
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """The outcome: the effects chosen, their fit, each one's last trial, and the first trial of every effect."""
+    """The outcome of a selection.
+
+    Attributes
+    ----------
+    chosen : frozenset of str
+        The effects that earned their place; ``result`` is their fit, ``retuned`` the one without any.
+    accepted : mapping of str to Trial
+        Each chosen effect's last trial.
+    trials : mapping of str to Trial
+        The first trial of every effect that was fitted.
+    dismissed : mapping of str to float
+        Effects not worth a fit: the share of the squared error that a first look found them to explain.
+    lookalikes : mapping of str to tuple of str
+        Per chosen effect, those that explain the same as well: the recordings can't tell them apart.
+    unnamed : UnnamedLaw or None
+        The best law without a name for what the re-tuned nominal leaves, where it counts.
+    remaining : UnnamedLaw or None
+        The best one for what the chosen effects leave, where it counts.
+    """
 
     retuned: FitResult
     chosen: Effects
     result: FitResult
     accepted: Mapping[str, Trial]
     trials: Mapping[str, Trial]
+    dismissed: Mapping[str, float]
+    lookalikes: Mapping[str, tuple[str, ...]]
+    unnamed: UnnamedLaw | None
+    remaining: UnnamedLaw | None
 
 
 @dataclass
@@ -78,6 +123,8 @@ class Selector:
         Noise floor of the output.
     names : sequence of str
         Effects that the recordings can tell.
+    least_ratio : float
+        By which an effect must lower the RMS at least: above 1 where part of the input is itself an estimate.
     """
 
     bench: Bench
@@ -85,7 +132,10 @@ class Selector:
     names: Sequence[str]
     floor: float
     progress: Progress
+    least_ratio: float = 1.0
     _rounds: int = 0
+    _dismissed: dict[str, float] = field(default_factory=dict)
+    _laws: dict[int, tuple[FitResult, UnnamedLaw | None]] = field(default_factory=dict)
 
     def run(self) -> Selection:
         """Add effects while one earns its place; then drop those that the others made superfluous.
@@ -95,25 +145,45 @@ class Selector:
         retuned = self.bench.fit(NOTHING)
         chosen, current = NOTHING, retuned
         first_trials: dict[str, Trial] = {}
+        dismissed: dict[str, float] = {}
         accepted: dict[str, Trial] = {}
         for _ in range(MOST_EFFECTS):
             trials = self._try_all(chosen, current)
             for name, trial in trials.items():
                 first_trials.setdefault(name, trial)
+            dismissed = dismissed or dict(self._dismissed)
             best = self._best(trials, current, retuned)
             if best is None and not chosen:
                 best = self._behind_profile(retuned)
             if best is None:
                 break
             accepted = {name: accepted.get(name, best) for name in best.effects} | {best.name: best}
-            chosen, current = best.effects, best.result
-            if counting_law(current) is None:
+            chosen, current = best.effects, self.bench.fit(best.effects, current)
+            if self._is_noise(current):
                 break
         chosen, current = self._drop_superfluous(chosen, current, retuned)
+        if any(EFFECTS[name].event for name in chosen):
+            current = self.bench.settle(chosen)
         accepted = {
             name: self._final(name, chosen, current, trial) for name, trial in accepted.items() if name in chosen
         }
-        return Selection(retuned, chosen, current, accepted, first_trials)
+        lookalikes = {name: self._lookalikes(name, chosen, current) for name in chosen}
+        self._report("looking for laws without a name", 0.9)
+        unnamed = self._law(retuned)
+        remaining = self._law(current) if chosen else None
+        return Selection(retuned, chosen, current, accepted, first_trials, dismissed, lookalikes, unnamed, remaining)
+
+    def _law(self, result: FitResult) -> UnnamedLaw | None:
+        """Return the law without a name that counts for what a fit leaves; each fit is searched once."""
+        known = self._laws.get(id(result))
+        if known is None:
+            known = self._laws[id(result)] = (result, counting_law(result))
+        return known[1]
+
+    def _is_noise(self, result: FitResult) -> bool:
+        """Tell whether what a fit leaves is next to the noise, and no law without a name finds anything in it."""
+        level = min(self.floor, unpredictable(residuals_by_record(result)))
+        return result.rms < VISIBLE * level and self._law(result) is None
 
     def _behind_profile(self, retuned: FitResult) -> Trial | None:
         """Look for an effect behind a slow load that by itself hides it, where something stands but nothing passed.
@@ -122,7 +192,7 @@ class Selector:
         knots out of an error that the fast effect keeps correlated. Both are judged again in the final set.
         """
         profiles = [name for name in self.names if EFFECTS[name].profile]
-        if not profiles or counting_law(retuned) is None:
+        if not profiles or self._law(retuned) is None:
             return None
         slow = frozenset(profiles[:1])
         behind = self.bench.fit(slow, retuned)
@@ -131,21 +201,60 @@ class Selector:
         return self._best(self._try_all(slow, behind), behind, retuned)
 
     def _try_all(self, chosen: Effects, current: FitResult) -> dict[str, Trial]:
-        trials = {}
+        """Look at every effect, fit what could matter a few steps, and to the end what comes near the best."""
         superseded = {name for have in chosen for name in EFFECTS[have].contains}
-        candidates = [name for name in self.names if name not in chosen and name not in superseded]
-        for i, name in enumerate(candidates):
-            share = 0.9 * (1.0 - 0.5**self._rounds * (1.0 - 0.5 * i / len(candidates)))  # a round is half of the rest
-            self.progress(f"testing {EFFECTS[name].title}", share)
+        names = [name for name in self.names if name not in chosen and name not in superseded]
+        looks = self._looks(names, chosen, current)
+        titles = ", ".join(EFFECTS[name].title for name in looks)
+        self._report(f"testing {titles}", 0.3)
+        fits = concurrently(
+            lambda name: self.bench.rough_fit(
+                with_effect(chosen, name), current, [look.release for look in looks[name]]
+            ),
+            list(looks),
+        )
+        rough = dict(zip(looks, fits, strict=True))
+        most = max((current.squares - result.squares for result in rough.values()), default=0.0)
+        self._report("finishing the best of them", 0.7)
+
+        def finished(name: str) -> Trial:
             effects = with_effect(chosen, name)
-            result = self.bench.fit(effects, current)
-            trials[name] = self._trial(name, effects, current, result)
+            near = current.squares - rough[name].squares >= WORTH_FINISHING * most
+            result = self.bench.fit(effects, current) if near else rough[name]
+            return self._trial(name, effects, current, result)
+
+        trials = dict(zip(rough, concurrently(finished, list(rough)), strict=True))
         self._rounds += 1
         return trials
 
+    def _looks(self, names: Sequence[str], chosen: Effects, current: FitResult) -> dict[str, list[Look]]:
+        """Return the looks worth a fit: what promises a fair part of the best, or contains a chosen effect."""
+        self._report("looking at every effect", 0.0)
+        screen = Screen(current, self.bench.model)
+        looks = dict(zip(names, concurrently(screen.looks, names), strict=True))
+        promises = {name: found[0].promise for name, found in looks.items()}
+        most = max((promise for promise in promises.values() if math.isfinite(promise)), default=0.0)
+        least = current.squares * -math.expm1(-VERY_STRONG / current.residual.size)
+        worth: list[str] = []
+        for name in sorted(names, key=lambda name: -promises[name]):
+            special = set(EFFECTS[name].contains)
+            related = bool(special & chosen) or bool(special & set(worth))
+            if related or promises[name] >= max(WORTH_FITTING * most, least):
+                worth.append(name)
+        self._dismissed = {
+            name: max(promises[name], 0.0) / current.squares for name in names if name not in worth[:MOST_FITS]
+        }
+        return {name: _promising(looks[name]) for name in worth[:MOST_FITS]}
+
+    def _report(self, what: str, part: float) -> None:
+        share = 0.9 * (1.0 - 0.5**self._rounds * (1.0 - 0.5 * part))  # a round is half of the rest
+        self.progress(what, share)
+
     def _trial(self, name: str, effects: Effects, before: FitResult, after: FitResult) -> Trial:
-        gained = gain(before, after)
-        p_value = min(1.0, gained.p_value * len(self.names))
+        plain = gain(before, after)
+        choices = scan_choices(name, after)
+        gained = replace(plain, delta_bic=plain.delta_bic - 2.0 * choices)
+        p_value = min(1.0, plain.p_value * len(self.names) * math.exp(min(choices, 600.0)))
         return Trial(name, effects, after, gained, None, p_value, self._statistics_fail(name, after, gained, p_value))
 
     def _statistics_fail(self, name: str, result: FitResult, gained: Gain, p_value: float) -> str | None:
@@ -155,18 +264,32 @@ class Selector:
             return f"could be chance (p = {p_value:.2g} after {len(self.names)} hypotheses)"
         if null_inside(name, result):
             return "its interval includes the value at which it does nothing"
-        return None
+        values = {
+            s.name: float(x) * s.scale
+            for s, x in zip(result.problem.shared, result.x, strict=False)
+            if s.effect == name
+        }
+        return EFFECTS[name].implausible(self.bench.model, self.bench.records, values) or None
 
     def _best(self, trials: Mapping[str, Trial], current: FitResult, retuned: FitResult) -> Trial | None:
         """Return the trial that gains most and passes every test, the simpler of two nested ones where they tie."""
         passing = [trial for trial in trials.values() if trial.failed is None]
-        for trial in sorted(passing, key=lambda t: -t.gain.delta_bic):
+        for trial in sorted(passing, key=lambda t: -self._rank(t, passing)):
             simpler = self._simpler(trial, trials, current)
             if self._weighty(simpler.name, simpler.effects, simpler.result, current, retuned) and self._holds_out(
                 simpler, current
             ):
                 return self._examined(simpler, current)
         return None
+
+    @staticmethod
+    def _rank(trial: Trial, passing: Sequence[Trial]) -> float:
+        """Return what a trial gains; of equivalent ones that gain the same, the first along the chain counts more."""
+        twins = {*EFFECTS[trial.name].equivalent, trial.name}
+        gains = [t.gain.delta_bic for t in passing if t.name in twins]
+        tied = max(gains) - trial.gain.delta_bic < VERY_STRONG
+        order = list(EFFECTS).index(trial.name) / len(EFFECTS)
+        return max(gains) - order if tied else trial.gain.delta_bic
 
     def _simpler(self, trial: Trial, trials: Mapping[str, Trial], current: FitResult) -> Trial:
         for name in EFFECTS[trial.name].contains:
@@ -196,6 +319,8 @@ class Selector:
         be a real part of the mismatch: a law written another way leaves just such a small remainder. So must a profile,
         which can take up any slow rest.
         """
+        if before.rms < self.least_ratio * after.rms:
+            return False
         mismatch = max(retuned.rms**2 - self.floor**2, retuned.rms**2 - after.rms**2)
         removed = before.rms**2 - after.rms**2
         if removed >= PART_OF_MISMATCH * mismatch:
@@ -205,10 +330,7 @@ class Selector:
         return not alike and self._visible(before, after)
 
     def _examine(self, trial: Trial, before: FitResult) -> HoldOut:
-        smaller = frozenset(shared.effect for shared in before.problem.shared if shared.effect)
-        if any(basis.profile.size for basis in before.problem.local):
-            smaller |= {name for name in trial.effects if EFFECTS[name].profile and name != trial.name}
-        return self.examiner.compare(before, smaller, trial.result, trial.effects)
+        return self.examiner.compare(before, effects_of(before), trial.result, trial.effects)
 
     def _holds_out(self, trial: Trial, before: FitResult) -> bool:
         """Tell whether a fair part of the gain on the fitted samples shows on unseen ones."""
@@ -244,6 +366,58 @@ class Selector:
         final = self._trial(name, chosen, without, current)
         return self._examined(final, without)
 
+    def _lookalikes(self, name: str, chosen: Effects, current: FitResult) -> tuple[str, ...]:
+        """Return the effects that explain as much in an effect's place, as far as these recordings can tell."""
+        entry = EFFECTS[name]
+        others = chosen - {name}
+        kin = {*entry.resembles, *entry.equivalent} | {
+            other for other in self.names if name in (*EFFECTS[other].resembles, *EFFECTS[other].equivalent)
+        }
+        rivals = [
+            other
+            for other in self.names
+            if other in kin and other not in chosen and name not in EFFECTS[other].contains
+        ]
+        alike = set(entry.equivalent)
+        without = self.bench.fit(others, current)
+        screen = Screen(without, self.bench.model)
+        explained = min(without.squares - current.squares, screen.looks(name)[0].promise)  # a strong law bends
+        n = gain(without, current).n_effective
+        for rival in rivals:
+            looks = screen.looks(rival)
+            if looks[0].promise < SAME_PROMISE * explained:
+                continue
+            result = self.bench.rough_fit(
+                with_effect(others, rival), without, [look.release for look in _promising(looks)]
+            )
+            if result.squares > NEARLY * current.squares:
+                continue
+            result = self.bench.fit(with_effect(others, rival), without)
+            worse = n * math.log(result.squares / current.squares)
+            worse += (result.free_count - current.free_count) * math.log(n)
+            if worse < VERY_STRONG:
+                alike.add(rival)
+        return tuple(sorted(alike))
+
+
+def _promising(looks: Sequence[Look]) -> list[Look]:
+    """Return the starts worth a fit: the best, and a second one where it promises nearly as much."""
+    return [look for look in looks[:STARTS] if look.promise >= PROMISING * looks[0].promise or look is looks[0]]
+
+
+def scan_choices(name: str, result: FitResult) -> float:
+    """Return the logarithm of how many intervals were tried to place an effect's events in all recordings."""
+    if not EFFECTS[name].event:
+        return 0.0
+    total = 0.0
+    for basis, local in zip(
+        result.problem.local, (result.local_of(i) for i in range(len(result.problem.local))), strict=True
+    ):
+        own = dict(zip(((u.effect, u.name) for u in basis.own), local[basis.own_rows], strict=True))
+        if own[name, "to_s"] > own[name, "from_s"]:
+            total += math.log(0.5 * MOST_CELLS**2)
+    return total
+
 
 def counting_law(result: FitResult) -> UnnamedLaw | None:
     """Return the law without a name that best explains what a fit leaves, if it is beyond chance and visible."""
@@ -254,14 +428,22 @@ def counting_law(result: FitResult) -> UnnamedLaw | None:
 
 
 def null_inside(name: str, result: FitResult) -> bool:
-    """Tell whether the interval of an effect's decisive (first) parameter includes its null.
+    """Tell whether the interval of every decisive parameter of an effect includes its null.
 
-    A profile is decided by its gain alone: it has no single parameter.
+    Decisive are the amplitudes of a periodic effect, the first parameter that is fitted of another. A profile is
+    decided by its gain alone: it has no single parameter.
     """
-    if EFFECTS[name].profile:
+    entry = EFFECTS[name]
+    if entry.profile:
         return False
-    parameter = EFFECTS[name].parameters[0]
-    index = next(i for i, s in enumerate(result.problem.shared) if (s.effect, s.name) == (name, parameter.name))
-    low, high = interval(result, covariance(result), index)
-    at_null = bool(np.isclose(result.x[index] * result.problem.shared[index].scale, parameter.null))
-    return at_null or low <= parameter.null <= high
+    nulls = {parameter.name: parameter.null for parameter in entry.parameters}
+    fitted = [i for i, s in enumerate(result.problem.shared) if s.effect == name and s.low < s.high]
+    amplitudes = [i for i in fitted if result.problem.shared[i].name in entry.phases.values()]
+    cov = covariance(result)
+    return all(_includes(result, cov, i, nulls[result.problem.shared[i].name]) for i in amplitudes or fitted[:1])
+
+
+def _includes(result: FitResult, cov: FloatArray, index: int, null: float) -> bool:
+    low, high = interval(result, cov, index)
+    at_null = bool(np.isclose(result.x[index] * result.problem.shared[index].scale, null))
+    return at_null or low <= null <= high

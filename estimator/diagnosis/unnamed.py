@@ -1,33 +1,42 @@
 """The rival that every name must beat: a law without a name, found by sparse regression at one place of the chain.
 
-Orthogonal matching pursuit (Pati, Rezaiifar, Krishnaprasad, Asilomar 1993) over the candidates of one element, after
-everything that re-tuning could explain has been projected out; the BIC decides how many terms, each paying for having
-been chosen among many.
+At every element the best sparse sum of simple functions is looked for; the BIC decides how many, each paying for its
+coefficients and for having been chosen among many. All elements are judged with one number of independent samples, that
+of the rival that leaves least: how correlated a rival's error is must not decide.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 
-import numpy as np
+from scipy import stats
 
-from estimator.diagnosis.disturbances import Candidate, candidates
-from estimator.diagnosis.evidence import Gain, gain_from_squares
+from estimator.diagnosis.disturbances import PLACES, Scene, elements, scene
+from estimator.diagnosis.equivalent import Place
+from estimator.diagnosis.evidence import SMALLEST_P, Gain
+from estimator.diagnosis.hunt import Hunt, again, first, first_along_motion
+from estimator.diagnosis.noise import effective_samples, noise_floor
+from estimator.diagnosis.pursuit import MOST_COEFFICIENTS
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
-from estimator.signals.record import FloatArray
 
-MOST_TERMS = 9
-"""Three load steps per recording in a set of three, or as many terms of another kind."""
+ROUNDS = 5
+"""Rounds that locate: the first promises, the others try what it promised."""
 
-ALIKE = 1e-6
-"""A candidate that re-tuning reproduces to this share of its power can't be told from it."""
+IN_REACH = 3.0
+"""Elements whose law leaves more than this many times the RMS of the best are not looked at again."""
 
 
 @dataclass(frozen=True, slots=True)
 class UnnamedLaw:
-    """The best law at one element: its terms and coefficients, what it gains, and the RMS it would leave."""
+    """The best law at one element: its terms and coefficients, what it gains, and the RMS it would leave.
+
+    A term with several coefficients, a free function or waves, is given by the RMS of what it does.
+    """
 
     element: Element
     terms: tuple[tuple[str, float], ...]
@@ -35,94 +44,65 @@ class UnnamedLaw:
     rms: float
 
 
-def best_unnamed(result: FitResult) -> UnnamedLaw | None:
+def best_unnamed(result: FitResult, rounds: int = 1) -> UnnamedLaw | None:
     """Return the law without a name that gains most over a fit; None where no candidate gains anything."""
-    found = [law for law in unnamed_laws(result) if law.gain.delta_bic > 0]
+    found = [law for law in unnamed_laws(result, rounds) if law.gain.delta_bic > 0]
     return max(found, key=lambda law: law.gain.delta_bic, default=None)
 
 
-def unnamed_laws(result: FitResult) -> list[UnnamedLaw]:
-    """Return the best law of each element that has candidates."""
-    pool = candidates(result)
-    projector = _Projector(result)
-    return [
-        law
-        for element in Element
-        if (law := _pursue(element, [c for c in pool if c.element is element], projector)) is not None
-    ]
+def unnamed_laws(result: FitResult, rounds: int = 1) -> list[UnnamedLaw]:
+    """Return the best law of each element that has candidates.
+
+    Parameters
+    ----------
+    rounds : int
+        1 looks from the fit alone: enough to tell whether anything is left. ``ROUNDS`` tells where.
+    """
+    return laws_of(scene(result, noise_floor(result.problem.records)), rounds)
 
 
-class _Projector:
-    """Takes out of a signal what the free unknowns of a fit could explain, to first order."""
-
-    def __init__(self, result: FitResult) -> None:
-        jacobian = result.jacobian[:, ~result.pinned]
-        self._basis = np.linalg.qr(jacobian)[0]
-        self._use = result.problem.use
-        self.sizes = np.cumsum([int(use.sum()) for use in self._use])[:-1]
-        self.unknowns = result.x.size
-        self.error = self.rest(result.residual)
-
-    def rest(self, signal: FloatArray) -> FloatArray:
-        """Return what is left of a stacked signal, shape (R,)."""
-        left: FloatArray = signal - self._basis @ (self._basis.T @ signal)
-        return left
-
-    def answer(self, candidate: Candidate) -> tuple[FloatArray, float]:
-        """Return what is left of a candidate's answer, scaled to unit norm, and its norm; all 0 where nothing is."""
-        stacked = np.concatenate([a[use] for a, use in zip(candidate.answers, self._use, strict=True)])
-        left = self.rest(stacked)
-        norm = float(np.linalg.norm(left))
-        if norm**2 <= ALIKE * float(stacked @ stacked):
-            return np.zeros_like(left), 0.0
-        return left / norm, norm
+def laws_of(view: Scene, rounds: int = 1) -> list[UnnamedLaw]:
+    """Return the best law of each element, given the inputs that explain the error at each place."""
+    return judged(view, hunts_of(view, rounds))
 
 
-def _pursue(element: Element, pool: list[Candidate], projector: _Projector) -> UnnamedLaw | None:
-    if not pool:
-        return None
-    scaled = [projector.answer(candidate) for candidate in pool]
-    answers = np.array([answer for answer, _ in scaled])
-    norms = np.array([norm for _, norm in scaled])
-    error = projector.error
-    chosen: list[int] = []
-    best: UnnamedLaw | None = None
-    left, coefficients = error, np.empty(0)
-    for _ in range(min(MOST_TERMS, len(pool))):
-        match = np.abs(answers @ left)
-        match[chosen] = 0.0
-        if match.max() <= 0.0:
-            break
-        chosen.append(int(match.argmax()))
-        coefficients = np.linalg.lstsq(answers[chosen].T, error, rcond=None)[0]
-        left = error - coefficients @ answers[chosen]
-        terms = [(pool[i].law, float(-c / norms[i])) for i, c in zip(chosen, coefficients, strict=True)]
-        law = _law(element, terms, error, left, projector, len(pool))
-        if best is None or law.gain.delta_bic > best.gain.delta_bic:
-            best = law
-    return best
+def judged(view: Scene, hunts: Sequence[Hunt]) -> list[UnnamedLaw]:
+    """Return what each hunt has found, weighed with one number of independent samples."""
+    best = min(hunts, key=lambda hunt: hunt.mean_square)
+    n = max(effective_samples(best.errors), best.ground.unknowns + MOST_COEFFICIENTS + 2.0)
+    before = sum(float(line.error[line.rows] @ line.error[line.rows]) for line in view.cut)
+    return [_law(hunt, n, before / best.ground.error.size) for hunt in hunts]
 
 
-def _law(
-    element: Element,
-    terms: list[tuple[str, float]],
-    error: FloatArray,
-    left: FloatArray,
-    projector: _Projector,
-    pool_size: int,
-) -> UnnamedLaw:
-    raw = gain_from_squares(
-        float(error @ error),
-        float(left @ left),
-        len(terms),
-        projector.unknowns + len(terms),
-        np.split(left, projector.sizes),
-    )
-    choices = 2.0 * len(terms) * math.log(pool_size)
-    p_value = min(1.0, raw.p_value * math.comb(pool_size, len(terms)))
-    return UnnamedLaw(
-        element,
-        tuple(terms),
-        Gain(raw.delta_bic - choices, p_value, raw.n_effective),
-        float(np.sqrt(np.mean(left**2))),
-    )
+def hunts_of(view: Scene, rounds: int = 1) -> list[Hunt]:
+    """Look for a law at every element, and again where it is among the best."""
+    with ThreadPoolExecutor(2) as pool:
+        if rounds == 1:
+            return list(pool.map(partial(first, view), elements(view.result)))
+        hunts = list(pool.map(partial(_tried, view), elements(view.result)))
+        for _ in range(rounds - 2):
+            least = min(hunt.mean_square for hunt in hunts)
+            near = [i for i, h in enumerate(hunts) if not h.stuck and h.mean_square <= IN_REACH**2 * least]
+            for i, moved in zip(near, pool.map(again, [hunts[i] for i in near]), strict=True):
+                hunts[i] = moved
+    return hunts
+
+
+def _tried(view: Scene, element: Element) -> Hunt:
+    """Look from the fit alone, and along the motion of an unknown input; return what simulates better."""
+    starts = [first(view, element)]
+    if PLACES[element] is not Place.SENSOR:
+        starts.append(first_along_motion(view, element))
+    return min((again(start) for start in starts), key=lambda hunt: (hunt.stuck, hunt.mean_square))
+
+
+def _law(hunt: Hunt, n: float, before: float) -> UnnamedLaw:
+    q = hunt.law.coefficients
+    if q == 0:
+        return UnnamedLaw(hunt.element, (), Gain(0.0, 1.0, n), math.sqrt(before))
+    gained = hunt.law.information(before, hunt.mean_square, n)
+    rest = max(n - hunt.ground.unknowns - q, 1.0)
+    f_value = max(before / hunt.mean_square - 1.0, 0.0) * rest / q
+    log_p = float(stats.f.logsf(f_value, q, rest)) + hunt.law.choices
+    p_value = max(math.exp(min(log_p, 0.0)), SMALLEST_P)
+    return UnnamedLaw(hunt.element, hunt.law.terms, Gain(gained, p_value, n), math.sqrt(hunt.mean_square))

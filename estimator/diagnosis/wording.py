@@ -25,7 +25,7 @@ def statement(
     judgement: Judgement, effects: Sequence[FoundEffect], fit: Fit, untestable: Sequence[UntestableEffect]
 ) -> str:
     """Return one paragraph: verdict, figures, and what to do next."""
-    parts = [_HEADLINES[judgement.verdict](judgement, effects, fit)]
+    parts = [_HEADLINES[judgement.verdict](judgement, effects, fit), *judgement.unconverged]
     if judgement.remaining is not None and judgement.verdict is Verdict.EXPLAINED:
         parts.append(
             f"A smaller remainder still follows {_law(judgement.remaining)} at the "

@@ -1,0 +1,134 @@
+"""The acquisition chain of a set of recordings: as they were read, and with its faults compensated."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from estimator.diagnosis.acquisition import (
+    Finding,
+    Misfit,
+    as_read,
+    compensate,
+    hidden_jitter,
+    recognise,
+    repaired,
+)
+from estimator.physics.catalogue import EFFECTS
+from estimator.physics.fit import FitResult, start_of
+from estimator.physics.free_run import FreeRun, free_run
+from estimator.physics.model import DrivelineModel
+from estimator.physics.simulate import simulate
+from estimator.signals.record import FloatArray, Record
+
+PULSE_SHARE = 0.01
+"""A torque pulse of this share of the largest torque shows the line's answer without disturbing its motion."""
+
+
+@dataclass(frozen=True, slots=True)
+class Chain:
+    """Recordings and what is recognised of the chain that made them.
+
+    Attributes
+    ----------
+    raw : tuple of Record
+        As read.
+    records : tuple of Record
+        With the faults compensated, for fits.
+    findings : tuple of Finding
+        What was recognised.
+    """
+
+    raw: tuple[Record, ...]
+    records: tuple[Record, ...]
+    findings: tuple[Finding, ...]
+
+    @property
+    def torque_is_unknown(self) -> bool:
+        """Whether some torque was not read."""
+        return any(not record.torque_trusted.all() for record in self.records)
+
+    def with_torques_from(self, result: FitResult) -> Chain:
+        """Return the chain with the torques that were not read estimated from a fit's error."""
+        return replace(self, records=repaired(self.records, _misfits(result)))
+
+    def with_jitter_in(self, result: FitResult) -> Chain:
+        """Return the chain with the jitter that only the errors of a converged fit show, where they show any."""
+        slopes = [
+            np.gradient(output, record.sample_time_s) for output, record in zip(result.outputs, self.raw, strict=True)
+        ]
+        errors = [record.output - output for output, record in zip(result.outputs, self.records, strict=True)]
+        if any(finding.name == "sample_jitter" for finding in self.findings):
+            return self
+        found = hidden_jitter(self.records, errors, slopes, [record.okay for record in self.records])
+        return self if found is None else replace(self, findings=(*self.findings, found))
+
+    def effects(self) -> dict[str, dict[str, float]]:
+        """Return what was recognised as effects of a model: name to parameter values."""
+        return {f.name: {name: sized.value for name, sized in f.parameters.items()} for f in self.findings}
+
+    def errors(self, outputs: Sequence[FloatArray]) -> list[FloatArray]:
+        """Return simulated, as this chain would have read it, less recorded; the good rows of each raw recording."""
+        return [
+            (as_read(output, record, self.effects()) - record.output)[record.okay]
+            for output, record in zip(outputs, self.raw, strict=True)
+        ]
+
+
+def read_through(records: Sequence[Record]) -> Chain:
+    """Recognise the faults of a set of recordings and compensate them."""
+    findings = recognise(records) if records else ()
+    return Chain(tuple(records), compensate(records, findings), findings)
+
+
+def _misfits(result: FitResult) -> list[Misfit]:
+    return [Misfit(_error(result, i), _pulse(result, i)) for i in range(len(result.problem.records))]
+
+
+def _error(result: FitResult, index: int) -> FloatArray:
+    error: FloatArray = result.outputs[index] - result.problem.records[index].output
+    return error
+
+
+def _pulse(result: FitResult, index: int) -> FloatArray:
+    """Return the answer of the output to 1 Nm during the first sample."""
+    record = result.problem.records[index]
+    size = PULSE_SHARE * float(np.max(np.abs(record.torque_nm)))
+    torque = record.torque_nm.copy()
+    torque[0, 0] += size
+    start, extra = (
+        start_of(result.problem, result.x, index),
+        result.problem.local[index].extra_load(result.local_of(index)),
+    )
+    moved = simulate(result.problem.grid, replace(record, torque_nm=torque), result.p_of(index), start, extra)
+    answer: FloatArray = (moved - result.outputs[index]) / size
+    return answer
+
+
+def mechanical(model: DrivelineModel) -> DrivelineModel:
+    """Return a model without the effects that are recognised in recordings and not fitted."""
+    return replace(model, effects={name: v for name, v in model.effects.items() if not EFFECTS[name].recognised})
+
+
+def replay(model: DrivelineModel, record: Record) -> FreeRun:
+    """Simulate one recording with a model, as the acquisition that the model describes would have read it.
+
+    Raises
+    ------
+    BadModel
+        Where the model's structure does not have the recorded output.
+    """
+    acquired: Mapping[str, Mapping[str, float]] = {
+        name: {key: value.value for key, value in values.items()}
+        for name, values in model.effects.items()
+        if EFFECTS[name].recognised
+    }
+    if not acquired:
+        return free_run(model, record)
+    found = tuple(finding for finding in recognise([record]) if finding.name in acquired)
+    run = free_run(mechanical(model), compensate([record], found)[0])
+    output = as_read(run.output, record, acquired)
+    error = (output - record.output)[record.okay]
+    return replace(run, output=output, rms=float(np.sqrt(np.mean(error**2))))

@@ -1,0 +1,147 @@
+"""The inertia a recording fits, over the nominal one, found in two ways that missing physics hardly touches.
+
+**By bands.** Well below its first mode a line moves as one body, well above it only the motor does: there torque and
+speed follow the inertias, whatever the shaft is like. A lag bends the upper band, play and a soft shaft the lower one;
+a factor between units moves both alike, so only where both agree is there a factor. Near the mode itself nothing is
+compared. A road, a brake or a speed control is slower than either band.
+
+**As one body.** Over a second the line moves as one body::
+
+    J (w(t + s) - w(t)) = int T dt - b int w dt - T_0 s,      J the sum of the inertias
+
+which is linear in 1/J, b/J and T_0/J. Means over a period of the first mode leave its swing out. This needs no mode and
+no torque near one, but motion that the torque makes: where a road makes it and a control sets the torque, the share
+of the speed's changes that the torque accounts for tells so.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+from scipy.signal import detrend
+
+from estimator.diagnosis.preconditions.driven import driven
+from estimator.physics.model import DrivelineModel, natural_frequencies_rad_s
+from estimator.physics.motion import measured_speed
+from estimator.physics.simulate import Grid
+from estimator.signals.record import FloatArray, Record
+
+BELOW, ABOVE = (0.1, 0.6), (1.6, math.inf)
+"""The two bands, in first modes of the nominal model: a mode off by a quarter lies in neither."""
+
+BLOCK_HZ, FEWEST_BINS = 1.0, 8
+"""Frequencies compared at a time: few enough for a delay of some samples not to matter."""
+
+BANDS_TELL = 0.5
+"""Share of the output in either band that must follow from the torque."""
+
+AGREE = 2.5
+"""Factor between the ratios of the two bands up to which they are of one cause."""
+
+STRETCH_S = 1.0
+"""Over which the change of speed is looked at."""
+
+FEWEST_STEPS = 10
+"""Samples of a stretch at least."""
+
+FEWEST_STRETCHES = 10
+"""Stretches that a recording must hold to say anything: the regression has three unknowns."""
+
+BODY_TELLS = 0.9
+"""Share of the speed's changes that the torque must account for. Where a road or a brake moves the line and a control
+sets the torque it is below 0.6, in tip-ins and reversals above."""
+
+
+@dataclass(frozen=True, slots=True)
+class Inertia:
+    """The inertia that a recording fits over the nominal one, negative where the speed falls with the torque.
+
+    ``share`` is the share of the motion that follows from the torque.
+    """
+
+    ratio: float
+    share: float
+
+
+NOTHING = Inertia(math.nan, 0.0)
+
+
+def fitted_inertia(record: Record, line: DrivelineModel, grid: Grid | None) -> Inertia | None:
+    """Return the inertia that a recording fits; None where it does not tell.
+
+    Parameters
+    ----------
+    line : DrivelineModel
+        Nominal model without effects.
+    grid : Grid, optional
+        How it is simulated; without one only the motion as one body is looked at.
+    """
+    first_hz = float(natural_frequencies_rad_s(line.values())[0]) / (2.0 * math.pi)
+    if grid is not None and 0.0 < ABOVE[0] * first_hz < 0.5 / record.sample_time_s:
+        below, above = (by_band(record, line, grid, low * first_hz, high * first_hz) for low, high in (BELOW, ABOVE))
+        alike = 1.0 / AGREE <= abs(below.ratio / above.ratio) <= AGREE
+        if min(below.share, above.share) >= BANDS_TELL and alike:
+            return Inertia(math.copysign(math.sqrt(abs(below.ratio * above.ratio)), below.ratio), below.share)
+    found = as_one_body(record, line, first_hz)
+    return found if found.share >= BODY_TELLS else None
+
+
+def by_band(record: Record, line: DrivelineModel, grid: Grid, low_hz: float, high_hz: float) -> Inertia:
+    """Return the ratio of inertias by which the nominal answer to the torque is too large in a band."""
+    model = driven(record, line, grid, 0.5 * low_hz, 2.0 * high_hz)
+    good = np.flatnonzero(record.okay)
+    output = np.interp(np.arange(model.size), good, record.output[good])
+    frequency = np.fft.rfftfreq(model.size, record.sample_time_s)
+    band = (frequency >= low_hz) & (frequency < high_hz)
+    Y, M = (np.fft.rfft(detrend(signal) * np.hanning(signal.size))[band] for signal in (output, model))
+    bins = max(FEWEST_BINS, round(BLOCK_HZ / frequency[1]))
+    blocks = Y.size // bins
+    if blocks == 0:
+        return NOTHING
+    Y, M = (spectrum[: blocks * bins].reshape(blocks, bins) for spectrum in (Y, M))
+    cross, power = (Y * M.conj()).sum(axis=1), (np.abs(M) ** 2).sum(axis=1)
+    total = float((np.abs(Y) ** 2).sum())
+    if not (power > 0.0).all() or total == 0.0:
+        return NOTHING
+    ratio = float(power.sum() / np.abs(cross).sum())
+    return Inertia(math.copysign(ratio, float(cross.real.sum())), float((np.abs(cross) ** 2 / power).sum()) / total)
+
+
+def as_one_body(record: Record, line: DrivelineModel, first_hz: float) -> Inertia:
+    """Return the ratio of inertias by which the impulse of the torque changes the speed."""
+    step = max(round(STRETCH_S / record.sample_time_s), FEWEST_STEPS)
+    width = max(1, round(1.0 / (first_hz * record.sample_time_s))) if first_hz > 0.0 else 1
+    inside = slice(width, record.okay.size - width)
+    okay = record.okay[inside]
+    both = okay[step:] & okay[:-step]
+    if both.sum() < FEWEST_STRETCHES * step:
+        return NOTHING
+    signals = [uniform_filter1d(signal, width)[inside] for signal in _integrals(record)]
+    changes = [(signal[step:] - signal[:-step])[both] for signal in signals]
+    speed, impulse, turned = (change - change.mean() for change in changes)
+    without = _rest(speed, turned[:, np.newaxis])
+    design = np.column_stack([impulse, turned])
+    inverse = float(np.linalg.lstsq(design, speed, rcond=None)[0][0])
+    rest = _rest(speed, design)
+    if inverse == 0.0 or not without @ without > 0.0:
+        return NOTHING
+    total = sum(value for name, value in line.values().items() if name.startswith("J"))
+    return Inertia(1.0 / (inverse * total), 1.0 - float(rest @ rest) / float(without @ without))
+
+
+def _integrals(record: Record) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return speed, impulse of the torque, and angle; each of shape (N,)."""
+    speed = measured_speed(record)
+    good = np.flatnonzero(np.isfinite(speed))
+    speed = np.interp(np.arange(speed.size), good, speed[good])
+    impulse = np.concatenate([[0.0], np.cumsum(record.total_torque_nm[:-1])]) * record.sample_time_s
+    angle = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]))]) * record.sample_time_s
+    return speed, impulse, angle
+
+
+def _rest(y: FloatArray, design: FloatArray) -> FloatArray:
+    rest: FloatArray = y - design @ np.linalg.lstsq(design, y, rcond=None)[0]
+    return rest

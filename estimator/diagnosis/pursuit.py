@@ -1,0 +1,156 @@
+"""Orthogonal matching pursuit over groups of candidates, after what re-tuning could explain has been projected out.
+
+Pati, Rezaiifar, Krishnaprasad, Asilomar 1993, on the Gram matrix of all answers: a choice costs one sweep of it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator.diagnosis.blocks import Line
+from estimator.diagnosis.disturbances import Candidate
+from estimator.diagnosis.noise import effective_samples
+from estimator.signals.record import BoolArray, FloatArray
+
+MOST_TERMS = 9
+"""Three load steps per recording in a set of three, or as many terms of another kind."""
+
+MOST_COEFFICIENTS = 45
+
+ALIKE = 1e-6
+"""A candidate that re-tuning reproduces to this share of its power can't be told from it."""
+
+TOO_ALIKE = 1e-8
+"""Share of a column's power below which it is a combination of others."""
+
+Indices = NDArray[np.intp]
+
+
+class Ground:
+    """What the free unknowns of a fit could explain, to first order; rows are the blocks in use of all recordings.
+
+    Attributes
+    ----------
+    raw, error : ndarray, shape (rows,)
+        The error, and what re-tuning would leave of it.
+    jacobian : ndarray, shape (rows, U)
+        Derivative of the output by every unknown.
+    """
+
+    def __init__(self, cut: Sequence[Line], jacobian: FloatArray, error: FloatArray, pinned: BoolArray) -> None:
+        self.jacobian, self.raw, self.unknowns = jacobian, error, jacobian.shape[1]
+        self._basis = np.linalg.qr(jacobian[:, ~pinned])[0]
+        self._sizes = np.cumsum([int(line.rows.sum()) for line in cut])[:-1]
+        self.error = self.rest(error)
+
+    def rest(self, signals: FloatArray) -> FloatArray:
+        """Return what is left of signals, shape (rows,) or (rows, q)."""
+        left: FloatArray = signals - self._basis @ (self._basis.T @ signals)
+        return left
+
+    def split(self, rows: FloatArray) -> list[FloatArray]:
+        """Split rows into one array per recording."""
+        return list(np.split(rows, self._sizes))
+
+
+@dataclass(frozen=True, slots=True)
+class Path:
+    """A pursuit.
+
+    Attributes
+    ----------
+    squares, coefficients : list
+        Sum of squares left after 0, 1, 2 ... groups, and how many coefficients those have.
+    chosen : list of int
+        Groups, in order.
+    columns : ndarray, shape (rows, q)
+        Their answers.
+    term : ndarray of int, shape (q,)
+        Which choice, from 0, each column belongs to.
+    alone : ndarray, shape (groups,)
+        How much of the error's power each group explains by itself.
+    """
+
+    squares: list[float]
+    coefficients: list[int]
+    chosen: list[int]
+    columns: FloatArray
+    term: Indices
+    alone: FloatArray
+
+    def solved(self, ground: Ground, terms: int, ridge: float) -> tuple[FloatArray, FloatArray]:
+        """Return the coefficients of the first terms, and what they leave of the error, shape (rows,)."""
+        columns = ground.rest(self.columns[:, self.term < terms])
+        if columns.shape[1] == 0:
+            return np.zeros(0), ground.error
+        coefficients: FloatArray = np.linalg.lstsq(columns, ground.error, rcond=ridge)[0].astype(np.float64)
+        return coefficients, ground.error - columns @ coefficients
+
+
+def pursue(pool: Sequence[Candidate], ground: Ground) -> Path:
+    """Choose groups of candidates while they are worth their coefficients."""
+    raw = np.hstack([candidate.answers for candidate in pool])
+    group = np.repeat(np.arange(len(pool)), [candidate.answers.shape[1] for candidate in pool])
+    rest = _unit(raw, ground.rest(raw))
+    full, full_match = rest.T @ rest, rest.T @ ground.error
+    gram, match = full, full_match
+    squares, counts, chosen = [float(ground.error @ ground.error)], [0], list[int]()
+    alone, _ = _gains(gram, match, group, len(pool))
+    left = ground.error
+    for _ in range(MOST_TERMS):
+        n = effective_samples(ground.split(left))
+        gains, ranks = _gains(gram, match, group, len(pool))
+        gains[chosen] = 0.0
+        remaining = np.maximum(squares[-1] - gains, np.finfo(float).tiny * max(squares[0], 1.0))
+        worth = np.where(gains > 0.0, n * np.log(squares[-1] / remaining) - ranks * math.log(n), -np.inf)
+        best = int(worth.argmax())
+        if worth[best] <= 0.0 or counts[-1] + ranks[best] > MOST_COEFFICIENTS:
+            break
+        chosen.append(best)
+        squares.append(float(remaining[best]))
+        counts.append(counts[-1] + int(ranks[best]))
+        members = np.flatnonzero(np.isin(group, chosen))
+        weights = np.linalg.lstsq(full[np.ix_(members, members)], full_match[members], rcond=TOO_ALIKE)[0]
+        left = ground.error - rest[:, members] @ weights
+        gram, match = _swept(gram, match, np.flatnonzero(group == best))
+    columns = [pool[each].answers for each in chosen]
+    term = np.repeat(np.arange(len(chosen)), [each.shape[1] for each in columns])
+    return Path(squares, counts, chosen, np.hstack([np.empty((left.size, 0)), *columns]), term, alone)
+
+
+def _unit(raw: FloatArray, rest: FloatArray) -> FloatArray:
+    """Scale what is left of answers to unit norm; to zero where re-tuning takes all of it."""
+    before, after = np.einsum("ij,ij->j", raw, raw), np.einsum("ij,ij->j", rest, rest)
+    alive = after > ALIKE * np.maximum(before, np.finfo(float).tiny)
+    scale = np.where(alive, 1.0 / np.sqrt(np.where(alive, after, 1.0)), 0.0)
+    unit: FloatArray = rest * scale
+    return unit
+
+
+def _gains(gram: FloatArray, match: FloatArray, group: Indices, count: int) -> tuple[FloatArray, FloatArray]:
+    """Return how much of the error's power each group takes, and how many coefficients it has."""
+    power = np.diag(gram)
+    good = power > TOO_ALIKE
+    single = np.where(good, match**2 / np.where(good, power, 1.0), 0.0)
+    gains = np.bincount(group, single, count).astype(np.float64)
+    ranks = np.bincount(group, good.astype(np.float64), count).astype(np.float64)
+    for each in np.flatnonzero(np.bincount(group, minlength=count) > 1):
+        rows = np.flatnonzero(group == each)
+        values, vectors = np.linalg.eigh(gram[np.ix_(rows, rows)])
+        kept = values > TOO_ALIKE
+        projected = vectors[:, kept].T @ match[rows]
+        gains[each] = float(np.sum(projected**2 / values[kept]))
+        ranks[each] = int(kept.sum())
+    return gains, ranks
+
+
+def _swept(gram: FloatArray, match: FloatArray, rows: Indices) -> tuple[FloatArray, FloatArray]:
+    """Take chosen columns out of all others."""
+    inverse = np.linalg.pinv(gram[np.ix_(rows, rows)], rcond=TOO_ALIKE, hermitian=True)
+    weights = gram[:, rows] @ inverse
+    return gram - weights @ gram[rows], match - weights @ match[rows]

@@ -1,0 +1,218 @@
+"""A first look at every effect: what it could explain of a fit's error to first order, and where its fit starts.
+
+One simulation per start point gives the direction in which the effect moves the output; what of it re-tuning could
+explain is projected out (a score test with a step of finite size: Rao, Proc. Camb. Phil. Soc. 44, 1948). Effects that
+could explain little next to the best are not worth a fit; the others start where this look left them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from estimator.physics.catalogue import EFFECTS
+from estimator.physics.effect import Effect
+from estimator.physics.fit import FitResult, start_of
+from estimator.physics.model import DrivelineModel
+from estimator.physics.own_scan import Cells, Stretch, Wave, cells, scan, waves
+from estimator.physics.projector import Projector
+from estimator.physics.simulate import simulate
+from estimator.physics.unknowns import Release, Shared, effect_unknowns
+from estimator.signals.record import FloatArray
+
+SMALLEST_SCALING, LARGEST_SCALING = 0.1, 4.0
+"""How far from a start's own size the first look may place a fit's start: the direction holds no further."""
+
+SIZES = np.geomspace(0.05, 10.0, 15)
+"""Sizes of an event that are tried, in multiples of its start's: all recordings share it, each finds its interval."""
+
+STEP_SHARES = (1.0, 0.1)
+"""Shares of a start's size that are looked along: what is not smooth shows in full, what moves far in small."""
+
+ROUNDS = 3
+"""Rounds in which the size of an event and its intervals in all recordings find each other from there."""
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """A start of an effect's fit, and the fall of the squared error it promises to first order."""
+
+    release: Release
+    promise: float
+
+
+class Screen:
+    """Looks at effects around one fit."""
+
+    def __init__(self, result: FitResult, model: DrivelineModel) -> None:
+        self._result = result
+        self._model = model
+        self._projector = Projector(result)
+        self._rows = np.cumsum([0, *(int(use.sum()) for use in result.problem.use)])
+
+    def looks(self, name: str) -> list[Look]:
+        """Return a look at each start of an effect, the most promising first."""
+        entry = EFFECTS[name]
+        releases = effect_unknowns(name, self._model, self._result.problem.records)
+        if entry.profile:
+            return [Look(release, np.inf) for release in releases]
+        looker = self._periodic if entry.phases else self._event if entry.event else self._plain
+        return sorted((looker(entry, release) for release in releases), key=lambda look: -look.promise)
+
+    def _plain(self, entry: Effect, release: Release) -> Look:
+        first = next(shared for shared in release.shared if shared.low < shared.high)
+        null = next(parameter.null for parameter in entry.shared_parameters if parameter.name == first.name)
+        zero = _zero(first, null)
+        return max(
+            (self._step(release, first, zero, share * (first.start - zero)) for share in STEP_SHARES),
+            key=lambda look: look.promise,
+        )
+
+    def _step(self, release: Release, first: Shared, zero: float, step: float) -> Look:
+        """Look along the change of the output that one size of an effect makes."""
+        stepped = _with_start(release, first, zero + step)
+        moved = np.concatenate(
+            [
+                self._runner(i)(_filled(self._result.p_of(i), stepped.shared)) - self._output(i)
+                for i in range(len(self._result.problem.records))
+            ]
+        )
+        ends = sorted((limit - zero) / step for limit in (first.low, first.high))
+        most = LARGEST_SCALING * abs((first.start - zero) / step)
+        reached, promise = self._projector.promise(moved, max(ends[0], -most), min(ends[1], most))
+        least = SMALLEST_SCALING * abs((first.start - zero) / step)
+        size = float(np.copysign(max(abs(reached), least), reached))
+        return Look(_with_start(release, first, float(np.clip(zero + size * step, first.low, first.high))), promise)
+
+    def _periodic(self, entry: Effect, release: Release) -> Look:
+        sizes = _sizes(release)
+        found = [
+            waves(entry, _filled(self._result.p_of(i), release.shared), sizes, self._runner(i))
+            for i in range(len(self._result.problem.records))
+        ]
+        amplitudes, phases, promise = self._regress(found)
+        shared = tuple(
+            replace(u, start=float(np.clip(amplitudes[u.name] / u.scale, u.low, u.high))) if u.name in amplitudes else u
+            for u in release.shared
+        )
+        own = tuple(
+            tuple(replace(u, start=phases[i].get(u.name, u.start)) for u in unknowns)
+            for i, unknowns in enumerate(release.own)
+        )
+        return Look(Release(shared, own), promise)
+
+    def _regress(self, found: list[list[Wave]]) -> tuple[dict[str, float], list[dict[str, float]], float]:
+        """Return the amplitudes all recordings share, the phases of each, and the promise."""
+        parts: dict[str, list[tuple[float, float]]] = {}
+        phases: list[dict[str, float]] = []
+        raws = []
+        for i, mine in enumerate(found):
+            raw = self._spread(np.concatenate([wave.answers for wave in mine]), i)
+            answers = self._projector.rest(raw)
+            raws.append(raw)
+            coefficients = -np.linalg.lstsq(answers.T, self._projector.error, rcond=None)[0].reshape(-1, 2)
+            phases.append({})
+            for wave, (along, across), power in zip(
+                mine, coefficients, (answers**2).sum(axis=1).reshape(-1, 2).sum(axis=1), strict=True
+            ):
+                parts.setdefault(wave.amplitude, []).append((float(np.hypot(along, across)), float(power)))
+                phases[i][wave.phase] = float(np.arctan2(across, along))
+        amplitudes = {
+            name: float(np.average([size for size, _ in each], weights=[max(w, 1e-300) for _, w in each]))
+            for name, each in parts.items()
+        }
+        change = np.zeros_like(self._projector.error)
+        for mine, answers, angles in zip(found, raws, phases, strict=True):
+            for wave, (at_zero, at_quarter) in zip(mine, answers.reshape(-1, 2, change.size), strict=True):
+                angle = angles[wave.phase]
+                change += amplitudes[wave.amplitude] * (np.cos(angle) * at_zero + np.sin(angle) * at_quarter)
+        return amplitudes, phases, self._projector.promise(change, 0.0, 1.0)[1]
+
+    def _event(self, entry: Effect, release: Release) -> Look:
+        sizes = _sizes(release)
+        size = release.shared[0]
+        grids = [
+            cells(entry, _filled(self._result.p_of(i), release.shared), own, sizes, self._runner(i))
+            for i, own in enumerate(release.own)
+        ]
+        error = self._projector.error
+        scans = [scan(self._projector.rest(self._spread(grid.answers, i)), error) for i, grid in enumerate(grids)]
+        tried = [value for value in SIZES * size.scale * abs(size.start) if self._may_be(size, value)]
+        tried += [-value for value in tried if self._may_be(size, -value)]
+        best = max(tried, key=lambda value: sum(each.best(value).taken for each in scans))
+        for _ in range(ROUNDS):
+            stretches = [each.best(best) for each in scans]
+            power = sum(stretch.power for stretch in stretches)
+            if power == 0.0:
+                return Look(release, 0.0)
+            best = float(
+                np.clip(-sum(s.match for s in stretches) / power, size.low * size.scale, size.high * size.scale)
+            )
+        own = tuple(
+            _between(unknowns, entry, grid, stretch)
+            for unknowns, grid, stretch in zip(release.own, grids, stretches, strict=True)
+        )
+        found = Release((replace(size, start=best / size.scale), *release.shared[1:]), own)
+        change = sum(
+            self._spread((grid.answers[stretch.last] - grid.answers[stretch.first])[None, :], i)[0]
+            for i, (grid, stretch) in enumerate(zip(grids, stretches, strict=True))
+        )
+        return Look(found, self._projector.promise(best * np.asarray(change), 0.0, LARGEST_SCALING)[1])
+
+    @staticmethod
+    def _may_be(size: Shared, value: float) -> bool:
+        return size.low * size.scale <= value <= size.high * size.scale
+
+    def _runner(self, index: int) -> Callable[[FloatArray], FloatArray]:
+        problem = self._result.problem
+        record, basis = problem.records[index], problem.local[index]
+        start = start_of(problem, self._result.x, index)
+        extra = basis.extra_load(self._result.local_of(index))
+        return lambda p: simulate(problem.grid, record, p, start, extra)[problem.use[index]]
+
+    def _output(self, index: int) -> FloatArray:
+        return self._result.outputs[index][self._result.problem.use[index]]
+
+    def _spread(self, answers: FloatArray, index: int) -> FloatArray:
+        """Place one recording's answers, shape (K, R_i), among the samples of all, shape (K, R)."""
+        full = np.zeros((answers.shape[0], self._rows[-1]))
+        full[:, self._rows[index] : self._rows[index + 1]] = answers
+        return full
+
+
+def _filled(p: FloatArray, shared: tuple[Shared, ...]) -> FloatArray:
+    filled = p.copy()
+    for unknown in shared:
+        filled[unknown.slot] = unknown.scale * unknown.start
+    return filled
+
+
+def _sizes(release: Release) -> Mapping[str, float]:
+    return {unknown.name: unknown.scale * unknown.start for unknown in release.shared}
+
+
+def _with_start(release: Release, unknown: Shared, start: float) -> Release:
+    return replace(release, shared=tuple(replace(u, start=start) if u is unknown else u for u in release.shared))
+
+
+def _zero(unknown: Shared, null: float) -> float:
+    """Return where an unknown does nothing, scaled; a limit does nothing where the data end: at its scale."""
+    value = null / unknown.scale
+    return value if np.isfinite(value) else 1.0
+
+
+def _between(own: tuple[Shared, ...], entry: Effect, grid: Cells, stretch: Stretch) -> tuple[Shared, ...]:
+    """Return a recording's moments as the scan found them; a fit may move them by a cell: beyond it others match."""
+    moments = {"from_s": float(grid.moments_s[stretch.first]), "to_s": float(grid.moments_s[stretch.last])}
+    cell = float(grid.moments_s[1] - grid.moments_s[0]) if stretch.last > stretch.first else 0.0
+    return tuple(
+        replace(
+            unknown,
+            start=moments[unknown.name],
+            low=max(unknown.low, moments[unknown.name] - cell),
+            high=min(unknown.high, moments[unknown.name] + cell),
+        )
+        for unknown in own
+    )

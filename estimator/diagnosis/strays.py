@@ -1,0 +1,37 @@
+"""Single readings that are off by far: wrong bits on the way from the sensor, which no motion of the line explains."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy import stats
+from scipy.ndimage import median_filter
+
+from estimator.signals.record import BoolArray, FloatArray
+
+NEIGHBOURS = 7
+"""A reading is held against the median of so many around it: a swing of the line lasts longer."""
+
+FALSE_ALARM = 0.01
+"""Probability that normal noise makes one stray in all recordings."""
+
+WITHIN = 0.9
+"""Share of the values that their spread is told from: few of them are their own neighbours' median, and no stray."""
+
+
+def strays(errors: Sequence[FloatArray]) -> list[BoolArray]:
+    """Tell which values of an error stand out of their neighbours, per recording; shapes (B_i,)."""
+    apart = [_apart(error) for error in errors]
+    every = np.concatenate(apart)
+    sigma = float(np.quantile(np.abs(every), WITHIN)) / float(stats.norm.isf(0.5 * (1.0 - WITHIN)))
+    limit = float(stats.norm.isf(0.5 * FALSE_ALARM / every.size)) * sigma
+    return [np.abs(each) > limit for each in apart]
+
+
+def _apart(error: FloatArray) -> FloatArray:
+    """Return how far each value is from its neighbours' median; 0 at the ends, with neighbours on one side only."""
+    apart: FloatArray = error - median_filter(error, NEIGHBOURS, mode="nearest")
+    ends = NEIGHBOURS // 2
+    apart[:ends] = apart[-ends:] = 0.0
+    return apart
