@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import json
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -13,10 +14,12 @@ from rich.text import Text
 
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Effect, EffectParameter
-from estimator.physics.model import Motion
+from estimator.physics.model import Motion, Structure
 from hil.errors import UsageError
-from hil.report.numbers import json_number, shown
+from hil.report.numbers import json_number
 from hil.report.wording import ELEMENTS
+
+SCALES = "Bounds are in multiples of a scale that the recordings give: torque in use, top speed, sampling period."
 
 
 def select(name: str | None) -> list[Effect]:
@@ -63,6 +66,9 @@ def _parameter(parameter: EffectParameter) -> dict[str, Any]:
         "meaning": parameter.meaning,
         "unit": {motion.value: parameter.unit(motion) for motion in Motion},
         "null": json_number(parameter.null),
+        "bounds_in_scales": [json_number(parameter.low), json_number(parameter.high)],
+        "optional": parameter.optional,
+        "per_recording": parameter.own,
     }
 
 
@@ -79,18 +85,51 @@ def effect_details(entry: Effect) -> RenderableType:
     facts = Table.grid(padding=(0, 2))
     for label, text in (
         ("law", entry.law),
-        ("source", entry.source),
         ("excited by", entry.excited_by),
-        ("structures", ", ".join(sorted(structure.value for structure in entry.structures))),
-        ("resembles", ", ".join(entry.resembles)),
-        ("same as, in these signals", ", ".join(entry.equivalent)),
+        ("confused with", ", ".join(entry.resembles)),
+        ("the same to torque and speed", ", ".join(entry.equivalent)),
         ("contains", ", ".join(entry.contains)),
+        ("structures", structures_text(entry)),
+        ("source", entry.source),
     ):
         if text:
             facts.add_row(label, Text(text))
-    parameters = Table("parameter", "unit", "no effect at", "meaning", box=None, pad_edge=False)
+    parameters = Table("parameter", "unit", "null", "bounds", "meaning", box=None, pad_edge=False)
     for parameter in entry.parameters:
-        units = dict.fromkeys(parameter.unit(motion) for motion in Motion)
-        parameters.add_row(parameter.name, " or ".join(units), shown(parameter.null), Text(parameter.meaning))
+        parameters.add_row(
+            parameter.name,
+            unit_text(parameter),
+            null_text(parameter),
+            bounds_text(entry, parameter),
+            Text(parameter.meaning),
+        )
     title = Text(f"{entry.name}: {entry.title} ({ELEMENTS[entry.element]})", style="bold")
-    return Group(title, facts, Text(""), parameters)
+    note = Text(f"With all parameters at null there is no effect. {SCALES}", style="dim")
+    return Group(title, facts, Text(""), parameters, Text(""), note)
+
+
+def structures_text(entry: Effect) -> str:
+    """Return the structures an effect makes sense in, smallest first."""
+    return ", ".join(structure.value for structure in Structure if structure in entry.structures)
+
+
+def unit_text(parameter: EffectParameter) -> str:
+    """Return a parameter's unit for rotation or translation, a dash for a bare number."""
+    return " or ".join(dict.fromkeys(parameter.unit(motion) for motion in Motion)) or "–"
+
+
+def null_text(parameter: EffectParameter) -> str:
+    """Return the value without the effect; a limit that is none is infinite."""
+    return "∞" if math.isinf(parameter.null) else f"{parameter.null:g}"
+
+
+def bounds_text(entry: Effect, parameter: EffectParameter) -> str:
+    """Return what a fit may try for a parameter."""
+    if entry.recognised:
+        return "read off the data"
+    if entry.event and parameter.own:
+        return "in the recording"
+    if entry.profile or math.isinf(parameter.high):
+        return "free"
+    span = f"{parameter.low:g} to {parameter.high:g}"
+    return span if parameter.own else f"{span} scales"

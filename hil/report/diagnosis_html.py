@@ -1,8 +1,8 @@
 """``report.html``: a diagnosis as one self-contained page.
 
-From the top: verdict and statement, the fit in figures, where the mismatch is, the physics found with its law
-and sizes, the recordings with their simulations and errors, the rivals and why each lost, what these tests
-can't tell, and the parameters.
+From the top: verdict and statement, the fit in figures, what was recognised in the acquisition, the physics found with
+its law over its data, where the mismatch is (place, time, frequency), the recordings with their simulations and errors,
+the rivals and why each lost, what these tests can't tell, and the parameters.
 """
 
 from __future__ import annotations
@@ -12,10 +12,12 @@ from html import escape
 
 import numpy as np
 
-from estimator.diagnosis.result import Diagnosis, FoundEffect, Interval, Trace, UnnamedLaw
+from estimator.diagnosis.result import Diagnosis, FoundEffect, Trace, UnnamedLaw
 from estimator.physics.catalogue import EFFECTS
+from estimator.physics.effect import Element
 from estimator.signals.record import FloatArray
 from hil.report import page as html
+from hil.report.discrepancy_html import frequency, law_pictures, location, worth_marking
 from hil.report.figures import (
     Line,
     Panel,
@@ -26,14 +28,12 @@ from hil.report.figures import (
     stretches_for,
     time_figure,
 )
+from hil.report.interval_bar import interval_bar
 from hil.report.numbers import p_statement, shown, shown_interval, shown_ratio, shown_times
-from hil.report.wording import BADGES, ELEMENTS, headline, listed, location_rows, quantity, torque_axis
+from hil.report.wording import BADGES, ELEMENTS, headline, listed, quantity, torque_axis
 
 MOST_DRAWN = 20
 """Recordings drawn at most; beyond, those with the largest error of the re-tuned model."""
-
-WHOLE = 0.95
-"""From this share on, a mismatch is everywhere in a recording."""
 
 RETUNED = "nominal re-tuned"
 AUGMENTED = "augmented"
@@ -42,12 +42,15 @@ KEPT_BACK = "stretches kept back as unseen data"
 
 def diagnosis_page(diagnosis: Diagnosis) -> str:
     """Return the text of the page."""
+    drawn = _drawn(diagnosis.traces)
     body = [
         _top(diagnosis),
         _fit(diagnosis),
-        _location(diagnosis),
+        _acquired(diagnosis),
         _found(diagnosis),
-        *_recordings(diagnosis),
+        location(diagnosis, [trace for trace in drawn if not trace.holdout]),
+        frequency(diagnosis),
+        *_recordings(diagnosis, drawn),
         _rivals(diagnosis),
         _untestable(diagnosis),
         _parameters(diagnosis),
@@ -120,24 +123,31 @@ def _fit(diagnosis: Diagnosis) -> str:
     return html.section("Fit", html.html_table(headings, cells, numbers=(1, 2, 3)))
 
 
-def _location(diagnosis: Diagnosis) -> str:
-    if not diagnosis.mismatch.detected:
+def _acquired(diagnosis: Diagnosis) -> str:
+    """Return what was recognised in the raw data, before any fit, and taken into account."""
+    found = [effect for effect in diagnosis.effects if _is_acquired(effect)]
+    if not found:
         return ""
-    return html.section(
-        "Where simulation and recording differ", html.table(("", ""), location_rows(diagnosis.mismatch))
-    )
+    pieces = [piece for effect in found for piece in _effect(diagnosis, effect)]
+    return html.section("Recognised in the recordings themselves", *pieces)
+
+
+def _is_acquired(effect: FoundEffect) -> bool:
+    return effect.element is Element.ACQUISITION or (effect.name in EFFECTS and EFFECTS[effect.name].recognised)
 
 
 def _found(diagnosis: Diagnosis) -> str:
     if diagnosis.unnamed is not None:
-        return _unnamed(diagnosis.unnamed, diagnosis.fit.unit)
-    if not diagnosis.effects:
+        return _unnamed(diagnosis, diagnosis.unnamed)
+    effects = [effect for effect in diagnosis.effects if not _is_acquired(effect)]
+    if not effects:
         return ""
-    pieces = [piece for effect in diagnosis.effects for piece in _effect(effect)]
+    pieces = [piece for effect in effects for piece in _effect(diagnosis, effect)]
     return html.section("The physics found", *pieces)
 
 
-def _unnamed(law: UnnamedLaw, unit: str) -> str:
+def _unnamed(diagnosis: Diagnosis, law: UnnamedLaw) -> str:
+    unit = diagnosis.fit.unit
     rows = [(name, shown(coefficient)) for name, coefficient in law.terms]
     return html.section(
         "A law without a name",
@@ -145,11 +155,18 @@ def _unnamed(law: UnnamedLaw, unit: str) -> str:
             f"At the {ELEMENTS[law.element]} these terms follow the mismatch best; to first order they bring the error "
             f"from {shown(law.rms_before, unit)} to {shown(law.rms_after, unit)}. It is a description, not a cause."
         ),
-        html.table(("term", "coefficient"), rows, numbers=(1,)),
+        html.table(("term", "coefficient, or RMS where it has several"), rows, numbers=(1,)),
+        *_pictures_at(diagnosis, law.element),
     )
 
 
-def _effect(effect: FoundEffect) -> list[str]:
+def _pictures_at(diagnosis: Diagnosis, element: Element) -> list[str]:
+    seen = diagnosis.discrepancy
+    names = [picture.name for picture in seen.pictures if picture.element is element] if seen is not None else []
+    return [piece for name in names for piece in law_pictures(diagnosis, name)]
+
+
+def _effect(diagnosis: Diagnosis, effect: FoundEffect) -> list[str]:
     evidence = effect.evidence
     pieces = [
         f"<h3>{escape(effect.name)} <small>({ELEMENTS[effect.element]})</small></h3>",
@@ -160,6 +177,7 @@ def _effect(effect: FoundEffect) -> list[str]:
     if effect.parameters:
         rows = [(name, shown(p.value), shown_interval(p.ci95), p.unit) for name, p in effect.parameters.items()]
         pieces.append(html.table(("parameter", "value", "95 % interval", "unit"), rows, numbers=(1, 2)))
+    pieces += law_pictures(diagnosis, effect.name)
     pieces.append(
         html.paragraph(
             f"Evidence: information criterion better by {shown(evidence.delta_bic)}; error on unseen data "
@@ -181,12 +199,15 @@ def _effect(effect: FoundEffect) -> list[str]:
     return pieces
 
 
-def _recordings(diagnosis: Diagnosis) -> list[str]:
-    traces = sorted(diagnosis.traces, key=lambda trace: _rms(trace.retuned - trace.measured), reverse=True)
-    drawn = set(map(id, traces[:MOST_DRAWN]))
+def _drawn(traces: Sequence[Trace]) -> list[Trace]:
+    """Return the recordings that are drawn, in their order."""
+    largest = sorted(traces, key=lambda trace: _rms(trace.retuned - trace.measured), reverse=True)[:MOST_DRAWN]
+    return [trace for trace in traces if any(trace is each for each in largest)]
+
+
+def _recordings(diagnosis: Diagnosis, drawn: Sequence[Trace]) -> list[str]:
     stretches = stretches_for(len(drawn))
-    kept = [trace for trace in diagnosis.traces if id(trace) in drawn]
-    sections = [_recording(diagnosis, trace, i, stretches) for i, trace in enumerate(kept)]
+    sections = [_recording(diagnosis, trace, i, stretches) for i, trace in enumerate(drawn)]
     left_out = len(diagnosis.traces) - len(drawn)
     if left_out:
         text = f"{left_out} more recordings, with smaller errors of the re-tuned model, are not drawn."
@@ -204,7 +225,11 @@ def _recording(diagnosis: Diagnosis, trace: Trace, number: int, stretches: int) 
     measured = np.where(trace.okay, trace.measured, np.nan)
     before, after = measured - trace.retuned, measured - trace.augmented
     inputs = input_lines(trace.torque_nm)
-    errors = (Line(RETUNED, before, Style.BEFORE), Line(AUGMENTED, after, Style.AFTER))
+    errors = [Line(RETUNED, before, Style.BEFORE)]
+    models = [Line(RETUNED, trace.retuned, Style.BEFORE)]
+    if not np.array_equal(trace.retuned, trace.augmented):
+        errors.append(Line(AUGMENTED, after, Style.AFTER))
+        models.append(Line(AUGMENTED, trace.augmented, Style.AFTER))
     panels = (
         Panel(torque_axis(diagnosis.augmented.motion), inputs),
         Panel(
@@ -212,13 +237,12 @@ def _recording(diagnosis: Diagnosis, trace: Trace, number: int, stretches: int) 
             (
                 Line("measured", measured, Style.MEASURED),
                 Line("nominal as given", trace.nominal, Style.NOMINAL, hidden=True),
-                Line(RETUNED, trace.retuned, Style.BEFORE),
-                Line(AUGMENTED, trace.augmented, Style.AFTER),
+                *models,
             ),
         ),
-        Panel(f"error [{fit.unit}]", errors, band=fit.noise_floor),
+        Panel(f"error [{fit.unit}]", tuple(errors), band=fit.noise_floor),
     )
-    shaded = _worth_marking(trace, diagnosis.mismatch.time_s.get(trace.name, ()))
+    shaded = worth_marking(trace, diagnosis.mismatch.time_s.get(trace.name, ()))
     sample_time_s = float(np.median(np.diff(trace.time_s)))
     kind = "held out" if trace.holdout else "used for the fit"
     figures = f"RMS error {shown(_rms(before))} → {shown(_rms(after))} {fit.unit}; {kind}."
@@ -231,14 +255,8 @@ def _recording(diagnosis: Diagnosis, trace: Trace, number: int, stretches: int) 
         ),
         time_figure(f"time-{number}", trace.time_s, panels, stretches, shaded),
         "<h3>Spectrum of the error</h3>",
-        spectrum_figure(f"spectrum-{number}", sample_time_s, errors, fit.unit),
+        spectrum_figure(f"spectrum-{number}", sample_time_s, errors, fit.unit, fit.noise_floor),
     )
-
-
-def _worth_marking(trace: Trace, spans: Sequence[Interval]) -> Sequence[Interval]:
-    """Return the intervals to shade: none where they are the whole recording, which tells nothing."""
-    covered = sum(high - low for low, high in spans)
-    return spans if covered < WHOLE * float(trace.time_s[-1] - trace.time_s[0]) else ()
 
 
 def _rivals(diagnosis: Diagnosis) -> str:
@@ -261,16 +279,21 @@ def _untestable(diagnosis: Diagnosis) -> str:
 
 
 def _parameters(diagnosis: Diagnosis) -> str:
-    rows = [
-        (name, shown(p.nominal), shown(p.value), shown_interval(p.ci95), _change(p.nominal, p.value), p.unit)
-        for name, p in diagnosis.parameters.items()
-    ]
-    rows += [
-        (f"constant load in {name}", "–", shown(load.value), shown_interval(load.ci95), "–", load.unit)
-        for name, load in diagnosis.load_torque.items()
-    ]
-    headings: Sequence[str] = ("parameter", "nominal", "found", "95 % interval", "change", "unit")
-    return html.section("Parameters of the model", html.table(headings, rows, numbers=(1, 2, 3, 4)))
+    rows = []
+    for name, p in diagnosis.parameters.items():
+        known = diagnosis.augmented.parameters.get(name)
+        bar = interval_bar(p.nominal, p.value, *p.ci95, known.tolerance if known is not None else 0.0)
+        cells = (name, shown(p.nominal), shown(p.value), shown_interval(p.ci95), _change(p.nominal, p.value), p.unit)
+        rows.append([*map(escape, cells), bar])
+    for name, load in diagnosis.load_torque.items():
+        cells = (f"constant load in {name}", "–", shown(load.value), shown_interval(load.ci95), "–", load.unit)
+        rows.append([*map(escape, cells), ""])
+    headings = ("parameter", "nominal", "found", "95 % interval", "change", "unit", "nominal, tolerance and interval")
+    return html.section(
+        "Parameters of the model",
+        html.html_table(headings, rows, numbers=(1, 2, 3, 4)),
+        html.paragraph("Bar: tolerance grey, nominal value as a line, value found as a dot with its interval.", "note"),
+    )
 
 
 def _change(nominal: float, value: float) -> str:

@@ -1,7 +1,8 @@
 """``diagnosis.json`` (CONTRACT, schema ``hil.diagnosis/1``): a Diagnosis for scripts.
 
 Keys beyond the contract: ``warnings``, ``load_torque`` per recording, ``unnamed`` (the law without a name where nothing
-explains the mismatch), and ``profiles`` in an effect that was found as a course over time.
+explains the mismatch), ``profiles`` in an effect that was found as a course over time, and ``discrepancy``: the best
+law without a name at each element, the likelihood of each place, and the tests over frequency.
 """
 
 from __future__ import annotations
@@ -12,11 +13,13 @@ from typing import Any
 
 from estimator.diagnosis.result import (
     Diagnosis,
+    Discrepancy,
     Estimated,
     Evidence,
     Fit,
     FoundEffect,
     Interval,
+    LawPicture,
     Mismatch,
     Profile,
     RejectedEffect,
@@ -54,6 +57,7 @@ def diagnosis_json(diagnosis: Diagnosis) -> Json:
         "load_torque": {name: _estimated(value) for name, value in diagnosis.load_torque.items()},
         "timing_s": {name: json_number(value) for name, value in diagnosis.timing_s.items()},
         "warnings": list(diagnosis.warnings),
+        "discrepancy": None if diagnosis.discrepancy is None else _discrepancy(diagnosis.discrepancy),
     }
 
 
@@ -85,6 +89,57 @@ def _unnamed(law: UnnamedLaw) -> Json:
         "terms": [{"law": name, "coefficient": json_number(value)} for name, value in law.terms],
         "rms_before": json_number(law.rms_before),
         "rms_after": json_number(law.rms_after),
+    }
+
+
+def _discrepancy(seen: Discrepancy) -> Json:
+    """Return what a script may want of the report's pictures: tests and laws, not courses over time."""
+    return {
+        "element": None if seen.element is None else seen.element.value,
+        "laws": [
+            {
+                "element": law.element.value,
+                "terms": [{"law": name, "coefficient": json_number(value)} for name, value in law.terms],
+                "rms_after": json_number(law.rms),
+                "delta_bic": json_number(law.delta_bic),
+                "p_value": json_number(law.p_value),
+            }
+            for law in seen.laws
+        ],
+        "places": [
+            {
+                "place": each.place,
+                "unit": each.unit,
+                "log_likelihood": json_number(each.log_likelihood),
+                "plausible": each.plausible,
+            }
+            for each in seen.equivalents
+        ],
+        "bands": [
+            {
+                "band_hz": _numbers((band.low_hz, band.high_hz)),
+                "power_to_floor": json_number(band.ratio),
+                "p_value": json_number(band.p_value),
+            }
+            for band in seen.spectrum.bands
+        ],
+        "response_p_values": {
+            name: {"retuned": json_number(each.p_before), "augmented": json_number(each.p_after)}
+            for name, each in seen.responses.items()
+        },
+        "pictures": [_picture(picture) for picture in seen.pictures],
+    }
+
+
+def _picture(picture: LawPicture) -> Json:
+    arrays = {"x": picture.x, "data": picture.data, "low": picture.low, "high": picture.high, "law": picture.law}
+    return {
+        "name": picture.name,
+        "element": picture.element.value,
+        "signal": picture.signal,
+        "signal_unit": picture.signal_unit,
+        "unit": picture.unit,
+        **{name: _numbers(values) for name, values in arrays.items()},
     }
 
 

@@ -40,6 +40,15 @@ SHADE = "#e69f00"
 PANEL_PX = 230
 LEGEND_PX = 130
 AXIS_TITLE_PX = 54
+TOP_PX = 34
+DECADES = {
+    "type": "log",
+    "dtick": 1,
+    "exponentformat": "power",
+    "minor": {"dtick": "D1", "showgrid": True},
+}
+"""A logarithmic axis."""
+
 CONFIG = {"responsive": True, "displaylogo": False, "modeBarButtonsToRemove": ["select2d", "lasso2d"]}
 
 SPECTRUM_SEGMENTS = 6
@@ -130,11 +139,16 @@ def time_figure(
     for low, high in shaded:
         figure.add_vrect(x0=low, x1=high, fillcolor=SHADE, opacity=0.25, line_width=0, layer="below")
     figure.update_xaxes(title_text="time [s]", row=len(panels), col=1)
-    return _html(figure, name, PANEL_PX * len(panels) + LEGEND_PX)
+    return figure_html(figure, name, PANEL_PX * len(panels) + LEGEND_PX)
 
 
-def spectrum_figure(name: str, sample_time_s: float, lines: Sequence[Line], unit: str) -> str:
-    """Draw amplitude spectral densities (Welch, Hann window); a gap counts as zero error."""
+def spectrum_figure(
+    name: str, sample_time_s: float, lines: Sequence[Line], unit: str, floor: float | None = None
+) -> str:
+    """Draw amplitude spectral densities (Welch, Hann window); a gap counts as zero error.
+
+    ``floor`` is the RMS of white noise, whose density is drawn as a dotted line.
+    """
     figure = go.Figure()
     for line in lines:
         length = min(line.y.size, max(SHORTEST_SEGMENT, min(LONGEST_SEGMENT, line.y.size // SPECTRUM_SEGMENTS)))
@@ -142,15 +156,12 @@ def spectrum_figure(name: str, sample_time_s: float, lines: Sequence[Line], unit
             np.nan_to_num(line.y), fs=1.0 / sample_time_s, nperseg=length, detrend="constant"
         )
         figure.add_trace(_scatter(line, frequency[1:], np.sqrt(power[1:]), first=True))
-    decades = {
-        "type": "log",
-        "dtick": 1,
-        "exponentformat": "power",
-        "minor": {"dtick": "D1", "showgrid": True},
-    }
-    figure.update_xaxes(title_text="frequency [Hz]", **decades)
-    figure.update_yaxes(title_text=f"{unit}/√Hz", **decades)
-    return _html(figure, name, PANEL_PX + LEGEND_PX)
+    if floor is not None and floor > 0.0:
+        level = floor * np.sqrt(2.0 * sample_time_s)
+        figure.add_hline(y=level, line={"color": "#777777", "width": 1, "dash": "dot"})
+    figure.update_xaxes(title_text="frequency [Hz]", **DECADES)
+    figure.update_yaxes(title_text=f"{unit}/√Hz", **DECADES)
+    return figure_html(figure, name, PANEL_PX + LEGEND_PX)
 
 
 def band_figure(name: str, x: FloatArray, y: FloatArray, low: FloatArray, high: FloatArray, axis: str) -> str:
@@ -165,7 +176,7 @@ def band_figure(name: str, x: FloatArray, y: FloatArray, low: FloatArray, high: 
     )
     figure.update_xaxes(title_text="time [s]")
     figure.update_yaxes(title_text=axis)
-    return _html(figure, name, PANEL_PX + LEGEND_PX)
+    return figure_html(figure, name, PANEL_PX + LEGEND_PX)
 
 
 def _scatter(line: Line, x: FloatArray, y: FloatArray, *, first: bool) -> go.Scatter:
@@ -182,12 +193,14 @@ def _scatter(line: Line, x: FloatArray, y: FloatArray, *, first: bool) -> go.Sca
     )
 
 
-def _html(figure: go.Figure, name: str, height_px: int) -> str:
+def figure_html(figure: go.Figure, name: str, height_px: int, top_px: int = TOP_PX) -> str:
+    """Return a figure as a piece of HTML with the page's look; ``name`` is unique in the page."""
+    inside_px = height_px - top_px - LEGEND_PX + TOP_PX
     figure.update_layout(
         template="plotly_white",
         height=height_px,
-        margin={"l": 64, "r": 12, "t": 34, "b": LEGEND_PX - 34},
-        legend={"orientation": "h", "yanchor": "top", "y": -AXIS_TITLE_PX / (height_px - LEGEND_PX), "x": 0},
+        margin={"l": 64, "r": 12, "t": top_px, "b": LEGEND_PX - TOP_PX},
+        legend={"orientation": "h", "yanchor": "top", "y": -AXIS_TITLE_PX / inside_px, "x": 0},
         hovermode="x unified",
         font={"family": "system-ui, sans-serif", "size": 13},
     )

@@ -31,6 +31,25 @@ ELEMENTS = MappingProxyType(
     }
 )
 
+PLACES = MappingProxyType({"motor": "motor", "shaft": "shaft", "load": "load", "sensor": "reading"})
+"""Places where an input may explain a mismatch."""
+
+CHECKS = MappingProxyType(
+    {
+        Element.TORQUE_PATH: "the torque readings against a second source (current, a torque transducer), each "
+        "inverter alone, limits and dead times, and the delay between command and shaft.",
+        Element.MOTOR: "bearings, brakes and whatever else may drag or turn with the motor; run a reversal and a "
+        "coast-down with the shaft disconnected.",
+        Element.SHAFT: "couplings, joints and mounts for play, rubber and cracks; repeat the reversal with larger and "
+        "smaller torque, and at another temperature.",
+        Element.LOAD: "road, wind, brakes, tyres and payload; repeat on a level road in both directions.",
+        Element.SPEED_SENSOR: "the resolver against an encoder, its filter and scale, and the reading at standstill "
+        "and at constant speed.",
+        Element.ACQUISITION: "time stamps, lost and repeated frames, and both clocks.",
+    }
+)
+"""What to look at where nothing in the catalogue explains a mismatch."""
+
 _QUANTITIES = MappingProxyType(
     {"rad/s": "speed", "m/s": "speed", "rad": "position", "m": "position", "Nm": "torque", "N": "force"}
 )

@@ -6,15 +6,23 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis.result import (
+    BandTest,
+    Course,
     Diagnosis,
+    Discrepancy,
+    Equivalent,
+    ErrorSpectrum,
     Estimated,
     Evidence,
     Fit,
     FoundEffect,
+    LawPicture,
     Mismatch,
     Profile,
+    RankedLaw,
     Region,
     RejectedEffect,
+    Response,
     Retuned,
     Trace,
     UntestableEffect,
@@ -42,6 +50,38 @@ def trace(name: str, holdout: bool, seed: int, n: int = 3000) -> Trace:
         retuned=smooth + 0.2 * np.sin(0.1 * t),
         augmented=smooth + wobble,
         holdout=holdout,
+    )
+
+
+def discrepancy() -> Discrepancy:
+    t, f = np.arange(0, 30, 0.01), np.linspace(0.4, 50, 128)
+    x = np.linspace(-400.0, 600.0, 20)
+    course = Course(t, np.sin(t), np.sin(t) - 0.2, np.sin(t) + 0.2)
+    places = (("motor", "Nm", 3101.0), ("shaft", "Nm", 3285.0), ("load", "Nm", -118.0), ("sensor", "rad/s", -4641.0))
+    size = 1 / f
+    response = Response(f, size, 0.9 * size, 1.1 * size, 0.8 * size, size, 1e-20, 0.6)
+    law = -30 * np.tanh(x / 50)
+    return Discrepancy(
+        element=Element.SHAFT,
+        laws=(
+            RankedLaw(
+                Element.SHAFT, (("a function of twist", 27.0), ("twist^2 d twist/dt", 700.0)), 0.14, 815.0, 1e-30
+            ),
+            RankedLaw(Element.MOTOR, (("w_M |w_M|", 0.01),), 0.6, 35.0, 2.8e-10),
+        ),
+        equivalents=tuple(
+            Equivalent(place, unit, {"run_1": course, "run_2": course}, likelihood, place == "shaft")
+            for place, unit, likelihood in places
+        ),
+        spectrum=ErrorSpectrum(
+            f, 0.1 / f, 0.01 / f, 0.007, (BandTest(6.25, 12.5, 218.2, 0.0), BandTest(12.5, 50, 1.1, 0.4))
+        ),
+        responses={"run_1": response, "run_2": response},
+        pictures=(
+            LawPicture(
+                "backlash", Element.SHAFT, "shaft torque k·twist", "Nm", "Nm", x, law + 1, law - 2, law + 4, law, 0.92
+            ),
+        ),
     )
 
 
@@ -115,4 +155,5 @@ def diagnosis() -> Diagnosis:
         ),
         traces=(trace("run_1", False, 1), trace("run_2", False, 2), trace("unseen", True, 3)),
         warnings=("run_2 has 60 samples missing",),
+        discrepancy=discrepancy(),
     )

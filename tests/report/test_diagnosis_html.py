@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from html.parser import HTMLParser
 
@@ -11,6 +12,7 @@ import pytest
 from estimator.diagnosis.result import Diagnosis, Mismatch, Trace, UnnamedLaw, Verdict
 from estimator.physics.effect import Element
 from hil.report.diagnosis_html import MOST_DRAWN, diagnosis_page
+from hil.report.interval_bar import interval_bar
 
 VOID = {"meta", "br", "hr", "img", "input", "link"}
 
@@ -56,8 +58,9 @@ def test_the_page_says_everything_from_the_verdict_down(diagnosis: Diagnosis) ->
     reader = read(diagnosis_page(diagnosis))
     assert reader.sections == [
         "Fit",
-        "Where simulation and recording differ",
         "The physics found",
+        "Where simulation and recording differ",
+        "Over frequency",
         "Recording run_1",
         "Recording run_2",
         "Recording unseen",
@@ -77,6 +80,10 @@ def test_the_page_says_everything_from_the_verdict_down(diagnosis: Diagnosis) ->
         "T_S = k e + c",
         "0.02 … 0.022",
         "can't tell it from shaft_hysteresis",
+        "Over shaft torque k·twist: the line is the law",
+        "a function of twist + twist^2 d twist/dt",
+        "6.25 to 12.5 Hz (218 ×)",
+        "p = 1e-20",
         "explains 48 % of what backlash explains",
         "the speed never changes sign",
         "kg m^2",
@@ -89,7 +96,9 @@ def test_the_page_fetches_nothing_and_holds_plotly_once(diagnosis: Diagnosis) ->
     page = diagnosis_page(diagnosis)
     assert read(page).fetched == []
     assert page.count("plotly.js v") == 1
-    assert page.count('class="plotly-graph-div"') == 2 * len(diagnosis.traces) + 1
+    profile, law, places, spectrum, response = 1, 1, 1, 1, 1
+    figures = 2 * len(diagnosis.traces) + profile + law + places + spectrum + response
+    assert page.count('class="plotly-graph-div"') == figures
 
 
 def test_the_same_diagnosis_makes_the_same_page(diagnosis: Diagnosis) -> None:
@@ -128,6 +137,38 @@ def test_effects_that_explain_only_a_part_are_told_as_such(diagnosis: Diagnosis)
     )
 
 
+def test_a_mismatch_without_a_name_tells_what_to_check(diagnosis: Diagnosis) -> None:
+    page = read(diagnosis_page(replace(diagnosis, verdict=Verdict.UNEXPLAINED, effects=()))).text
+    assert "What to check: couplings" in page
+    assert "What to check" not in read(diagnosis_page(diagnosis)).text
+
+
+def test_faults_of_the_acquisition_have_their_own_section(diagnosis: Diagnosis) -> None:
+    lost = replace(
+        diagnosis.effects[0], name="lost_samples", element=Element.ACQUISITION, statement="a frame is missing"
+    )
+    reader = read(diagnosis_page(replace(diagnosis, effects=(*diagnosis.effects, lost))))
+    first = reader.sections.index("Recognised in the recordings themselves")
+    assert reader.sections[first + 1] == "The physics found"
+    assert reader.text.count("a frame is missing") == 1
+
+
+def test_a_page_without_a_discrepancy_is_whole(diagnosis: Diagnosis) -> None:
+    reader = read(diagnosis_page(replace(diagnosis, discrepancy=None)))
+    assert "Over frequency" not in reader.sections
+    assert "Where simulation and recording differ" in reader.sections
+
+
+def test_parameters_are_drawn_between_their_tolerances() -> None:
+    drawing = interval_bar(100.0, 110.0, 105.0, 115.0, 0.2)
+    assert "+10.0 % of nominal, interval +5.0 to +15.0 %" in drawing
+    places = [float(x) for x in re.findall(r'(?:c?x)="([0-9.]+)"', drawing)]
+    tolerance, interval, value = places
+    assert tolerance < 100.0 < interval < value < 200.0
+    assert interval_bar(0.0, 1.0, 0.5, 1.5, 0.2) == ""
+    assert interval_bar(1.0, float("nan"), 0.5, 1.5, 0.2) == ""
+
+
 def long_trace(number: int) -> Trace:
     n = 4_000
     rng = np.random.default_rng(number)
@@ -148,7 +189,14 @@ def long_trace(number: int) -> Trace:
 
 def test_many_long_recordings_stay_under_ten_megabytes(diagnosis: Diagnosis) -> None:
     traces = tuple(long_trace(number) for number in range(MOST_DRAWN + 1))
-    page = diagnosis_page(replace(diagnosis, traces=traces))
+    seen = diagnosis.discrepancy
+    assert seen is not None
+    course = seen.equivalents[0].courses["run_1"]
+    courses = {trace.name: course for trace in traces}
+    places = tuple(replace(each, courses=courses) for each in seen.equivalents)
+    responses = {trace.name: seen.responses["run_1"] for trace in traces}
+    seen = replace(seen, equivalents=places, responses=responses)
+    page = diagnosis_page(replace(diagnosis, traces=traces, discrepancy=seen))
     assert len(page.encode()) < 10e6
     sections = read(page).sections
     assert [f"Recording run_{number}" in sections for number in range(MOST_DRAWN + 1)] == [False] + [True] * MOST_DRAWN

@@ -38,6 +38,7 @@ def test_the_text_is_strict_json_of_the_contract(diagnosis: Diagnosis) -> None:
         "load_torque",
         "timing_s",
         "warnings",
+        "discrepancy",
     ]
     assert content["schema"] == "hil.diagnosis/1"
     assert content["verdict"] == "explained"
@@ -127,3 +128,29 @@ def test_a_law_without_a_name_is_written(diagnosis):
         "rms_before": 0.12,
         "rms_after": 0.051,
     }
+
+
+def test_what_the_pictures_rest_on_is_written(diagnosis: Diagnosis) -> None:
+    seen = diagnosis_json(diagnosis)["discrepancy"]
+    assert seen["element"] == "shaft"
+    assert seen["laws"][1] == {
+        "element": "motor",
+        "terms": [{"law": "w_M |w_M|", "coefficient": 0.01}],
+        "rms_after": 0.6,
+        "delta_bic": 35.0,
+        "p_value": 2.8e-10,
+    }
+    assert [(each["place"], each["plausible"]) for each in seen["places"]] == [
+        ("motor", False),
+        ("shaft", True),
+        ("load", False),
+        ("sensor", False),
+    ]
+    assert seen["bands"][0] == {"band_hz": [6.25, 12.5], "power_to_floor": 218.2, "p_value": 0.0}
+    assert seen["response_p_values"]["run_1"] == {"retuned": 1e-20, "augmented": 0.6}
+    (picture,) = seen["pictures"]
+    assert [len(picture[key]) for key in ("x", "data", "low", "high", "law")] == [20] * 5
+
+
+def test_without_a_discrepancy_the_key_is_null(diagnosis: Diagnosis) -> None:
+    assert diagnosis_json(replace(diagnosis, discrepancy=None))["discrepancy"] is None

@@ -31,7 +31,7 @@ def regression(
     shared = tuple(Shared(effect, name, scale, -bound, bound, 0.0) for name in NOMINAL[: x.size])
     nothing = np.empty(0)
     local = tuple(
-        LocalBasis(Structure.ONE_MASS, False, nothing, nothing, np.empty((0, r.output.size))) for r in records
+        LocalBasis(Structure.ONE_MASS, False, nothing, nothing, (), np.empty((0, r.output.size))) for r in records
     )
     problem = Problem(
         Grid(Structure.ONE_MASS, 1, 1.0), records, np.zeros(SIZE), shared, local, tuple(r.okay for r in records)

@@ -7,9 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.assemble import augmented_model, found_effects, load_torques, retuned_parameters
+from estimator.diagnosis.acquisition import Finding, Sized
+from estimator.diagnosis.assemble import (
+    acquired_effects,
+    augmented_model,
+    found_effects,
+    load_torques,
+    retuned_parameters,
+)
+from estimator.diagnosis.chain import Chain
 from estimator.diagnosis.holdout import Examiner
 from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects, everything
+from estimator.diagnosis.noise import effective_samples
 from estimator.diagnosis.result import FoundEffect
 from estimator.diagnosis.selection import Selection, Selector
 from estimator.physics.effect import Element
@@ -17,8 +26,9 @@ from estimator.physics.free_run import free_run
 from estimator.physics.model import EffectValue, Motion
 from estimator.physics.simulate import Start
 from estimator.signals.record import FloatArray, Record
+from tests.estimator.diagnosis.outcome import outcome
 from tests.estimator.diagnosis.planted import SIGMA, drive_torque, rubbing
-from tests.estimator.physics.bench import ONE_MASS, linear_record, model, scaled
+from tests.estimator.physics.bench import ONE_MASS, linear_record, model, random_steps, scaled
 
 COULOMB = "coulomb_friction_motor"
 FRICTION_NM = 12.0
@@ -51,13 +61,15 @@ def assembled(records: list[Record], *names: str) -> tuple[Selection, Examiner]:
     chosen: Effects = frozenset(names)
     bench, examiner = Bench(LINE, records, everything(records)), Examiner(LINE, records, ())
     retuned = bench.fit(NOTHING)
-    result = bench.fit(chosen, retuned)
+    result = retuned
+    for count in range(1, len(names) + 1):
+        result = bench.fit(frozenset(names[:count]), result)
     select = Selector(bench, examiner, names, SIGMA, lambda message, share: None)
     trials = {}
     for name in names:
         without = bench.fit(chosen - {name}, result)
         trials[name] = select._examined(select._trial(name, chosen, without, result), without)
-    return Selection(retuned, chosen, result, trials, trials), examiner
+    return outcome(retuned, chosen, result, trials=trials), examiner
 
 
 @pytest.fixture(scope="module")
@@ -114,6 +126,7 @@ class TestAnEffect:
             for rec in rubbing(lambda speed: FRICTION_NM)
         ]
         selection, examiner = assembled(late, "actuator_lag", COULOMB)
+        selection = replace(selection, lookalikes={"actuator_lag": ("speed_filter",)})
         found = found_effects(selection, LINE, examiner)
         assert [effect.name for effect in found] == [COULOMB, "actuator_lag"]
         assert found[0].evidence.delta_bic > found[1].evidence.delta_bic
@@ -141,6 +154,83 @@ class TestAProfile:
         assert found.value == pytest.approx(25.0 / np.sqrt(2.0), rel=0.1)
         assert 0.0 <= found.ci95[0] < found.value < found.ci95[1]
         assert found.unit == "Nm"
+
+
+BRAKED_S = {"run_1": (2.0, 5.0), "run_2": (6.0, 9.5), "run_3": (0.0, 0.0)}
+
+
+@pytest.fixture(scope="module")
+def brake() -> FoundEffect:
+    """Recordings whose clock does not start at zero, two with a brake for a while and one without."""
+    time_s, records = np.arange(1200) * 0.01, []
+    for seed, (name, (begin, end)) in enumerate(BRAKED_S.items(), start=1):
+        load = np.where((time_s >= begin) & (time_s < end), FRICTION_NM, 0.0)
+        rec = linear_record(
+            ONE_MASS,
+            random_steps(1200, seed, mean_nm=90.0),
+            Start(5.0, 0.0, 20.0),
+            sigma=SIGMA,
+            seed=seed,
+            name=name,
+            extra_load_nm=load,
+        )
+        records.append(replace(rec, time_s=rec.time_s + 100.0))
+    bench, examiner = Bench(LINE, records, everything(records)), Examiner(LINE, records, ())
+    selection = Selector(bench, examiner, ["brake_drag"], SIGMA, lambda message, share: None).run()
+    (found,) = found_effects(selection, LINE, examiner)
+    return found
+
+
+class TestAnEvent:
+    def test_its_moments_are_on_each_recordings_own_time(self, brake: FoundEffect) -> None:
+        for name in ("run_1", "run_2"):
+            ((begin, end),) = brake.time_s[name]
+            assert (begin - 100.0, end - 100.0) == pytest.approx(BRAKED_S[name], abs=0.05)
+
+    def test_a_recording_without_it_has_none(self, brake: FoundEffect) -> None:
+        assert set(brake.time_s) == {"run_1", "run_2"}
+
+    def test_its_moments_are_no_parameters(self, brake: FoundEffect) -> None:
+        """A parameter holds for all recordings, and for those to come."""
+        assert list(brake.parameters) == ["brake_nm"]
+        low, high = brake.parameters["brake_nm"].ci95
+        assert low < FRICTION_NM < high
+
+    def test_what_is_no_event_has_none(self, friction: FoundEffect) -> None:
+        assert friction.time_s == {}
+
+
+class TestAcquired:
+    """What was recognised of the acquisition, as effects: a share of 0.1, errors of 1 before and 0.1 after."""
+
+    RNG = np.random.default_rng(1)
+    BEFORE = (RNG.standard_normal(1000), RNG.standard_normal(500))
+    FOUND = Finding("stale_samples", {"share": Sized(0.1, (0.09, 0.11), "")}, {}, 1e-12, "a tenth is stale")
+
+    @pytest.fixture
+    def acquired(self) -> FoundEffect:
+        chain = Chain((), (), (self.FOUND,))
+        (effect,) = acquired_effects(chain, self.BEFORE, [0.1 * error for error in self.BEFORE])
+        return effect
+
+    def test_they_are_said_as_found(self, acquired: FoundEffect) -> None:
+        assert (acquired.name, acquired.element) == ("stale_samples", Element.ACQUISITION)
+        assert acquired.statement == "a tenth is stale"
+        assert acquired.parameters["share"].ci95 == (0.09, 0.11)
+        assert acquired.evidence.p_value == 1e-12
+
+    def test_what_compensating_them_gains_speaks_for_them(self, acquired: FoundEffect) -> None:
+        n = effective_samples([0.1 * error for error in self.BEFORE])
+        assert acquired.evidence.delta_bic == pytest.approx(n * np.log(100.0) - np.log(n))
+
+    def test_unseen_are_the_last_three_tenths(self, acquired: FoundEffect) -> None:
+        last = np.concatenate([self.BEFORE[0][700:], self.BEFORE[1][350:]])
+        rms = float(np.sqrt(np.mean(last**2)))
+        assert acquired.evidence.holdout_rms_before == pytest.approx(rms)
+        assert acquired.evidence.holdout_rms_after == pytest.approx(0.1 * rms)
+
+    def test_without_findings_there_are_none(self) -> None:
+        assert acquired_effects(Chain((), (), ()), self.BEFORE, self.BEFORE) == ()
 
 
 class TestParameters:

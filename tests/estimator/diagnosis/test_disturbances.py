@@ -7,17 +7,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from estimator.diagnosis.blocks import motion_of
 from estimator.diagnosis.disturbances import (
-    LOAD_STEP_EVERY_S,
+    STEP_EVERY_S,
     Candidate,
+    Scene,
     candidates,
-    motion_of,
+    elements,
+    scene,
 )
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult, fit, make_problem
 from estimator.physics.simulate import Start
 from estimator.signals.record import FloatArray, OutputKind
-from tests.estimator.diagnosis.planted import drive_torque, nominal_fit, quiet
+from tests.estimator.diagnosis.planted import SIGMA, drive_torque, nominal_fit, quiet
 from tests.estimator.physics.bench import (
     ANGLE,
     LOAD_SPEED,
@@ -43,8 +46,28 @@ def result() -> FitResult:
 
 
 @pytest.fixture(scope="module")
-def pool(result: FitResult) -> list[Candidate]:
-    return candidates(result)
+def view(result: FitResult) -> Scene:
+    return scene(result, SIGMA)
+
+
+def everywhere(view: Scene) -> list[Candidate]:
+    return [candidate for element in elements(view.result) for candidate in candidates(view, element)]
+
+
+@pytest.fixture(scope="module")
+def pool(view: Scene) -> list[Candidate]:
+    return everywhere(view)
+
+
+def first(candidate: Candidate, samples: int = 1500) -> FloatArray:
+    """Answer of the first recording to the first coefficient."""
+    return candidate.answers[:samples, 0]
+
+
+def between(values: FloatArray) -> FloatArray:
+    """A signal in the middle of each period, where a held torque acts; straight on at the end."""
+    later = np.append(values[1:], 2.0 * values[-1] - values[-2])
+    return 0.5 * (values + later)
 
 
 def response(drive: FloatArray, load: FloatArray) -> FloatArray:
@@ -79,12 +102,13 @@ def test_the_motion_of_a_fit_is_the_motion_of_the_line(result: FitResult) -> Non
 def test_an_answer_is_the_exact_response_per_unit(pool: list[Candidate], element: Element, law: str) -> None:
     states = exact_states(TWO_MASS, drive_torque(1), START)
     torque, time_s = drive_torque(1), np.arange(1500) * 0.01
+    speed, load_speed, twist = (between(states[:, i]) for i in (SPEED, LOAD_SPEED, TWIST))
     values = {
         "T |T|": torque * np.abs(torque),
         "T t": torque * time_s,
-        "w_M |w_M|": states[:, SPEED] * np.abs(states[:, SPEED]),
-        "twist^3": states[:, TWIST] ** 3,
-        "w_L |w_L|": states[:, LOAD_SPEED] * np.abs(states[:, LOAD_SPEED]),
+        "w_M |w_M|": speed * np.abs(speed),
+        "twist^3": twist**3,
+        "w_L |w_L|": load_speed * np.abs(load_speed),
     }[law]
     nothing = np.zeros_like(values)
     expected = {
@@ -93,71 +117,79 @@ def test_an_answer_is_the_exact_response_per_unit(pool: list[Candidate], element
         Element.SHAFT: response(-values, -values),
         Element.LOAD: response(nothing, values),
     }[element]
-    answer = pick(pool, element, law).answers[0]
+    answer = first(pick(pool, element, law))
     assert np.max(np.abs(answer - expected)) < 2e-3 * np.ptp(expected)
 
 
-def test_a_delay_of_one_period_is_minus_one_of_the_difference(pool: list[Candidate]) -> None:
+def test_a_delay_of_one_period_is_the_difference_to_the_torque_before(pool: list[Candidate]) -> None:
     torque = drive_torque(1)
     late = np.concatenate([[torque[0]], torque[:-1]])
     expected = response(late - torque, np.zeros_like(torque))
-    answer = pick(pool, Element.TORQUE_PATH, "dT/dt").answers[0]
-    assert np.max(np.abs(-answer - expected)) < 1e-3 * np.ptp(expected)
+    answer = first(pick(pool, Element.TORQUE_PATH, "one period late"))
+    assert np.max(np.abs(answer - expected)) < 1e-3 * np.ptp(expected)
 
 
 def test_the_answer_to_an_error_of_the_reading_is_the_error(pool: list[Candidate]) -> None:
+    """Waves are in the phase of each recording: cosine and sine of the first, then of the second."""
     states = exact_states(TWO_MASS, drive_torque(1), START)
-    expected = states[:, SPEED] * np.sin(states[:, ANGLE])
-    answer = pick(pool, Element.SPEED_SENSOR, "sin(angle)").answers[0]
-    np.testing.assert_allclose(answer, expected, atol=2e-3 * np.ptp(expected))
+    turns = [c for c in pool if c.element is Element.SPEED_SENSOR and c.law == "w wave 1 times per motor turn"]
+    expected = states[:, SPEED] * np.sin(states[:, ANGLE] - states[0, ANGLE])
+    assert turns[0].answers.shape == (3000, 4)
+    np.testing.assert_allclose(turns[0].answers[:1500, 1], expected, atol=5e-3 * np.ptp(expected))
+    assert not turns[0].answers[1500:, :2].any()
+    assert not turns[0].answers[:1500, 2:].any()
 
 
 def test_load_steps_are_on_a_grid_each_in_one_recording(result: FitResult, pool: list[Candidate]) -> None:
     steps = [c for c in pool if c.law.startswith("load step")]
-    per_recording = int(14.99 / LOAD_STEP_EVERY_S) - 1
+    per_recording = int(14.99 / STEP_EVERY_S) - 1
     assert len(steps) == 2 * per_recording
     assert len({c.law for c in steps}) == len(steps)
     in_second = [c for c in steps if c.law.endswith("in run_2")]
     assert len(in_second) == per_recording
     for i, candidate in enumerate(in_second, start=1):
         assert candidate.element is Element.LOAD
-        moment = round(i * LOAD_STEP_EVERY_S / 0.01)
-        assert not candidate.answers[0].any()
-        assert not candidate.answers[1][: moment + 1].any()
+        moment = round(i * STEP_EVERY_S / 0.01)
+        assert not candidate.answers[: 1500 + moment + 1].any()
         load = np.where(np.arange(1500) >= moment, 1.0, 0.0)
         expected = response(np.zeros(1500), load)
-        assert np.max(np.abs(candidate.answers[1] - expected)) < 5e-3 * np.ptp(expected)
+        assert np.max(np.abs(candidate.answers[1500:, 0] - expected)) < 5e-3 * np.ptp(expected)
 
 
 def test_every_input_but_the_last_may_count_more_than_its_reading() -> None:
     shares = np.column_stack([0.3 * drive_torque(1), 0.7 * drive_torque(1) + 20.0, np.full(1500, -20.0)])
     rec = replace(linear_record(TWO_MASS, drive_torque(1), START), torque_nm=shares)
-    pool = candidates(fit(make_problem(model(TWO_MASS), [rec], ())))
+    pool = candidates(scene(fit(make_problem(model(TWO_MASS), [rec], ())), SIGMA), Element.TORQUE_PATH)
     assert [c.law for c in pool if c.law.endswith("alone")] == ["T_1 alone", "T_2 alone"]
     expected = response(shares[:, 1], np.zeros(1500))
-    answer = pick(pool, Element.TORQUE_PATH, "T_2 alone").answers[0]
+    answer = first(pick(pool, Element.TORQUE_PATH, "T_2 alone"))
     assert np.max(np.abs(answer - expected)) < 1e-3 * np.ptp(expected)
 
 
 def test_one_mass_has_no_shaft_and_its_load_acts_at_the_motor() -> None:
     rec = linear_record(ONE_MASS, random_steps(600, seed=3), REST)
-    pool = candidates(fit(make_problem(model(ONE_MASS), [rec], ())))
-    assert {c.element for c in pool} == {Element.TORQUE_PATH, Element.MOTOR, Element.SPEED_SENSOR}
-    assert {c.element for c in pool if c.law.startswith("load step")} == {Element.MOTOR}
+    view = scene(fit(make_problem(model(ONE_MASS), [rec], ())), SIGMA)
+    assert elements(view.result) == (
+        Element.TORQUE_PATH,
+        Element.MOTOR,
+        Element.SPEED_SENSOR,
+        Element.ACQUISITION,
+    )
+    assert {c.element for c in everywhere(view) if c.law.startswith("load step")} == {Element.MOTOR}
 
 
 def test_a_position_has_no_error_of_the_speed_reading() -> None:
     rec = linear_record(TWO_MASS, random_steps(600, seed=3), START, kind=OutputKind.POSITION)
-    pool = candidates(fit(make_problem(model(TWO_MASS), [rec], ())))
-    assert Element.SPEED_SENSOR not in {c.element for c in pool}
-    assert pool
+    view = scene(fit(make_problem(model(TWO_MASS), [rec], ())), SIGMA)
+    assert elements(view.result) == (Element.TORQUE_PATH, Element.MOTOR, Element.SHAFT, Element.LOAD)
+    assert everywhere(view)
 
 
 def test_a_law_that_is_zero_throughout_has_no_answer() -> None:
     """The line stands still but for the noise of nothing: no speed, no friction."""
     rec = linear_record(TWO_MASS, np.zeros(400), REST)
-    pool = candidates(fit(make_problem(model(TWO_MASS), [rec], ())))
-    assert not pick(pool, Element.TORQUE_PATH, "T |T|").answers[0].any()
+    pool = candidates(scene(fit(make_problem(model(TWO_MASS), [rec], ())), SIGMA), Element.TORQUE_PATH)
+    assert not pick(pool, Element.TORQUE_PATH, "T |T|").answers.any()
 
 
 def test_a_profile_of_the_fit_goes_on_in_the_answers() -> None:
@@ -171,6 +203,6 @@ def test_a_profile_of_the_fit_goes_on_in_the_answers() -> None:
     assert followed.rms < 0.02 * nominal_fit(hill).rms
     moved = motion_of(followed, 0)
     assert np.max(np.abs(moved.speed - hill[0].output)) < 0.01 * np.ptp(hill[0].output)
-    step = pick(candidates(followed), Element.LOAD, "load step at 5.0 s in run_1")
+    step = pick(candidates(scene(followed, SIGMA), Element.LOAD), Element.LOAD, "load step at 5.0 s in run_1")
     expected = response(np.zeros(1500), np.where(np.arange(1500) >= 500, 1.0, 0.0))
-    assert np.max(np.abs(step.answers[0] - expected)) < 1e-2 * np.ptp(expected)
+    assert np.max(np.abs(first(step) - expected)) < 1e-2 * np.ptp(expected)

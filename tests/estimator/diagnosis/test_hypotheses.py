@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from estimator.diagnosis.hypotheses import NOTHING, Bench, everything, open_hypotheses, with_effect
+from estimator.diagnosis.hypotheses import NOTHING, Bench, effects_of, everything, open_hypotheses, with_effect
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
+from estimator.physics.model import Motion, Structure
 from estimator.physics.simulate import Start
+from estimator.physics.unknowns import effect_unknowns
+from estimator.signals.record import OutputKind
 from tests.estimator.diagnosis.planted import SIGMA, quiet, rubbing
 from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, linear_record, model, random_steps
 
@@ -59,29 +64,49 @@ def names_of(result: FitResult) -> list[tuple[str, str]]:
     return [(shared.effect, shared.name) for shared in result.problem.shared]
 
 
-def test_nominal_parameters_come_first_then_each_effect_by_name(bench: Bench) -> None:
-    both = bench.fit(frozenset({"transport_delay", "actuator_lag"}), bench.fit(NOTHING))
+def test_nominal_parameters_come_first_then_effects_as_they_were_added(bench: Bench) -> None:
+    late = bench.fit(frozenset({"transport_delay"}), bench.fit(NOTHING))
+    both = bench.fit(frozenset({"transport_delay", "actuator_lag"}), late)
     assert names_of(both) == [
         ("", "J_M"),
         ("", "b_M"),
-        ("actuator_lag", "time_constant_s"),
         ("transport_delay", "delay_s"),
+        ("actuator_lag", "time_constant_s"),
     ]
+    for basis in both.problem.local:
+        assert [(unknown.effect, unknown.name) for unknown in basis.own] == [
+            ("transport_delay", "before_nm"),
+            ("actuator_lag", "before_nm"),
+        ]
 
 
-def test_a_profile_is_each_recordings_own(bench: Bench) -> None:
-    road = bench.fit(frozenset({"road_grade"}), bench.fit(NOTHING))
-    assert names_of(road) == names_of(bench.fit(NOTHING))
-    assert all(basis.profile.shape[0] > 2 for basis in road.problem.local)
-    assert road.rms <= bench.fit(NOTHING).rms
+def test_an_effect_that_is_taken_out_takes_its_own_unknowns_along(bench: Bench) -> None:
+    lagging = bench.fit(frozenset({"actuator_lag"}), bench.fit(NOTHING))
+    without = bench.fit(COULOMB, lagging)
+    assert effects_of(lagging) == {"actuator_lag"}
+    assert effects_of(without) == COULOMB
+    assert [basis.own for basis in without.problem.local] == [(), ()]
 
 
-def test_an_effect_that_is_known_starts_where_it_was(bench: Bench) -> None:
-    """One start is enough then: as many hypotheses as starts would cost the product."""
-    with_friction = bench.fit(COULOMB, bench.fit(NOTHING))
-    more = bench.fit(COULOMB | {"actuator_lag"}, with_friction)
-    assert more.value("coulomb_friction_motor", "friction_nm") == pytest.approx(FRICTION_NM, rel=0.05)
-    assert more.rms <= with_friction.rms * (1.0 + 1e-3)
+def test_effects_that_nothing_starts_from_are_refused() -> None:
+    records = quiet(seeds=(1,), values=ONE_MASS, samples=300)
+    with pytest.raises(ValueError, match="fitted from a fit without them, came none"):
+        Bench(model(ONE_MASS), records, everything(records)).fit(COULOMB)
+
+
+def test_a_rough_fit_is_gone_on_with() -> None:
+    """From a start ten times too small a few steps do not get there."""
+    records = rubbing(lambda speed: float(8.0 + 14.0 * np.exp(-((speed / 0.8) ** 2))))
+    fresh, stribeck = Bench(model(ONE_MASS), records, everything(records)), frozenset({"stribeck_friction"})
+    nominal = fresh.fit(NOTHING)
+    start = effect_unknowns("stribeck_friction", fresh.model, records)[0]
+    small = replace(start, shared=tuple(replace(unknown, start=0.1 * unknown.start) for unknown in start.shared))
+    rough = fresh.rough_fit(stribeck, nominal, [small])
+    assert fresh.rough_fit(stribeck, nominal, [small]) is rough
+    assert not rough.converged
+    finished = fresh.fit(stribeck)
+    assert finished.converged
+    assert finished.squares < rough.squares < nominal.squares
 
 
 class TestOpenHypotheses:
@@ -90,21 +115,40 @@ class TestOpenHypotheses:
 
     def test_one_mass_has_no_shaft_effects(self) -> None:
         testable, untestable = open_hypotheses(model(ONE_MASS), [self.REVERSAL])
-        assert {EFFECTS[name].element for name in testable} == {Element.TORQUE_PATH, Element.MOTOR, Element.LOAD}
-        assert untestable == {}
+        assert {EFFECTS[name].element for name in testable} == set(Element) - {Element.SHAFT}
+        assert all(Structure.ONE_MASS in EFFECTS[name].structures for name in {*testable, *untestable})
 
     def test_what_can_not_be_told_is_given_with_its_reason(self) -> None:
         testable, untestable = open_hypotheses(model(ONE_MASS), [self.FORWARD])
-        assert set(untestable) == {"coulomb_friction_motor", "stribeck_friction"}
+        assert set(untestable) >= {"coulomb_friction_motor", "stribeck_friction", "speed_sign_blind"}
         assert "never changes sign" in untestable["stribeck_friction"].reason
         assert not set(testable) & set(untestable)
+
+    def test_what_the_test_was_not_or_the_model_does_not_know_is_no_hypothesis_either(self) -> None:
+        """One torque input has no second one to differ from; without a gear ratio a wheel's angle is unknown."""
+        _, untestable = open_hypotheses(model(ONE_MASS), [self.REVERSAL])
+        assert set(untestable) == {"inverter_gain_mismatch", "load_imbalance"}
 
     def test_what_the_model_has_is_no_hypothesis(self) -> None:
         having = model(ONE_MASS, effects={"coulomb_friction_motor": {"friction_nm": 3.0}})
         testable, untestable = open_hypotheses(having, [self.REVERSAL])
         assert "coulomb_friction_motor" not in {*testable, *untestable}
 
-    def test_two_masses_have_all(self) -> None:
+    def test_two_masses_with_two_torques_have_all_that_is_fitted(self) -> None:
+        """What is recognised in the readings is no hypothesis about the line."""
         rec = linear_record(TWO_MASS, random_steps(1000, 3, hold=50), Start(0.0, 0.0, 0.5, 0.0, 0.5))
-        testable, _ = open_hypotheses(model(TWO_MASS), [rec])
-        assert set(testable) == set(EFFECTS)
+        other = random_steps(1000, 4, size_nm=30.0)
+        shared = replace(rec, torque_nm=np.column_stack([rec.total_torque_nm - other, other]))
+        testable, untestable = open_hypotheses(replace(model(TWO_MASS), gear_ratio=5.6), [shared])
+        assert set(testable) == {name for name, entry in EFFECTS.items() if not entry.recognised}
+        assert untestable == {}
+
+    def test_a_position_has_no_effects_of_a_speed_sensor(self) -> None:
+        angle = linear_record(ONE_MASS, random_steps(1000, 1, hold=50), Start(0.0, 0.0, 0.5), kind=OutputKind.POSITION)
+        testable, untestable = open_hypotheses(model(ONE_MASS), [angle])
+        assert not {"resolver_error", "speed_filter", "speed_sign_blind"} & {*testable, *untestable}
+
+    def test_where_nothing_turns_nothing_repeats_with_the_turn(self) -> None:
+        sliding = model(ONE_MASS, motion=Motion.TRANSLATION)
+        testable, untestable = open_hypotheses(sliding, [self.REVERSAL])
+        assert not [name for name in {*testable, *untestable} if EFFECTS[name].phases]

@@ -1,4 +1,4 @@
-"""The verdict: floor, laws without a name, and the objections to effects that were chosen."""
+"""The verdict: floor, laws without a name, faults of the acquisition, and the objections to chosen effects."""
 
 from __future__ import annotations
 
@@ -8,31 +8,43 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from estimator.diagnosis.acquisition import Finding
 from estimator.diagnosis.evidence import VERY_STRONG
 from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects, everything
-from estimator.diagnosis.judgement import ABOVE_FLOOR, judge
+from estimator.diagnosis.judgement import ABOVE_FLOOR, MOST, NEAR_FLOOR, NEAR_FLOOR_PROFILE, judge
 from estimator.diagnosis.result import Verdict
-from estimator.diagnosis.selection import VISIBLE, Selection
+from estimator.diagnosis.selection import VISIBLE, Selection, counting_law
 from estimator.diagnosis.unnamed import best_unnamed
 from estimator.physics.effect import Element
+from estimator.physics.fit import FitResult
 from estimator.physics.model import DrivelineModel
 from estimator.physics.simulate import Start
 from estimator.signals.record import OutputKind, Record
+from tests.estimator.diagnosis.outcome import outcome
 from tests.estimator.diagnosis.planted import SIGMA, TIGHT, drive_torque, quiet, recordings, rubbing
+from tests.estimator.diagnosis.regression import of_rms
 from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, linear_record, model
 
 COULOMB: Effects = frozenset({"coulomb_friction_motor"})
+ROAD: Effects = frozenset({"road_grade"})
+CUBIC: Effects = frozenset({"stiffness_nonlinearity"})
 
 
 def selection(records: Sequence[Record], chosen: Effects = NOTHING, line: DrivelineModel | None = None) -> Selection:
     """What a selection that chose these effects hands over."""
     bench = Bench(line or model(ONE_MASS), records, everything(records))
     retuned = bench.fit(NOTHING)
-    return Selection(retuned, chosen, bench.fit(chosen, retuned), {}, {})
+    result = bench.fit(chosen, retuned)
+    remaining = counting_law(result) if chosen else None
+    return outcome(retuned, chosen, result, unnamed=counting_law(retuned), remaining=remaining)
 
 
 def sensor_error(coefficient: float) -> list[Record]:
     return recordings(Element.SPEED_SENSOR, lambda moved: np.abs(moved.speed), coefficient)
+
+
+def finding(name: str) -> Finding:
+    return Finding(name, {}, {}, 1e-9, "")
 
 
 class TestNothingChosen:
@@ -66,6 +78,70 @@ class TestNothingChosen:
         assert judge(chosen, SIGMA).verdict is Verdict.NO_MISMATCH
 
 
+class TestFaultsOfTheAcquisition:
+    """They are compensated before: where nothing else is missing, they are what was."""
+
+    def test_alone_they_explain(self) -> None:
+        found = selection(quiet(values=ONE_MASS))
+        assert judge(found, SIGMA, [finding("stale_samples")]).verdict is Verdict.EXPLAINED
+        assert judge(found, SIGMA).verdict is Verdict.NO_MISMATCH
+
+    def test_beside_something_without_a_name_they_do_not(self) -> None:
+        found = selection(sensor_error(0.03), line=model(TWO_MASS, TIGHT))
+        assert judge(found, SIGMA, [finding("stale_samples")]).verdict is Verdict.UNEXPLAINED
+
+    @pytest.mark.parametrize(
+        ("name", "verdict"), [("sample_jitter", Verdict.EXPLAINED), ("stale_samples", Verdict.UNEXPLAINED)]
+    )
+    def test_only_jitter_leaves_an_error_above_the_floor(self, name: str, verdict: Verdict) -> None:
+        """Nothing tells when a sample was taken: what that does to the reading can't be compensated."""
+        found = selection(quiet(values=ONE_MASS))
+        assert judge(found, 0.9 * found.retuned.rms / ABOVE_FLOOR, [finding(name)]).verdict is verdict
+
+
+class TestHowMuchMayBeLeft:
+    """On white errors of a given RMS, floor 0.1: what stands above it, and what is left of that."""
+
+    FLOOR = 0.1
+
+    def objection(self, before: float, after: float, chosen: Effects = COULOMB) -> str:
+        return judge(outcome(of_rms(before, 2), chosen, of_rms(after, 3)), self.FLOOR).objection
+
+    def test_the_limits_are_these(self) -> None:
+        assert (MOST, NEAR_FLOOR, NEAR_FLOOR_PROFILE) == (0.8, 1.5, 1.15)
+
+    @pytest.mark.parametrize(
+        ("before", "after", "left"),
+        [
+            (1.0, 0.145, ""),  # 1.45 times the noise, and (0.145^2 - 0.1^2) / (1 - 0.1^2) = 1 % of the mismatch
+            (1.0, 0.157, "1% of the mismatch, 1.6 times the noise"),
+            (0.2, 0.12, ""),  # (0.12^2 - 0.1^2) / (0.2^2 - 0.1^2) = 15 %
+            (0.2, 0.13, "23% of the mismatch, 1.3 times the noise"),
+            (1.0, 0.5, "24% of the mismatch, 5 times the noise"),
+        ],
+    )
+    def test_a_fifth_of_the_mismatch_and_half_again_the_noise(self, before: float, after: float, left: str) -> None:
+        objection = self.objection(before, after)
+        assert objection == (f"dry friction at the motor would leave {left}" if left else "")
+
+    @pytest.mark.parametrize(("after", "believed"), [(0.114, True), (0.116, False)])
+    def test_a_profile_alone_must_come_nearer(self, after: float, believed: bool) -> None:
+        assert (self.objection(1.0, after, ROAD) == "") is believed
+        assert self.objection(1.0, after, ROAD | COULOMB) == ""
+
+    @pytest.mark.parametrize(("share", "left"), [(0.6, ""), (0.8, "64% of the mismatch")])
+    def test_of_a_position_half(self, share: float, left: str) -> None:
+        """0.6^2 = 36 % and 0.8^2 = 64 % are left; how near to the noise is not asked."""
+
+        def as_position(result: FitResult) -> FitResult:
+            records = tuple(replace(rec, kind=OutputKind.POSITION) for rec in result.problem.records)
+            return replace(result, problem=replace(result.problem, records=records))
+
+        before, after = as_position(of_rms(1.0, 2)), as_position(of_rms(share, 3))
+        objection = judge(outcome(before, COULOMB, after), 1e-6).objection
+        assert objection == (f"dry friction at the motor would leave {left}" if left else "")
+
+
 class TestChosen:
     def test_an_effect_that_reaches_the_floor_explains(self) -> None:
         judged = judge(selection(rubbing(lambda speed: 12.0), COULOMB), SIGMA)
@@ -73,24 +149,30 @@ class TestChosen:
         assert judged.remaining is None
 
     def test_one_that_leaves_most_standing_does_not(self) -> None:
-        judged = judge(selection(rubbing(lambda speed: 12.0), frozenset({"actuator_lag"})), SIGMA)
+        found = selection(rubbing(lambda speed: 12.0), frozenset({"actuator_lag"}))
+        judged = judge(found, SIGMA)
         assert judged.verdict is Verdict.UNEXPLAINED
-        assert judged.objection == "lag of the torque would leave most of the mismatch standing"
+        assert judged.objection.startswith("lag of the torque would leave 100% of the mismatch, ")
 
     def test_a_profile_that_leaves_a_law_does_not(self) -> None:
-        """A road may follow anything slow; what it leaves of dry friction, it does not explain."""
-        judged = judge(selection(rubbing(lambda speed: 12.0), frozenset({"road_grade"})), SIGMA)
+        """A road may follow anything slow; what it leaves of a little dry friction, it does not explain."""
+        wave = [replace(rec, output=rec.output + np.sin(0.5 * rec.time_s)) for rec in rubbing(lambda speed: 1.6)]
+        judged = judge(selection(wave, ROAD), SIGMA)
         assert judged.verdict is Verdict.UNEXPLAINED
         assert judged.remaining is not None
         assert judged.remaining.element is Element.MOTOR
         law = judged.remaining.terms[0][0]
         assert judged.objection == f"road grade would leave {law} at the motor unexplained"
 
+    @staticmethod
+    def nearly(found: Selection) -> Selection:
+        """The same with white errors of 1.3 times the noise left."""
+        errors = np.random.default_rng(5).standard_normal(found.retuned.residual.size)
+        return replace(found, result=replace(found.result, residual=1.3 * SIGMA * errors))
+
     def test_one_elsewhere_that_a_simple_law_beats_does_not(self) -> None:
-        """Two thirds of a sensor's error removed by a shaft effect, all of it by |w| at the sensor."""
-        chosen = selection(sensor_error(0.05), frozenset({"stiffness_nonlinearity"}), model(TWO_MASS, TIGHT))
-        partly = replace(chosen, result=replace(chosen.result, residual=0.6 * chosen.retuned.residual))
-        judged = judge(partly, SIGMA)
+        """An error of the sensor, nearly explained by the shaft, and to the noise by |w| at the sensor."""
+        judged = judge(self.nearly(selection(sensor_error(0.05), CUBIC, model(TWO_MASS, TIGHT))), SIGMA)
         assert judged.verdict is Verdict.UNEXPLAINED
         assert judged.objection == (
             "a law of |w| at the speed_sensor explains it with less than hardening or softening shaft"
@@ -98,16 +180,14 @@ class TestChosen:
 
     def test_the_same_at_the_laws_own_element_is_believed(self) -> None:
         records = recordings(Element.SHAFT, lambda moved: moved.twist**3, 4e4)
-        chosen = selection(records, frozenset({"stiffness_nonlinearity"}), model(TWO_MASS, TIGHT))
-        partly = replace(chosen, result=replace(chosen.result, residual=0.6 * chosen.retuned.residual))
-        judged = judge(partly, SIGMA)
+        judged = judge(self.nearly(selection(records, CUBIC, model(TWO_MASS, TIGHT))), SIGMA)
         assert judged.unnamed is not None
         assert judged.unnamed.element is Element.SHAFT
         assert judged.verdict is Verdict.EXPLAINED
 
     def test_what_it_leaves_is_told(self) -> None:
         """Friction of a motor that also misreads: named, and the rest is given as a law."""
-        records = [replace(rec, output=rec.output + 0.02 * np.abs(rec.output)) for rec in rubbing(lambda speed: 12.0)]
+        records = [replace(rec, output=rec.output + 0.013 * np.abs(rec.output)) for rec in rubbing(lambda speed: 12.0)]
         judged = judge(selection(records, COULOMB), SIGMA)
         assert judged.verdict is Verdict.EXPLAINED
         assert judged.remaining is not None

@@ -52,6 +52,10 @@ class TestTime:
     def test_noise_is_no_mismatch(self) -> None:
         assert intervals(fitted(drive(np.zeros(2000))), SIGMA) == {}
 
+    @pytest.mark.parametrize("seed", range(5))
+    def test_noise_at_the_floor_is_rarely_a_mismatch(self, seed: int) -> None:
+        assert intervals(fitted(*(drive(np.zeros(2000), f"run_{i}", 10 * seed + i) for i in range(3))), SIGMA) == {}
+
     def test_masked_samples_hold_none(self) -> None:
         rec = drive(burst(5.0, 8.0))
         okay = (TIME_S < 4.9) | (TIME_S > 8.1)
@@ -127,6 +131,16 @@ class TestRegion:
         found = region(fitted(rec), element)
         assert found.signal == name
         assert share[0] * top - 0.15 * top <= found.low < found.high <= share[1] * top + 0.15 * top
+
+    def test_the_noise_of_the_rest_does_not_widen_it(self) -> None:
+        """A faint error in a small part, noise in all: without the floor taken off, the noise decides."""
+        states = exact_states(TWO_MASS, SWELL, START)
+        top = float(np.max(states[:, SPEED]))
+        inside = states[:, SPEED] > 0.8 * top
+        rec = drive(np.where(inside, 0.06 * np.sin(2 * np.pi * 8.0 * TIME_S), 0.0))
+        found = region(fitted(rec), Element.MOTOR, SIGMA)
+        assert found.low > 0.6 * top
+        assert region(fitted(rec), Element.MOTOR).low < 0.0
 
     def test_errors_everywhere_span_most_of_the_range(self) -> None:
         found = region(fitted(drive(burst(0.0, 20.0))), Element.TORQUE_PATH)

@@ -1,43 +1,180 @@
-"""The yardsticks of these tests, against closed formulas."""
+"""Every effect of the catalogue planted by independent code (``hil.proof.truth``) in one bus, and diagnosed.
+
+The truth has its own integrator, its own formulations and its own noise. Each effect is the planted nearest rival of
+those that resemble it: what is not there must not be named. Beside them: nothing missing, parameters merely off, what
+the catalogue does not have, and pairs. All with the first seed, none chosen; 20 s of each of the three tests.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from estimator.physics.effect import Element
-from estimator.physics.simulate import Start
-from tests.estimator.diagnosis.planted import SIGMA, disturbed, quiet, rubbing_speed
-from tests.estimator.physics.bench import ONE_MASS, SAMPLE_TIME_S, SPEED, TWO_MASS, exact_states, random_steps
+from estimator.diagnosis import Diagnosis, Verdict, diagnose
+from estimator.diagnosis.chain import replay
+from estimator.diagnosis.result import FoundEffect
+from estimator.physics.catalogue import EFFECTS
+from estimator.physics.model import DrivelineModel, Parameter, Structure
+from estimator.signals.record import Record
+from hil.proof.campaign_sizes import COUNTERPARTS
+from hil.proof.truth.bus import NOMINAL_ERROR
+from hil.proof.truth.case import TESTS, TruthRecording, record
+from hil.proof.truth.registry import EFFECTS as HIDDEN
+from hil.proof.truth.specimen import Specimen, draw_specimen
+from hil.recording.signals import to_record
+from hil.recording.signals_config import SignalsConfig
+from hil.recording.table import Table
+
+SEED = 1
+SAMPLES = 2000
+TOLERANCE = 0.2
+COLUMNS = ("time_s", "torque_m1_nm", "torque_m2_nm", "speed_rad_s", "flags")
 
 
-def test_where_nothing_is_planted_the_recordings_are_the_linear_line_and_noise() -> None:
-    rec = quiet((1,))[0]
-    exact = exact_states(TWO_MASS, rec.total_torque_nm, Start(5.0, 0.0, 2.0, 0.0, 2.0))[:, SPEED]
-    assert np.std(rec.output - exact) == pytest.approx(SIGMA, rel=0.1)
+@dataclass(frozen=True)
+class Planted:
+    """One bus with something hidden in it, what was recorded, and the verdict."""
+
+    specimen: Specimen
+    recordings: Sequence[TruthRecording]
+    diagnosis: Diagnosis
+
+    @property
+    def named(self) -> set[str]:
+        return {effect.name for effect in self.diagnosis.effects}
+
+    def effect_that_stands_for(self, name: str) -> FoundEffect:
+        """The claim that holds the effect: by its name, or by one that is declared to be the same."""
+        (found,) = (e for e in self.diagnosis.effects if name in (e.name, *e.indistinguishable_from))
+        return found
 
 
-def test_viscous_friction_planted_is_more_of_it_in_the_line() -> None:
-    """By fixed-point iteration; held over each period it comes half a period late, which costs a few per cent."""
-    torque, start = random_steps(600, 1), Start(5.0, 0.0, 2.0, 0.0, 2.0)
-    planted = disturbed(Element.MOTOR, lambda moved: moved.speed, 0.2, torque, start)
-    exact = exact_states(TWO_MASS | {"b_M": TWO_MASS["b_M"] + 0.2}, torque, start)[:, SPEED]
-    plain = exact_states(TWO_MASS, torque, start)[:, SPEED]
-    assert np.max(np.abs(planted - exact)) < 0.2 * np.max(np.abs(plain - exact))
+def as_read(recording: TruthRecording, name: str, samples: int = SAMPLES) -> Record:
+    """Read a recording as the tool reads a file of it."""
+    columns = {column: getattr(recording, column) for column in COLUMNS}
+    kept = {column: values[:samples] for column, values in columns.items() if values is not None}
+    return to_record(Table(Path(f"{name}.csv"), kept), SignalsConfig())
 
 
-def test_a_rubbing_mass_coasts_to_the_stop_of_the_closed_formula() -> None:
-    """w(t) = (w_0 + T_c/b) exp(-b t/J) - T_c/b until it stops, and then it stays."""
-    friction, w_0 = 12.0, 3.0
-    speed = rubbing_speed(lambda w: friction, np.zeros(800), Start(0.0, 0.0, w_0), substeps=100)
-    b, j = ONE_MASS["b_M"], ONE_MASS["J_M"]
-    time_s = np.arange(800) * SAMPLE_TIME_S
-    expected = np.maximum((w_0 + friction / b) * np.exp(-b / j * time_s) - friction / b, 0.0)
-    np.testing.assert_allclose(speed, expected, atol=1e-3)
-    assert speed[-1] == 0.0
+def nominal_of(specimen: Specimen) -> DrivelineModel:
+    structure = Structure.TWO_MASS
+    parameters = {name: Parameter(specimen.nominal[name], TOLERANCE) for name in structure.parameter_names}
+    return DrivelineModel(structure, parameters, gear_ratio=specimen.bus.gear_ratio)
 
 
-def test_without_friction_it_is_the_linear_mass() -> None:
-    torque, start = random_steps(600, 2), Start(5.0, 0.0, 2.0)
-    speed = rubbing_speed(lambda w: 0.0, torque, start)
-    np.testing.assert_allclose(speed, exact_states(ONE_MASS, torque, start)[:, SPEED], atol=1e-9)
+def planted(name: str, seed: int = SEED, nominal_error: float = NOMINAL_ERROR, tests: int = len(TESTS)) -> Planted:
+    specimen = draw_specimen(name, seed, nominal_error)
+    recordings = [record(specimen, number) for number in range(tests)]
+    read = [as_read(recording, f"run_{number}") for number, recording in enumerate(recordings, start=1)]
+    return Planted(specimen, recordings, diagnose(read, nominal_of(specimen)))
+
+
+def rivals_of(name: str) -> set[str]:
+    """Effects that are said to look alike in part, by either's entry."""
+    listed = {other for other, entry in EFFECTS.items() if name in entry.resembles}
+    return {*EFFECTS[name].resembles, *listed}
+
+
+def assert_named(case: Planted, hidden: Sequence[str]) -> None:
+    """All that is hidden is named, or stands as one of a pair that is the same; nothing else is."""
+    assert case.diagnosis.verdict is Verdict.EXPLAINED, case.diagnosis.statement
+    claims = [case.effect_that_stands_for(name) for name in hidden]
+    assert case.named == {claim.name for claim in claims}
+    for name, claim in zip(hidden, claims, strict=True):
+        assert not case.named & (rivals_of(name) - set(hidden) - {claim.name})
+        assert set(claim.indistinguishable_from) <= rivals_of(claim.name) | set(EFFECTS[claim.name].equivalent)
+        assert len(claim.indistinguishable_from) <= 1
+        assert claim.element is EFFECTS[claim.name].element
+        assert claim.evidence.p_value < 0.01
+
+
+def assert_sized(case: Planted, name: str) -> None:
+    """Sizes that the truth's law and the fitted one both have agree: written in two ways, to a quarter."""
+    found = case.effect_that_stands_for(name).parameters
+    bus = asdict(case.specimen.bus)
+    for parameter, true_size in COUNTERPARTS.get(name, {}).items():
+        true = true_size(case.specimen.sizes[name], bus)
+        if parameter in found and true is not None:
+            assert found[parameter].value == pytest.approx(true, rel=0.25), parameter
+
+
+def assert_placed_in_time(case: Planted, name: str) -> None:
+    """Found when it happened, most of the time in either interval in both; not found where it did not happen."""
+    found = case.effect_that_stands_for(name).time_s
+    end_s = SAMPLES * 0.01
+    for number, recording in enumerate(case.recordings, start=1):
+        intervals = found.get(f"run_{number}", ())
+        assert len(intervals) == len(recording.events[name])
+        for (begin, end), (true_begin, true_end) in zip(intervals, recording.events[name], strict=True):
+            both = min(end, true_end, end_s) - max(begin, true_begin)
+            either = max(end, min(true_end, end_s)) - min(begin, true_begin)
+            assert both > 0.8 * either
+
+
+IN_CATALOGUE = [name for name, effect in HIDDEN.items() if effect.catalogued and name in EFFECTS]
+OUTSIDE = [name for name, effect in HIDDEN.items() if not effect.catalogued]
+
+
+def test_every_effect_of_the_catalogue_is_planted() -> None:
+    assert set(IN_CATALOGUE) == set(EFFECTS)
+
+
+@pytest.mark.parametrize("name", IN_CATALOGUE)
+def test_what_was_planted_is_named_and_nothing_else(name: str) -> None:
+    case = planted(name)
+    assert_named(case, [name])
+    assert_sized(case, name)
+    if EFFECTS[name].event:
+        assert_placed_in_time(case, name)
+    if not EFFECTS[name].recognised:
+        fit = case.diagnosis.fit
+        assert fit.holdout_augmented < 0.9 * fit.holdout_retuned
+
+
+@pytest.mark.parametrize("pair", [("backlash", "actuator_lag"), ("speed_quantisation", "backlash")])
+def test_both_of_a_pair_are_named(pair: tuple[str, str]) -> None:
+    case = planted("+".join(pair))
+    assert_named(case, pair)
+    for name in pair:
+        assert_sized(case, name)
+
+
+@pytest.mark.parametrize("nominal_error", [0.0, NOMINAL_ERROR], ids=["right", "off"])
+def test_nothing_missing_is_said_whether_the_parameters_are_right_or_off(nominal_error: float) -> None:
+    case = planted("none", nominal_error=nominal_error)
+    assert case.diagnosis.verdict is Verdict.NO_MISMATCH
+    assert case.diagnosis.effects == ()
+    assert not case.diagnosis.mismatch.detected
+    for name in ("J_M", "J_L", "k", "c"):
+        assert case.diagnosis.parameters[name].value == pytest.approx(getattr(case.specimen.bus, name), rel=0.02)
+
+
+@pytest.mark.parametrize("name", OUTSIDE)
+def test_what_the_catalogue_does_not_have_is_given_no_name(name: str) -> None:
+    case = planted(name)
+    assert case.diagnosis.verdict is Verdict.UNEXPLAINED
+    assert case.diagnosis.effects == ()
+    assert case.diagnosis.mismatch.detected
+    assert case.diagnosis.mismatch.element is not None
+    assert case.diagnosis.mismatch.element.value == HIDDEN[name].place.value
+    assert case.diagnosis.unnamed is not None
+
+
+def test_the_augmented_model_explains_fresh_recordings() -> None:
+    """The augmented model is judged on recordings made after the verdict, against the noise of the speed reading."""
+    case = planted("coulomb_friction_motor")
+    fresh = [as_read(record(case.specimen, len(TESTS) + n), f"fresh_{n + 1}") for n in range(len(TESTS))]
+    errors = [replay(case.diagnosis.augmented, unseen).rms for unseen in fresh]
+    assert float(np.median(errors)) < 1.2 * case.diagnosis.fit.noise_floor
+
+
+def test_constant_direction_leaves_dry_friction_untestable() -> None:
+    """Cruise alone can't tell dry friction from the constant load; the tool says so and names the test."""
+    case = planted("coulomb_friction_motor", tests=1)
+    untestable = {entry.name: entry.suggested_test for entry in case.diagnosis.untestable}
+    assert untestable["coulomb_friction_motor"] == "reversal"
+    assert case.diagnosis.verdict is Verdict.NO_MISMATCH

@@ -13,6 +13,7 @@ from estimator.diagnosis.selection import Selection, Trial
 from estimator.diagnosis.unnamed import UnnamedLaw
 from estimator.diagnosis.wording import PLACES, rejection, statement
 from estimator.physics.effect import Element
+from tests.estimator.diagnosis.outcome import outcome
 from tests.estimator.diagnosis.regression import of_rms
 
 FIT = Fit("rad/s", 0.61, 0.4321, 0.0523, 0.4444, 0.0555, 0.0501)
@@ -98,7 +99,7 @@ class TestRejection:
         return Trial(name, frozenset({name}), of_rms(rms, 3), GAIN, None, 0.0, failed)
 
     def chosen(self, *names: str) -> Selection:
-        return Selection(self.RETUNED, frozenset(names), self.BEST if names else self.RETUNED, {}, {})
+        return outcome(self.RETUNED, frozenset(names), self.BEST if names else self.RETUNED)
 
     def test_a_failed_test_is_the_reason(self) -> None:
         assert (

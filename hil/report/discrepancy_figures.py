@@ -1,0 +1,209 @@
+"""Figures of a mismatch: the law over its data, the input that would explain the error, its spectrum, the response."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+from estimator.diagnosis.result import Course, Equivalent, ErrorSpectrum, Interval, LawPicture, Response
+from estimator.signals.record import FloatArray
+from hil.report.decimate import extremes
+from hil.report.figures import DECADES, LEGEND_PX, PANEL_PX, SHADE, Style, figure_html
+from hil.report.wording import PLACES
+
+CHOICE_PX = 46
+"""Room above a figure for the choice of a recording."""
+
+GAP = 8.0
+"""In distances of neighbouring bins: from here on nothing is drawn between two of them."""
+
+BAND = "rgba(0,114,178,0.18)"
+MEASURED_BAND = "rgba(120,128,136,0.28)"
+FLOOR = {"color": "#777777", "width": 1.2, "dash": "dot"}
+
+
+def law_figure(name: str, picture: LawPicture) -> str:
+    """Draw a law over its signal with the data it was found from."""
+    colour, width, _ = Style.AFTER.value
+    order = np.argsort(picture.x)
+    x, data = picture.x[order], picture.data[order]
+    figure = go.Figure()
+    line = {"color": colour, "width": 2.2}
+    curve_x, curve = _broken(x, picture.law[order])
+    figure.add_trace(go.Scatter(x=curve_x, y=curve, mode="lines", line=line, name="law found"))
+    figure.add_trace(
+        go.Scatter(
+            x=x,
+            y=data,
+            mode="markers",
+            marker={"color": Style.BEFORE.value[0], "size": 7, "symbol": "diamond"},
+            error_y={
+                "type": "data",
+                "symmetric": False,
+                "array": picture.high[order] - data,
+                "arrayminus": data - picture.low[order],
+                "thickness": width,
+                "width": 3,
+            },
+            name="what the recordings ask for, 95 %",
+        )
+    )
+    figure.add_hline(y=0.0, line={"color": "#b4bac1", "width": 1})
+    figure.update_xaxes(title_text=f"{picture.signal} [{picture.signal_unit}]")
+    figure.update_yaxes(title_text=f"{_what(picture)} [{picture.unit}]")
+    return figure_html(figure, name, PANEL_PX + 90 + LEGEND_PX)
+
+
+def _broken(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Break a line where the signal was not for long: what is not seen is not drawn."""
+    gaps = np.flatnonzero(np.diff(x) > GAP * np.median(np.diff(x))) + 1
+    return np.insert(x, gaps, np.nan), np.insert(y, gaps, np.nan)
+
+
+def _what(picture: LawPicture) -> str:
+    if picture.element.value in ("speed_sensor", "acquisition"):
+        return "error of reading"
+    return "force" if picture.unit == "N" else "torque"
+
+
+def course_figure(
+    name: str,
+    equivalents: Sequence[Equivalent],
+    recordings: Sequence[str],
+    marked: Mapping[str, Sequence[Interval]],
+    stretches: int,
+) -> str:
+    """Draw the input at every place over time, a panel each, one recording at a time."""
+    count = len(equivalents)
+    figure = make_subplots(rows=count, cols=1, shared_xaxes=True, vertical_spacing=0.05)
+    shown: list[str] = []
+    for recording in recordings:
+        for row, equivalent in enumerate(equivalents, start=1):
+            for trace in _band(equivalent.courses[recording], stretches, first=row == 1):
+                trace.visible = recording == recordings[0]
+                figure.add_trace(trace, row=row, col=1)
+                shown.append(recording)
+    for row, equivalent in enumerate(equivalents, start=1):
+        figure.update_yaxes(title_text=f"{PLACES[equivalent.place]} [{equivalent.unit}]", row=row, col=1)
+    figure.update_xaxes(title_text="time [s]", row=count, col=1)
+    shapes = {recording: [_shade(low, high) for low, high in marked.get(recording, ())] for recording in recordings}
+    _choose(figure, recordings, shown, shapes)
+    figure.update_layout(shapes=shapes[recordings[0]])
+    return figure_html(figure, name, 170 * count + LEGEND_PX + CHOICE_PX, top_px=34 + CHOICE_PX)
+
+
+def _shade(low: float, high: float) -> dict[str, object]:
+    place = {"type": "rect", "xref": "x", "yref": "paper", "x0": low, "x1": high, "y0": 0, "y1": 1}
+    return {**place, "fillcolor": SHADE, "opacity": 0.18, "line": {"width": 0}, "layer": "below"}
+
+
+def _band(course: Course, stretches: int, *, first: bool) -> list[go.Scatter]:
+    colour, width, _ = Style.AFTER.value
+    kept = extremes(course.value, stretches)
+    x = course.time_s[kept].astype(np.float32)
+    edge = {"mode": "lines", "line": {"width": 0}, "showlegend": False, "hoverinfo": "skip"}
+    return [
+        go.Scatter(x=x, y=course.low[kept].astype(np.float32), **edge),
+        go.Scatter(
+            x=x,
+            y=course.high[kept].astype(np.float32),
+            mode="lines",
+            line={"width": 0},
+            fill="tonexty",
+            fillcolor=BAND,
+            hoverinfo="skip",
+            name="95 % band",
+            showlegend=first,
+        ),
+        go.Scatter(
+            x=x,
+            y=course.value[kept].astype(np.float32),
+            mode="lines",
+            line={"color": colour, "width": width},
+            name="would explain the error by itself",
+            showlegend=first,
+        ),
+    ]
+
+
+def _choose(
+    figure: go.Figure,
+    recordings: Sequence[str],
+    shown: Sequence[str],
+    shapes: Mapping[str, list[dict[str, object]]] | None = None,
+) -> None:
+    """Add the choice of a recording above a figure; ``shown`` tells which recording each trace belongs to."""
+    if len(recordings) < 2:
+        return
+    buttons = [
+        {
+            "label": recording,
+            "method": "update",
+            "args": [
+                {"visible": [each == recording for each in shown]},
+                {} if shapes is None else {"shapes": shapes[recording]},
+            ],
+        }
+        for recording in recordings
+    ]
+    menu = {"buttons": buttons, "x": 0, "xanchor": "left", "y": 1, "yanchor": "bottom", "pad": {"b": 8}}
+    figure.update_layout(updatemenus=[menu])
+
+
+def error_spectrum_figure(name: str, spectrum: ErrorSpectrum, unit: str, band_hz: Interval | None) -> str:
+    """Draw the error's density before and after, with the floor and the band that holds most of the mismatch."""
+    figure = go.Figure()
+    lines = [("nominal re-tuned", spectrum.before, Style.BEFORE)]
+    if not np.array_equal(spectrum.before, spectrum.after):
+        lines.append(("augmented", spectrum.after, Style.AFTER))
+    for label, values, style in lines:
+        colour, width, _ = style.value
+        line = {"color": colour, "width": width + 0.4}
+        figure.add_trace(go.Scatter(x=spectrum.frequency_hz, y=values, mode="lines", line=line, name=label))
+    ends = spectrum.frequency_hz[[0, -1]]
+    if spectrum.floor > 0.0:
+        figure.add_trace(go.Scatter(x=ends, y=[spectrum.floor] * 2, mode="lines", line=FLOOR, name="noise floor"))
+    if band_hz is not None and band_hz[0] > 0.0:
+        figure.add_vrect(x0=band_hz[0], x1=band_hz[1], fillcolor=SHADE, opacity=0.18, line_width=0, layer="below")
+    figure.update_xaxes(title_text="frequency [Hz]", **DECADES)
+    figure.update_yaxes(title_text=f"error [{unit}/√Hz]", **DECADES)
+    return figure_html(figure, name, PANEL_PX + 40 + LEGEND_PX)
+
+
+def response_figure(name: str, responses: Mapping[str, Response], axis: str) -> str:
+    """Draw the response of a recording with its confidence, and of both models, one recording at a time."""
+    figure = go.Figure()
+    recordings, shown = list(responses), list[str]()
+    for recording, response in responses.items():
+        for trace in _responses(response):
+            trace.visible = recording == recordings[0]
+            figure.add_trace(trace)
+            shown.append(recording)
+    _choose(figure, recordings, shown)
+    figure.update_xaxes(title_text="frequency [Hz]", **DECADES)
+    figure.update_yaxes(title_text=axis, **DECADES)
+    return figure_html(figure, name, PANEL_PX + 40 + LEGEND_PX + CHOICE_PX, top_px=34 + CHOICE_PX)
+
+
+def _responses(response: Response) -> list[go.Scatter]:
+    f = response.frequency_hz
+    smallest = 0.1 * float(np.min(response.measured[response.measured > 0.0], initial=np.inf))
+    high = np.where(np.isfinite(response.high), response.high, response.measured)
+    lines = [_line(f, np.maximum(response.low, smallest), None), _line(f, high, None)]
+    lines[1].update(fill="tonexty", fillcolor=MEASURED_BAND, name="estimate without a model, 95 %", showlegend=True)
+    lines.append(_line(f, response.measured, Style.MEASURED, "estimate without a model"))
+    lines.append(_line(f, response.before, Style.BEFORE, "nominal re-tuned"))
+    if not np.array_equal(response.before, response.after):
+        lines.append(_line(f, response.after, Style.AFTER, "augmented"))
+    return lines
+
+
+def _line(x: FloatArray, y: FloatArray, style: Style | None, name: str = "") -> go.Scatter:
+    if style is None:
+        edge = {"width": 0}
+        return go.Scatter(x=x, y=y, mode="lines", line=edge, showlegend=False, hoverinfo="skip")
+    colour, width, _ = style.value
+    return go.Scatter(x=x, y=y, mode="lines", line={"color": colour, "width": min(width, 2.5)}, name=name)

@@ -1,0 +1,164 @@
+"""The acquisition chain: faults out before the fits, back in where simulations are held against recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimator.diagnosis.chain import Chain, mechanical, read_through, replay
+from estimator.diagnosis.hypotheses import NOTHING, Bench, everything
+from estimator.physics.catalogue import EFFECTS
+from estimator.physics.fit import FitResult
+from estimator.physics.free_run import free_run
+from estimator.physics.model import DrivelineModel, EffectValue, Parameter, Structure
+from estimator.signals.record import Record
+from tests.estimator.diagnosis.acquisition.bench import NOISE, SAMPLES, Line, drives, periodic_rows, random_rows, stale
+
+EVERY = 7
+STALE = periodic_rows(EVERY)
+LOST = random_rows(np.random.default_rng(3), 0.06, burst=2.0)
+
+
+def line_of(line: Line, effects: Mapping[str, Mapping[str, float]] | None = None) -> DrivelineModel:
+    """The driveline as a model that is trusted to a fifth."""
+    values = {"J_M": line.j_m, "J_L": line.j_l, "k": line.k, "c": line.c, "b_M": line.b_m, "b_L": line.b_l}
+    return DrivelineModel(
+        Structure.TWO_MASS,
+        {name: Parameter(value, 0.2) for name, value in values.items()},
+        effects={name: {key: EffectValue(v) for key, v in each.items()} for name, each in (effects or {}).items()},
+    )
+
+
+TRUTH = drives(1)[0]
+HEALTHY = TRUTH.record("cruise")
+MODEL = line_of(TRUTH.line)
+
+
+def with_stale_speed() -> Record:
+    return stale(HEALTHY, STALE, (0,))
+
+
+def with_lost_torque() -> Record:
+    """Both torques were not read in some rows; the recording holds the last value, as a reader fills it."""
+    rows = np.maximum.accumulate(np.where(LOST, 0, np.arange(SAMPLES)))
+    return replace(HEALTHY, torque_nm=HEALTHY.torque_nm[rows], torque_okay=~LOST)
+
+
+class TestHealthy:
+    def test_nothing_is_found_and_nothing_changed(self) -> None:
+        chain = read_through([HEALTHY])
+        assert chain.findings == ()
+        assert chain.effects() == {}
+        assert not chain.torque_is_unknown
+        assert chain.records[0] is chain.raw[0] is HEALTHY
+
+    def test_its_errors_are_plain_differences(self) -> None:
+        output = HEALTHY.output + 0.3
+        (errors,) = read_through([HEALTHY]).errors([output])
+        np.testing.assert_allclose(errors, 0.3)
+
+    def test_of_no_recordings_there_is_an_empty_chain(self) -> None:
+        assert read_through([]) == Chain((), (), ())
+
+
+class TestStale:
+    def test_it_is_masked_for_fits_and_kept_as_read(self) -> None:
+        read = with_stale_speed()
+        chain = read_through([read])
+        assert [finding.name for finding in chain.findings] == ["stale_samples"]
+        assert not chain.records[0].okay[STALE].any()
+        assert chain.raw[0].okay.all()
+        assert chain.effects()["stale_samples"]["share"] == pytest.approx(1.0 / EVERY, rel=0.01)
+
+    def test_errors_are_those_of_the_simulation_as_this_chain_would_have_read_it(self) -> None:
+        """Where the recording repeats, so does the simulation: what is left is the noise, in every row."""
+        read, true = with_stale_speed(), TRUTH.speed()
+        (errors,) = read_through([read]).errors([true])
+        renewed = np.maximum.accumulate(np.where(STALE, 0, np.arange(SAMPLES)))
+        np.testing.assert_allclose(errors, true[renewed] - read.output)
+        assert np.std(errors) == pytest.approx(NOISE, rel=0.05)
+        assert np.std(true - read.output) > 2.0 * NOISE
+
+
+class TestLostTorque:
+    def test_it_is_unknown_and_estimated_from_what_the_speed_did(self) -> None:
+        read = with_lost_torque()
+        chain = read_through([read])
+        assert chain.torque_is_unknown
+        held = self.error_nm(chain)
+        repaired = chain.with_torques_from(self.fitted(chain))
+        assert repaired.raw == chain.raw
+        assert held > 20.0
+        assert self.error_nm(repaired) < 0.3 * held
+
+    def test_a_fit_to_the_repaired_is_at_the_noise(self) -> None:
+        chain = read_through([with_lost_torque()])
+        held = self.fitted(chain)
+        fitted = self.fitted(chain.with_torques_from(held))
+        assert held.rms > 2.0 * NOISE
+        assert fitted.rms < 1.3 * NOISE
+
+    @staticmethod
+    def fitted(chain: Chain) -> FitResult:
+        return Bench(MODEL, chain.records, everything(chain.records)).fit(NOTHING)
+
+    @staticmethod
+    def error_nm(chain: Chain) -> float:
+        """RMS error of the total torque in the rows in which it was not read."""
+        off = (chain.records[0].total_torque_nm - HEALTHY.total_torque_nm)[LOST]
+        return float(np.sqrt(np.mean(off**2)))
+
+
+class TestHiddenJitter:
+    def jittered(self) -> Record:
+        return TRUTH.record("cruise", speed=TRUTH.speed(1.5e-3 * np.random.default_rng(4).standard_normal(SAMPLES)))
+
+    def test_it_is_found_in_the_errors_of_a_converged_fit(self) -> None:
+        records = [self.jittered()]
+        chain, result = read_through(records), Bench(MODEL, records, everything(records)).fit(NOTHING)
+        found = chain.with_jitter_in(result)
+        assert [finding.name for finding in found.findings] == ["sample_jitter"]
+        assert found.effects()["sample_jitter"]["jitter_s"] == pytest.approx(1.5e-3, rel=0.1)
+        assert found.with_jitter_in(result) is found
+
+    def test_a_healthy_chain_stays(self) -> None:
+        chain, result = read_through([HEALTHY]), Bench(MODEL, [HEALTHY], everything([HEALTHY])).fit(NOTHING)
+        assert chain.with_jitter_in(result) is chain
+
+
+class TestReplay:
+    """A model on a recording, as the acquisition that the model describes would have read it."""
+
+    def test_without_such_effects_it_is_a_free_run(self) -> None:
+        np.testing.assert_array_equal(replay(MODEL, HEALTHY).output, free_run(MODEL, HEALTHY).output)
+
+    def test_repeats_are_repeated(self) -> None:
+        read = with_stale_speed()
+        run = replay(line_of(TRUTH.line, {"stale_samples": {"share": 1.0 / EVERY}}), read)
+        np.testing.assert_array_equal(run.output[STALE], run.output[np.flatnonzero(STALE) - 1])
+        assert run.rms == pytest.approx(NOISE, rel=0.05)
+        assert replay(MODEL, read).rms > 2.0 * NOISE
+
+    def test_the_reading_is_rounded(self) -> None:
+        step = 0.4
+        read = replace(HEALTHY, output=step * np.round(HEALTHY.output / step))
+        run = replay(line_of(TRUTH.line, {"speed_quantisation": {"step_rad_s": step}}), read)
+        np.testing.assert_allclose(run.output, step * np.round(run.output / step), atol=1e-9)
+        np.testing.assert_allclose(np.median(np.abs(run.output - read.output)), 0.0, atol=1e-9)
+
+    def test_what_the_recording_has_and_the_model_has_not_stays_an_error(self) -> None:
+        """The model says rounded, the recording repeats as well: nobody compensated that."""
+        quantised = line_of(TRUTH.line, {"speed_quantisation": {"step_rad_s": 1e-6}})
+        assert replay(quantised, with_stale_speed()).rms > 2.0 * NOISE
+
+
+class TestMechanical:
+    def test_what_is_recognised_in_recordings_is_taken_out_and_nothing_else(self) -> None:
+        mechanics = {"backlash": {"gap_rad": 0.02}, "clock_drift": {"rate": 1e-4}}
+        recognised = {name: {entry.parameters[0].name: 0.1} for name, entry in EFFECTS.items() if entry.recognised}
+        whole = line_of(TRUTH.line, mechanics | recognised)
+        assert set(recognised) == {"speed_quantisation", "stale_samples", "lost_samples", "sample_jitter"}
+        assert mechanical(whole) == line_of(TRUTH.line, mechanics)

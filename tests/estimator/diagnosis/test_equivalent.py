@@ -1,0 +1,131 @@
+"""The unknown input at each place: found where it was planted, with a band that covers it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.linalg import block_diag
+
+from estimator.diagnosis.blocks import lines
+from estimator.diagnosis.equivalent import Place, explain, explain_all, places
+from estimator.diagnosis.kalman import Chain, Filtered, run_filter, run_smoother
+from estimator.physics.effect import Element
+from estimator.physics.fit import FitResult, fit, make_problem
+from estimator.physics.simulate import Start
+from estimator.signals.record import FloatArray
+from tests.estimator.diagnosis.planted import SIGMA, Moved, drive_torque, recordings
+from tests.estimator.physics.bench import ONE_MASS, TWIST, TWO_MASS, exact_states, linear_record, model, random_steps
+
+
+def stairs(moved: Moved) -> FloatArray:
+    """Random steps every 0.3 s, the same in every recording, about zero."""
+    rng = np.random.default_rng(11)
+    levels = rng.uniform(-1.0, 1.0, 60)
+    return (levels - levels.mean())[(moved.time_s / 0.3).astype(int)]
+
+
+def nominal(element: Element, size: float) -> FitResult:
+    """The true line, nothing re-tuned, on recordings with a planted input."""
+    return fit(make_problem(model(TWO_MASS), recordings(element, stairs, size), ()))
+
+
+PLANTED = [
+    (Element.TORQUE_PATH, Place.MOTOR, 20.0),
+    (Element.SHAFT, Place.SHAFT, 40.0),
+    (Element.LOAD, Place.LOAD, 20.0),
+    (Element.SPEED_SENSOR, Place.SENSOR, 0.3),
+]
+
+
+@pytest.mark.parametrize(("element", "place", "size"), PLANTED, ids=[p.value for _, p, _ in PLANTED])
+def test_a_planted_input_is_found_within_its_band(element: Element, place: Place, size: float) -> None:
+    """But for its mean: a constant torque is the constant load's, a constant twist is invisible."""
+    result = nominal(element, size)
+    (first, _) = explain(result, lines(result), place, SIGMA).inputs
+    time_s = result.problem.records[0].time_s
+    planted = size * stairs(Moved(time_s, *[np.zeros_like(time_s)] * 5))
+    apart = first.value - planted
+    apart -= np.median(apart)
+    assert np.mean(np.abs(apart) <= 1.96 * first.std) > 0.9
+    assert np.std(apart) < (0.6 if place is Place.SHAFT else 0.4) * np.std(
+        planted
+    )  # the shaft's slow part is invisible
+
+
+@pytest.mark.parametrize(("element", "place", "size"), PLANTED[1:], ids=[p.value for _, p, _ in PLANTED[1:]])
+def test_the_right_place_is_the_likeliest(element: Element, place: Place, size: float) -> None:
+    result = nominal(element, size)
+    found = explain_all(result, lines(result), SIGMA)
+    assert max(found, key=lambda each: found[each].log_likelihood) is place
+
+
+def test_the_motion_that_goes_with_the_input_is_the_true_one() -> None:
+    """A load step: the twist that the nominal simulation lacks is in the motion of the load's input."""
+    torque, start = drive_torque(1), Start(5.0, 0.0, 2.0, 0.0, 2.0)
+    extra = np.where(np.arange(torque.size) >= 700, 40.0, 0.0)
+    rec = linear_record(TWO_MASS, torque, start, sigma=SIGMA, seed=1, extra_load_nm=extra)
+    result = fit(make_problem(model(TWO_MASS), [rec], ()))
+    (found,) = explain(result, lines(result), Place.LOAD, SIGMA).inputs
+    twist = exact_states(TWO_MASS, torque, start, extra_load_nm=extra)[:, TWIST]
+    middle = 0.5 * (twist + np.append(twist[1:], twist[-1]))
+    assert np.std(found.motion.twist - middle) < 0.03 * np.std(middle)
+
+
+def test_one_mass_has_two_places() -> None:
+    rec = linear_record(ONE_MASS, random_steps(600, seed=3), Start(0.0, 0.0, 0.0), sigma=SIGMA)
+    result = fit(make_problem(model(ONE_MASS), [rec], ()))
+    assert places(result) == (Place.MOTOR, Place.SENSOR)
+    assert set(explain_all(result, lines(result), SIGMA)) == {Place.MOTOR, Place.SENSOR}
+
+
+def test_masked_stretches_widen_the_band() -> None:
+    rec = linear_record(TWO_MASS, drive_torque(1), Start(5.0, 0.0, 2.0, 0.0, 2.0), sigma=SIGMA, seed=1)
+    okay = rec.okay.copy()
+    okay[600:900] = False
+    result = fit(make_problem(model(TWO_MASS), [replace(rec, okay=okay)], ()))
+    (found,) = explain(result, lines(result), Place.MOTOR, SIGMA).inputs
+    assert np.isfinite(found.value).all()
+    assert found.std[750] > 1.1 * np.median(found.std[okay])
+
+
+def test_filter_and_smoother_are_the_conditional_normal_distribution() -> None:
+    """Against the joint normal distribution of 30 blocks, inverted as a whole."""
+    rng = np.random.default_rng(2)
+    blocks, n = 30, 2
+    phi = np.array([[0.9, 0.2], [-0.3, 0.8]])
+    drive, c, direct = np.array([0.5, 0.1]), np.array([1.0, 0.3]), 0.2
+    memory, walk, noise = 0.97, 0.3, 0.1
+    weight = np.where(np.arange(blocks) % 7 == 3, 0.0, 2.0)
+    f = np.block([[phi, drive[:, None]], [np.zeros((1, n)), np.array([[memory]])]])
+    prior = np.diag([1.0, 2.0, 3.0])
+    move = np.eye(3 * blocks)
+    for b in range(1, blocks):
+        move[3 * b : 3 * b + 3] = f @ move[3 * b - 3 : 3 * b]
+        move[3 * b : 3 * b + 3, 3 * b : 3 * b + 3] = np.eye(3)
+    covariance = move @ block_diag(prior, *[np.diag([0.0, 0.0, walk])] * (blocks - 1)) @ move.T
+    seen = np.flatnonzero(weight)
+    h = np.zeros((seen.size, 3 * blocks))
+    for row, b in enumerate(seen):
+        h[row, 3 * b : 3 * b + 3] = [*c, direct]
+    spread = h @ covariance @ h.T + 0.5 * noise * np.eye(seen.size)
+    error = rng.standard_normal(blocks)
+    gain = covariance @ h.T @ np.linalg.inv(spread)
+    mean = (gain @ error[seen]).reshape(blocks, 3)
+    variance = np.diag(covariance - gain @ h @ covariance).reshape(blocks, 3)
+    likelihood = -0.5 * (
+        error[seen] @ np.linalg.solve(spread, error[seen])
+        + np.linalg.slogdet(spread)[1]
+        + seen.size * np.log(2.0 * np.pi)
+    )
+
+    chain = Chain(phi[None], drive[None], c[None], np.array([direct]), memory, walk)
+    kept = Filtered(
+        np.zeros((blocks, 3)), np.zeros((blocks, 3, 3)), np.zeros((blocks, 3)), np.zeros(blocks), np.zeros(blocks)
+    )
+    estimates, spreads = np.zeros((blocks, 3)), np.zeros(blocks)
+    assert run_filter(chain, error, weight, noise, prior, kept) == pytest.approx(likelihood)
+    run_smoother(chain, kept, estimates, spreads)
+    np.testing.assert_allclose(estimates, mean, atol=1e-9)
+    np.testing.assert_allclose(spreads, variance[:, 2], atol=1e-9)

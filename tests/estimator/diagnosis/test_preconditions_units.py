@@ -1,0 +1,167 @@
+"""Wrong units and signs are refused with the factor; nominal values that are off, and missing physics, are not."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimator.diagnosis.preconditions.factors import known_factors
+from estimator.diagnosis.preconditions.inertia import as_one_body, fitted_inertia
+from estimator.diagnosis.preconditions.units import BEYOND, require_plausible_units
+from estimator.errors import Implausible
+from estimator.physics.effect import Element
+from estimator.physics.simulate import Start, grid_for
+from estimator.signals.record import FloatArray, OutputKind, Record
+from tests.estimator.diagnosis.planted import Moved, recordings, rubbing
+from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, linear_record, model, random_steps, scaled
+
+Change = Callable[[Record], Record]
+
+SAMPLES = 2000
+
+
+def drive(values: dict[str, float] = TWO_MASS, kind: OutputKind = OutputKind.SPEED) -> Record:
+    """Twenty seconds of random steps, shared by two inverters, one of them with a part of its own."""
+    torque = random_steps(SAMPLES, seed=3)
+    sigma = 1e-4 if kind is OutputKind.POSITION else 0.02
+    record = linear_record(values, torque, Start(10.0, 0.0, 20.0, 0.0, 20.0), sigma=sigma, kind=kind)
+    own = 10.0 * np.sin(np.arange(SAMPLES) / 7.0)
+    return replace(record, torque_nm=np.column_stack([0.6 * torque + own, 0.4 * torque - own]))
+
+
+def output(factor: float) -> Change:
+    return lambda record: replace(record, output=factor * record.output)
+
+
+def torque(*factors: float) -> Change:
+    return lambda record: replace(record, torque_nm=record.torque_nm * np.array(factors))
+
+
+def in_ms(record: Record) -> Record:
+    return replace(record, time_s=1e3 * record.time_s, sample_time_s=1e3 * record.sample_time_s)
+
+
+WRONG: dict[str, tuple[Change, str]] = {
+    "rpm": (output(60.0 / (2.0 * math.pi)), "is the speed in rpm, expected rad/s?"),
+    "degrees": (output(180.0 / math.pi), "is the output in degrees, expected radians?"),
+    "km/h": (output(3.6), "is the speed in km/h, expected m/s?"),
+    "turns per second": (output(0.5 / math.pi), "is the speed in turns per second, expected rad/s?"),
+    "kNm": (torque(1e-3, 1e-3), "is the torque in kNm"),
+    "mNm": (torque(1e3, 1e3), "is the torque in mNm"),
+    "torque turned round": (torque(-1.0, -1.0), "the output falls where the torque rises"),
+    "output turned round": (output(-1.0), "the output falls where the torque rises"),
+    "one torque turned round": (torque(1.0, -1.0), "the sign of torque input 2 turned round"),
+    "ms": (in_ms, "sampling period is 10 s, and with 0.01 s it fits the nominal inertia. Is time in ms"),
+    "no unit known": (output(20.0), "No common unit is off by this"),
+}
+
+
+@pytest.mark.parametrize("values", [TWO_MASS, ONE_MASS], ids=["two masses", "one mass"])
+@pytest.mark.parametrize("fault", WRONG)
+def test_a_factor_is_refused_by_name(fault: str, values: dict[str, float]) -> None:
+    change, said = WRONG[fault]
+    with pytest.raises(Implausible) as refusal:
+        require_plausible_units([change(drive(values))], model(values))
+    assert str(refusal.value).startswith("recording run is implausible: ")
+    assert said in str(refusal.value)
+
+
+@pytest.mark.parametrize("direction", [1.0, -1.0], ids=["too large", "too small"])
+def test_a_position_in_other_units(direction: float) -> None:
+    wrong = output(1e3**direction)(drive(kind=OutputKind.POSITION))
+    with pytest.raises(Implausible, match="This is close to"):
+        require_plausible_units([wrong], model(TWO_MASS))
+
+
+def test_the_gear_ratio_is_a_known_factor() -> None:
+    line = replace(model(TWO_MASS), gear_ratio=13.0)
+    with pytest.raises(
+        Implausible, match="close to the gear ratio: is the speed, the torque or the inertia at the whe"
+    ):
+        require_plausible_units([output(1.0 / 13.0)(drive())], line)
+
+
+@pytest.mark.parametrize("values", [TWO_MASS, ONE_MASS], ids=["two masses", "one mass"])
+@pytest.mark.parametrize("kind", [OutputKind.SPEED, OutputKind.POSITION])
+def test_right_units_pass(values: dict[str, float], kind: OutputKind) -> None:
+    require_plausible_units([drive(values, kind)], model(values))
+
+
+@pytest.mark.parametrize("name", sorted(TWO_MASS))
+@pytest.mark.parametrize("factor", [0.8, 1.0 / 0.8])
+def test_nominal_values_that_are_off_pass(name: str, factor: float) -> None:
+    require_plausible_units([drive()], model(scaled(TWO_MASS, **{name: factor})))
+
+
+LAWS: dict[str, tuple[Element, Callable[[Moved], FloatArray], float]] = {
+    "play": (Element.SHAFT, lambda moved: -4200.0 * np.clip(moved.twist, -0.01, 0.01), 1.0),
+    "dry friction of a third of the torque": (Element.MOTOR, lambda moved: np.sign(moved.speed), 30.0),
+    "a hill": (Element.LOAD, lambda moved: np.sin(0.3 * moved.time_s), 60.0),
+    "a curved reading": (Element.SPEED_SENSOR, lambda moved: moved.speed * np.abs(moved.speed), 0.005),
+}
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_missing_physics_passes(law: str) -> None:
+    require_plausible_units(recordings(*LAWS[law]), model(TWO_MASS))
+
+
+def test_friction_in_one_mass_passes() -> None:
+    require_plausible_units(rubbing(lambda speed: 40.0), model(ONE_MASS))
+
+
+def test_a_control_that_holds_the_speed_on_a_hill_passes() -> None:
+    """The torque follows the road here: seen as one body it would be an inertia of a fraction of the true one."""
+    inertia, wanted, dt = 20.0, 50.0, 0.01
+    rng = np.random.default_rng(1)
+    speed, torques, held = [wanted], [], 0.0
+    for k in range(3000):
+        error = wanted - speed[-1]
+        held += 8.0 * error * dt
+        torques.append(60.0 * error + held)
+        hill = 50.0 * math.sin(0.4 * k * dt)
+        speed.append(speed[-1] + dt / inertia * (torques[-1] - 4.0 * speed[-1] - hill))
+    rec = drive(ONE_MASS)
+    noisy = np.array(speed[:-1]) + 0.01 * rng.standard_normal(3000)
+    closed = replace(
+        rec, time_s=dt * np.arange(3000), torque_nm=np.array(torques)[:, None], output=noisy, okay=np.ones(3000, bool)
+    )
+    line = model(ONE_MASS)
+    assert fitted_inertia(closed, line, grid_for(line, [closed])) is None
+    require_plausible_units([closed], line)
+
+
+@pytest.mark.parametrize(("factor", "refused"), [(0.95, False), (1.05, True)])
+def test_the_tolerance_widens_what_is_plausible(factor: float, refused: bool) -> None:
+    """A model trusted to a factor is taken at its word."""
+    wrong = output(1.0 / (1.5 * BEYOND * factor))(drive(ONE_MASS))
+    if refused:
+        with pytest.raises(Implausible):
+            require_plausible_units([wrong], model(ONE_MASS, 0.5))
+    else:
+        require_plausible_units([wrong], model(ONE_MASS, 0.5))
+
+
+def test_a_force_as_output_is_not_judged() -> None:
+    require_plausible_units([replace(output(1e6)(drive()), kind=OutputKind.FORCE)], model(TWO_MASS))
+
+
+def test_too_short_to_tell() -> None:
+    rec = drive(ONE_MASS)
+    short = replace(
+        rec, time_s=rec.time_s[:900], torque_nm=rec.torque_nm[:900], output=rec.output[:900], okay=rec.okay[:900]
+    )
+    assert as_one_body(short, model(ONE_MASS), 0.0).share == 0.0
+
+
+@pytest.mark.parametrize(("ratio", "first"), [(0.1, "1 / (60/(2 pi))"), (6.0, "2 pi"), (1e-3, "1 / (1000)")])
+def test_the_nearest_known_factor_comes_first(ratio: float, first: str) -> None:
+    assert known_factors(ratio)[0].startswith(f"{first}: ")
+
+
+def test_nothing_known_is_close() -> None:
+    assert known_factors(25.0) == []

@@ -1,0 +1,184 @@
+"""Long gaps cut recordings into segments, and what is found of these is told of the recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimator.diagnosis import diagnose
+from estimator.diagnosis.joined import joined
+from estimator.diagnosis.preconditions import prepare
+from estimator.diagnosis.result import Course, Discrepancy, Equivalent, Estimated, Profile, Response, Verdict
+from estimator.diagnosis.segments import FEWEST_SAMPLES, LONG_S, LONG_SAMPLES, cut, segments, sliced
+from estimator.physics.simulate import Start
+from estimator.signals.record import Record
+from tests.estimator.physics.bench import ONE_MASS, SAMPLE_TIME_S, linear_record, model, random_steps
+
+Rows = Sequence[tuple[int, int]]
+LINE = model(ONE_MASS)
+LONG = round(LONG_S / SAMPLE_TIME_S)
+
+
+def drive(samples: int = 3000, bad: Rows = (), name: str = "run", load_nm: float = 5.0) -> Record:
+    start = Start(load_nm, 0.0, 3.0)
+    record = linear_record(ONE_MASS, random_steps(samples, seed=1), start, sigma=0.02, name=name)
+    okay = np.ones(samples, dtype=bool)
+    for first, end in bad:
+        okay[first:end] = False
+    return replace(record, okay=okay)
+
+
+@pytest.mark.parametrize(
+    ("bad", "parts"),
+    [
+        ([], [(0, 3000)]),
+        ([(1000, 1000 + LONG)], [(0, 3000)]),
+        ([(1000, 1000 + LONG + 1)], [(0, 1000), (1000 + LONG + 1, 3000)]),
+        ([(0, LONG), (3000 - LONG, 3000)], [(0, 3000)]),
+        ([(0, LONG + 1), (3000 - LONG - 1, 3000)], [(LONG + 1, 3000 - LONG - 1)]),
+        ([(500, 900), (910, 1400)], [(0, 500), (900, 910), (1400, 3000)]),
+    ],
+)
+def test_where_segments_are(bad: Rows, parts: Rows) -> None:
+    assert segments(drive(bad=bad)) == [slice(*part) for part in parts]
+
+
+def test_a_few_lost_samples_are_no_gap_where_sampling_is_slow() -> None:
+    slow = replace(drive(bad=[(1000, 1000 + LONG_SAMPLES)]), sample_time_s=1.0)
+    assert segments(slow) == [slice(0, 3000)]
+
+
+def test_a_recording_without_long_gaps_stays_as_it_is() -> None:
+    whole = drive(bad=[(700, 740)])
+    found = cut([whole])
+    assert found.records[0] is whole
+    assert (dict(found.rows), found.warnings) == ({}, ())
+
+
+def test_segments_keep_the_time_and_go_by_names_of_their_own() -> None:
+    whole = drive(bad=[(500, 900), (910, 1400)])
+    found = cut([whole, drive(name="other")])
+    assert [record.name for record in found.records] == ["run#1", "run#2", "other"]
+    assert found.of(["run"]) == found.records[:2]
+    second = found.records[1]
+    assert second.time_s[0] == whole.time_s[1400]
+    assert second.since_start_s[0] == pytest.approx(14.0)
+    assert np.array_equal(second.torque_nm, whole.torque_nm[1400:])
+    assert found.warnings == (
+        "recording run: gaps of more than 1 s cut it into 3 segments, each with its own initial state and constant "
+        "load; left out as holding less than 2 s: 1; used: 100% of the good samples.",
+    )
+
+
+def test_a_gap_at_an_end_makes_no_other_recording_of_it() -> None:
+    found = cut([drive(bad=[(0, 500)])])
+    assert [record.name for record in found.records] == ["run"]
+    assert found.records[0].time_s[0] == 5.0
+    assert found.warnings == ()
+
+
+@pytest.mark.parametrize(("period_s", "least"), [(0.01, 200), (0.1, FEWEST_SAMPLES)])
+def test_short_segments_are_left_out(period_s: float, least: int) -> None:
+    def kept(samples: int) -> list[str]:
+        bad = [(samples, 1000)]
+        return [record.name for record in cut([replace(drive(bad=bad), sample_time_s=period_s)]).records]
+
+    assert kept(least) == ["run#1", "run#2"]
+    assert kept(least - 1) == ["run#1"]
+
+
+def test_of_a_segment_of_a_part_time_counts_from_the_very_beginning() -> None:
+    half = sliced(drive(), slice(1000, 3000))
+    quarter = sliced(replace(half, torque_okay=np.ones(2000, dtype=bool), offset_s=np.zeros(2000)), slice(500, 700))
+    assert (quarter.began_s, quarter.since_start_s[0]) == (0.0, pytest.approx(15.0))
+    assert quarter.offset_s is not None
+    assert quarter.torque_okay is not None
+    assert quarter.offset_s.shape == quarter.torque_okay.shape == (200,)
+
+
+def test_a_held_out_recording_in_scraps_is_told_and_not_used() -> None:
+    ready = prepare([drive()], LINE, [replace(drive(name="unseen"), okay=np.arange(3000) % 300 < 100)])
+    assert ready.holdout == ()
+    assert "recording unseen: gaps of more than 1 s cut it into 10 segments, none of which" in ready.warnings[0]
+
+
+class TestDiagnosis:
+    """Thirty seconds with a gap in which the line was braked: simulated through, it would be far off."""
+
+    @pytest.fixture
+    def whole(self) -> Record:
+        before, after = drive(1400, load_nm=5.0), drive(1400, load_nm=9.0)
+        time_s = SAMPLE_TIME_S * np.arange(3000)
+        torque = np.concatenate([before.torque_nm, np.full((200, 1), 40.0), after.torque_nm])
+        output = np.concatenate([before.output, np.full(200, np.nan), after.output])
+        return Record("run", SAMPLE_TIME_S, time_s, torque, output, np.isfinite(output))
+
+    def test_it_is_diagnosed_as_one_recording(self, whole: Record) -> None:
+        found = diagnose([whole], LINE)
+        assert found.verdict is Verdict.NO_MISMATCH
+        assert found.fit.retuned == pytest.approx(0.02, rel=0.1)
+        (trace,) = found.traces
+        assert trace.name == "run"
+        assert np.array_equal(trace.time_s, whole.time_s)
+        assert np.array_equal(np.isfinite(trace.retuned), whole.okay)
+        assert np.std((trace.retuned - trace.measured)[whole.okay]) < 0.03
+        assert list(found.load_torque) == ["run"]
+        assert found.load_torque["run"].value == pytest.approx(7.0, abs=0.3)
+
+
+def test_courses_intervals_and_texts_are_joined() -> None:
+    """A diagnosis as it could be of two segments, put together from pieces of a real one."""
+    whole = drive(bad=[(500, 1500)])
+    parts = cut([whole])
+    base = diagnose([drive(600, name="run")], LINE)
+    course = [Course(r.time_s[:3], np.ones(3), np.zeros(3), 2.0 * np.ones(3)) for r in parts.records]
+    profile = [Profile(c.time_s, c.value, c.low, c.high, "Nm") for c in course]
+    response = [
+        Response(*(np.full(2, float(i)) for _ in range(6)), p_before=1.0, p_after=1.0) for i, _ in enumerate(course)
+    ]
+    names = [record.name for record in parts.records]
+    seen = Discrepancy(
+        element=None,
+        laws=(),
+        equivalents=(Equivalent("load", "Nm", dict(zip(names, course, strict=True)), 0.0, True),),
+        spectrum=None,  # type: ignore[arg-type]
+        responses=dict(zip(names, response, strict=True)),
+        pictures=(),
+    )
+    pieces = replace(
+        base,
+        statement="a step in run#2, not in run#1",
+        mismatch=replace(base.mismatch, time_s={"run#1": ((0.0, 1.0),), "run#2": ((20.0, 21.0), (25.0, 26.0))}),
+        load_torque={"run#1": Estimated(1.0, (0.0, 2.0), "Nm"), "run#2": Estimated(5.0, (4.0, 6.0), "Nm")},
+        traces=(),
+        warnings=("run#2 is odd",),
+        discrepancy=seen,
+        effects=(),
+    )
+    result = joined(pieces, parts)
+    assert result.statement == "a step in run, not in run"
+    assert result.warnings == ("run is odd",)
+    assert dict(result.mismatch.time_s) == {"run": ((0.0, 1.0), (20.0, 21.0), (25.0, 26.0))}
+    assert result.load_torque["run"].value == pytest.approx(1.0 * 0.25 + 5.0 * 0.75)
+    assert result.load_torque["run"].ci95[1] - result.load_torque["run"].value == pytest.approx(np.hypot(0.25, 0.75))
+    assert result.discrepancy is not None
+    merged = result.discrepancy.equivalents[0].courses["run"]
+    assert np.isnan(merged.value[3])
+    assert np.all(np.diff(merged.time_s) > 0)
+    assert merged.time_s[4] == whole.time_s[1500]
+    assert result.discrepancy.responses["run"] is response[1]
+    assert profile[0].unit == "Nm"
+
+
+def test_names_of_many_segments_are_not_mixed_up() -> None:
+    bad = [(310 * i + 200, 310 * i + 310) for i in range(14)]
+    parts = cut([drive(4500, bad=bad)])
+    assert len(parts.records) > 10
+    base = diagnose([drive(600)], LINE)
+    said = replace(
+        base, statement="run#12 and run#1", traces=(), load_torque={}, mismatch=replace(base.mismatch, time_s={})
+    )
+    assert joined(said, parts).statement == "run and run"

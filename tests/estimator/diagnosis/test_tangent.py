@@ -1,0 +1,97 @@
+"""The linearised line against the exact response of a linear one, and against nudges of a nonlinear one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimator.diagnosis.blocks import block_mean, block_mean_of, lines, simulated, spread_stretches
+from estimator.diagnosis.tangent import block_length, tangent
+from estimator.physics.fit import FitResult, fit, make_problem
+from estimator.physics.model import EffectValue
+from estimator.physics.simulate import Start
+from estimator.signals.record import FloatArray
+from tests.estimator.diagnosis.planted import drive_torque
+from tests.estimator.physics.bench import SPEED, TWIST, TWO_MASS, exact_states, linear_record, model, record
+
+START = Start(5.0, 0.0, 2.0, 0.0, 2.0)
+SAMPLES = 1500
+
+
+def result_of(effects: dict[str, dict[str, float]] | None = None) -> FitResult:
+    line = model(TWO_MASS)
+    given = {name: {k: EffectValue(v, (v, v)) for k, v in e.items()} for name, e in (effects or {}).items()}
+    rec = linear_record(TWO_MASS, drive_torque(1), START)
+    return fit(make_problem(replace(line, effects=given), [rec], ()))
+
+
+def walk(seed: int) -> FloatArray:
+    return np.cumsum(np.random.default_rng(seed).standard_normal(SAMPLES))
+
+
+@pytest.mark.parametrize("at_load", [False, True])
+def test_a_linear_line_answers_exactly(at_load: bool) -> None:
+    line = tangent(result_of(), 0, 1)
+    assert line.phi.shape == (1, 3, 3)
+    torque, nothing = walk(3), np.zeros(SAMPLES)
+    motor, load = (nothing, torque) if at_load else (torque, nothing)
+    exact = exact_states(TWO_MASS, motor, Start(0.0, 0.0, 0.0), extra_load_nm=load)[:, SPEED]
+    assert np.max(np.abs(line.answer(motor, load) - exact)) < 1e-5 * np.ptp(exact)
+
+
+def test_the_answer_to_an_initial_state_is_the_free_motion() -> None:
+    line = tangent(result_of(), 0, 1)
+    start = Start(0.0, 0.0, 0.0, twist_rad=float(line.scale[1]))
+    exact = exact_states(TWO_MASS, np.zeros(SAMPLES), start)[:, SPEED]
+    np.testing.assert_allclose(line.free(SAMPLES)[1], exact, atol=1e-4 * np.ptp(exact))
+
+
+@pytest.mark.parametrize("at_load", [False, True])
+def test_a_line_with_a_gap_answers_as_its_simulation_does(at_load: bool) -> None:
+    result = result_of({"backlash": {"gap_rad": 0.01, "contact_rad": 0.001}})
+    line = tangent(result, 0, 1)
+    assert line.phi.shape == (SAMPLES, 3, 3)
+    force, nothing = 1e-4 * walk(4), np.zeros(SAMPLES)
+    motor, load = (nothing, force) if at_load else (force, nothing)
+    nudged = simulated(result, 0, (motor, load)) - result.outputs[0]
+    assert np.max(np.abs(line.answer(motor, load) - nudged)) < 0.02 * np.ptp(nudged)
+
+
+def test_blocks_of_samples_are_their_average() -> None:
+    result = result_of()
+    fine, coarse = tangent(result, 0, 1), tangent(result, 0, 5)
+    held = np.repeat(walk(5)[: SAMPLES // 5], 5)
+    nothing = np.zeros(SAMPLES)
+    expected = block_mean(fine.answer(held, nothing), 5)
+    found = coarse.answer(held[::5], nothing[::5])
+    assert np.max(np.abs(found - expected)) < 1e-4 * np.ptp(expected)
+
+
+def test_fast_sampling_is_cut_into_blocks_and_slow_sampling_is_not() -> None:
+    states = exact_states(TWO_MASS, drive_torque(1), START, sample_time_s=1e-3)
+    fast = record(drive_torque(1), states[:, SPEED], sample_time_s=1e-3)
+    result = fit(make_problem(model(TWO_MASS), [fast], ()))
+    length = block_length(result)
+    assert 5 <= length <= 10
+    assert block_length(result_of()) == 1
+    (line,) = lines(result)
+    assert line.size == SAMPLES // length
+    middle = block_mean(states[:, TWIST], length)
+    assert np.max(np.abs(line.motion.twist - middle)) < 0.02 * np.ptp(middle)
+
+
+def test_masked_samples_do_not_count_in_a_block() -> None:
+    values, use = np.array([1.0, 99.0, 3.0, 4.0, 99.0, 99.0]), np.array([True, False, True, True, False, False])
+    mean, weight = block_mean_of(values, use, 2)
+    np.testing.assert_array_equal(mean, [1.0, 3.5, 0.0])
+    np.testing.assert_array_equal(weight, [1, 2, 0])
+
+
+def test_a_long_recording_is_used_in_stretches_from_end_to_end() -> None:
+    used = spread_stretches(100_000, 10_000)
+    assert used.sum() == 9_000
+    assert used[0]
+    assert used[-1]
+    assert spread_stretches(500, 10_000).all()
