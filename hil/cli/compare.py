@@ -33,7 +33,7 @@ def compare(
     if out is not None:
         require_folder(out)
     file = read_model_for_recordings(model)
-    records = read_records(recordings, file.signals)
+    records = read_records(recordings, file.signals, file.on_bench)
     comparisons = [compare_record(file.model, record) for record in records]
     text = comparison_text(comparisons)
     if out is not None:

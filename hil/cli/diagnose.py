@@ -68,7 +68,7 @@ def diagnose(
 
     require_folder(out)
     file = read_model_for_recordings(model)
-    records = read_records([*recordings, *(holdout or ())], file.signals)
+    records = read_records([*recordings, *(holdout or ())], file.signals, file.on_bench)
     training, kept_back = records[: len(recordings)], records[len(recordings) :]
     with progress_bar() as progress:
         diagnosis = diagnose_records(training, file.model, kept_back, progress)
@@ -77,7 +77,7 @@ def diagnose(
         out,
         {
             "diagnosis.json": lambda path: path.write_text(text, encoding="utf-8"),
-            "augmented.toml": lambda path: write_model(path, diagnosis.augmented, file.signals),
+            "augmented.toml": lambda path: write_model(path, diagnosis.augmented, file.signals, file.laws),
             "report.html": lambda path: path.write_text(diagnosis_page(diagnosis), encoding="utf-8"),
         },
     )

@@ -54,7 +54,7 @@ def test_figures_and_plots_are_written(inputs: list[str], tmp_path: Path, capsys
 @pytest.mark.parametrize(
     ("position", "text", "said"),
     [
-        (0, bench.MODEL.replace("one_mass", "joint"), "not supported yet"),
+        (0, bench.MODEL.replace("one_mass", "joint"), "parameters.k: missing, joint needs k, c"),
         (0, None, "No such file"),
         (1, "time_s,torque_m1_nm\n0,1\n", "column speed_rad_s: missing"),
         (2, "time_s\n", "empty or truncated"),

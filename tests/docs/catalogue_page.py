@@ -12,7 +12,7 @@ from pathlib import Path
 
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Effect, EffectParameter
-from estimator.physics.model import Motion
+from hil.report.catalogue import bounds_text, null_text, structures_text, unit_text
 
 PAGE = Path(__file__).parents[2] / "docs" / "catalogue.md"
 
@@ -22,29 +22,32 @@ _FACTS = re.compile(r"<!-- facts: (?P<name>\w+) -->\n(?P<facts>.*?)<!-- end -->"
 def facts_of(entry: Effect) -> str:
     """Return what the catalogue says of one effect, as Markdown."""
     rows = [
-        ("element", f"`{entry.element.value}`"),
         ("excited by", entry.excited_by),
-        ("resembles", _names(entry.resembles)),
+        ("confused with", _names(entry.resembles)),
         ("the same to torque and speed", _names(entry.equivalent)),
         ("contains", _names(entry.contains)),
-        ("structures", ", ".join(f"`{structure.value}`" for structure in sorted(entry.structures, key=str))),
+        ("structures", ", ".join(f"`{name}`" for name in structures_text(entry).split(", "))),
         ("source", entry.source),
     ]
-    lines = ["```text", entry.law, "```", "", "| | |", "| --- | --- |"]
+    lines = ["```text", entry.law, "```", ""]
+    lines += [
+        f"![{entry.title}: speed with and without it, what is left, and the law](images/effects/{entry.name}.svg)"
+    ]
+    lines += ["", "| | |", "| --- | --- |"]
     lines += [f"| {label} | {text} |" for label, text in rows if text]
-    lines += ["", "| parameter | unit | no effect at | meaning |", "| --- | --- | --- | --- |"]
-    lines += [_parameter(parameter) for parameter in entry.parameters]
+    lines += ["", "| parameter | unit | null | bounds | meaning |", "| --- | --- | --- | --- | --- |"]
+    lines += [_parameter(entry, parameter) for parameter in entry.parameters]
     return "\n".join(lines) + "\n"
 
 
 def _names(names: tuple[str, ...]) -> str:
-    return ", ".join(f"`{name}`" if name in EFFECTS else f"{name} (not in the catalogue yet)" for name in names)
+    return ", ".join(f"[`{name}`](#{name})" for name in names)
 
 
-def _parameter(parameter: EffectParameter) -> str:
-    unit = " or ".join(dict.fromkeys(parameter.unit(motion) for motion in Motion))
+def _parameter(entry: Effect, parameter: EffectParameter) -> str:
     name = f"`{parameter.name}`" + (", optional" if parameter.optional else "")
-    return f"| {name} | {unit} | {parameter.null:g} | {parameter.meaning} |"
+    cells = (name, unit_text(parameter), null_text(parameter), bounds_text(entry, parameter), parameter.meaning)
+    return f"| {' | '.join(cells)} |"
 
 
 def facts_on_page() -> dict[str, str]:

@@ -53,11 +53,11 @@ def extended(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_the_page_has_an_example_of_each_kind() -> None:
-    assert len(TRIALS) == 3
+    assert len(TRIALS) == 4
     assert sum(block.language == "diff" for block in EXTEND) == 5
 
 
-@pytest.mark.parametrize("number", range(len(TRIALS)), ids=["effect", "experiment", "format"])
+@pytest.mark.parametrize("number", range(len(TRIALS)), ids=["effect", "law", "experiment", "format"])
 def test_the_example_runs_as_printed(extended: Path, number: int) -> None:
     script = extended / f"trial_{number}.py"
     script.write_text(TRIALS[number], encoding="utf-8")

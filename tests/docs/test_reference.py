@@ -12,6 +12,7 @@ from pydantic import BaseModel
 from drivers.inverter_check import CONFIGURED_OBJECTS
 from drivers.plc_map import USED
 from estimator.diagnosis import evidence, holdout, judgement, locate, noise, selection
+from estimator.physics import own_law
 from hil.config.experiment_tables import AnyExperiment
 from hil.config.model_file import read_model
 from hil.config.rig_file import Rig
@@ -100,7 +101,12 @@ def test_the_thresholds_of_a_verdict_are_those_of_the_code() -> None:
     assert "at least a quarter" in page
     assert selection.MOST_EFFECTS == 4
     assert "up to four effects" in page
-    assert judgement.MOST == 0.5
+    assert judgement.MOST == 0.8
+    assert "a fifth or more of the mismatch's power" in page
+    assert f"{judgement.NEAR_FLOOR:g} times the noise" in page
+    assert f"{judgement.NEAR_FLOOR_PROFILE:g} times for a load profile alone" in page
+    assert selection.WORTH_FITTING == 0.2
+    assert "less than a fifth of the best one's part" in page
 
 
 def test_every_concealed_effect_is_listed() -> None:
@@ -108,18 +114,22 @@ def test_every_concealed_effect_is_listed() -> None:
 
 
 MODELS = [
-    pytest.param(block.text, id=page.name)
+    pytest.param(page, block.text, id=page.name)
     for page in pages()
     for block in blocks(page)
     if block.language == "toml" and 'schema = "hil.model/1"' in block.text
 ]
 
 
-@pytest.mark.parametrize("model", MODELS)
-def test_a_shown_model_file_is_one(model: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("page", "model"), MODELS)
+def test_a_shown_model_file_is_one(page: Path, model: str, tmp_path: Path) -> None:
     path = tmp_path / "model.toml"
+    for block in blocks(page):
+        if block.language == "python" and block.title and "/" not in block.title:  # a module beside the model file
+            (tmp_path / block.title).write_text(block.text, encoding="utf-8")
     path.write_text(model, encoding="utf-8")
     assert read_model(path).model.parameters
+    own_law.install(())
 
 
 def test_the_shown_signals_are_read(tmp_path: Path) -> None:
