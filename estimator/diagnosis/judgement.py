@@ -105,7 +105,7 @@ def _objection(selection: Selection, floor: float, unnamed: UnnamedLaw | None, r
         return f"{named} would leave {leaves}"
     if profiles and len(selection.chosen) == 1 and remaining is not None:  # an edge in what should be smooth
         return f"{named} would leave {remaining.terms[0][0]} at the {remaining.element.value} unexplained"
-    if unnamed is None:
+    if unnamed is None or not _reads_speed(selection):  # a free-running position drifts as any flexible law does
         return ""
     elements = {EFFECTS[name].element for name in selection.chosen}
     rival_is_simpler = unnamed.gain.delta_bic > gain(selection.retuned, selection.result).delta_bic + VERY_STRONG

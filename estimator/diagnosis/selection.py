@@ -30,8 +30,8 @@ from estimator.physics.own_scan import MOST_CELLS
 from estimator.physics.parallel import concurrently
 from estimator.signals.record import FloatArray
 
-SIGNIFICANT = 0.01
-"""Probability of a false claim that is accepted per diagnosis, all hypotheses together."""
+SIGNIFICANT = 0.05
+"""Probability of a gain by chance that this test accepts per diagnosis, all hypotheses together; four others follow."""
 
 MOST_EFFECTS = 4
 

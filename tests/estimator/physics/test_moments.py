@@ -91,9 +91,13 @@ class TestWithoutIdle:
         return linear_record(ONE_MASS, torque, start, sigma=SIGMA, seed=seed, name=f"run_{seed}", extra_load_nm=load)
 
     def fitted(self, *started_s: tuple[float, float]) -> FitResult:
+        """Fit with moments that may move by half a second, as after a scan."""
         records = [self.driven(1, (2.0, 5.0)), self.driven(2, None)]
         own = [
-            tuple(replace(u, start=start) for u, start in zip(own_unknowns(["brake_drag"], rec), at, strict=True))
+            tuple(
+                replace(u, start=start, low=max(u.low, start - 0.5), high=min(u.high, start + 0.5))
+                for u, start in zip(own_unknowns(["brake_drag"], rec), at, strict=True)
+            )
             for rec, at in zip(records, started_s, strict=True)
         ]
         return fit(make_problem(self.LINE, records, (), own=own))
