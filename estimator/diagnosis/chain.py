@@ -16,6 +16,7 @@ from estimator.diagnosis.acquisition import (
     recognise,
     repaired,
 )
+from estimator.diagnosis.segments import tiles
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult, start_of
 from estimator.physics.free_run import FreeRun, free_run
@@ -115,11 +116,24 @@ def mechanical(model: DrivelineModel) -> DrivelineModel:
 def replay(model: DrivelineModel, record: Record) -> FreeRun:
     """Simulate one recording with a model, as the acquisition that the model describes would have read it.
 
+    After a long gap the simulation begins anew, with an initial state and a load of its own; ``start`` is that of the
+    segment with the most good samples.
+
     Raises
     ------
     BadModel
         Where the model's structure does not have the recorded output.
     """
+    parts = tiles(record)
+    runs = [_replay(model, part) for part in parts]
+    most = max(range(len(parts)), key=lambda i: int(parts[i].okay.sum()))
+    output = np.concatenate([run.output for run in runs])
+    error = (output - record.output)[record.okay]
+    return FreeRun(output, float(np.sqrt(np.mean(error**2))), runs[most].start)
+
+
+def _replay(model: DrivelineModel, record: Record) -> FreeRun:
+    """Simulate one recording without long gaps."""
     acquired: Mapping[str, Mapping[str, float]] = {
         name: {key: value.value for key, value in values.items()}
         for name, values in model.effects.items()

@@ -32,17 +32,16 @@ def noise_floor(records: Sequence[Record]) -> float:
         If so many samples are masked that no predictor can be fitted to any recording.
     """
     squares, count = 0.0, 0
-    usable = {record.name: _usable(record) for record in records}
-    long = [record for record in records if usable[record.name].sum() >= FEWEST_PREDICTED]
+    pairs = [(record, _usable(record)) for record in records]
+    long = [(record, usable) for record, usable in pairs if usable.sum() >= FEWEST_PREDICTED]
     if not long:
-        most = max(records, key=lambda record: int(usable[record.name].sum()))
+        record, usable = max(pairs, key=lambda pair: int(pair[1].sum()))
         raise NotExciting(
-            f"recording {most.name}: {usable[most.name].sum()} samples follow {PREDICTOR_ORDER} samples of which most "
-            f"are good, expected at least {FEWEST_PREDICTED} to estimate the noise. Too many are masked: check flags "
-            "and mask."
+            f"recording {record.name}: {usable.sum()} samples follow {PREDICTOR_ORDER} samples of which most are good, "
+            f"expected at least {FEWEST_PREDICTED} to estimate the noise. Too many are masked: check flags and mask."
         )
-    for record in long:
-        errors = _one_step_errors(record, usable[record.name])
+    for record, usable in long:
+        errors = _one_step_errors(record, usable)
         squares += float(errors @ errors)
         count += max(errors.size - 2 * PREDICTOR_ORDER - 1, 1)
     return float(np.sqrt(squares / count))

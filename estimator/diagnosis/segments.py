@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,9 @@ SHORTEST_S = 2.0
 
 FEWEST_SAMPLES = 50
 """Good samples of a segment at least: more than twice what a predictor of its own error looks back on."""
+
+FEWEST_FOR_START = 10
+"""Good samples from which initial state and load are read off for a simulation alone."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +75,19 @@ def segments(record: Record) -> list[slice]:
     if record.okay.size - 1 - last[-1] <= longest:
         last[-1] = record.okay.size - 1
     return [slice(int(a), int(b) + 1) for a, b in zip(first, last, strict=True)]
+
+
+def tiles(record: Record) -> list[Record]:
+    """Return the segments of a recording, each up to where the next begins: all rows, for a simulation of each.
+
+    One of fewer than ``FEWEST_FOR_START`` good samples goes with the one before it.
+    """
+    parts = segments(record)
+    starts = [part.start for part in parts[1:] if int(record.okay[part].sum()) >= FEWEST_FOR_START]
+    if not starts:
+        return [record]
+    edges = [0, *starts, record.okay.size]
+    return [sliced(record, slice(first, end)) for first, end in pairwise(edges)]
 
 
 def cut(records: Sequence[Record]) -> Cut:

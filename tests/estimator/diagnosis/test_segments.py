@@ -9,10 +9,13 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis import diagnose
+from estimator.diagnosis.chain import replay
 from estimator.diagnosis.joined import joined
+from estimator.diagnosis.noise import noise_floor
 from estimator.diagnosis.preconditions import prepare
 from estimator.diagnosis.result import Course, Discrepancy, Equivalent, Estimated, Profile, Response, Verdict
-from estimator.diagnosis.segments import FEWEST_SAMPLES, LONG_S, LONG_SAMPLES, cut, segments, sliced
+from estimator.diagnosis.segments import FEWEST_SAMPLES, LONG_S, LONG_SAMPLES, cut, segments, sliced, tiles
+from estimator.errors import NotExciting
 from estimator.physics.simulate import Start
 from estimator.signals.record import Record
 from tests.estimator.physics.bench import ONE_MASS, SAMPLE_TIME_S, linear_record, model, random_steps
@@ -105,6 +108,21 @@ def test_a_held_out_recording_in_scraps_is_told_and_not_used() -> None:
     assert "recording unseen: gaps of more than 1 s cut it into 10 segments, none of which" in ready.warnings[0]
 
 
+def test_tiles_are_all_rows_each_from_where_a_segment_begins() -> None:
+    whole = drive(bad=[(500, 900), (905, 1400)])
+    parts = tiles(whole)
+    assert [part.time_s.size for part in parts] == [1400, 1600]
+    assert tiles(drive(bad=[(500, 540)]))[0].time_s.size == 3000
+
+
+def test_a_part_too_short_for_the_noise_is_left_to_the_others() -> None:
+    long, short = drive(), sliced(drive(), slice(0, 60))
+    assert noise_floor([long, short]) == noise_floor([long])
+    assert noise_floor([long, sliced(drive(), slice(0, 10))]) == noise_floor([long])
+    with pytest.raises(NotExciting, match="40 samples follow 20 samples of which most are good, expected at least 82"):
+        noise_floor([short])
+
+
 class TestDiagnosis:
     """Thirty seconds with a gap in which the line was braked: simulated through, it would be far off."""
 
@@ -127,6 +145,11 @@ class TestDiagnosis:
         assert np.std((trace.retuned - trace.measured)[whole.okay]) < 0.03
         assert list(found.load_torque) == ["run"]
         assert found.load_torque["run"].value == pytest.approx(7.0, abs=0.3)
+
+    def test_its_simulation_begins_anew_behind_the_gap(self, whole: Record) -> None:
+        run = replay(LINE, whole)
+        assert run.output.shape == whole.time_s.shape
+        assert run.rms == pytest.approx(0.02, rel=0.1)
 
 
 def test_courses_intervals_and_texts_are_joined() -> None:
