@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN    := .venv/bin
 READY  := .venv/.ready
 
-.PHONY: setup demo test lint lock clean
+.PHONY: setup demo test campaign lint lock clean
 
 setup: $(READY)
 
@@ -18,7 +18,11 @@ demo: $(READY)
 	$(BIN)/hil demo
 
 test: lint
-	$(BIN)/python -m pytest -n 2
+	$(BIN)/python -m pytest -n 2 -m "not campaign"
+
+# What takes too long for every change.
+campaign: $(READY)
+	$(BIN)/python -m pytest -n 2 -m campaign
 
 lint: $(READY)
 	$(BIN)/ruff check .
