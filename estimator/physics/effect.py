@@ -6,6 +6,7 @@ is compiled into the one kernel (``estimator.physics.kernel``); everything else 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
@@ -95,6 +96,28 @@ Starts = Callable[[DrivelineModel, Sequence[Record]], list[Start]]
 Testable = Callable[[DrivelineModel, Sequence[Record]], Untestable | None]
 
 
+def of_order_one(_model: DrivelineModel, _records: Sequence[Record]) -> tuple[float, ...]:
+    """Return the scale of an effect that is not fitted, and whose one parameter is its own scale."""
+    return (1.0,)
+
+
+def not_fitted(_model: DrivelineModel, _records: Sequence[Record]) -> list[Start]:
+    """Return no start: the effect is recognised in the raw data."""
+    return []
+
+
+def in_any_recording(_model: DrivelineModel, _records: Sequence[Record]) -> Untestable | None:
+    """Ask nothing of the recordings beyond what ``excited_by`` says."""
+    return None
+
+
+MOMENTS = (
+    EffectParameter("from_s", "s", 0.0, 0.0, math.inf, "moment it begins: t_1, of each recording", True, True),
+    EffectParameter("to_s", "s", 0.0, 0.0, math.inf, "moment it ends: t_2, of each recording", True, True),
+)
+"""Own parameters of an event: from when to when it acts, since the recording began."""
+
+
 def always_plausible(_model: DrivelineModel, _records: Sequence[Record], _values: Mapping[str, float]) -> str:
     """Find nothing to object to."""
     return ""
@@ -143,7 +166,7 @@ class Effect:
         Model and records to start points of the fit, in units of the scales, one value per parameter that all
         recordings share; ``Held`` values are not fitted.
     testable : callable
-        Model and records to None, or to the reason why they can't tell.
+        Model and records to None, or to the reason why they can't tell; by default any recording can.
     sentence : callable
         Parameter values to the statement a driveline engineer would write.
     kinds : frozenset[OutputKind]
@@ -171,10 +194,10 @@ class Effect:
     resembles: tuple[str, ...]
     equivalent: tuple[str, ...]
     contains: tuple[str, ...]
-    scales: Scales
-    starts: Starts
-    testable: Testable
     sentence: Callable[[Mapping[str, float], Motion], str]
+    scales: Scales = of_order_one
+    starts: Starts = not_fitted
+    testable: Testable = in_any_recording
     kinds: frozenset[OutputKind] = frozenset(OutputKind)
     profile: bool = False
     event: bool = False

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 
-from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start, Untestable
+from estimator.physics.effect import EVERY_LINE, MOMENTS, Effect, EffectParameter, Element, Start
 from estimator.physics.model import DrivelineModel, Motion, unit
 from estimator.physics.motion import torque_scale
 from estimator.signals.record import Record
@@ -19,11 +18,6 @@ def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...
 def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
     """Return one start: its moments are found by a scan."""
     return [(0.5,)]
-
-
-def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
-    """Any recording in which the vehicle moves will do."""
-    return None
 
 
 def sentence(values: Mapping[str, float], motion: Motion) -> str:
@@ -40,8 +34,7 @@ EFFECT = Effect(
     excited_by="driving, with stretches with and without",
     parameters=(
         EffectParameter("brake_nm", "torque", 0.0, 0.0, 60.0, "braking torque T_B"),
-        EffectParameter("from_s", "s", 0.0, 0.0, math.inf, "moment it begins: t_1, of each recording", True, True),
-        EffectParameter("to_s", "s", 0.0, 0.0, math.inf, "moment it ends: t_2, of each recording", True, True),
+        *MOMENTS,
     ),
     structures=EVERY_LINE,
     resembles=("generator_coupled", "coulomb_friction_load", "road_grade"),
@@ -50,6 +43,5 @@ EFFECT = Effect(
     event=True,
     scales=scales,
     starts=starts,
-    testable=testable,
     sentence=sentence,
 )

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from estimator.physics.effect import WITH_SHAFT, Effect, EffectParameter, Element, Start, Untestable
+from estimator.physics.effect import WITH_SHAFT, Effect, EffectParameter, Element, Start
 from estimator.physics.model import DrivelineModel, Motion, natural_frequencies_rad_s, unit
 from estimator.signals.record import Record
 
@@ -24,11 +24,6 @@ def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...
 def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
     """Return modes below, around and above the first resonance, as close as they are narrow."""
     return [(0.2, float(ratio), 1.0) for ratio in np.geomspace(0.3, 5.0, 24)]
-
-
-def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
-    """Any recording with a PRBS will do."""
-    return None
 
 
 def sentence(values: Mapping[str, float], motion: Motion) -> str:
@@ -64,7 +59,6 @@ EFFECT = Effect(
     contains=(),
     scales=scales,
     starts=starts,
-    testable=testable,
     sentence=sentence,
     implausible=implausible,
 )

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 
-from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start, Untestable
+from estimator.physics.effect import EVERY_LINE, MOMENTS, Effect, EffectParameter, Element, Start
 from estimator.physics.model import DrivelineModel, Motion, unit
 from estimator.signals.record import Record
 
@@ -18,11 +17,6 @@ def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...
 def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
     """Return a small and a large generator."""
     return [(0.3,), (1.5,)]
-
-
-def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
-    """Any recording in which the torque changes will do."""
-    return None
 
 
 def sentence(values: Mapping[str, float], motion: Motion) -> str:
@@ -40,8 +34,7 @@ EFFECT = Effect(
     excited_by="PRBS or torque steps while the clutch is closed",
     parameters=(
         EffectParameter("inertia_kg_m2", "inertia", 0.0, 0.0, 20.0, "inertia that is coupled: J_G"),
-        EffectParameter("from_s", "s", 0.0, 0.0, math.inf, "moment it is coupled: t_1, of each recording", True, True),
-        EffectParameter("to_s", "s", 0.0, 0.0, math.inf, "moment it is released: t_2, of each recording", True, True),
+        *MOMENTS,
     ),
     structures=EVERY_LINE,
     resembles=("stiffness_change", "brake_drag", "inertia_change"),
@@ -50,6 +43,5 @@ EFFECT = Effect(
     event=True,
     scales=scales,
     starts=starts,
-    testable=testable,
     sentence=sentence,
 )

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 
-from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start, Untestable
+from estimator.physics.effect import EVERY_LINE, MOMENTS, Effect, EffectParameter, Element, Start
 from estimator.physics.model import DrivelineModel, Motion, load_inertia, unit
 from estimator.signals.record import Record
 
@@ -18,11 +17,6 @@ def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...
 def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
     """Return a lighter and a heavier load."""
     return [(-1.0,), (1.0,)]
-
-
-def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
-    """Any recording in which the speed changes will do."""
-    return None
 
 
 def sentence(values: Mapping[str, float], motion: Motion) -> str:
@@ -39,8 +33,7 @@ EFFECT = Effect(
     excited_by="acceleration before and after the change",
     parameters=(
         EffectParameter("change_kg_m2", "inertia", 0.0, -9.0, 40.0, "change of the inertia: delta"),
-        EffectParameter("from_s", "s", 0.0, 0.0, math.inf, "moment of the change: t_1, of each recording", True, True),
-        EffectParameter("to_s", "s", 0.0, 0.0, math.inf, "moment it is undone: t_2, of each recording", True, True),
+        *MOMENTS,
     ),
     structures=EVERY_LINE,
     resembles=("generator_coupled", "road_grade"),
@@ -49,6 +42,5 @@ EFFECT = Effect(
     event=True,
     scales=scales,
     starts=starts,
-    testable=testable,
     sentence=sentence,
 )

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from estimator.compiled import compiled
-from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start, Untestable
+from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start
 from estimator.physics.model import DrivelineModel, Motion
 from estimator.signals.record import OutputKind, Record
 
@@ -30,11 +30,6 @@ def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...
 def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
     """Return one start: the problem is linear in amplitudes and phases together."""
     return [(0.5, 0.5)]
-
-
-def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
-    """Need motion: the error of the speed grows with the speed."""
-    return None
 
 
 def sentence(values: Mapping[str, float], motion: Motion) -> str:
@@ -66,6 +61,5 @@ EFFECT = Effect(
     phases={"once_phase_rad": "once_rad", "twice_phase_rad": "twice_rad"},
     scales=scales,
     starts=starts,
-    testable=testable,
     sentence=sentence,
 )

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from estimator.physics.effect import EVERY_STRUCTURE, Effect, EffectParameter, Element, Start, Untestable
+from estimator.physics.effect import EVERY_STRUCTURE, Effect, EffectParameter, Element
 from estimator.physics.model import DrivelineModel, Motion
 from estimator.signals.record import Record
 
@@ -15,16 +15,6 @@ from estimator.signals.record import Record
 def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
     """Return one sampling period."""
     return (min(record.sample_time_s for record in records),)
-
-
-def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
-    """Return none: it is not fitted."""
-    return []
-
-
-def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
-    """Any recording whose output changes will do; the less it changes, the less jitter matters."""
-    return None
 
 
 def sentence(values: Mapping[str, float], motion: Motion) -> str:
@@ -45,8 +35,6 @@ EFFECT = Effect(
     equivalent=(),
     contains=(),
     scales=scales,
-    starts=starts,
-    testable=testable,
     sentence=sentence,
     recognised=True,
 )

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from estimator.compiled import compiled
-from estimator.physics.effect import WITH_SPRING, Effect, EffectParameter, Element, Start, Untestable
+from estimator.physics.effect import WITH_SPRING, Effect, EffectParameter, Element, Start
 from estimator.physics.model import DrivelineModel, Motion, unit
 from estimator.physics.motion import torque_scale
 from estimator.signals.record import Record
@@ -30,11 +30,6 @@ def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...
 def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
     """Return a sharp and a round slider."""
     return [(0.5, 0.5), (1.0, 4.0)]
-
-
-def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
-    """Need a twist rate of both signs, which every torque step gives."""
-    return None
 
 
 def sentence(values: Mapping[str, float], motion: Motion) -> str:
@@ -63,6 +58,5 @@ EFFECT = Effect(
     contains=(),
     scales=scales,
     starts=starts,
-    testable=testable,
     sentence=sentence,
 )

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from estimator.compiled import compiled
-from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start, Untestable, long_enough
+from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start, long_enough
 from estimator.physics.model import DrivelineModel, Motion
 from estimator.signals.record import OutputKind, Record
 
@@ -27,11 +27,6 @@ def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...
 def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
     """Return a start below and one above a sampling period."""
     return [(0.3,), (2.0,)]
-
-
-def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
-    """Any recording in which the torque steps will do."""
-    return None
 
 
 def sentence(values: Mapping[str, float], motion: Motion) -> str:
@@ -66,7 +61,6 @@ EFFECT = Effect(
     kinds=frozenset({OutputKind.SPEED}),
     scales=scales,
     starts=starts,
-    testable=testable,
     sentence=sentence,
     implausible=long_enough("time_constant_s"),
 )

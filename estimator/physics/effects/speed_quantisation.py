@@ -5,26 +5,11 @@ It is recognised in the raw recordings (``estimator.diagnosis.acquisition``) and
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
-from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start, Untestable
-from estimator.physics.model import DrivelineModel, Motion, unit
-from estimator.signals.record import OutputKind, Record
-
-
-def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
-    """Return one: a step is found, not fitted."""
-    return (1.0,)
-
-
-def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
-    """Return none: it is not fitted."""
-    return []
-
-
-def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
-    """Any recording of a speed that changes will do."""
-    return None
+from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element
+from estimator.physics.model import Motion, unit
+from estimator.signals.record import OutputKind
 
 
 def sentence(values: Mapping[str, float], motion: Motion) -> str:
@@ -44,9 +29,6 @@ EFFECT = Effect(
     resembles=(),
     equivalent=(),
     contains=(),
-    scales=scales,
-    starts=starts,
-    testable=testable,
     sentence=sentence,
     kinds=frozenset({OutputKind.SPEED}),
     recognised=True,

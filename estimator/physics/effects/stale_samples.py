@@ -5,26 +5,10 @@ It is recognised in the raw recordings (``estimator.diagnosis.acquisition``) and
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
-from estimator.physics.effect import EVERY_STRUCTURE, Effect, EffectParameter, Element, Start, Untestable
-from estimator.physics.model import DrivelineModel, Motion
-from estimator.signals.record import Record
-
-
-def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
-    """Return one: a share is its own scale."""
-    return (1.0,)
-
-
-def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
-    """Return none: it is not fitted."""
-    return []
-
-
-def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
-    """Any recording that moves will do; at standstill every reading repeats by right."""
-    return None
+from estimator.physics.effect import EVERY_STRUCTURE, Effect, EffectParameter, Element
+from estimator.physics.model import Motion
 
 
 def sentence(values: Mapping[str, float], motion: Motion) -> str:
@@ -44,9 +28,6 @@ EFFECT = Effect(
     resembles=("transport_delay",),
     equivalent=(),
     contains=(),
-    scales=scales,
-    starts=starts,
-    testable=testable,
     sentence=sentence,
     recognised=True,
 )

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 
-from estimator.physics.effect import WITH_SPRING, Effect, EffectParameter, Element, Start, Untestable
+from estimator.physics.effect import MOMENTS, WITH_SPRING, Effect, EffectParameter, Element, Start
 from estimator.physics.model import DrivelineModel, Motion
 from estimator.signals.record import Record
 
@@ -18,11 +17,6 @@ def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...
 def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
     """Return a softer and a stiffer shaft."""
     return [(-0.2,), (0.2,)]
-
-
-def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
-    """Any recording that excites the resonance will do."""
-    return None
 
 
 def sentence(values: Mapping[str, float], motion: Motion) -> str:
@@ -39,8 +33,7 @@ EFFECT = Effect(
     excited_by="PRBS around the resonance before and after the change",
     parameters=(
         EffectParameter("change", "", 0.0, -0.95, 5.0, "relative change of the stiffness: delta"),
-        EffectParameter("from_s", "s", 0.0, 0.0, math.inf, "moment of the change: t_1, of each recording", True, True),
-        EffectParameter("to_s", "s", 0.0, 0.0, math.inf, "moment it is undone: t_2, of each recording", True, True),
+        *MOMENTS,
     ),
     structures=WITH_SPRING,
     resembles=("generator_coupled", "backlash", "stiffness_nonlinearity"),
@@ -49,6 +42,5 @@ EFFECT = Effect(
     event=True,
     scales=scales,
     starts=starts,
-    testable=testable,
     sentence=sentence,
 )

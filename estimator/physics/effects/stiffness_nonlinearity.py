@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from estimator.compiled import compiled
-from estimator.physics.effect import WITH_SPRING, Effect, EffectParameter, Element, Start, Untestable
+from estimator.physics.effect import WITH_SPRING, Effect, EffectParameter, Element, Start
 from estimator.physics.model import DrivelineModel, Motion, unit
 from estimator.physics.motion import torque_scale
 from estimator.signals.record import Record
@@ -36,11 +36,6 @@ def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
     return [(0.5, 1.0), (-0.5, 0.5)]
 
 
-def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
-    """Any recording in which the torque varies will do; how well it does is told by the interval."""
-    return None
-
-
 def sentence(values: Mapping[str, float], motion: Motion) -> str:
     """Say what was found, as the twist at which the stiffness has changed by a tenth."""
     hardening, shape = values["hardening_per_rad2"], values["shape"]
@@ -66,6 +61,5 @@ EFFECT = Effect(
     contains=(),
     scales=scales,
     starts=starts,
-    testable=testable,
     sentence=sentence,
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Held, Start, Untestable
+from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Held, Start
 from estimator.physics.model import DrivelineModel, Motion, unit
 from estimator.physics.motion import largest_torque, torque_scale
 from estimator.signals.record import Record
@@ -26,11 +26,6 @@ def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
     return [
         (*limits, 10.0) for x in (0.9, 0.6) for limits in ((x, x, off), (x, off, off), (off, x, off), (off, off, x))
     ]
-
-
-def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
-    """Any recording of some torque will do."""
-    return None
 
 
 def sentence(values: Mapping[str, float], motion: Motion) -> str:
@@ -67,6 +62,5 @@ EFFECT = Effect(
     contains=(),
     scales=scales,
     starts=starts,
-    testable=testable,
     sentence=sentence,
 )

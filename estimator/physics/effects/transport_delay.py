@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from estimator.compiled import compiled
-from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start, Untestable, long_enough
+from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start, long_enough
 from estimator.physics.model import DrivelineModel, Motion
 from estimator.signals.record import FloatArray, Record
 
@@ -40,11 +40,6 @@ def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
     return [(0.4,), (1.5,), (4.0,)]
 
 
-def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
-    """Any recording in which the torque steps will do."""
-    return None
-
-
 def sentence(values: Mapping[str, float], motion: Motion) -> str:
     """Say what was found."""
     return f"the torque acts {1e3 * values['delay_s']:.3g} ms later than its reading"
@@ -69,7 +64,6 @@ EFFECT = Effect(
     contains=(),
     scales=scales,
     starts=starts,
-    testable=testable,
     sentence=sentence,
     implausible=long_enough("delay_s"),
 )

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from estimator.compiled import compiled
-from estimator.physics.effect import WITH_SHAFT, Effect, EffectParameter, Element, Held, Start, Untestable
+from estimator.physics.effect import WITH_SHAFT, Effect, EffectParameter, Element, Held, Start
 from estimator.physics.model import DrivelineModel, Motion, unit
 from estimator.physics.motion import speed_scale, torque_scale
 from estimator.signals.record import Record
@@ -64,11 +64,6 @@ def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
     ]
 
 
-def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
-    """Any recording in which the torque changes will do."""
-    return None
-
-
 def sentence(values: Mapping[str, float], motion: Motion) -> str:
     """Say what was found."""
     torque = unit("torque", motion)
@@ -98,6 +93,5 @@ EFFECT = Effect(
     contains=(),
     scales=scales,
     starts=starts,
-    testable=testable,
     sentence=sentence,
 )
