@@ -12,11 +12,13 @@ from estimator.diagnosis.evidence import gain_from_squares
 from estimator.diagnosis.holdout import Examiner
 from estimator.diagnosis.intervals import Z95, covariance, interval
 from estimator.diagnosis.result import Estimated, Evidence, FoundEffect, Interval, Profile, Retuned
-from estimator.diagnosis.selection import Selection, Trial
+from estimator.diagnosis.selection import Selection
+from estimator.diagnosis.trial import Trial
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effects import road_grade
 from estimator.physics.fit import FitResult, local_part
 from estimator.physics.model import DrivelineModel, EffectValue, parameter_unit, unit
+from estimator.physics.steps import moments_of
 from estimator.physics.unknowns import LOAD_TORQUE
 from estimator.signals.record import FloatArray
 
@@ -62,12 +64,10 @@ def _found(
 def _moments(name: str, result: FitResult) -> dict[str, tuple[Interval, ...]]:
     """Return when an event lasts in each recording that has it, on the recording's own time [s]."""
     found: dict[str, tuple[Interval, ...]] = {}
-    for i, (record, basis) in enumerate(zip(result.problem.records, result.problem.local, strict=True)):
-        own = zip(basis.own, result.local_of(i)[basis.own_rows], strict=True)
-        values = {unknown.name: float(value) for unknown, value in own if unknown.effect == name}
+    for record, (from_s, to_s) in zip(result.problem.records, moments_of(result, name), strict=True):
         began = float(record.time_s[0] - record.since_start_s[0])
-        if values["to_s"] - values["from_s"] > record.sample_time_s:
-            found[record.name] = ((began + values["from_s"], began + values["to_s"]),)
+        if to_s - from_s > record.sample_time_s:
+            found[record.name] = ((began + from_s, began + to_s),)
     return found
 
 
@@ -108,8 +108,9 @@ def rms_of(errors: Sequence[FloatArray]) -> float:
 
 
 def _parameters(name: str, result: FitResult, cov: FloatArray, model: DrivelineModel) -> dict[str, Estimated]:
+    """Return what was fitted, and what was held; a held value at its null only where a model file needs it."""
     units = {parameter.name: parameter.unit(model.motion) for parameter in EFFECTS[name].parameters}
-    nulls = {parameter.name: parameter.null for parameter in EFFECTS[name].parameters}
+    left_out = {parameter.name: parameter.null for parameter in EFFECTS[name].parameters if parameter.optional}
     return {
         shared.name: Estimated(float(result.x[i]) * shared.scale, interval(result, cov, i), units[shared.name])
         for i, shared in enumerate(result.problem.shared)
@@ -119,7 +120,7 @@ def _parameters(name: str, result: FitResult, cov: FloatArray, model: DrivelineM
         for i, shared in enumerate(result.problem.shared)
         if shared.effect == name and shared.low == shared.high
         for value in [float(result.x[i]) * shared.scale]
-        if value != nulls[shared.name]
+        if value != left_out.get(shared.name)
     }
 
 

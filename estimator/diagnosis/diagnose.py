@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -21,7 +21,7 @@ from estimator.diagnosis.assemble import (
 )
 from estimator.diagnosis.chain import Chain, mechanical, read_through
 from estimator.diagnosis.discrepancy import discrepancy
-from estimator.diagnosis.evidence import Gain, gain, residuals_by_record
+from estimator.diagnosis.evidence import Gain, gain, information, residuals_by_record
 from estimator.diagnosis.holdout import Examiner, foreign_outputs
 from estimator.diagnosis.hypotheses import NOTHING, Bench, Progress, effects_of, everything, open_hypotheses
 from estimator.diagnosis.judgement import Judgement, judge
@@ -42,7 +42,7 @@ from estimator.diagnosis.result import (
 from estimator.diagnosis.selection import VISIBLE, Selection, Selector
 from estimator.diagnosis.unnamed import UnnamedLaw as Nameless
 from estimator.diagnosis.wording import rejection, statement
-from estimator.physics.effect import Element
+from estimator.physics.effect import Element, Untestable
 from estimator.physics.fit import FitResult, fit, make_problem
 from estimator.physics.model import DrivelineModel, unit
 from estimator.signals.record import FloatArray, OutputKind, Record
@@ -97,14 +97,14 @@ def _diagnose(
     progress("fitting the nominal model", 0.0)
     line = mechanical(model)
     chain, unseen = read_through(records), read_through(holdout)
-    bench = Bench(line, chain.records, everything(chain.records))
     if chain.torque_is_unknown:
-        chain = chain.with_torques_from(bench.fit(NOTHING))
-        bench = Bench(line, chain.records, everything(chain.records))
-    floor = noise_floor(chain.records)
-    names, untestable = open_hypotheses(line, chain.records)
-    examiner = Examiner(line, chain.records, unseen.records)
-    selection = Selector(bench, examiner, names, floor, progress, VISIBLE if chain.torque_is_unknown else 1.0).run()
+        chain = chain.with_torques_from(Bench(line, chain.records, everything(chain.records)).fit(NOTHING))
+    search = _search(chain, line, unseen.records, progress)
+    if chain.torque_is_unknown and search.selection.chosen:  # a torque estimated with physics missing hides the rest
+        chain = chain.with_torques_from(search.selection.result)
+        search = _search(chain, line, unseen.records, progress)
+    bench, examiner, selection, floor = search.bench, search.examiner, search.selection, search.floor
+    untestable = search.untestable
     progress("weighing the verdict", 0.9)
     chain = chain.with_jitter_in(selection.result)
     judgement = judge(selection, floor, chain.findings)
@@ -137,6 +137,28 @@ def _diagnose(
         warnings=judgement.unconverged,
         discrepancy=seen,
     )
+
+
+@dataclass(frozen=True, slots=True)
+class _Search:
+    """A selection, what it was made with, and what the recordings can't tell."""
+
+    bench: Bench
+    examiner: Examiner
+    floor: float
+    selection: Selection
+    untestable: Mapping[str, Untestable]
+
+
+def _search(chain: Chain, model: DrivelineModel, unseen: Sequence[Record], progress: Progress) -> _Search:
+    """Look for what is missing in recordings whose faults of the acquisition are compensated."""
+    bench = Bench(model, chain.records, everything(chain.records))
+    examiner = Examiner(model, chain.records, unseen)
+    floor = noise_floor(chain.records)
+    names, untestable = open_hypotheses(model, chain.records)
+    least_ratio = VISIBLE if chain.torque_is_unknown else 1.0
+    selection = Selector(bench, examiner, names, floor, progress, least_ratio).run()
+    return _Search(bench, examiner, floor, selection, untestable)
 
 
 def _located(judgement: Judgement, seen: Discrepancy) -> Judgement:
@@ -227,24 +249,20 @@ def _unnamed(selection: Selection, judgement: Judgement) -> UnnamedLaw | None:
 
 
 def _rejected(selection: Selection, believed: bool, judgement: Judgement) -> tuple[RejectedEffect, ...]:
-    final = selection.result
+    """Return the rivals and why each lost; their information is counted from what was chosen, with one n for all."""
+    retuned, final = selection.retuned, selection.result
+    n = gain(retuned, final).n_effective
     rivals = []
     for name, trial in selection.trials.items():
         if name in selection.chosen:
             if not believed:
                 rivals.append(RejectedEffect(name, judgement.objection, 0.0))
             continue
-        delta = (
-            trial.gain.delta_bic - gain(selection.retuned, final).delta_bic
-            if selection.chosen
-            else trial.gain.delta_bic
-        )
-        rivals.append(RejectedEffect(name, rejection(trial, selection), delta))
+        rivals.append(RejectedEffect(name, rejection(trial, selection), information(final, trial.result, n)))
     for name, share in selection.dismissed.items():
         if name not in selection.trials:
-            explained = gain(selection.retuned, final).delta_bic if selection.chosen else 0.0
             reason = f"a first look explains {share:.0%} of the error: too little next to others for a fit"
-            rivals.append(RejectedEffect(name, reason, -explained))
+            rivals.append(RejectedEffect(name, reason, information(final, retuned, n)))
     return tuple(sorted(rivals, key=lambda rival: -rival.delta_bic))
 
 

@@ -55,6 +55,15 @@ def gain(smaller: FitResult, larger: FitResult) -> Gain:
     )
 
 
+def information(smaller: FitResult, larger: FitResult, n: float) -> float:
+    """Return the BIC that the larger of two fits gains, with a number of independent samples given.
+
+    Rivals are ranked with one n for all: how correlated a rival's error is must not decide.
+    """
+    ratio = smaller.squares / max(larger.squares, np.finfo(float).tiny)
+    return n * math.log(ratio) - (larger.free_count - smaller.free_count) * math.log(n)
+
+
 def gain_from_squares(before: float, after: float, added: int, unknowns: int, errors: Sequence[FloatArray]) -> Gain:
     """Compare two nested least-squares fits by their sums of squares.
 

@@ -7,21 +7,19 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from estimator.diagnosis.screening import Screen
+from estimator.diagnosis.screening import STARTS, Screen
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Untestable
-from estimator.physics.fit import HEAT, ITERATIONS, FitResult, best_fit, converge, make_problem
+from estimator.physics.fit import HEAT, ITERATIONS, FitResult, Problem, best_fit, converge, make_problem
 from estimator.physics.model import DrivelineModel, Motion
 from estimator.physics.moments import polished, without_idle
 from estimator.physics.simulate import grid_for
+from estimator.physics.steps import from_their_moment
 from estimator.physics.unknowns import Release, nominal_unknowns, own_unknowns
 from estimator.signals.record import BoolArray, Record
 
 Effects = frozenset[str]
 NOTHING: Effects = frozenset()
-
-STARTS = 2
-"""Start points of an effect that are fitted, the most promising of its list."""
 
 Progress = Callable[[str, float], None]
 """Called with what is being done and the share of the work behind it; raise from it to cancel."""
@@ -70,15 +68,13 @@ class Bench:
         return self._fits[effects]
 
     def settle(self, effects: Effects) -> FitResult:
-        """Take events that do nothing out of single recordings; the set's fit is that one from now on."""
-        self._fits[effects] = without_idle(self._fits[effects])
+        """Take events that do nothing out of single recordings, and tell steps from their moment on, from now on."""
+        self._fits[effects] = from_their_moment(without_idle(self._fits[effects]), self.model)
         return self._fits[effects]
 
     def _fit(
         self, effects: Effects, warm: FitResult | None, releases: Sequence[Release], iterations: int = ITERATIONS
     ) -> FitResult:
-        grid = grid_for(self.model, self.records)
-        profile = any(EFFECTS[name].profile for name in effects)
         had = NOTHING if warm is None else effects_of(warm)
         kept = _kept(warm, effects, self) if warm is not None else self._nominal()
         new = sorted(name for name in effects - had if not EFFECTS[name].profile)
@@ -87,19 +83,28 @@ class Bench:
                 raise ValueError("a set of effects is fitted from a fit without them, came none")
             releases = [look.release for look in Screen(warm, self.model).looks(new[0])[:STARTS]]
         problems = [
-            make_problem(
-                self.model,
-                self.records,
-                (*kept.shared, *release.shared),
-                own=[(*old, *mine) for old, mine in zip(kept.own, release.own, strict=True)],
-                profile=profile,
-                use=self.use,
-                grid=grid,
+            self._problem(
+                effects,
+                Release(
+                    (*kept.shared, *release.shared),
+                    tuple((*old, *mine) for old, mine in zip(kept.own, release.own, strict=True)),
+                ),
             )
             for release in (releases or [Release((), ((),) * len(self.records))])
         ]
         result = best_fit(problems, warm, iterations)
         return polished(result, iterations) if any(EFFECTS[name].event for name in effects) else result
+
+    def _problem(self, effects: Effects, release: Release) -> Problem:
+        return make_problem(
+            self.model,
+            self.records,
+            release.shared,
+            own=release.own,
+            profile=any(EFFECTS[name].profile for name in effects),
+            use=self.use,
+            grid=grid_for(self.model, self.records),
+        )
 
     def _nominal(self) -> Release:
         """Return the nominal parameters, and what the model's own effects leave to every recording."""

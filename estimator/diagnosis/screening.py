@@ -7,7 +7,7 @@ could explain little next to the best are not worth a fit; the others start wher
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -31,6 +31,12 @@ SIZES = np.geomspace(0.05, 10.0, 15)
 STEP_SHARES = (1.0, 0.1)
 """Shares of a start's size that are looked along: what is not smooth shows in full, what moves far in small."""
 
+STARTS = 2
+"""Start points of an effect that are fitted, the most promising of its list."""
+
+PROMISING = 0.5
+"""Share of the best start's promise below which another start of the same effect is not tried."""
+
 ROUNDS = 3
 """Rounds in which the size of an event and its intervals in all recordings find each other from there."""
 
@@ -41,6 +47,11 @@ class Look:
 
     release: Release
     promise: float
+
+
+def promising(looks: Sequence[Look]) -> list[Look]:
+    """Return the starts worth a fit: the best, and a second one where it promises nearly as much."""
+    return [look for look in looks[:STARTS] if look.promise >= PROMISING * looks[0].promise or look is looks[0]]
 
 
 class Screen:

@@ -15,20 +15,17 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
 from estimator.diagnosis.evidence import VERY_STRONG, Gain, gain, residuals_by_record
 from estimator.diagnosis.holdout import Examiner, HoldOut
-from estimator.diagnosis.hypotheses import NOTHING, STARTS, Bench, Effects, Progress, effects_of, with_effect
-from estimator.diagnosis.intervals import covariance, interval
+from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects, Progress, effects_of, with_effect
+from estimator.diagnosis.lookalikes import lookalikes
 from estimator.diagnosis.noise import unpredictable
-from estimator.diagnosis.screening import Look, Screen
+from estimator.diagnosis.screening import Look, Screen, promising
+from estimator.diagnosis.trial import Trial, has_edge, null_inside, ranks, scan_choices
 from estimator.diagnosis.unnamed import UnnamedLaw, best_unnamed
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult
-from estimator.physics.own_scan import MOST_CELLS
 from estimator.physics.parallel import concurrently
-from estimator.signals.record import FloatArray
 
 SIGNIFICANT = 0.05
 """Probability of a gain by chance that this test accepts per diagnosis, all hypotheses together; four others follow."""
@@ -44,15 +41,6 @@ MOST_FITS = 10
 WORTH_FINISHING = 0.5
 """Share of the best rough fit's gain below which a rival's fit is not finished."""
 
-PROMISING = 0.5
-"""Share of the best start's promise below which another start of the same effect is not tried."""
-
-SAME_PROMISE = 0.5
-"""Share of what an effect explains that a first look must promise of its look-alike."""
-
-NEARLY = 1.5
-"""Squared error of a rival's rough fit, over the chosen one's, beyond which it is no look-alike."""
-
 PART_OF_MISMATCH = 0.05
 """Share of the first mismatch's power that a further effect must remove, or else
 ``VISIBLE`` of the RMS and half of what stands."""
@@ -65,19 +53,6 @@ PART_UNSEEN = 0.25
 """Share of the relative gain on fitted samples that must show on unseen ones; an effect may act mostly elsewhere."""
 
 VISIBLE = 1.05
-
-
-@dataclass(frozen=True, slots=True)
-class Trial:
-    """One effect tried on top of others, with what speaks for it and the first test it failed."""
-
-    name: str
-    effects: Effects
-    result: FitResult
-    gain: Gain
-    holdout: HoldOut | None
-    p_value: float
-    failed: str | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,20 +133,19 @@ class Selector:
             if best is None:
                 break
             accepted = {name: accepted.get(name, best) for name in best.effects} | {best.name: best}
-            chosen, current = best.effects, self.bench.fit(best.effects, current)
+            chosen, current = self._drop_superfluous(best.effects, self.bench.fit(best.effects, current), retuned)
             if self._is_noise(current):
                 break
-        chosen, current = self._drop_superfluous(chosen, current, retuned)
         if any(EFFECTS[name].event for name in chosen):
             current = self.bench.settle(chosen)
         accepted = {
             name: self._final(name, chosen, current, trial) for name, trial in accepted.items() if name in chosen
         }
-        lookalikes = {name: self._lookalikes(name, chosen, current) for name in chosen}
+        alike = {name: lookalikes(name, chosen, current, self.bench, self.names) for name in chosen}
         self._report("looking for laws without a name", 0.9)
         unnamed = self._law(retuned)
         remaining = self._law(current) if chosen else None
-        return Selection(retuned, chosen, current, accepted, first_trials, dismissed, lookalikes, unnamed, remaining)
+        return Selection(retuned, chosen, current, accepted, first_trials, dismissed, alike, unnamed, remaining)
 
     def _law(self, result: FitResult) -> UnnamedLaw | None:
         """Return the law without a name that counts for what a fit leaves; each fit is searched once."""
@@ -244,7 +218,7 @@ class Selector:
         self._dismissed = {
             name: max(promises[name], 0.0) / current.squares for name in names if name not in worth[:MOST_FITS]
         }
-        return {name: _promising(looks[name]) for name in worth[:MOST_FITS]}
+        return {name: promising(looks[name]) for name in worth[:MOST_FITS]}
 
     def _report(self, what: str, part: float) -> None:
         share = 0.9 * (1.0 - 0.5**self._rounds * (1.0 - 0.5 * part))  # a round is half of the rest
@@ -264,6 +238,8 @@ class Selector:
             return f"could be chance (p = {p_value:.2g} after {len(self.names)} hypotheses)"
         if null_inside(name, result):
             return "its interval includes the value at which it does nothing"
+        if EFFECTS[name].event and not has_edge(name, result):
+            return "it would act in whole recordings or not at all: no moment is seen at which it begins or ends"
         values = {
             s.name: float(x) * s.scale
             for s, x in zip(result.problem.shared, result.x, strict=False)
@@ -274,22 +250,14 @@ class Selector:
     def _best(self, trials: Mapping[str, Trial], current: FitResult, retuned: FitResult) -> Trial | None:
         """Return the trial that gains most and passes every test, the simpler of two nested ones where they tie."""
         passing = [trial for trial in trials.values() if trial.failed is None]
-        for trial in sorted(passing, key=lambda t: -self._rank(t, passing)):
+        rank = ranks(passing, current)
+        for trial in sorted(passing, key=lambda t: -rank[t.name]):
             simpler = self._simpler(trial, trials, current)
             if self._weighty(simpler.name, simpler.effects, simpler.result, current, retuned) and self._holds_out(
                 simpler, current
             ):
                 return self._examined(simpler, current)
         return None
-
-    @staticmethod
-    def _rank(trial: Trial, passing: Sequence[Trial]) -> float:
-        """Return what a trial gains; of equivalent ones that gain the same, the first along the chain counts more."""
-        twins = {*EFFECTS[trial.name].equivalent, trial.name}
-        gains = [t.gain.delta_bic for t in passing if t.name in twins]
-        tied = max(gains) - trial.gain.delta_bic < VERY_STRONG
-        order = list(EFFECTS).index(trial.name) / len(EFFECTS)
-        return max(gains) - order if tied else trial.gain.delta_bic
 
     def _simpler(self, trial: Trial, trials: Mapping[str, Trial], current: FitResult) -> Trial:
         for name in EFFECTS[trial.name].contains:
@@ -340,15 +308,7 @@ class Selector:
         return unseen >= PART_UNSEEN * seen
 
     def _examined(self, trial: Trial, before: FitResult) -> Trial:
-        return Trial(
-            trial.name,
-            trial.effects,
-            trial.result,
-            trial.gain,
-            self._examine(trial, before),
-            trial.p_value,
-            None,
-        )
+        return replace(trial, holdout=self._examine(trial, before), failed=None)
 
     def _drop_superfluous(self, chosen: Effects, current: FitResult, retuned: FitResult) -> tuple[Effects, FitResult]:
         for name in sorted(chosen) if len(chosen) > 1 else ():
@@ -366,58 +326,6 @@ class Selector:
         final = self._trial(name, chosen, without, current)
         return self._examined(final, without)
 
-    def _lookalikes(self, name: str, chosen: Effects, current: FitResult) -> tuple[str, ...]:
-        """Return the effects that explain as much in an effect's place, as far as these recordings can tell."""
-        entry = EFFECTS[name]
-        others = chosen - {name}
-        kin = {*entry.resembles, *entry.equivalent} | {
-            other for other in self.names if name in (*EFFECTS[other].resembles, *EFFECTS[other].equivalent)
-        }
-        rivals = [
-            other
-            for other in self.names
-            if other in kin and other not in chosen and name not in EFFECTS[other].contains
-        ]
-        alike = set(entry.equivalent)
-        without = self.bench.fit(others, current)
-        screen = Screen(without, self.bench.model)
-        explained = min(without.squares - current.squares, screen.looks(name)[0].promise)  # a strong law bends
-        n = gain(without, current).n_effective
-        for rival in rivals:
-            looks = screen.looks(rival)
-            if looks[0].promise < SAME_PROMISE * explained:
-                continue
-            result = self.bench.rough_fit(
-                with_effect(others, rival), without, [look.release for look in _promising(looks)]
-            )
-            if result.squares > NEARLY * current.squares:
-                continue
-            result = self.bench.fit(with_effect(others, rival), without)
-            worse = n * math.log(result.squares / current.squares)
-            worse += (result.free_count - current.free_count) * math.log(n)
-            if worse < VERY_STRONG:
-                alike.add(rival)
-        return tuple(sorted(alike))
-
-
-def _promising(looks: Sequence[Look]) -> list[Look]:
-    """Return the starts worth a fit: the best, and a second one where it promises nearly as much."""
-    return [look for look in looks[:STARTS] if look.promise >= PROMISING * looks[0].promise or look is looks[0]]
-
-
-def scan_choices(name: str, result: FitResult) -> float:
-    """Return the logarithm of how many intervals were tried to place an effect's events in all recordings."""
-    if not EFFECTS[name].event:
-        return 0.0
-    total = 0.0
-    for basis, local in zip(
-        result.problem.local, (result.local_of(i) for i in range(len(result.problem.local))), strict=True
-    ):
-        own = dict(zip(((u.effect, u.name) for u in basis.own), local[basis.own_rows], strict=True))
-        if own[name, "to_s"] > own[name, "from_s"]:
-            total += math.log(0.5 * MOST_CELLS**2)
-    return total
-
 
 def counting_law(result: FitResult) -> UnnamedLaw | None:
     """Return the law without a name that best explains what a fit leaves, if it is beyond chance and visible."""
@@ -425,25 +333,3 @@ def counting_law(result: FitResult) -> UnnamedLaw | None:
     if law is None or law.gain.delta_bic < VERY_STRONG or law.gain.p_value > SIGNIFICANT:
         return None
     return law if result.rms >= VISIBLE * law.rms else None
-
-
-def null_inside(name: str, result: FitResult) -> bool:
-    """Tell whether the interval of every decisive parameter of an effect includes its null.
-
-    Decisive are the amplitudes of a periodic effect, the first parameter that is fitted of another. A profile is
-    decided by its gain alone: it has no single parameter.
-    """
-    entry = EFFECTS[name]
-    if entry.profile:
-        return False
-    nulls = {parameter.name: parameter.null for parameter in entry.parameters}
-    fitted = [i for i, s in enumerate(result.problem.shared) if s.effect == name and s.low < s.high]
-    amplitudes = [i for i in fitted if result.problem.shared[i].name in entry.phases.values()]
-    cov = covariance(result)
-    return all(_includes(result, cov, i, nulls[result.problem.shared[i].name]) for i in amplitudes or fitted[:1])
-
-
-def _includes(result: FitResult, cov: FloatArray, index: int, null: float) -> bool:
-    low, high = interval(result, cov, index)
-    at_null = bool(np.isclose(result.x[index] * result.problem.shared[index].scale, null))
-    return at_null or low <= null <= high

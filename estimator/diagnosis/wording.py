@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 
 from estimator.diagnosis.judgement import Judgement
 from estimator.diagnosis.result import Fit, FoundEffect, UntestableEffect, Verdict
-from estimator.diagnosis.selection import Selection, Trial
+from estimator.diagnosis.selection import Selection
+from estimator.diagnosis.trial import Trial
 from estimator.diagnosis.unnamed import UnnamedLaw
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element

@@ -136,6 +136,26 @@ def long_enough(key: str) -> Callable[[DrivelineModel, Sequence[Record], Mapping
 
 
 @dataclass(frozen=True, slots=True)
+class Step:
+    """Which nominal parameter an event changes, and how: by its size, or by its size as a share.
+
+    Attributes
+    ----------
+    of : callable
+        Model to the parameter's name.
+    relative : bool
+    """
+
+    of: Callable[[DrivelineModel], str]
+    relative: bool = False
+
+    def turned(self, nominal: float, size: float) -> tuple[float, float]:
+        """Return value and size of the same step told the other way round: changed is what was not."""
+        after = nominal * (1.0 + size) if self.relative else nominal + size
+        return after, nominal / after - 1.0 if self.relative else -size
+
+
+@dataclass(frozen=True, slots=True)
 class Effect:
     """An entry of the catalogue.
 
@@ -175,6 +195,8 @@ class Effect:
         True where the parameters are a profile over each recording's own time (road grade) and not constants.
     event : bool
         True where it acts during an interval of each recording, from its own ``from_s`` to its own ``to_s``.
+    step : Step or None
+        Where the event is a step of a nominal parameter: of which.
     phases : mapping of str to str
         Own phase to the shared amplitude that it belongs to, for effects periodic in an angle.
     implausible : callable
@@ -201,6 +223,7 @@ class Effect:
     kinds: frozenset[OutputKind] = frozenset(OutputKind)
     profile: bool = False
     event: bool = False
+    step: Step | None = None
     phases: Mapping[str, str] = field(default_factory=dict)
     implausible: Callable[[DrivelineModel, Sequence[Record], Mapping[str, float]], str] = always_plausible
     recognised: bool = False

@@ -178,12 +178,7 @@ def start_vector(problem: Problem) -> FloatArray:
 def outputs_at(problem: Problem, x: FloatArray) -> tuple[FloatArray, ...]:
     """Simulate every recording at scaled unknowns ``x``."""
     p = parameters(problem, x)
-    return tuple(_simulate_one(problem, p, local_part(problem, x, i), i) for i in range(len(problem.records)))
-
-
-def output_of(problem: Problem, x: FloatArray, index: int) -> FloatArray:
-    """Simulate one recording at scaled unknowns ``x``."""
-    return _simulate_one(problem, parameters(problem, x), local_part(problem, x, index), index)
+    return tuple(simulated(problem, p, local_part(problem, x, i), i) for i in range(len(problem.records)))
 
 
 def start_of(problem: Problem, x: FloatArray, index: int) -> Start:
@@ -191,7 +186,8 @@ def start_of(problem: Problem, x: FloatArray, index: int) -> Start:
     return problem.local[index].start(local_part(problem, x, index))
 
 
-def _simulate_one(problem: Problem, p: FloatArray, local: FloatArray, index: int) -> FloatArray:
+def simulated(problem: Problem, p: FloatArray, local: FloatArray, index: int) -> FloatArray:
+    """Return the output of one recording for a parameter vector and the recording's own unknowns, shape (N,)."""
     record, basis = problem.records[index], problem.local[index]
     filled = basis.parameters(p, local)
     out = simulate(problem.grid, record, filled, basis.start(local), basis.extra_load(local))
@@ -234,7 +230,7 @@ def jacobian_at(problem: Problem, x: FloatArray, outputs: Sequence[FloatArray]) 
         local, basis = local_part(problem, x, i), problem.local[i]
         steps = np.where(local + STEP <= basis.high, STEP, -STEP)
         columns = [
-            (_simulate_one(problem, p, local + step * unit, i) - outputs[i])[problem.use[i]] / step
+            (simulated(problem, p, local + step * unit, i) - outputs[i])[problem.use[i]] / step
             for step, unit in zip(steps, np.eye(local.size), strict=True)
         ]
         return np.array(columns).T

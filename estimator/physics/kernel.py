@@ -143,6 +143,7 @@ SLIP = slot("tyre_slip", "slip_per_nm")
 SLIP_WHEEL = slot("tyre_slip", "wheel_share")
 SLIP_SPEED = slot("tyre_slip", "creep_rad_s")
 RELAXATION = slot("tyre_slip", "relaxation_rad")
+CARCASS = slot("tyre_slip", "carcass_s")
 IMBALANCE = slot("load_imbalance", "amplitude_nm")
 IMBALANCE_RATIO = slot("load_imbalance", "motor_turns_per_turn")
 IMBALANCE_PHASE = slot("load_imbalance", "phase_rad")
@@ -217,6 +218,7 @@ def rates(masses: int, now: Conditions, x: State, p: FloatArray) -> State:
     shaft = shaft_torque(x.twist + now.joint_angle, rate + joint_rate, x.loading, p, now.stiffness)
     shaft = shaft * now.shaft_factor + now.shaft_extra
     pull = shaft
+    reaction = shaft * (1.0 + now.joint_rate)  # a joint that turns unevenly passes on power, not torque
     middle_twist, middle_speed = 0.0, 0.0
     if masses == 3:
         middle_twist = x.middle_speed - x.load_speed
@@ -225,7 +227,7 @@ def rates(masses: int, now: Conditions, x: State, p: FloatArray) -> State:
     load, vehicle, traction = load_rates(pull, now, x, p)
     return State(
         x.speed,
-        (drive - shaft) / now.inertia_motor,
+        (drive - reaction) / now.inertia_motor,
         rate,
         load,
         shaft_hysteresis.loading_rate(x.loading, rate, now.yield_twist, now.fastest) if p[SLIDER] != 0.0 else 0.0,
@@ -264,14 +266,12 @@ def load_rates(pull: float, now: Conditions, x: State, p: FloatArray) -> tuple[f
     share, rate = float(p[SLIP_WHEEL]), 0.0
     if p[RELAXATION] > 0.0:
         traction = x.traction
+        wheel_inertia = share * now.inertia_load
         rate = tyre_slip.build_up(
-            wheel - vehicle,
-            math.hypot(vehicle, p[SLIP_SPEED]),
-            traction,
-            p[SLIP],
-            p[RELAXATION],
-            share * now.inertia_load,
-            now.fastest,
+            wheel - vehicle, abs(vehicle), traction, p[SLIP], p[RELAXATION], wheel_inertia, now.fastest
+        )
+        traction += tyre_slip.carcass(
+            wheel - vehicle, vehicle, p[SLIP], p[SLIP_SPEED], p[RELAXATION], p[CARCASS], wheel_inertia * now.fastest
         )
     else:
         steepest = now.fastest * now.inertia_load

@@ -1,4 +1,4 @@
-"""The last metres to an event's moments: the error has several optima within tenths of a second of the right one."""
+"""The way to an event's moments: the error has several optima within seconds of the right one."""
 
 from __future__ import annotations
 
@@ -8,14 +8,23 @@ from dataclasses import replace
 import numpy as np
 
 from estimator.physics.catalogue import EFFECTS
-from estimator.physics.fit import ITERATIONS, FitResult, Problem, fit, output_of
-from estimator.signals.record import FloatArray
+from estimator.physics.fit import ITERATIONS, FitResult, Problem, fit, simulated
+from estimator.physics.parallel import concurrently
+from estimator.physics.unknowns import LocalBasis
+from estimator.signals.record import FloatArray, Record
 
-OFFSETS_S = np.array([0.01, 0.02, 0.04, 0.08, 0.15, 0.3, 0.5])
+OFFSETS_S = np.array([0.01, 0.02, 0.04, 0.08, 0.15, 0.3, 0.6, 1.2, 2.4])
 OFFSETS_S = np.concatenate([-OFFSETS_S[::-1], OFFSETS_S])
 """Where else the error is looked at, around the moment a fit ended at."""
 
+REACH_S = 0.5
+"""How far a fit may go on from a moment that was moved: beyond it others match."""
+
 ROUNDS = 3
+"""Moves and fits from there, in turn."""
+
+MOVES = 4
+"""Moves of one event in one recording before the next fit."""
 
 WORTH = 20.0
 """Gain in log-likelihood ratio, twice, that an event in one recording must bring: it was sought among hundreds."""
@@ -24,10 +33,10 @@ WORTH = 20.0
 def polished(result: FitResult, iterations: int = ITERATIONS) -> FitResult:
     """Move the moments of events to where the error is smallest nearby, and fit on from there while it helps."""
     for _ in range(ROUNDS):
-        x = _moved(result)
-        if x is None:
+        moved = _moved(result)
+        if moved is None:
             return result
-        better = fit(result.problem, x, iterations)
+        better = fit(*moved, iterations)
         if better.squares >= result.squares:
             return result
         result = better
@@ -70,26 +79,80 @@ def _silenced(result: FitResult, index: int) -> tuple[Problem, FloatArray] | Non
     return replace(result.problem, local=local), x
 
 
-def _moved(result: FitResult) -> FloatArray | None:
-    """Return the unknowns with moments moved, one after the other; None where none is better elsewhere."""
-    x, moved = result.x.copy(), False
-    first = len(result.problem.shared)
-    for i, basis in enumerate(result.problem.local):
-        rows = basis.own_rows
-        for row, unknown in zip(range(first + rows.start, first + rows.stop), basis.own, strict=True):
-            if EFFECTS[unknown.effect].event and unknown.low < unknown.high:
-                tried = np.unique(np.clip(x[row] + OFFSETS_S, unknown.low, unknown.high))
-                squares = [_squares(result, x, i, row, value) for value in (x[row], *tried)]
-                best = int(np.argmin(squares))
-                if best > 0:
-                    x[row], moved = tried[best - 1], True
-        first += basis.guess.size
-    return x if moved else None
+def _moved(result: FitResult) -> tuple[Problem, FloatArray] | None:
+    """Return the problem around moments that were moved, and its unknowns; None where none is better elsewhere."""
+    found = concurrently(lambda i: _moved_in(result, i), range(len(result.problem.records)))
+    if all(local is None for local in found):
+        return None
+    bases, parts = [], [result.x[: len(result.problem.shared)]]
+    for i, (basis, local) in enumerate(zip(result.problem.local, found, strict=True)):
+        parts.append(result.local_of(i) if local is None else local)
+        bases.append(basis if local is None else _around(basis, local, result.problem.records[i]))
+    return replace(result.problem, local=tuple(bases)), np.concatenate(parts)
 
 
-def _squares(result: FitResult, x: FloatArray, index: int, row: int, value: float) -> float:
-    tried = x.copy()
-    tried[row] = value
-    record, use = result.problem.records[index], result.problem.use[index]
-    error = (output_of(result.problem, tried, index) - record.output)[use]
-    return float(error @ error)
+def _moved_in(result: FitResult, index: int) -> FloatArray | None:
+    """Return one recording's unknowns with moments moved; None where none is better elsewhere."""
+    basis, local = result.problem.local[index], result.local_of(index).copy()
+    ends = _ends(basis)
+    if not ends:
+        return None
+    misfit = _Misfit(result, index)
+    began = best = misfit.squares(local)
+    first, last = result.problem.records[index].since_start_s[[0, -1]]
+    for begin, end in ends:
+        for _ in range(MOVES):
+            tried = [_shifted(local, rows, offset) for rows in ([begin], [end], [begin, end]) for offset in OFFSETS_S]
+            tried = [x for x in tried if first <= x[begin] < x[end] <= last]
+            squares = [misfit.squares(x) for x in tried]
+            if not squares or min(squares) >= best:
+                break
+            best = min(squares)
+            local = tried[int(np.argmin(squares))]
+    return local if best < began else None
+
+
+def _shifted(local: FloatArray, rows: list[int], offset_s: float) -> FloatArray:
+    x = local.copy()
+    x[rows] += offset_s
+    return x
+
+
+def _ends(basis: LocalBasis) -> list[tuple[int, int]]:
+    """Return where beginning and end of each event that acts stand among a recording's unknowns."""
+    rows = range(basis.own_rows.start, basis.own_rows.stop)
+    place = {(u.effect, u.name): row for row, u in zip(rows, basis.own, strict=True) if u.low < u.high}
+    return [
+        (row, place[effect, "to_s"])
+        for (effect, name), row in place.items()
+        if EFFECTS[effect].event and name == "from_s"
+    ]
+
+
+def _around(basis: LocalBasis, local: FloatArray, record: Record) -> LocalBasis:
+    """Return a basis whose moments may be fitted around where they are."""
+    first, last = (float(end) for end in record.since_start_s[[0, -1]])
+    own = tuple(
+        replace(u, start=at, low=max(first, at - REACH_S), high=min(last, at + REACH_S))
+        if EFFECTS[u.effect].event and u.low < u.high
+        else u
+        for u, at in zip(basis.own, (float(value) for value in local[basis.own_rows]), strict=True)
+    )
+    return replace(basis, own=own)
+
+
+class _Misfit:
+    """The error of one recording for other moments, less what its load torque and initial state could take up."""
+
+    def __init__(self, result: FitResult, index: int) -> None:
+        self._problem, self._p, self._index = result.problem, result.p, index
+        rows = np.cumsum([0, *(int(use.sum()) for use in result.problem.use)])
+        first = len(result.problem.shared) + sum(b.guess.size for b in result.problem.local[:index])
+        columns = np.arange(first, first + result.problem.local[index].own_rows.start)
+        self._taken_up = np.linalg.qr(result.jacobian[rows[index] : rows[index + 1], columns])[0]
+
+    def squares(self, local: FloatArray) -> float:
+        record, use = self._problem.records[self._index], self._problem.use[self._index]
+        error = (simulated(self._problem, self._p, local, self._index) - record.output)[use]
+        taken_up = self._taken_up.T @ error
+        return float(error @ error - taken_up @ taken_up)

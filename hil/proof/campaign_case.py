@@ -73,7 +73,11 @@ def run_case(kind: Kind, seed: int, folder: Path, limit_s: float) -> tuple[dict[
         The truth, JSON types only.
     Answer
     """
-    case = make_case(kind.effect, seed, kind.nominal_error)
+    return run_made(make_case(kind.effect, seed, kind.nominal_error), folder, limit_s)
+
+
+def run_made(case: Case, folder: Path, limit_s: float) -> tuple[dict[str, Any], Answer]:
+    """Diagnose and unseal a case that is made already; see `run_case`."""
     with tempfile.TemporaryDirectory(prefix="hil-case-") as neutral:
         answer = _ask(case, Path(neutral), limit_s)
         shutil.rmtree(folder, ignore_errors=True)

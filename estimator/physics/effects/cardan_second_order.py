@@ -44,7 +44,7 @@ EFFECT = Effect(
     element=Element.SHAFT,
     title="second order of the Cardan joints",
     law="T_S = (k e + c de/dt) (1 + r cos(2 phi_M + alpha)) + A cos(2 phi_M + alpha), "
-    "e = twist + a cos(2 phi_M + alpha), two of a, A and r zero",
+    "e = twist + a cos(2 phi_M + alpha), two of a, A and r zero; on the motor T_S de/dtwist",
     source="Seherr-Thoss, Schmelz, Aucktor: Universal Joints and Driveshafts, 2nd ed., Springer 2006",
     excited_by="slow speeds at which twice per turn passes the resonance",
     parameters=(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from estimator.physics.effect import EVERY_LINE, MOMENTS, Effect, EffectParameter, Element, Start
+from estimator.physics.effect import EVERY_LINE, MOMENTS, Effect, EffectParameter, Element, Start, Step
 from estimator.physics.model import DrivelineModel, Motion, load_inertia, unit
 from estimator.signals.record import Record
 
@@ -40,6 +40,7 @@ EFFECT = Effect(
     equivalent=(),
     contains=(),
     event=True,
+    step=Step(load_inertia),
     scales=scales,
     starts=starts,
     sentence=sentence,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from estimator.physics.effect import MOMENTS, WITH_SPRING, Effect, EffectParameter, Element, Start
+from estimator.physics.effect import MOMENTS, WITH_SPRING, Effect, EffectParameter, Element, Start, Step
 from estimator.physics.model import DrivelineModel, Motion
 from estimator.signals.record import Record
 
@@ -40,6 +40,7 @@ EFFECT = Effect(
     equivalent=(),
     contains=(),
     event=True,
+    step=Step(lambda _model: "k", relative=True),
     scales=scales,
     starts=starts,
     sentence=sentence,

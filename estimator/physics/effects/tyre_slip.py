@@ -49,18 +49,36 @@ def build_up(
     return (slide / slip_per_nm - roll * traction) / max(relaxation, least)
 
 
+@compiled
+def carcass(
+    slide: float,
+    vehicle: float,
+    slip_per_nm: float,
+    creep_speed: float,
+    relaxation: float,
+    carcass_s: float,
+    stiffest: float,
+) -> float:
+    """Return the torque by which the carcass damps its wind-up [Nm], near standstill where rolling can't relax it.
+
+    ``stiffest`` is the damping that the integration step can follow [Nm s/rad].
+    """
+    damping = min(carcass_s / (slip_per_nm * relaxation), stiffest)
+    return damping * slide / (1.0 + (vehicle / creep_speed) ** 2)
+
+
 def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
-    """Return the compliance of a per cent of slip at the torque in use, 1, a tenth of the top speed, and a radian."""
-    return (0.01 / torque_scale(records), 1.0, 0.1 * speed_scale(records), 1.0)
+    """Return a per cent of slip at the torque in use, 1, a tenth of the top speed, a radian, and 10 ms."""
+    return (0.01 / torque_scale(records), 1.0, 0.1 * speed_scale(records), 1.0, 0.01)
 
 
 def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
     """Return creep from small to large, at once or after rolling, for a light and a heavy wheel."""
     return [
-        (slip, wheel, creep, relaxation)
+        (slip, wheel, creep, relaxation, damping)
         for slip in (0.3, 1.5)
         for wheel in (0.05, 0.15)
-        for creep, relaxation in ((1.0, Held(0.0)), (0.3, 2.0))
+        for creep, relaxation, damping in ((1.0, Held(0.0), Held(0.0)), (0.5, 3.0, 0.5))
     ]
 
 
@@ -78,14 +96,16 @@ EFFECT = Effect(
     element=Element.LOAD,
     title="slip of the tyre",
     law="J_W dw_W/dt = T_S - T_x, J_V dw_V/dt = T_x - b_L w_V - T_load, "
-    "T_x = (w_W - w_V) / (s (|w_V| + w_0)), or l dT_x/dt + sqrt(w_V^2 + w_0^2) T_x = (w_W - w_V) / s",
-    source="linear range of the slip curve, relaxation length: Pacejka, Tire and Vehicle Dynamics, 3rd ed., 2012",
+    "T_x = (w_W - w_V) / (s (|w_V| + w_0)); or T_x = T_l + t_c (w_W - w_V) / (s l (1 + (w_V/w_0)^2)), "
+    "l dT_l/dt + |w_V| T_l = (w_W - w_V) / s",
+    source="linear slip, relaxation length, standstill: Pacejka, Tire and Vehicle Dynamics, 3rd ed., 2012, ch. 4, 7, 8.6",
     excited_by="large torque changes: tip-in, tip-out, PRBS",
     parameters=(
         EffectParameter("slip_per_nm", "per_torque", 0.0, 0.0, 100.0, "slip per torque: s"),
         EffectParameter("wheel_share", "", 0.05, 0.005, 0.7, "share of J_L that is the wheel's: J_W / J_L", True),
         EffectParameter("creep_rad_s", "speed", 1.0, 0.1, 100.0, "speed below which slip is a slide: w_0", True),
-        EffectParameter("relaxation_rad", "angle", 0.0, 0.05, 100.0, "motor angle over which traction builds up", True),
+        EffectParameter("relaxation_rad", "angle", 0.0, 0.05, 100.0, "motor angle over which traction builds up: l", True),
+        EffectParameter("carcass_s", "s", 0.0, 0.0, 20.0, "damping of the carcass at standstill: t_c", True),
     ),
     structures=WITH_SHAFT,
     resembles=("extra_torsional_mode",),

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from estimator.diagnosis.hypotheses import NOTHING, Effects
-from estimator.diagnosis.selection import Selection, Trial
+from estimator.diagnosis.selection import Selection
+from estimator.diagnosis.trial import Trial
 from estimator.diagnosis.unnamed import UnnamedLaw
 from estimator.physics.fit import FitResult
 

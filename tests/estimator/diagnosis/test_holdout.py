@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.holdout import BLOCK_S, EVERY_S, Examiner, blocks, foreign_outputs, split
+from estimator.diagnosis.holdout import BLOCK_S, EVERY_S, Examiner, blocks, foreign_outputs
 from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects, everything
 from estimator.physics.effects.road_grade import KNOT_SPACING_S
 from estimator.physics.fit import FitResult
@@ -65,22 +65,8 @@ def fits(records: list[Record], effects: Effects) -> tuple[FitResult, FitResult]
     return bench.fit(NOTHING), bench.fit(effects, bench.fit(NOTHING))
 
 
-class TestSplit:
-    def test_the_last_part_is_a_recording_of_its_own(self) -> None:
-        rec = record(random_steps(1000, 1), np.arange(1000.0))
-        first, last = split(rec)
-        assert (first.output.size, last.output.size) == (700, 300)
-        np.testing.assert_array_equal(np.concatenate([first.output, last.output]), rec.output)
-        assert last.time_s[0] == rec.time_s[700]
-        assert (last.name, last.kind, last.sample_time_s) == (rec.name, rec.kind, rec.sample_time_s)
-
-    def test_it_is_cut_by_its_good_samples(self) -> None:
-        """A reading that dies in the last third still leaves something to judge on."""
-        okay = np.arange(1000) < 500
-        first, last = split(record(random_steps(1000, 1), np.arange(1000.0), okay=okay))
-        assert (int(first.okay.sum()), int(last.okay.sum())) == (350, 150)
-
-    def test_blocks_are_kept_out_all_along_and_not_at_the_ends(self) -> None:
+class TestBlocks:
+    def test_they_are_kept_out_all_along_and_not_at_the_ends(self) -> None:
         out = blocks(record(np.zeros(2000), np.zeros(2000)))
         assert out.mean() == pytest.approx(BLOCK_S / EVERY_S, abs=0.01)
         assert not out[:50].any()

@@ -25,10 +25,8 @@ from estimator.diagnosis.selection import (
     WORTH_FITTING,
     Selection,
     Selector,
-    Trial,
-    null_inside,
-    scan_choices,
 )
+from estimator.diagnosis.trial import Trial, has_edge, null_inside, scan_choices
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult
 from estimator.physics.own_scan import MOST_CELLS
@@ -258,33 +256,6 @@ class TestLookalikes:
         assert selection.lookalikes == {"actuator_lag": ("speed_filter",)}
 
 
-class TestRank:
-    """Of twins that gain the same, the first along the chain counts more; a gap decides otherwise."""
-
-    LAG, FILTER, DELAY = "actuator_lag", "speed_filter", "transport_delay"
-
-    def ranks(self, gains: dict[str, float]) -> list[str]:
-        result = of_rms(0.2, 3)
-        plain = gain(of_rms(1.0, 2), result)
-        trials = [
-            Trial(name, frozenset({name}), result, replace(plain, delta_bic=value), None, 0.0, None)
-            for name, value in gains.items()
-        ]
-        return [trial.name for trial in sorted(trials, key=lambda trial: -Selector._rank(trial, trials))]
-
-    @pytest.mark.parametrize("ahead", [0.0, 9.0])
-    def test_tied(self, ahead: float) -> None:
-        assert self.ranks({self.FILTER: 100.0 + ahead, self.LAG: 100.0}) == [self.LAG, self.FILTER]
-
-    def test_not_tied(self) -> None:
-        assert self.ranks({self.FILTER: 111.0, self.LAG: 100.0}) == [self.FILTER, self.LAG]
-
-    @pytest.mark.parametrize(("gained", "place"), [(120.0, 0), (103.0, 2), (90.0, 2)])
-    def test_others_keep_their_place(self, gained: float, place: int) -> None:
-        """Both twins count for the better one's 105; what is no twin of theirs for what it gains itself."""
-        assert self.ranks({self.FILTER: 105.0, self.DELAY: gained, self.LAG: 100.0}).index(self.DELAY) == place
-
-
 class TestEvents:
     """Intervals are chosen among many: each that was placed is paid for."""
 
@@ -302,6 +273,9 @@ class TestEvents:
         assert MOST_CELLS == 40
         assert scan_choices("brake_drag", braked.result) == pytest.approx(2.0 * np.log(800.0))
         assert scan_choices(COULOMB, braked.result) == 0.0
+
+    def test_it_begins_and_ends_inside_a_recording(self, braked: Selection) -> None:
+        assert has_edge("brake_drag", braked.result)
 
     def test_they_are_paid_for(self, braked: Selection) -> None:
         trial = braked.accepted["brake_drag"]

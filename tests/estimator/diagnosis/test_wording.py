@@ -9,7 +9,8 @@ import pytest
 from estimator.diagnosis.evidence import Gain
 from estimator.diagnosis.judgement import Judgement
 from estimator.diagnosis.result import Evidence, Fit, FoundEffect, UntestableEffect, Verdict
-from estimator.diagnosis.selection import Selection, Trial
+from estimator.diagnosis.selection import Selection
+from estimator.diagnosis.trial import Trial
 from estimator.diagnosis.unnamed import UnnamedLaw
 from estimator.diagnosis.wording import PLACES, rejection, statement
 from estimator.physics.effect import Element

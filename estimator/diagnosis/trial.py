@@ -1,0 +1,87 @@
+"""One effect tried on top of others: what speaks for it, when its events are, and how rivals rank."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimator.diagnosis.evidence import VERY_STRONG, Gain, information
+from estimator.diagnosis.holdout import HoldOut
+from estimator.diagnosis.hypotheses import Effects
+from estimator.diagnosis.intervals import covariance, interval
+from estimator.physics.catalogue import EFFECTS
+from estimator.physics.fit import FitResult
+from estimator.physics.own_scan import MOST_CELLS
+from estimator.physics.steps import inside, moments_of
+from estimator.signals.record import FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """One effect tried on top of others, with what speaks for it and the first test it failed."""
+
+    name: str
+    effects: Effects
+    result: FitResult
+    gain: Gain
+    holdout: HoldOut | None
+    p_value: float
+    failed: str | None
+
+
+def ranks(passing: Sequence[Trial], before: FitResult) -> dict[str, float]:
+    """Return what trials gain over one fit, with one number of independent samples, that of the least error.
+
+    Of equivalent effects that gain the same, the first along the chain counts more.
+    """
+    if not passing:
+        return {}
+    n = min(passing, key=lambda trial: trial.result.squares).gain.n_effective
+    gained = {t.name: information(before, t.result, n) - 2.0 * scan_choices(t.name, t.result) for t in passing}
+    found = {}
+    for name, mine in gained.items():
+        most = max(gained.get(twin, mine) for twin in (name, *EFFECTS[name].equivalent))
+        place = list(EFFECTS).index(name) / len(EFFECTS)
+        found[name] = most - place if most - mine < VERY_STRONG else mine
+    return found
+
+
+def scan_choices(name: str, result: FitResult) -> float:
+    """Return the logarithm of how many intervals were tried to place an effect's events in all recordings."""
+    if not EFFECTS[name].event:
+        return 0.0
+    acting = sum(to_s > from_s for from_s, to_s in moments_of(result, name))
+    return acting * math.log(0.5 * MOST_CELLS**2)
+
+
+def has_edge(name: str, result: FitResult) -> bool:
+    """Tell whether an event begins or ends inside a recording."""
+    return any(
+        to_s > from_s and (inside(record, from_s) or inside(record, to_s))
+        for record, (from_s, to_s) in zip(result.problem.records, moments_of(result, name), strict=True)
+    )
+
+
+def null_inside(name: str, result: FitResult) -> bool:
+    """Tell whether the interval of every decisive parameter of an effect includes its null.
+
+    Decisive are the amplitudes of a periodic effect, the first parameter that is fitted of another. A profile is
+    decided by its gain alone: it has no single parameter.
+    """
+    entry = EFFECTS[name]
+    if entry.profile:
+        return False
+    nulls = {parameter.name: parameter.null for parameter in entry.parameters}
+    fitted = [i for i, s in enumerate(result.problem.shared) if s.effect == name and s.low < s.high]
+    amplitudes = [i for i in fitted if result.problem.shared[i].name in entry.phases.values()]
+    cov = covariance(result)
+    return all(_includes(result, cov, i, nulls[result.problem.shared[i].name]) for i in amplitudes or fitted[:1])
+
+
+def _includes(result: FitResult, cov: FloatArray, index: int, null: float) -> bool:
+    low, high = interval(result, cov, index)
+    at_null = bool(np.isclose(result.x[index] * result.problem.shared[index].scale, null))
+    return at_null or low <= null <= high

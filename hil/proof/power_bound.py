@@ -1,0 +1,176 @@
+r"""How small an effect any test at all could find: the likelihood-ratio test of two simple hypotheses.
+
+With white noise of known deviation sigma, the most powerful test between two known outputs that differ by Delta has the
+power Phi(d - z_{1-alpha}), d = |Delta| / sigma (Neyman and Pearson, Phil. Trans. A 231, 1933; Kay, Fundamentals of
+Statistical Signal Processing II, 1998, sec. 4.3). Where nuisance parameters are unknown, what of Delta they could
+imitate is lost to any test that is indifferent to them: d = |(I - P) Delta| / sigma, P the projector on the outputs'
+sensitivities (Scharf and Friedlander, IEEE Trans. Signal Process. 42, 1994).
+
+Both know the true torques, of which a tool has the readings, and look for one effect on one side.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import optimize, stats
+
+from hil.proof.power_drive import drive, under_torques_of
+from hil.proof.power_nuisance import nuisance, without
+from hil.proof.power_sizes import imposed, scale_of
+from hil.proof.truth.acquisition import Acquisition
+from hil.proof.truth.case import TESTS
+from hil.proof.truth.experiments import SAMPLES
+from hil.proof.truth.physics import FloatArray
+from hil.proof.truth.registry import EFFECTS
+from hil.proof.truth.sensors import SPEED_NOISE_RAD_S
+from hil.proof.truth.specimen import Specimen
+
+LEVEL = 0.05
+"""Probability of a name by chance per diagnosis, all hypotheses together: what the tool allows itself."""
+
+HYPOTHESES = sum(effect.catalogued for effect in EFFECTS.values()) - 1
+"""Entries of the catalogue, among which ``LEVEL`` is divided; one of the registered effects is nothing."""
+
+POWER = 0.9
+
+CLOSE = 1e-3
+"""Relative error of a size that was searched."""
+
+FARTHEST = 1e6
+"""Factor from its start within which a size is searched."""
+
+STRETCH = math.e
+"""Factor by which a bracket grows."""
+
+
+@dataclass(frozen=True, slots=True)
+class Distance:
+    """How far apart the outputs with an effect and without are, over the deviation of the noise.
+
+    Attributes
+    ----------
+    known : float
+        |Delta| / sigma: to a test that knows everything else.
+    fair : float
+        |(I - P) Delta| / sigma: to one that has to estimate bus, load torques and initial states.
+    """
+
+    known: float
+    fair: float
+
+
+@dataclass(frozen=True, slots=True)
+class Bound:
+    """Sizes of an effect that the best test finds with `POWER`, in the effect's unit; `known` and `fair` as above."""
+
+    known: float
+    fair: float
+
+
+def deviation_rad_s(acquisition: Acquisition) -> float:
+    """Return the standard deviation of a speed reading: sensor noise, and rounding to a grid where there is one."""
+    return math.sqrt(SPEED_NOISE_RAD_S**2 + acquisition.grid_rad_s**2 / 12.0)
+
+
+def threshold(alpha: float) -> float:
+    """Return z_{1-alpha}: what a distance exceeds by chance alone with probability alpha."""
+    return float(stats.norm.isf(alpha))
+
+
+def power(distance: float, alpha: float) -> float:
+    """Return the probability that the best test of level alpha finds what is a distance away."""
+    return float(stats.norm.cdf(distance - threshold(alpha)))
+
+
+def needed_distance(alpha: float, wanted: float = POWER) -> float:
+    """Return the distance that the best test of level alpha finds with a wanted power."""
+    return threshold(alpha) + float(stats.norm.ppf(wanted))
+
+
+def size_at(needed: float, distance: Callable[[float], float], start: float) -> float:
+    """Return the size at which a growing distance reaches what is needed, to a share of `CLOSE`.
+
+    Parameters
+    ----------
+    needed
+        The distance.
+    distance
+        Of a size greater than 0.
+    start
+        A size to begin with.
+
+    Raises
+    ------
+    ValueError
+        If no size within a factor of `FARTHEST` of the start has that distance.
+    """
+    known: dict[float, float] = {}
+
+    def excess(log_size: float) -> float:
+        if log_size not in known:
+            known[log_size] = math.log(max(distance(math.exp(log_size)), math.ulp(0.0)) / needed)
+        return known[log_size]
+
+    low = high = math.log(start)
+    least, most = low - math.log(FARTHEST), low + math.log(FARTHEST)
+    while excess(low) > 0.0 and low > least:
+        high, low = low, low - math.log(STRETCH)
+    while excess(high) < 0.0 and high < most:
+        low, high = high, high + math.log(STRETCH)
+    if excess(low) > 0.0 or excess(high) < 0.0:
+        raise ValueError(
+            f"size: expected one between {math.exp(least):.3g} and {math.exp(most):.3g} at a distance of {needed:.3g}, "
+            f"came {distance(math.exp(low)):.3g} at {math.exp(low):.3g} and {distance(math.exp(high)):.3g} at "
+            f"{math.exp(high):.3g}. Does the effect vanish with its size?"
+        )
+    return math.exp(optimize.brentq(excess, low, high, xtol=CLOSE))
+
+
+class Yardstick:
+    """Measures how far the outputs of one specimen are from those without its effect.
+
+    Parameters
+    ----------
+    specimen
+        Hides one effect with a single size.
+    samples
+        Length N of each of the three recordings.
+    """
+
+    def __init__(self, specimen: Specimen, samples: int = SAMPLES) -> None:
+        self._specimen = specimen
+        self._scale = scale_of(specimen.effect)
+        self._absent = imposed(specimen, self._scale.least)
+        self._samples = samples
+        self._deviation = deviation_rad_s(specimen.acquisition())
+        self._nuisance = nuisance(specimen.seed, samples)
+        self._distances: dict[float, Distance] = {}
+
+    def difference_rad_s(self, size: float) -> FloatArray:
+        """Return Delta, the recordings one behind the other, shape (3 N,): with the effect less without."""
+        specimen = imposed(self._specimen, size)
+        return np.concatenate([self._difference(specimen, test) for test in range(len(TESTS))])
+
+    def _difference(self, specimen: Specimen, test: int) -> FloatArray:
+        there = drive(specimen, test, self._samples)
+        absent = under_torques_of(there, self._absent, test)
+        return there.speed_rad_s() - absent.speed_rad_s()
+
+    def distance(self, size: float) -> Distance:
+        """Return how far apart the outputs are at a size."""
+        if size not in self._distances:
+            difference = self.difference_rad_s(size)
+            rest = without(self._nuisance, difference)
+            norms = (float(np.linalg.norm(each)) / self._deviation for each in (difference, rest))
+            self._distances[size] = Distance(*norms)
+        return self._distances[size]
+
+    def bound(self, alpha: float) -> Bound:
+        """Return the sizes found with `POWER` at a level."""
+        needed = needed_distance(alpha)
+        fair = size_at(needed, lambda size: self.distance(size).fair, self._scale.start)
+        return Bound(size_at(needed, lambda size: self.distance(size).known, self._scale.start), fair)

@@ -1,0 +1,152 @@
+"""What a power study adds up to: per effect the bounds' sizes, the tool's, and how many times the one is the other."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from hil.proof.campaign_statistics import Rate, Row, finite, outcomes, share
+from hil.proof.power_bound import HYPOTHESES, POWER, power
+from hil.proof.power_fit import Curve, fit_curve
+from hil.proof.power_sizes import SCALES
+
+SCHEMA = "hil.power/1"
+
+
+def summary(rows: Sequence[Row], bounds: Sequence[Row]) -> dict[str, Any]:
+    """Return what rows and bounds of a study add up to; JSON types only, null where a figure is not finite."""
+    done = [row for row in rows if row["fault"] is None]
+    return {
+        "schema": SCHEMA,
+        "power": POWER,
+        "trials": len(done),
+        "effects": {
+            effect: _figures(mine, [row for row in bounds if row["kind"] == effect])
+            for effect in SCALES
+            if (mine := [row for row in done if row["effect"] == effect])
+        },
+        "faults": [
+            {"kind": row["kind"], "seed": row["seed"], "fault": row["fault"]}
+            for row in rows
+            if row["fault"] is not None
+        ],
+    }
+
+
+def _figures(rows: Sequence[Row], bounds: Sequence[Row]) -> dict[str, Any]:
+    found = [row["found"] for row in rows]
+    fair = fit_curve([row["multiple"] for row in rows], found)
+    known = fit_curve([row["over_known"] for row in rows], found)
+    sizes = {name: [row["bound"][name] for row in bounds] for name in ("known", "fair")}
+    middle = float(np.median(sizes["fair"]))
+    return {
+        "unit": bounds[0]["unit"],
+        "buses": len(bounds),
+        "trials": len(rows),
+        "alpha": bounds[0]["alpha"],
+        "bound": {
+            name: {"median": float(np.median(of)), "least": min(of), "most": max(of)} for name, of in sizes.items()
+        },
+        "size": {name: finite_or_none(value * middle) for name, value in _ends(fair).items()},
+        "over_fair": {name: finite_or_none(value) for name, value in _ends(fair).items()},
+        "over_known": {name: finite_or_none(value) for name, value in _ends(known).items()},
+        "steepness": fair.steepness,
+        "points": [_point(rows, multiple) for multiple in sorted({row["multiple"] for row in rows})],
+        "outcomes": outcomes(rows),
+    }
+
+
+def _ends(curve: Curve) -> dict[str, float]:
+    return {"value": curve.size, "low": curve.low, "high": curve.high}
+
+
+def finite_or_none(value: float) -> float | None:
+    """Return a number as JSON can have it; unlike `finite` not rounded: a size may be small."""
+    return value if math.isfinite(value) else None
+
+
+def _point(rows: Sequence[Row], multiple: float) -> dict[str, Any]:
+    """Return what was found at one multiple, and what the two best tests would find at the same sizes."""
+    mine = [row for row in rows if row["multiple"] == multiple]
+    best = {
+        name: finite(float(np.mean([power(row["distance"][name], row["alpha"]) for row in mine])))
+        for name in ("known", "fair")
+    }
+    return {"multiple": multiple, **share(row["found"] for row in mine).as_json(), "best": best}
+
+
+def markdown(rows: Sequence[Row], bounds: Sequence[Row]) -> str:
+    """Return the summary as Markdown tables."""
+    data = summary(rows, bounds)
+    effects: Mapping[str, Any] = data["effects"]
+    return "\n".join(
+        [
+            "# Power",
+            "",
+            f"{data['trials']} trials. Sizes that are found with {POWER:.0%} power; in brackets the range over the "
+            "buses, or the 95 % interval. *Everything known* and *bus unknown* are the best possible tests (module "
+            f"`hil.proof.power_bound`); alpha is their level, a {HYPOTHESES}th of 5 % unless it was set.",
+            "",
+            "| effect | unit | alpha | everything known | bus unknown | tool | tool / bus unknown | "
+            "tool / everything known | trials |",
+            "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
+            *(_line(effect, figures) for effect, figures in effects.items()),
+            "",
+            "## By size",
+            "",
+            "| effect | size / bus unknown | found | interval | best, bus unknown | best, everything known |",
+            "| --- | --- | --- | --- | --- | --- |",
+            *(_point_line(effect, point) for effect, figures in effects.items() for point in figures["points"]),
+            "",
+            "## Outcomes",
+            "",
+            *(f"- `{effect}`: {_counts(figures['outcomes'])}" for effect, figures in effects.items()),
+            *_faults(data["faults"]),
+            "",
+        ]
+    )
+
+
+def _line(effect: str, figures: Mapping[str, Any]) -> str:
+    known, fair = (
+        f"{of['median']:.3g} ({of['least']:.3g} to {of['most']:.3g})"
+        for of in (figures["bound"]["known"], figures["bound"]["fair"])
+    )
+    cells = (
+        f"`{effect}`",
+        figures["unit"],
+        f"{figures['alpha']:.2g}",
+        known,
+        fair,
+        *(_interval(figures[name]) for name in ("size", "over_fair", "over_known")),
+        f"{figures['trials']} on {figures['buses']} buses",
+    )
+    return f"| {' | '.join(cells)} |"
+
+
+def _interval(of: Mapping[str, float | None]) -> str:
+    value, low, high = of["value"], of["low"], of["high"]
+    told = "not reached" if value is None else f"{value:.3g}"
+    ends = f"from {low or 0.0:.3g}" if high is None else f"{low or 0.0:.3g} to {high:.3g}"
+    return f"{told} ({ends})"
+
+
+def _point_line(effect: str, point: Mapping[str, Any]) -> str:
+    low, high = Rate(point["hits"], point["trials"]).interval
+    best = point["best"]
+    return (
+        f"| `{effect}` | {point['multiple']:g} | {point['hits']} of {point['trials']} | {low:.0%} to {high:.0%} | "
+        f"{best['fair']:.0%} | {best['known']:.0%} |"
+    )
+
+
+def _counts(counts: Mapping[str, int]) -> str:
+    return ", ".join(f"{name} {count}" for name, count in counts.items())
+
+
+def _faults(faults: Sequence[Mapping[str, Any]]) -> list[str]:
+    lines = [f"- `{fault['kind']}` seed {fault['seed']}: {fault['fault']}" for fault in faults]
+    return ["", "## Commands that failed", "", *lines] if lines else []

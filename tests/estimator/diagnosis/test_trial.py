@@ -1,0 +1,55 @@
+"""Ranks of rivals, with one number of independent samples for all."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from estimator.diagnosis.evidence import gain, information
+from estimator.diagnosis.trial import Trial, ranks
+from tests.estimator.diagnosis.regression import of_rms
+
+LAG, FILTER, DELAY = "actuator_lag", "speed_filter", "transport_delay"
+RETUNED = of_rms(1.0, 2)
+
+
+def trial(name: str, gained: float) -> Trial:
+    """A trial with one more unknown than the re-tuned nominal that gains this much information."""
+    n = gain(RETUNED, of_rms(0.9, 3)).n_effective
+    result = of_rms(float(np.exp(-(gained + np.log(n)) / (2.0 * n))), 3)
+    assert information(RETUNED, result, n) == pytest.approx(gained, abs=1e-6)
+    return Trial(name, frozenset({name}), result, gain(RETUNED, result), None, 0.0, None)
+
+
+def ranked(gains: dict[str, float]) -> list[str]:
+    found = ranks([trial(name, gained) for name, gained in gains.items()], RETUNED)
+    return sorted(found, key=lambda name: -found[name])
+
+
+@pytest.mark.parametrize("ahead", [0.0, 9.0])
+def test_of_twins_that_tie_the_first_along_the_chain_counts_more(ahead: float) -> None:
+    assert ranked({FILTER: 100.0 + ahead, LAG: 100.0}) == [LAG, FILTER]
+
+
+def test_a_gap_decides_between_twins() -> None:
+    assert ranked({FILTER: 111.0, LAG: 100.0}) == [FILTER, LAG]
+
+
+@pytest.mark.parametrize(("gained", "place"), [(120.0, 0), (103.0, 2), (90.0, 2)])
+def test_others_keep_their_place(gained: float, place: int) -> None:
+    """Both twins count for the better one's 105; what is no twin of theirs for what it gains itself."""
+    assert ranked({FILTER: 105.0, DELAY: gained, LAG: 100.0}).index(DELAY) == place
+
+
+def test_how_correlated_an_error_is_does_not_decide() -> None:
+    """Of two rivals the one that leaves less ranks first, though its own n is smaller and its own BIC gains less."""
+    better, worse = of_rms(0.5, 3), of_rms(0.6, 3)
+    few = Trial(LAG, frozenset({LAG}), better, gain(RETUNED, better), None, 0.0, None)
+    short = type(few.gain)(few.gain.delta_bic / 10.0, few.gain.p_value, few.gain.n_effective / 10.0)
+    trials = [
+        Trial(LAG, frozenset({LAG}), better, short, None, 0.0, None),
+        Trial(DELAY, frozenset({DELAY}), worse, gain(RETUNED, worse), None, 0.0, None),
+    ]
+    assert trials[1].gain.delta_bic > trials[0].gain.delta_bic
+    found = ranks(trials, RETUNED)
+    assert found[LAG] > found[DELAY]
