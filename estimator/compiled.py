@@ -18,7 +18,7 @@ from numba.core import config as numba_config
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
-PACKAGES = ("signals", "identification", "physics")
+PACKAGES = ("signals", "identification", "physics", "diagnosis/line")
 """Packages that hold compiled code, or constants that it freezes."""
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from estimator.diagnosis.chain import Chain
 from estimator.diagnosis.evidence import gain_from_squares
 from estimator.diagnosis.holdout import Examiner
-from estimator.diagnosis.intervals import Z95, covariance, interval
+from estimator.diagnosis.intervals import Z95, interval, reported_covariance
 from estimator.diagnosis.result import Estimated, Evidence, FoundEffect, Interval, Profile, Retuned
 from estimator.diagnosis.selection import Selection
 from estimator.diagnosis.trial import Trial
@@ -28,7 +28,7 @@ PROFILE_POINTS_S = 1.0
 
 def found_effects(selection: Selection, model: DrivelineModel, examiner: Examiner) -> tuple[FoundEffect, ...]:
     """Return the chosen effects, strongest first, with values and intervals of the final fit."""
-    cov = covariance(selection.result)
+    cov = reported_covariance(selection.result)
     trials = sorted(selection.accepted.values(), key=lambda trial: -trial.gain.delta_bic)
     return tuple(_found(trial, selection, cov, model, examiner) for trial in trials)
 
@@ -153,7 +153,7 @@ def _profile_size(result: FitResult, cov: FloatArray, model: DrivelineModel) -> 
 
 def retuned_parameters(result: FitResult, model: DrivelineModel) -> dict[str, Retuned]:
     """Return every nominal parameter before and after; one trusted exactly stays what it was."""
-    cov = covariance(result)
+    cov = reported_covariance(result)
     fitted = {
         shared.name: (float(result.x[i]) * shared.scale, interval(result, cov, i))
         for i, shared in enumerate(result.problem.shared)
@@ -168,7 +168,7 @@ def retuned_parameters(result: FitResult, model: DrivelineModel) -> dict[str, Re
 
 def load_torques(result: FitResult, model: DrivelineModel) -> dict[str, Estimated]:
     """Return the constant load torque of each recording (translation: the offset force), by name."""
-    cov = covariance(result)
+    cov = reported_covariance(result)
     torques = {}
     first = len(result.problem.shared)
     for i, (record, basis) in enumerate(zip(result.problem.records, result.problem.local, strict=True)):

@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from estimator.diagnosis import locate
 from estimator.diagnosis.assemble import (
     acquired_effects,
     augmented_model,
@@ -20,7 +19,6 @@ from estimator.diagnosis.assemble import (
     rms_of,
 )
 from estimator.diagnosis.chain import Chain, mechanical, read_through
-from estimator.diagnosis.discrepancy import discrepancy
 from estimator.diagnosis.evidence import Gain, gain, information, residuals_by_record
 from estimator.diagnosis.holdout import Examiner, foreign_outputs
 from estimator.diagnosis.hypotheses import NOTHING, Bench, Progress, effects_of, everything, open_hypotheses
@@ -41,6 +39,7 @@ from estimator.diagnosis.result import (
 )
 from estimator.diagnosis.selection import VISIBLE, Selection, Selector
 from estimator.diagnosis.unnamed import UnnamedLaw as Nameless
+from estimator.diagnosis.where import discrepancy, locate
 from estimator.diagnosis.wording import rejection, statement
 from estimator.physics.effect import Element, Untestable
 from estimator.physics.fit import FitResult, fit, make_problem

@@ -5,12 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from estimator.diagnosis.evidence import residuals_by_record
-from estimator.diagnosis.noise import correlation_length
+from estimator.diagnosis.noise import correlation_length, unpredictable
 from estimator.physics.fit import FitResult
-from estimator.signals.record import FloatArray
+from estimator.signals.record import BoolArray, FloatArray
 
 Z95 = 1.959963984540054
 """97.5 % point of the normal distribution."""
+
+COHERENT_S = 1.0
+"""How long an error that is no noise keeps its value: the pace at which a test changes what it excites."""
 
 
 def covariance(result: FitResult) -> FloatArray:
@@ -21,15 +24,39 @@ def covariance(result: FitResult) -> FloatArray:
     parameter at a bound of its law is held there and has no variance. A nominal parameter at the edge of its tolerance
     is not: the tolerance is a belief about it, and how well the data determine it does not change there.
     """
-    held = result.pinned
-    of_effects = np.array([bool(shared.effect) for shared in result.problem.shared], dtype=np.bool_)
-    held[: of_effects.size] &= of_effects
-    free = ~held
+    free = _free(result)
     j = result.jacobian[:, free]
-    bread = np.linalg.pinv(j.T @ j, hermitian=True)
+    bread = _bread(j)
     full = np.zeros((result.x.size, result.x.size))
     full[np.ix_(free, free)] = bread @ _meat(result, j) @ bread
     return full
+
+
+def reported_covariance(result: FitResult) -> FloatArray:
+    """Return the covariance that intervals are reported from, shape (U, U): of the noise, and of what is no noise.
+
+    The part of the error that its own past foretells is physics written another way, or the torque reading's own
+    noise. It pulls the unknowns as an error would that keeps its value for ``COHERENT_S``: its mean square times that
+    many samples takes the place of the noise's variance in ``sigma^2 (J'J)^-1``.
+    """
+    coherent = max(result.rms**2 - unpredictable(residuals_by_record(result)) ** 2, 0.0)
+    samples = COHERENT_S / min(record.sample_time_s for record in result.problem.records)
+    free = _free(result)
+    full = covariance(result)
+    full[np.ix_(free, free)] += coherent * samples * _bread(result.jacobian[:, free])
+    return full
+
+
+def _free(result: FitResult) -> BoolArray:
+    held = result.pinned
+    of_effects = np.array([bool(shared.effect) for shared in result.problem.shared], dtype=np.bool_)
+    held[: of_effects.size] &= of_effects
+    return ~held
+
+
+def _bread(jacobian: FloatArray) -> FloatArray:
+    bread: FloatArray = np.asarray(np.linalg.pinv(jacobian.T @ jacobian, hermitian=True), dtype=np.float64)
+    return bread
 
 
 def _meat(result: FitResult, jacobian: FloatArray) -> FloatArray:

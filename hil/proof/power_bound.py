@@ -12,6 +12,7 @@ Both know the true torques, of which a tool has the readings, and look for one e
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -112,7 +113,7 @@ def size_at(needed: float, distance: Callable[[float], float], start: float) -> 
 
     def excess(log_size: float) -> float:
         if log_size not in known:
-            known[log_size] = math.log(max(distance(math.exp(log_size)), math.ulp(0.0)) / needed)
+            known[log_size] = math.log(max(distance(math.exp(log_size)), sys.float_info.min)) - math.log(needed)
         return known[log_size]
 
     low = high = math.log(start)

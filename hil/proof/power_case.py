@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import zlib
+
 import numpy as np
 
 from hil.proof.power_drive import drive
@@ -22,7 +24,7 @@ def trial_case(specimen: Specimen, size: float, trial: int, samples: int) -> Cas
     size
         Of the effect, in its unit.
     trial
-        Numbers the trials of one bus: each has noise of its own.
+        Numbers the trials of one bus and effect: each has noise of its own.
     samples
         Length of each recording.
     """
@@ -33,7 +35,7 @@ def trial_case(specimen: Specimen, size: float, trial: int, samples: int) -> Cas
 def _recorded(specimen: Specimen, test: int, trial: int, samples: int) -> TruthRecording:
     driven = drive(specimen, test, samples)
     speed = driven.speed_rad_s()
-    rng = stream(specimen.seed, Stream.RECORDING, test, 1 + trial)
+    rng = stream(specimen.seed, Stream.RECORDING, test, 1 + trial, zlib.crc32(specimen.effect.encode()))
     m1, m2 = torque_reading(driven.m1_nm, rng), torque_reading(driven.m2_nm, rng)
     return TruthRecording(
         time_s=sample_times_s()[:samples],

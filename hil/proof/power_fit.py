@@ -37,7 +37,7 @@ class Curve:
     Attributes
     ----------
     size : float
-        Found with `POWER`; infinite where the trials don't reach so far.
+        Found with `POWER`; infinite where the trials don't reach so far, 0 where all were found.
     low, high : float
         Its 95 % interval; 0 or infinite where it is open.
     steepness : float
@@ -50,8 +50,8 @@ class Curve:
     steepness: float
 
     def power(self, size: float) -> float:
-        """Return the probability of finding a size; NaN where no finite size was fitted."""
-        if not math.isfinite(self.size):
+        """Return the probability of finding a size; NaN where no size was fitted."""
+        if not 0.0 < self.size < math.inf:
             return math.nan
         return float(special.expit(special.logit(POWER) + self.steepness * math.log(size / self.size)))
 
@@ -80,8 +80,9 @@ def fit_curve(sizes: Sequence[float], found: Sequence[bool]) -> Curve:
     best = int(profile.argmax())
     inside = np.flatnonzero(profile >= profile[best] - _WITHIN)
     last = SIZES - 1
+    size = math.inf if best == last or not hit.any() else math.exp(grid[best])
     return Curve(
-        size=math.inf if best == last else math.exp(grid[best]),
+        size=0.0 if hit.all() else size,
         low=0.0 if inside[0] == 0 else math.exp(grid[inside[0]]),
         high=math.inf if inside[-1] == last else math.exp(grid[inside[-1]]),
         steepness=float(STEEPNESS[int(level[:, best].argmax())]),

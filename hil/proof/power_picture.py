@@ -77,7 +77,7 @@ def _panel(effect: str, figures: Mapping[str, Any], left: float) -> list[str]:
         line(FAIR, [(p["multiple"], p["best"]["fair"]) for p in points]),
         line(KNOWN, [(p["multiple"], p["best"]["known"]) for p in points]),
     ]
-    if figures["over_fair"]["value"] is not None:
+    if figures["over_fair"]["value"]:
         curve = Curve(figures["over_fair"]["value"], 0.0, math.inf, figures["steepness"])
         parts.append(line(TOOL, [(float(size), curve.power(float(size))) for size in sizes]))
     for point in points:

@@ -129,7 +129,7 @@ def _line(effect: str, figures: Mapping[str, Any]) -> str:
 
 def _interval(of: Mapping[str, float | None]) -> str:
     value, low, high = of["value"], of["low"], of["high"]
-    told = "not reached" if value is None else f"{value:.3g}"
+    told = "not reached" if value is None else f"{value:.3g}" if value else "below all tried"
     ends = f"from {low or 0.0:.3g}" if high is None else f"{low or 0.0:.3g} to {high:.3g}"
     return f"{told} ({ends})"
 

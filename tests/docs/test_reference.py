@@ -11,7 +11,8 @@ from pydantic import BaseModel
 
 from drivers.inverter_check import CONFIGURED_OBJECTS
 from drivers.plc_map import USED
-from estimator.diagnosis import evidence, holdout, judgement, locate, noise, selection
+from estimator.diagnosis import evidence, holdout, judgement, noise, selection
+from estimator.diagnosis.where import locate
 from estimator.physics import own_law
 from hil.config.experiment_tables import AnyExperiment
 from hil.config.model_file import read_model

@@ -98,13 +98,13 @@ EFFECT = Effect(
     law="J_W dw_W/dt = T_S - T_x, J_V dw_V/dt = T_x - b_L w_V - T_load, "
     "T_x = (w_W - w_V) / (s (|w_V| + w_0)); or T_x = T_l + t_c (w_W - w_V) / (s l (1 + (w_V/w_0)^2)), "
     "l dT_l/dt + |w_V| T_l = (w_W - w_V) / s",
-    source="linear slip, relaxation length, standstill: Pacejka, Tire and Vehicle Dynamics, 3rd ed., 2012, ch. 4, 7, 8.6",
+    source="linear slip, relaxation, standstill: Pacejka, Tire and Vehicle Dynamics, 3rd ed., 2012, ch. 4, 7, 8.6",
     excited_by="large torque changes: tip-in, tip-out, PRBS",
     parameters=(
         EffectParameter("slip_per_nm", "per_torque", 0.0, 0.0, 100.0, "slip per torque: s"),
         EffectParameter("wheel_share", "", 0.05, 0.005, 0.7, "share of J_L that is the wheel's: J_W / J_L", True),
         EffectParameter("creep_rad_s", "speed", 1.0, 0.1, 100.0, "speed below which slip is a slide: w_0", True),
-        EffectParameter("relaxation_rad", "angle", 0.0, 0.05, 100.0, "motor angle over which traction builds up: l", True),
+        EffectParameter("relaxation_rad", "angle", 0.0, 0.05, 100.0, "angle over which traction builds up: l", True),
         EffectParameter("carcass_s", "s", 0.0, 0.0, 20.0, "damping of the carcass at standstill: t_c", True),
     ),
     structures=WITH_SHAFT,

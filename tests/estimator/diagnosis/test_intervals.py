@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from estimator.diagnosis.intervals import Z95, covariance, interval
+from estimator.diagnosis.intervals import Z95, covariance, interval, reported_covariance
+from estimator.physics.fit import FitResult
+from estimator.signals.record import FloatArray
 from tests.estimator.diagnosis.regression import autoregressive, regression
 
 REPETITIONS, SAMPLES = 200, 2000
@@ -114,3 +116,44 @@ def test_recordings_are_not_correlated_across_their_ends() -> None:
     swapped = covariance(regression([design[300:], design[:300]], [output[300:], output[:300]]))[0, 0]
     assert halves == pytest.approx(swapped)
     assert halves != pytest.approx(whole)
+
+
+class TestReported:
+    """White errors of the regression's own, and beside them one that keeps its value for a second."""
+
+    SIGMA, SAMPLES = 0.1, 9000
+
+    def errors(self, coherent: float, seed: int) -> FloatArray:
+        rng = np.random.default_rng(seed)
+        held = np.repeat(rng.standard_normal(self.SAMPLES // 100), 100)
+        noise: FloatArray = self.SIGMA * rng.standard_normal(self.SAMPLES) + coherent * held
+        return noise
+
+    def result(self, coherent: float, seed: int = 1) -> FitResult:
+        rng = np.random.default_rng(100 + seed)
+        held = np.repeat(rng.standard_normal((self.SAMPLES // 100, 3)), 100, axis=0)
+        return regression([held], [held @ TRUE + self.errors(coherent, seed)])
+
+    def test_noise_alone_is_reported_as_it_is(self) -> None:
+        result = self.result(0.0)
+        assert np.diag(reported_covariance(result)) == pytest.approx(np.diag(covariance(result)), rel=0.2)
+
+    def test_what_is_no_noise_counts_for_as_long_as_it_keeps_its_value(self) -> None:
+        """100 times its mean square takes the place of sigma^2; from twenty noisy values some of it is foretold."""
+        result = self.result(0.05)
+        added = np.diag(reported_covariance(result) - covariance(result))
+        j = result.jacobian
+        share = added / (100 * 0.05**2 * np.diag(np.linalg.inv(j.T @ j)))
+        assert (share > 0.3).all()
+        assert (share < 1.0).all()
+
+    def test_the_truth_is_inside_although_part_of_the_error_is_coherent(self) -> None:
+        hits = []
+        for seed in range(100):
+            result = self.result(0.05, seed)
+            cov = reported_covariance(result)
+            hits += [
+                low <= true <= high
+                for true, (low, high) in zip(TRUE, (interval(result, cov, i) for i in range(3)), strict=True)
+            ]
+        assert np.mean(hits) >= 0.9

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import signal, stats
 
-from estimator.diagnosis.blocks import Motion, motion_of
+from estimator.diagnosis.line import Motion, motion_of
 from estimator.diagnosis.result import Interval, Region
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult

@@ -1,4 +1,4 @@
-"""The output's answer to a disturbance, against the exact response of a linear driveline."""
+"""The output's answer to a law, against the exact response of a linear driveline."""
 
 from __future__ import annotations
 
@@ -7,15 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.blocks import motion_of
-from estimator.diagnosis.disturbances import (
-    STEP_EVERY_S,
-    Candidate,
-    Scene,
-    candidates,
-    elements,
-    scene,
-)
+from estimator.diagnosis.line.motion import motion_of
+from estimator.diagnosis.unnamed.candidates import Candidate, candidates
+from estimator.diagnosis.unnamed.forms import STEP_EVERY_S
+from estimator.diagnosis.unnamed.scene import Scene, elements, scene
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult, fit, make_problem
 from estimator.physics.simulate import Start
@@ -78,15 +73,6 @@ def response(drive: FloatArray, load: FloatArray) -> FloatArray:
 def pick(pool: list[Candidate], element: Element, law: str) -> Candidate:
     (found,) = [c for c in pool if (c.element, c.law) == (element, law)]
     return found
-
-
-def test_the_motion_of_a_fit_is_the_motion_of_the_line(result: FitResult) -> None:
-    states = exact_states(TWO_MASS, drive_torque(2), START)
-    moved = motion_of(result, 1)
-    for found, state in ((moved.speed, SPEED), (moved.twist, TWIST), (moved.load_speed, LOAD_SPEED)):
-        assert np.max(np.abs(found - states[:, state])) < 1e-3 * np.ptp(states[:, state])
-    assert np.max(np.abs(moved.angle - states[:, ANGLE])) < 1e-3 * np.ptp(states[:, ANGLE])
-    np.testing.assert_array_equal(moved.torque, drive_torque(2))
 
 
 @pytest.mark.parametrize(
@@ -154,6 +140,15 @@ def test_load_steps_are_on_a_grid_each_in_one_recording(result: FitResult, pool:
         load = np.where(np.arange(1500) >= moment, 1.0, 0.0)
         expected = response(np.zeros(1500), load)
         assert np.max(np.abs(candidate.answers[1500:, 0] - expected)) < 5e-3 * np.ptp(expected)
+
+
+def test_what_sets_in_at_a_moment_does_so_in_one_recording_and_names_it(pool: list[Candidate]) -> None:
+    late = pick(pool, Element.LOAD, "dw_L/dt from 5.0 s on in run_2").answers[:, 0]
+    early = pick(pool, Element.LOAD, "dw_L/dt from 5.0 s on in run_1").answers[:, 0]
+    assert not late[:2001].any()
+    assert late[2001:].any()
+    assert early[501:1500].any()
+    assert not early[1500:].any()
 
 
 def test_every_input_but_the_last_may_count_more_than_its_reading() -> None:

@@ -15,12 +15,14 @@ from functools import partial
 
 from scipy import stats
 
-from estimator.diagnosis.disturbances import PLACES, Scene, elements, scene
-from estimator.diagnosis.equivalent import Place
 from estimator.diagnosis.evidence import SMALLEST_P, Gain
-from estimator.diagnosis.hunt import Hunt, again, first, first_along_motion
+from estimator.diagnosis.line import PLACES, Place
 from estimator.diagnosis.noise import effective_samples, noise_floor
-from estimator.diagnosis.pursuit import MOST_COEFFICIENTS
+from estimator.diagnosis.unnamed.first_look import first, first_along_motion
+from estimator.diagnosis.unnamed.hunt import Hunt
+from estimator.diagnosis.unnamed.look_again import again
+from estimator.diagnosis.unnamed.pursuit import MOST_COEFFICIENTS
+from estimator.diagnosis.unnamed.scene import Scene, elements, scene
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
 

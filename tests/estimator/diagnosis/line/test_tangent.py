@@ -7,14 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.blocks import block_mean, block_mean_of, lines, simulated, spread_stretches
-from estimator.diagnosis.tangent import block_length, tangent
+from estimator.diagnosis.line.averages import block_mean
+from estimator.diagnosis.line.linearise import tangent
+from estimator.diagnosis.line.motion import simulated
 from estimator.physics.fit import FitResult, fit, make_problem
 from estimator.physics.model import EffectValue
 from estimator.physics.simulate import Start
 from estimator.signals.record import FloatArray
 from tests.estimator.diagnosis.planted import drive_torque
-from tests.estimator.physics.bench import SPEED, TWIST, TWO_MASS, exact_states, linear_record, model, record
+from tests.estimator.physics.bench import SPEED, TWO_MASS, exact_states, linear_record, model
 
 START = Start(5.0, 0.0, 2.0, 0.0, 2.0)
 SAMPLES = 1500
@@ -67,31 +68,3 @@ def test_blocks_of_samples_are_their_average() -> None:
     expected = block_mean(fine.answer(held, nothing), 5)
     found = coarse.answer(held[::5], nothing[::5])
     assert np.max(np.abs(found - expected)) < 1e-4 * np.ptp(expected)
-
-
-def test_fast_sampling_is_cut_into_blocks_and_slow_sampling_is_not() -> None:
-    states = exact_states(TWO_MASS, drive_torque(1), START, sample_time_s=1e-3)
-    fast = record(drive_torque(1), states[:, SPEED], sample_time_s=1e-3)
-    result = fit(make_problem(model(TWO_MASS), [fast], ()))
-    length = block_length(result)
-    assert 5 <= length <= 10
-    assert block_length(result_of()) == 1
-    (line,) = lines(result)
-    assert line.size == SAMPLES // length
-    middle = block_mean(states[:, TWIST], length)
-    assert np.max(np.abs(line.motion.twist - middle)) < 0.02 * np.ptp(middle)
-
-
-def test_masked_samples_do_not_count_in_a_block() -> None:
-    values, use = np.array([1.0, 99.0, 3.0, 4.0, 99.0, 99.0]), np.array([True, False, True, True, False, False])
-    mean, weight = block_mean_of(values, use, 2)
-    np.testing.assert_array_equal(mean, [1.0, 3.5, 0.0])
-    np.testing.assert_array_equal(weight, [1, 2, 0])
-
-
-def test_a_long_recording_is_used_in_stretches_from_end_to_end() -> None:
-    used = spread_stretches(100_000, 10_000)
-    assert used.sum() == 9_000
-    assert used[0]
-    assert used[-1]
-    assert spread_stretches(500, 10_000).all()

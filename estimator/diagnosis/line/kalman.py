@@ -50,40 +50,29 @@ class Filtered(NamedTuple):
 
 
 @compiled
+def row_times_column(a: FloatArray, row: int, b: FloatArray, column: int) -> float:
+    """Return one entry of ``a b``."""
+    total = 0.0
+    for k in range(a.shape[1]):
+        total += a[row, k] * b[k, column]
+    return total
+
+
+@compiled
 def product(a: FloatArray, b: FloatArray, out: FloatArray) -> None:
-    """Fill ``out`` with ``a b``; small square matrices."""
-    m = a.shape[0]
-    for i in range(m):
-        for j in range(m):
-            total = 0.0
-            for k in range(m):
-                total += a[i, k] * b[k, j]
-            out[i, j] = total
+    """Fill ``out`` with ``a b``; small matrices."""
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            out[i, j] = row_times_column(a, i, b, j)
 
 
 @compiled
-def transposed_product(a: FloatArray, b: FloatArray, out: FloatArray) -> None:
-    """Fill ``out`` with ``a' b``."""
-    m = a.shape[0]
-    for i in range(m):
-        for j in range(m):
-            total = 0.0
-            for k in range(m):
-                total += a[k, i] * b[k, j]
-            out[i, j] = total
-
-
-@compiled
-def product_transposed(a: FloatArray, b: FloatArray, out: FloatArray) -> None:
-    """Fill ``out``, symmetric, with ``a b'``."""
-    m = a.shape[0]
-    for i in range(m):
+def symmetric_product(a: FloatArray, b: FloatArray, out: FloatArray) -> None:
+    """Fill ``out`` with ``a b`` where that is symmetric, and keep it so to the last bit."""
+    for i in range(out.shape[0]):
         for j in range(i + 1):
-            total = 0.0
-            for k in range(m):
-                total += a[i, k] * b[j, k]
-            out[i, j] = total
-            out[j, i] = total
+            out[i, j] = row_times_column(a, i, b, j)
+            out[j, i] = out[i, j]
 
 
 @compiled
@@ -163,7 +152,7 @@ def run_filter(
                 moved[r] += f[r, j] * mean[j]
         mean[:] = moved
         product(f, covariance, half)
-        product_transposed(half, f, covariance)
+        symmetric_product(half, f.T, covariance)
         covariance[m - 1, m - 1] += chain.walk
     return likelihood
 
@@ -196,7 +185,7 @@ def run_smoother(chain: Chain, kept: Filtered, estimates: FloatArray, variance: 
                 back[r] += step[j, r] * score[j]
         score[:] = back
         product(information, step, half)
-        transposed_product(step, half, information)
+        product(step.T, half, information)
         spread = kept.covariances[b, m - 1, m - 1]
         for r in range(m):
             estimates[b, r] = kept.means[b, r]

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.diagnosis.blocks import Line
-from estimator.diagnosis.disturbances import Candidate
 from estimator.diagnosis.noise import effective_samples
-from estimator.signals.record import BoolArray, FloatArray
+from estimator.diagnosis.unnamed.candidates import Candidate
+from estimator.diagnosis.unnamed.ground import Ground
+from estimator.signals.record import FloatArray
 
 MOST_TERMS = 9
 """Three load steps per recording in a set of three, or as many terms of another kind."""
@@ -29,33 +29,6 @@ TOO_ALIKE = 1e-8
 """Share of a column's power below which it is a combination of others."""
 
 Indices = NDArray[np.intp]
-
-
-class Ground:
-    """What the free unknowns of a fit could explain, to first order; rows are the blocks in use of all recordings.
-
-    Attributes
-    ----------
-    raw, error : ndarray, shape (rows,)
-        The error, and what re-tuning would leave of it.
-    jacobian : ndarray, shape (rows, U)
-        Derivative of the output by every unknown.
-    """
-
-    def __init__(self, cut: Sequence[Line], jacobian: FloatArray, error: FloatArray, pinned: BoolArray) -> None:
-        self.jacobian, self.raw, self.unknowns = jacobian, error, jacobian.shape[1]
-        self._basis = np.linalg.qr(jacobian[:, ~pinned])[0]
-        self._sizes = np.cumsum([int(line.rows.sum()) for line in cut])[:-1]
-        self.error = self.rest(error)
-
-    def rest(self, signals: FloatArray) -> FloatArray:
-        """Return what is left of signals, shape (rows,) or (rows, q)."""
-        left: FloatArray = signals - self._basis @ (self._basis.T @ signals)
-        return left
-
-    def split(self, rows: FloatArray) -> list[FloatArray]:
-        """Split rows into one array per recording."""
-        return list(np.split(rows, self._sizes))
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,16 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimator.diagnosis.blocks import Line, Motion, lines
-from estimator.diagnosis.discrepancy_picture import input_unit, picture
-from estimator.diagnosis.discrepancy_spectrum import error_spectrum, responses
-from estimator.diagnosis.disturbances import Scene
-from estimator.diagnosis.equivalent import Explanation, Input, explain_all
 from estimator.diagnosis.evidence import VERY_STRONG
-from estimator.diagnosis.hunt import Hunt, without_law
 from estimator.diagnosis.intervals import Z95
+from estimator.diagnosis.line import Explanation, Input, Line, Motion, explain_all, lines
 from estimator.diagnosis.result import Course, Discrepancy, Equivalent, LawPicture, RankedLaw
-from estimator.diagnosis.unnamed import ROUNDS, UnnamedLaw, hunts_of, judged
+from estimator.diagnosis.unnamed import ROUNDS, Hunt, Scene, UnnamedLaw, hunts_of, judged, without_law
+from estimator.diagnosis.where.axes import input_unit
+from estimator.diagnosis.where.picture import picture
+from estimator.diagnosis.where.responses import responses
+from estimator.diagnosis.where.spectrum import error_spectrum
 from estimator.physics import model
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult, outputs_at

@@ -11,29 +11,31 @@ from __future__ import annotations
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from enum import Enum
 from functools import partial
 
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from estimator.diagnosis.blocks import Line, Motion
-from estimator.diagnosis.kalman import Chain, Filtered, run_filter, run_smoother
-from estimator.diagnosis.tangent import LOAD, MOTOR
+from estimator.diagnosis.line.blocks import Line
+from estimator.diagnosis.line.kalman import Chain, Filtered, run_filter, run_smoother
+from estimator.diagnosis.line.motion import Motion
+from estimator.diagnosis.line.places import FORCES, Place, places, size_at
+from estimator.diagnosis.line.tangent import LOAD, MOTOR
 from estimator.physics import kernel
 from estimator.physics.fit import FitResult
-from estimator.physics.model import Structure
-from estimator.physics.motion import speed_scale, torque_scale
 from estimator.signals.record import FloatArray
 
+SLOWEST, FASTEST = 1e-3, 1e2
+"""Range of the walk's rate, as a share of the torque or speed in use, per root second."""
 
-class Place(Enum):
-    """Where an unknown input may act: on the motor, in the shaft, against the load, on the reading."""
+WIDE = 10.0
+"""Before the first sample a state may be off by this many times its size in use; the input by its size in use."""
 
-    MOTOR = "motor"
-    SHAFT = "shaft"
-    LOAD = "load"
-    SENSOR = "sensor"
+FORGETS_S = 1.0
+"""A shaft torque that stays is invisible: it only holds another twist. Its walk returns to zero in about this time."""
+
+SEARCH_TOLERANCE = 0.15
+"""Of the rate's decimal logarithm: the likelihood is flat around its top."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,31 +74,6 @@ class Explanation:
     log_likelihood: float
 
 
-FORCES = {Place.MOTOR: (1.0, 0.0), Place.SHAFT: (-1.0, -1.0), Place.LOAD: (0.0, 1.0), Place.SENSOR: (0.0, 0.0)}
-"""Torque on the motor and torque against the load per unit of the input."""
-
-SLOWEST, FASTEST = 1e-3, 1e2
-"""Range of the walk's rate, as a share of the torque or speed in use, per root second."""
-
-WIDE = 10.0
-"""Before the first sample a state may be off by this many times its size in use; the input by its size in use."""
-
-FORGETS_S = 1.0
-"""A shaft torque that stays is invisible: it only holds another twist. Its walk returns to zero in about this time."""
-
-SEARCH_TOLERANCE = 0.15
-"""Of the rate's decimal logarithm: the likelihood is flat around its top."""
-
-
-def places(result: FitResult) -> tuple[Place, ...]:
-    """Return the places that a fit's structure has."""
-    if result.problem.grid.structure is Structure.JOINT:
-        return (Place.SHAFT,)
-    if result.problem.grid.structure is Structure.ONE_MASS:
-        return (Place.MOTOR, Place.SENSOR)
-    return tuple(Place)
-
-
 def explain(result: FitResult, cut: Sequence[Line], place: Place, floor: float) -> Explanation:
     """Estimate the input at one place that explains a fit's error.
 
@@ -124,12 +101,6 @@ def explain(result: FitResult, cut: Sequence[Line], place: Place, floor: float) 
     return Explanation(place, tuple(smooth(line, place, rate, size, floor) for line in cut), rate, -float(best.fun))
 
 
-def size_at(result: FitResult, place: Place) -> float:
-    """Return the size in use of what acts at a place: torque, or speed at the sensor."""
-    records = result.problem.records
-    return speed_scale(records) if place is Place.SENSOR else torque_scale(records)
-
-
 def explain_all(result: FitResult, cut: Sequence[Line], floor: float) -> dict[Place, Explanation]:
     """Estimate the input at every place; the compiled passes hold no interpreter lock and run side by side."""
     wanted = places(result)
@@ -140,26 +111,6 @@ def explain_all(result: FitResult, cut: Sequence[Line], floor: float) -> dict[Pl
 
 def _explain_at(result: FitResult, cut: Sequence[Line], floor: float, place: Place) -> Explanation:
     return explain(result, cut, place, floor)
-
-
-def _chain(line: Line, place: Place, rate: float) -> Chain:
-    tangent = line.tangent
-    motor, load = FORCES[place]
-    direct = tangent.d[:, MOTOR] * motor + tangent.d[:, LOAD] * load + (1.0 if place is Place.SENSOR else 0.0)
-    drive = np.ascontiguousarray(tangent.gamma[:, :, MOTOR] * motor + tangent.gamma[:, :, LOAD] * load)
-    memory = float(np.exp(-line.period_s / FORGETS_S)) if place is Place.SHAFT else 1.0
-    return Chain(tangent.phi, drive, tangent.c, direct, memory, rate**2 * line.period_s)
-
-
-def _filter(line: Line, place: Place, chain: Chain, size: float, floor: float, kept: Filtered) -> float:
-    """Run the filter over one recording and return the log-likelihood of its error."""
-    states = np.zeros_like(line.tangent.scale) if place is Place.SENSOR else WIDE * line.tangent.scale
-    prior = np.diag(np.append(states, size) ** 2)  # with an error of the reading the line itself is as simulated
-    return run_filter(chain, line.error, np.where(line.okay, line.weight, 0.0), floor**2, prior, kept)
-
-
-def _room(rows: int, m: int) -> Filtered:
-    return Filtered(np.zeros((rows, m)), np.zeros((rows, m, m)), np.zeros((rows, m)), np.zeros(rows), np.zeros(rows))
 
 
 def smooth(line: Line, place: Place, rate: float, size: float, floor: float) -> Input:
@@ -180,3 +131,23 @@ def smooth(line: Line, place: Place, rate: float, size: float, floor: float) -> 
     if kernel.LOAD_SPEED not in line.tangent.states:
         moved["load_speed"] = moved["speed"]
     return Input(estimates[:, -1], np.sqrt(np.maximum(variance, 0.0)), replace(line.motion, **moved))
+
+
+def _chain(line: Line, place: Place, rate: float) -> Chain:
+    tangent = line.tangent
+    motor, load = FORCES[place]
+    direct = tangent.d[:, MOTOR] * motor + tangent.d[:, LOAD] * load + (1.0 if place is Place.SENSOR else 0.0)
+    drive = np.ascontiguousarray(tangent.gamma[:, :, MOTOR] * motor + tangent.gamma[:, :, LOAD] * load)
+    memory = float(np.exp(-line.period_s / FORGETS_S)) if place is Place.SHAFT else 1.0
+    return Chain(tangent.phi, drive, tangent.c, direct, memory, rate**2 * line.period_s)
+
+
+def _filter(line: Line, place: Place, chain: Chain, size: float, floor: float, kept: Filtered) -> float:
+    """Run the filter over one recording and return the log-likelihood of its error."""
+    states = np.zeros_like(line.tangent.scale) if place is Place.SENSOR else WIDE * line.tangent.scale
+    prior = np.diag(np.append(states, size) ** 2)  # with an error of the reading the line itself is as simulated
+    return run_filter(chain, line.error, np.where(line.okay, line.weight, 0.0), floor**2, prior, kept)
+
+
+def _room(rows: int, m: int) -> Filtered:
+    return Filtered(np.zeros((rows, m)), np.zeros((rows, m, m)), np.zeros((rows, m)), np.zeros(rows), np.zeros(rows))

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.locate import WINDOW_S, band_hz, intervals, region
+from estimator.diagnosis.where.locate import WINDOW_S, band_hz, intervals, region
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult, fit, make_problem
 from estimator.physics.simulate import Start

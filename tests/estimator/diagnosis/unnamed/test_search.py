@@ -7,10 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.disturbances import Candidate, candidates, scene
-from estimator.diagnosis.hunt import ground_of
-from estimator.diagnosis.pursuit import Ground, pursue
-from estimator.diagnosis.unnamed import ROUNDS, best_unnamed, unnamed_laws
+from estimator.diagnosis.unnamed.search import ROUNDS, best_unnamed, unnamed_laws
 from estimator.physics.effect import Element
 from estimator.physics.simulate import Start
 from tests.estimator.diagnosis.planted import SIGMA, Law, nominal_fit, quiet, recordings
@@ -109,48 +106,6 @@ def test_each_element_that_has_candidates_has_a_law() -> None:
     laws = unnamed_laws(nominal_fit(quiet((1,))))
     assert [law.element for law in laws] == list(Element)
     assert len({law.gain.n_effective for law in laws}) == 1
-
-
-def test_what_re_tuning_explains_is_not_a_law() -> None:
-    """A load inertia within its tolerance is d w_L/dt at the load: projected out, nothing is left of it."""
-    result = nominal_fit(quiet((1,)))
-    view = scene(result, SIGMA)
-    ground = ground_of(view)
-    pool = {c.law: c for c in candidates(view, Element.LOAD)}
-    (inertia,) = (c.answers for law, c in pool.items() if law.startswith("dw_L/dt from 1.0 s"))
-    drag = pool["w_L |w_L|"].answers
-    assert np.linalg.norm(ground.rest(inertia)) < 0.3 * np.linalg.norm(inertia)
-    assert np.linalg.norm(ground.rest(drag)) > 0.05 * np.linalg.norm(drag)
-    free = result.jacobian[:, ~result.pinned]
-    assert np.max(np.abs(free.T @ ground.rest(drag))) < 1e-8 * np.max(np.abs(result.jacobian)) * np.linalg.norm(drag)
-
-
-def test_a_column_of_the_jacobian_is_nothing_at_all() -> None:
-    result = nominal_fit(quiet((1,)))
-    ground = ground_of(scene(result, SIGMA))
-    path = pursue([Candidate(Element.MOTOR, "a parameter", result.jacobian[:, [2]].copy())], ground)
-    assert path.chosen == []
-    assert path.alone.tolist() == [0.0]
-
-
-def test_a_group_is_worth_its_coefficients_and_not_more() -> None:
-    """Two columns that carry the error, one of them twice, among columns of noise: rank 2, not 3."""
-    rng = np.random.default_rng(5)
-    result = nominal_fit(quiet((1,)))
-    plain = ground_of(scene(result, SIGMA))
-    rows = plain.error.size
-    signal = rng.standard_normal((rows, 2))
-    noise = [Candidate(Element.MOTOR, f"noise {i}", rng.standard_normal((rows, 1))) for i in range(20)]
-    planted = Candidate(Element.MOTOR, "planted", np.column_stack([signal, signal[:, 0] - signal[:, 1]]))
-    error = signal @ np.array([0.1, -0.05]) + 0.02 * rng.standard_normal(rows)
-    ground = Ground(scene(result, SIGMA).cut, plain.jacobian, error, result.pinned)
-    path = pursue([*noise[:10], planted, *noise[10:]], ground)
-    assert path.chosen == [10]
-    assert path.coefficients == [0, 2]
-    coefficients, left = path.solved(ground, 1, 1e-9)
-    np.testing.assert_allclose(planted.answers @ coefficients, signal @ [0.1, -0.05], atol=0.005)
-    assert left @ left == pytest.approx(path.squares[1], rel=1e-6)
-    assert left.std() == pytest.approx(0.02, rel=0.1)
 
 
 def test_a_large_mismatch_is_located_by_simulating_with_the_law_found() -> None:

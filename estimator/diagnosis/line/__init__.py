@@ -1,0 +1,28 @@
+"""The line of a fit, linearised and cut into blocks: what small torques do to it, and which would explain its error."""
+
+from estimator.diagnosis.line.averages import block_mean_of
+from estimator.diagnosis.line.blocks import Line, lines
+from estimator.diagnosis.line.equivalent import Explanation, Input, explain, explain_all, smooth
+from estimator.diagnosis.line.motion import NO_FORCE, Force, Motion, motion_of, simulated
+from estimator.diagnosis.line.places import DRIVES, FORCES, PLACES, Place, size_at
+
+__all__ = [
+    "DRIVES",
+    "FORCES",
+    "NO_FORCE",
+    "PLACES",
+    "Explanation",
+    "Force",
+    "Input",
+    "Line",
+    "Motion",
+    "Place",
+    "block_mean_of",
+    "explain",
+    "explain_all",
+    "lines",
+    "motion_of",
+    "simulated",
+    "size_at",
+    "smooth",
+]

@@ -1,0 +1,116 @@
+"""Recordings of a fit cut into blocks of samples: the rows on which its error is explained."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimator.diagnosis.line.averages import block_mean_of
+from estimator.diagnosis.line.linearise import block_length, tangent
+from estimator.diagnosis.line.motion import NO_FORCE, Force, Motion, between, motion_in_blocks, states_of
+from estimator.diagnosis.line.tangent import Tangent
+from estimator.physics.fit import FitResult
+from estimator.signals.record import BoolArray, FloatArray, Record
+
+MOST_ROWS = 30_000
+"""Blocks that laws are fitted to, all recordings together: five minutes at 10 ms. They bound memory."""
+
+STRETCH = 3000
+"""Blocks of a stretch of a long recording."""
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """One recording of a fit, in blocks.
+
+    Attributes
+    ----------
+    record : Record
+    length : int
+        Samples per block.
+    tangent : Tangent
+    error : ndarray, shape (B,)
+        Measured less simulated output, averaged over the block's good samples; 0 where there are none.
+    weight : ndarray, shape (B,)
+        How many samples of the block count.
+    motion : Motion
+        As the fit has it, in the middle of each block.
+    reading : Motion
+        The same at the moments at which the output was read.
+    stretches : ndarray of bool, shape (B,)
+        Where laws are fitted: everywhere, or in stretches spread over a long recording.
+    """
+
+    record: Record
+    length: int
+    tangent: Tangent
+    error: FloatArray
+    weight: FloatArray
+    motion: Motion
+    reading: Motion
+    stretches: BoolArray
+
+    @property
+    def okay(self) -> BoolArray:
+        """Blocks with at least half their samples, shape (B,)."""
+        return np.asarray(2 * self.weight >= self.length)
+
+    @property
+    def rows(self) -> BoolArray:
+        """Blocks that laws are fitted to, shape (B,)."""
+        return self.okay & self.stretches
+
+    @property
+    def period_s(self) -> float:
+        """Length of a block [s]."""
+        return self.length * self.record.sample_time_s
+
+    def samples(self, values: FloatArray) -> FloatArray:
+        """Hold a signal of shape (B,) over the samples of each block, the last to the end; shape (N,)."""
+        held = np.repeat(values, self.length)
+        return np.concatenate([held, np.full(self.record.time_s.size - held.size, held[-1])])
+
+    @property
+    def size(self) -> int:
+        """Number of blocks."""
+        return int(self.error.size)
+
+
+def lines(result: FitResult, forces: Sequence[Force] | None = None) -> tuple[Line, ...]:
+    """Return the recordings of a fit in blocks, under further torques where there are any."""
+    length = block_length(result)
+    count = len(result.problem.records)
+    every = [NO_FORCE] * count if forces is None else forces
+    return tuple(_line(result, i, length, force) for i, force in enumerate(every))
+
+
+def _line(result: FitResult, index: int, length: int, force: Force) -> Line:
+    record = result.problem.records[index]
+    use = result.problem.use[index]
+    error, weight = block_mean_of(record.output - result.outputs[index], use, length)
+    states = states_of(result, index, force)
+    return Line(
+        record,
+        length,
+        tangent(result, index, length),
+        error,
+        weight,
+        motion_in_blocks(record, {name: between(values) for name, values in states.items()}, length),
+        motion_in_blocks(record, states, length),
+        spread_stretches(error.size, MOST_ROWS // len(result.problem.records)),
+    )
+
+
+def spread_stretches(blocks: int, most: int) -> BoolArray:
+    """Return which blocks of a recording are used: all, or evenly spread stretches of at most so many; (blocks,)."""
+    used = np.ones(blocks, dtype=np.bool_)
+    if blocks <= most:
+        return used
+    length = min(STRETCH, most)
+    starts = np.linspace(0, blocks - length, max(most // length, 1)).astype(int)
+    used[:] = False
+    for start in starts:
+        used[start : start + length] = True
+    return used

@@ -1,0 +1,155 @@
+"""The driveline of a fit, linearised along its own simulation, whatever law is in the model."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from estimator.diagnosis.line.differences import Nudges, Setting, linearise
+from estimator.diagnosis.line.tangent import Tangent
+from estimator.physics import kernel
+from estimator.physics.catalogue import BUILT_IN
+from estimator.physics.effect import Element
+from estimator.physics.fit import FitResult, start_of
+from estimator.physics.layout import slot
+from estimator.physics.model import Structure, natural_frequencies_rad_s
+from estimator.physics.motion import speed_scale, torque_scale
+from estimator.physics.simulate import MASSES, initial_state, motor_angle, output_state
+from estimator.physics.torque_path import shaft_torque
+from estimator.signals.record import FloatArray, OutputKind, Record
+
+NUDGE = 1e-5
+"""Size of a difference step, as a share of the speed or torque in use."""
+
+LONGEST_BLOCK_S = 0.01
+BLOCKS_PER_PERIOD = 12.0
+"""Samples closer together than this many per period of the line's fastest mode are averaged."""
+
+
+def block_length(result: FitResult) -> int:
+    """Return how many samples of a fit's recordings make a block: 1 where they are as far apart as the line needs."""
+    sample_time_s = result.problem.records[0].sample_time_s
+    structure = result.problem.grid.structure
+    values = {name: float(result.p[slot("", name)]) for name in structure.parameter_names}
+    fastest = float(natural_frequencies_rad_s(values)[-1])
+    longest_s = LONGEST_BLOCK_S
+    if fastest > 0.0:
+        longest_s = min(longest_s, 2.0 * np.pi / (BLOCKS_PER_PERIOD * fastest))
+    return max(1, int(longest_s / sample_time_s))
+
+
+def tangent(result: FitResult, index: int, length: int) -> Tangent:
+    """Linearise one recording of a fit.
+
+    Parameters
+    ----------
+    length : int
+        Samples per block; what does not fill a block at the end is left out.
+
+    Returns
+    -------
+    Tangent
+        Of ``N // length`` blocks, or of one where the model is linear.
+    """
+    problem = result.problem
+    if problem.grid.structure is Structure.JOINT:
+        return _of_joint(result)
+    record, p = problem.records[index], result.p_of(index).copy()
+    p[kernel.QUANTISATION] = 0.0  # steps have no slope; their size is noise here
+    direct = p.copy()
+    direct[[kernel.DELAY, kernel.LAG, kernel.DRIFT]] = 0.0  # a disturbance acts on the shaft, behind the torque path
+    start, angle = start_of(problem, result.x, index), motor_angle(record)
+    torque = shaft_torque(record.torque_nm, record.time_s - record.time_s[0], p)
+    states = active_states(problem.grid.structure, p, record.kind)
+    scale = _scales(result, states)
+    blocks = record.time_s.size // length
+    phi, gamma, c, d = linearise(
+        _setting(result, record, angle),
+        Nudges(np.array(states), NUDGE * scale, NUDGE * torque_scale([record])),
+        torque,
+        _load(result, index, start.load_torque_nm),
+        p,
+        direct,
+        initial_state(start, torque[0], angle[0], p),
+        min(blocks, 1) if is_linear(p) else blocks,
+        length,
+    )
+    return Tangent(phi, gamma, c, d, states, scale)
+
+
+def _setting(result: FitResult, record: Record, angle: FloatArray) -> Setting:
+    grid = result.problem.grid
+    output = output_state(record, grid.structure)
+    return Setting(
+        masses=MASSES[grid.structure],
+        sample_time_s=record.sample_time_s,
+        substeps=grid.substeps,
+        sign_width=grid.sign_width,
+        angle=angle,
+        output=output,
+        sensor=output != kernel.ANGLE,
+        out=np.zeros(angle.size),
+        slopes=np.zeros((2, 0)),  # no room: not wanted
+    )
+
+
+def _load(result: FitResult, index: int, constant_nm: float) -> FloatArray:
+    """Return the load torque of one recording at a fit, shape (N,)."""
+    load = np.full(result.problem.records[index].time_s.size, constant_nm)
+    extra = result.problem.local[index].extra_load(result.local_of(index))
+    return load if extra is None else load + extra
+
+
+def _of_joint(result: FitResult) -> Tangent:
+    """Return the tangent of a joint: its motion is imposed, a torque against the load is missing in what it takes."""
+    states = active_states(Structure.JOINT, result.p, OutputKind.FORCE)
+    n = len(states)
+    at_output = np.array([[0.0, -1.0]])
+    return Tangent(
+        np.zeros((1, n, n)), np.zeros((1, n, 2)), np.zeros((1, n)), at_output, states, _scales(result, states)
+    )
+
+
+_NONLINEAR = tuple(
+    (slot(entry.name, parameter.name), parameter.null)
+    for entry in BUILT_IN.values()
+    if entry.element not in (Element.TORQUE_PATH, Element.ACQUISITION) and not entry.profile
+    for parameter in entry.parameters[:1]
+)
+"""Decisive parameter of each effect that changes how the line answers to a torque behind the torque path."""
+
+
+def is_linear(p: FloatArray) -> bool:
+    """Tell whether a parameter vector is that of a linear line that does not change with time."""
+    return all(p[i] == null for i, null in _NONLINEAR)
+
+
+def active_states(structure: Structure, p: FloatArray, kind: OutputKind) -> tuple[int, ...]:
+    """Return which entries of the kernel's state can move the output of a model."""
+    states = [kernel.ANGLE] if kind is OutputKind.POSITION else []
+    states.append(kernel.SPEED)
+    if structure is not Structure.ONE_MASS:
+        states += [kernel.TWIST, kernel.LOAD_SPEED]
+    names = kernel.State._fields
+    if structure is Structure.THREE_MASS:
+        states += [names.index("middle_twist"), names.index("middle_speed")]
+    if p[kernel.SLIDER] != 0.0:
+        states.append(names.index("loading"))
+    if p[kernel.SLIP] > 0.0:
+        states.append(names.index("vehicle_speed"))
+    if p[kernel.BRANCH_INERTIA] > 0.0:
+        states += [names.index("branch_twist"), names.index("branch_speed")]
+    if p[kernel.FILTER] > 0.0:
+        states.append(kernel.FILTERED)
+    return tuple(states)
+
+
+def _scales(result: FitResult, states: tuple[int, ...]) -> FloatArray:
+    records = result.problem.records
+    speed, torque = speed_scale(records), torque_scale(records)
+    stiffness = float(result.p[slot("", "k")])
+    twist = torque / stiffness if stiffness > 0.0 else 1.0
+    names = kernel.State._fields
+    sizes = dict.fromkeys(range(kernel.STATES), speed)
+    sizes |= {names.index(name): twist for name in ("twist", "branch_twist", "middle_twist")}
+    sizes |= {names.index("loading"): 1.0, kernel.ANGLE: 1.0}
+    return np.array([sizes[state] for state in states])

@@ -1,0 +1,86 @@
+"""What happens in the line of a fit: its states, as it is and under further torques."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from estimator.diagnosis.line.averages import block_mean
+from estimator.diagnosis.line.tangent import LOAD, MOTOR
+from estimator.physics import kernel
+from estimator.physics.fit import FitResult, start_of
+from estimator.physics.model import Structure
+from estimator.physics.simulate import motor_angle, simulate
+from estimator.signals.record import FloatArray, Record
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """What happens in one recording, for laws to be functions of; arrays of shape (B,), one value per block.
+
+    ``angle`` is by the recording's own output; ``inputs`` has shape (B, M).
+    """
+
+    time_s: FloatArray
+    torque: FloatArray
+    inputs: FloatArray
+    angle: FloatArray
+    speed: FloatArray
+    twist: FloatArray
+    load_speed: FloatArray
+
+
+Force = tuple[FloatArray | float, FloatArray | float]
+"""Torque on the motor and torque against the load beside the model's, shape (N,) each [Nm]."""
+
+NO_FORCE: Force = (0.0, 0.0)
+
+
+def simulated(result: FitResult, index: int, force: Force = NO_FORCE, state: int | None = None) -> FloatArray:
+    """Simulate a recording at a fit's unknowns under further torques: its output, or a state; shape (N,)."""
+    problem = result.problem
+    record, basis = problem.records[index], problem.local[index]
+    torque = record.torque_nm.copy()
+    torque[:, 0] += force[MOTOR]
+    load = basis.extra_load(result.local_of(index))
+    return simulate(
+        problem.grid,
+        replace(record, torque_nm=torque),
+        result.p_of(index),
+        start_of(problem, result.x, index),
+        force[LOAD] + (np.zeros(torque.shape[0]) if load is None else load),
+        state,
+    )
+
+
+def motion_of(result: FitResult, index: int) -> Motion:
+    """Simulate every state of one recording at a fit, at every sample."""
+    return motion_in_blocks(result.problem.records[index], states_of(result, index), 1)
+
+
+def states_of(result: FitResult, index: int, force: Force = NO_FORCE) -> dict[str, FloatArray]:
+    """Simulate every state of one recording at a fit; the angle is by the recording's own output."""
+    wanted = (kernel.SPEED, kernel.TWIST, kernel.LOAD_SPEED)
+    speed, twist, load_speed = (simulated(result, index, force, state) for state in wanted)
+    if result.problem.grid.structure is Structure.ONE_MASS:
+        load_speed = speed
+    angle = motor_angle(result.problem.records[index])
+    return {"angle": angle, "speed": speed, "twist": twist, "load_speed": load_speed}
+
+
+def motion_in_blocks(record: Record, states: dict[str, FloatArray], length: int) -> Motion:
+    """Return sampled states of one recording, with its time and torque, averaged over blocks."""
+    return Motion(
+        block_mean(record.time_s, length),
+        block_mean(record.total_torque_nm, length),
+        block_mean(record.torque_nm, length),
+        **{name: block_mean(values, length) for name, values in states.items()},
+    )
+
+
+def between(values: FloatArray) -> FloatArray:
+    """Return a sampled signal half a sample later, where the torque held from a sample on has its middle."""
+    later = np.append(values[1:], 2.0 * values[-1] - values[-2])
+    middle: FloatArray = 0.5 * (values + later)
+    return middle

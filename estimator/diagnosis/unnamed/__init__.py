@@ -1,0 +1,19 @@
+"""Laws without a name: at each element the best sparse sum of functions, the rival that every name must beat."""
+
+from estimator.diagnosis.unnamed.hunt import Hunt
+from estimator.diagnosis.unnamed.look_again import without_law
+from estimator.diagnosis.unnamed.scene import Scene, scene
+from estimator.diagnosis.unnamed.search import ROUNDS, UnnamedLaw, best_unnamed, hunts_of, judged, unnamed_laws
+
+__all__ = [
+    "ROUNDS",
+    "Hunt",
+    "Scene",
+    "UnnamedLaw",
+    "best_unnamed",
+    "hunts_of",
+    "judged",
+    "scene",
+    "unnamed_laws",
+    "without_law",
+]

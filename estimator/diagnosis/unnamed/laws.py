@@ -1,0 +1,193 @@
+"""The laws that are tried, element by element, as functions of the motion at their place."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from estimator.diagnosis.line import Motion
+from estimator.diagnosis.unnamed.shapes import (
+    at_low_speed,
+    behind,
+    beyond,
+    decaying,
+    fading,
+    inside,
+    peaked,
+    rate,
+    rising,
+    sign,
+    since_start,
+    slide,
+)
+from estimator.physics.effect import Element
+from estimator.signals.record import FloatArray
+
+Law = Callable[[Motion], FloatArray]
+"""A function of the motion in one recording, shape (B,)."""
+
+
+def one(motion: Motion) -> FloatArray:
+    """Return what does not change: the law of a plain step or wave."""
+    return np.ones_like(motion.angle)
+
+
+def _torque(motion: Motion) -> FloatArray:
+    return motion.torque
+
+
+def _speed(motion: Motion) -> FloatArray:
+    return motion.speed
+
+
+def _twist(m: Motion) -> FloatArray:
+    return m.twist
+
+
+def _twist_rate(m: Motion) -> FloatArray:
+    apart: FloatArray = m.speed - m.load_speed
+    return apart
+
+
+def _of(function: Callable[[FloatArray, float], FloatArray], signal: Law, size: float) -> Law:
+    """Return a function with one size of a signal."""
+    return lambda m: function(signal(m), size)
+
+
+def _with(function: Callable[[FloatArray, Motion, float], FloatArray], signal: Law, time_s: float) -> Law:
+    """Return a function with one time of a signal and of its course."""
+    return lambda m: function(signal(m), m, time_s)
+
+
+def _drag_laws(name: str, speed: Law) -> dict[str, Law]:
+    """Return what may brake a mass, as functions of its speed and of time."""
+    laws: dict[str, Law] = {
+        f"sign({name})": lambda m: sign(speed(m)),
+        f"{name} |{name}|": lambda m: speed(m) * np.abs(speed(m)),
+        f"{name}^3": lambda m: speed(m) ** 3,
+        f"|{name}|": lambda m: np.abs(speed(m)),
+    }
+    for share in (0.05, 0.15, 0.4):
+        laws[f"{name} / (1 + ({name} / {share:g} top)^2)"] = _of(peaked, speed, share)
+        laws[f"sign({name}) exp(-|{name}| / {share:g} top)"] = _of(fading, speed, share)
+    for time_s in (3.0, 10.0, 30.0):
+        laws[f"{name} exp(-t / {time_s:g} s)"] = _with(decaying, speed, time_s)
+    return laws
+
+
+MOTOR_LAWS: Mapping[str, Law] = _drag_laws("w_M", lambda m: m.speed)
+
+LOAD_LAWS: Mapping[str, Law] = _drag_laws("w_L", lambda m: m.load_speed) | {
+    f"shaft torque behind by {time_s:g} s": _with(behind, lambda m: m.twist, time_s) for time_s in (0.01, 0.03, 0.1)
+}
+
+
+def _shaft_laws() -> dict[str, Law]:
+    laws: dict[str, Law] = {
+        "twist |twist|": lambda m: m.twist * np.abs(m.twist),
+        "twist^2": lambda m: m.twist**2,
+        "twist^3": lambda m: m.twist**3,
+        "sign(twist)": lambda m: sign(m.twist),
+        "sign(d twist/dt)": lambda m: sign(_twist_rate(m)),
+        "|d twist/dt| d twist/dt": lambda m: np.abs(_twist_rate(m)) * _twist_rate(m),
+        "twist^2 d twist/dt": lambda m: m.twist**2 * _twist_rate(m),
+        "|twist| d twist/dt": lambda m: np.abs(m.twist) * _twist_rate(m),
+        "twist |w_M|": lambda m: m.twist * np.abs(m.speed),
+        "twist w_M^2": lambda m: m.twist * m.speed**2,
+        "d twist/dt |w_M|": lambda m: _twist_rate(m) * np.abs(m.speed),
+        "twist t": lambda m: m.twist * since_start(m),
+    }
+    for share in (0.03, 0.1, 0.3):
+        laws[f"twist held inside {share:g} of its range"] = _of(inside, _twist, share)
+        laws[f"slider that yields at {share:g} of the twist"] = _of(slide, _twist, share)
+        laws[f"twist / (1 + (w_M / {share:g} top)^2)"] = _with(at_low_speed, _twist, share)
+    for time_s in (0.005, 0.01, 0.02, 0.04, 0.1, 0.3):
+        laws[f"relaxation of the twist in {time_s:g} s"] = _with(behind, _twist, time_s)
+    return laws
+
+
+SHAFT_LAWS: Mapping[str, Law] = _shaft_laws()
+
+
+def _torque_laws() -> dict[str, Law]:
+    laws: dict[str, Law] = {
+        "T": lambda m: m.torque,
+        "|T|": lambda m: np.abs(m.torque),
+        "T |T|": lambda m: m.torque * np.abs(m.torque),
+        "T^3": lambda m: m.torque**3,
+        "sign(T)": lambda m: sign(m.torque),
+        "T t": lambda m: m.torque * since_start(m),
+        "one period late": lambda m: np.append(m.torque[:1], m.torque[:-1]) - m.torque,
+        "two periods late": lambda m: np.append(m.torque[[0, 0]], m.torque[:-2]) - m.torque,
+        "T |w_M|": lambda m: m.torque * np.abs(m.speed),
+    }
+    for share in (0.03, 0.1):
+        laws[f"T held inside {share:g} of its range"] = _of(inside, _torque, share)
+    for share in (0.5, 0.65, 0.8, 0.9):
+        laws[f"T beyond {share:g} of its range"] = _of(beyond, _torque, share)
+    for time_s in (0.005, 0.02, 0.06, 0.2):
+        laws[f"T behind by {time_s:g} s"] = _with(behind, _torque, time_s)
+    for time_s in (3.0, 10.0, 30.0):
+        laws[f"T (1 - exp(-t / {time_s:g} s))"] = _with(rising, _torque, time_s)
+    return laws
+
+
+TORQUE_LAWS: Mapping[str, Law] = _torque_laws()
+
+
+def _reading_laws() -> dict[str, Law]:
+    laws: dict[str, Law] = {
+        "dw/dt": lambda m: rate(m.speed, m),
+        "|w|": lambda m: np.abs(m.speed),
+        "w": lambda m: m.speed,
+        "w |w|": lambda m: m.speed * np.abs(m.speed),
+        "w^3": lambda m: m.speed**3,
+        "sign(w)": lambda m: sign(m.speed),
+        "T": lambda m: m.torque,
+    }
+    for time_s in (0.005, 0.02, 0.06, 0.2):
+        laws[f"w behind by {time_s:g} s"] = _with(behind, _speed, time_s)
+    return laws
+
+
+READING_LAWS: Mapping[str, Law] = _reading_laws()
+
+LAWS: Mapping[Element, Mapping[str, Law]] = {
+    Element.TORQUE_PATH: TORQUE_LAWS,
+    Element.MOTOR: MOTOR_LAWS,
+    Element.SHAFT: SHAFT_LAWS,
+    Element.LOAD: LOAD_LAWS,
+    Element.SPEED_SENSOR: READING_LAWS,
+    Element.ACQUISITION: {"t dw/dt": lambda m: since_start(m) * rate(m.speed, m)},
+}
+
+FREE: Mapping[Element, Mapping[str, Law]] = {
+    Element.TORQUE_PATH: {"T": lambda m: m.torque},
+    Element.MOTOR: {"w_M": lambda m: m.speed},
+    Element.SHAFT: {"twist": lambda m: m.twist, "d twist/dt": _twist_rate},
+    Element.LOAD: {"w_L": lambda m: m.load_speed},
+    Element.SPEED_SENSOR: {"w": lambda m: m.speed},
+    Element.ACQUISITION: {},
+}
+"""Signals of which a law may be any function."""
+
+CHANGING: Mapping[Element, Mapping[str, Law]] = {
+    Element.TORQUE_PATH: {},
+    Element.MOTOR: {"dw_M/dt": lambda m: rate(m.speed, m)},
+    Element.SHAFT: {"twist": lambda m: m.twist},
+    Element.LOAD: {"dw_L/dt": lambda m: rate(m.load_speed, m), "sign(w_L)": lambda m: sign(m.load_speed)},
+    Element.SPEED_SENSOR: {},
+    Element.ACQUISITION: {},
+}
+"""Laws that may set in at a moment of one recording."""
+
+MODULATIONS: Mapping[Element, Mapping[str, Law]] = {
+    Element.TORQUE_PATH: {"": one, "T ": _torque},
+    Element.MOTOR: {},  # what depends on the motor's angle is the torque path's there
+    Element.SHAFT: {"": one},
+    Element.LOAD: {"": one},
+    Element.SPEED_SENSOR: {"w ": _speed},
+    Element.ACQUISITION: {},
+}
+"""What a wave over the angle is multiplied by."""

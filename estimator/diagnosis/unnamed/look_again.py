@@ -1,0 +1,120 @@
+"""The look for a law from where the law found has led.
+
+A large mismatch is more than a small disturbance of the re-tuned model. A further round simulates with the law found
+and with what it changes of the parameters, looks at the error from there, and chooses anew; a step that does not make
+the simulation better is shortened (Gauss-Newton over the model's unknowns and the law's coefficients).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.optimize import lsq_linear
+
+from estimator.diagnosis.line import block_mean_of, lines, simulated
+from estimator.diagnosis.unnamed.candidates import answers, candidates
+from estimator.diagnosis.unnamed.extra import Extra, extra_of
+from estimator.diagnosis.unnamed.ground import Ground
+from estimator.diagnosis.unnamed.hunt import NO_LAW, RIDGE, Found, Hunt, cost, terms_of, weights_of, worthwhile
+from estimator.diagnosis.unnamed.pursuit import pursue
+from estimator.diagnosis.unnamed.scene import Scene
+from estimator.physics.fit import STEP, FitResult, bounds, residual_at
+from estimator.signals.record import FloatArray
+
+STEPS = (1.0, 0.5, 0.2, 0.05)
+"""Shares of a step that are tried until the error falls."""
+
+
+def again(hunt: Hunt) -> Hunt:
+    """Simulate with the law found, look at the error from there, and choose again."""
+    if hunt.stuck:
+        return hunt
+    terms = worthwhile(hunt)
+    if terms == 0:
+        return _given_up(hunt)
+    step, coefficients = _solution(hunt, terms)
+    wanted = weights_of(hunt, terms, coefficients)
+    before = hunt.view.result
+    for share in STEPS:
+        weights = [old + share * (new - old) for old, new in zip(hunt.weights, wanted, strict=True)]
+        x = np.clip(before.x + share * step, *bounds(before.problem))
+        extra = extra_of(hunt.view, hunt.element, weights)
+        moved = replace(before, x=x, outputs=tuple(extra.output(before, x, i) for i in range(len(weights))))
+        if _squares(moved) < _squares(before):
+            return _looked(hunt, moved, extra, weights, cost(hunt, terms, terms_of(hunt, terms, coefficients)))
+    return _given_up(hunt)
+
+
+def _given_up(hunt: Hunt) -> Hunt:
+    """Return a hunt that goes no further; a law that was only promised, and not simulated, is none."""
+    if any(w.any() for w in hunt.weights):
+        return replace(hunt, stuck=True)
+    error = np.concatenate([line.error[line.rows] for line in hunt.view.cut])
+    mean_square, errors = float(error @ error) / error.size, hunt.ground.split(error)
+    return replace(hunt, stuck=True, law=NO_LAW, mean_square=mean_square, errors=errors)
+
+
+def without_law(hunt: Hunt) -> FitResult:
+    """Return the model that a hunt has come to, simulated without its law."""
+    result = hunt.view.result
+    outputs = tuple(simulated(result, i) for i in range(len(hunt.view.cut)))
+    return replace(result, outputs=outputs)
+
+
+def _looked(hunt: Hunt, moved: FitResult, extra: Extra, weights: list[FloatArray], law: Found) -> Hunt:
+    """Look at the error of a simulation with a law, and choose among the forms again."""
+    view = Scene(moved, lines(moved, extra.forces), hunt.view.explanations)
+    known = answers(view, hunt.element, [w[:, np.newaxis] for w in weights])[:, 0]
+    error = np.concatenate([line.error[line.rows] for line in view.cut])
+    ground = Ground(view.cut, _jacobian(view, extra), error + known, moved.pinned)
+    path = pursue(candidates(view, hunt.element, hunt.forms), ground)
+    return replace(
+        hunt,
+        view=view,
+        ground=ground,
+        path=path,
+        weights=weights,
+        law=law,
+        mean_square=float(error @ error) / error.size,
+        errors=ground.split(error),
+    )
+
+
+def _squares(result: FitResult) -> float:
+    """Return the sum of squares of the error of simulated outputs."""
+    left = residual_at(result.problem, result.outputs)
+    return float(left @ left)
+
+
+def _jacobian(view: Scene, extra: Extra) -> FloatArray:
+    """Return the derivative of the output by every unknown with a law in place, shape (rows, U)."""
+    result = view.result
+    _, high = bounds(result.problem)
+    shared = len(result.problem.shared)
+    first_local = shared + np.cumsum([0, *(basis.guess.size for basis in result.problem.local)])
+    parts = []
+    for i, line in enumerate(view.cut):
+        part = np.zeros((int(line.rows.sum()), result.x.size))
+        for j in [*range(shared), *range(first_local[i], first_local[i + 1])]:
+            x = result.x.copy()
+            x[j] += STEP if x[j] + STEP <= high[j] else -STEP
+            change = (extra.output(result, x, i) - result.outputs[i]) / (x[j] - result.x[j])
+            part[:, j] = block_mean_of(change, result.problem.use[i], line.length)[0][line.rows]
+        parts.append(part)
+    return np.vstack(parts)
+
+
+def _solution(hunt: Hunt, terms: int) -> tuple[FloatArray, FloatArray]:
+    """Return the step of the unknowns, inside their bounds, and the coefficients of the first terms."""
+    result, ground, path = hunt.view.result, hunt.ground, hunt.path
+    columns = path.columns[:, path.term < terms]
+    design = np.hstack([ground.jacobian, columns])
+    scale = np.maximum(np.linalg.norm(design, axis=0), np.finfo(float).tiny)
+    q, r = np.linalg.qr(np.vstack([design / scale, RIDGE * np.eye(scale.size)]))
+    low, high = bounds(result.problem)
+    free, open_edge = np.full(columns.shape[1], np.inf), 1e-12  # an unknown at its bound has no room but must have some
+    lower = np.concatenate([np.minimum(low - result.x, -open_edge), -free]) * scale
+    upper = np.concatenate([np.maximum(high - result.x, open_edge), free]) * scale
+    solved = lsq_linear(r, q[: ground.raw.size].T @ ground.raw, (lower, upper)).x / scale
+    return solved[: result.x.size], solved[result.x.size :]

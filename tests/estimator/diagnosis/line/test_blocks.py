@@ -1,0 +1,44 @@
+"""Recordings in blocks: how long they are, what counts in them, and which are used."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from estimator.diagnosis.line.averages import block_mean, block_mean_of
+from estimator.diagnosis.line.blocks import lines, spread_stretches
+from estimator.diagnosis.line.linearise import block_length
+from estimator.physics.fit import fit, make_problem
+from estimator.physics.simulate import Start
+from tests.estimator.diagnosis.planted import drive_torque
+from tests.estimator.physics.bench import SPEED, TWIST, TWO_MASS, exact_states, linear_record, model, record
+
+START = Start(5.0, 0.0, 2.0, 0.0, 2.0)
+
+
+def test_fast_sampling_is_cut_into_blocks_and_slow_sampling_is_not() -> None:
+    states = exact_states(TWO_MASS, drive_torque(1), START, sample_time_s=1e-3)
+    slow = linear_record(TWO_MASS, drive_torque(1), START)
+    fast = record(drive_torque(1), states[:, SPEED], sample_time_s=1e-3)
+    result = fit(make_problem(model(TWO_MASS), [fast], ()))
+    length = block_length(result)
+    assert 5 <= length <= 10
+    assert block_length(fit(make_problem(model(TWO_MASS), [slow], ()))) == 1
+    (line,) = lines(result)
+    assert line.size == 1500 // length
+    middle = block_mean(states[:, TWIST], length)
+    assert np.max(np.abs(line.motion.twist - middle)) < 0.02 * np.ptp(middle)
+
+
+def test_masked_samples_do_not_count_in_a_block() -> None:
+    values, use = np.array([1.0, 99.0, 3.0, 4.0, 99.0, 99.0]), np.array([True, False, True, True, False, False])
+    mean, weight = block_mean_of(values, use, 2)
+    np.testing.assert_array_equal(mean, [1.0, 3.5, 0.0])
+    np.testing.assert_array_equal(weight, [1, 2, 0])
+
+
+def test_a_long_recording_is_used_in_stretches_from_end_to_end() -> None:
+    used = spread_stretches(100_000, 10_000)
+    assert used.sum() == 9_000
+    assert used[0]
+    assert used[-1]
+    assert spread_stretches(500, 10_000).all()
