@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN    := .venv/bin
 READY  := .venv/.ready
 
-.PHONY: setup demo test campaign lint lock clean
+.PHONY: setup demo test campaign bench lint lock clean
 
 setup: $(READY)
 
@@ -23,6 +23,11 @@ test: lint
 # What takes too long for every change.
 campaign: $(READY)
 	$(BIN)/python -m pytest -n 2 -m campaign
+
+# Speed as ratios to scipy doing the same fit, growth with the length, memory: docs/benchmarks.md.
+bench: $(READY)
+	$(BIN)/python -m tests.benchmarks.fit
+	$(BIN)/python -m tests.benchmarks.diagnosis
 
 lint: $(READY)
 	$(BIN)/ruff check .

@@ -15,7 +15,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from estimator.diagnosis.evidence import VERY_STRONG, Gain, gain, residuals_by_record
+from estimator.diagnosis.evidence import VERY_STRONG, Gain, gain, information, residuals_by_record
 from estimator.diagnosis.holdout import Examiner, HoldOut
 from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects, Progress, effects_of, with_effect
 from estimator.diagnosis.lookalikes import lookalikes
@@ -54,6 +54,9 @@ PART_UNSEEN = 0.25
 
 VISIBLE = 1.05
 
+NEAR_NOISE = 1.5
+"""Error over the noise floor above which a choice is compared with what can be found behind a slow load."""
+
 
 @dataclass(frozen=True, slots=True)
 class Selection:
@@ -88,6 +91,15 @@ class Selection:
     remaining: UnnamedLaw | None
 
 
+@dataclass(frozen=True, slots=True)
+class _Path:
+    """Effects chosen so far, their fit, and the trial of each."""
+
+    chosen: Effects
+    current: FitResult
+    accepted: Mapping[str, Trial]
+
+
 @dataclass
 class Selector:
     """Runs the selection on one bench.
@@ -109,43 +121,66 @@ class Selector:
     progress: Progress
     least_ratio: float = 1.0
     _rounds: int = 0
+    _trials: dict[str, Trial] = field(default_factory=dict)
     _dismissed: dict[str, float] = field(default_factory=dict)
     _laws: dict[int, tuple[FitResult, UnnamedLaw | None]] = field(default_factory=dict)
 
     def run(self) -> Selection:
         """Add effects while one earns its place; then drop those that the others made superfluous.
 
-        A further round of fits is only made where some law, named or not, still has something to explain.
+        Where that ends far from the noise, another way is tried: behind a slow load.
         """
         retuned = self.bench.fit(NOTHING)
-        chosen, current = NOTHING, retuned
-        first_trials: dict[str, Trial] = {}
-        dismissed: dict[str, float] = {}
-        accepted: dict[str, Trial] = {}
-        for _ in range(MOST_EFFECTS):
-            trials = self._try_all(chosen, current)
-            for name, trial in trials.items():
-                first_trials.setdefault(name, trial)
-            dismissed = dismissed or dict(self._dismissed)
-            best = self._best(trials, current, retuned)
-            if best is None and not chosen:
-                best = self._behind_profile(retuned)
-            if best is None:
-                break
-            accepted = {name: accepted.get(name, best) for name in best.effects} | {best.name: best}
-            chosen, current = self._drop_superfluous(best.effects, self.bench.fit(best.effects, current), retuned)
-            if self._is_noise(current):
-                break
+        path = self._grown(_Path(NOTHING, retuned, {}), retuned)
+        if not path.chosen or path.current.rms > NEAR_NOISE * self._level(path.current):
+            path = self._better(path, self._behind_profile(retuned), retuned)
+        chosen, current = path.chosen, path.current
         if any(EFFECTS[name].event for name in chosen):
             current = self.bench.settle(chosen)
         accepted = {
-            name: self._final(name, chosen, current, trial) for name, trial in accepted.items() if name in chosen
+            name: self._final(name, chosen, current, trial) for name, trial in path.accepted.items() if name in chosen
         }
         alike = {name: lookalikes(name, chosen, current, self.bench, self.names) for name in chosen}
         self._report("looking for laws without a name", 0.9)
-        unnamed = self._law(retuned)
-        remaining = self._law(current) if chosen else None
-        return Selection(retuned, chosen, current, accepted, first_trials, dismissed, alike, unnamed, remaining)
+        return Selection(
+            retuned,
+            chosen,
+            current,
+            accepted,
+            self._trials,
+            self._dismissed,
+            alike,
+            unnamed=self._law(retuned),
+            remaining=self._law(current) if chosen else None,
+        )
+
+    def _grown(self, path: _Path, retuned: FitResult) -> _Path:
+        """Add effects to a path while one earns its place.
+
+        A further round of fits is only made where some law, named or not, still has something to explain.
+        """
+        for _ in range(MOST_EFFECTS - len(path.chosen)):
+            best = self._best(self._try_all(path.chosen, path.current), path.current, retuned)
+            if best is None:
+                break
+            path = self._with(path, best, retuned)
+            if self._is_noise(path.current):
+                break
+        return path
+
+    def _with(self, path: _Path, best: Trial, retuned: FitResult) -> _Path:
+        """Return a path with the effects of a trial, less those it made superfluous."""
+        accepted = {name: path.accepted.get(name, best) for name in best.effects} | {best.name: best}
+        whole = self.bench.fit(best.effects, best.result)
+        return _Path(*self._drop_superfluous(best.effects, whole, retuned), accepted)
+
+    def _better(self, path: _Path, other: Trial | None, retuned: FitResult) -> _Path:
+        """Return the better of a path and the one that another first trial begins."""
+        if other is None:
+            return path
+        begun = self._grown(self._with(_Path(NOTHING, retuned, {}), other, retuned), retuned)
+        n = gain(retuned, begun.current).n_effective
+        return begun if information(path.current, begun.current, n) > 0.0 else path
 
     def _law(self, result: FitResult) -> UnnamedLaw | None:
         """Return the law without a name that counts for what a fit leaves; each fit is searched once."""
@@ -156,11 +191,14 @@ class Selector:
 
     def _is_noise(self, result: FitResult) -> bool:
         """Tell whether what a fit leaves is next to the noise, and no law without a name finds anything in it."""
-        level = min(self.floor, unpredictable(residuals_by_record(result)))
-        return result.rms < VISIBLE * level and self._law(result) is None
+        return result.rms < VISIBLE * self._level(result) and self._law(result) is None
+
+    def _level(self, result: FitResult) -> float:
+        """Return the noise: of the reading, or of a fit's error if that is less."""
+        return min(self.floor, unpredictable(residuals_by_record(result)))
 
     def _behind_profile(self, retuned: FitResult) -> Trial | None:
-        """Look for an effect behind a slow load that by itself hides it, where something stands but nothing passed.
+        """Look for an effect behind a slow load that by itself hides it, where something stands.
 
         A slow disturbance moves the free run by many times what a fast effect does; and alone it must pay for all its
         knots out of an error that the fast effect keeps correlated. Both are judged again in the final set.
@@ -199,6 +237,7 @@ class Selector:
 
         trials = dict(zip(rough, concurrently(finished, list(rough)), strict=True))
         self._rounds += 1
+        self._trials = trials | self._trials
         return trials
 
     def _looks(self, names: Sequence[str], chosen: Effects, current: FitResult) -> dict[str, list[Look]]:
@@ -215,9 +254,10 @@ class Selector:
             related = bool(special & chosen) or bool(special & set(worth))
             if related or promises[name] >= max(WORTH_FITTING * most, least):
                 worth.append(name)
-        self._dismissed = {
-            name: max(promises[name], 0.0) / current.squares for name in names if name not in worth[:MOST_FITS]
-        }
+        if not chosen:
+            self._dismissed = {
+                name: max(promises[name], 0.0) / current.squares for name in names if name not in worth[:MOST_FITS]
+            }
         return {name: promising(looks[name]) for name in worth[:MOST_FITS]}
 
     def _report(self, what: str, part: float) -> None:
@@ -275,8 +315,7 @@ class Selector:
         return removed >= PART_FOR_DETAIL * (current.rms**2 - special.result.rms**2)
 
     def _visible(self, before: FitResult, after: FitResult) -> bool:
-        floor = min(self.floor, unpredictable(residuals_by_record(before)))
-        standing = max(before.rms**2 - floor**2, 0.0)
+        standing = max(before.rms**2 - self._level(before) ** 2, 0.0)
         removed = before.rms**2 - after.rms**2
         return before.rms >= VISIBLE * after.rms and removed >= 0.5 * standing
 
@@ -285,7 +324,7 @@ class Selector:
 
         At an element of its own it may be small, if it can be seen. Beside another effect of the same element it must
         be a real part of the mismatch: a law written another way leaves just such a small remainder. So must a profile,
-        which can take up any slow rest.
+        which can take up any slow rest, and a wave beside another wave: no machine's is a pure sine.
         """
         if before.rms < self.least_ratio * after.rms:
             return False
@@ -294,7 +333,8 @@ class Selector:
         if removed >= PART_OF_MISMATCH * mismatch:
             return True
         neighbours = {EFFECTS[other].element for other in effects if other != name}
-        alike = EFFECTS[name].element in neighbours or EFFECTS[name].profile
+        overtone = bool(EFFECTS[name].phases) and any(EFFECTS[other].phases for other in effects - {name})
+        alike = EFFECTS[name].element in neighbours or EFFECTS[name].profile or overtone
         return not alike and self._visible(before, after)
 
     def _examine(self, trial: Trial, before: FitResult) -> HoldOut:

@@ -125,6 +125,8 @@ CRACK_FROM = slot("stiffness_change", "from_s")
 CRACK_TO = slot("stiffness_change", "to_s")
 SLIDER = slot("shaft_hysteresis", "friction_nm")
 YIELD = slot("shaft_hysteresis", "yield_rad")
+SHARPNESS = slot("shaft_hysteresis", "sharpness")
+UNLOADING = slot("shaft_hysteresis", "unloading")
 CARDAN = slot("cardan_second_order", "amplitude_nm")
 CARDAN_PHASE = slot("cardan_second_order", "phase_rad")
 CARDAN_ANGLE = slot("cardan_second_order", "angle_rad")
@@ -230,7 +232,7 @@ def rates(masses: int, now: Conditions, x: State, p: FloatArray) -> State:
         (drive - reaction) / now.inertia_motor,
         rate,
         load,
-        shaft_hysteresis.loading_rate(x.loading, rate, now.yield_twist, now.fastest) if p[SLIDER] != 0.0 else 0.0,
+        sliding(x.loading, rate, now, p),
         vehicle,
         x.speed - x.branch_speed,
         branch_acceleration,
@@ -238,6 +240,14 @@ def rates(masses: int, now: Conditions, x: State, p: FloatArray) -> State:
         middle_speed,
         traction,
     )
+
+
+@compiled
+def sliding(loading: float, rate: float, now: Conditions, p: FloatArray) -> float:
+    """Return how fast the slider inside the shaft loads [1/s]; 0 where there is none."""
+    if p[SLIDER] == 0.0:
+        return 0.0
+    return shaft_hysteresis.loading_rate(loading, rate, now.yield_twist, p[SHARPNESS], p[UNLOADING], now.fastest)
 
 
 @compiled

@@ -2,8 +2,8 @@
 
 ``scipy.optimize.least_squares`` decomposes the whole Jacobian at every step; with ten thousand errors and twenty
 unknowns that costs more than the simulations that made it. Here the step comes from the normal equations, with
-Marquardt's scaling (SIAM J. Appl. Math. 11, 1963) and unknowns held at the bounds they press against (the active set
-of Bertsekas, SIAM J. Control Optim. 20, 1982).
+Marquardt's scaling (SIAM J. Appl. Math. 11, 1963), and is the least of the damped quadratic inside the bounds
+(``scipy.optimize.lsq_linear``: Stark and Parker, Computational Statistics 10, 1995).
 """
 
 from __future__ import annotations
@@ -12,6 +12,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import linalg
+from scipy.optimize import lsq_linear
 
 from estimator.signals.record import FloatArray
 
@@ -20,7 +22,10 @@ CONVERGED = 0.01
 
 FIRST_DAMPING = 1e-3
 EASE, STIFFEN = 0.2, 5.0
-MOST_DAMPING = 1e9
+LEAST_DAMPING, MOST_DAMPING = 1e-10, 1e9
+
+TINY = 1e-12
+"""Room that a bound always leaves: an interval of no length is none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +70,7 @@ def minimise(
                 return Solution(x, errors, derivative, True)
             tried = residual(x + step)
             moved = float(tried @ tried) < square
-            damping *= EASE if moved else STIFFEN
+            damping = max(damping * (EASE if moved else STIFFEN), LEAST_DAMPING)
         if not moved:
             return Solution(x, errors, derivative, True)
         x, errors = x + step, tried
@@ -80,21 +85,17 @@ def _step(
     low: FloatArray,
     high: FloatArray,
 ) -> FloatArray:
-    """Return the damped Gauss-Newton step, cut at the bounds; unknowns that meet one are held and the rest solved."""
-    fixed = low == high
-    held = fixed | ((x <= low) & (gradient > 0)) | ((x >= high) & (gradient < 0))
-    down, up = (np.subtract(bound, x, out=np.zeros_like(x), where=~fixed) for bound in (low, high))  # may be infinite
-    step = np.zeros_like(x)
+    """Return the damped Gauss-Newton step inside the bounds: the least of the damped quadratic there."""
+    free = low < high
     diagonal = np.diag(curvature)
-    scale = damping * np.maximum(diagonal, 1e-12 * diagonal.max())
-    while not held.all():
-        free = ~held
-        right = -gradient[free] - curvature[np.ix_(free, held)] @ step[held]
-        step[free] = np.linalg.solve(curvature[np.ix_(free, free)] + np.diag(scale[free]), right)
-        cut = np.clip(step, down, up)
-        outside = free & (cut != step)
-        step = cut
-        if not outside.any():
-            break
-        held = held | outside
+    damped = curvature + np.diag(damping * np.maximum(diagonal, 1e-12 * diagonal.max()))
+    step = np.zeros_like(x)
+    factor = linalg.cholesky(damped[np.ix_(free, free)])  # upper triangular
+    target = -linalg.solve_triangular(factor, gradient[free], trans="T")
+    inside = linalg.solve_triangular(factor, target)
+    down, up = low[free] - x[free], high[free] - x[free]
+    if np.any((inside < down) | (inside > up)):
+        room = (np.minimum(down, 0.0), np.maximum(up, 0.0) + TINY)
+        inside = np.clip(lsq_linear(factor, target, room, method="bvls").x, down, up)
+    step[free] = inside
     return step

@@ -74,9 +74,7 @@ def run_study(
     measuring = [partial(measure, study, *bus) for bus in unmeasured]
     for row in appended(measuring, out / BOUNDS, options.jobs):
         bounds[row["kind"], row["seed"]] = row
-        _tell(
-            f"{row['kind']} {row['seed']}: bound {row['bound']['known']:.3g}, {row['bound']['fair']:.3g} {row['unit']}"
-        )
+        _tell(f"{row['kind']} {row['seed']}: bound {row['bound']['recorded']:.3g} {row['unit']}")
     finished = {key for key, row in results.items() if row["fault"] is None}
     planned = [(bus, multiple) for bus in buses for multiple in study.multiples]
     missing = [(bus, multiple) for bus, multiple in planned if (kind_of(bus[0], multiple), bus[1]) not in finished]
@@ -158,7 +156,7 @@ def _parser() -> argparse.ArgumentParser:
         "--multiples",
         type=_multiples,
         default=MULTIPLES,
-        help="sizes to try, over that of the bound with the bus unknown (default: "
+        help="sizes to try, over the bound of who has the recordings alone (default: "
         f"{','.join(f'{multiple:g}' for multiple in MULTIPLES)})",
     )
     parser.add_argument(

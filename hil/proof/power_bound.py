@@ -4,9 +4,10 @@ With white noise of known deviation sigma, the most powerful test between two kn
 power Phi(d - z_{1-alpha}), d = |Delta| / sigma (Neyman and Pearson, Phil. Trans. A 231, 1933; Kay, Fundamentals of
 Statistical Signal Processing II, 1998, sec. 4.3). Where nuisance parameters are unknown, what of Delta they could
 imitate is lost to any test that is indifferent to them: d = |(I - P) Delta| / sigma, P the projector on the outputs'
-sensitivities (Scharf and Friedlander, IEEE Trans. Signal Process. 42, 1994).
+sensitivities (Scharf and Friedlander, IEEE Trans. Signal Process. 42, 1994). Where the torques are known by their
+readings only, the noise is no longer white, and both are taken of the whitened outputs (`hil.proof.power_noise`).
 
-Both know the true torques, of which a tool has the readings, and look for one effect on one side.
+All of these tests look for one effect, on one side, and know its law.
 """
 
 from __future__ import annotations
@@ -20,14 +21,13 @@ import numpy as np
 from scipy import optimize, stats
 
 from hil.proof.power_drive import drive, under_torques_of
-from hil.proof.power_nuisance import nuisance, without
+from hil.proof.power_noise import deviation_rad_s, whitened
+from hil.proof.power_nuisance import orthonormal, sensitivities, without
 from hil.proof.power_sizes import imposed, scale_of
-from hil.proof.truth.acquisition import Acquisition
 from hil.proof.truth.case import TESTS
 from hil.proof.truth.experiments import SAMPLES
 from hil.proof.truth.physics import FloatArray
 from hil.proof.truth.registry import EFFECTS
-from hil.proof.truth.sensors import SPEED_NOISE_RAD_S
 from hil.proof.truth.specimen import Specimen
 
 LEVEL = 0.05
@@ -56,25 +56,24 @@ class Distance:
     ----------
     known : float
         |Delta| / sigma: to a test that knows everything else.
-    fair : float
+    bus_unknown : float
         |(I - P) Delta| / sigma: to one that has to estimate bus, load torques and initial states.
+    recorded : float
+        The same of the whitened outputs: to one that has the recordings and nothing else.
     """
 
     known: float
-    fair: float
+    bus_unknown: float
+    recorded: float
 
 
 @dataclass(frozen=True, slots=True)
 class Bound:
-    """Sizes of an effect that the best test finds with `POWER`, in the effect's unit; `known` and `fair` as above."""
+    """Sizes of an effect that the best test finds with `POWER`, in the effect's unit; by what it knows, as above."""
 
     known: float
-    fair: float
-
-
-def deviation_rad_s(acquisition: Acquisition) -> float:
-    """Return the standard deviation of a speed reading: sensor noise, and rounding to a grid where there is one."""
-    return math.sqrt(SPEED_NOISE_RAD_S**2 + acquisition.grid_rad_s**2 / 12.0)
+    bus_unknown: float
+    recorded: float
 
 
 def threshold(alpha: float) -> float:
@@ -148,7 +147,9 @@ class Yardstick:
         self._absent = imposed(specimen, self._scale.least)
         self._samples = samples
         self._deviation = deviation_rad_s(specimen.acquisition())
-        self._nuisance = nuisance(specimen.seed, samples)
+        moved = sensitivities(specimen.seed, samples)
+        self._nuisance = orthonormal(moved)
+        self._nuisance_whitened = orthonormal(whitened(moved, specimen.seed, samples))
         self._distances: dict[float, Distance] = {}
 
     def difference_rad_s(self, size: float) -> FloatArray:
@@ -165,13 +166,19 @@ class Yardstick:
         """Return how far apart the outputs are at a size."""
         if size not in self._distances:
             difference = self.difference_rad_s(size)
-            rest = without(self._nuisance, difference)
-            norms = (float(np.linalg.norm(each)) / self._deviation for each in (difference, rest))
-            self._distances[size] = Distance(*norms)
+            even = whitened(difference, self._specimen.seed, self._samples)
+            self._distances[size] = Distance(
+                known=float(np.linalg.norm(difference)) / self._deviation,
+                bus_unknown=float(np.linalg.norm(without(self._nuisance, difference))) / self._deviation,
+                recorded=float(np.linalg.norm(without(self._nuisance_whitened, even))),
+            )
         return self._distances[size]
 
     def bound(self, alpha: float) -> Bound:
         """Return the sizes found with `POWER` at a level."""
-        needed = needed_distance(alpha)
-        fair = size_at(needed, lambda size: self.distance(size).fair, self._scale.start)
-        return Bound(size_at(needed, lambda size: self.distance(size).known, self._scale.start), fair)
+        needed, start = needed_distance(alpha), self._scale.start
+        return Bound(
+            known=size_at(needed, lambda size: self.distance(size).known, start),
+            bus_unknown=size_at(needed, lambda size: self.distance(size).bus_unknown, start),
+            recorded=size_at(needed, lambda size: self.distance(size).recorded, start),
+        )

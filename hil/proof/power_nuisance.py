@@ -32,8 +32,8 @@ BUSES_KEPT = 8
 
 
 @lru_cache(maxsize=BUSES_KEPT)
-def nuisance(seed: int, samples: int) -> FloatArray:
-    """Return an orthonormal basis of all that the nuisance parameters of a seed's bus move, shape (3 N, rank).
+def sensitivities(seed: int, samples: int) -> FloatArray:
+    """Return what each nuisance parameter of a seed's bus moves the outputs by, shape (3 N, 18), in no unit.
 
     Nothing is hidden in the bus. Six parameters are shared, four are each recording's own: the load torque, two speeds
     and the twist at its beginning. None is held to the nominal model's tolerance.
@@ -46,7 +46,7 @@ def nuisance(seed: int, samples: int) -> FloatArray:
         Length N of each recording.
     """
     specimen = draw_specimen("none", seed)
-    return orthonormal(_sensitivities([drive(specimen, test, samples) for test in range(len(TESTS))]))
+    return _columns([drive(specimen, test, samples) for test in range(len(TESTS))])
 
 
 def without(basis: FloatArray, moved: FloatArray) -> FloatArray:
@@ -63,7 +63,7 @@ def orthonormal(columns: FloatArray) -> FloatArray:
     return spanning
 
 
-def _sensitivities(drives: Sequence[Drive]) -> FloatArray:
+def _columns(drives: Sequence[Drive]) -> FloatArray:
     ends = np.cumsum([0, *(each.m1_nm.size for each in drives)])
     shared = [np.concatenate([_by_parameter(each, name) for each in drives]) for name in PARAMETERS]
     own = []

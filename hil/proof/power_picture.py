@@ -1,4 +1,4 @@
-"""Power against size as a picture: what the tool found, its fitted curve, and the two best possible tests."""
+"""Power against size as a picture: what the tool found, its fitted curve, and the best possible tests."""
 
 from __future__ import annotations
 
@@ -12,11 +12,13 @@ import numpy as np
 from hil.proof.campaign_statistics import Rate
 from hil.proof.power_bound import POWER
 from hil.proof.power_fit import Curve
+from hil.proof.power_report import BASE, KNOWLEDGE
 
 WIDTH_PX, HEIGHT_PX, LEFT_PX, TOP_PX, GAP_PX, BOTTOM_PX = 250, 170, 52, 46, 40, 40
-TOOL, FAIR, KNOWN = "#1f77b4", "#2ca02c", "#7f7f7f"
+TOOL = "#1f77b4"
 
-LINES = ((TOOL, "tool"), (FAIR, "best test, bus unknown"), (KNOWN, "best test, everything known"))
+BEST = {"recorded": "#2ca02c", "bus_unknown": "#98df8a", "known": "#7f7f7f"}
+"""Colours of the best possible tests."""
 
 FINEST = 120
 """Points of a curve."""
@@ -36,9 +38,9 @@ def power_svg(effects: Mapping[str, Any]) -> str:
     Returns
     -------
     str
-        An SVG document; across is the size over that of the bound with the bus unknown, logarithmic.
+        An SVG document; across is the size over that of the best test that has the recordings alone, logarithmic.
     """
-    width = LEFT_PX + (WIDTH_PX + GAP_PX) * max(len(effects), 2)
+    width = LEFT_PX + (WIDTH_PX + GAP_PX) * max(len(effects), 3)
     height = TOP_PX + HEIGHT_PX + BOTTOM_PX
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" viewBox="0 0 {width} {height}" '
@@ -53,7 +55,8 @@ def power_svg(effects: Mapping[str, Any]) -> str:
 
 def _legend() -> list[str]:
     parts = []
-    for place, (colour, name) in enumerate(LINES):
+    lines = [(TOOL, "tool"), *((colour, f"best test, {KNOWLEDGE[name]}") for name, colour in BEST.items())]
+    for place, (colour, name) in enumerate(lines):
         x = LEFT_PX + 190 * place
         parts.append(f'<line x1="{x}" y1="12" x2="{x + 18}" y2="12" stroke="{colour}" stroke-width="2"/>')
         parts.append(f'<text x="{x + 24}" y="16">{name}</text>')
@@ -74,11 +77,10 @@ def _panel(effect: str, figures: Mapping[str, Any], left: float) -> list[str]:
     sizes = np.geomspace(least, most, FINEST)
     parts = [
         *_frame(effect, points, left, across),
-        line(FAIR, [(p["multiple"], p["best"]["fair"]) for p in points]),
-        line(KNOWN, [(p["multiple"], p["best"]["known"]) for p in points]),
+        *(line(colour, [(p["multiple"], p["best"][name]) for p in points]) for name, colour in BEST.items()),
     ]
-    if figures["over_fair"]["value"]:
-        curve = Curve(figures["over_fair"]["value"], 0.0, math.inf, figures["steepness"])
+    if figures["over"][BASE]["value"]:
+        curve = Curve(figures["over"][BASE]["value"], 0.0, math.inf, figures["steepness"])
         parts.append(line(TOOL, [(float(size), curve.power(float(size))) for size in sizes]))
     for point in points:
         x = across(point["multiple"])
@@ -95,7 +97,7 @@ def _frame(
     parts = [
         f'<rect x="{left}" y="{TOP_PX}" width="{WIDTH_PX}" height="{HEIGHT_PX}" fill="none" stroke="#aaaaaa"/>',
         f'<text x="{left}" y="{TOP_PX - 6}" font-weight="bold">{escape(effect)}</text>',
-        f'<text x="{left + 0.5 * WIDTH_PX}" y="{bottom + 30}" text-anchor="middle">size / bound, bus unknown</text>',
+        f'<text x="{left + 0.5 * WIDTH_PX}" y="{bottom + 30}" text-anchor="middle">size / bound</text>',
         *(f'<text x="{left - 6}" y="{_up(at) + 4:.1f}" text-anchor="end">{at:g}</text>' for at in (0.0, 0.5, POWER)),
         f'<line x1="{left}" y1="{_up(POWER):.1f}" x2="{left + WIDTH_PX}" y2="{_up(POWER):.1f}" stroke="#dddddd"/>',
     ]

@@ -15,6 +15,16 @@ from hil.proof.power_sizes import SCALES
 
 SCHEMA = "hil.power/1"
 
+KNOWLEDGE = {
+    "known": "everything known",
+    "bus_unknown": "bus unknown",
+    "recorded": "recordings alone",
+}
+"""What the best possible tests know, and what to call them."""
+
+BASE = "recorded"
+"""The one whose sizes are multiplied."""
+
 
 def summary(rows: Sequence[Row], bounds: Sequence[Row]) -> dict[str, Any]:
     """Return what rows and bounds of a study add up to; JSON types only, null where a figure is not finite."""
@@ -38,10 +48,9 @@ def summary(rows: Sequence[Row], bounds: Sequence[Row]) -> dict[str, Any]:
 
 def _figures(rows: Sequence[Row], bounds: Sequence[Row]) -> dict[str, Any]:
     found = [row["found"] for row in rows]
-    fair = fit_curve([row["multiple"] for row in rows], found)
-    known = fit_curve([row["over_known"] for row in rows], found)
-    sizes = {name: [row["bound"][name] for row in bounds] for name in ("known", "fair")}
-    middle = float(np.median(sizes["fair"]))
+    curves = {name: fit_curve([row["over"][name] for row in rows], found) for name in KNOWLEDGE}
+    sizes = {name: [row["bound"][name] for row in bounds] for name in KNOWLEDGE}
+    middle = float(np.median(sizes[BASE]))
     return {
         "unit": bounds[0]["unit"],
         "buses": len(bounds),
@@ -50,30 +59,25 @@ def _figures(rows: Sequence[Row], bounds: Sequence[Row]) -> dict[str, Any]:
         "bound": {
             name: {"median": float(np.median(of)), "least": min(of), "most": max(of)} for name, of in sizes.items()
         },
-        "size": {name: finite_or_none(value * middle) for name, value in _ends(fair).items()},
-        "over_fair": {name: finite_or_none(value) for name, value in _ends(fair).items()},
-        "over_known": {name: finite_or_none(value) for name, value in _ends(known).items()},
-        "steepness": fair.steepness,
+        "size": _ends(curves[BASE], middle),
+        "over": {name: _ends(curve) for name, curve in curves.items()},
+        "steepness": curves[BASE].steepness,
         "points": [_point(rows, multiple) for multiple in sorted({row["multiple"] for row in rows})],
         "outcomes": outcomes(rows),
     }
 
 
-def _ends(curve: Curve) -> dict[str, float]:
-    return {"value": curve.size, "low": curve.low, "high": curve.high}
-
-
-def finite_or_none(value: float) -> float | None:
-    """Return a number as JSON can have it; unlike `finite` not rounded: a size may be small."""
-    return value if math.isfinite(value) else None
+def _ends(curve: Curve, unit: float = 1.0) -> dict[str, float | None]:
+    """Return a curve's size and interval as JSON can have them; not rounded, for a size may be small."""
+    ends = {"value": curve.size, "low": curve.low, "high": curve.high}
+    return {name: value * unit if math.isfinite(value) else None for name, value in ends.items()}
 
 
 def _point(rows: Sequence[Row], multiple: float) -> dict[str, Any]:
-    """Return what was found at one multiple, and what the two best tests would find at the same sizes."""
+    """Return what was found at one multiple, and what the best tests would find at the same sizes."""
     mine = [row for row in rows if row["multiple"] == multiple]
     best = {
-        name: finite(float(np.mean([power(row["distance"][name], row["alpha"]) for row in mine])))
-        for name in ("known", "fair")
+        name: finite(float(np.mean([power(row["distance"][name], row["alpha"]) for row in mine]))) for name in KNOWLEDGE
     }
     return {"multiple": multiple, **share(row["found"] for row in mine).as_json(), "best": best}
 
@@ -82,23 +86,24 @@ def markdown(rows: Sequence[Row], bounds: Sequence[Row]) -> str:
     """Return the summary as Markdown tables."""
     data = summary(rows, bounds)
     effects: Mapping[str, Any] = data["effects"]
+    names = list(KNOWLEDGE.values())
+    told = " | ".join(names)
     return "\n".join(
         [
             "# Power",
             "",
             f"{data['trials']} trials. Sizes that are found with {POWER:.0%} power; in brackets the range over the "
-            "buses, or the 95 % interval. *Everything known* and *bus unknown* are the best possible tests (module "
-            f"`hil.proof.power_bound`); alpha is their level, a {HYPOTHESES}th of 5 % unless it was set.",
+            "buses, or the 95 % interval. Best possible tests (module `hil.proof.power_bound`) by what they know; "
+            f"alpha is their level, a {HYPOTHESES}th of 5 % unless it was set.",
             "",
-            "| effect | unit | alpha | everything known | bus unknown | tool | tool / bus unknown | "
-            "tool / everything known | trials |",
-            "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
+            f"| effect | unit | alpha | {told} | tool | {' | '.join(f'tool / {name}' for name in names)} | trials |",
+            f"|{' --- |' * (5 + 2 * len(names))}",
             *(_line(effect, figures) for effect, figures in effects.items()),
             "",
             "## By size",
             "",
-            "| effect | size / bus unknown | found | interval | best, bus unknown | best, everything known |",
-            "| --- | --- | --- | --- | --- | --- |",
+            f"| effect | size / {KNOWLEDGE[BASE]} | found | interval | {' | '.join(f'best, {n}' for n in names)} |",
+            f"|{' --- |' * (4 + len(names))}",
             *(_point_line(effect, point) for effect, figures in effects.items() for point in figures["points"]),
             "",
             "## Outcomes",
@@ -111,17 +116,14 @@ def markdown(rows: Sequence[Row], bounds: Sequence[Row]) -> str:
 
 
 def _line(effect: str, figures: Mapping[str, Any]) -> str:
-    known, fair = (
-        f"{of['median']:.3g} ({of['least']:.3g} to {of['most']:.3g})"
-        for of in (figures["bound"]["known"], figures["bound"]["fair"])
-    )
+    bounds = (f"{of['median']:.3g} ({of['least']:.3g} to {of['most']:.3g})" for of in figures["bound"].values())
     cells = (
         f"`{effect}`",
         figures["unit"],
         f"{figures['alpha']:.2g}",
-        known,
-        fair,
-        *(_interval(figures[name]) for name in ("size", "over_fair", "over_known")),
+        *bounds,
+        _interval(figures["size"]),
+        *(_interval(of) for of in figures["over"].values()),
         f"{figures['trials']} on {figures['buses']} buses",
     )
     return f"| {' | '.join(cells)} |"
@@ -136,11 +138,9 @@ def _interval(of: Mapping[str, float | None]) -> str:
 
 def _point_line(effect: str, point: Mapping[str, Any]) -> str:
     low, high = Rate(point["hits"], point["trials"]).interval
-    best = point["best"]
-    return (
-        f"| `{effect}` | {point['multiple']:g} | {point['hits']} of {point['trials']} | {low:.0%} to {high:.0%} | "
-        f"{best['fair']:.0%} | {best['known']:.0%} |"
-    )
+    best = " | ".join(f"{share:.0%}" for share in point["best"].values())
+    hits = f"{point['hits']} of {point['trials']}"
+    return f"| `{effect}` | {point['multiple']:g} | {hits} | {low:.0%} to {high:.0%} | {best} |"
 
 
 def _counts(counts: Mapping[str, int]) -> str:

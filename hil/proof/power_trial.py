@@ -32,7 +32,7 @@ class Study:
     alpha : float
         Level of the best test.
     multiples : tuple of float
-        Sizes to try over the fair bound's.
+        Sizes to try, over the bound of who has the recordings alone.
     samples : int
         Length of each recording.
     """
@@ -46,7 +46,7 @@ def measure(study: Study, effect: str, seed: int) -> dict[str, Any]:
     """Return the row of one bus and effect in ``bounds.jsonl``: the bounds, and the distances of all sizes to try."""
     yardstick = Yardstick(draw_specimen(effect, seed), study.samples)
     bound = yardstick.bound(study.alpha)
-    distances = {f"{m:g}": asdict(yardstick.distance(m * bound.fair)) for m in study.multiples}
+    distances = {f"{m:g}": asdict(yardstick.distance(m * bound.recorded)) for m in study.multiples}
     given = {"alpha": study.alpha, "samples": study.samples, "unit": scale_of(effect).unit}
     return {"kind": effect, "seed": seed, "fault": None, **given, "bound": asdict(bound), "distances": distances}
 
@@ -61,13 +61,13 @@ def attempt(study: Study, bounds: Mapping[str, Any], multiple: float, out: Path,
     bounds
         The row of `measure`.
     multiple
-        Size over the fair bound's.
+        Size over the bound of who has the recordings alone.
     out
         Folder of the study; the case's files go to ``cases/EFFECT/SEED/MULTIPLE``.
     limit_s
         Time for the command [s].
     """
-    effect, seed, size = bounds["kind"], bounds["seed"], multiple * bounds["bound"]["fair"]
+    effect, seed, size = bounds["kind"], bounds["seed"], multiple * bounds["bound"]["recorded"]
     case = trial_case(draw_specimen(effect, seed), size, round(multiple / LEAST_MULTIPLE), study.samples)
     truth, answer = run_made(case, out / "cases" / effect / str(seed) / f"{multiple:g}", limit_s)
     row = score(Kind(effect, Group.SINGLE, effect), seed, truth, answer)
@@ -77,7 +77,7 @@ def attempt(study: Study, bounds: Mapping[str, Any], multiple: float, out: Path,
         "effect": effect,
         "multiple": multiple,
         "size": size,
-        "over_known": size / bounds["bound"]["known"],
+        "over": {name: size / least for name, least in bounds["bound"].items()},
         "distance": bounds["distances"][f"{multiple:g}"],
         "alpha": study.alpha,
         "samples": study.samples,

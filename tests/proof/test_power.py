@@ -59,11 +59,11 @@ def test_a_study_goes_on_where_it_ended_and_says_what_it_adds_up_to(tool, tmp_pa
     assert [row["multiple"] for row in rows] == [1.0, 2.0, 3.0]
     assert [row["found"] for row in rows] == [True, False, True]
     bound = _rows(tmp_path / "bounds.jsonl")[-1]["bound"]
-    assert rows[1]["size"] == pytest.approx(2.0 * bound["fair"])
-    assert rows[1]["over_known"] == pytest.approx(2.0 * bound["fair"] / bound["known"])
+    assert rows[1]["size"] == pytest.approx(2.0 * bound["recorded"])
+    assert rows[1]["over"]["known"] == pytest.approx(2.0 * bound["recorded"] / bound["known"])
     figures = json.loads((tmp_path / "summary.json").read_text())["effects"]["coulomb_friction_motor"]
     assert [(p["multiple"], p["hits"], p["trials"]) for p in figures["points"]] == [(1, 1, 1), (2, 0, 1), (3, 1, 1)]
-    assert figures["points"][0]["best"]["fair"] == pytest.approx(0.9, abs=0.01)
+    assert figures["points"][0]["best"]["recorded"] == pytest.approx(0.9, abs=0.01)
     assert figures["outcomes"] == {"right": 2, "missed": 1}
     assert "| `coulomb_friction_motor` | 2 | 0 of 1 |" in (tmp_path / "summary.md").read_text()
     circles = ET.parse(tmp_path / "power.svg").getroot().findall("{http://www.w3.org/2000/svg}circle")
@@ -129,7 +129,7 @@ def test_the_public_command_is_scored_by_the_verdict_it_wrote(tmp_path):
     assert row["verdict"] == verdict["verdict"]
     assert row["found"] is (verdict["verdict"] == "explained" and "coulomb_friction_motor" in named)
     assert row["size"] == pytest.approx(truth["hidden"]["coulomb_friction_motor"]["coulomb_nm"])
-    assert row["distance"]["fair"] == pytest.approx(3.0 * 4.2367, rel=0.05)  # z for 0.05 / 32, and for 0.9
+    assert row["distance"]["recorded"] == pytest.approx(3.0 * 4.2367, rel=0.05)  # z for 0.05 / 32, and for 0.9
     assert len((case / "case" / "run_1.csv").read_text().splitlines()) == 1501
 
 

@@ -11,7 +11,6 @@ from hil.proof.power_bound import (
     LEVEL,
     POWER,
     Yardstick,
-    deviation_rad_s,
     needed_distance,
     power,
     size_at,
@@ -19,7 +18,8 @@ from hil.proof.power_bound import (
 )
 from hil.proof.power_case import trial_case
 from hil.proof.power_drive import drive, under_torques_of
-from hil.proof.power_nuisance import nuisance, orthonormal, without
+from hil.proof.power_noise import answer_rad_s, deviation_rad_s, torque_deviation_nm, whitened
+from hil.proof.power_nuisance import orthonormal, sensitivities, without
 from hil.proof.power_sizes import SCALES, imposed
 from hil.proof.truth.acquisition import Acquisition
 from hil.proof.truth.case import record
@@ -90,7 +90,7 @@ def test_another_bus_is_no_effect(name):
     moved = np.zeros(3 * SHORT)
     moved[:SHORT] = other.speed_rad_s() - here.speed_rad_s()
     moved_all = moved if name == "load_torque_nm" else _moved_in_all(name)
-    assert np.linalg.norm(without(nuisance(2, SHORT), moved_all)) < 0.02 * np.linalg.norm(moved_all)
+    assert np.linalg.norm(without(orthonormal(sensitivities(2, SHORT)), moved_all)) < 0.02 * np.linalg.norm(moved_all)
 
 
 def _moved_in_all(name):
@@ -106,18 +106,21 @@ def _moved_in_all(name):
 def test_the_distance_grows_with_the_size_and_is_less_to_who_does_not_know_the_bus(effect):
     yardstick = Yardstick(draw_specimen(effect, 3), SHORT)
     distances = [yardstick.distance(factor * SCALES[effect].start) for factor in (0.5, 1.0, 2.0)]
-    assert distances[0].fair < distances[1].fair < distances[2].fair
-    assert distances[0].known < distances[1].known < distances[2].known
-    assert all(distance.fair < distance.known for distance in distances)
+    for name in ("known", "bus_unknown", "recorded"):
+        grown = [getattr(distance, name) for distance in distances]
+        assert grown == sorted(grown)
+        assert grown[0] < 0.9 * grown[2]
+    assert all(distance.recorded < distance.bus_unknown < distance.known for distance in distances)
 
 
 def test_the_bound_is_where_the_best_test_has_its_power():
     yardstick = Yardstick(draw_specimen("coulomb_friction_motor", 3), SHORT)
     bound = yardstick.bound(ALPHA)
-    assert bound.known < bound.fair
-    assert power(yardstick.distance(bound.fair).fair, ALPHA) == pytest.approx(POWER, abs=1e-3)
-    assert power(yardstick.distance(bound.known).known, ALPHA) == pytest.approx(POWER, abs=1e-3)
-    assert yardstick.bound(0.01 * ALPHA).fair > bound.fair
+    assert bound.known < bound.bus_unknown < bound.recorded
+    for name in ("known", "bus_unknown", "recorded"):
+        distance = getattr(yardstick.distance(getattr(bound, name)), name)
+        assert power(distance, ALPHA) == pytest.approx(POWER, abs=2e-3)
+    assert yardstick.bound(0.01 * ALPHA).recorded > bound.recorded
 
 
 def test_a_size_replaces_the_drawn_one_on_its_side():
@@ -145,3 +148,22 @@ def test_each_trial_has_noise_of_its_own_and_the_same_bus_and_drive():
     noise = np.concatenate([r.speed_rad_s - r.speed_true_rad_s for r in one.recordings])
     assert noise.std() == pytest.approx(SPEED_NOISE_RAD_S, rel=0.1)
     assert one.truth()["hidden"] == {"actuator_lag": {"current_loop_time_s": 0.002}}
+
+
+def test_the_noise_of_free_runs_is_white_once_it_is_whitened():
+    """Free runs of the linear truth under torques with noise, which the test draws itself."""
+    rng = np.random.default_rng(6)
+    answer = answer_rad_s(2, SHORT)
+    torque = rng.normal(0.0, torque_deviation_nm(), (SHORT, 400))
+    moved = np.stack([np.convolve(each, answer)[:SHORT] for each in torque.T], axis=1)
+    errors = moved + rng.normal(0.0, SPEED_NOISE_RAD_S, (SHORT, 400))
+    white = whitened(errors, 2, SHORT)
+    slow = np.ones(SHORT) / math.sqrt(SHORT)
+    assert np.var(white) == pytest.approx(1.0, abs=0.02)
+    assert np.var(slow @ white) == pytest.approx(1.0, abs=0.3)
+    assert abs(_next_to_each_other(white)) < 0.01  # three deviations of 120000 draws
+    assert _next_to_each_other(errors) > 0.03
+
+
+def _next_to_each_other(errors):
+    return np.mean(errors[1:] * errors[:-1]) / np.mean(errors**2)

@@ -13,23 +13,29 @@ from estimator.signals.record import Record
 
 
 @compiled
-def loading_rate(loading: float, rate: float, yield_twist: float, fastest: float) -> float:
+def loading_rate(
+    loading: float, rate: float, yield_twist: float, sharpness: float, unloading: float, fastest: float
+) -> float:
     """Return how fast the slider loads [1/s] at a twist rate: towards 1 against the motion, and no further.
 
     A slider that yields within one integration step is held to the ``fastest`` decay [1/s] the step can follow.
     """
-    return min(abs(rate) / yield_twist, fastest) * (math.copysign(1.0, rate) - loading)
+    pace = min(abs(rate) / yield_twist, fastest)
+    yielded = min(abs(loading), 1.0) ** sharpness
+    if rate * loading < 0.0:
+        yielded *= -unloading
+    return pace * math.copysign(1.0 - yielded, rate)
 
 
 def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
-    """Return a twentieth of the torque in use, and a fiftieth of the twist that it gives."""
+    """Return a twentieth of the torque in use, a fiftieth of the twist that it gives, and the shape of Dahl's law."""
     torque = torque_scale(records)
-    return (0.05 * torque, 0.02 * torque / model.parameters["k"].value)
+    return (0.05 * torque, 0.02 * torque / model.parameters["k"].value, 1.0, 1.0)
 
 
 def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
-    """Return a sharp and a round slider."""
-    return [(0.5, 0.5), (1.0, 4.0)]
+    """Return a slider that yields early and one that yields late."""
+    return [(0.5, 0.5, 1.0, 0.7), (1.0, 4.0, 1.0, 0.7)]
 
 
 def sentence(values: Mapping[str, float], motion: Motion) -> str:
@@ -45,12 +51,14 @@ EFFECT = Effect(
     name="shaft_hysteresis",
     element=Element.SHAFT,
     title="hysteresis of the shaft",
-    law="T_S = k twist + c d twist/dt + T_h z, dz/dt = (r - |r| z) / y, r = d twist/dt",
-    source="Dahl, AIAA J. 14(12), 1976; Bouc-Wen with exponent 1: Wen, J. Eng. Mech. Div. ASCE 102, 1976",
+    law="T_S = k twist + c d twist/dt + T_h z, dz/dt = r (1 - |z|^n) / y, back r (1 + u |z|^n) / y, r = d twist/dt",
+    source="Bouc-Wen: Wen, J. Eng. Mech. Div. ASCE 102, 1976; n = u = 1: Dahl, AIAA J. 14(12), 1976",
     excited_by="torque of both signs, small and large amplitudes",
     parameters=(
         EffectParameter("friction_nm", "torque", 0.0, 0.0, 40.0, "friction torque of the slider: T_h"),
         EffectParameter("yield_rad", "angle", 1.0, 0.1, 100.0, "twist over which it yields: y"),
+        EffectParameter("sharpness", "", 1.0, 0.2, 20.0, "how suddenly it yields: n", True),
+        EffectParameter("unloading", "", 1.0, 0.0, 1.0, "stiffness on the way back: u", True),
     ),
     structures=WITH_SPRING,
     resembles=("coulomb_friction_motor", "backlash", "stiffness_nonlinearity"),

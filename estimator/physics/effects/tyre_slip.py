@@ -11,6 +11,9 @@ from estimator.physics.model import DrivelineModel, Motion, unit
 from estimator.physics.motion import speed_scale, torque_scale
 from estimator.signals.record import Record
 
+LIGHTEST = 0.005
+"""Least share of the load's inertia that a wheel has."""
+
 
 @compiled
 def coupling(
@@ -82,6 +85,13 @@ def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
     ]
 
 
+def implausible(model: DrivelineModel, records: Sequence[Record], values: Mapping[str, float]) -> str:
+    """Object to a wheel so light that nothing tells it from a damper at the vehicle."""
+    if values["wheel_share"] > 1.1 * LIGHTEST:
+        return ""
+    return f"a wheel with {values['wheel_share']:.1%} of the load's inertia is lighter than any"
+
+
 def sentence(values: Mapping[str, float], motion: Motion) -> str:
     """Say what was found."""
     torque = unit("torque", motion)
@@ -102,7 +112,7 @@ EFFECT = Effect(
     excited_by="large torque changes: tip-in, tip-out, PRBS",
     parameters=(
         EffectParameter("slip_per_nm", "per_torque", 0.0, 0.0, 100.0, "slip per torque: s"),
-        EffectParameter("wheel_share", "", 0.05, 0.005, 0.7, "share of J_L that is the wheel's: J_W / J_L", True),
+        EffectParameter("wheel_share", "", 0.05, LIGHTEST, 0.7, "share of J_L that is the wheel's: J_W / J_L", True),
         EffectParameter("creep_rad_s", "speed", 1.0, 0.1, 100.0, "speed below which slip is a slide: w_0", True),
         EffectParameter("relaxation_rad", "angle", 0.0, 0.05, 100.0, "angle over which traction builds up: l", True),
         EffectParameter("carcass_s", "s", 0.0, 0.0, 20.0, "damping of the carcass at standstill: t_c", True),
@@ -113,5 +123,6 @@ EFFECT = Effect(
     contains=(),
     scales=scales,
     starts=starts,
+    implausible=implausible,
     sentence=sentence,
 )

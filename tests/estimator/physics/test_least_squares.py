@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from scipy.optimize import least_squares
+from scipy.optimize import least_squares, lsq_linear
 
 from estimator.physics.least_squares import CONVERGED, Solution, minimise
 from estimator.signals.record import FloatArray
@@ -189,3 +189,15 @@ def test_an_unknown_held_at_infinity_is_left_there() -> None:
     ours = minimise(lambda x: x[0] - errors, lambda x: jacobian, np.array([3.0, np.inf]), low, high)
     assert ours.x[0] == pytest.approx(errors.mean(), abs=0.02)  # a seventh of its standard error
     assert ours.x[1] == np.inf
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_correlated_unknowns_that_meet_many_bounds(seed: int) -> None:
+    """Three directions carry twelve unknowns: the free step leaves the box almost everywhere."""
+    rng = np.random.default_rng(seed)
+    a = rng.standard_normal((60, 3)) @ rng.standard_normal((3, 12)) + 0.02 * rng.standard_normal((60, 12))
+    b, box = 10.0 * rng.standard_normal(60), np.full(12, 0.5)
+    ours = minimise(lambda x: a @ x - b, lambda x: a, np.zeros(12), -box, box)
+    theirs = lsq_linear(a, b, (-box, box), method="bvls")
+    assert ours.converged
+    assert ours.residual @ ours.residual == pytest.approx(2.0 * theirs.cost, rel=CONVERGED / 60)

@@ -1,0 +1,64 @@
+"""``python -m tests.benchmarks.memory RECORDINGS.npz``: one diagnosis in a process of its own, and its peak memory.
+
+Written as one line: peak resident memory once the recordings are loaded and once they are diagnosed [MiB], the verdict.
+"""
+
+from __future__ import annotations
+
+import json
+import resource
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from estimator.diagnosis.diagnose import diagnose
+from estimator.physics.model import DrivelineModel, Parameter, Structure
+from estimator.signals.record import FloatArray, Record
+from tests.benchmarks.cases import Case
+
+KIB_PER_MIB = 1024
+
+
+def write_case(path: Path, case: Case) -> None:
+    """Write a case for another process."""
+    arrays: dict[str, FloatArray] = {}
+    for i, record in enumerate(case.records):
+        arrays |= {f"{i}_time_s": record.time_s, f"{i}_torque_nm": record.torque_nm, f"{i}_output": record.output}
+    parameters = {name: (each.value, each.tolerance) for name, each in case.model.parameters.items()}
+    np.savez(path, parameters=json.dumps(parameters), recordings=len(case.records), **arrays)
+
+
+def read_case(path: Path) -> Case:
+    """Read a case that another process wrote."""
+    with np.load(path) as stored:
+        parameters = {name: Parameter(*values) for name, values in json.loads(str(stored["parameters"])).items()}
+        records = tuple(
+            _record(i, stored[f"{i}_time_s"], stored[f"{i}_torque_nm"], stored[f"{i}_output"])
+            for i in range(int(stored["recordings"]))
+        )
+    return Case(DrivelineModel(Structure.TWO_MASS, parameters), records)
+
+
+def _record(index: int, time_s: FloatArray, torque_nm: FloatArray, output: FloatArray) -> Record:
+    period_s = float(time_s[1] - time_s[0])
+    okay = np.ones(time_s.size, dtype=np.bool_)
+    return Record(f"run_{index + 1}", period_s, time_s, torque_nm, output, okay)
+
+
+def peak_mib() -> float:
+    """Return the peak resident memory of this process [MiB]; Linux counts it in KiB."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / KIB_PER_MIB
+
+
+def main(arguments: list[str]) -> int:
+    """Diagnose a case and write what it took."""
+    case = read_case(Path(arguments[0]))
+    loaded = peak_mib()
+    verdict = diagnose(case.records, case.model).verdict.value
+    sys.stdout.write(json.dumps({"loaded_mib": loaded, "peak_mib": peak_mib(), "verdict": verdict}) + "\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
