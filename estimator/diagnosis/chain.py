@@ -36,13 +36,16 @@ class Chain:
     ----------
     raw : tuple of Record
         As read.
+    filled : tuple of Record
+        With the faults compensated, torques that were not read filled in.
     records : tuple of Record
-        With the faults compensated, for fits.
+        The same with these torques estimated, for fits.
     findings : tuple of Finding
         What was recognised.
     """
 
     raw: tuple[Record, ...]
+    filled: tuple[Record, ...]
     records: tuple[Record, ...]
     findings: tuple[Finding, ...]
 
@@ -53,7 +56,7 @@ class Chain:
 
     def with_torques_from(self, result: FitResult) -> Chain:
         """Return the chain with the torques that were not read estimated from a fit's error."""
-        return replace(self, records=repaired(self.records, _misfits(result)))
+        return replace(self, records=repaired(self.records, _misfits(result), self.filled))
 
     def with_jitter_in(self, result: FitResult) -> Chain:
         """Return the chain with the jitter that only the errors of a converged fit show, where they show any."""
@@ -81,7 +84,8 @@ class Chain:
 def read_through(records: Sequence[Record]) -> Chain:
     """Recognise the faults of a set of recordings and compensate them."""
     findings = recognise(records) if records else ()
-    return Chain(tuple(records), compensate(records, findings), findings)
+    filled = compensate(records, findings)
+    return Chain(tuple(records), filled, filled, findings)
 
 
 def _misfits(result: FitResult) -> list[Misfit]:

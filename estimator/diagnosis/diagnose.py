@@ -21,7 +21,7 @@ from estimator.diagnosis.assemble import (
 from estimator.diagnosis.chain import Chain, mechanical, read_through
 from estimator.diagnosis.evidence import Gain, gain, information, residuals_by_record
 from estimator.diagnosis.holdout import Examiner, foreign_outputs
-from estimator.diagnosis.hypotheses import NOTHING, Bench, Progress, effects_of, everything, open_hypotheses
+from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects, Progress, effects_of, everything, open_hypotheses
 from estimator.diagnosis.judgement import Judgement, judge
 from estimator.diagnosis.noise import noise_floor, unpredictable
 from estimator.diagnosis.preconditions import prepare
@@ -96,12 +96,10 @@ def _diagnose(
     progress("fitting the nominal model", 0.0)
     line = mechanical(model)
     chain, unseen = read_through(records), read_through(holdout)
-    if chain.torque_is_unknown:
-        chain = chain.with_torques_from(Bench(line, chain.records, everything(chain.records)).fit(NOTHING))
-    search = _search(chain, line, unseen.records, progress)
+    search = _search(_repaired(chain, line, NOTHING), line, unseen.records, progress)
     if chain.torque_is_unknown and search.selection.chosen:  # a torque estimated with physics missing hides the rest
-        chain = chain.with_torques_from(search.selection.result)
-        search = _search(chain, line, unseen.records, progress)
+        search = _search(_repaired(chain, line, search.selection.chosen), line, unseen.records, progress)
+    chain = search.chain
     bench, examiner, selection, floor = search.bench, search.examiner, search.selection, search.floor
     untestable = search.untestable
     progress("weighing the verdict", 0.9)
@@ -138,10 +136,19 @@ def _diagnose(
     )
 
 
+def _repaired(chain: Chain, model: DrivelineModel, effects: Effects) -> Chain:
+    """Return a chain with torques that were not read estimated from a fit with these effects."""
+    if not chain.torque_is_unknown:
+        return chain
+    bench = Bench(model, chain.records, everything(chain.records))
+    return chain.with_torques_from(bench.fit_by_steps(effects))
+
+
 @dataclass(frozen=True, slots=True)
 class _Search:
     """A selection, what it was made with, and what the recordings can't tell."""
 
+    chain: Chain
     bench: Bench
     examiner: Examiner
     floor: float
@@ -157,7 +164,7 @@ def _search(chain: Chain, model: DrivelineModel, unseen: Sequence[Record], progr
     names, untestable = open_hypotheses(model, chain.records)
     least_ratio = VISIBLE if chain.torque_is_unknown else 1.0
     selection = Selector(bench, examiner, names, floor, progress, least_ratio).run()
-    return _Search(bench, examiner, floor, selection, untestable)
+    return _Search(chain, bench, examiner, floor, selection, untestable)
 
 
 def _located(judgement: Judgement, seen: Discrepancy) -> Judgement:

@@ -25,10 +25,17 @@ BLOCK_S, EVERY_S = 0.6, 2.0
 
 @dataclass(frozen=True, slots=True)
 class HoldOut:
-    """RMS of the free-run error on unseen samples, without and with a set of effects."""
+    """RMS of the free-run error on unseen samples, without and with a set of effects.
+
+    Attributes
+    ----------
+    spread : float
+        Standard error of the fall of the squared error, as a share of that before: blocks differ.
+    """
 
     before: float
     after: float
+    spread: float = 0.0
 
 
 def blocks(record: Record) -> BoolArray:
@@ -58,16 +65,38 @@ class Examiner:
 
     def compare(self, before: FitResult, smaller: Effects, after: FitResult, larger: Effects) -> HoldOut:
         """Compare two hypotheses on unseen samples; ``before`` and ``after`` are their fits of everything."""
-        return HoldOut(self._error_in_blocks(before, smaller), self._error_in_blocks(after, larger))
+        squares = [self._squares(fit, effects) for fit, effects in ((before, smaller), (after, larger))]
+        counts = np.array([np.sum(block) for record in self._judged for block in _single_blocks(record)])
+        fall = squares[0] - squares[1]
+        spread = float(np.std(fall) * np.sqrt(fall.size) / squares[0].sum())
+        rms_before, rms_after = (float(np.sqrt(each.sum() / counts.sum())) for each in squares)
+        return HoldOut(rms_before, rms_after, spread)
 
-    def _error_in_blocks(self, full: FitResult, effects: Effects) -> float:
-        if not self.holdout:
-            kept_out = [blocks(record) & record.okay for record in self.records]
-            return _rms(self.records, self._between.fit(effects, full).outputs, kept_out)
-        kept_out = [blocks(record) & record.okay for record in self.holdout]
-        use = [record.okay & ~out for record, out in zip(self.holdout, kept_out, strict=True)]
-        outputs = foreign_outputs(full, self.model, self.holdout, use, effects)
-        return _rms(self.holdout, outputs, kept_out)
+    @property
+    def _judged(self) -> Sequence[Record]:
+        return self.holdout or self.records
+
+    def _squares(self, full: FitResult, effects: Effects) -> FloatArray:
+        """Return the sum of squared errors in each block."""
+        if self.holdout:
+            use = [record.okay & ~blocks(record) for record in self.holdout]
+            outputs = foreign_outputs(full, self.model, self.holdout, use, effects)
+        else:
+            outputs = self._between.fit(effects, full).outputs
+        return np.array(
+            [
+                np.sum((output - record.output)[block] ** 2)
+                for output, record in zip(outputs, self._judged, strict=True)
+                for block in _single_blocks(record)
+            ]
+        )
+
+
+def _single_blocks(record: Record) -> list[BoolArray]:
+    """Return the good samples of each block that has any."""
+    out = blocks(record) & record.okay
+    number = np.floor((record.time_s - record.time_s[0]) / EVERY_S).astype(int)
+    return [out & (number == i) for i in np.unique(number[out])]
 
 
 def foreign_outputs(
@@ -82,8 +111,3 @@ def foreign_outputs(
         simulate_foreign(model, result.p, result.problem.grid, record, samples, effects)
         for record, samples in zip(records, use, strict=True)
     )
-
-
-def _rms(records: Sequence[Record], outputs: Sequence[FloatArray], where: Sequence[BoolArray]) -> float:
-    errors = [(out - record.output)[mask] for record, out, mask in zip(records, outputs, where, strict=True)]
-    return float(np.sqrt(np.mean(np.concatenate(errors) ** 2)))

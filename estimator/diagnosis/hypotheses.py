@@ -44,6 +44,7 @@ class Bench:
     records: Sequence[Record]
     use: Sequence[BoolArray]
     _fits: dict[Effects, FitResult] = field(default_factory=dict)
+    _rough: dict[Effects, FitResult] = field(default_factory=dict)
 
     def fit(self, effects: Effects, warm: FitResult | None = None, releases: Sequence[Release] = ()) -> FitResult:
         """Fit the nominal parameters, within their tolerances, together with a set of effects.
@@ -57,15 +58,27 @@ class Bench:
         """
         known = self._fits.get(effects)
         if known is None or not known.converged:
-            result = self._fit(effects, warm, releases) if known is None else polished(converge(known))
-            self._fits[effects] = result
+            begun = self._rough.get(effects) if known is None else known
+            result = self._fit(effects, warm, releases) if begun is None else polished(converge(begun))
+            told = from_their_moment(result, self.model)
+            self._fits[effects] = result if told is result else polished(told)
         return self._fits[effects]
+
+    def fit_by_steps(self, effects: Effects) -> FitResult:
+        """Fit a set of effects of which none has been fitted here, one after the other along the chain."""
+        result, had = self.fit(NOTHING), NOTHING
+        for name in (name for name in EFFECTS if name in effects):
+            had = had | {name}
+            result = self.fit(had, result)
+        return result
 
     def rough_fit(self, effects: Effects, warm: FitResult, releases: Sequence[Release]) -> FitResult:
         """Fit as ``fit`` does, a few steps only; ``fit`` goes on from there."""
-        if effects not in self._fits:
-            self._fits[effects] = self._fit(effects, warm, releases, HEAT)
-        return self._fits[effects]
+        if effects in self._fits:
+            return self._fits[effects]
+        if effects not in self._rough:
+            self._rough[effects] = self._fit(effects, warm, releases, HEAT)
+        return self._rough[effects]
 
     def settle(self, effects: Effects) -> FitResult:
         """Take events that do nothing out of single recordings, and tell steps from their moment on, from now on."""

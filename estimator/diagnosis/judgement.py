@@ -10,7 +10,7 @@ from estimator.diagnosis.convergence import unconverged
 from estimator.diagnosis.evidence import VERY_STRONG, gain, residuals_by_record
 from estimator.diagnosis.noise import unpredictable
 from estimator.diagnosis.result import Verdict
-from estimator.diagnosis.selection import Selection
+from estimator.diagnosis.selection import VISIBLE, Selection
 from estimator.diagnosis.unnamed import UnnamedLaw
 from estimator.physics.catalogue import EFFECTS
 from estimator.signals.record import OutputKind
@@ -82,7 +82,11 @@ def _leaves_too_much(selection: Selection, floor: float, profile_alone: bool) ->
     Near to the noise is asked of a speed only: a free-running position drifts away from any model.
     """
     before, after = selection.retuned.rms, selection.result.rms
-    level = min(floor, unpredictable(residuals_by_record(selection.result)))
+    level = floor
+    if all(record.torque_trusted.all() for record in selection.result.problem.records):
+        level = min(floor, unpredictable(residuals_by_record(selection.result)))
+    if after < VISIBLE * level and selection.remaining is None:
+        return ""  # what is left is the noise of the reading and of the torque's
     share = (before**2 - after**2) / (before**2 - min(level, after) ** 2)
     if not _reads_speed(selection):
         return f"{1.0 - share:.0%} of the mismatch" if share < MOST_OF_POSITION else ""

@@ -90,6 +90,8 @@ class Screen:
                 for i in range(len(self._result.problem.records))
             ]
         )
+        if not np.isfinite(moved).all():  # so far out that the line flies apart: this start promises nothing
+            return Look(release, 0.0)
         ends = sorted((limit - zero) / step for limit in (first.low, first.high))
         most = LARGEST_SCALING * abs((first.start - zero) / step)
         reached, promise = self._projector.promise(moved, max(ends[0], -most), min(ends[1], most))

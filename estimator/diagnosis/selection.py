@@ -18,10 +18,11 @@ from dataclasses import dataclass, field, replace
 from estimator.diagnosis.evidence import VERY_STRONG, Gain, gain, information, residuals_by_record
 from estimator.diagnosis.holdout import Examiner, HoldOut
 from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects, Progress, effects_of, with_effect
+from estimator.diagnosis.intervals import Z95
 from estimator.diagnosis.lookalikes import lookalikes
 from estimator.diagnosis.noise import unpredictable
 from estimator.diagnosis.screening import Look, Screen, promising
-from estimator.diagnosis.trial import Trial, has_edge, null_inside, ranks, scan_choices
+from estimator.diagnosis.trial import Trial, has_edge, null_inside, ranks, scan_choices, values_of
 from estimator.diagnosis.unnamed import UnnamedLaw, best_unnamed
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult
@@ -280,24 +281,36 @@ class Selector:
             return "its interval includes the value at which it does nothing"
         if EFFECTS[name].event and not has_edge(name, result):
             return "it would act in whole recordings or not at all: no moment is seen at which it begins or ends"
-        values = {
-            s.name: float(x) * s.scale
-            for s, x in zip(result.problem.shared, result.x, strict=False)
-            if s.effect == name
-        }
-        return EFFECTS[name].implausible(self.bench.model, self.bench.records, values) or None
+        values = values_of(name, result)
+        entry, given = EFFECTS[name], (self.bench.model, self.bench.records, values)
+        return entry.implausible(*given) or entry.unresolved(*given) or None
 
     def _best(self, trials: Mapping[str, Trial], current: FitResult, retuned: FitResult) -> Trial | None:
         """Return the trial that gains most and passes every test, the simpler of two nested ones where they tie."""
         passing = [trial for trial in trials.values() if trial.failed is None]
         rank = ranks(passing, current)
+        most = self._most_unresolved(trials, current)
         for trial in sorted(passing, key=lambda t: -rank[t.name]):
+            if trial.result.squares > most:
+                return None
             simpler = self._simpler(trial, trials, current)
             if self._weighty(simpler.name, simpler.effects, simpler.result, current, retuned) and self._holds_out(
                 simpler, current
             ):
                 return self._examined(simpler, current)
         return None
+
+    def _most_unresolved(self, trials: Mapping[str, Trial], current: FitResult) -> float:
+        """Return the squared error that an effect too small to tell leaves; infinity without one that beats chance."""
+        return min(
+            (
+                trial.result.squares
+                for trial in trials.values()
+                if trial.gain.delta_bic >= VERY_STRONG
+                and EFFECTS[trial.name].unresolved(self.bench.model, self.bench.records, trial.values)
+            ),
+            default=math.inf,
+        )
 
     def _simpler(self, trial: Trial, trials: Mapping[str, Trial], current: FitResult) -> Trial:
         for name in EFFECTS[trial.name].contains:
@@ -341,11 +354,11 @@ class Selector:
         return self.examiner.compare(before, effects_of(before), trial.result, trial.effects)
 
     def _holds_out(self, trial: Trial, before: FitResult) -> bool:
-        """Tell whether a fair part of the gain on the fitted samples shows on unseen ones."""
+        """Tell whether a fair part of the gain on the fitted samples shows on unseen ones, as far as these can tell."""
         held = self._examine(trial, before)
         seen = 1.0 - (trial.result.rms / before.rms) ** 2
         unseen = 1.0 - (held.after / held.before) ** 2
-        return unseen >= PART_UNSEEN * seen
+        return unseen + Z95 * held.spread >= PART_UNSEEN * seen
 
     def _examined(self, trial: Trial, before: FitResult) -> Trial:
         return replace(trial, holdout=self._examine(trial, before), failed=None)

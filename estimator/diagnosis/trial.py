@@ -31,6 +31,20 @@ class Trial:
     p_value: float
     failed: str | None
 
+    @property
+    def values(self) -> dict[str, float]:
+        """Fitted values of the parameters that all recordings share."""
+        return values_of(self.name, self.result)
+
+
+def values_of(name: str, result: FitResult) -> dict[str, float]:
+    """Return the values of an effect's parameters that all recordings share."""
+    return {
+        shared.name: float(x) * shared.scale
+        for shared, x in zip(result.problem.shared, result.x, strict=False)
+        if shared.effect == name
+    }
+
 
 def ranks(passing: Sequence[Trial], before: FitResult) -> dict[str, float]:
     """Return what trials gain over one fit, with one number of independent samples, that of the least error.

@@ -201,6 +201,9 @@ class Effect:
         Own phase to the shared amplitude that it belongs to, for effects periodic in an angle.
     implausible : callable
         Model, records and parameter values to the reason why such values are no case of this effect, or "".
+    unresolved : callable
+        The same, to the reason why such values are too small to tell from another way of sampling, or "". Where such
+        an effect explains most, nothing that explains less is named in its place.
     recognised : bool
         True where it is recognised in the raw data before any fit (repeated, lost, quantised samples).
     """
@@ -226,6 +229,7 @@ class Effect:
     step: Step | None = None
     phases: Mapping[str, str] = field(default_factory=dict)
     implausible: Callable[[DrivelineModel, Sequence[Record], Mapping[str, float]], str] = always_plausible
+    unresolved: Callable[[DrivelineModel, Sequence[Record], Mapping[str, float]], str] = always_plausible
     recognised: bool = False
 
     @property

@@ -127,6 +127,7 @@ SLIDER = slot("shaft_hysteresis", "friction_nm")
 YIELD = slot("shaft_hysteresis", "yield_rad")
 SHARPNESS = slot("shaft_hysteresis", "sharpness")
 UNLOADING = slot("shaft_hysteresis", "unloading")
+SLIDER_INSIDE = slot("shaft_hysteresis", "inside")
 CARDAN = slot("cardan_second_order", "amplitude_nm")
 CARDAN_PHASE = slot("cardan_second_order", "phase_rad")
 CARDAN_ANGLE = slot("cardan_second_order", "angle_rad")
@@ -199,6 +200,8 @@ def shaft_torque(twist: float, rate: float, loading: float, p: FloatArray, stiff
     if p[GAP] > 0.0:
         loaded = beyond_gap(twist, p[GAP])
         damping *= backlash.damping_share(loaded, p[CONTACT])
+    if p[SLIDER_INSIDE] > 0.0:
+        stiffness = max(stiffness - p[SLIDER_INSIDE] * p[SLIDER] / p[YIELD], 0.0)
     elastic = stiffness * loaded * stiffness_nonlinearity.factor(loaded, p[HARDENING], p[SHAPE])
     return elastic + damping + float(p[SLIDER]) * loading
 

@@ -101,8 +101,10 @@ def _moved_in(result: FitResult, index: int) -> FloatArray | None:
     began = best = misfit.squares(local)
     first, last = result.problem.records[index].since_start_s[[0, -1]]
     for begin, end in ends:
+        may_move = [row for row in (begin, end) if basis.low[row] < basis.high[row]]
+        moves = [[row] for row in may_move] + ([may_move] if len(may_move) > 1 else [])
         for _ in range(MOVES):
-            tried = [_shifted(local, rows, offset) for rows in ([begin], [end], [begin, end]) for offset in OFFSETS_S]
+            tried = [_shifted(local, rows, offset) for rows in moves for offset in OFFSETS_S]
             tried = [x for x in tried if first <= x[begin] < x[end] <= last]
             squares = [misfit.squares(x) for x in tried]
             if not squares or min(squares) >= best:
@@ -119,14 +121,10 @@ def _shifted(local: FloatArray, rows: list[int], offset_s: float) -> FloatArray:
 
 
 def _ends(basis: LocalBasis) -> list[tuple[int, int]]:
-    """Return where beginning and end of each event that acts stand among a recording's unknowns."""
-    rows = range(basis.own_rows.start, basis.own_rows.stop)
-    place = {(u.effect, u.name): row for row, u in zip(rows, basis.own, strict=True) if u.low < u.high}
-    return [
-        (row, place[effect, "to_s"])
-        for (effect, name), row in place.items()
-        if EFFECTS[effect].event and name == "from_s"
-    ]
+    """Return where beginning and end of each event that may move stand among a recording's unknowns."""
+    place = {(u.effect, u.name): row for row, u in enumerate(basis.own, start=basis.own_rows.start)}
+    movable = {u.effect for u in basis.own if EFFECTS[u.effect].event and u.low < u.high}
+    return [(place[effect, "from_s"], place[effect, "to_s"]) for effect in sorted(movable)]
 
 
 def _around(basis: LocalBasis, local: FloatArray, record: Record) -> LocalBasis:

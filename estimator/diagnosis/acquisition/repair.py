@@ -6,7 +6,8 @@ probability, at::
 
     min  sum_k (simulated_k + sum_j h[k - j] d_j - measured_k)^2 / s^2  +  sum_j d_j^2 / v_j
 
-v_j is the variance of the torque's change over as many samples as row j is away from a reading. The constant load
+v_j is the variance of the torque's change over as many samples as row j is away from a reading; d_j counts from the
+torque as it was filled in there, whatever an earlier estimate has added to it. The constant load
 torque and the start of the recording may have absorbed part of the wrong torque; their answers are fitted along, free.
 """
 
@@ -46,8 +47,15 @@ class Misfit:
     pulse: FloatArray
 
 
-def repaired(records: Sequence[Record], misfits: Sequence[Misfit]) -> tuple[Record, ...]:
+def repaired(
+    records: Sequence[Record], misfits: Sequence[Misfit], filled: Sequence[Record] | None = None
+) -> tuple[Record, ...]:
     """Return the records with unknown torques estimated; those without, or with too many, as they are.
+
+    Parameters
+    ----------
+    filled : sequence of Record, optional
+        The records with unknown torques as they were filled in, where ``records`` have been repaired before.
 
     ``torque_okay`` stays as it is: an estimate is no reading, and a better model may estimate again.
 
@@ -56,16 +64,18 @@ def repaired(records: Sequence[Record], misfits: Sequence[Misfit]) -> tuple[Reco
     BadShape
         If an error has not one value per sample, or holds NaN in unmasked rows.
     """
-    return tuple(_repaired(record, misfit) for record, misfit in zip(records, misfits, strict=True))
+    began = records if filled is None else filled
+    return tuple(_repaired(*each) for each in zip(records, misfits, began, strict=True))
 
 
-def _repaired(record: Record, misfit: Misfit) -> Record:
+def _repaired(record: Record, misfit: Misfit, filled: Record) -> Record:
     _require_error(record, misfit)
     unknown = ~record.torque_trusted
     rows = np.flatnonzero(_short(any_of(unknown)))
     if rows.size == 0 or rows.size > MOST_UNKNOWN * record.okay.size:
         return record
-    correction = _corrections(record, misfit, rows)
+    added = (record.total_torque_nm - filled.total_torque_nm)[rows]
+    correction = _corrections(record, misfit, rows, added)
     parts = unknown[rows] * np.maximum(_step_size(record), np.finfo(float).tiny)
     torque = record.torque_nm.copy()
     torque[rows] += correction[:, np.newaxis] * parts / parts.sum(axis=1, keepdims=True)
@@ -88,8 +98,10 @@ def _short(unknown: BoolArray) -> BoolArray:
     return kept
 
 
-def _corrections(record: Record, misfit: Misfit, rows: np.ndarray[tuple[int], np.dtype[np.intp]]) -> FloatArray:
-    """Return the most probable correction of the total torque in each of the rows [Nm], shape (n,)."""
+def _corrections(
+    record: Record, misfit: Misfit, rows: np.ndarray[tuple[int], np.dtype[np.intp]], added: FloatArray
+) -> FloatArray:
+    """Return the most probable correction of the total torque in each of the rows beyond ``added`` [Nm], shape (n,)."""
     n = record.okay.size
     pulse = np.zeros(n)
     length = min(n, misfit.pulse.size)
@@ -106,7 +118,9 @@ def _corrections(record: Record, misfit: Misfit, rows: np.ndarray[tuple[int], np
     normal = regressors.T @ regressors
     # The free answers carry no prior; a grain of their own power keeps them apart where they are alike.
     prior[rows.size :] = 1e-9 * np.diag(normal)[rows.size :]
-    solved = linalg.solve(normal + np.diag(prior), -regressors.T @ misfit.error[seen], assume_a="pos")
+    right = -regressors.T @ misfit.error[seen]
+    right[: rows.size] -= prior[: rows.size] * added
+    solved = linalg.solve(normal + np.diag(prior), right, assume_a="pos")
     corrections: FloatArray = solved[: rows.size]
     return corrections
 

@@ -66,5 +66,5 @@ EFFECT = Effect(
     scales=scales,
     starts=starts,
     sentence=sentence,
-    implausible=long_enough("time_constant_s"),
+    unresolved=long_enough("time_constant_s"),
 )

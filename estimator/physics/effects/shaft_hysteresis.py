@@ -28,14 +28,14 @@ def loading_rate(
 
 
 def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
-    """Return a twentieth of the torque in use, a fiftieth of the twist that it gives, and the shape of Dahl's law."""
+    """Return a twentieth of the torque in use, a fiftieth of the twist that it gives, and 1 for the shape."""
     torque = torque_scale(records)
-    return (0.05 * torque, 0.02 * torque / model.parameters["k"].value, 1.0, 1.0)
+    return (0.05 * torque, 0.02 * torque / model.parameters["k"].value, 1.0, 1.0, 1.0)
 
 
 def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
-    """Return a slider that yields early and one that yields late."""
-    return [(0.5, 0.5, 1.0, 0.7), (1.0, 4.0, 1.0, 0.7)]
+    """Return sliders that yield early and late, a part of them in the nominal stiffness."""
+    return [(0.5, 0.5, 1.0, 0.7, 0.2), (1.0, 4.0, 1.0, 0.7, 0.5)]
 
 
 def sentence(values: Mapping[str, float], motion: Motion) -> str:
@@ -51,7 +51,8 @@ EFFECT = Effect(
     name="shaft_hysteresis",
     element=Element.SHAFT,
     title="hysteresis of the shaft",
-    law="T_S = k twist + c d twist/dt + T_h z, dz/dt = r (1 - |z|^n) / y, back r (1 + u |z|^n) / y, r = d twist/dt",
+    law="T_S = (k - m T_h / y) twist + c r + T_h z, dz/dt = r (1 - |z|^n) / y, back r (1 + u |z|^n) / y, "
+    "r = d twist/dt",
     source="Bouc-Wen: Wen, J. Eng. Mech. Div. ASCE 102, 1976; n = u = 1: Dahl, AIAA J. 14(12), 1976",
     excited_by="torque of both signs, small and large amplitudes",
     parameters=(
@@ -59,6 +60,7 @@ EFFECT = Effect(
         EffectParameter("yield_rad", "angle", 1.0, 0.1, 100.0, "twist over which it yields: y"),
         EffectParameter("sharpness", "", 1.0, 0.2, 20.0, "how suddenly it yields: n", True),
         EffectParameter("unloading", "", 1.0, 0.0, 1.0, "stiffness on the way back: u", True),
+        EffectParameter("inside", "", 0.0, 0.0, 1.0, "part of its stiffness that k holds: m", True),
     ),
     structures=WITH_SPRING,
     resembles=("coulomb_friction_motor", "backlash", "stiffness_nonlinearity"),

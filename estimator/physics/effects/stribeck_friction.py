@@ -30,8 +30,8 @@ def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...
 
 
 def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
-    """Return starts at a narrow and a wide Stribeck range: the fit is not convex in its width."""
-    return [(0.5, 0.3, 0.6), (0.5, 0.3, 3.0)]
+    """Return starts at narrow and wide Stribeck ranges: the fit is not convex in the width."""
+    return [(0.5, 0.3, width) for width in (0.6, 1.5, 3.0)]
 
 
 def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:

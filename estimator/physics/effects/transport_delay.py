@@ -65,5 +65,5 @@ EFFECT = Effect(
     scales=scales,
     starts=starts,
     sentence=sentence,
-    implausible=long_enough("delay_s"),
+    unresolved=long_enough("delay_s"),
 )

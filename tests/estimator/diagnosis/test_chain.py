@@ -61,7 +61,7 @@ class TestHealthy:
         np.testing.assert_allclose(errors, 0.3)
 
     def test_of_no_recordings_there_is_an_empty_chain(self) -> None:
-        assert read_through([]) == Chain((), (), ())
+        assert read_through([]) == Chain((), (), (), ())
 
 
 class TestStale:
