@@ -16,7 +16,7 @@ from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Effect
 from estimator.physics.fit import FitResult, start_of
 from estimator.physics.model import DrivelineModel
-from estimator.physics.own_scan import Cells, Stretch, Wave, cells, scan, waves
+from estimator.physics.own_scan import Cells, Stretch, Wave, cells, scanned, waves
 from estimator.physics.projector import Projector
 from estimator.physics.simulate import simulate
 from estimator.physics.unknowns import Release, Shared, effect_unknowns
@@ -150,8 +150,10 @@ class Screen:
             cells(entry, _filled(self._result.p_of(i), release.shared), own, sizes, self._runner(i))
             for i, own in enumerate(release.own)
         ]
-        error = self._projector.error
-        scans = [scan(self._projector.rest(self._spread(grid.answers, i)), error) for i, grid in enumerate(grids)]
+        scans = [
+            scanned(*self._projector.products(grid.answers, slice(*self._rows[i : i + 2])))
+            for i, grid in enumerate(grids)
+        ]
         tried = [value for value in SIZES * size.scale * abs(size.start) if self._may_be(size, value)]
         tried += [-value for value in tried if self._may_be(size, -value)]
         best = max(tried, key=lambda value: sum(each.best(value).taken for each in scans))

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from estimator.diagnosis.stretches import share_of, stretches
 from estimator.signals.record import Record
 
 LONG_S = 1.0
@@ -96,18 +97,22 @@ def cut(records: Sequence[Record]) -> Cut:
     rows: dict[str, slice] = {}
     origin: dict[str, str] = {}
     warnings: list[str] = []
+    share = share_of(records)
     for record in records:
         found = segments(record)
-        if found == [slice(0, record.okay.size)]:
-            kept.append(record)
-            origin[record.name] = record.name
-            continue
         long = found
         if len(found) > 1:
             long = [part for part in found if _is_long(record, part)]
             warnings.append(_told(record, found, long))
-        for i, part in enumerate(long, start=1):
-            name = record.name if len(found) == 1 else f"{record.name}#{i}"
+        used = stretches(record, long, share)
+        if used == [slice(0, record.okay.size)]:
+            kept.append(record)
+            origin[record.name] = record.name
+            continue
+        if used != long:
+            warnings.append(_told_of_stretches(record, long, used))
+        for i, part in enumerate(used, start=1):
+            name = record.name if len(used) == 1 and len(found) == 1 else f"{record.name}#{i}"
             kept.append(sliced(record, part, name))
             rows[name], origin[name] = part, record.name
     return Cut(tuple(records), tuple(kept), rows, origin, tuple(warnings))
@@ -127,6 +132,14 @@ def _told(record: Record, found: Sequence[slice], long: Sequence[slice]) -> str:
     short = len(found) - len(long)
     left_out = f"; left out as holding less than {least:g} s: {short}; used: {used:.0%} of the good samples"
     return f"{text}, each with its own initial state and constant load{left_out if short else ''}."
+
+
+def _told_of_stretches(record: Record, long: Sequence[slice], used: Sequence[slice]) -> str:
+    whole, seen = (sum(part.stop - part.start for part in parts) * record.sample_time_s for parts in (long, used))
+    return (
+        f"recording {record.name}: {seen:.0f} s of its {whole:.0f} s are used, in {len(used)} stretches, each with its "
+        "own initial state and constant load."
+    )
 
 
 def sliced(record: Record, rows: slice, name: str | None = None) -> Record:

@@ -145,6 +145,10 @@ def scan(answers: FloatArray, error: FloatArray) -> Scan:
     error : ndarray, shape (R,)
         Simulated less measured.
     """
-    gram, match = answers @ answers.T, answers @ error
+    return scanned(answers @ answers.T, answers @ error)
+
+
+def scanned(gram: FloatArray, match: FloatArray) -> Scan:
+    """Prepare the same search from the products of the answers with each other, (M, M), and with the error, (M,)."""
     power = np.maximum(np.diag(gram)[:, None] - 2.0 * gram + np.diag(gram)[None, :], 0.0)
     return Scan(match[None, :] - match[:, None], power)

@@ -32,6 +32,14 @@ class Projector:
         left: FloatArray = signals - (signals @ self._free) @ self._free.T
         return left
 
+    def products(self, answers: FloatArray, rows: slice) -> tuple[FloatArray, FloatArray]:
+        """Return the products of what is left of answers with each other, (K, K), and with ``error``, (K,).
+
+        The answers, shape (K, rows), are 0 in all other rows: one recording's own.
+        """
+        seen = answers @ self._free[rows]
+        return answers @ answers.T - seen @ seen.T, answers @ self.error[rows]
+
     def promise(self, direction: FloatArray, low: float, high: float) -> tuple[float, float]:
         """Return how far to go along a direction, within bounds, and by how much the squared error falls.
 

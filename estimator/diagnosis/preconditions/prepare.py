@@ -9,6 +9,7 @@ from estimator.diagnosis.joined import joined
 from estimator.diagnosis.preconditions.clipped import without_clipped
 from estimator.diagnosis.preconditions.exciting import require_excitation, require_signals
 from estimator.diagnosis.preconditions.model_values import model_warnings
+from estimator.diagnosis.preconditions.thinned import thinned
 from estimator.diagnosis.preconditions.together import require_together
 from estimator.diagnosis.preconditions.units import require_plausible_units
 from estimator.diagnosis.result import Diagnosis
@@ -53,7 +54,7 @@ def prepare(records: Sequence[Record], model: DrivelineModel, holdout: Sequence[
     for record in mended:
         output_state(record, model.structure)
         require_signals(record)
-    segments = cut(mended)
+    segments = cut(thinned(mended, model))
     training = segments.of(record.name for record in records)
     if not training:
         raise NotExciting(" ".join(segments.warnings), tuple(record.name for record in records))

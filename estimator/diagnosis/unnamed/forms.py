@@ -24,8 +24,8 @@ STEP_EVERY_S = 0.5
 CHANGE_EVERY_S = 1.0
 """Grid of the moments at which an inertia, a stiffness or a drag may change."""
 
-MOST_MOMENTS = 60
-"""Moments in one recording; a longer one has a coarser grid."""
+MOST_MOMENTS = 180
+"""Moments in all recordings together; longer ones have a coarser grid."""
 
 USUAL_ORDERS = (1.0, 2.0)
 """Waves per motor turn that are tried in any case: imbalance, and joints at an angle."""
@@ -139,7 +139,7 @@ def _changes(result: FitResult, element: Element, motions: Sequence[Motion]) -> 
         Form(f"{name} from {moment:.1f} s on in {names[i]}", partial(_from_moment, i, law, moment))
         for i, motion in enumerate(motions)
         for name, law in CHANGING[element].items()
-        for moment in moments(motion, CHANGE_EVERY_S)
+        for moment in moments(motion, CHANGE_EVERY_S, len(motions))
     ]
 
 
@@ -152,7 +152,7 @@ def _steps(result: FitResult, element: Element, motions: Sequence[Motion]) -> li
     return [
         Form(f"load step at {moment:.1f} s in {names[i]}", partial(_from_moment, i, one, moment))
         for i, motion in enumerate(motions)
-        for moment in moments(motion, STEP_EVERY_S)
+        for moment in moments(motion, STEP_EVERY_S, len(motions))
     ] + [Form(f"a slow course of the load in {name}", partial(_course, i)) for i, name in enumerate(names)]
 
 
@@ -176,9 +176,9 @@ def _course(index: int, motions: Sequence[Motion]) -> list[Columns]:
     return columns
 
 
-def moments(motion: Motion, every_s: float) -> FloatArray:
-    """Return the moments of a recording at which something may set in [s]."""
+def moments(motion: Motion, every_s: float, recordings: int) -> FloatArray:
+    """Return the moments of one of so many recordings at which something may set in [s]."""
     length_s = float(motion.time_s[-1] - motion.time_s[0])
-    every_s = max(every_s, length_s / MOST_MOMENTS)
+    every_s = max(every_s, recordings * length_s / MOST_MOMENTS)
     found: FloatArray = motion.time_s[0] + every_s * np.arange(1, max(int(length_s / every_s), 2))
     return found

@@ -20,17 +20,19 @@ class Ground:
         The error, and what re-tuning would leave of it.
     jacobian : ndarray, shape (rows, U)
         Derivative of the output by every unknown.
+    basis : ndarray, shape (rows, F)
+        Orthonormal basis of what the free unknowns move.
     """
 
     def __init__(self, cut: Sequence[Line], jacobian: FloatArray, error: FloatArray, pinned: BoolArray) -> None:
         self.jacobian, self.raw, self.unknowns = jacobian, error, jacobian.shape[1]
-        self._basis = np.linalg.qr(jacobian[:, ~pinned])[0]
+        self.basis = np.linalg.qr(jacobian[:, ~pinned])[0]
         self._sizes = np.cumsum([int(line.rows.sum()) for line in cut])[:-1]
         self.error = self.rest(error)
 
     def rest(self, signals: FloatArray) -> FloatArray:
         """Return what is left of signals, shape (rows,) or (rows, q)."""
-        left: FloatArray = signals - self._basis @ (self._basis.T @ signals)
+        left: FloatArray = signals - self.basis @ (self.basis.T @ signals)
         return left
 
     def split(self, rows: FloatArray) -> list[FloatArray]:

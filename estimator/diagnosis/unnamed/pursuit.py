@@ -25,6 +25,9 @@ MOST_COEFFICIENTS = 45
 ALIKE = 1e-6
 """A candidate that re-tuning reproduces to this share of its power can't be told from it."""
 
+CHUNK = 4096
+"""Rows that are worked on at a time."""
+
 TOO_ALIKE = 1e-8
 """Share of a column's power below which it is a combination of others."""
 
@@ -67,10 +70,8 @@ class Path:
 
 def pursue(pool: Sequence[Candidate], ground: Ground) -> Path:
     """Choose groups of candidates while they are worth their coefficients."""
-    raw = np.hstack([candidate.answers for candidate in pool])
     group = np.repeat(np.arange(len(pool)), [candidate.answers.shape[1] for candidate in pool])
-    rest = _unit(raw, ground.rest(raw))
-    full, full_match = rest.T @ rest, rest.T @ ground.error
+    scale, full, full_match = _products(pool, ground)
     gram, match = full, full_match
     squares, counts, chosen = [float(ground.error @ ground.error)], [0], list[int]()
     alone, _ = _gains(gram, match, group, len(pool))
@@ -89,20 +90,37 @@ def pursue(pool: Sequence[Candidate], ground: Ground) -> Path:
         counts.append(counts[-1] + int(ranks[best]))
         members = np.flatnonzero(np.isin(group, chosen))
         weights = np.linalg.lstsq(full[np.ix_(members, members)], full_match[members], rcond=TOO_ALIKE)[0]
-        left = ground.error - rest[:, members] @ weights
+        answers = np.hstack([pool[each].answers for each in sorted(chosen)])
+        left = ground.error - ground.rest(answers @ (scale[members] * weights))
         gram, match = _swept(gram, match, np.flatnonzero(group == best))
     columns = [pool[each].answers for each in chosen]
     term = np.repeat(np.arange(len(chosen)), [each.shape[1] for each in columns])
     return Path(squares, counts, chosen, np.hstack([np.empty((left.size, 0)), *columns]), term, alone)
 
 
-def _unit(raw: FloatArray, rest: FloatArray) -> FloatArray:
-    """Scale what is left of answers to unit norm; to zero where re-tuning takes all of it."""
-    before, after = np.einsum("ij,ij->j", raw, raw), np.einsum("ij,ij->j", rest, rest)
+def _products(pool: Sequence[Candidate], ground: Ground) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the scales that make what re-tuning leaves of the answers of unit norm, its Gram matrix and its match.
+
+    Rows are taken in chunks: the answers of a long recording fill the memory once, and not once more for every step.
+    """
+    chunks = [slice(first, first + CHUNK) for first in range(0, ground.error.size, CHUNK)]
+    seen = sum(ground.basis[rows].T @ _stacked(pool, rows) for rows in chunks)
+    width = sum(candidate.answers.shape[1] for candidate in pool)
+    before, gram, match = np.zeros(width), np.zeros((width, width)), np.zeros(width)
+    for rows in chunks:
+        raw = _stacked(pool, rows)
+        rest = raw - ground.basis[rows] @ seen
+        before += np.einsum("ij,ij->j", raw, raw)
+        gram += rest.T @ rest
+        match += rest.T @ ground.error[rows]
+    after = np.diag(gram)
     alive = after > ALIKE * np.maximum(before, np.finfo(float).tiny)
     scale = np.where(alive, 1.0 / np.sqrt(np.where(alive, after, 1.0)), 0.0)
-    unit: FloatArray = rest * scale
-    return unit
+    return scale, gram * np.outer(scale, scale), match * scale
+
+
+def _stacked(pool: Sequence[Candidate], rows: slice) -> FloatArray:
+    return np.hstack([candidate.answers[rows] for candidate in pool])
 
 
 def _gains(gram: FloatArray, match: FloatArray, group: Indices, count: int) -> tuple[FloatArray, FloatArray]:

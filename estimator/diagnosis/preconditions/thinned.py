@@ -1,0 +1,53 @@
+"""Recordings faster than the line needs, thinned to what it needs: a diagnosis takes time and memory by the sample.
+
+The torque is averaged over the samples between two that are kept, as it acts on an inertia; the output is taken as it
+was read at the kept moments. Averaging that, too, would lower its noise, but also damp what the line does: at 12 blocks
+a period by 1 %, which a fit would take for a parameter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from estimator.physics.model import DrivelineModel, Structure, natural_frequencies_rad_s
+from estimator.signals.record import Record
+
+LONGEST_S = 0.01
+PER_PERIOD = 12.0
+"""Samples kept per period of the line's fastest mode, at least; and one in `LONGEST_S`."""
+
+
+def thinned(records: Sequence[Record], model: DrivelineModel) -> list[Record]:
+    """Return recordings with as many samples as the model's fastest mode needs; those that have no more as they are."""
+    return [_thin(record, factor_for(record.sample_time_s, model)) for record in records]
+
+
+def factor_for(sample_time_s: float, model: DrivelineModel) -> int:
+    """Return one in how many samples is enough."""
+    if model.structure is Structure.JOINT:
+        return 1
+    fastest = float(natural_frequencies_rad_s(model.values())[-1])
+    longest_s = LONGEST_S if fastest == 0.0 else min(LONGEST_S, 2.0 * np.pi / (PER_PERIOD * fastest))
+    return max(1, int(longest_s / sample_time_s * (1.0 + 1e-9)))
+
+
+def _thin(record: Record, factor: int) -> Record:
+    if factor == 1:
+        return record
+    count = record.okay.size // factor
+    kept = slice(0, count * factor, factor)
+    blocks = count, factor
+    trusted = np.asarray(record.torque_trusted[: count * factor].reshape(*blocks, -1).all(axis=1))
+    return replace(
+        record,
+        sample_time_s=factor * record.sample_time_s,
+        time_s=record.time_s[kept],
+        torque_nm=record.torque_nm[: count * factor].reshape(*blocks, -1).mean(axis=1),
+        output=record.output[kept],
+        okay=record.okay[kept],
+        torque_okay=None if record.torque_okay is None else trusted,
+        offset_s=None if record.offset_s is None else record.offset_s[kept],
+    )

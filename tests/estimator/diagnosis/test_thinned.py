@@ -1,0 +1,47 @@
+"""A recording faster than the line needs is thinned, and says the same of the line."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimator.diagnosis.hypotheses import NOTHING, Bench, everything
+from estimator.diagnosis.preconditions.thinned import LONGEST_S, factor_for, thinned
+from estimator.physics.layout import flat
+from estimator.physics.simulate import Start, grid_for, simulate
+from tests.estimator.physics.bench import TWO_MASS, model, random_steps, record
+
+LINE = model(TWO_MASS)
+
+
+@pytest.mark.parametrize(("period_s", "factor"), [(0.01, 1), (0.02, 1), (0.005, 2)])
+def test_one_in_as_many_samples_as_the_line_allows(period_s: float, factor: int) -> None:
+    """The line swings at a few hertz: 10 ms are enough, and the most."""
+    assert factor_for(period_s, LINE) == factor
+    assert factor * period_s <= max(LONGEST_S, period_s)
+
+
+def test_a_stiff_line_keeps_twelve_samples_a_period() -> None:
+    stiff = model({**TWO_MASS, "k": 100.0 * TWO_MASS["k"]})
+    j = TWO_MASS["J_M"] * TWO_MASS["J_L"] / (TWO_MASS["J_M"] + TWO_MASS["J_L"])
+    period_s = 2.0 * np.pi / np.sqrt(100.0 * TWO_MASS["k"] / j)
+    factor = factor_for(0.0001, stiff)
+    assert period_s / (factor * 0.0001) >= 12.0
+    assert period_s / ((factor + 1) * 0.0001) < 12.0
+
+
+def test_the_line_found_is_the_same() -> None:
+    """Torque that changes every 10 ms, read every millisecond."""
+    torque = np.repeat(random_steps(1500, 1, mean_nm=20.0), 10)
+    time_s = 0.001 * np.arange(torque.size)
+    blank = replace(record(torque, np.zeros(torque.size)), sample_time_s=0.001, time_s=time_s)
+    clean = simulate(grid_for(LINE, [blank]), blank, flat(LINE), Start(5.0, 0.0, 5.0, 0.001, 5.0))
+    fast = replace(blank, output=clean + 0.02 * np.random.default_rng(1).standard_normal(torque.size))
+    (thin,) = thinned([fast], LINE)
+    assert thin.sample_time_s == pytest.approx(0.01)
+    assert thin.output.size == fast.output.size // 10
+    found = Bench(LINE, [thin], everything([thin])).fit(NOTHING)
+    assert found.rms == pytest.approx(0.02, rel=0.05)
+    assert found.value("", "k") == pytest.approx(TWO_MASS["k"], rel=0.01)
