@@ -136,6 +136,7 @@ CARDAN_SHARE = slot("cardan_second_order", "share")
 CARDAN_SHARE_PHASE = slot("cardan_second_order", "share_phase_rad")
 BRANCH_INERTIA = slot("extra_torsional_mode", "inertia_kg_m2")
 BRANCH_FREQUENCY = slot("extra_torsional_mode", "frequency_hz")
+LINE_SHARE = slot("extra_torsional_mode", "line_share")
 BRANCH_DAMPING = slot("extra_torsional_mode", "damping_ratio")
 COULOMB_LOAD = slot("coulomb_friction_load", "friction_nm")
 AERO = slot("aerodynamic_drag", "drag_nm_s2")
@@ -195,7 +196,7 @@ def motor_friction(speed: float, p: FloatArray, width: float) -> float:
 @compiled
 def shaft_torque(twist: float, rate: float, loading: float, p: FloatArray, stiffness: float) -> float:
     """Return the torque the shaft carries [Nm] at a twist [rad], its rate [rad/s] and the hysteresis' loading [-]."""
-    damping = float(p[C]) * rate
+    damping = float(p[C] * p[LINE_SHARE] ** 2) * rate
     loaded = twist
     if p[GAP] > 0.0:
         loaded = beyond_gap(twist, p[GAP])
@@ -203,7 +204,7 @@ def shaft_torque(twist: float, rate: float, loading: float, p: FloatArray, stiff
     if p[SLIDER_INSIDE] > 0.0:
         stiffness = max(stiffness - p[SLIDER_INSIDE] * p[SLIDER] / p[YIELD], 0.0)
     elastic = stiffness * loaded * stiffness_nonlinearity.factor(loaded, p[HARDENING], p[SHAPE])
-    return elastic + damping + float(p[SLIDER]) * loading
+    return float(elastic) + damping + float(p[SLIDER]) * loading
 
 
 @compiled
@@ -331,7 +332,7 @@ def conditions(
         joint_rate,
         inertia_motor,
         inertia_load,
-        p[K] * (1.0 + cracked * p[CRACK]),
+        p[K] * p[LINE_SHARE] * (1.0 + cracked * p[CRACK]),
         p[B_L] + warming_friction.cold_part(time_s, p[WARMING], p[WARMING_TIME]),
         dry_load,
         max(sign_width, dry_motor / (fastest * inertia_motor)),

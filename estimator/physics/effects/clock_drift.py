@@ -19,6 +19,16 @@ def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
     return [(-1.0,), (-0.25,), (0.25,), (1.0,)]
 
 
+def unresolved(model: DrivelineModel, records: Sequence[Record], values: Mapping[str, float]) -> str:
+    """Object to clocks that part by less than a tenth of a sampling period over the longest recording."""
+    longest_s = max(float(record.time_s[-1] - record.time_s[0]) for record in records)
+    least_s = 0.1 * min(record.sample_time_s for record in records)
+    parted_s = abs(values["rate"]) * longest_s
+    if parted_s >= least_s:
+        return ""
+    return f"the clocks part by {1e3 * parted_s:.2g} ms, less than a tenth of the sampling period"
+
+
 def sentence(values: Mapping[str, float], motion: Motion) -> str:
     """Say what was found."""
     return f"the torque's clock runs {1e6 * values['rate']:+.0f} ppm off the speed's"
@@ -38,5 +48,6 @@ EFFECT = Effect(
     contains=(),
     scales=scales,
     starts=starts,
+    unresolved=unresolved,
     sentence=sentence,
 )

@@ -16,14 +16,15 @@ MOST_DAMPING = 0.15
 
 
 def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
-    """Return a tenth of the motor's inertia, the line's own frequency, and a usual damping."""
+    """Return a tenth of the motor's inertia, the line's own frequency, a usual damping, and 1."""
     frequency = float(natural_frequencies_rad_s(model.values())[0]) / (2.0 * math.pi)
-    return (0.1 * model.parameters["J_M"].value, frequency, 0.05)
+    return (0.1 * model.parameters["J_M"].value, frequency, 0.05, 1.0)
 
 
 def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
-    """Return modes below, around and above the first resonance, as close as they are narrow."""
-    return [(0.2, float(ratio), 1.0) for ratio in np.geomspace(0.3, 5.0, 24)]
+    """Return modes below, around and above the first resonance, as close as they are narrow; heavy ones far above."""
+    near = [(0.2, float(ratio), 1.0, 1.0) for ratio in np.geomspace(0.3, 5.0, 24)]
+    return [*near, *((1.5, ratio, 1.0, 0.95) for ratio in (3.0, 4.0, 5.0, 6.0))]
 
 
 def sentence(values: Mapping[str, float], motion: Motion) -> str:
@@ -45,13 +46,15 @@ EFFECT = Effect(
     name="extra_torsional_mode",
     element=Element.SHAFT,
     title="one more torsional mode",
-    law="J_X dw_X/dt = k_X (phi_M - phi_X) + c_X (w_M - w_X), reacting on the motor; k_X = J_X (2 pi f)^2",
+    law="J_X dw_X/dt = k_X (phi_M - phi_X) + c_X (w_M - w_X), reacting on the motor; k_X = J_X (2 pi f)^2; "
+    "T_S = s k twist + s^2 c d twist/dt, s < 1 where the spring is in the line",
     source="an inertia on a spring beside the main one: Den Hartog, Mechanical Vibrations, 4th ed., 1956",
     excited_by="PRBS that reaches the mode's frequency",
     parameters=(
         EffectParameter("inertia_kg_m2", "inertia", 0.0, 0.0, 50.0, "inertia J_X"),
-        EffectParameter("frequency_hz", "Hz", 1.0, 0.05, 5.0, "its frequency with the motor held: f"),
+        EffectParameter("frequency_hz", "Hz", 1.0, 0.05, 8.0, "its frequency with the motor held: f"),
         EffectParameter("damping_ratio", "", 0.05, 0.02, 4.0, "its damping ratio: c_X / (2 sqrt(k_X J_X))"),
+        EffectParameter("line_share", "", 1.0, 0.4, 1.0, "share of the twist that the main shaft has: s", True),
     ),
     structures=WITH_SHAFT,
     resembles=("actuator_lag", "stiffness_nonlinearity", "tyre_slip", "speed_filter"),
