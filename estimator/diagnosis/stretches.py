@@ -17,8 +17,8 @@ from estimator.signals.record import Record
 LONGEST_S = 60.0
 """Length of a stretch at most: hundreds of periods of a driveline's first mode, and a dozen speed changes."""
 
-MOST_SAMPLES = 24_000
-"""Samples that are fitted, of all recordings together: four minutes at 10 ms. Every array of a fit is in proportion."""
+MOST_SAMPLES = 30_000
+"""Samples that are fitted, of all recordings together: five minutes at 10 ms. Every array of a fit is in proportion."""
 
 
 def stretches(record: Record, parts: Sequence[slice], share: float) -> list[slice]:

@@ -92,7 +92,6 @@ def test_the_thresholds_of_a_verdict_are_those_of_the_code() -> None:
         f"removes {selection.PART_FOR_DETAIL:.0%}".replace("%", " %") + " more",
         f"{judgement.ABOVE_FLOOR:g} times the floor",
         f"the last {noise.PREDICTOR_ORDER} outputs",
-        f"the last {holdout.KEPT_OUT:.0%}".replace("%", " %") + " of each recording",
         f"blocks of {holdout.BLOCK_S:g} s every {holdout.EVERY_S:g} s",
         f"over {locate.WINDOW_S:g} s",
         f"central {locate.CENTRAL:.0%}".replace("%", " %"),

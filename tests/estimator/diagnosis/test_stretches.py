@@ -44,5 +44,5 @@ def test_recordings_share_what_may_be_used_by_their_length() -> None:
 def test_it_is_told() -> None:
     (warning,) = cut([lasting(2 * MOST_SAMPLES)]).warnings
     assert warning == (
-        "recording run: 240 s of its 480 s are used, in 4 stretches, each with its own initial state and constant load."
+        "recording run: 300 s of its 600 s are used, in 5 stretches, each with its own initial state and constant load."
     )

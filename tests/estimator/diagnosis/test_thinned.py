@@ -9,6 +9,7 @@ import pytest
 
 from estimator.diagnosis.hypotheses import NOTHING, Bench, everything
 from estimator.diagnosis.preconditions.thinned import LONGEST_S, factor_for, thinned
+from estimator.diagnosis.stretches import MOST_SAMPLES
 from estimator.physics.layout import flat
 from estimator.physics.simulate import Start, grid_for, simulate
 from tests.estimator.physics.bench import TWO_MASS, model, random_steps, record
@@ -33,8 +34,8 @@ def test_a_stiff_line_keeps_twelve_samples_a_period() -> None:
 
 
 def test_the_line_found_is_the_same() -> None:
-    """Torque that changes every 10 ms, read every millisecond."""
-    torque = np.repeat(random_steps(1500, 1, mean_nm=20.0), 10)
+    """Torque that changes every 10 ms, read every millisecond, more often than is used."""
+    torque = np.repeat(random_steps(MOST_SAMPLES // 10 + 1, 1, mean_nm=20.0), 10)
     time_s = 0.001 * np.arange(torque.size)
     blank = replace(record(torque, np.zeros(torque.size)), sample_time_s=0.001, time_s=time_s)
     clean = simulate(grid_for(LINE, [blank]), blank, flat(LINE), Start(5.0, 0.0, 5.0, 0.001, 5.0))
@@ -42,6 +43,8 @@ def test_the_line_found_is_the_same() -> None:
     (thin,) = thinned([fast], LINE)
     assert thin.sample_time_s == pytest.approx(0.01)
     assert thin.output.size == fast.output.size // 10
+    short = replace(fast, **{name: getattr(fast, name)[:9000] for name in ("time_s", "torque_nm", "output", "okay")})
+    assert thinned([short], LINE) == [short]
     found = Bench(LINE, [thin], everything([thin])).fit(NOTHING)
     assert found.rms == pytest.approx(0.02, rel=0.05)
     assert found.value("", "k") == pytest.approx(TWO_MASS["k"], rel=0.01)

@@ -147,9 +147,18 @@ def test_null_parameters_leave_the_simulation_bit_equal(entry: Effect, reversal:
 def test_the_decisive_parameter_at_its_null_is_no_effect_whatever_the_others_are(
     entry: Effect, reversal: Record
 ) -> None:
-    """Inverters have a gain or a limit each, a resolver and joints several errors: there each decides for itself."""
+    """Inverters have a gain or a limit each, a resolver and joints several errors: there each decides for itself.
+
+    So do the inertia and the softness of a mode in the line.
+    """
     nominal = output_with(entry, {}, reversal)
-    each = {"inverter_gain_mismatch", "torque_saturation", "resolver_error", "stribeck_friction"}
+    each = {
+        "inverter_gain_mismatch",
+        "torque_saturation",
+        "resolver_error",
+        "stribeck_friction",
+        "extra_torsional_mode",
+    }
     for values in start_values(entry, [reversal]):
         several = entry.name in each or len(entry.phases) > 1
         decisive = entry.shared_parameters if several else entry.shared_parameters[:1]

@@ -114,11 +114,12 @@ def test_a_slipping_tyre_couples_wheel_and_vehicle_by_creep(slip: float, share: 
 
 @pytest.mark.parametrize(("slip", "roll"), [(2e-3, 0.5), (5e-4, 3.0)])
 def test_the_traction_of_a_tyre_may_build_up_as_it_rolls(slip: float, roll: float) -> None:
-    v, share, creep = TWO_MASS, 0.15, 2.0
+    v, share, creep, carcass_s = TWO_MASS, 0.15, 2.0, 0.01
 
     def rhs(t: float, x: FloatArray, torque: float) -> FloatArray:
-        _, w_M, twist, w_W, w_V, T_x = x
+        _, w_M, twist, w_W, w_V, T_l = x
         T_S = v["k"] * twist + v["c"] * (w_M - w_W)
+        T_x = T_l + carcass_s / (slip * roll) / (1.0 + (w_V / creep) ** 2) * (w_W - w_V)
         drag = v["b_L"] * w_V + START.load_torque_nm
         return np.array(
             [
@@ -127,13 +128,14 @@ def test_the_traction_of_a_tyre_may_build_up_as_it_rolls(slip: float, roll: floa
                 w_M - w_W,
                 (T_S - T_x) / (share * v["J_L"]),
                 (T_x - drag) / ((1.0 - share) * v["J_L"]),
-                ((w_W - w_V) / slip - np.hypot(w_V, creep) * T_x) / roll,
+                ((w_W - w_V) / slip - abs(w_V) * T_l) / roll,
             ]
         )
 
     start = np.array([*start_vector(), START.load_speed_rad_s, START.load_torque_nm])  # it carries the constant load
     expected = reference.solve(rhs, start, Held.of(TORQUE, SAMPLE_TIME_S), TIME_S)[:, reference.SPEED]
     values = {"slip_per_nm": slip, "wheel_share": share, "creep_rad_s": creep, "relaxation_rad": roll}
+    values["carcass_s"] = carcass_s
     assert_law({"tyre_slip": values}, expected)
 
 

@@ -98,15 +98,23 @@ def test_cardan_joints_may_pass_on_a_share_of_the_shafts_torque() -> None:
 
 
 def test_cardan_joints_may_twist_the_shaft_by_their_angle() -> None:
-    """The phase is the measured angle's, the rate is the motor's own speed."""
+    """The phase is the measured angle's, the rate is the motor's own speed; the motor feels the joint's power."""
     size = 5e-3
 
     def rhs(t: float, x: FloatArray, torque: float) -> FloatArray:
         angle = 2.0 * 10.0 * t - 0.4
         bent = size * np.cos(angle)
-        turning = -2.0 * size * np.sin(angle) * x[reference.SPEED]
-        line = two_mass(shaft=lambda t, twist, rate: K * (twist + bent) + C * (rate + turning))
-        return line(t, x, torque)
+        slope = -2.0 * size * np.sin(angle)
+        turning = slope * x[reference.SPEED]
+        carried: list[float] = []
+
+        def shaft(t: float, twist: float, rate: float) -> float:
+            carried.append(K * (twist + bent) + C * (rate + turning))
+            return carried[-1]
+
+        rates = two_mass(shaft=shaft)(t, x, torque)
+        rates[reference.SPEED] -= slope * carried[-1] / TWO_MASS["J_M"]
+        return rates
 
     effects = {"cardan_second_order": {"angle_rad": size, "angle_phase_rad": -0.4}}
     assert_law(effects, solved(rhs), measured(np.full(SAMPLES, 10.0)))

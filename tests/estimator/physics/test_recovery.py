@@ -34,12 +34,16 @@ GEARED = replace(
 
 @dataclass(frozen=True, slots=True)
 class Plant:
-    """What is planted: shared values, each recording's own, and how far off the fit starts."""
+    """What is planted: shared values, each recording's own, and how far off the fit starts.
+
+    ``undetermined`` are parameters of which the recordings determine only what they are together.
+    """
 
     shared: Mapping[str, float]
     own: tuple[Mapping[str, float], Mapping[str, float]] = field(default_factory=lambda: ({}, {}))
     factor: float = 1.1
     off: float = 0.02
+    undetermined: frozenset[str] = frozenset()
 
 
 EVENTS = ({"from_s": 3.21, "to_s": 8.4}, {"from_s": 5.5, "to_s": 11.03})
@@ -59,16 +63,24 @@ PLANTS = {
     "backlash": Plant({"gap_rad": 0.02, "contact_rad": 1e-3}),
     "stiffness_nonlinearity": Plant({"hardening_per_rad2": 250.0, "shape": 1.0}),
     "stiffness_change": Plant({"change": -0.2}, EVENTS),
-    "shaft_hysteresis": Plant({"friction_nm": 20.0, "yield_rad": 4e-3}),
+    "shaft_hysteresis": Plant(
+        {"friction_nm": 20.0, "yield_rad": 4e-3, "sharpness": 2.0, "unloading": 0.3, "inside": 0.4},
+        undetermined=frozenset({"k", "inside"}),  # the stiffness after it has yielded
+    ),
     "cardan_second_order": Plant({"amplitude_nm": 15.0}, PHASES),
     "cardan_second_order/angle": Plant({"angle_rad": 0.004}, ({"angle_phase_rad": 0.4}, {"angle_phase_rad": -1.1})),
     "cardan_second_order/share": Plant({"share": 0.1}, ({"share_phase_rad": 0.4}, {"share_phase_rad": -1.1})),
-    "extra_torsional_mode": Plant({"inertia_kg_m2": 0.2, "frequency_hz": 14.0, "damping_ratio": 0.05}),
+    "extra_torsional_mode": Plant(
+        {"inertia_kg_m2": 0.2, "frequency_hz": 14.0, "damping_ratio": 0.05, "line_share": 0.9},
+        undetermined=frozenset({"k", "c", "line_share"}),  # what the shaft and the other spring are together
+    ),
     "coulomb_friction_load": Plant({"friction_nm": 15.0}),
     "aerodynamic_drag": Plant({"drag_nm_s2": 0.5}),
     "brake_drag": Plant({"brake_nm": 20.0}, EVENTS),
     "tyre_slip": Plant({"slip_per_nm": 1e-3, "wheel_share": 0.1, "creep_rad_s": 3.0}),
-    "tyre_slip/relaxing": Plant({"slip_per_nm": 5e-4, "wheel_share": 0.1, "creep_rad_s": 3.0, "relaxation_rad": 2.0}),
+    "tyre_slip/relaxing": Plant(
+        {"slip_per_nm": 5e-4, "wheel_share": 0.1, "creep_rad_s": 3.0, "relaxation_rad": 2.0, "carcass_s": 0.01}
+    ),
     "load_imbalance": Plant({"amplitude_nm": 40.0, "motor_turns_per_turn": 3.0}, PHASES),
     "inertia_change": Plant({"change_kg_m2": 6.0}, EVENTS),
     "warming_friction": Plant({"cold_nm_s": 3.0, "time_constant_s": 5.0}),
