@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from estimator.diagnosis.screening import STARTS, Screen
+from estimator.diagnosis.screening import Screen, promising
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Untestable
 from estimator.physics.fit import HEAT, ITERATIONS, FitResult, Problem, best_fit, converge, make_problem
@@ -94,7 +94,7 @@ class Bench:
         if new and not releases:
             if warm is None:
                 raise ValueError("a set of effects is fitted from a fit without them, came none")
-            releases = [look.release for look in Screen(warm, self.model).looks(new[0])[:STARTS]]
+            releases = [look.release for look in promising(Screen(warm, self.model).looks(new[0]))]
         problems = [
             self._problem(
                 effects,

@@ -48,10 +48,21 @@ class Look:
     release: Release
     promise: float
 
+    @property
+    def variant(self) -> frozenset[str]:
+        """Which of the law's parameters are free: what is held makes it another variant."""
+        return frozenset(unknown.name for unknown in self.release.shared if unknown.low < unknown.high)
+
 
 def promising(looks: Sequence[Look]) -> list[Look]:
-    """Return the starts worth a fit: the best, and a second one where it promises nearly as much."""
-    return [look for look in looks[:STARTS] if look.promise >= PROMISING * looks[0].promise or look is looks[0]]
+    """Return the starts worth a fit: the best, and others where they promise nearly as much.
+
+    These are the second best, and the best of every other variant of the law: a look at one is no look at another.
+    """
+    near = [look for look in looks if look.promise >= PROMISING * looks[0].promise or look is looks[0]]
+    seen = {look.variant for look in near[:STARTS]}
+    others = {look.variant: look for look in reversed(near) if look.variant not in seen}
+    return [*near[:STARTS], *others.values()]
 
 
 class Screen:

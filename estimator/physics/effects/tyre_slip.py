@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from estimator.compiled import compiled
-from estimator.physics.effect import WITH_SHAFT, Effect, EffectParameter, Element, Held, Start
+from estimator.physics.effect import WITH_SHAFT, Effect, EffectParameter, Element, Start
 from estimator.physics.model import DrivelineModel, Motion, unit
 from estimator.physics.motion import speed_scale, torque_scale
 from estimator.signals.record import Record
@@ -81,7 +81,7 @@ def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
         (slip, wheel, creep, relaxation, damping)
         for slip in (0.3, 1.5)
         for wheel in (0.05, 0.15)
-        for creep, relaxation, damping in ((1.0, Held(0.0), Held(0.0)), (0.5, 3.0, 0.5))
+        for creep, relaxation, damping in ((1.0, 0.5, 0.5), (0.5, 3.0, 0.5))
     ]
 
 

@@ -7,7 +7,7 @@ the catalogue does not have, and pairs. All with the first seed, none chosen; 20
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -133,31 +133,29 @@ def test_every_effect_of_the_catalogue_is_planted() -> None:
     assert set(IN_CATALOGUE) == set(EFFECTS)
 
 
-UNNAMED_YET = {
-    "tyre_slip": "the law has no damping of the carcass near standstill: through the reversal it leaves 3 times the "
-    "noise, and is not believed; without that recording it is found, sizes and all",
+WITH_EVERY_CHANGE = {
+    "inverter_gain_mismatch",
+    "actuator_lag",
+    "coulomb_friction_motor",
+    "backlash",
+    "shaft_hysteresis",
+    "stiffness_change",
+    "aerodynamic_drag",
+    "brake_drag",
+    "resolver_error",
+    "stale_samples",
+    "torque_deadband",
 }
-
-CLAIMED_WRONGLY = {
-    "speed_stiffened_shaft": "named as a step of the stiffness that lasts all of one recording, without an edge in any",
-}
+"""Of every element some, of every kind of law one; the others take too long and are run by `make campaign`."""
 
 
-LONGEST = {"maxwell_shaft", "sensor_curvature", "speed_stiffened_shaft", "speed_spikes", "tyre_slip"}
-"""Abstentions look everywhere before they are one: these are run by `make campaign`."""
+def by_turns(names: Sequence[str]) -> list[object]:
+    """Mark what is run by `make campaign` only."""
+    marks = {True: (), False: (pytest.mark.campaign,)}
+    return [pytest.param(name, marks=marks[name in WITH_EVERY_CHANGE]) for name in names]
 
 
-def expecting(names: Sequence[str], to_fail: Mapping[str, str]) -> list[object]:
-    """Mark what is known to fail, with the reason, and what takes longest, for `make campaign`."""
-    return [pytest.param(name, marks=_marks(name, to_fail)) for name in names]
-
-
-def _marks(name: str, to_fail: Mapping[str, str]) -> list[pytest.MarkDecorator]:
-    marks = [pytest.mark.xfail(strict=True, reason=to_fail[name])] if name in to_fail else []
-    return [*marks, pytest.mark.campaign] if name in LONGEST else marks
-
-
-@pytest.mark.parametrize("name", expecting(IN_CATALOGUE, UNNAMED_YET))
+@pytest.mark.parametrize("name", by_turns(IN_CATALOGUE))
 def test_what_was_planted_is_named_and_nothing_else(name: str) -> None:
     case = planted(name)
     assert_named(case, [name])
@@ -192,7 +190,7 @@ def test_nothing_missing_is_said_whether_the_parameters_are_right_or_off(nominal
         assert case.diagnosis.parameters[name].value == pytest.approx(getattr(case.specimen.bus, name), rel=0.02)
 
 
-@pytest.mark.parametrize("name", expecting(OUTSIDE, CLAIMED_WRONGLY))
+@pytest.mark.parametrize("name", by_turns(OUTSIDE))
 def test_what_the_catalogue_does_not_have_is_given_no_name(name: str) -> None:
     case = planted(name)
     assert case.diagnosis.verdict is Verdict.UNEXPLAINED
