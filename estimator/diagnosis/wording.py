@@ -92,5 +92,10 @@ def rejection(trial: Trial, selection: Selection) -> str:
     special = [name for name in EFFECTS[trial.name].contains if name in selection.chosen]
     if special:
         return f"contains {special[0]}, and its further parameters add too little"
+    others = sorted((trial.effects - {trial.name}) & selection.chosen)
+    if others:
+        more = max(best**2 - trial.result.rms**2, 0.0) / retuned**2
+        beside = " and ".join(others)
+        return f"beside {beside} it removes {more:.1%} more of the mismatch: too little, or not on unseen data"
     share = (retuned**2 - trial.result.rms**2) / (retuned**2 - best**2)
     return f"explains {max(share, 0.0):.0%} of what {' + '.join(sorted(selection.chosen))} explains"

@@ -16,6 +16,9 @@ from hil.report.wording import BADGES, ELEMENTS, headline
 
 _COLOURS = MappingProxyType({Verdict.EXPLAINED: "blue", Verdict.UNEXPLAINED: "yellow", Verdict.NO_MISMATCH: "green"})
 
+MOST_RIVALS = 6
+"""Rivals that a terminal shows, the nearest first."""
+
 
 def diagnosis_summary(diagnosis: Diagnosis) -> RenderableType:
     """Return what a terminal shows of a diagnosis."""
@@ -28,7 +31,9 @@ def diagnosis_summary(diagnosis: Diagnosis) -> RenderableType:
     if diagnosis.effects:
         pieces.append(_effects_table(diagnosis))
     pieces.append(_parameter_table(diagnosis))
-    pieces += [Text(f"rejected: {rival.name}: {rival.reason}") for rival in diagnosis.rejected]
+    pieces += [Text(f"rejected: {rival.name}: {rival.reason}") for rival in diagnosis.rejected[:MOST_RIVALS]]
+    if len(diagnosis.rejected) > MOST_RIVALS:
+        pieces.append(Text(f"rejected: {len(diagnosis.rejected) - MOST_RIVALS} more, with reasons in the report"))
     pieces += [
         Text(f"can't tell: {entry.name}: {entry.reason}; test: {entry.suggested_test}")
         for entry in diagnosis.untestable

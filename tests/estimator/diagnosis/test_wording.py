@@ -112,6 +112,13 @@ class TestRejection:
         said = rejection(self.trial("backlash", 0.5), self.chosen("transport_delay", "actuator_lag"))
         assert said == "explains 76% of what actuator_lag + transport_delay explains"
 
+    def test_one_tried_beside_what_was_chosen_is_told_what_it_adds(self) -> None:
+        """(0.1^2 - 0.09^2) / 1 = 0.2 %."""
+        effects = frozenset({"actuator_lag", "backlash"})
+        trial = Trial("backlash", effects, of_rms(0.09, 4), GAIN, None, 0.0, None)
+        said = rejection(trial, self.chosen("actuator_lag"))
+        assert said.startswith("beside actuator_lag it removes 0.2% more of the mismatch")
+
     def test_one_that_makes_things_worse_explains_nothing(self) -> None:
         assert rejection(self.trial("backlash", 1.1), self.chosen("actuator_lag")).startswith("explains 0%")
 
