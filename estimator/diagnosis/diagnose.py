@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -21,9 +21,9 @@ from estimator.diagnosis.assemble import (
 from estimator.diagnosis.chain import Chain, mechanical, read_through
 from estimator.diagnosis.evidence import Gain, gain, information, residuals_by_record
 from estimator.diagnosis.holdout import Examiner, foreign_outputs
-from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects, Progress, effects_of, everything, open_hypotheses
+from estimator.diagnosis.hypotheses import NOTHING, Bench, Progress, effects_of, everything
 from estimator.diagnosis.judgement import Judgement, judge
-from estimator.diagnosis.noise import noise_floor, unpredictable
+from estimator.diagnosis.noise import unpredictable
 from estimator.diagnosis.preconditions import prepare
 from estimator.diagnosis.result import (
     Diagnosis,
@@ -37,11 +37,12 @@ from estimator.diagnosis.result import (
     UntestableEffect,
     Verdict,
 )
-from estimator.diagnosis.selection import VISIBLE, Selection, Selector
+from estimator.diagnosis.search import search
+from estimator.diagnosis.selection import Selection
 from estimator.diagnosis.unnamed import UnnamedLaw as Nameless
 from estimator.diagnosis.where import discrepancy, locate
 from estimator.diagnosis.wording import rejection, statement
-from estimator.physics.effect import Element, Untestable
+from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult, fit, make_problem
 from estimator.physics.model import DrivelineModel, unit
 from estimator.signals.record import FloatArray, OutputKind, Record
@@ -96,14 +97,10 @@ def _diagnose(
     progress("fitting the nominal model", 0.0)
     line = mechanical(model)
     chain, unseen = read_through(records), read_through(holdout)
-    search = _search(_repaired(chain, line, NOTHING), line, unseen.records, progress)
-    if chain.torque_is_unknown and search.selection.chosen:  # a torque estimated with physics missing hides the rest
-        search = _search(_repaired(chain, line, search.selection.chosen), line, unseen.records, progress)
-    chain = search.chain
-    bench, examiner, selection, floor = search.bench, search.examiner, search.selection, search.floor
-    untestable = search.untestable
+    found = search(chain, line, unseen.records, progress)
+    bench, examiner, selection, floor = found.bench, found.examiner, found.selection, found.floor
     progress("weighing the verdict", 0.9)
-    chain = chain.with_jitter_in(selection.result)
+    chain = found.chain.with_jitter_in(selection.result)
     judgement = judge(selection, floor, chain.findings)
     believed = judgement.verdict is Verdict.EXPLAINED
     final = selection.result if believed else selection.retuned
@@ -115,7 +112,7 @@ def _diagnose(
     figures = _fit_figures(chain, before, selection, examiner, line, floor, believed)
     acquired = acquired_effects(chain, residuals_by_record(before), chain.errors(final.outputs))
     effects = (*(found_effects(selection, line, examiner) if believed else ()), *acquired)
-    blind = tuple(UntestableEffect(n, u.reason, u.suggested_test) for n, u in untestable.items())
+    blind = tuple(UntestableEffect(n, u.reason, u.suggested_test) for n, u in found.untestable.items())
     progress("done", 1.0)
     return Diagnosis(
         verdict=judgement.verdict,
@@ -134,37 +131,6 @@ def _diagnose(
         warnings=judgement.unconverged,
         discrepancy=seen,
     )
-
-
-def _repaired(chain: Chain, model: DrivelineModel, effects: Effects) -> Chain:
-    """Return a chain with torques that were not read estimated from a fit with these effects."""
-    if not chain.torque_is_unknown:
-        return chain
-    bench = Bench(model, chain.records, everything(chain.records))
-    return chain.with_torques_from(bench.fit_by_steps(effects))
-
-
-@dataclass(frozen=True, slots=True)
-class _Search:
-    """A selection, what it was made with, and what the recordings can't tell."""
-
-    chain: Chain
-    bench: Bench
-    examiner: Examiner
-    floor: float
-    selection: Selection
-    untestable: Mapping[str, Untestable]
-
-
-def _search(chain: Chain, model: DrivelineModel, unseen: Sequence[Record], progress: Progress) -> _Search:
-    """Look for what is missing in recordings whose faults of the acquisition are compensated."""
-    bench = Bench(model, chain.records, everything(chain.records))
-    examiner = Examiner(model, chain.records, unseen)
-    floor = noise_floor(chain.records)
-    names, untestable = open_hypotheses(model, chain.records)
-    least_ratio = VISIBLE if chain.torque_is_unknown else 1.0
-    selection = Selector(bench, examiner, names, floor, progress, least_ratio).run()
-    return _Search(chain, bench, examiner, floor, selection, untestable)
 
 
 def _located(judgement: Judgement, seen: Discrepancy) -> Judgement:

@@ -1,0 +1,57 @@
+"""The search for what is missing, on recordings whose faults of the acquisition are compensated."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from estimator.diagnosis.chain import Chain
+from estimator.diagnosis.holdout import Examiner
+from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects, Progress, everything, open_hypotheses
+from estimator.diagnosis.noise import noise_floor
+from estimator.diagnosis.selection import VISIBLE, Selection, Selector
+from estimator.physics.effect import Untestable
+from estimator.physics.model import DrivelineModel
+from estimator.signals.record import Record
+
+
+@dataclass(frozen=True, slots=True)
+class Search:
+    """A selection, what it was made with, and what the recordings can't tell."""
+
+    chain: Chain
+    bench: Bench
+    examiner: Examiner
+    floor: float
+    selection: Selection
+    untestable: Mapping[str, Untestable]
+
+
+def search(chain: Chain, model: DrivelineModel, unseen: Sequence[Record], progress: Progress) -> Search:
+    """Look for what is missing.
+
+    Torques that were not read are estimated from the nominal fit first. Where effects are found, they are estimated
+    again with these, and the search begins anew: a torque estimated with physics missing hides the rest.
+    """
+    found = _searched(_repaired(chain, model, NOTHING), model, unseen, progress)
+    if chain.torque_is_unknown and found.selection.chosen:
+        found = _searched(_repaired(chain, model, found.selection.chosen), model, unseen, progress)
+    return found
+
+
+def _repaired(chain: Chain, model: DrivelineModel, effects: Effects) -> Chain:
+    """Return a chain with torques that were not read estimated from a fit with these effects."""
+    if not chain.torque_is_unknown:
+        return chain
+    bench = Bench(model, chain.records, everything(chain.records))
+    return chain.with_torques_from(bench.fit_by_steps(effects))
+
+
+def _searched(chain: Chain, model: DrivelineModel, unseen: Sequence[Record], progress: Progress) -> Search:
+    bench = Bench(model, chain.records, everything(chain.records))
+    examiner = Examiner(model, chain.records, unseen)
+    floor = noise_floor(chain.records)
+    names, untestable = open_hypotheses(model, chain.records)
+    least_ratio = VISIBLE if chain.torque_is_unknown else 1.0
+    selection = Selector(bench, examiner, names, floor, progress, least_ratio).run()
+    return Search(chain, bench, examiner, floor, selection, untestable)
