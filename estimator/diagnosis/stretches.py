@@ -1,8 +1,8 @@
 """Stretches of long recordings: what a diagnosis looks at, so that its time and memory are bounded.
 
 Where all recordings together hold more than ``MOST_SAMPLES``, stretches evenly spread over them are used, each with its
-own initial state and constant load torque. A simulation over many minutes says no more of a driveline than several over
-one minute each; what happens in between is not seen, and a warning says so.
+own initial state and constant load torque; recordings shorter than one stay whole. A simulation over many minutes says
+no more of a driveline than several over one minute each; what happens in between is not seen, and a warning says so.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def share_of(records: Sequence[Record]) -> float:
 
 def _pieces(part: slice, longest: int, share: float) -> list[slice]:
     size = part.stop - part.start
-    allowed = math.ceil(share * size)
+    allowed = min(size, max(math.ceil(share * size), longest))
     count = math.ceil(allowed / longest)
     length = allowed // count
     starts = part.start + np.linspace(0, size - length, count).astype(int)

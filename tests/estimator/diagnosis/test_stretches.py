@@ -41,6 +41,14 @@ def test_recordings_share_what_may_be_used_by_their_length() -> None:
     assert used["long"] == pytest.approx(3 * used["short"], rel=0.01)
 
 
+def test_many_short_recordings_stay_whole() -> None:
+    samples = round(0.5 * LONGEST_S / 0.01)
+    records = [lasting(samples, f"run_{i}") for i in range(2 * MOST_SAMPLES // samples)]
+    found = cut(records)
+    assert [each.output.size for each in found.records] == [samples] * len(records)
+    assert found.warnings == ()
+
+
 def test_it_is_told() -> None:
     (warning,) = cut([lasting(2 * MOST_SAMPLES)]).warnings
     assert warning == (
