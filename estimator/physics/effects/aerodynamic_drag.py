@@ -2,35 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 from estimator.compiled import compiled
-from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start, Untestable
+from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element
 from estimator.physics.effects import quadratic_friction
-from estimator.physics.model import DrivelineModel, Motion, unit
-from estimator.physics.motion import speed_scale, torque_scale
-from estimator.signals.record import Record
+from estimator.physics.model import Motion, unit
 
 
 @compiled
 def law(speed: float, drag: float) -> float:
     """Return the drag ``q w |w|`` against the motion [Nm]."""
     return drag * speed * abs(speed)
-
-
-def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
-    """Return a twentieth of the torque in use at the top speed."""
-    return (0.05 * torque_scale(records) / speed_scale(records) ** 2,)
-
-
-def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
-    """Return one start: the problem is convex in the drag."""
-    return [(0.5,)]
-
-
-def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
-    """Need speeds that differ, or else it is the constant load."""
-    return quadratic_friction.testable(model, records)
 
 
 def sentence(values: Mapping[str, float], motion: Motion) -> str:
@@ -51,8 +34,8 @@ EFFECT = Effect(
     resembles=("quadratic_friction", "road_grade"),
     equivalent=(),
     contains=(),
-    scales=scales,
-    starts=starts,
-    testable=testable,
+    scales=quadratic_friction.scales,
+    starts=quadratic_friction.starts,
+    testable=quadratic_friction.testable,
     sentence=sentence,
 )

@@ -1,0 +1,36 @@
+"""Effects that are there but too small to tell, or no case of their kind: each says so with the figure."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from estimator.physics.catalogue import EFFECTS
+from estimator.physics.effects.tyre_slip import LIGHTEST
+from tests.estimator.physics.bench import TWO_MASS, model, record
+
+LINE = model(TWO_MASS)
+RECORDS = [record(np.zeros(3001), np.zeros(3001))]  # 30 s at 10 ms
+
+
+@pytest.mark.parametrize(
+    ("name", "key", "told", "not_told"),
+    [
+        ("actuator_lag", "time_constant_s", 1.1e-3, 0.9e-3),
+        ("speed_filter", "time_constant_s", 1.1e-3, 0.9e-3),
+        ("transport_delay", "delay_s", 1.1e-3, 0.9e-3),
+        ("clock_drift", "rate", -1.1e-3 / 30.0, -0.9e-3 / 30.0),
+    ],
+)
+def test_a_tenth_of_the_sampling_period_is_the_least_that_is_told(
+    name: str, key: str, told: float, not_told: float
+) -> None:
+    unresolved = EFFECTS[name].unresolved
+    assert unresolved(LINE, RECORDS, {key: told}) == ""
+    assert "less than a tenth of the sampling period" in unresolved(LINE, RECORDS, {key: not_told})
+
+
+def test_a_wheel_at_the_edge_of_its_bounds_is_none() -> None:
+    implausible = EFFECTS["tyre_slip"].implausible
+    assert implausible(LINE, RECORDS, {"wheel_share": 0.03}) == ""
+    assert implausible(LINE, RECORDS, {"wheel_share": LIGHTEST}) != ""
