@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis.hypotheses import NOTHING, Bench, everything
-from estimator.diagnosis.screening import Look, Screen
+from estimator.diagnosis.screening import Look, Screen, promising
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
 from estimator.physics.model import DrivelineModel
 from estimator.physics.simulate import Start
-from estimator.physics.unknowns import Shared
+from estimator.physics.unknowns import Release, Shared
 from estimator.signals.record import Record
 from tests.estimator.diagnosis.planted import SIGMA, TIGHT, disturbed, drive_torque, quiet, rubbing
 from tests.estimator.physics.bench import (
@@ -199,3 +199,26 @@ class TestMoments:
     def test_where_it_does_not_happen_next_to_nothing_is_left_of_it(self, coupled: Looked) -> None:
         begin, end = (float(x) for x in coupled[2].local_of(2)[coupled[2].problem.local[2].own_rows])
         assert end - begin < 0.1
+
+
+class TestPromising:
+    """Starts of one law: with two parameters free, or with one of them held."""
+
+    @staticmethod
+    def look(promise: float, held: bool = False) -> Look:
+        free = Shared("tyre_slip", "slip_per_nm", 1.0, 0.0, 1.0, 0.5)
+        other = Shared("tyre_slip", "wheel_share", 1.0, *((0.1, 0.1) if held else (0.0, 1.0)), 0.1)
+        return Look(Release((free, other), ((),)), promise)
+
+    def test_the_best_and_a_second_that_promises_nearly_as_much(self) -> None:
+        looks = [self.look(promise) for promise in (10.0, 9.0, 8.0)]
+        assert promising(looks) == looks[:2]
+        assert promising([looks[0], self.look(4.0)]) == looks[:1]
+
+    def test_every_other_variant_has_its_best(self) -> None:
+        looks = [self.look(10.0), self.look(9.0), self.look(8.0, held=True), self.look(7.0, held=True)]
+        assert promising(looks) == looks[:3]
+
+    def test_a_variant_that_promises_little_has_none(self) -> None:
+        looks = [self.look(10.0), self.look(9.0), self.look(4.0, held=True)]
+        assert promising(looks) == looks[:2]

@@ -334,6 +334,28 @@ class TestRules:
         assert not select._weighty("stiffness_nonlinearity", same, after, before, self.RETUNED)
         assert select._weighty("stiffness_nonlinearity", same, of_rms(0.101, 4), of_rms(0.5, 3), self.RETUNED)
 
+    def test_a_small_wave_beside_a_wave_is_its_overtone(self, select: Selector) -> None:
+        """Motor and load are two elements; alone beside friction the same rest would count."""
+        after, before = of_rms(0.101, 4), of_rms(0.12, 3)
+        assert not select._weighty(
+            "load_imbalance", frozenset({"torque_ripple", "load_imbalance"}), after, before, self.RETUNED
+        )
+        assert select._weighty("load_imbalance", frozenset({COULOMB, "load_imbalance"}), after, before, self.RETUNED)
+
+    @pytest.mark.parametrize(("lag_rms", "named"), [(0.15, False), (0.3, True)])
+    def test_nothing_is_named_in_place_of_what_is_too_small_to_tell(
+        self, select: Selector, monkeypatch: pytest.MonkeyPatch, lag_rms: float, named: bool
+    ) -> None:
+        """A lag of no time at all that explains more than friction bars it; one that explains less does not."""
+        lag = replace(self.trial("actuator_lag", lag_rms), failed="less than a tenth of the sampling period")
+        values = {"actuator_lag": {"time_constant_s": 0.0}, COULOMB: {"friction_nm": 1.0}}
+        monkeypatch.setattr(Trial, "values", property(lambda trial: values[trial.name]))
+        monkeypatch.setattr(Selector, "_holds_out", lambda *_: True)
+        monkeypatch.setattr(Selector, "_examined", lambda _, trial, __: trial)
+        trials = {"actuator_lag": lag, COULOMB: self.trial(COULOMB, 0.2)}
+        best = select._best(trials, self.RETUNED, self.RETUNED)
+        assert (best is not None) is named
+
     def test_where_the_torque_is_an_estimate_a_gain_must_be_seen(self, select: Selector) -> None:
         """1 - 0.97^2 = 6 % of the mismatch is weight enough, but not where part of it was put in by a repair."""
         guessed = replace(select, least_ratio=VISIBLE)
