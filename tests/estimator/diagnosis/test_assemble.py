@@ -9,6 +9,7 @@ import pytest
 
 from estimator.diagnosis.acquisition import Finding, Sized
 from estimator.diagnosis.assemble import (
+    _parameters,
     acquired_effects,
     augmented_model,
     found_effects,
@@ -21,13 +22,16 @@ from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects, everything
 from estimator.diagnosis.noise import effective_samples
 from estimator.diagnosis.result import FoundEffect
 from estimator.diagnosis.selection import Selection, Selector
+from estimator.physics.catalogue import effect_problems
 from estimator.physics.effect import Element
 from estimator.physics.free_run import free_run
 from estimator.physics.model import EffectValue, Motion
 from estimator.physics.simulate import Start
+from estimator.physics.unknowns import Shared
 from estimator.signals.record import FloatArray, Record
 from tests.estimator.diagnosis.outcome import outcome
 from tests.estimator.diagnosis.planted import SIGMA, drive_torque, rubbing
+from tests.estimator.diagnosis.regression import regression
 from tests.estimator.physics.bench import ONE_MASS, linear_record, model, random_steps, scaled
 
 COULOMB = "coulomb_friction_motor"
@@ -281,3 +285,19 @@ class TestAugmentedModel:
         found = augmented_model(rubbed[0].result, having, [friction])
         assert set(found.effects) == {"transport_delay", COULOMB}
         assert augmented_model(rubbed[0].result, having, []).effects == having.effects
+
+
+def test_a_held_value_is_told_at_its_null_where_a_model_file_needs_it() -> None:
+    """A ripple of order 6, the null of the order: without it the augmented model could not be read."""
+    result = regression([np.random.default_rng(1).standard_normal((500, 3))], [np.zeros(500)])
+    shared = (
+        Shared("torque_ripple", "amplitude_nm", 1.0, 0.0, 20.0, 0.5),
+        Shared("torque_ripple", "share", 1.0, 0.0, 0.0, 0.0),
+        Shared("torque_ripple", "order", 1.0, 6.0, 6.0, 6.0),
+    )
+    fitted = replace(result, problem=replace(result.problem, shared=shared), x=np.array([0.5, 0.0, 6.0]))
+    told = _parameters("torque_ripple", fitted, np.eye(3), LINE)
+    assert set(told) == {"amplitude_nm", "order"}
+    assert told["order"].ci95 == (6.0, 6.0)
+    values = {name: EffectValue(each.value, each.ci95) for name, each in told.items()}
+    assert effect_problems("torque_ripple", values, LINE) == []
