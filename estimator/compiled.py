@@ -42,3 +42,8 @@ if not os.environ.get("NUMBA_CACHE_DIR"):
 def compiled(function: Function) -> Function:
     """Compile a function to machine code without the interpreter lock; cached on disk."""
     return cast(Function, numba.njit(cache=True, nogil=True, error_model="numpy")(function))
+
+
+def inlined(function: Function) -> Function:
+    """Compile a function into whatever calls it: what is constant there is worked out once, and no call is left."""
+    return cast(Function, numba.njit(cache=True, nogil=True, error_model="numpy", forceinline=True)(function))

@@ -7,7 +7,7 @@ could explain little next to the best are not worth a fit; the others start wher
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,9 +16,9 @@ from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Effect
 from estimator.physics.fit import FitResult, start_of
 from estimator.physics.model import DrivelineModel
-from estimator.physics.own_scan import Cells, Stretch, Wave, cells, scanned, waves
+from estimator.physics.own_scan import Cells, Simulate, Stretch, Wave, cells, scanned, waves
 from estimator.physics.projector import Projector
-from estimator.physics.simulate import simulate
+from estimator.physics.simulate import Case, simulate_each
 from estimator.physics.unknowns import Release, Shared, effect_unknowns
 from estimator.signals.record import FloatArray
 
@@ -87,20 +87,19 @@ class Screen:
         first = next(shared for shared in release.shared if shared.low < shared.high)
         null = next(parameter.null for parameter in entry.shared_parameters if parameter.name == first.name)
         zero = _zero(first, null)
-        return max(
-            (self._step(release, first, zero, share * (first.start - zero)) for share in STEP_SHARES),
-            key=lambda look: look.promise,
-        )
-
-    def _step(self, release: Release, first: Shared, zero: float, step: float) -> Look:
-        """Look along the change of the output that one size of an effect makes."""
-        stepped = _with_start(release, first, zero + step)
-        moved = np.concatenate(
+        steps = [share * (first.start - zero) for share in STEP_SHARES]
+        stepped = [_with_start(release, first, zero + step).shared for step in steps]
+        moved = np.hstack(
             [
-                self._runner(i)(_filled(self._result.p_of(i), stepped.shared)) - self._output(i)
+                self._runner(i)([_filled(self._result.p_of(i), shared) for shared in stepped]) - self._output(i)
                 for i in range(len(self._result.problem.records))
             ]
         )
+        looks = [self._along(release, first, zero, step, change) for step, change in zip(steps, moved, strict=True)]
+        return max(looks, key=lambda look: look.promise)
+
+    def _along(self, release: Release, first: Shared, zero: float, step: float, moved: FloatArray) -> Look:
+        """Look along the change of the output that one size of an effect makes."""
         if not np.isfinite(moved).all():  # so far out that the line flies apart: this start promises nothing
             return Look(release, 0.0)
         ends = sorted((limit - zero) / step for limit in (first.low, first.high))
@@ -191,12 +190,17 @@ class Screen:
     def _may_be(size: Shared, value: float) -> bool:
         return size.low * size.scale <= value <= size.high * size.scale
 
-    def _runner(self, index: int) -> Callable[[FloatArray], FloatArray]:
+    def _runner(self, index: int) -> Simulate:
         problem = self._result.problem
         record, basis = problem.records[index], problem.local[index]
         start = start_of(problem, self._result.x, index)
         extra = basis.extra_load(self._result.local_of(index))
-        return lambda p: simulate(problem.grid, record, p, start, extra)[problem.use[index]]
+
+        def run(parameters: Sequence[FloatArray]) -> FloatArray:
+            cases = [Case(p, start, extra) for p in parameters]
+            return simulate_each(problem.grid, record, cases)[:, problem.use[index]]
+
+        return run
 
     def _output(self, index: int) -> FloatArray:
         return self._result.outputs[index][self._result.problem.use[index]]

@@ -14,10 +14,10 @@ import numpy as np
 from estimator.physics.layout import flat
 from estimator.physics.least_squares import minimise
 from estimator.physics.model import DrivelineModel
-from estimator.physics.parallel import concurrently
-from estimator.physics.simulate import Grid, Start, grid_for, simulate
+from estimator.physics.parallel import WORKERS, concurrently
+from estimator.physics.simulate import Case, Grid, Start, grid_for, simulate_each
 from estimator.physics.unknowns import LocalBasis, Shared, local_basis, own_unknowns
-from estimator.signals.record import BoolArray, FloatArray, Record
+from estimator.signals.record import BoolArray, FloatArray, IntArray, Record
 
 STEP = 1e-5
 """Finite-difference step in scaled unknowns: the simulation is smooth to about 1e-10 of its size."""
@@ -188,9 +188,15 @@ def start_of(problem: Problem, x: FloatArray, index: int) -> Start:
 
 def simulated(problem: Problem, p: FloatArray, local: FloatArray, index: int) -> FloatArray:
     """Return the output of one recording for a parameter vector and the recording's own unknowns, shape (N,)."""
+    only: FloatArray = simulated_each(problem, [(p, local)], index)[0]
+    return only
+
+
+def simulated_each(problem: Problem, points: Sequence[tuple[FloatArray, FloatArray]], index: int) -> FloatArray:
+    """Return the outputs of one recording for parameter vectors and the recording's own unknowns, shape (K, N)."""
     record, basis = problem.records[index], problem.local[index]
-    filled = basis.parameters(p, local)
-    out = simulate(problem.grid, record, filled, basis.start(local), basis.extra_load(local))
+    cases = [Case(basis.parameters(p, local), basis.start(local), basis.extra_load(local)) for p, local in points]
+    out = simulate_each(problem.grid, record, cases)
     if np.isfinite(out).all():
         return out
     worst = BAD * float(np.ptp(record.output[record.okay]))
@@ -208,38 +214,32 @@ def residual_at(problem: Problem, outputs: Sequence[FloatArray]) -> FloatArray:
 
 def jacobian_at(problem: Problem, x: FloatArray, outputs: Sequence[FloatArray]) -> FloatArray:
     """Return the derivative of the errors by the scaled unknowns, shape (R, U), by differences inside the bounds."""
-    base = _stack(problem, outputs)
     low, high = bounds(problem)
-    n_shared = len(problem.shared)
-
-    def shared_column(j: int) -> FloatArray:
-        if low[j] == high[j]:
-            return np.zeros_like(base)
-        step = STEP if x[j] + STEP <= high[j] else -STEP
-        moved = x.copy()
-        moved[j] += step
-        column: FloatArray = (_stack(problem, outputs_at(problem, moved)) - base) / step
-        return column
-
+    steps = np.where(x + STEP <= high, STEP, -STEP)
+    columns = [_moving(problem, low < high, i) for i in range(len(problem.records))]
+    parts = [(i, part) for i, mine in enumerate(columns) for part in np.array_split(mine, WORKERS)]
     rows = np.cumsum([0, *(int(use.sum()) for use in problem.use)])
-    jacobian = np.zeros((base.size, x.size))
-    jacobian[:, :n_shared] = np.array(concurrently(shared_column, range(n_shared))).T.reshape(base.size, n_shared)
-    p = parameters(problem, x)
+    jacobian = np.zeros((rows[-1], x.size))
 
-    def local_block(i: int) -> FloatArray:
-        local, basis = local_part(problem, x, i), problem.local[i]
-        steps = np.where(local + STEP <= basis.high, STEP, -STEP)
-        columns = [
-            (simulated(problem, p, local + step * unit, i) - outputs[i])[problem.use[i]] / step
-            for step, unit in zip(steps, np.eye(local.size), strict=True)
-        ]
-        return np.array(columns).T
+    def fill(work: tuple[int, IntArray]) -> None:
+        i, mine = work
+        points = []
+        for j in mine:
+            moved = x.copy()
+            moved[j] += steps[j]
+            points.append((parameters(problem, moved), local_part(problem, moved, i)))
+        change = (simulated_each(problem, points, i) - outputs[i])[:, problem.use[i]]
+        jacobian[rows[i] : rows[i + 1], mine] = (change / steps[mine, None]).T
 
-    first = n_shared
-    for i, block in enumerate(concurrently(local_block, range(len(problem.records)))):
-        jacobian[rows[i] : rows[i + 1], first : first + block.shape[1]] = block
-        first += block.shape[1]
+    concurrently(fill, [work for work in parts if work[1].size])
     return jacobian
+
+
+def _moving(problem: Problem, free: BoolArray, index: int) -> IntArray:
+    """Return which unknowns move one recording: those of all, as far as they are free, and its own."""
+    first = len(problem.shared) + sum(basis.guess.size for basis in problem.local[:index])
+    own = np.arange(first, first + problem.local[index].guess.size)
+    return np.concatenate([np.flatnonzero(free[: len(problem.shared)]), own])
 
 
 def fit(problem: Problem, x0: FloatArray | None = None, iterations: int = ITERATIONS) -> FitResult:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,7 +13,7 @@ from estimator.physics.layout import slot
 from estimator.physics.model import DrivelineModel
 from estimator.physics.own_scan import cells, scan, waves
 from estimator.physics.projector import Projector
-from estimator.physics.simulate import Grid, Start, simulate
+from estimator.physics.simulate import Case, Grid, Start, simulate_each
 from estimator.physics.unknowns import own_unknowns
 from estimator.signals.record import BoolArray, FloatArray, Record
 
@@ -84,8 +84,8 @@ def _with_own(problem: Problem) -> FloatArray:
     rest = Projector(still)
     begin, extra = start_of(still.problem, still.x, 0), basis.extra_load(still.x)
 
-    def run(p: FloatArray) -> FloatArray:
-        return simulate(problem.grid, record, p, begin, extra)[use]
+    def run(parameters: Sequence[FloatArray]) -> FloatArray:
+        return simulate_each(problem.grid, record, [Case(p, begin, extra) for p in parameters])[:, use]
 
     found: dict[tuple[str, str], float] = {}
     for name in names:

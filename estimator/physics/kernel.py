@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from estimator.compiled import compiled
+from estimator.compiled import compiled, inlined
 from estimator.physics.effects import (
     actuator_lag,
     aerodynamic_drag,
@@ -173,7 +173,7 @@ RADIANS_PER_STEP_OF_MODE = 0.6
 """The same for the extra mode, which is seen through the motor's inertia only."""
 
 
-@compiled
+@inlined
 def is_varying(p: FloatArray) -> bool:
     """Tell whether the conditions change within a period: an event, a law over time or over the angle."""
     events = p[GENERATOR] != 0.0 or p[CRACK] != 0.0 or p[PAYLOAD] != 0.0 or p[BRAKE] != 0.0
@@ -182,7 +182,7 @@ def is_varying(p: FloatArray) -> bool:
     return bool(events or ripples or joints or p[WARMING] != 0.0)
 
 
-@compiled
+@inlined
 def motor_friction(speed: float, p: FloatArray, width: float) -> float:
     """Return the torque of every friction law at the motor [Nm], viscous included."""
     return (
@@ -193,7 +193,7 @@ def motor_friction(speed: float, p: FloatArray, width: float) -> float:
     )
 
 
-@compiled
+@inlined
 def shaft_torque(twist: float, rate: float, loading: float, p: FloatArray, stiffness: float) -> float:
     """Return the torque the shaft carries [Nm] at a twist [rad], its rate [rad/s] and the hysteresis' loading [-]."""
     damping = float(p[C] * p[LINE_SHARE] ** 2) * rate
@@ -207,7 +207,7 @@ def shaft_torque(twist: float, rate: float, loading: float, p: FloatArray, stiff
     return float(elastic) + damping + float(p[SLIDER]) * loading
 
 
-@compiled
+@inlined
 def rates(masses: int, now: Conditions, x: State, p: FloatArray) -> State:
     """Return the time derivative of the mechanical state under the conditions ``now``."""
     drive = now.torque - motor_friction(x.speed, p, now.width_motor)
@@ -246,7 +246,7 @@ def rates(masses: int, now: Conditions, x: State, p: FloatArray) -> State:
     )
 
 
-@compiled
+@inlined
 def sliding(loading: float, rate: float, now: Conditions, p: FloatArray) -> float:
     """Return how fast the slider inside the shaft loads [1/s]; 0 where there is none."""
     if p[SLIDER] == 0.0:
@@ -254,7 +254,7 @@ def sliding(loading: float, rate: float, now: Conditions, p: FloatArray) -> floa
     return shaft_hysteresis.loading_rate(loading, rate, now.yield_twist, p[SHARPNESS], p[UNLOADING], now.fastest)
 
 
-@compiled
+@inlined
 def branch_rate(twist: float, rate: float, p: FloatArray) -> float:
     """Return the acceleration of the extra mode's inertia on its spring [rad/s^2]; 0 where there is none."""
     if p[BRANCH_INERTIA] <= 0.0:
@@ -263,14 +263,14 @@ def branch_rate(twist: float, rate: float, p: FloatArray) -> float:
     return frequency * (frequency * twist + 2.0 * float(p[BRANCH_DAMPING]) * rate)
 
 
-@compiled
+@inlined
 def load_drag(wheel: float, vehicle: float, now: Conditions, p: FloatArray) -> float:
     """Return what slows the load down [Nm]: dry friction at the wheel, viscous and air drag at the vehicle."""
     dry = dry_friction(wheel, now.dry_load, now.width_load)
     return dry + now.viscous_load * vehicle + aerodynamic_drag.law(vehicle, p[AERO])
 
 
-@compiled
+@inlined
 def load_rates(pull: float, now: Conditions, x: State, p: FloatArray) -> tuple[float, float, float]:
     """Return the accelerations of the load and, where the tyre slips, of the vehicle [rad/s^2]; the traction's rate."""
     wheel = x.load_speed
@@ -297,7 +297,7 @@ def load_rates(pull: float, now: Conditions, x: State, p: FloatArray) -> tuple[f
     return wheel_rate, (traction - drag - now.load) / ((1.0 - share) * now.inertia_load), rate
 
 
-@compiled
+@inlined
 def conditions(
     masses: int, time_s: float, h: float, angle: float, load: float, sign_width: float, p: FloatArray
 ) -> Conditions:
@@ -342,7 +342,7 @@ def conditions(
     )
 
 
-@compiled
+@inlined
 def with_torque(now: Conditions, torque: float) -> Conditions:
     """Return the conditions with a torque [Nm] beside the ripple."""
     return Conditions(
@@ -365,7 +365,7 @@ def with_torque(now: Conditions, torque: float) -> Conditions:
     )
 
 
-@compiled
+@inlined
 def moved(x: State, dx: State, h: float) -> State:
     """Return a state moved along its derivative for a time [s]."""
     return State(
@@ -383,7 +383,7 @@ def moved(x: State, dx: State, h: float) -> State:
     )
 
 
-@compiled
+@inlined
 def runge_kutta(masses: int, now: Conditions, x: State, p: FloatArray, h: float) -> State:
     """Return the state after one sub-step under constant conditions."""
     first = rates(masses, now, x, p)
@@ -396,7 +396,7 @@ def runge_kutta(masses: int, now: Conditions, x: State, p: FloatArray, h: float)
     return moved(x, fourth, h / 6.0)
 
 
-@compiled
+@inlined
 def entry(x: State, output: int) -> float:
     """Return the state that is an output: ANGLE, SPEED, TWIST or LOAD_SPEED."""
     if output == SPEED:
@@ -406,7 +406,7 @@ def entry(x: State, output: int) -> float:
     return x.twist if output == TWIST else x.angle
 
 
-@compiled
+@inlined
 def reading(speed: float, angle: float, p: FloatArray) -> float:
     """Return the speed that the resolver gives [rad/s] at a motor angle [rad]."""
     return speed * resolver_error.slope(
@@ -414,13 +414,86 @@ def reading(speed: float, angle: float, p: FloatArray) -> float:
     )
 
 
-@compiled
+@inlined
 def shown(read: float, filtered: float, p: FloatArray) -> float:
     """Return what is recorded of a reading: filtered, without its sign, quantised, as the sensor has it [rad/s]."""
     value = filtered if p[FILTER] > 0.0 else read
     value += float(p[BLIND]) * (abs(value) - value)
     step = float(p[QUANTISATION])
     return step * math.floor(value / step + 0.5) if step > 0.0 else value
+
+
+@inlined
+def unpacked(state: FloatArray) -> State:
+    """Return the mechanical part of the state array."""
+    return State(
+        state[0], state[1], state[2], state[3], state[4], state[5], state[6], state[7], state[8], state[9], state[10]
+    )
+
+
+@inlined
+def integrate_masses(
+    masses: int,
+    sample_time_s: float,
+    substeps: int,
+    sign_width: float,
+    first: int,
+    start_s: float,
+    torque: FloatArray,
+    load: FloatArray,
+    angle: FloatArray,
+    p: FloatArray,
+    state: FloatArray,
+    output: int,
+    sensor: bool,
+    out: FloatArray,
+    slopes: FloatArray,
+) -> None:
+    """Do what ``integrate`` does, for a number of masses that is known when it is compiled."""
+    if p[BRANCH_INERTIA] > 0.0:
+        turn_of_mode = 2.0 * math.pi * p[BRANCH_FREQUENCY] * sample_time_s
+        substeps = max(substeps, math.ceil(turn_of_mode / RADIANS_PER_STEP_OF_MODE))
+    h = sample_time_s / substeps
+    length = 1.0 / substeps
+    delay, begun = p[DELAY] / sample_time_s, start_s / sample_time_s
+    before_all = torque[0] + p[DELAYED_BEFORE]
+    varying, filtering = is_varying(p), p[FILTER] > 0.0
+    late = p[DELAY] != 0.0 or p[DRIFT] != 0.0
+    steep = slopes.shape[1] > 0
+    slope = 0.0
+    n = torque.shape[0]
+    x = unpacked(state)
+    lagged, filtered = state[LAGGED], state[FILTERED]
+    now = conditions(masses, start_s, h, 0.0, 0.0, sign_width, p)
+    for k in range(first, n):
+        turn = angle[k + 1] - angle[k] if k + 1 < n else angle[k] - angle[k - 1]
+        value = entry(x, output)
+        out[k] = shown(reading(value, angle[k], p), filtered, p) if sensor else value
+        if steep:
+            slopes[0, k] = slope
+        for j in range(substeps):
+            place = k + j * length
+            if varying or j == 0:
+                middle = angle[k] + turn * (j + 0.5) * length
+                now = conditions(masses, start_s + place * sample_time_s, h, middle, load[k], sign_width, p)
+            supplied = torque[k]
+            if late:
+                source = place + (place + begun) * p[DRIFT] - delay
+                supplied = transport_delay.delayed_mean(torque, before_all, source, length)
+            mean, lagged = actuator_lag.step(supplied, lagged, p[LAG], h)
+            before = entry(x, output)
+            x = runge_kutta(masses, with_torque(now, mean), x, p, h)
+            after = entry(x, output)
+            slope = (after - before) / h
+            if filtering:
+                read = reading(before, angle[k] + turn * j * length, p)
+                ends = reading(after, angle[k] + turn * (j + 1) * length, p)
+                filtered = speed_filter.step(read, ends, filtered, p[FILTER], h)
+            if steep and j == 0:
+                slopes[1, k] = slope
+    for i, last in enumerate(x):
+        state[i] = last
+    state[LAGGED], state[FILTERED] = lagged, filtered
 
 
 @compiled
@@ -474,52 +547,38 @@ def integrate(
     slopes : ndarray, shape (2, N) or (2, 0)
         Where it has room: slope of the output just before and just after each sample [unit of the output / s].
     """
-    if p[BRANCH_INERTIA] > 0.0:
-        turn_of_mode = 2.0 * math.pi * p[BRANCH_FREQUENCY] * sample_time_s
-        substeps = max(substeps, math.ceil(turn_of_mode / RADIANS_PER_STEP_OF_MODE))
-    h = sample_time_s / substeps
-    length = 1.0 / substeps
-    delay, begun = p[DELAY] / sample_time_s, start_s / sample_time_s
-    before_all = torque[0] + p[DELAYED_BEFORE]
-    varying, filtering = is_varying(p), p[FILTER] > 0.0
-    steep = slopes.shape[1] > 0
-    slope = 0.0
-    n = torque.shape[0]
-    x = unpacked(state)
-    lagged, filtered = state[LAGGED], state[FILTERED]
-    now = conditions(masses, start_s, h, 0.0, 0.0, sign_width, p)
-    for k in range(first, n):
-        turn = angle[k + 1] - angle[k] if k + 1 < n else angle[k] - angle[k - 1]
-        value = entry(x, output)
-        out[k] = shown(reading(value, angle[k], p), filtered, p) if sensor else value
-        if steep:
-            slopes[0, k] = slope
-        for j in range(substeps):
-            place = k + j * length
-            if varying or j == 0:
-                middle = angle[k] + turn * (j + 0.5) * length
-                now = conditions(masses, start_s + place * sample_time_s, h, middle, load[k], sign_width, p)
-            source = place + (place + begun) * p[DRIFT] - delay
-            supplied = transport_delay.delayed_mean(torque, before_all, source, length)
-            mean, lagged = actuator_lag.step(supplied, lagged, p[LAG], h)
-            before = entry(x, output)
-            x = runge_kutta(masses, with_torque(now, mean), x, p, h)
-            after = entry(x, output)
-            slope = (after - before) / h
-            if filtering:
-                read = reading(before, angle[k] + turn * j * length, p)
-                ends = reading(after, angle[k] + turn * (j + 1) * length, p)
-                filtered = speed_filter.step(read, ends, filtered, p[FILTER], h)
-            if steep and j == 0:
-                slopes[1, k] = slope
-    for i, last in enumerate(x):
-        state[i] = last
-    state[LAGGED], state[FILTERED] = lagged, filtered
+    given = (sample_time_s, substeps, sign_width, first, start_s, torque, load, angle, p)
+    wanted = (state, output, sensor, out, slopes)
+    if masses == 1:
+        integrate_masses(1, *given, *wanted)
+    elif masses == 2:
+        integrate_masses(2, *given, *wanted)
+    else:
+        integrate_masses(3, *given, *wanted)
 
 
 @compiled
-def unpacked(state: FloatArray) -> State:
-    """Return the mechanical part of the state array."""
-    return State(
-        state[0], state[1], state[2], state[3], state[4], state[5], state[6], state[7], state[8], state[9], state[10]
-    )
+def integrate_each(
+    masses: int,
+    sample_time_s: float,
+    substeps: int,
+    sign_width: float,
+    start_s: float,
+    torque: FloatArray,
+    load: FloatArray,
+    angle: FloatArray,
+    p: FloatArray,
+    state: FloatArray,
+    output: int,
+    sensor: bool,
+    out: FloatArray,
+    slopes: FloatArray,
+) -> None:
+    """Do what ``integrate`` does for every row of ``torque``, ``load``, ``p``, ``state``, ``out`` and ``slopes``.
+
+    One call for many simulations: threads do not wait for the interpreter in between.
+    """
+    given = (sample_time_s, substeps, sign_width, 0, start_s)
+    for i in range(torque.shape[0]):
+        rows = (torque[i], load[i], angle, p[i], state[i])
+        integrate(masses, *given, *rows, output, sensor, out[i], slopes[i])

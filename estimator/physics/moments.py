@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from estimator.physics.catalogue import EFFECTS
-from estimator.physics.fit import ITERATIONS, FitResult, Problem, fit, simulated
+from estimator.physics.fit import ITERATIONS, FitResult, Problem, fit, simulated_each
 from estimator.physics.parallel import concurrently
 from estimator.physics.unknowns import LocalBasis
 from estimator.signals.record import FloatArray, Record
@@ -98,7 +99,7 @@ def _moved_in(result: FitResult, index: int) -> FloatArray | None:
     if not ends:
         return None
     misfit = _Misfit(result, index)
-    began = best = misfit.squares(local)
+    began = best = float(misfit.squares([local])[0])
     first, last = result.problem.records[index].since_start_s[[0, -1]]
     for begin, end in ends:
         may_move = [row for row in (begin, end) if basis.low[row] < basis.high[row]]
@@ -106,11 +107,11 @@ def _moved_in(result: FitResult, index: int) -> FloatArray | None:
         for _ in range(MOVES):
             tried = [_shifted(local, rows, offset) for rows in moves for offset in OFFSETS_S]
             tried = [x for x in tried if first <= x[begin] < x[end] <= last]
-            squares = [misfit.squares(x) for x in tried]
-            if not squares or min(squares) >= best:
+            squares = misfit.squares(tried)
+            if not tried or squares.min() >= best:
                 break
-            best = min(squares)
-            local = tried[int(np.argmin(squares))]
+            best = float(squares.min())
+            local = tried[int(squares.argmin())]
     return local if best < began else None
 
 
@@ -149,8 +150,12 @@ class _Misfit:
         columns = np.arange(first, first + result.problem.local[index].own_rows.start)
         self._taken_up = np.linalg.qr(result.jacobian[rows[index] : rows[index + 1], columns])[0]
 
-    def squares(self, local: FloatArray) -> float:
+    def squares(self, tried: Sequence[FloatArray]) -> FloatArray:
+        """Return the squared error for each of several vectors of the recording's unknowns, shape (K,)."""
+        if not tried:
+            return np.empty(0)
         record, use = self._problem.records[self._index], self._problem.use[self._index]
-        error = (simulated(self._problem, self._p, local, self._index) - record.output)[use]
-        taken_up = self._taken_up.T @ error
-        return float(error @ error - taken_up @ taken_up)
+        outputs = simulated_each(self._problem, [(self._p, local) for local in tried], self._index)
+        errors = (outputs - record.output)[:, use]
+        left: FloatArray = (errors**2).sum(axis=1) - ((errors @ self._taken_up) ** 2).sum(axis=1)
+        return left

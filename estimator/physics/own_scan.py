@@ -8,7 +8,7 @@ and a sine, and moments from the answers to the effect in every cell of a grid o
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -19,8 +19,8 @@ from estimator.physics.layout import slot
 from estimator.physics.unknowns import Shared
 from estimator.signals.record import FloatArray
 
-Simulate = Callable[[FloatArray], FloatArray]
-"""Parameter vector to the simulated samples that count, shape (R,)."""
+Simulate = Callable[[Sequence[FloatArray]], FloatArray]
+"""K parameter vectors to the simulated samples that count, shape (K, R)."""
 
 MOST_CELLS = 40
 SHORTEST_CELL_S = 0.5
@@ -60,20 +60,18 @@ def waves(entry: Effect, p: FloatArray, sizes: Mapping[str, float], run: Simulat
     silent = p.copy()
     for amplitude in entry.phases.values():
         silent[slot(entry.name, amplitude)] = 0.0
-    still = run(silent)
-    found = []
-    for phase, amplitude in entry.phases.items():
-        if sizes[amplitude] == 0.0:
-            continue
-        size = SMALL * sizes[amplitude]
-        answers = []
+    acting = [(phase, amplitude) for phase, amplitude in entry.phases.items() if sizes[amplitude] != 0.0]
+    moved = [silent]
+    for phase, amplitude in acting:
         for angle in (0.0, 0.5 * math.pi):
-            moved = silent.copy()
-            moved[slot(entry.name, amplitude)] = size
-            moved[slot(entry.name, phase)] = angle
-            answers.append((run(moved) - still) / size)
-        found.append(Wave(phase, amplitude, np.array(answers)))
-    return found
+            moved.append(silent.copy())
+            moved[-1][slot(entry.name, amplitude)] = SMALL * sizes[amplitude]
+            moved[-1][slot(entry.name, phase)] = angle
+    still, *outputs = run(moved)
+    return [
+        Wave(phase, amplitude, (np.array(outputs[2 * i : 2 * i + 2]) - still) / (SMALL * sizes[amplitude]))
+        for i, (phase, amplitude) in enumerate(acting)
+    ]
 
 
 def cells(entry: Effect, p: FloatArray, own: tuple[Shared, ...], sizes: Mapping[str, float], run: Simulate) -> Cells:
@@ -84,16 +82,13 @@ def cells(entry: Effect, p: FloatArray, own: tuple[Shared, ...], sizes: Mapping[
     silent = p.copy()
     silent[begin.slot] = silent[end.slot] = begin.low
     size_name, size = next(iter(sizes.items()))
-    still = run(silent)
-    total = np.zeros_like(still)
-    sums = [total]
+    moved = [silent]
     for low, high in pairwise(moments):
-        moved = silent.copy()
-        moved[slot(entry.name, size_name)] = SMALL * size
-        moved[begin.slot], moved[end.slot] = low, high
-        total = total + (run(moved) - still) / (SMALL * size)
-        sums.append(total)
-    return Cells(moments, np.array(sums))
+        moved.append(silent.copy())
+        moved[-1][slot(entry.name, size_name)] = SMALL * size
+        moved[-1][begin.slot], moved[-1][end.slot] = low, high
+    outputs = run(moved)
+    return Cells(moments, np.cumsum((outputs - outputs[0]) / (SMALL * size), axis=0))
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -138,6 +139,23 @@ def output_state(record: Record, structure: Structure) -> int:
     return index
 
 
+@dataclass(frozen=True, slots=True)
+class Case:
+    """One simulation of a recording.
+
+    Attributes
+    ----------
+    p : ndarray, shape (layout.SIZE,)
+        Parameters of the superset model, the recording's own among them.
+    extra_load_nm : ndarray, shape (N,), optional
+        Load torque over time, beside the constant one.
+    """
+
+    p: FloatArray
+    start: Start
+    extra_load_nm: FloatArray | None = None
+
+
 def simulate(
     grid: Grid,
     record: Record,
@@ -150,10 +168,8 @@ def simulate(
 
     Parameters
     ----------
-    p : ndarray, shape (layout.SIZE,)
-        Parameters of the superset model, the recording's own among them.
-    extra_load_nm : ndarray, shape (N,), optional
-        Load torque over time, beside the constant one.
+    p, start, extra_load_nm
+        See ``Case``.
     output : int, optional
         State to return (``kernel.SPEED`` ...), without the sensor; the recorded output by default.
 
@@ -162,52 +178,111 @@ def simulate(
     ndarray, shape (N,)
         In the unit of ``record.output``.
     """
+    only: FloatArray = simulate_each(grid, record, [Case(p, start, extra_load_nm)], output)[0]
+    return only
+
+
+def simulate_each(grid: Grid, record: Record, cases: Sequence[Case], output: int | None = None) -> FloatArray:
+    """Simulate a recording several times; see ``simulate``.
+
+    Returns
+    -------
+    ndarray, shape (len(cases), N)
+    """
+    wanted = output_state(record, grid.structure) if output is None else output
     if grid.structure is Structure.JOINT:
-        load = start.load_torque_nm + (0.0 if extra_load_nm is None else extra_load_nm)
-        wanted = output_state(record, grid.structure) if output is None else output
-        return joint.simulate(record, p, np.broadcast_to(load, record.output.shape), start.twist_rad, wanted)
-    since_start_s = record.since_start_s
-    torque = shaft_torque(record.torque_nm, since_start_s, p)
-    load = np.full(torque.shape, start.load_torque_nm)
-    if extra_load_nm is not None:
-        load += extra_load_nm
-    angle = motor_angle(record) if np.any(p[PERIODIC]) else np.zeros_like(torque)
-    recorded = output is None
-    state = output_state(record, grid.structure) if output is None else output
-    jitter = record.offset_s if recorded else None
-    begin = initial_state(start, torque[0], angle[0], p)
-    masses, substeps, sample_time_s = MASSES[grid.structure], grid.substeps, record.sample_time_s
-    laws = own_law.active(p)
-    every = 1
-    if laws:  # their torques are held over an integration step: every step is a sample then
-        run = own_law_run.Run.of(masses, substeps, grid.sign_width, record, torque, load, angle, p).under(laws, begin)
-        torque, load, angle, sample_time_s = run.torque, run.load, run.angle, run.step_s
-        every, substeps = substeps, 1
-    slopes = np.zeros((2, 0 if jitter is None else torque.size))
-    out = np.empty_like(torque)
-    kernel.integrate(
-        masses,
-        sample_time_s,
-        substeps,
+        return np.array([_joint_output(record, case, wanted) for case in cases])
+    if any(own_law.active(case.p) for case in cases):
+        return np.array([_under_laws(grid, record, case, wanted, output is None) for case in cases])
+    inputs = [_input(record, case) for case in cases]
+    shape = (len(cases), record.time_s.size)
+    slopes = np.zeros((shape[0], 2, shape[1] if output is None and record.offset_s is not None else 0))
+    out = np.empty(shape)
+    kernel.integrate_each(
+        MASSES[grid.structure],
+        record.sample_time_s,
+        grid.substeps,
         grid.sign_width,
-        0,
-        since_start_s[0],
-        torque,
-        load,
-        angle,
-        p,
-        begin.copy(),
-        state,
-        recorded and state != kernel.ANGLE,
+        record.since_start_s[0],
+        np.array([each.torque for each in inputs]),
+        np.array([each.load for each in inputs]),
+        _angle(record, [case.p for case in cases]),
+        np.array([case.p for case in cases]),
+        np.array([each.state for each in inputs]),
+        wanted,
+        output is None and wanted != kernel.ANGLE,
         out,
         slopes,
     )
-    if laws and recorded:
-        out += run.misread(laws, begin)
-    out, slopes = out[::every], slopes[:, ::every]
-    if jitter is not None:
-        out += np.where(jitter < 0.0, slopes[0], slopes[1]) * jitter
-    return out
+    return _sampled_off_time(out, slopes, record.offset_s)
+
+
+class _Input(NamedTuple):
+    """What drives a line: torque on its shaft and load torque [Nm], shape (N,) each, and the kernel's start state."""
+
+    torque: FloatArray
+    load: FloatArray
+    state: FloatArray
+
+
+def _input(record: Record, case: Case) -> _Input:
+    torque = shaft_torque(record.torque_nm, record.since_start_s, case.p)
+    load = np.full(torque.shape, case.start.load_torque_nm)
+    if case.extra_load_nm is not None:
+        load += case.extra_load_nm
+    return _Input(torque, load, initial_state(case.start, torque[0], 0.0, case.p))
+
+
+def _angle(record: Record, parameters: Sequence[FloatArray]) -> FloatArray:
+    """Return the angle that periodic laws take their phase from; 0 where none needs it."""
+    if any(p[PERIODIC].any() for p in parameters):
+        return motor_angle(record)
+    return np.zeros(record.time_s.size)
+
+
+def _sampled_off_time(out: FloatArray, slopes: FloatArray, offset_s: FloatArray | None) -> FloatArray:
+    """Return outputs (..., N) as they were when the samples were taken, off their time stamps [s]."""
+    if offset_s is None or slopes.shape[-1] == 0:
+        return out
+    moved: FloatArray = out + np.where(offset_s < 0.0, slopes[..., 0, :], slopes[..., 1, :]) * offset_s
+    return moved
+
+
+def _joint_output(record: Record, case: Case, output: int) -> FloatArray:
+    load = case.start.load_torque_nm + (0.0 if case.extra_load_nm is None else case.extra_load_nm)
+    return joint.simulate(record, case.p, np.broadcast_to(load, record.output.shape), case.start.twist_rad, output)
+
+
+def _under_laws(grid: Grid, record: Record, case: Case, output: int, recorded: bool) -> FloatArray:
+    """Simulate with laws of a user's own: their torques are held over an integration step, which is a sample then."""
+    laws, given = own_law.active(case.p), _input(record, case)
+    angle, masses = _angle(record, [case.p]), MASSES[grid.structure]
+    run = own_law_run.Run.of(
+        masses, grid.substeps, grid.sign_width, record, given.torque, given.load, angle, case.p
+    ).under(laws, given.state)
+    slopes = np.zeros((2, run.torque.size if recorded and record.offset_s is not None else 0))
+    out = np.empty_like(run.torque)
+    kernel.integrate(
+        masses,
+        run.step_s,
+        1,
+        grid.sign_width,
+        0,
+        record.since_start_s[0],
+        run.torque,
+        run.load,
+        run.angle,
+        case.p,
+        given.state.copy(),
+        output,
+        recorded and output != kernel.ANGLE,
+        out,
+        slopes,
+    )
+    if recorded:
+        out += run.misread(laws, given.state)
+    every = grid.substeps
+    return _sampled_off_time(out[::every], slopes[:, ::every], record.offset_s)
 
 
 PERIODIC = np.array(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 
 from estimator.physics.effects import torque_saturation
@@ -46,16 +48,16 @@ def shaft_torque(torque_nm: FloatArray, since_start_s: FloatArray, p: FloatArray
     p : ndarray, shape (layout.SIZE,)
         Parameters of the superset model.
     """
-    gains = p[[_GAIN_M1, _GAIN_M2]]
-    if np.any(gains != 1.0):
+    gains = np.array([p[_GAIN_M1], p[_GAIN_M2]])
+    if (gains != 1.0).any():
         torque_nm = torque_nm.copy()
         count = min(torque_nm.shape[1], gains.size)
         torque_nm[:, :count] *= gains[:count]
-    limits = p[[_LIMIT_M1, _LIMIT_M2]][: torque_nm.shape[1]]
-    if np.any(np.isfinite(limits)):
+    limits = np.array([p[_LIMIT_M1], p[_LIMIT_M2]])[: torque_nm.shape[1]]
+    if np.isfinite(limits).any():
         columns = [limited(torque, limit, p[_SHARPNESS]) for torque, limit in zip(torque_nm.T, limits, strict=False)]
         torque_nm = np.column_stack([*columns, torque_nm[:, limits.size :]])
-    total: FloatArray = limited(torque_nm.sum(axis=1), p[_LIMIT_SUM], p[_SHARPNESS])
+    total: FloatArray = limited(functools.reduce(np.add, torque_nm.T), p[_LIMIT_SUM], p[_SHARPNESS])
     if p[_DEPTH] != 0.0:
         total = total * (1.0 + p[_DEPTH] * np.expm1(-since_start_s / p[_DERATING_TIME]))
     return total

@@ -12,6 +12,7 @@ from estimator.errors import BadShape
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.int64]
 
 
 class OutputKind(Enum):

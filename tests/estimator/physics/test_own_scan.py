@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 import pytest
 
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.layout import SIZE, slot
-from estimator.physics.own_scan import MOST_CELLS, SHORTEST_CELL_S, Stretch, cells, scan, waves
+from estimator.physics.own_scan import MOST_CELLS, SHORTEST_CELL_S, Simulate, Stretch, cells, scan, waves
 from estimator.physics.unknowns import own_unknowns
 from estimator.signals.record import FloatArray
 from tests.estimator.physics.bench import record
 
 BRAKE, IMBALANCE, RESOLVER = EFFECTS["brake_drag"], EFFECTS["load_imbalance"], EFFECTS["resolver_error"]
+
+
+def each(run: Callable[[FloatArray], FloatArray]) -> Simulate:
+    """One simulation after the other."""
+    return lambda parameters: np.array([run(p) for p in parameters])
 
 
 class TestBestStretch:
@@ -69,7 +74,7 @@ class TestCells:
 
     def test_sums_of_answers_are_the_event_between_two_moments(self) -> None:
         own = own_unknowns(["brake_drag"], record(np.zeros(1200)))
-        grid = cells(BRAKE, np.zeros(SIZE), own, {"brake_nm": 8.0}, self.run)
+        grid = cells(BRAKE, np.zeros(SIZE), own, {"brake_nm": 8.0}, each(self.run))
         assert (grid.moments_s[0], grid.moments_s[-1]) == (0.0, pytest.approx(12.0))
         for a, b in ((0, 24), (3, 4), (5, 19)):
             lasting = (self.TIME_S >= grid.moments_s[a] - 1e-9) & (self.TIME_S < grid.moments_s[b] - 1e-9)
@@ -82,7 +87,7 @@ class TestCells:
     )
     def test_cells_are_as_fine_as_they_may_be(self, samples: int, count: int) -> None:
         own = own_unknowns(["brake_drag"], record(np.zeros(samples)))
-        grid = cells(BRAKE, np.zeros(SIZE), own, {"brake_nm": 8.0}, lambda p: np.zeros(samples))
+        grid = cells(BRAKE, np.zeros(SIZE), own, {"brake_nm": 8.0}, each(lambda _: np.zeros(samples)))
         assert SHORTEST_CELL_S == 0.5
         assert grid.moments_s.size == count + 1 == grid.answers.shape[0]
         np.testing.assert_array_equal(grid.answers[0], 0.0)
@@ -96,13 +101,13 @@ class TestWaves:
             amplitude, phase = (p[slot("load_imbalance", name)] for name in ("amplitude_nm", "phase_rad"))
             return 3.0 + amplitude * np.cos(self.ANGLE + phase)
 
-        (wave,) = waves(IMBALANCE, np.zeros(SIZE), {"amplitude_nm": 6.0, "motor_turns_per_turn": 5.6}, run)
+        (wave,) = waves(IMBALANCE, np.zeros(SIZE), {"amplitude_nm": 6.0, "motor_turns_per_turn": 5.6}, each(run))
         assert (wave.phase, wave.amplitude) == ("phase_rad", "amplitude_nm")
         np.testing.assert_allclose(wave.answers, [np.cos(self.ANGLE), -np.sin(self.ANGLE)], atol=1e-9)
 
     @pytest.mark.parametrize(("sizes", "found"), [({"once_rad": 0.1, "twice_rad": 0.0}, ["once_phase_rad"])])
     def test_an_amplitude_that_is_not_tried_has_no_wave(self, sizes: Mapping[str, float], found: list[str]) -> None:
-        answers = waves(RESOLVER, np.zeros(SIZE), sizes, lambda p: np.zeros(3))
+        answers = waves(RESOLVER, np.zeros(SIZE), sizes, each(lambda _: np.zeros(3)))
         assert [wave.phase for wave in answers] == found
 
     def test_every_amplitude_answers_with_the_others_silent(self) -> None:
@@ -116,6 +121,6 @@ class TestWaves:
 
         p = np.zeros(SIZE)
         p[slot("resolver_error", "once_rad")] = p[slot("resolver_error", "twice_rad")] = 0.4
-        once, twice = waves(RESOLVER, p, {"once_rad": 0.1, "twice_rad": 0.1}, run)
+        once, twice = waves(RESOLVER, p, {"once_rad": 0.1, "twice_rad": 0.1}, each(run))
         np.testing.assert_allclose(once.answers[0], np.cos(self.ANGLE), atol=1e-9)
         np.testing.assert_allclose(twice.answers[1], np.cos(2.0 * self.ANGLE + 0.5 * math.pi), atol=1e-9)

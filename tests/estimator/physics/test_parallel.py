@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 
 import pytest
 
@@ -39,15 +40,38 @@ def test_one_item_alone_stays_where_it_is() -> None:
     assert concurrently(lambda _: threading.get_ident(), []) == []
 
 
-def test_calls_inside_a_call_run_one_after_the_other_in_its_own_thread() -> None:
-    """More of them than workers, each with a call inside, would otherwise wait for each other for ever."""
+def test_calls_inside_calls_never_work_on_more_than_so_many_at_once() -> None:
+    """More of them than workers, each with calls inside, that wait for each other must not wait for ever."""
+    lock, working, most = threading.Lock(), set[int](), 0
 
-    def outer(item: int) -> tuple[int, list[tuple[int, int]]]:
-        return threading.get_ident(), concurrently(lambda inner: (item + inner, threading.get_ident()), range(3))
+    def leaf(item: int) -> int:
+        nonlocal most
+        with lock:
+            working.add(threading.get_ident())
+            most = max(most, len(working))
+        time.sleep(0.001)
+        with lock:
+            working.discard(threading.get_ident())
+        return item
 
-    for item, (worker, inner) in enumerate(concurrently(outer, range(4 * WORKERS))):
-        assert worker != threading.get_ident()
-        assert inner == [(item, worker), (item + 1, worker), (item + 2, worker)]
+    def outer(item: int) -> list[list[int]]:
+        return concurrently(lambda inner: concurrently(leaf, [item, inner]), range(3))
+
+    items = range(4 * WORKERS)
+    assert concurrently(outer, items) == [[[item, inner] for inner in range(3)] for item in items]
+    assert most == WORKERS
+
+
+def test_an_idle_core_helps_inside_the_last_long_call() -> None:
+    """As soon as nothing else is left: many short calls inside it are enough to see that."""
+    workers = set[int]()
+
+    def leaf(_: int) -> None:
+        workers.add(threading.get_ident())
+        time.sleep(0.001)
+
+    concurrently(lambda item: concurrently(leaf, range(200 * item)), range(2))
+    assert len(workers) == WORKERS
 
 
 def test_an_exception_comes_out_and_the_next_call_works() -> None:

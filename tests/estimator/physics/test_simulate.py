@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from estimator.errors import BadModel
 from estimator.physics import kernel
-from estimator.physics.layout import flat
+from estimator.physics.layout import flat, slot
 from estimator.physics.model import Structure, natural_frequencies_rad_s
 from estimator.physics.simulate import (
     FASTEST_IN_NYQUIST,
     RADIANS_PER_STEP,
     SIGN_WIDTH,
+    Case,
     Start,
     grid_for,
     output_state,
     simulate,
+    simulate_each,
     substeps_for,
 )
 from estimator.signals.record import Location, OutputKind
@@ -145,3 +149,20 @@ def test_the_record_and_the_parameters_are_left_alone() -> None:
     simulate(grid_for(line, [rec]), rec, p, Start(5.0, 0.0, 0.0), np.ones(50))
     np.testing.assert_array_equal(p, flat(line))
     np.testing.assert_array_equal(rec.torque_nm, torque)
+
+
+def test_many_simulations_in_one_call_are_those_of_single_calls() -> None:
+    """Each with its own parameters, start and load: none leaves anything to the next."""
+    rng = np.random.default_rng(3)
+    bus = model(TWO_MASS)
+    recording = replace(record(random_steps(400, seed=3)), offset_s=rng.uniform(-0.002, 0.002, 400))
+    cases = []
+    for i in range(4):
+        p = flat(bus)
+        p[slot("", "k")] *= 1.0 + 0.1 * i
+        p[slot("torque_ripple", "amplitude_nm")] = 3.0 * i
+        cases.append(Case(p, Start(5.0 * i, 0.0, 1.0 + i), rng.standard_normal(400) if i % 2 else None))
+    grid = grid_for(bus, [recording])
+    single = [simulate(grid, recording, case.p, case.start, case.extra_load_nm) for case in cases]
+    np.testing.assert_array_equal(simulate_each(grid, recording, cases), single)
+    assert np.ptp([out[-1] for out in single]) > 0.1
