@@ -8,13 +8,15 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import MappingProxyType
-from typing import Any, Final, Generic, TypeVar
+from typing import Any, Final, TypeVar
 
 from hil.errors import UsageError
+from hil.simulator.fault_kind import Kind, Moment
 from hil.simulator.inverter_settings import FaultAtStep, InverterFaults
 from hil.simulator.plc_device import PlcFaults
+from hil.simulator.plc_faults import PLC_KINDS
 from hil.simulator.rig_server import RigFaults
 
 F = TypeVar("F", InverterFaults, PlcFaults)
@@ -26,27 +28,6 @@ NOBODY: Final = (0xBAD, 0xBAD)
 """Vendor-ID and product code of no device."""
 
 _SPEC = re.compile(r"(?P<device>\w+)\.(?P<kind>\w+)(?:@(?P<at_s>.+))?")
-
-
-@dataclass(frozen=True, slots=True)
-class Moment:
-    """When a fault comes, in simulated time [s]; ``step`` is that SYNC, counted from 1."""
-
-    at_s: float
-    period_s: float
-
-    @property
-    def step(self) -> int:
-        """Number of the SYNC at that time; 0 from power-on."""
-        return round(self.at_s / self.period_s)
-
-
-@dataclass(frozen=True, slots=True)
-class Kind(Generic[F]):
-    """One kind of fault: whether it comes at a moment, and what it does to a device's faults."""
-
-    timed: bool
-    put_into: Callable[[F, Moment], F]
 
 
 def _ignoring(index: int) -> Callable[[InverterFaults, Moment], InverterFaults]:
@@ -61,14 +42,6 @@ INVERTER_KINDS: Final[Mapping[str, Kind[InverterFaults]]] = MappingProxyType(
         "stuck": Kind(False, _ignoring(0x6040)),
         "hang": Kind(True, lambda faults, when: replace(faults, hang_at_step=when.step)),
         "fault": Kind(True, lambda faults, when: replace(faults, fault=FaultAtStep(when.step, OVERCURRENT))),
-    }
-)
-PLC_KINDS: Final[Mapping[str, Kind[PlcFaults]]] = MappingProxyType(
-    {
-        "clutch_closes": Kind(True, lambda faults, when: replace(faults, clutch_closes_at_s=when.at_s)),
-        "permissive_withdrawn": Kind(True, lambda faults, when: replace(faults, permissive_withdrawn_at_s=when.at_s)),
-        "mode_changes": Kind(True, lambda faults, when: replace(faults, mode_changes_at_s=when.at_s)),
-        "hang": Kind(True, lambda faults, when: replace(faults, hangs_at_s=when.at_s)),
     }
 )
 DEVICES: Final[Mapping[str, Mapping[str, Kind[Any]]]] = MappingProxyType(
