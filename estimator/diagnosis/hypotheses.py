@@ -80,6 +80,13 @@ class Bench:
             self._rough[effects] = self._fit(effects, warm, releases, HEAT)
         return self._rough[effects]
 
+    def let_go(self, keep: Effects) -> None:
+        """Take the derivatives out of all fits but one: what lost is rarely looked at again."""
+        for fits in (self._fits, self._rough):
+            for effects, result in fits.items():
+                if effects != keep:
+                    fits[effects] = result.light()
+
     def settle(self, effects: Effects) -> FitResult:
         """Take events that do nothing out of single recordings, and tell steps from their moment on, from now on."""
         self._fits[effects] = from_their_moment(without_idle(self._fits[effects]), self.model)

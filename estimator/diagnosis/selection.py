@@ -162,12 +162,18 @@ class Selector:
         """
         for _ in range(MOST_EFFECTS - len(path.chosen)):
             best = self._best(self._try_all(path.chosen, path.current), path.current, retuned)
+            self._let_go(path.current if best is None else best.result)
             if best is None:
                 break
             path = self._with(path, best, retuned)
             if self._is_noise(path.current):
                 break
         return path
+
+    def _let_go(self, kept: FitResult) -> None:
+        """Let the derivatives of what lost a round go."""
+        self.bench.let_go(effects_of(kept))
+        self._trials = {name: replace(trial, result=trial.result.light()) for name, trial in self._trials.items()}
 
     def _with(self, path: _Path, best: Trial, retuned: FitResult) -> _Path:
         """Return a path with the effects of a trial, less those it made superfluous."""

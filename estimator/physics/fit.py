@@ -7,7 +7,7 @@ recording only, so one simulation of every recording gives a column of the Jacob
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -67,8 +67,8 @@ class FitResult:
         Simulated output of each recording, every sample.
     residual : ndarray, shape (R,)
         Errors of the samples that count.
-    jacobian : ndarray, shape (R, U)
-        Derivative of the errors by the scaled unknowns.
+    derivative : ndarray, shape (R, U), or None
+        Derivative of the errors by the scaled unknowns; None where it was let go.
     converged : bool
         False where the iteration limit ended the fit.
     """
@@ -77,8 +77,19 @@ class FitResult:
     x: FloatArray
     outputs: tuple[FloatArray, ...]
     residual: FloatArray
-    jacobian: FloatArray
+    derivative: FloatArray | None
     converged: bool
+
+    @property
+    def jacobian(self) -> FloatArray:
+        """Derivative of the errors by the scaled unknowns, shape (R, U); found again where it was let go."""
+        if self.derivative is None:
+            return jacobian_at(self.problem, self.x, self.outputs)
+        return self.derivative
+
+    def light(self) -> FitResult:
+        """Return this fit without its derivative, which of long recordings takes most of its room."""
+        return replace(self, derivative=None)
 
     @property
     def squares(self) -> float:

@@ -14,8 +14,8 @@ from estimator.diagnosis.line.tangent import Tangent
 from estimator.physics.fit import FitResult
 from estimator.signals.record import BoolArray, FloatArray, Record
 
-MOST_ROWS = 30_000
-"""Blocks that laws are fitted to, all recordings together: five minutes at 10 ms. They bound memory."""
+MOST_ROWS = 20_000
+"""Blocks that laws are fitted to, all recordings together: over three minutes at 10 ms. They bound memory."""
 
 STRETCH = 3000
 """Blocks of a stretch of a long recording."""

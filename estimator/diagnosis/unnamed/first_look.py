@@ -12,7 +12,7 @@ from estimator.diagnosis.line import PLACES
 from estimator.diagnosis.noise import effective_samples
 from estimator.diagnosis.unnamed.candidates import answers, candidates
 from estimator.diagnosis.unnamed.forms import forms
-from estimator.diagnosis.unnamed.ground import Ground, ground_of
+from estimator.diagnosis.unnamed.ground import Ground
 from estimator.diagnosis.unnamed.hunt import NO_LAW, RIDGE, Found, Hunt, cost, rms, terms_of, worthwhile
 from estimator.diagnosis.unnamed.laws import Law
 from estimator.diagnosis.unnamed.pursuit import pursue
@@ -34,12 +34,12 @@ PARAMETER_LAWS: Mapping[str, tuple[Element, Law]] = {
 """What one unit more of a nominal parameter does, as a law at its place."""
 
 
-def first(view: Scene, element: Element) -> Hunt:
-    """Look for a law at an element from a fit alone."""
-    return _from(view, element, ground_of(view))
+def first(view: Scene, ground: Ground, element: Element) -> Hunt:
+    """Look for a law at an element from a fit alone; ``ground`` is that of the view."""
+    return _from(view, element, ground)
 
 
-def first_along_motion(view: Scene, element: Element) -> Hunt:
+def first_along_motion(view: Scene, plain: Ground, element: Element) -> Hunt:
     """Look for a law as a function of the motion that goes with an unknown input at the element's place.
 
     Along the true motion the line with other parameters and a law is the line as it is under further torques, exactly,
@@ -49,7 +49,6 @@ def first_along_motion(view: Scene, element: Element) -> Hunt:
     inputs = view.explanations[PLACES[element]].inputs
     cut = tuple(replace(line, motion=each.motion) for line, each in zip(view.cut, inputs, strict=True))
     along = replace(view, cut=cut)
-    plain = ground_of(view)
     jacobian = plain.jacobian.copy()
     for j, unknown in enumerate(view.result.problem.shared):
         place = PARAMETER_LAWS.get(unknown.name) if not unknown.effect else None

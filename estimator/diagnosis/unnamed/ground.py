@@ -43,12 +43,13 @@ class Ground:
 def ground_of(view: Scene) -> Ground:
     """Return what re-tuning a fit further could explain of its error."""
     result = view.result
+    jacobian = result.jacobian
     row, parts = 0, []
     for line, use in zip(view.cut, result.problem.use, strict=True):
         count, full = int(use.sum()), np.zeros(use.size)
         part = np.empty((int(line.rows.sum()), result.x.size))
         for j in range(result.x.size):
-            full[use] = result.jacobian[row : row + count, j]
+            full[use] = jacobian[row : row + count, j]
             part[:, j] = block_mean_of(full, use, line.length)[0][line.rows]
         row += count
         parts.append(part)

@@ -19,6 +19,7 @@ from estimator.diagnosis.evidence import SMALLEST_P, Gain
 from estimator.diagnosis.line import PLACES, Place
 from estimator.diagnosis.noise import effective_samples, noise_floor
 from estimator.diagnosis.unnamed.first_look import first, first_along_motion
+from estimator.diagnosis.unnamed.ground import Ground, ground_of
 from estimator.diagnosis.unnamed.hunt import Hunt
 from estimator.diagnosis.unnamed.look_again import again
 from estimator.diagnosis.unnamed.pursuit import MOST_COEFFICIENTS
@@ -78,10 +79,11 @@ def judged(view: Scene, hunts: Sequence[Hunt]) -> list[UnnamedLaw]:
 
 def hunts_of(view: Scene, rounds: int = 1) -> list[Hunt]:
     """Look for a law at every element, and again where it is among the best."""
+    ground = ground_of(view)
     with ThreadPoolExecutor(2) as pool:
         if rounds == 1:
-            return list(pool.map(partial(first, view), elements(view.result)))
-        hunts = list(pool.map(partial(_tried, view), elements(view.result)))
+            return list(pool.map(partial(first, view, ground), elements(view.result)))
+        hunts = list(pool.map(partial(_tried, view, ground), elements(view.result)))
         for _ in range(rounds - 2):
             least = min(hunt.mean_square for hunt in hunts)
             near = [i for i, h in enumerate(hunts) if not h.stuck and h.mean_square <= IN_REACH**2 * least]
@@ -90,11 +92,11 @@ def hunts_of(view: Scene, rounds: int = 1) -> list[Hunt]:
     return hunts
 
 
-def _tried(view: Scene, element: Element) -> Hunt:
+def _tried(view: Scene, ground: Ground, element: Element) -> Hunt:
     """Look from the fit alone, and along the motion of an unknown input; return what simulates better."""
-    starts = [first(view, element)]
+    starts = [first(view, ground, element)]
     if PLACES[element] is not Place.SENSOR:
-        starts.append(first_along_motion(view, element))
+        starts.append(first_along_motion(view, ground, element))
     return min((again(start) for start in starts), key=lambda hunt: (hunt.stuck, hunt.mean_square))
 
 

@@ -128,7 +128,7 @@ def without_effect(result: FitResult, name: str) -> FitResult:
     x = np.concatenate([result.x[kept], result.x[count:]])
     problem = replace(result.problem, p=p, shared=tuple(result.problem.shared[j] for j in kept))
     columns = [*kept, *range(count, result.x.size)]
-    return replace(result, problem=problem, x=x, jacobian=result.jacobian[:, columns], outputs=outputs_at(problem, x))
+    return replace(result, problem=problem, x=x, derivative=result.jacobian[:, columns], outputs=outputs_at(problem, x))
 
 
 def _picture_of_law(

@@ -109,6 +109,16 @@ def test_a_rough_fit_is_gone_on_with() -> None:
     assert finished.squares < rough.squares < nominal.squares
 
 
+def test_fits_but_one_let_their_derivatives_go() -> None:
+    records = rubbing(lambda speed: FRICTION_NM)
+    bench = Bench(model(ONE_MASS), records, everything(records))
+    kept = bench.fit(COULOMB, bench.fit(NOTHING))
+    bench.let_go(COULOMB)
+    assert bench.fit(COULOMB) is kept
+    assert kept.derivative is not None
+    assert bench.fit(NOTHING).derivative is None
+
+
 class TestOpenHypotheses:
     REVERSAL = linear_record(ONE_MASS, random_steps(1000, 1, hold=50), Start(0.0, 0.0, 0.5), sigma=0.01)
     FORWARD = linear_record(ONE_MASS, random_steps(1000, 2), Start(0.0, 0.0, 50.0), sigma=0.01)

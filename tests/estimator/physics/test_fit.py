@@ -101,6 +101,14 @@ class TestRecovery:
 
 
 class TestJacobian:
+    def test_one_that_was_let_go_is_found_again(self) -> None:
+        result = fit(nominal_problem(recordings(samples=300)))
+        light = result.light()
+        assert light.derivative is None
+        assert result.derivative is not None
+        scale = np.abs(result.jacobian).max(axis=0)
+        np.testing.assert_allclose(light.jacobian / scale, result.jacobian / scale, atol=1e-4)
+
     def test_it_agrees_with_central_differences(self) -> None:
         problem = nominal_problem(recordings(samples=300))
         x = start_vector(problem) * 1.01
