@@ -8,12 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hil.proof import campaign, campaign_case
-from hil.proof.campaign_case import Answer, CommandFailed, rms_over_floor, run_case
-from hil.proof.campaign_kinds import kind
-from hil.proof.campaign_matrix import confusion_svg
-from hil.proof.campaign_report import markdown, summary
-from hil.proof.campaign_statistics import Rate, columns, confusion, coverage
+from hil.proof.campaign import case as campaign_case
+from hil.proof.campaign import run as campaign
+from hil.proof.campaign.case import Answer, CommandFailed, rms_over_floor, run_case
+from hil.proof.campaign.kinds import kind
+from hil.proof.campaign.matrix import confusion_svg
+from hil.proof.campaign.report import markdown, summary
+from hil.proof.campaign.statistics import Rate, columns, confusion, coverage
 from hil.proof.truth.case import make_case
 
 DIAGNOSIS = {

@@ -4,10 +4,10 @@ import pytest
 
 from estimator.physics.catalogue import EFFECTS as CATALOGUE
 from hil.errors import UsageError
-from hil.proof.campaign_case import Answer
-from hil.proof.campaign_kinds import PAIRS, Group, kind, parse_kinds, parse_seeds
-from hil.proof.campaign_score import ALIKE, FAILED, iou, right_columns, score
-from hil.proof.campaign_sizes import COUNTERPARTS, compare
+from hil.proof.campaign.case import Answer
+from hil.proof.campaign.kinds import PAIRS, Group, kind, parse_kinds, parse_seeds
+from hil.proof.campaign.score import ALIKE, FAILED, iou, right_columns, score
+from hil.proof.campaign.sizes import COUNTERPARTS, compare
 from hil.proof.truth.registry import EFFECTS
 from hil.proof.truth.specimen import draw_specimen
 

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from scipy import special
 
-from hil.proof import campaign_case, power
-from hil.proof.campaign_case import CommandFailed
-from hil.proof.power_fit import fit_curve
+from hil.proof.campaign import case as campaign_case
+from hil.proof.power import run as power
+from hil.proof.campaign.case import CommandFailed
+from hil.proof.power.fit import fit_curve
 
 FRICTION = {"name": "coulomb_friction_motor", "element": "motor", "indistinguishable_from": [], "time_s": {}}
 SHORT = ["--effects", "coulomb_friction_motor", "--duration-s", "2"]

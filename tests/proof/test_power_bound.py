@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hil.errors import UsageError
-from hil.proof.power_bound import (
+from hil.proof.power.bound import (
     HYPOTHESES,
     LEVEL,
     POWER,
@@ -16,11 +16,11 @@ from hil.proof.power_bound import (
     size_at,
     threshold,
 )
-from hil.proof.power_case import trial_case
-from hil.proof.power_drive import drive, under_torques_of
-from hil.proof.power_noise import answer_rad_s, deviation_rad_s, torque_deviation_nm, whitened
-from hil.proof.power_nuisance import orthonormal, sensitivities, without
-from hil.proof.power_sizes import SCALES, imposed
+from hil.proof.power.case import trial_case
+from hil.proof.power.drive import drive, under_torques_of
+from hil.proof.power.noise import answer_rad_s, deviation_rad_s, torque_deviation_nm, whitened
+from hil.proof.power.nuisance import orthonormal, sensitivities, without
+from hil.proof.power.sizes import SCALES, imposed
 from hil.proof.truth.acquisition import Acquisition
 from hil.proof.truth.case import record
 from hil.proof.truth.sensors import SPEED_NOISE_RAD_S

@@ -20,7 +20,7 @@ from estimator.diagnosis.result import FoundEffect
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.model import DrivelineModel, Parameter, Structure
 from estimator.signals.record import Record
-from hil.proof.campaign_sizes import COUNTERPARTS
+from hil.proof.campaign.sizes import COUNTERPARTS
 from hil.proof.truth.bus import NOMINAL_ERROR
 from hil.proof.truth.case import TESTS, TruthRecording, record
 from hil.proof.truth.registry import EFFECTS as HIDDEN

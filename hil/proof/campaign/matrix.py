@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Collection, Mapping
 from html import escape
 
-from hil.proof.campaign_statistics import columns
+from hil.proof.campaign.statistics import columns
 
 CELL_PX, LEFT_PX, TOP_PX, RIGHT_PX, BOTTOM_PX = 22, 190, 170, 90, 8
 RIGHT, WRONG = (31, 119, 180), (214, 39, 40)
@@ -19,7 +19,7 @@ def confusion_svg(matrix: Mapping[str, Counter[str]], right: Mapping[str, Collec
     Parameters
     ----------
     matrix
-        Of `hil.proof.campaign_statistics.confusion`.
+        Of `hil.proof.campaign.statistics.confusion`.
     right
         Columns that are right for each planted kind.
 

@@ -19,14 +19,14 @@ from pathlib import Path
 from typing import Any
 
 from hil.errors import RecordingError, UsageError
-from hil.proof.campaign import LIMIT_S, RESULTS, read_results
-from hil.proof.campaign_kinds import parse_seeds
-from hil.proof.campaign_statistics import Row
-from hil.proof.power_bound import HYPOTHESES, LEVEL
-from hil.proof.power_picture import power_svg
-from hil.proof.power_report import markdown, summary
-from hil.proof.power_sizes import SCALES, scale_of
-from hil.proof.power_trial import LEAST_MULTIPLE, Study, attempt, kind_of, made_otherwise, measure
+from hil.proof.campaign.kinds import parse_seeds
+from hil.proof.campaign.run import LIMIT_S, RESULTS, read_results
+from hil.proof.campaign.statistics import Row
+from hil.proof.power.bound import HYPOTHESES, LEVEL
+from hil.proof.power.picture import power_svg
+from hil.proof.power.report import markdown, summary
+from hil.proof.power.sizes import SCALES, scale_of
+from hil.proof.power.trial import LEAST_MULTIPLE, Study, attempt, kind_of, made_otherwise, measure
 from hil.proof.truth.experiments import DURATION_S, PERIOD_S
 
 BOUNDS = "bounds.jsonl"
@@ -201,7 +201,3 @@ def main(arguments: Sequence[str] | None = None) -> int:
             write_summary(list(results.values()), list(bounds.values()), options.out)
     _tell(f"{options.out / 'summary.md'}")
     return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

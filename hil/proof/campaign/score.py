@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from estimator.physics.catalogue import EFFECTS as CATALOGUE
-from hil.proof.campaign_case import Answer
-from hil.proof.campaign_kinds import NOTHING, Group, Kind
-from hil.proof.campaign_sizes import compare
-from hil.proof.campaign_statistics import ABSTAINED, NO_MISMATCH, finite
+from hil.proof.campaign.case import Answer
+from hil.proof.campaign.kinds import NOTHING, Group, Kind
+from hil.proof.campaign.sizes import compare
+from hil.proof.campaign.statistics import ABSTAINED, NO_MISMATCH, finite
 from hil.proof.judge import Outcome, judge
 
 Json = Mapping[str, Any]

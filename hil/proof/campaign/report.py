@@ -6,8 +6,8 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from hil.proof.campaign_kinds import Group
-from hil.proof.campaign_statistics import (
+from hil.proof.campaign.kinds import Group
+from hil.proof.campaign.statistics import (
     Rate,
     Row,
     by_kind,

@@ -6,8 +6,8 @@ import zlib
 
 import numpy as np
 
-from hil.proof.power_drive import drive
-from hil.proof.power_sizes import imposed
+from hil.proof.power.drive import drive
+from hil.proof.power.sizes import imposed
 from hil.proof.truth.case import TESTS, Case, TruthRecording
 from hil.proof.truth.experiments import sample_times_s
 from hil.proof.truth.sensors import speed_reading, torque_reading

@@ -7,13 +7,13 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from hil.proof.campaign_case import run_made
-from hil.proof.campaign_kinds import Group, Kind
-from hil.proof.campaign_score import ALIKE, score
+from hil.proof.campaign.case import run_made
+from hil.proof.campaign.kinds import Group, Kind
+from hil.proof.campaign.score import ALIKE, score
 from hil.proof.judge import Outcome
-from hil.proof.power_bound import Yardstick
-from hil.proof.power_case import trial_case
-from hil.proof.power_sizes import scale_of
+from hil.proof.power.bound import Yardstick
+from hil.proof.power.case import trial_case
+from hil.proof.power.sizes import scale_of
 from hil.proof.truth.specimen import draw_specimen
 
 FOUND = {Outcome.RIGHT.name.lower(), ALIKE, Outcome.FALSE_CLAIM.name.lower()}

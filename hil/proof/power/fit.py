@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special, stats
 
-from hil.proof.power_bound import POWER
+from hil.proof.power.bound import POWER
 from hil.proof.truth.physics import FloatArray
 
 STEEPNESS = np.geomspace(0.5, 60.0, 60)

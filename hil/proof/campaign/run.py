@@ -17,12 +17,12 @@ from pathlib import Path
 from typing import Any
 
 from hil.errors import RecordingError, UsageError
-from hil.proof.campaign_case import run_case
-from hil.proof.campaign_kinds import ALL, Group, Kind, kind, parse_kinds, parse_seeds
-from hil.proof.campaign_matrix import confusion_svg
-from hil.proof.campaign_report import markdown, summary
-from hil.proof.campaign_score import right_columns, score
-from hil.proof.campaign_statistics import Row, confusion
+from hil.proof.campaign.case import run_case
+from hil.proof.campaign.kinds import ALL, Group, Kind, kind, parse_kinds, parse_seeds
+from hil.proof.campaign.matrix import confusion_svg
+from hil.proof.campaign.report import markdown, summary
+from hil.proof.campaign.score import right_columns, score
+from hil.proof.campaign.statistics import Row, confusion
 
 RESULTS = "results.jsonl"
 
@@ -148,7 +148,3 @@ def main(arguments: Sequence[str] | None = None) -> int:
         write_summary(list(rows.values()), options.out)
     sys.stdout.write(f"{options.out / 'summary.md'}\n")
     return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from hil.proof.campaign_statistics import Rate
-from hil.proof.power_bound import POWER
-from hil.proof.power_fit import Curve
-from hil.proof.power_report import BASE, KNOWLEDGE
+from hil.proof.campaign.statistics import Rate
+from hil.proof.power.bound import POWER
+from hil.proof.power.fit import Curve
+from hil.proof.power.report import BASE, KNOWLEDGE
 
 WIDTH_PX, HEIGHT_PX, LEFT_PX, TOP_PX, GAP_PX, BOTTOM_PX = 250, 170, 52, 46, 40, 40
 TOOL = "#1f77b4"
@@ -33,7 +33,7 @@ def power_svg(effects: Mapping[str, Any]) -> str:
     Parameters
     ----------
     effects
-        ``effects`` of `hil.proof.power_report.summary`.
+        ``effects`` of `hil.proof.power.report.summary`.
 
     Returns
     -------

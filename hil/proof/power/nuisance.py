@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from hil.proof.power_drive import Drive, drive
+from hil.proof.power.drive import Drive, drive
 from hil.proof.truth.case import TESTS
 from hil.proof.truth.physics import FloatArray, Physics
 from hil.proof.truth.specimen import draw_specimen

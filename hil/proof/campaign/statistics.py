@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from hil.proof.campaign_kinds import Group
+from hil.proof.campaign.kinds import Group
 
 Row = Mapping[str, Any]
 

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from hil.proof.campaign_statistics import Rate, Row, finite, outcomes, share
-from hil.proof.power_bound import HYPOTHESES, POWER, power
-from hil.proof.power_fit import Curve, fit_curve
-from hil.proof.power_sizes import SCALES
+from hil.proof.campaign.statistics import Rate, Row, finite, outcomes, share
+from hil.proof.power.bound import HYPOTHESES, POWER, power
+from hil.proof.power.fit import Curve, fit_curve
+from hil.proof.power.sizes import SCALES
 
 SCHEMA = "hil.power/1"
 
@@ -93,7 +93,7 @@ def markdown(rows: Sequence[Row], bounds: Sequence[Row]) -> str:
             "# Power",
             "",
             f"{data['trials']} trials. Sizes that are found with {POWER:.0%} power; in brackets the range over the "
-            "buses, or the 95 % interval. Best possible tests (module `hil.proof.power_bound`) by what they know; "
+            "buses, or the 95 % interval. Best possible tests (module `hil.proof.power.bound`) by what they know; "
             f"alpha is their level, a {HYPOTHESES}th of 5 % unless it was set.",
             "",
             f"| effect | unit | alpha | {told} | tool | {' | '.join(f'tool / {name}' for name in names)} | trials |",

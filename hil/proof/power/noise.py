@@ -14,7 +14,7 @@ from functools import lru_cache
 import numpy as np
 from scipy import linalg
 
-from hil.proof.power_drive import drive
+from hil.proof.power.drive import drive
 from hil.proof.truth.acquisition import FAULTLESS, Acquisition
 from hil.proof.truth.physics import FloatArray
 from hil.proof.truth.sensors import SPEED_NOISE_RAD_S, TORQUE_NOISE_NM, TORQUE_QUANTUM_NM

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from hil.proof.campaign_kinds import Kind
+from hil.proof.campaign.kinds import Kind
 from hil.proof.make_case import write_recording, write_sealed, write_shown
 from hil.proof.truth.case import Case, TruthRecording, make_case
 from hil.proof.truth.sensors import SPEED_NOISE_RAD_S

@@ -5,7 +5,7 @@ power Phi(d - z_{1-alpha}), d = |Delta| / sigma (Neyman and Pearson, Phil. Trans
 Statistical Signal Processing II, 1998, sec. 4.3). Where nuisance parameters are unknown, what of Delta they could
 imitate is lost to any test that is indifferent to them: d = |(I - P) Delta| / sigma, P the projector on the outputs'
 sensitivities (Scharf and Friedlander, IEEE Trans. Signal Process. 42, 1994). Where the torques are known by their
-readings only, the noise is no longer white, and both are taken of the whitened outputs (`hil.proof.power_noise`).
+readings only, the noise is no longer white, and both are taken of the whitened outputs (`hil.proof.power.noise`).
 
 All of these tests look for one effect, on one side, and know its law.
 """
@@ -20,10 +20,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import optimize, stats
 
-from hil.proof.power_drive import drive, under_torques_of
-from hil.proof.power_noise import deviation_rad_s, whitened
-from hil.proof.power_nuisance import orthonormal, sensitivities, without
-from hil.proof.power_sizes import imposed, scale_of
+from hil.proof.power.drive import drive, under_torques_of
+from hil.proof.power.noise import deviation_rad_s, whitened
+from hil.proof.power.nuisance import orthonormal, sensitivities, without
+from hil.proof.power.sizes import imposed, scale_of
 from hil.proof.truth.case import TESTS
 from hil.proof.truth.experiments import SAMPLES
 from hil.proof.truth.physics import FloatArray

@@ -1,0 +1,1 @@
+"""Many sealed cases, scored."""

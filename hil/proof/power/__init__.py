@@ -1,0 +1,1 @@
+"""How small an effect is found, beside the best test there can be."""
