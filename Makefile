@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN    := .venv/bin
 READY  := .venv/.ready
 
-.PHONY: setup demo test campaign bench lint lock clean
+.PHONY: setup demo prove test campaign bench lint lock clean
 
 setup: $(READY)
 
@@ -16,6 +16,10 @@ $(READY): requirements.lock pyproject.toml
 
 demo: $(READY)
 	$(BIN)/hil demo
+
+# Sealed cases, answered by the public command and opened: out/proof/scoreboard.html. Goes on where it was interrupted.
+prove: $(READY)
+	$(BIN)/hil prove --out out/proof
 
 test: lint
 	$(BIN)/python -m pytest -n 2 -m "not campaign"

@@ -32,9 +32,11 @@ class ExitStatus(IntEnum):
 
 COMMANDS: dict[str, str] = {
     "demo": "The whole job with nothing connected: sealed effect, verdict, seal opened.",
+    "prove": "The proof: sealed cases, answered and opened, with a scoreboard.",
     "sim": "Serve the simulated slaves: two inverters, PLC, driveline.",
     "check": "Find every device, compare it with rig file and EDS; commands no torque.",
     "run": "Run one experiment and record it.",
+    "replay": "Rebuild the samples of a run from its bus trace.",
     "identify": "Identify the driveline from recordings.",
     "diagnose": "Locate the mismatch and name the missing physics.",
     "simulate": "Free-run simulation from the measured torques.",

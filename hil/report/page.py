@@ -9,13 +9,17 @@ from importlib.resources import files
 from hil.report.figures import plotly_script
 
 
-def page(title: str, body: Iterable[str], footer: str) -> str:
-    """Put sections into a page; ``body`` is HTML already, ``title`` and ``footer`` are text."""
+def page(title: str, body: Iterable[str], footer: str, *, plots: bool = True) -> str:
+    """Put sections into a page; ``body`` is HTML already, ``title`` and ``footer`` are text.
+
+    ``plots`` brings the script that draws figures along, which is megabytes.
+    """
     style = files("hil.report").joinpath("page.css").read_text(encoding="utf-8")
+    script = plotly_script() if plots else ""
     return (
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{escape(title)}</title>\n<style>\n{style}</style>\n{plotly_script()}\n</head>\n<body>\n<main>\n"
+        f"<title>{escape(title)}</title>\n<style>\n{style}</style>\n{script}\n</head>\n<body>\n<main>\n"
         + "\n".join(body)
         + f"\n<footer>{escape(footer)}</footer>\n</main>\n</body>\n</html>\n"
     )

@@ -8,13 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hil.proof import fresh
 from hil.proof.campaign import case as campaign_case
 from hil.proof.campaign import run as campaign
-from hil.proof.campaign.case import Answer, CommandFailed, rms_over_floor, run_case
+from hil.proof.campaign.case import Answer, run_case
 from hil.proof.campaign.kinds import kind
 from hil.proof.campaign.matrix import confusion_svg
 from hil.proof.campaign.report import markdown, summary
 from hil.proof.campaign.statistics import Rate, columns, confusion, coverage
+from hil.proof.command import CommandFailed, run_hil
+from hil.proof.fresh import rms_over_floor
 from hil.proof.truth.case import make_case
 
 DIAGNOSIS = {
@@ -42,6 +45,7 @@ class Tool:
             out = Path(folder).parent / "out"
             out.mkdir()
             (out / "diagnosis.json").write_text(json.dumps(DIAGNOSIS))
+            (out / "augmented.toml").write_text("a model")
         else:
             recorded = np.genfromtxt(Path(folder) / arguments[4], delimiter=",", names=True)
             table = np.column_stack([recorded["time_s"], recorded["speed_rad_s"] + 0.1])
@@ -51,7 +55,8 @@ class Tool:
 @pytest.fixture
 def tool(monkeypatch, tmp_path):
     tool = Tool(tmp_path)
-    monkeypatch.setattr(campaign_case, "_hil", tool)
+    for module in (campaign_case, fresh):
+        monkeypatch.setattr(module, "run_hil", tool)
     return tool
 
 
@@ -73,7 +78,7 @@ def test_a_command_that_fails_ends_its_case_and_no_other(monkeypatch, tmp_path):
     def broken(arguments, folder, limit_s):
         raise CommandFailed("hil diagnose: ended with status 3: no bus")
 
-    monkeypatch.setattr(campaign_case, "_hil", broken)
+    monkeypatch.setattr(campaign_case, "run_hil", broken)
     status = campaign.main(["--seeds", "1", "--kinds", "none,off", "--out", str(tmp_path)])
     rows = [json.loads(line) for line in (tmp_path / "results.jsonl").read_text().splitlines()]
     assert status == 0
@@ -83,9 +88,9 @@ def test_a_command_that_fails_ends_its_case_and_no_other(monkeypatch, tmp_path):
 
 def test_the_real_command_is_run_and_its_failure_is_quoted(tmp_path):
     with pytest.raises(CommandFailed, match=r"hil diagnose: ended with status 2: .*absent.toml"):
-        campaign_case._hil(["diagnose", "run_1.csv", "--model", "absent.toml", "--out", "out"], tmp_path, 60.0)
+        run_hil(["diagnose", "run_1.csv", "--model", "absent.toml", "--out", "out"], tmp_path, 60.0)
     with pytest.raises(CommandFailed, match="took longer than"):
-        campaign_case._hil(["--help"], tmp_path, 0.01)
+        run_hil(["--help"], tmp_path, 0.01)
 
 
 def test_a_campaign_goes_on_where_it_ended_and_repeats_what_failed(tool, tmp_path, capsys):
@@ -142,7 +147,7 @@ def test_fresh_errors_leave_out_what_was_lost():
     recording = case.fresh[0]
     exact = np.nan_to_num(recording.speed_rad_s)
     exact[recording.flags != 0] += 1e3
-    assert rms_over_floor(recording, exact) == 0.0
+    assert rms_over_floor(recording.speed_rad_s, recording.flags, exact) == 0.0
 
 
 def _flags(seed):

@@ -10,8 +10,8 @@ import pytest
 from scipy import special
 
 from hil.proof.campaign import case as campaign_case
+from hil.proof.command import CommandFailed
 from hil.proof.power import run as power
-from hil.proof.campaign.case import CommandFailed
 from hil.proof.power.fit import fit_curve
 
 FRICTION = {"name": "coulomb_friction_motor", "element": "motor", "indistinguishable_from": [], "time_s": {}}
@@ -43,7 +43,7 @@ class Tool:
 @pytest.fixture
 def tool(monkeypatch):
     tool = Tool()
-    monkeypatch.setattr(campaign_case, "_hil", tool)
+    monkeypatch.setattr(campaign_case, "run_hil", tool)
     return tool
 
 
@@ -78,7 +78,7 @@ def test_a_command_that_fails_is_told_and_run_again(monkeypatch, tmp_path, tool)
 
     arguments = [*SHORT, "--out", str(tmp_path), "--seeds", "1", "--multiples", "1"]
     with monkeypatch.context() as context:
-        context.setattr(campaign_case, "_hil", broken)
+        context.setattr(campaign_case, "run_hil", broken)
         assert power.main(arguments) == 0
     assert "no bus" in (tmp_path / "summary.md").read_text()
     assert json.loads((tmp_path / "summary.json").read_text())["effects"] == {}

@@ -86,10 +86,19 @@ def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
 
 
 def implausible(model: DrivelineModel, records: Sequence[Record], values: Mapping[str, float]) -> str:
-    """Object to a wheel so light that nothing tells it from a damper at the vehicle."""
-    if values["wheel_share"] > 1.1 * LIGHTEST:
-        return ""
-    return f"a wheel with {values['wheel_share']:.1%} of the load's inertia is lighter than any"
+    """Object to a wheel so light that nothing tells it from a damper at the vehicle, and to a carcass at speed.
+
+    A carcass that damps its wind-up at every speed is a spring with a damper: an elastic line, but no rolling tyre.
+    """
+    if values["wheel_share"] <= 1.1 * LIGHTEST:
+        return f"a wheel with {values['wheel_share']:.1%} of the load's inertia is lighter than any"
+    top = speed_scale(records)
+    if values.get("relaxation_rad", 0.0) > 0.0 and values["creep_rad_s"] > top:
+        return (
+            f"its carcass would act as at standstill up to {values['creep_rad_s']:.3g} {unit('speed', model.motion)}, "
+            f"beyond the top speed of {top:.3g}: a spring and a damper, no tyre that rolls"
+        )
+    return ""
 
 
 def sentence(values: Mapping[str, float], motion: Motion) -> str:

@@ -34,3 +34,13 @@ def test_a_wheel_at_the_edge_of_its_bounds_is_none() -> None:
     implausible = EFFECTS["tyre_slip"].implausible
     assert implausible(LINE, RECORDS, {"wheel_share": 0.03}) == ""
     assert implausible(LINE, RECORDS, {"wheel_share": LIGHTEST}) != ""
+
+
+def test_a_carcass_that_damps_at_every_speed_is_no_tyre() -> None:
+    """A spring and a damper, as in a visco-elastic shaft; a wheel that slides at every speed may do so."""
+    driven = [record(np.zeros(3001), np.linspace(0.0, 80.0, 3001))]
+    implausible = EFFECTS["tyre_slip"].implausible
+    rolling = {"wheel_share": 0.1, "relaxation_rad": 5.0}
+    assert implausible(LINE, driven, {**rolling, "creep_rad_s": 40.0}) == ""
+    assert "beyond the top speed of 79" in implausible(LINE, driven, {**rolling, "creep_rad_s": 500.0})
+    assert implausible(LINE, driven, {"wheel_share": 0.1, "relaxation_rad": 0.0, "creep_rad_s": 500.0}) == ""

@@ -1,0 +1,157 @@
+"""``hil prove``: sealed challenges, answered by the public command line, opened and scored."""
+
+from __future__ import annotations
+
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from hil.proof.prove.make import Progress
+
+SEEDS = 2**31
+SHORT = 12
+"""Cases of the short form: a few minutes on two cores."""
+
+Folder = Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a set of cases.")]
+Jobs = Annotated[int, typer.Option(min=1, help="Cases at a time.")]
+Cases = Annotated[int, typer.Option(min=1, max=999, help="How many cases.")]
+Seed = Annotated[int | None, typer.Option(min=0, help="What everything is drawn from; else at random, and not told.")]
+KeyFile = Annotated[Path | None, typer.Option("--key-file", metavar="FILE", help="File of the key, outside DIR.")]
+
+app = typer.Typer(add_completion=False, no_args_is_help=False)
+
+
+@app.callback(invoke_without_command=True, epilog="Example: hil prove --out out/proof --cases 12")
+def prove(
+    context: typer.Context,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for cases, verdicts and scoreboard.")] = Path(
+        "out/proof"
+    ),
+    cases: Cases = SHORT,
+    seed: Seed = None,
+    jobs: Jobs = 2,
+) -> None:
+    """Seal cases, let the public command answer them, open the seals, write the scoreboard.
+
+    Called again it goes on where it was interrupted. The key is kept beside DIR, in DIR.key. To check the claim
+    yourself, make the set on one machine, answer it on another, and open it with the key.
+    """
+    if context.invoked_subcommand is not None:
+        return
+    key_path = out.with_name(f"{out.name}.key")
+    if not key_path.exists():
+        make(out, cases, seed, jobs, key_path)
+    run(out, jobs)
+    open_(out, None, key_path, None, jobs)
+
+
+@app.command(epilog="Example: hil prove make proof --cases 200 --key-file proof.key")
+def make(
+    folder: Folder,
+    cases: Cases = SHORT,
+    seed: Seed = None,
+    jobs: Jobs = 2,
+    key_file: KeyFile = None,
+) -> None:
+    """Draw, record and seal a set of cases. Prints the key, or writes it to FILE."""
+    from hil.proof.prove.make import make as make_set
+    from hil.proof.prove.vault import new_key, parse_key
+    from hil.report.outputs import require_folder
+
+    require_folder(folder)
+    key = new_key()
+    if key_file is not None:
+        _require_outside(key_file, folder)
+        require_folder(key_file.parent)
+    chosen = secrets.randbelow(SEEDS) if seed is None else seed
+    with _progress() as progress:
+        make_set(folder, cases, chosen, parse_key(key), jobs, progress)
+    if key_file is None:
+        typer.echo(f"key: {key}")
+    else:
+        key_file.touch(mode=0o600)
+        key_file.write_text(f"{key}\n", encoding="utf-8")
+        typer.echo(f"key: in {key_file}")
+    typer.echo(f"made: {folder}/cases   next: hil prove run {folder}")
+
+
+@app.command(epilog="Example: hil prove run proof")
+def run(folder: Folder, jobs: Jobs = 2) -> None:
+    """Let the public command answer every case; it is shown DIR/cases, one case at a time, and nothing else."""
+    from hil.proof.prove.answer import answer
+
+    with _progress() as progress:
+        digest = answer(folder, jobs, progress)
+    typer.echo(f"verdicts: {folder}/verdicts   digest: {digest}")
+
+
+@app.command("open", epilog="Example: hil prove open proof --key-file proof.key")
+def open_(
+    folder: Folder,
+    key: Annotated[str | None, typer.Option(metavar="KEY", help="As hil prove make has printed it.")] = None,
+    key_file: KeyFile = None,
+    verdicts: Annotated[
+        str | None, typer.Option(metavar="DIGEST", help="As hil prove run has printed it: refuse other verdicts.")
+    ] = None,
+    jobs: Jobs = 2,
+) -> None:
+    """Open the seals, check that nothing was changed, score the verdicts; writes DIR/scoreboard.html and .json."""
+    from hil.proof.prove.judge_set import judge_set
+    from hil.proof.prove.manifest import VERDICTS
+    from hil.proof.prove.scoreboard import PAGE, scoreboard_files
+    from hil.proof.prove.vault import parse_key
+    from hil.report.outputs import publish
+
+    secret = parse_key(_key_text(key, key_file))
+    with _progress() as progress:
+        rows = judge_set(folder, secret, jobs, progress, verdicts)
+    publish(folder, scoreboard_files(rows, VERDICTS))
+    for row in rows:
+        if not row["success"]:
+            found = row["fault"] or ", ".join(row.get("named", ())) or row.get("verdict")
+            typer.echo(f"{row['case']}: {row['outcome']}: hidden {row['kind']}, found {found}")
+    right = sum(row["success"] for row in rows)
+    typer.echo(f"{right} of {len(rows)} as they should be   scoreboard: {folder / PAGE}")
+
+
+def _key_text(key: str | None, key_file: Path | None) -> str:
+    from hil.errors import UsageError
+
+    if (key is None) == (key_file is None):
+        raise UsageError("expected the key once, with --key or --key-file. hil prove make has printed or written it.")
+    return key if key is not None else Path(str(key_file)).read_text(encoding="utf-8")
+
+
+def _require_outside(key_file: Path, folder: Path) -> None:
+    from hil.errors import UsageError
+
+    if folder.resolve() in key_file.resolve().parents:
+        raise UsageError(
+            f"{key_file}: expected a file outside {folder}: whoever answers the cases must not see the key."
+        )
+    if key_file.exists():
+        raise UsageError(f"{key_file}: expected a file that is not there yet: it may be the key of another set.")
+
+
+@contextmanager
+def _progress() -> Iterator[Progress]:
+    """Show what is done on standard error, with the time taken and left."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+    from rich.progress import Progress as Bar
+
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+    )
+    with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("", total=None)
+        yield lambda what, done, total: bar.update(task, description=what, completed=done, total=total)

@@ -1,0 +1,1 @@
+"""Sealed challenges: made and sealed, answered by the public command, opened and scored."""

@@ -1,0 +1,91 @@
+"""``hil prove run``: every case answered by the public command, which sees that case and nothing else.
+
+::
+
+    DIR/verdicts/case_001/       diagnosis.json, augmented.toml, report.html; or fault.txt: why there is none
+    DIR/verdicts/verdicts.json   a digest of each file, and of the case it answers
+"""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+import time
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from pathlib import Path
+from typing import Any
+
+from hil.proof.command import CommandFailed, run_hil
+from hil.proof.prove.make import Progress
+from hil.proof.prove.manifest import (
+    CASES,
+    VERDICTS,
+    VERDICTS_LIST,
+    Shown,
+    digest_of,
+    digests_of,
+    read_commitments,
+    read_list,
+    require_unchanged,
+    write_list,
+)
+
+LIMIT_S = 900.0
+"""Time one command may take before its case counts as failed."""
+
+FAULT = "fault.txt"
+
+
+def answer(folder: Path, jobs: int, progress: Progress, limit_s: float = LIMIT_S) -> str:
+    """Answer every case of a set that has no answer yet; return one digest of all answers.
+
+    Raises
+    ------
+    UsageError, SealBroken
+        If the folder has no set, or a case has changed since it was made.
+    """
+    cases = read_commitments(folder)
+    answered: dict[str, Any] = _answered(folder, cases)
+    waiting = {name: shown for name, shown in cases.items() if name not in answered}
+    pool = ThreadPoolExecutor(jobs)
+    try:
+        running = {pool.submit(_answer_one, folder, name, shown, limit_s): name for name, shown in waiting.items()}
+        for done in as_completed(running):
+            answered[running[done]] = done.result()
+            write_list(folder / VERDICTS_LIST, dict(sorted(answered.items())))
+            progress(f"{running[done]} answered", len(answered), len(cases))
+    finally:
+        pool.shutdown(cancel_futures=True)
+    return digest_of(answered)
+
+
+def _answered(folder: Path, cases: Mapping[str, Shown]) -> dict[str, Any]:
+    """Return the answers there are from an earlier run, to just these cases."""
+    if not (folder / VERDICTS_LIST).exists():
+        return {}
+    listed = read_list(folder / VERDICTS_LIST, "remove the folder verdicts to begin anew")
+    known = {name: digest_of(dict(shown.files)) for name, shown in cases.items()}
+    return {name: entry for name, entry in listed.items() if entry["case"] == known.get(name)}
+
+
+def _answer_one(folder: Path, name: str, shown: Shown, limit_s: float) -> dict[str, Any]:
+    case, out = folder / CASES / name, folder / VERDICTS / name
+    require_unchanged(case, shown.files)
+    began = time.perf_counter()
+    with tempfile.TemporaryDirectory(prefix="hil-case-") as neutral:
+        place = Path(neutral) / "case"
+        place.mkdir()
+        for file in shown.files:
+            shutil.copyfile(case / file, place / file)
+        (Path(neutral) / "out").mkdir()
+        try:
+            runs = sorted(file for file in shown.files if file.endswith(".csv"))
+            run_hil(["diagnose", *runs, "--model", "model.toml", "--out", "../out"], place, limit_s)
+        except CommandFailed as failure:
+            (Path(neutral) / "out" / FAULT).write_text(f"{failure}\n", encoding="utf-8")
+        took_s = time.perf_counter() - began
+        shutil.rmtree(out, ignore_errors=True)
+        shutil.copytree(Path(neutral) / "out", out)
+    files = digests_of(out, sorted(path.name for path in out.iterdir()))
+    return {"case": digest_of(dict(shown.files)), "files": files, "diagnose_s": round(took_s, 2)}

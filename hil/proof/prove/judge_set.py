@@ -1,0 +1,107 @@
+"""``hil prove open``: seals opened, commitments checked, verdicts scored."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+import zlib
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from pathlib import Path
+from typing import Any
+
+from hil.errors import UsageError
+from hil.proof.campaign.case import Answer
+from hil.proof.campaign.kinds import kind
+from hil.proof.campaign.score import score
+from hil.proof.command import CommandFailed
+from hil.proof.fresh import fresh_over_floor
+from hil.proof.prove.answer import FAULT, LIMIT_S
+from hil.proof.prove.make import Progress
+from hil.proof.prove.manifest import (
+    CASES,
+    SEALED,
+    VERDICTS,
+    VERDICTS_LIST,
+    Shown,
+    digest_of,
+    read_commitments,
+    read_list,
+    require_unchanged,
+)
+from hil.proof.prove.vault import unlock
+from hil.proof.seal import SealBroken, verify
+
+Row = dict[str, Any]
+
+
+def judge_set(folder: Path, key: bytes, jobs: int, progress: Progress, verdicts: str | None = None) -> list[Row]:
+    """Open a set and score its verdicts.
+
+    Parameters
+    ----------
+    verdicts
+        The digest that ``answer`` returned, where it was kept: verdicts and their list can't both be changed then.
+
+    Returns
+    -------
+    list of dict
+        One row per case, as a campaign's (``hil.proof.campaign.score``), with ``case``, its name, beside.
+
+    Raises
+    ------
+    SealBroken
+        If a truth, a case or a verdict is not what it was; naming it.
+    UsageError
+        If a case has no verdict yet.
+    """
+    cases = read_commitments(folder)
+    answered = read_list(folder / VERDICTS_LIST, "hil prove run DIR writes it")
+    if verdicts is not None and digest_of(answered) != verdicts:
+        raise SealBroken(f"{folder / VERDICTS_LIST}: expected the verdicts of digest {verdicts}, came others")
+    if missing := sorted(set(cases) - set(answered)):
+        raise UsageError(
+            f"{folder}: expected a verdict for every case, none for {', '.join(missing)}. hil prove run DIR"
+        )
+    rows: dict[str, Row] = {}
+    pool = ThreadPoolExecutor(jobs)
+    try:
+        running = {pool.submit(_judge_one, folder, key, name, cases[name], answered[name]): name for name in cases}
+        for done in as_completed(running):
+            rows[running[done]] = done.result()
+            progress(f"{running[done]} opened", len(rows), len(cases))
+    finally:
+        pool.shutdown(cancel_futures=True)
+    return [rows[name] for name in sorted(rows)]
+
+
+def _judge_one(folder: Path, key: bytes, name: str, shown: Shown, answered: Mapping[str, Any]) -> Row:
+    require_unchanged(folder / CASES / name, shown.files)
+    if answered["case"] != digest_of(dict(shown.files)):
+        raise SealBroken(f"{folder / VERDICTS / name}: answers another case than {folder / CASES / name}")
+    require_unchanged(folder / VERDICTS / name, answered["files"])
+    opened = json.loads(zlib.decompress(unlock(key, name, folder / SEALED / f"{name}.sealed")))
+    truth = verify(shown.commitment, opened)
+    planted, case, fresh = kind(str(truth["kind"])), truth["case"], truth["fresh"]
+    if not isinstance(case, dict) or not isinstance(fresh, dict):
+        raise SealBroken(f"{folder / SEALED / name}: expected a truth with case and fresh recordings")
+    answer = _answer(folder / VERDICTS / name, fresh, float(answered["diagnose_s"]))
+    return {"case": name, **score(planted, int(str(truth["seed"])), case, answer)}
+
+
+def _answer(verdict: Path, fresh: Mapping[str, str], took_s: float) -> Answer:
+    if (verdict / FAULT).exists():
+        return Answer(None, diagnose_s=took_s, fault=(verdict / FAULT).read_text(encoding="utf-8").strip())
+    diagnosis = json.loads((verdict / "diagnosis.json").read_text(encoding="utf-8"))
+    try:
+        over_floor = [_over_floor(text, verdict / "augmented.toml") for text in fresh.values()]
+    except CommandFailed as failure:
+        return Answer(diagnosis, diagnose_s=took_s, fault=str(failure))
+    return Answer(diagnosis, over_floor, took_s)
+
+
+def _over_floor(recording: str, model: Path) -> float:
+    with tempfile.TemporaryDirectory(prefix="hil-fresh-") as unsealed:
+        path = Path(unsealed) / "fresh.csv"
+        path.write_text(recording, encoding="utf-8")
+        return fresh_over_floor(path, model, LIMIT_S)

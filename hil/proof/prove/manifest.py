@@ -1,0 +1,99 @@
+"""What must not change: digests of files, and the two lists of them that a set of cases has.
+
+``cases/commitments.json`` is written with the cases: a commitment to each truth, a digest of each file that is shown.
+``verdicts/verdicts.json`` is written with the verdicts: a digest of each file of them, and of the case it answers.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from hil.errors import UsageError
+from hil.proof.seal import SealBroken, canonical_json
+
+CASES, SEALED, VERDICTS = "cases", "sealed", "verdicts"
+COMMITMENTS = Path(CASES) / "commitments.json"
+VERDICTS_LIST = Path(VERDICTS) / "verdicts.json"
+SCHEMA = "hil.prove/1"
+
+Digests = Mapping[str, str]
+"""File name to SHA-256."""
+
+
+def digests_of(folder: Path, names: Iterable[str]) -> dict[str, str]:
+    """Return the SHA-256 of files of a folder, by name."""
+    return {name: hashlib.sha256((folder / name).read_bytes()).hexdigest() for name in names}
+
+
+def digest_of(listed: object) -> str:
+    """Return one SHA-256 of a list; JSON types only."""
+    return hashlib.sha256(canonical_json(listed)).hexdigest()
+
+
+def require_unchanged(folder: Path, digests: Digests) -> None:
+    """See that files are those a list was made of.
+
+    Raises
+    ------
+    SealBroken
+        Naming the first that is missing or has changed.
+    """
+    for name, digest in digests.items():
+        path = folder / name
+        if not path.is_file():
+            raise SealBroken(f"{path}: expected the file that is in the list, it is gone. Believe no score without it.")
+        if digests_of(folder, [name])[name] != digest:
+            raise SealBroken(f"{path}: changed since its digest was listed. Believe no score made from it.")
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """One case as it is shown: the commitment to its truth, and its files."""
+
+    commitment: str
+    files: Digests
+
+
+def read_commitments(folder: Path) -> dict[str, Shown]:
+    """Read the cases of a set by name.
+
+    Raises
+    ------
+    UsageError
+        If the folder has no set, or its list is damaged.
+    """
+    listed = read_list(folder / COMMITMENTS, "hil prove make DIR makes one")
+    return {name: Shown(entry["commitment"], entry["files"]) for name, entry in listed.items()}
+
+
+def read_list(path: Path, advice: str) -> dict[str, Any]:
+    """Read the entries of a list by case.
+
+    Raises
+    ------
+    UsageError
+        If there is none, or it is damaged; with advice.
+    """
+    try:
+        listed = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise UsageError(f"{path}: expected a list of cases, can't be read: {error.strerror}; {advice}") from error
+    except ValueError as error:
+        raise UsageError(f"{path}: expected JSON, came: {error}; {advice}") from error
+    if not isinstance(listed, dict) or listed.get("schema") != SCHEMA or not isinstance(listed.get("cases"), dict):
+        raise UsageError(f"{path}: expected an object of schema {SCHEMA} with cases; {advice}")
+    cases: dict[str, Any] = listed["cases"]
+    return cases
+
+
+def write_list(path: Path, entries: Mapping[str, Any]) -> None:
+    """Write a list of cases; a reader finds the old one or the new one."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    unfinished = path.with_name(f".{path.name}.unfinished")
+    unfinished.write_text(json.dumps({"schema": SCHEMA, "cases": entries}, indent=1) + "\n", encoding="utf-8")
+    unfinished.replace(path)

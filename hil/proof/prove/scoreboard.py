@@ -1,0 +1,150 @@
+"""The scoreboard: what was concealed, what was found, how much better the fit became; every miss. HTML and JSON."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from hil.proof.campaign.kinds import Group, kind
+from hil.proof.campaign.matrix import confusion_svg
+from hil.proof.campaign.report import TITLES, WANTED, summary
+from hil.proof.campaign.score import right_columns
+from hil.proof.campaign.statistics import Rate, Row, confusion, coverage, quantiles, share
+from hil.report import page as html
+
+SCHEMA = "hil.scoreboard/1"
+PAGE, DATA = "scoreboard.html", "scoreboard.json"
+
+FALSE_CLAIMS = ("false_claim", "wrong", "invented")
+"""Outcomes in which something was named that is not there."""
+
+FOOTER = (
+    "hil prove. What was hidden was drawn by a simulator that shares no code with the model that is fitted, and sealed "
+    "before the public command saw the recordings. Intervals of rates are Wilson's, 95 %."
+)
+
+
+def scoreboard_files(rows: Sequence[Row], verdicts: str) -> dict[str, Callable[[Path], object]]:
+    """Return what writes the scoreboard, by file name.
+
+    Parameters
+    ----------
+    rows
+        Of `hil.proof.prove.judge_set.judge_set`.
+    verdicts
+        Where the verdicts' folder is, seen from the page.
+    """
+    data = json.dumps(scoreboard_json(rows), indent=1, allow_nan=False) + "\n"
+    text = scoreboard_page(rows, verdicts)
+    return {
+        DATA: lambda to: to.write_text(data, encoding="utf-8"),
+        PAGE: lambda to: to.write_text(text, encoding="utf-8"),
+    }
+
+
+def scoreboard_json(rows: Sequence[Row]) -> dict[str, Any]:
+    """Return the scoreboard for scripts; JSON types only."""
+    return {
+        "schema": SCHEMA,
+        "summary": summary(rows),
+        "false_claims": _rate(rows, FALSE_CLAIMS).as_json(),
+        "cases": [dict(row) for row in rows],
+    }
+
+
+def scoreboard_page(rows: Sequence[Row], verdicts: str) -> str:
+    """Return the page: figures first, misses next, then every case."""
+    misses = [row for row in rows if not row["success"]]
+    title = f"{len(rows) - len(misses)} of {len(rows)} sealed cases answered as they should be"
+    sections = [
+        f'<header class="top">\n<h1>{escape(title)}</h1>\n{html.tiles(_tiles(rows))}\n</header>',
+        html.section("By what was hidden", _groups(rows)),
+        html.section("Misses", _cases(misses, verdicts) if misses else html.paragraph("None.")),
+        html.section("What was named", f'<div class="wide">{_matrix(rows)}</div>'),
+        html.section("Every case", _cases(rows, verdicts)),
+    ]
+    return html.page("Scoreboard", sections, FOOTER, plots=False)
+
+
+def _tiles(rows: Sequence[Row]) -> list[tuple[str, str, str]]:
+    sizes = coverage(rows).values()
+    held = Rate(sum(rate.hits for rate in sizes), sum(rate.trials for rate in sizes))
+    fresh = quantiles((value for row in rows for value in row["fresh_over_floor"]), (0.5,))[0]
+    located = share(row["element_right"] for row in rows if row.get("element_right") is not None)
+    return [
+        (
+            "as it should be",
+            _percent(share(row["success"] for row in rows)),
+            _interval(share(r["success"] for r in rows)),
+        ),
+        (
+            "something named that is not there",
+            _percent(_rate(rows, FALSE_CLAIMS)),
+            _interval(_rate(rows, FALSE_CLAIMS)),
+        ),
+        ("right element", _percent(located), _interval(located)),
+        ("95 % intervals that hold the truth", _percent(held), f"of {held.trials}"),
+        ("error on fresh recordings", "–" if fresh is None else f"{fresh:.3g} ×", "the sensor's noise, median"),
+    ]
+
+
+def _groups(rows: Sequence[Row]) -> str:
+    lines = []
+    for group in Group:
+        members = [row for row in rows if row["group"] == group.value]
+        if members:
+            rate = share(row["success"] for row in members)
+            lines.append(
+                (TITLES[group], WANTED[group], f"{rate.hits} of {rate.trials}", _percent(rate), _interval(rate))
+            )
+    return html.table(("hidden", "wanted", "cases", "rate", "interval"), lines, numbers=(2, 3))
+
+
+def _matrix(rows: Sequence[Row]) -> str:
+    matrix = confusion(rows)
+    return confusion_svg(matrix, {planted: right_columns(kind(planted)) for planted in matrix})
+
+
+def _cases(rows: Sequence[Row], verdicts: str) -> str:
+    headings = ("case", "hidden", "found", "outcome", "error before", "after", "noise", "fresh / noise", "report")
+    return html.html_table(headings, [_case(row, verdicts) for row in rows], numbers=(4, 5, 6, 7))
+
+
+def _case(row: Row, verdicts: str) -> list[str]:
+    fit: Mapping[str, Any] = row.get("fit", {})
+    errors = [_number(fit.get(name)) for name in ("retuned", "augmented", "noise_floor")]
+    fresh = quantiles(row["fresh_over_floor"], (0.5,))[0]
+    report = f'<a href="{escape(verdicts)}/{escape(row["case"])}/report.html">report</a>'
+    mark = "✓" if row["success"] else "✗"
+    return [
+        *(escape(text) for text in (row["case"], row["kind"], _found(row), f"{mark} {row['outcome']}")),
+        *errors,
+        _number(fresh),
+        report if "verdict" in row else escape(row["fault"] or ""),
+    ]
+
+
+def _found(row: Row) -> str:
+    if "verdict" not in row:
+        return "nothing: the command failed"
+    return ", ".join(row["named"]) or str(row["verdict"]).replace("_", " ")
+
+
+def _rate(rows: Sequence[Row], outcomes: Sequence[str]) -> Rate:
+    return share(row["outcome"] in outcomes for row in rows)
+
+
+def _percent(rate: Rate) -> str:
+    return f"{100.0 * rate.value:.0f} %" if rate.trials else "–"
+
+
+def _interval(rate: Rate) -> str:
+    low, high = rate.interval
+    return f"{100.0 * low:.0f} to {100.0 * high:.0f} %"
+
+
+def _number(value: float | None) -> str:
+    return "–" if value is None else f"{value:.3g}"

@@ -1,0 +1,57 @@
+"""``hil prove``: from the making of a sealed set to its scoreboard, by the public command alone."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from hil.cli.main import run
+
+SEED = "5"
+"""Of a set whose first case is quickly answered."""
+
+
+def test_a_set_is_made_answered_opened_and_scored(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out, key = tmp_path / "proof", tmp_path / "proof.key"
+    assert run(["prove", "--out", str(out), "--cases", "1", "--seed", SEED]) == 0
+    said = capsys.readouterr().out
+    assert re.search(r"digest: [0-9a-f]{64}", said)
+    data = json.loads((out / "scoreboard.json").read_text())
+    assert [case["case"] for case in data["cases"]] == ["case_001"]
+    assert data["cases"][0]["fault"] is None
+    assert (out / "verdicts" / "case_001" / "report.html").is_file()
+    assert "Scoreboard" in (out / "scoreboard.html").read_text()
+    assert key.stat().st_mode & 0o077 == 0  # nobody else can read it
+    assert not list(out.rglob("*.key"))
+    assert run(["prove", "--out", str(out), "--cases", "1"]) == 0  # goes on: nothing is left to do
+    assert json.loads((out / "scoreboard.json").read_text()) == data
+
+
+@pytest.mark.parametrize(
+    ("arguments", "wanted"),
+    [
+        (["open", "DIR"], "expected the key once"),
+        (["open", "DIR", "--key", "12"], "expected the 64 hexadecimal digits"),
+        (["run", "DIR"], "hil prove make DIR makes one"),
+        (["make", "DIR", "--key-file", "DIR/key"], "expected a file outside"),
+        (["make", "DIR", "--cases", "0"], "cases"),
+    ],
+)
+def test_wrong_use_is_refused_with_what_was_expected(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], wanted: str
+) -> None:
+    folder = str(tmp_path / "set")
+    assert run(["prove", *(text.replace("DIR", folder) for text in arguments)]) == 2
+    assert wanted in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_key_of_another_set_is_not_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    key = tmp_path / "mine.key"
+    key.write_text("mine")
+    assert run(["prove", "make", str(tmp_path / "set"), "--key-file", str(key)]) == 2
+    assert "not there yet" in capsys.readouterr().err
+    assert key.read_text() == "mine"

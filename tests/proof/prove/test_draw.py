@@ -1,0 +1,33 @@
+"""What is hidden in a set: the same for the same seed, every group among many."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import pytest
+
+from hil.proof.campaign.kinds import Group
+from hil.proof.prove.draw import SHARES, draw
+
+
+def test_equal_seeds_draw_the_same_and_more_cases_begin_as_fewer_do() -> None:
+    assert draw(12, 7)[:5] == draw(5, 7)
+    assert draw(5, 7) != draw(5, 8)
+
+
+def test_names_tell_nothing() -> None:
+    assert [each.name for each in draw(3, 1)] == ["case_001", "case_002", "case_003"]
+
+
+def test_every_group_comes_about_as_often_as_it_should() -> None:
+    """Five standard deviations of a binomial count."""
+    cases = 600
+    counts = Counter(each.kind.group for each in draw(cases, 3))
+    assert sum(SHARES.values()) == pytest.approx(1.0)
+    for group in Group:
+        p = SHARES[group]
+        assert counts[group] == pytest.approx(cases * p, abs=5.0 * (cases * p * (1.0 - p)) ** 0.5)
+
+
+def test_no_two_cases_of_a_set_are_drawn_from_one_seed() -> None:
+    assert len({each.seed for each in draw(200, 2)}) == 200
