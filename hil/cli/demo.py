@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from estimator.diagnosis.result import Diagnosis
     from hil.config.rig_file import Rig
     from hil.proof.judge import Judgement
-    from hil.proof.sealed_process import SealedProcess
+    from hil.proof.wire.sealed_process import SealedProcess
     from hil.rig.check import Finding
 
 SEEDS = 1_000_000
@@ -69,7 +69,7 @@ class _Demo:
 
     def run(self) -> None:
         from hil.proof.seal import verify
-        from hil.proof.sealed_process import sealed_process
+        from hil.proof.wire.sealed_process import sealed_process
 
         self._say(f"1/6 a bus with a concealed effect is drawn from seed {self._seed}, in a process of its own")
         with sealed_process("--seed", str(self._seed), "--model", str(self._nominal)) as sealed:
@@ -96,7 +96,7 @@ class _Demo:
         import tomlkit
 
         from hil.config.rig_file import read_rig
-        from hil.proof.sealed_rig import RIG_FILE
+        from hil.proof.wire.sealed_rig import RIG_FILE
 
         document: Any = tomlkit.parse(RIG_FILE.read_text(encoding="utf-8"))
         host, _, port = sealed.modbus.rpartition(":")

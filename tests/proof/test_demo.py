@@ -18,7 +18,7 @@ from hil.cli.demo import _Demo
 from hil.cli.main import run
 from hil.config.rig_file import read_rig
 from hil.proof.seal import verify
-from hil.proof.sealed_process import sealed_process
+from hil.proof.wire.sealed_process import sealed_process
 
 SEED_OF_NONE = 115
 """A seed whose bus hides nothing: the quickest to diagnose."""

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import IO, cast
 
 from hil.errors import RunAborted
-from hil.proof.sealed_rig import OPEN
+from hil.proof.wire.sealed_rig import OPEN
 
 _READY = re.compile(r"ready bus=(?P<bus>\S+) modbus=(?P<modbus>\S+) commitment=(?P<commitment>[0-9a-f]{64})\n")
 
@@ -98,7 +98,7 @@ def sealed_process(*arguments: str) -> Iterator[SealedProcess]:
     Parameters
     ----------
     *arguments
-        Those of ``python -m hil.proof.sealed_rig``.
+        Those of ``python -m hil.proof.wire.sealed_rig``.
 
     Raises
     ------
@@ -115,7 +115,7 @@ def sealed_process(*arguments: str) -> Iterator[SealedProcess]:
 
 def _start(arguments: tuple[str, ...], complaints: IO[bytes]) -> _Pipes:
     process = subprocess.Popen(
-        [sys.executable, "-m", "hil.proof.sealed_rig", *arguments],
+        [sys.executable, "-m", "hil.proof.wire.sealed_rig", *arguments],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=complaints,

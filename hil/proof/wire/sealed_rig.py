@@ -1,4 +1,4 @@
-"""``python -m hil.proof.sealed_rig --seed N``: a simulated rig that keeps its truth until it is asked.
+"""``python -m hil.proof.wire.sealed_rig --seed N``: a simulated rig that keeps its truth until it is asked.
 
 It prints one line when it can be reached::
 
@@ -23,8 +23,8 @@ from typing import TextIO
 from drivers.errors import DriverError
 from hil.config.rig_file import Rig, read_rig
 from hil.errors import HilError
-from hil.proof.challenge import CONCEALED, Challenge, compile_truth, draw_challenge
 from hil.proof.nominal_file import model_toml
+from hil.proof.wire.challenge import CONCEALED, Challenge, compile_truth, draw_challenge
 from hil.simulator.loopback import modbus_address
 from hil.simulator.rig_server import RigServer
 
@@ -39,7 +39,7 @@ _BAD_INPUT = 2
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="python -m hil.proof.sealed_rig", description="Serve a simulated rig with a concealed effect."
+        prog="python -m hil.proof.wire.sealed_rig", description="Serve a simulated rig with a concealed effect."
     )
     parser.add_argument("--seed", required=True, type=int, help="what everything is drawn from, 0 or more")
     parser.add_argument("--effect", help=f"conceal this one; otherwise one of {', '.join(CONCEALED)} is drawn")
