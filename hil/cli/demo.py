@@ -93,16 +93,10 @@ class _Demo:
 
     def _rig(self, sealed: SealedProcess) -> Rig:
         """Write the rig file with the addresses of this run, and read it as any command would."""
-        import tomlkit
-
         from hil.config.rig_file import read_rig
-        from hil.proof.wire.sealed_rig import RIG_FILE
+        from hil.proof.wire.rig_text import rig_text
 
-        document: Any = tomlkit.parse(RIG_FILE.read_text(encoding="utf-8"))
-        host, _, port = sealed.modbus.rpartition(":")
-        document["can"]["url"] = sealed.bus
-        document["plc"]["host"], document["plc"]["port"] = host, int(port)
-        self._rig_path.write_text(tomlkit.dumps(document), encoding="utf-8")
+        self._rig_path.write_text(rig_text(sealed), encoding="utf-8")
         return read_rig(self._rig_path)
 
     def _check(self, rig: Rig) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from hil.proof.seal import Seal, seal
@@ -23,14 +24,15 @@ CONCEALED = (
 
 @dataclass(frozen=True, slots=True)
 class Challenge:
-    """A specimen at rest, ready to be driven, and its seal."""
+    """A specimen at rest, ready to be driven, the faults of the devices it is driven by, and its seal."""
 
     specimen: Specimen
     plant: TruthDriveline
+    faults: tuple[str, ...]
     seal: Seal
 
 
-def draw_challenge(seed: int, effect: str | None = None) -> Challenge:
+def draw_challenge(seed: int, effect: str | None = None, faults: Sequence[str] = ()) -> Challenge:
     """Draw a challenge.
 
     Parameters
@@ -38,7 +40,9 @@ def draw_challenge(seed: int, effect: str | None = None) -> Challenge:
     seed
         What everything is drawn from, 0 or more.
     effect
-        The effect to conceal; None draws one of `CONCEALED`.
+        The effect to conceal in the driveline; None draws one of `CONCEALED`.
+    faults
+        What is wrong with inverters, PLC and bus, as ``hil sim --fault`` takes it.
 
     Raises
     ------
@@ -48,7 +52,8 @@ def draw_challenge(seed: int, effect: str | None = None) -> Challenge:
     name = choose_effect(CONCEALED, seed) if effect is None else effect
     specimen = draw_specimen(name, seed)
     physics = specimen.physics(stream(seed, Stream.RECORDING))
-    return Challenge(specimen, TruthDriveline(physics), seal(specimen.truth()))
+    truth = {**specimen.truth(), "faults": list(faults)}
+    return Challenge(specimen, TruthDriveline(physics), tuple(faults), seal(truth))
 
 
 def compile_truth(challenge: Challenge) -> None:

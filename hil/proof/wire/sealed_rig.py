@@ -25,6 +25,7 @@ from hil.config.rig_file import Rig, read_rig
 from hil.errors import HilError
 from hil.proof.nominal_file import model_toml
 from hil.proof.wire.challenge import CONCEALED, Challenge, compile_truth, draw_challenge
+from hil.simulator.fault_spec import rig_faults
 from hil.simulator.loopback import modbus_address
 from hil.simulator.rig_server import RigServer
 
@@ -43,6 +44,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--seed", required=True, type=int, help="what everything is drawn from, 0 or more")
     parser.add_argument("--effect", help=f"conceal this one; otherwise one of {', '.join(CONCEALED)} is drawn")
+    parser.add_argument("--fault", action="append", default=[], metavar="SPEC", help="as hil sim takes it; repeatable")
     parser.add_argument("--rig", type=Path, default=RIG_FILE, help="rig file the simulated devices agree with")
     parser.add_argument("--bus", default="ws://127.0.0.1:0/", help="where the CAN bus is served")
     parser.add_argument("--modbus", default="127.0.0.1:0", help="where the PLC is served")
@@ -59,7 +61,9 @@ def serve(challenge: Challenge, rig: Rig, bus_url: str, modbus: str, asked: Text
         If an address can't be served at.
     """
     compile_truth(challenge)
-    with RigServer(challenge.plant, rig, bus_url, modbus_address(modbus), seed=challenge.specimen.seed) as server:
+    faults = rig_faults(challenge.faults, rig.period_s)
+    address, seed = modbus_address(modbus), challenge.specimen.seed
+    with RigServer(challenge.plant, rig, bus_url, address, faults, seed) as server:
         commitment = challenge.seal.commitment
         _tell(told, f"ready bus={server.bus_url} modbus={server.modbus} commitment={commitment}")
         for line in asked:
@@ -84,7 +88,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     with suppress(KeyboardInterrupt):
         try:
             rig = read_rig(options.rig)
-            challenge = draw_challenge(options.seed, options.effect)
+            challenge = draw_challenge(options.seed, options.effect, options.fault)
             if options.model is not None:
                 options.model.write_text(model_toml(challenge.specimen), encoding="utf-8")
             serve(challenge, rig, options.bus, options.modbus, sys.stdin, sys.stdout)
