@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import secrets
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -14,6 +14,9 @@ if TYPE_CHECKING:
     from hil.proof.prove.make import Progress
 
 SEEDS = 2**31
+RIG_SEED = 11
+"""What the sealed rigs are drawn from where no seed is given."""
+
 SHORT = 12
 """Cases of the short form: a few minutes on two cores."""
 
@@ -22,6 +25,9 @@ Jobs = Annotated[int, typer.Option(min=1, help="Cases at a time.")]
 Cases = Annotated[int, typer.Option(min=1, max=999, help="How many cases.")]
 Seed = Annotated[int | None, typer.Option(min=0, help="What everything is drawn from; else at random, and not told.")]
 KeyFile = Annotated[Path | None, typer.Option("--key-file", metavar="FILE", help="File of the key, outside DIR.")]
+Data = Annotated[
+    Path | None, typer.Option(metavar="DATA", help="Folder of the real recordings; without it they are left out.")
+]
 
 app = typer.Typer(add_completion=False, no_args_is_help=False)
 
@@ -35,8 +41,10 @@ def prove(
     cases: Cases = SHORT,
     seed: Seed = None,
     jobs: Jobs = 2,
+    rigs: Annotated[bool, typer.Option(help="Drive the sealed rigs too: CANopen and Modbus.")] = True,
+    data: Data = None,
 ) -> None:
-    """Seal cases, let the public command answer them, open the seals, write the scoreboard.
+    """Prove the claim: sealed cases, sealed rigs and, where they are at hand, real recordings; one scoreboard.
 
     Called again it goes on where it was interrupted. The key is kept beside DIR, in DIR.key. To check the claim
     yourself, make the set on one machine, answer it on another, and open it with the key.
@@ -47,6 +55,10 @@ def prove(
     if not key_path.exists():
         make(out, cases, seed, jobs, key_path)
     run(out, jobs)
+    if rigs:
+        wire(out, None, RIG_SEED if seed is None else seed)
+    if data is not None:
+        real(data, out, None, jobs)
     open_(out, None, key_path, None, jobs)
 
 
@@ -102,21 +114,71 @@ def open_(
 ) -> None:
     """Open the seals, check that nothing was changed, score the verdicts; writes DIR/scoreboard.html and .json."""
     from hil.proof.prove.judge_set import judge_set
-    from hil.proof.prove.manifest import VERDICTS
-    from hil.proof.prove.scoreboard import PAGE, scoreboard_files
+    from hil.proof.prove.scoreboard import PAGE, REAL, WIRE, Board, scoreboard_files
     from hil.proof.prove.vault import parse_key
+    from hil.proof.wire.run import read_rows
     from hil.report.outputs import publish
 
     secret = parse_key(_key_text(key, key_file))
     with _progress() as progress:
         rows = judge_set(folder, secret, jobs, progress, verdicts)
-    publish(folder, scoreboard_files(rows, VERDICTS))
+    publish(folder, scoreboard_files(Board(rows, read_rows(folder / WIRE), _real_cases(folder / REAL))))
     for row in rows:
         if not row["success"]:
             found = row["fault"] or ", ".join(row.get("named", ())) or row.get("verdict")
             typer.echo(f"{row['case']}: {row['outcome']}: hidden {row['kind']}, found {found}")
     right = sum(row["success"] for row in rows)
     typer.echo(f"{right} of {len(rows)} as they should be   scoreboard: {folder / PAGE}")
+
+
+@app.command(epilog="Example: hil prove wire proof")
+def wire(
+    folder: Folder,
+    only: Annotated[list[str] | None, typer.Option(metavar="RIG", help="This one alone; may be repeated.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="What buses and sizes are drawn from.")] = RIG_SEED,
+) -> None:
+    """Drive rigs with something concealed in their slaves, over CANopen and Modbus; writes DIR/wire/wire.json."""
+    from hil.proof.prove.scoreboard import WIRE
+    from hil.proof.wire.concealed import WIRED
+    from hil.proof.wire.run import run_wire
+
+    with _progress() as progress:
+        rows = run_wire(folder / WIRE, seed, only or list(WIRED), progress)
+    for row in rows:
+        found = ", ".join(row.get("named", ())) or row.get("verdict", row["said"])
+        typer.echo(f"{row['case']}: {row['outcome']}: {found}")
+    typer.echo(f"{sum(row['success'] for row in rows)} of {len(rows)} rigs as they should be")
+
+
+@app.command(epilog="Example: hil prove real data proof")
+def real(
+    data: Annotated[Path, typer.Argument(metavar="DATA", help="Folder of the real recordings.")],
+    folder: Folder,
+    only: Annotated[list[str] | None, typer.Option(metavar="NAME", help="This one alone; may be repeated.")] = None,
+    jobs: Jobs = 1,
+) -> None:
+    """Conceal what is known of real recordings, ask for it, compare; writes DIR/real/real.json."""
+    from hil.proof.prove.scoreboard import REAL
+    from hil.proof.real.run import run_real
+
+    with _progress() as progress:
+        results = run_real(data, folder / REAL, only or (), jobs, _in_per_cent(progress))
+    for result in results:
+        typer.echo(f"{result.name}: {'as it should be' if result.named_right else 'not as it should be'}")
+
+
+def _real_cases(folder: Path) -> list[dict[str, Any]]:
+    """Return what was made of real recordings; nothing where none were asked for."""
+    import json
+
+    path = folder / "real.json"
+    cases: list[dict[str, Any]] = json.loads(path.read_text(encoding="utf-8"))["cases"] if path.exists() else []
+    return cases
+
+
+def _in_per_cent(progress: Progress) -> Callable[[str, float], None]:
+    """Take the share of the work done, 0 to 1."""
+    return lambda what, share: progress(what, round(100 * share), 100)
 
 
 def _key_text(key: str | None, key_file: Path | None) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -13,10 +14,15 @@ from hil.proof.campaign.matrix import confusion_svg
 from hil.proof.campaign.report import TITLES, WANTED, summary
 from hil.proof.campaign.score import right_columns
 from hil.proof.campaign.statistics import Rate, Row, confusion, coverage, quantiles, share
+from hil.proof.prove.manifest import VERDICTS
+from hil.proof.prove.scoreboard_real import real_section
+from hil.proof.prove.scoreboard_wire import wire_section
 from hil.report import page as html
 
 SCHEMA = "hil.scoreboard/1"
 PAGE, DATA = "scoreboard.html", "scoreboard.json"
+WIRE, REAL = "wire", "real"
+"""Folders beside the page."""
 
 FALSE_CLAIMS = ("false_claim", "wrong", "invented")
 """Outcomes in which something was named that is not there."""
@@ -27,44 +33,61 @@ FOOTER = (
 )
 
 
-def scoreboard_files(rows: Sequence[Row], verdicts: str) -> dict[str, Callable[[Path], object]]:
-    """Return what writes the scoreboard, by file name.
+@dataclass(frozen=True, slots=True)
+class Board:
+    """Everything the scoreboard shows.
 
-    Parameters
+    Attributes
     ----------
-    rows
-        Of `hil.proof.prove.judge_set.judge_set`.
-    verdicts
-        Where the verdicts' folder is, seen from the page.
+    sealed
+        Rows of `hil.proof.prove.judge_set.judge_set`.
+    wire
+        Rows of `hil.proof.wire.run.run_wire`.
+    real
+        Cases of ``real.json`` (`hil.proof.real.result`).
     """
-    data = json.dumps(scoreboard_json(rows), indent=1, allow_nan=False) + "\n"
-    text = scoreboard_page(rows, verdicts)
+
+    sealed: Sequence[Row]
+    wire: Sequence[Row] = ()
+    real: Sequence[Mapping[str, Any]] = ()
+
+
+def scoreboard_files(board: Board) -> dict[str, Callable[[Path], object]]:
+    """Return what writes the scoreboard, by file name; it stands beside the folders verdicts, wire and real."""
+    data = json.dumps(scoreboard_json(board), indent=1, allow_nan=False) + "\n"
+    text = scoreboard_page(board)
     return {
         DATA: lambda to: to.write_text(data, encoding="utf-8"),
         PAGE: lambda to: to.write_text(text, encoding="utf-8"),
     }
 
 
-def scoreboard_json(rows: Sequence[Row]) -> dict[str, Any]:
+def scoreboard_json(board: Board) -> dict[str, Any]:
     """Return the scoreboard for scripts; JSON types only."""
+    rows = board.sealed
     return {
         "schema": SCHEMA,
         "summary": summary(rows),
         "false_claims": _rate(rows, FALSE_CLAIMS).as_json(),
         "cases": [dict(row) for row in rows],
+        "wire": [dict(row) for row in board.wire],
+        "real": [dict(case) for case in board.real],
     }
 
 
-def scoreboard_page(rows: Sequence[Row], verdicts: str) -> str:
-    """Return the page: figures first, misses next, then every case."""
+def scoreboard_page(board: Board) -> str:
+    """Return the page: figures first, misses next, then rigs, real recordings and every sealed case."""
+    rows = board.sealed
     misses = [row for row in rows if not row["success"]]
     title = f"{len(rows) - len(misses)} of {len(rows)} sealed cases answered as they should be"
     sections = [
         f'<header class="top">\n<h1>{escape(title)}</h1>\n{html.tiles(_tiles(rows))}\n</header>',
         html.section("By what was hidden", _groups(rows)),
-        html.section("Misses", _cases(misses, verdicts) if misses else html.paragraph("None.")),
+        html.section("Misses", _cases(misses) if misses else html.paragraph("None.")),
+        *([wire_section(board.wire, WIRE)] if board.wire else []),
+        *([real_section(board.real, REAL)] if board.real else []),
         html.section("What was named", f'<div class="wide">{_matrix(rows)}</div>'),
-        html.section("Every case", _cases(rows, verdicts)),
+        html.section("Every case", _cases(rows)),
     ]
     return html.page("Scoreboard", sections, FOOTER, plots=False)
 
@@ -108,16 +131,16 @@ def _matrix(rows: Sequence[Row]) -> str:
     return confusion_svg(matrix, {planted: right_columns(kind(planted)) for planted in matrix})
 
 
-def _cases(rows: Sequence[Row], verdicts: str) -> str:
+def _cases(rows: Sequence[Row]) -> str:
     headings = ("case", "hidden", "found", "outcome", "error before", "after", "noise", "fresh / noise", "report")
-    return html.html_table(headings, [_case(row, verdicts) for row in rows], numbers=(4, 5, 6, 7))
+    return html.html_table(headings, [_case(row) for row in rows], numbers=(4, 5, 6, 7))
 
 
-def _case(row: Row, verdicts: str) -> list[str]:
+def _case(row: Row) -> list[str]:
     fit: Mapping[str, Any] = row.get("fit", {})
     errors = [_number(fit.get(name)) for name in ("retuned", "augmented", "noise_floor")]
     fresh = quantiles(row["fresh_over_floor"], (0.5,))[0]
-    report = f'<a href="{escape(verdicts)}/{escape(row["case"])}/report.html">report</a>'
+    report = f'<a href="{VERDICTS}/{escape(row["case"])}/report.html">report</a>'
     mark = "✓" if row["success"] else "✗"
     return [
         *(escape(text) for text in (row["case"], row["kind"], _found(row), f"{mark} {row['outcome']}")),

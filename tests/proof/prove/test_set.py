@@ -19,7 +19,7 @@ from hil.proof.prove.draw import draw
 from hil.proof.prove.judge_set import judge_set
 from hil.proof.prove.make import make
 from hil.proof.prove.manifest import CASES, COMMITMENTS, SEALED, VERDICTS, VERDICTS_LIST
-from hil.proof.prove.scoreboard import scoreboard_files
+from hil.proof.prove.scoreboard import Board, scoreboard_files
 from hil.proof.prove.vault import new_key, parse_key
 from hil.proof.seal import SealBroken
 
@@ -136,7 +136,7 @@ def test_answers_are_scored_against_the_truth(proof: Path, tool: Tool, tmp_path:
     assert [row["kind"] for row in rows] == [each.kind.name for each in draw(COUNT, SEED)]
     assert {row["outcome"] for row in rows} == {"abstained"}
     assert rows[0]["fresh_over_floor"] == pytest.approx([2.0, 2.0, 2.0], rel=1e-6)  # 0.1 over 0.05 rad/s
-    for name, write in scoreboard_files(rows, VERDICTS).items():
+    for name, write in scoreboard_files(Board(rows)).items():
         write(tmp_path / name)
     page = (tmp_path / "scoreboard.html").read_text()
     for row in rows:
@@ -201,7 +201,7 @@ def test_a_case_changed_before_it_is_answered_is_not_answered(proof: Path, tool:
 def test_verdicts_and_their_list_changed_together_are_told_by_the_digest_that_was_kept(proof: Path, tool: Tool) -> None:
     digest = answer(proof, 1, silent)
     listed = json.loads((proof / VERDICTS_LIST).read_text())
-    listed["cases"]["case_001"]["diagnose_s"] = 0.0
+    listed["cases"]["case_001"]["diagnose_s"] = 99.0
     (proof / VERDICTS_LIST).write_text(json.dumps(listed))
     with pytest.raises(SealBroken, match="came others"):
         judge_set(proof, KEY, 1, silent, digest)
@@ -229,3 +229,44 @@ def test_what_is_missing_is_asked_for(proof: Path, tool: Tool, tmp_path: Path) -
         judge_set(proof, KEY, 1, silent)
     with pytest.raises(UsageError, match="hil prove make"):
         answer(tmp_path / "nothing", 1, silent)
+
+
+def test_rigs_and_real_recordings_stand_on_the_same_page(tmp_path: Path) -> None:
+    rig = {
+        "case": "clutch_closed",
+        "where": "the PLC: the clutch stays closed",
+        "said": "PLC: clutch is closed, expected open.",
+        "outcome": "right",
+        "success": True,
+    }
+    agreement = {
+        "what": "gap",
+        "unit": "mm",
+        "truth": 4.06,
+        "found": 4.1,
+        "ci95": [4.0, 4.2],
+        "inside": True,
+        "within": True,
+        "asked": "within 10 % of 4.06 mm",
+    }
+    run = {
+        "name": "sines",
+        "verdict": "explained",
+        "named": ["backlash"],
+        "fault": None,
+        "held_out": {"before": {"a": 1.11}, "after": {"a": 0.2}},
+        "black_boxes": [{"name": "output error", "held_out": {"a": 0.9}, "reason": None}],
+        "agreements": [agreement],
+        "report": "joint/sines/out/report.html",
+    }
+    case = {"title": "A <joint>", "concealed": ["backlash"], "conceals": "its gap", "runs": [run], "agreements": []}
+    for name, write in scoreboard_files(Board([], [rig], [case])).items():
+        write(tmp_path / name)
+    page = (tmp_path / "scoreboard.html").read_text()
+    assert "Over the wire: 1 of 1" in page
+    assert "clutch is closed" in page
+    assert "A &lt;joint&gt;" in page
+    assert 'href="real/joint/sines/out/report.html"' in page
+    assert "output error: 0.9" in page
+    assert "holds it" in page
+    assert json.loads((tmp_path / "scoreboard.json").read_text())["wire"] == [rig]
