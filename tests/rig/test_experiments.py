@@ -92,3 +92,10 @@ def test_tip_steps_through_zero_torque_and_keeps_its_mean_speed() -> None:
 def test_vehicle_that_does_not_move_ends_the_approach() -> None:
     with pytest.raises(RunAborted, match=r"approach: the speed is 0\.00 rad/s after 5 s, expected it steady at 40\.00"):
         drive(staged(cruise(), timeout_s=5.0), RigidVehicle(inertia_kg_m2=math.inf))
+
+
+def test_a_resolver_whose_error_goes_round_with_the_shaft_does_not_keep_the_vehicle_from_being_there() -> None:
+    """An error of 3 rad/s at the start speed, nine times a second; the speed itself is steady after some time."""
+    law = cruise(speed_rad_s=60.0)
+    course = drive(staged(law), RigidVehicle(resolver_error_rad=0.05))
+    assert Phase.MEASURE in course.phase

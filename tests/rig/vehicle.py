@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 from hil.rig.experiments.base import Experiment, Phase
@@ -18,10 +19,18 @@ class RigidVehicle:
     friction_nm_s: float = 1.25
     load_nm: float = 0.0
     speed_rad_s: float = 0.0
+    resolver_error_rad: float = 0.0
+    angle_rad: float = 0.0
+
+    @property
+    def reading_rad_s(self) -> float:
+        """What the resolver shows: its angle is off by so much, once a turn [rad/s]."""
+        return self.speed_rad_s * (1.0 + self.resolver_error_rad * math.cos(self.angle_rad))
 
     def advance(self, torque_nm: float) -> None:
         net_nm = torque_nm - self.friction_nm_s * self.speed_rad_s - self.load_nm
         self.speed_rad_s += PERIOD_S * net_nm / self.inertia_kg_m2
+        self.angle_rad += PERIOD_S * self.speed_rad_s
 
 
 @dataclass
@@ -41,7 +50,7 @@ def drive(experiment: Experiment, vehicle: RigidVehicle, cycles: int = 20_000) -
     """Run a plan to its end on a vehicle."""
     course = Course()
     for cycle in range(cycles):
-        base = experiment.torque(cycle * PERIOD_S, vehicle.speed_rad_s)
+        base = experiment.torque(cycle * PERIOD_S, vehicle.reading_rad_s)
         course.torque_nm.append(base.torque_nm)
         course.speed_rad_s.append(vehicle.speed_rad_s)
         course.phase.append(base.phase)

@@ -11,10 +11,11 @@ BANDWIDTH_HZ = 0.1
 """Crossover of the approach's speed loop [Hz]: 50 times below the 5 Hz the paper begins at."""
 
 SETTLED_FOR_S = 1.0
-"""The speed must stay where it is for this long [s]: several periods of any driveline resonance."""
+"""The mean speed is taken over so long [s]: several periods of any driveline resonance, several turns of the motor,
+so that a resolver whose error goes round with the shaft does not keep the vehicle from ever being there."""
 
 STEADY_WITHIN_RAD_S = 0.05
-"""How far the low-passed speed may move in that time [rad/s].
+"""How far that mean may move from one such time to the next [rad/s].
 
 What is handed over is then the torque that holds the speed, to within 0.05 rad/s² times the inertia: 5 Nm
 for 100 kg m².
@@ -45,10 +46,11 @@ class Approach:
     """
 
     __slots__ = (
+        "_errors_rad_s",
         "_hold",
+        "_mean_rad_s",
+        "_mean_since_s",
         "_speed_rad_s",
-        "_steady_error_rad_s",
-        "_steady_since_s",
         "_timeout_s",
         "_tolerance_rad_s",
         "settled",
@@ -67,8 +69,9 @@ class Approach:
         self._speed_rad_s = speed_rad_s
         self._timeout_s = timeout_s
         self._tolerance_rad_s = max(TOLERANCE_LEAST_RAD_S, TOLERANCE_SHARE * abs(speed_rad_s))
-        self._steady_since_s = 0.0
-        self._steady_error_rad_s = math.inf
+        self._mean_since_s = 0.0
+        self._mean_rad_s = math.inf
+        self._errors_rad_s: list[float] = []
         self.settled = False
 
     def torque_nm(self, time_s: float, speed_rad_s: float) -> float:
@@ -90,9 +93,10 @@ class Approach:
         return torque_nm
 
     def _is_steady(self, time_s: float) -> bool:
-        error_rad_s = self._hold.error_rad_s
-        moved_rad_s = abs(error_rad_s - self._steady_error_rad_s)
-        if abs(error_rad_s) > self._tolerance_rad_s or moved_rad_s > STEADY_WITHIN_RAD_S:
-            self._steady_since_s = time_s
-            self._steady_error_rad_s = error_rad_s
-        return time_s - self._steady_since_s >= SETTLED_FOR_S
+        self._errors_rad_s.append(self._hold.error_rad_s)
+        if time_s - self._mean_since_s < SETTLED_FOR_S:
+            return False
+        mean_rad_s = sum(self._errors_rad_s) / len(self._errors_rad_s)
+        moved_rad_s = abs(mean_rad_s - self._mean_rad_s)
+        self._mean_since_s, self._mean_rad_s, self._errors_rad_s = time_s, mean_rad_s, []
+        return abs(mean_rad_s) <= self._tolerance_rad_s and moved_rad_s <= STEADY_WITHIN_RAD_S
