@@ -21,6 +21,9 @@ from estimator.signals.record import BoolArray, Record
 Effects = frozenset[str]
 NOTHING: Effects = frozenset()
 
+MUCH_BYTES = 2**24
+"""Room of a derivative that is rather found again than kept: a round of the search has a dozen of them."""
+
 Progress = Callable[[str, float], None]
 """Called with what is being done and the share of the work behind it; raise from it to cancel."""
 
@@ -61,7 +64,7 @@ class Bench:
             begun = self._rough.get(effects) if known is None else known
             result = self._fit(effects, warm, releases) if begun is None else polished(converge(begun))
             told = from_their_moment(result, self.model)
-            self._fits[effects] = result if told is result else polished(told)
+            self._fits[effects] = _without_much(result if told is result else polished(told))
         return self._fits[effects]
 
     def fit_by_steps(self, effects: Effects) -> FitResult:
@@ -77,7 +80,7 @@ class Bench:
         if effects in self._fits:
             return self._fits[effects]
         if effects not in self._rough:
-            self._rough[effects] = self._fit(effects, warm, releases, HEAT)
+            self._rough[effects] = _without_much(self._fit(effects, warm, releases, HEAT))
         return self._rough[effects]
 
     def let_go(self, keep: Effects) -> None:
@@ -130,6 +133,13 @@ class Bench:
         """Return the nominal parameters, and what the model's own effects leave to every recording."""
         own = tuple(own_unknowns(self.model.effects, record) for record in self.records)
         return Release(nominal_unknowns(self.model), own)
+
+
+def _without_much(result: FitResult) -> FitResult:
+    """Let a derivative go that takes much room: that of a long recording with its load's profile."""
+    if result.derivative is None or result.derivative.nbytes <= MUCH_BYTES:
+        return result
+    return result.light()
 
 
 def effects_of(result: FitResult) -> Effects:

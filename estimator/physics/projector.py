@@ -21,8 +21,9 @@ class Projector:
     def __init__(self, result: FitResult) -> None:
         low, high = bounds(result.problem)
         movable = low < high
-        self._free = np.linalg.qr(result.jacobian[:, ~result.pinned])[0]
-        self._all, self._triangle = np.linalg.qr(result.jacobian[:, movable])
+        jacobian = result.jacobian
+        self._free = np.linalg.qr(jacobian[:, ~result.pinned])[0]
+        self._all, self._triangle = np.linalg.qr(jacobian[:, movable])
         self._room = (low - result.x)[movable], (high - result.x)[movable]
         self._residual = result.residual
         self.error = self.rest(result.residual)

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from estimator.diagnosis import hypotheses
 from estimator.diagnosis.hypotheses import NOTHING, Bench, effects_of, everything, open_hypotheses, with_effect
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
@@ -117,6 +118,16 @@ def test_fits_but_one_let_their_derivatives_go() -> None:
     assert bench.fit(COULOMB) is kept
     assert kept.derivative is not None
     assert bench.fit(NOTHING).derivative is None
+
+
+def test_a_derivative_that_takes_much_room_is_found_again_when_it_is_needed(monkeypatch: pytest.MonkeyPatch) -> None:
+    records = rubbing(lambda speed: FRICTION_NM)
+    bench = Bench(model(ONE_MASS), records, everything(records))
+    plenty = bench.fit(NOTHING)
+    monkeypatch.setattr(hypotheses, "MUCH_BYTES", 0)
+    scarce = Bench(model(ONE_MASS), records, everything(records)).fit(NOTHING)
+    assert scarce.derivative is None
+    np.testing.assert_allclose(scarce.jacobian, plenty.jacobian, rtol=1e-3, atol=1e-6)
 
 
 class TestOpenHypotheses:
