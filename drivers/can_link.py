@@ -2,7 +2,8 @@
 
 Every frame is stamped once, with the host's monotonic clock, where it arrives. The receive thread is this
 module's own: ``canopen``'s swallows what a callback raises and leaves a dead bus unnoticed. What goes wrong
-in the thread is kept and raised in the caller's next call.
+in the thread is kept and raised in the caller's next call. On a virtual bus of this process there is no such
+thread: a frame is received in the thread that sends it (`drivers.inline_bus`).
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import struct
 import threading
 import time
 from collections.abc import Callable
+from copy import copy
 from http.client import HTTPException
 from types import TracebackType
 from typing import Any, Self
@@ -22,6 +24,7 @@ import canopen
 
 from drivers.errors import BusDown, ProtocolViolation
 from drivers.heartbeat import HeartbeatProducer, NmtState
+from drivers.inline_bus import InlineBus
 from drivers.remote_bus import BoundedRemoteBus
 
 logging.getLogger("canopen").addHandler(logging.NullHandler())  # our errors say it; canopen would print it too
@@ -31,7 +34,13 @@ HOST_NODE_ID = 127
 """Node id of the host's own heartbeat: the highest, so that it yields to every device."""
 
 FrameCallback = Callable[[bytes, int], None]
-"""``callback(data, t_ns)``, called in the receive thread; ``t_ns`` is the monotonic time of arrival."""
+"""``callback(data, t_ns)``, called where frames are received; ``t_ns`` is the monotonic time of arrival."""
+
+Tap = Callable[[can.Message, int], None]
+"""``tap(message, t_ns)``, called for every frame sent, just before, and received; it keeps neither thread waiting."""
+
+BUS_OFF = 0x040
+"""Error class of an error frame: the controller is off the bus (CAN_ERR_BUSOFF of Linux; python-can passes it on)."""
 
 _RECEIVE_POLL_S = 0.02
 """How long `CanLink.close` may wait for the receive thread."""
@@ -54,18 +63,31 @@ class _Network(canopen.Network):
 
     def __init__(self, bus: can.BusABC, raise_if_down: Callable[[], None]) -> None:
         super().__init__(bus)
+        self._wire = bus
+        self.tap: Tap | None = None
         self._raise_if_down = raise_if_down
+        self._send: Callable[[can.Message], None] = self._send_alone
+        if isinstance(bus, InlineBus):  # what a frame sets off is done before its sending returns: it may send itself
+            self._send = bus.hand_out
 
     def send_message(self, can_id: int, data: bytes, remote: bool = False) -> None:
         self._raise_if_down()
+        message = can.Message(arbitration_id=can_id, is_extended_id=False, is_remote_frame=remote, data=data)
         try:
-            super().send_message(can_id, data, remote)
+            if self.tap is not None:
+                message.is_rx = False
+                self.tap(copy(message), time.monotonic_ns())
+            self._send(message)
         except (can.CanError, OSError) as error:
             raise BusDown(
                 f"CAN bus {self.bus}: frame 0x{can_id:03X} can't be sent ({error}), expected a bus "
                 "that takes "
                 "it. Check adapter, cable and termination."
             ) from error
+
+    def _send_alone(self, message: can.Message) -> None:
+        with self.send_lock:  # few adapters can be written to by two threads at a time
+            self._wire.send(message)
 
 
 class CanLink:
@@ -86,8 +108,12 @@ class CanLink:
         self._violation: ProtocolViolation | None = None
         self._producer: HeartbeatProducer | None = None
         self.network = _Network(bus, self._raise_if_down)
-        self._thread = threading.Thread(target=self._receive, name=f"CAN receive, {bus}", daemon=True)
-        self._thread.start()
+        self._thread: threading.Thread | None = None
+        if isinstance(bus, InlineBus):
+            bus.receive_by(self._take)
+        else:
+            self._thread = threading.Thread(target=self._receive, name=f"CAN receive, {bus}", daemon=True)
+            self._thread.start()
 
     @classmethod
     def open(cls, url: str) -> CanLink:
@@ -116,8 +142,12 @@ class CanLink:
         return cls(bus)
 
     def subscribe(self, cob_id: int, callback: FrameCallback) -> None:
-        """Have ``callback`` called for every frame with this identifier, in the receive thread."""
+        """Have ``callback`` called for every frame with this identifier, where frames are received."""
         self._subscribers.setdefault(cob_id, []).append(callback)
+
+    def trace_by(self, tap: Tap | None) -> None:
+        """Have ``tap`` called for every frame from now on, sent or received; None ends it."""
+        self.network.tap = tap
 
     def send(self, cob_id: int, data: bytes) -> None:
         """Send one frame.
@@ -152,6 +182,12 @@ class CanLink:
         if self._producer is None:
             self._producer = HeartbeatProducer(self.send, HOST_NODE_ID, period_s, lambda: NmtState.OPERATIONAL)
 
+    def stop_heartbeat(self) -> None:
+        """Send no heartbeat any more, until `produce_heartbeat`; drives then take the host for dead."""
+        if self._producer is not None:
+            self._producer.stop()
+            self._producer = None
+
     def raise_if_failed(self) -> None:
         """Raise what the receive thread met.
 
@@ -178,30 +214,50 @@ class CanLink:
             raise BusDown(f"CAN bus {self._bus} is closed, expected an open one. Open the link again.")
 
     def _receive(self) -> None:
-        while not self._closing.is_set():
+        while self._lost is None and not self._closing.is_set():
             try:
                 message = self._bus.recv(_RECEIVE_POLL_S)
+                off = message is None and self._bus.state is can.BusState.ERROR
             except Exception as error:  # noqa: BLE001 - each back end raises its own; all mean the bus is gone
                 self._lost = error
                 return
-            if message is None or message.is_error_frame or message.is_remote_frame:
-                continue
-            try:
-                self._dispatch(message.arbitration_id, message.data, time.monotonic_ns())
-            except Exception as error:  # noqa: BLE001 - a defect of this program: raised by close()
-                self._lost = self._defect = error
-                return
+            if message is not None:
+                self._take(message)
+            elif off:
+                self._take_error(BUS_OFF)
 
-    def _dispatch(self, cob_id: int, data: bytearray, t_ns: int) -> None:
+    def _take(self, message: can.Message) -> None:
+        """Take one frame; after a defect nothing is taken any more."""
+        if self._lost is not None:
+            return
+        t_ns = time.monotonic_ns()
+        try:
+            if self.network.tap is not None:
+                self.network.tap(message, t_ns)
+            if message.is_error_frame:
+                self._take_error(message.arbitration_id)
+            elif not message.is_remote_frame:
+                self._dispatch(message.arbitration_id, bytes(message.data), t_ns)
+        except BusDown as error:  # a callback had to answer, and the bus has gone, or been closed, meanwhile
+            self._lost = error
+        except Exception as error:  # noqa: BLE001 - a defect of this program: raised by close()
+            self._lost = self._defect = error
+
+    def _take_error(self, error_class: int) -> None:
+        if error_class & BUS_OFF:
+            self._lost = can.CanOperationError("bus-off: the controller has left the bus after too many errors")
+
+    def _dispatch(self, cob_id: int, data: bytes, t_ns: int) -> None:
         try:
             for callback in self._subscribers.get(cob_id, ()):
-                callback(bytes(data), t_ns)
-            self.network.notify(cob_id, data, t_ns)
+                callback(data, t_ns)
+            if cob_id in self.network.subscribers:
+                self.network.notify(cob_id, bytearray(data), t_ns)
         except ProtocolViolation as violation:
             self._violation = violation
         except struct.error as error:  # what canopen's decoders raise for a frame that is too short
             self._violation = ProtocolViolation(
-                f"CAN bus {self._bus}: frame 0x{cob_id:03X} with data [{bytes(data).hex(' ')}] is not what "
+                f"CAN bus {self._bus}: frame 0x{cob_id:03X} with data [{data.hex(' ')}] is not what "
                 f"CiA 301 has there ({error}). Check the device's firmware version."
             )
 
@@ -213,10 +269,10 @@ class CanLink:
         Exception
             What a subscriber raised in the receive thread, if it was no error of the bus: a defect.
         """
-        if self._producer is not None:
-            self._producer.stop()
+        self.stop_heartbeat()
         self._closing.set()
-        self._thread.join()
+        if self._thread is not None:
+            self._thread.join()
         self._bus.shutdown()
         defect, self._defect = self._defect, None
         if defect is not None:
@@ -240,4 +296,6 @@ def _python_can_bus(url: str) -> can.BusABC:
     if not parts.scheme or not parts.path:
         raise ValueError("the URL names no interface and channel")
     options: dict[str, Any] = {key: int(value) if value.isdecimal() else value for key, value in parse_qsl(parts.query)}
+    if parts.scheme == "virtual":
+        return InlineBus(parts.path, **options)
     return can.Bus(interface=parts.scheme, channel=parts.path, ignore_config=True, **options)

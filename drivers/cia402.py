@@ -26,6 +26,8 @@ class PowerState(Enum):
     FAULT_REACTION_ACTIVE = "fault reaction active"
     FAULT = "fault"
 
+    __hash__ = object.__hash__  # members are single objects; an Enum's own hash is slow, and the cycle looks up by it
+
 
 class Command(Enum):
     """A command of the controlword, 0x6040; the value is the word that gives it (bits 0 to 3 and 7)."""
@@ -36,6 +38,8 @@ class Command(Enum):
     SWITCH_ON = 0x0007  # in OPERATION_ENABLED the same word is called "disable operation"
     ENABLE_OPERATION = 0x000F
     FAULT_RESET = 0x0080  # a rising edge of bit 7
+
+    __hash__ = object.__hash__  # as above
 
 
 class TorqueMode(IntEnum):

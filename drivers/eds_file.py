@@ -1,28 +1,29 @@
-"""An inverter's EDS (CiA 306): data types, default values and PDO layouts of its objects.
+"""An inverter's EDS (CiA 306) as the drivers use it: data types, default values and PDO layouts of its objects.
 
-The parser is ``canopen.objectdictionary``. It leaves a default it can't read as None without a word; here
-that is an error as soon as the value is asked for.
+The chain is `eds_text` (lines), `eds_objects` (objects), `eds_dictionary` (the ``canopen`` library's own form).
+What a file has wrong is an error as soon as it is asked for; `drivers.eds_check` tells it all beforehand.
 """
 
 from __future__ import annotations
 
-from configparser import Error as IniError
 from pathlib import Path
 
-from canopen.objectdictionary import ObjectDictionary, ObjectDictionaryError, import_od
+from canopen.objectdictionary import ObjectDictionary
 
+from drivers.eds_dictionary import build_dictionary
+from drivers.eds_finding import Severity
+from drivers.eds_objects import read_objects
+from drivers.eds_pdo import find_pdo
+from drivers.eds_text import NO_EDS, EdsText, read_eds_text
 from drivers.errors import ConfigMismatch
-from drivers.pdo_map import PdoCodec, PdoLayout, read_layout
+from drivers.pdo_map import PdoCodec, PdoLayout
 from drivers.resources import data_file
 from drivers.scaling import IntegerType
 
 _INTEGER_CODES = {kind.value for kind in IntegerType}
 
-_MANDATORY_SECTION = "[DeviceInfo]"
-"""Without it the library only warns, and everything it says about the device is missing."""
-
-_PDO_NUMBERS = range(0x200)
-"""Offsets of the up to 512 PDOs from 0x1400, 0x1600, 0x1800 and 0x1A00."""
+_MANDATORY_SECTION = "DeviceInfo"
+"""Without it, it is another kind of file."""
 
 
 class EdsFile:
@@ -38,13 +39,13 @@ class EdsFile:
     Raises
     ------
     ConfigMismatch
-        If the file is not there or is no EDS.
+        If the file is not there, is no EDS, or has two values for one key.
     """
 
     def __init__(self, path: Path | None, node_id: int) -> None:
         self.path = path or data_file("inverter.eds")
         self.node_id = node_id
-        self.dictionary = _parse(self.path, node_id)
+        self.dictionary = _parse(read_eds_text(self.path), node_id)
 
     def integer_type(self, index: int, subindex: int = 0) -> IntegerType:
         """Look up the data type of an integer object.
@@ -80,6 +81,10 @@ class EdsFile:
             )
         return value
 
+    def has_default(self, index: int, subindex: int = 0) -> bool:
+        """Whether the EDS gives the object a default value that can be read; makers leave many blank."""
+        return isinstance(getattr(self.dictionary.get_variable(index, subindex), "default", None), int)
+
     def has(self, index: int) -> bool:
         """Whether the EDS lists the object."""
         return index in self.dictionary
@@ -94,47 +99,34 @@ class EdsFile:
         return found
 
     def pdo_carrying(self, communication_base: int, mapping_base: int, *indices: int) -> PdoLayout:
-        """Find the PDO that maps all the objects ``indices``.
+        """Find the first PDO that maps all the objects ``indices``.
 
         Raises
         ------
         ConfigMismatch
             If no PDO of this EDS carries all of them.
         """
-        layouts = self._layouts(communication_base, mapping_base)
-        for layout in layouts:
-            if set(indices) <= {mapped.index for mapped in layout.objects}:
-                return layout
+        search = find_pdo(self.has, self.default, (communication_base, mapping_base), indices)
+        if search.layout is not None:
+            return search.layout
         wanted = ", ".join(f"0x{index:04X}" for index in indices)
         raise ConfigMismatch(
             f"EDS {self.path}: expected one PDO from 0x{communication_base:04X} on that maps {wanted}, found "
-            f"{'; '.join(map(str, layouts)) or 'no PDO'}. Give the EDS a mapping that has them in one PDO."
+            f"{'; '.join(search.others) or 'no PDO'}. Give the EDS a mapping that has them in one PDO."
         )
 
     def codec(self, layout: PdoLayout, where: str) -> PdoCodec:
         """Build packer and unpacker of a PDO's frames, with this EDS's data types."""
         return PdoCodec(layout, self.types(), where)
 
-    def _layouts(self, communication_base: int, mapping_base: int) -> tuple[PdoLayout, ...]:
-        return tuple(
-            read_layout(self.default, communication_base + n, mapping_base + n)
-            for n in _PDO_NUMBERS
-            if self.has(communication_base + n) and self.has(mapping_base + n)
-        )
 
-
-def _parse(path: Path, node_id: int) -> ObjectDictionary:
-    advice = "Expected an EDS as CiA 306 has it; take the file from the drive's maker."
-    try:
-        with path.open(encoding="latin-1") as file:
-            if _MANDATORY_SECTION not in file.read():
-                raise ConfigMismatch(f"EDS {path} has no section {_MANDATORY_SECTION}. {advice}")
-            file.seek(0)
-            dictionary = import_od(file, node_id)
-    except OSError as error:
-        raise ConfigMismatch(f"EDS {path} can't be read: {error.strerror}. {advice}") from error
-    except (IniError, ObjectDictionaryError, ValueError, KeyError) as error:
-        raise ConfigMismatch(f"EDS {path} can't be read: {error}. {advice}") from error
+def _parse(text: EdsText, node_id: int) -> ObjectDictionary:
+    if text.section(_MANDATORY_SECTION) is None:
+        raise ConfigMismatch(f"EDS {text.path} has no section [{_MANDATORY_SECTION}]. {NO_EDS}")
+    for finding in text.findings:
+        if finding.severity is Severity.ERROR:
+            raise ConfigMismatch(f"EDS {text.path} can't be read: line {finding.line}, {finding}")
+    dictionary = build_dictionary(text, read_objects(text), node_id)
     if not len(dictionary):
-        raise ConfigMismatch(f"EDS {path} lists no object. {advice}")
+        raise ConfigMismatch(f"EDS {text.path} lists no object. {NO_EDS}")
     return dictionary

@@ -41,7 +41,7 @@ class InverterFeedback:
 
 
 class FeedbackReceiver:
-    """Takes the TPDOs of one inverter in the receive thread and hands the latest to the caller's thread.
+    """Takes the TPDOs of one inverter where frames are received and hands the latest to the caller's thread.
 
     Parameters
     ----------
@@ -102,6 +102,9 @@ class FeedbackReceiver:
 
     def await_after(self, after_ns: int, timeout_s: float) -> InverterFeedback | None:
         """Wait for feedback that arrived after ``after_ns`` [ns]; None if there is none in time."""
+        latest = self.latest
+        if latest is not None and latest.t_ns > after_ns:
+            return latest
         deadline = time.monotonic() + timeout_s
         with self._arrived:
             while self.latest is None or self.latest.t_ns <= after_ns:

@@ -11,40 +11,28 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from drivers.can_link import HOST_NODE_ID, CanLink
+from drivers.can_link import CanLink
 from drivers.cia402 import Command
+from drivers.drive_settings import drive_settings
 from drivers.eds_file import EdsFile
 from drivers.emcy import EMCY_COB_ID
 from drivers.errors import CommandRefused, ConfigMismatch, DriverError
 from drivers.feedback import FeedbackReceiver, InverterFeedback
+from drivers.frozen_feedback import FrozenFeedback
 from drivers.heartbeat import HEARTBEAT_COB_ID, NMT_COB_ID, NmtCommand, NmtState, nmt_frame
-from drivers.inverter_check import (
-    Difference,
-    configurable_differences,
-    configured_objects,
-    fixed_differences,
-)
+from drivers.inverter_check import Difference, configurable_differences, fixed_differences
+from drivers.inverter_pdos import command_codec, feedback_codec, feedback_receiver
 from drivers.inverter_settings import InverterSettings
 from drivers.node_monitor import NodeMonitor
-from drivers.pdo_map import (
-    RPDO_COMMUNICATION,
-    RPDO_MAPPING,
-    TPDO_COMMUNICATION,
-    TPDO_MAPPING,
-    PdoCodec,
-    PdoLayout,
-    configuration_writes,
-)
+from drivers.pdo_map import PdoLayout, configuration_writes
 from drivers.power_control import PowerControl
-from drivers.scaling import TorqueScale, VelocityScale
+from drivers.scaling import TorqueScale
 from drivers.sdo import SdoChannel
 from drivers.sdo_node import SdoNode
+from drivers.stop_proof import StopProof
 from drivers.torque_guard import GuardedTorque
 
 __all__ = ["Difference", "Inverter", "InverterFeedback", "InverterSettings"]
-
-_COMMAND_OBJECTS = (0x6040, 0x6071, 0x60B2)
-_FEEDBACK_OBJECTS = (0x6041, 0x6077, 0x606C)
 
 
 class Inverter:
@@ -60,7 +48,8 @@ class Inverter:
     Raises
     ------
     ConfigMismatch
-        If the EDS can't be read or has no PDOs that carry the torque command and its feedback.
+        If the EDS can't be read, has no PDOs that carry the torque command and its feedback, or would have the
+        drive keep its torque without a host.
     """
 
     def __init__(self, link: CanLink, settings: InverterSettings) -> None:
@@ -69,14 +58,16 @@ class Inverter:
         self._where = settings.where
         self._eds = EdsFile(settings.eds_path, settings.node_id)
         self._torque = TorqueScale(settings.rated_torque_nm)
-        self._rpdo = self._command_codec()
-        self._tpdo = self._codec(TPDO_COMMUNICATION, TPDO_MAPPING, _FEEDBACK_OBJECTS)
+        self._rpdo = command_codec(self._eds, self._where)
+        self._tpdo = feedback_codec(self._eds, self._where)
+        self._given = drive_settings(self._eds, settings, self._rpdo.layout)
         node = SdoNode(settings.node_id, self._eds.dictionary)
         link.network.add_node(node)
         self._sdo = SdoChannel(node, self._eds, self._where, settings.sdo_timeout_s)
         self._power = PowerControl(self._sdo, settings)
         self._feedback = self._subscribe_feedback()
         self._monitor = self._subscribe_monitor()
+        self._frozen = FrozenFeedback(self._where)
         self._armed = False
 
     @property
@@ -101,7 +92,7 @@ class Inverter:
         """
         return (
             *fixed_differences(self._sdo, self._eds, self.settings),
-            *configurable_differences(self._sdo, self._eds, self.settings, self._layouts),
+            *configurable_differences(self._sdo, self.settings, self._layouts, self._given),
         )
 
     def fault(self) -> str | None:
@@ -118,8 +109,20 @@ class Inverter:
         """
         return self._power.fault()
 
+    def device_name(self) -> str:
+        """Read the name the maker gave the drive, object 0x1008; in segments, for it is a text.
+
+        Raises
+        ------
+        ConfigMismatch
+            If the drive has no such object: it is optional.
+        DeviceTimeout, ProtocolViolation
+            If the drive does not answer, or not with a text.
+        """
+        return self._sdo.upload_text(0x1008)
+
     def configure(self) -> None:
-        """Give the device the EDS's PDO layout and option codes, start heartbeats and NMT operation.
+        """Give the device its PDO layout, option codes and what it watches the host by; start NMT operation.
 
         Every write is read back; NMT OPERATIONAL is confirmed by the node's heartbeat.
 
@@ -131,19 +134,21 @@ class Inverter:
             If the node does not answer or does not become operational.
         """
         self._armed = False
+        self._frozen.start_anew()
         self._monitor.expect(None)
         self._send_nmt(NmtCommand.ENTER_PRE_OPERATIONAL)
         if differences := tuple(fixed_differences(self._sdo, self._eds, self.settings)):
             raise ConfigMismatch(
                 f"{'; '.join(map(str, differences))}. Correct the rig file, or connect the drive it describes."
             )
-        for index in configured_objects(self._eds):
-            self._sdo.download_confirmed(index, 0, self._eds.default(index))
         for layout in self._layouts:
             for index, subindex, value in configuration_writes(layout):
                 self._sdo.download_confirmed(index, subindex, value)
-        self._start_heartbeats()
+        self._link.produce_heartbeat(self.settings.heartbeat_ms / 1000.0)  # before the drive listens for it
+        for setting in self._given:
+            self._sdo.download_confirmed(setting.index, setting.subindex, setting.value)
         self._feedback.start_anew()
+        self._monitor.forget_lost_host()
         self._send_nmt(NmtCommand.START)
         self._monitor.await_state(NmtState.OPERATIONAL, self.settings.state_timeout_s)
         self._monitor.expect(NmtState.OPERATIONAL)
@@ -181,6 +186,7 @@ class Inverter:
             )
         base = self._torque.to_raw(torque.base_nm, self._where)
         prbs = self._torque.to_raw(torque.prbs_nm, self._where)
+        self._frozen.commanded(base + prbs, self.latest)
         self._send_rpdo(Command.ENABLE_OPERATION, base, prbs)
 
     def await_feedback(self, after_ns: int, timeout_s: float) -> InverterFeedback | None:
@@ -192,6 +198,55 @@ class Inverter:
             None if none came in ``timeout_s``.
         """
         return self._feedback.await_after(after_ns, timeout_s)
+
+    def quick_stop(self) -> None:
+        """Stop as the quick stop option code 0x605A has it, confirmed by statusword and torque actual value.
+
+        A ramp of a second takes a second; `disarm` takes the torque away at once. The drive is disarmed after it.
+
+        Raises
+        ------
+        DeviceTimeout
+            If the drive does not follow.
+        """
+        self._armed = False
+        self._send_rpdo(Command.QUICK_STOP, 0, 0)  # overwrites the RPDO still waiting for SYNC
+        self._power.quick_stop(self._go_on_stopping)
+
+    def _go_on_stopping(self) -> None:
+        """Repeat the command with every SYNC, or the drive would take the host for dead before its ramp is over."""
+        self._send_rpdo(Command.QUICK_STOP, 0, 0)
+        self._link.sync()
+
+    def prove_stop(self, period_s: float) -> tuple[Difference, ...]:
+        """Let the host play dead and see that the drive notices: commands no torque, leaves the drive disabled.
+
+        Configures the drive as for a run, and brings it to READY TO SWITCH ON, with the power stage off.
+
+        Parameters
+        ----------
+        period_s
+            Time between two SYNCs [s].
+
+        Returns
+        -------
+        tuple of Difference
+            Empty if it is proved.
+
+        Raises
+        ------
+        DriverError
+            If the drive can't be configured or made ready.
+        """
+        proof = StopProof(
+            self._link,
+            self.settings,
+            self._power,
+            self._monitor,
+            self.configure,
+            lambda: self._send_rpdo(Command.SHUTDOWN, 0, 0),
+        )
+        return tuple(proof.run(self._given, period_s))
 
     def disarm(self) -> None:
         """Take the torque to zero and leave OPERATION_ENABLED, confirmed by the statusword.
@@ -235,7 +290,8 @@ class Inverter:
         Raises
         ------
         DeviceFault
-            If the drive has sent an EMCY, is in FAULT, or has left NMT OPERATIONAL.
+            If the drive has sent an EMCY, is in FAULT, has left NMT OPERATIONAL, or sends the same feedback again and
+            again while its command changes.
         DeviceTimeout
             If its heartbeat is lost, or never came.
         BusDown, ProtocolViolation
@@ -243,6 +299,7 @@ class Inverter:
         """
         self._link.raise_if_failed()
         self._monitor.raise_if_unwell(time.monotonic_ns())
+        self._frozen.raise_if_frozen()
         if self.latest is not None:
             self._power.raise_if_fault(self.latest.state)
 
@@ -250,22 +307,8 @@ class Inverter:
     def _layouts(self) -> tuple[PdoLayout, PdoLayout]:
         return self._rpdo.layout, self._tpdo.layout
 
-    def _command_codec(self) -> PdoCodec:
-        codec = self._codec(RPDO_COMMUNICATION, RPDO_MAPPING, _COMMAND_OBJECTS)
-        for mapped in codec.layout.objects:
-            if mapped.index not in _COMMAND_OBJECTS:
-                raise ConfigMismatch(
-                    f"EDS {self._eds.path}: the RPDO maps {mapped}, which this program has no value for; expected "
-                    "0x6040, 0x6071 and 0x60B2 alone. Take the object out of the mapping in the EDS."
-                )
-        return codec
-
-    def _codec(self, communication: int, mapping: int, indices: tuple[int, ...]) -> PdoCodec:
-        return self._eds.codec(self._eds.pdo_carrying(communication, mapping, *indices), self._where)
-
     def _subscribe_feedback(self) -> FeedbackReceiver:
-        velocity = VelocityScale.from_object(self._eds.default(0x60A9), f"EDS {self._eds.path}")
-        receiver = FeedbackReceiver(self._tpdo, self._torque, velocity)
+        receiver = feedback_receiver(self._eds, self._tpdo, self._torque)
         self._link.subscribe(self._tpdo.layout.cob_id, receiver.on_frame)
         return receiver
 
@@ -275,18 +318,12 @@ class Inverter:
         self._link.subscribe(EMCY_COB_ID + self.settings.node_id, monitor.on_emergency)
         return monitor
 
-    def _start_heartbeats(self) -> None:
-        self._link.produce_heartbeat(self.settings.heartbeat_ms / 1000.0)
-        consumer = HOST_NODE_ID << 16 | self.settings.heartbeat_timeout_ms
-        self._sdo.download_confirmed(0x1016, 1, consumer)
-        self._sdo.download_confirmed(0x1017, 0, self.settings.heartbeat_ms)
-
     def _send_nmt(self, command: NmtCommand) -> None:
         self._link.send(NMT_COB_ID, nmt_frame(command, self.settings.node_id))
 
     def _send_rpdo(self, command: Command, base: int, prbs: int) -> None:
         values = {0x6040: command.value, 0x6071: base, 0x60B2: prbs}
-        data = self._rpdo.pack(tuple(values[mapped.index] for mapped in self._rpdo.layout.objects))
+        data = self._rpdo.pack(tuple([values[index] for index in self._rpdo.indices]))
         self._link.send(self._rpdo.layout.cob_id, data)
 
 

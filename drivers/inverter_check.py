@@ -6,22 +6,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from drivers.cia402 import TorqueMode
+from drivers.drive_settings import DriveSetting
 from drivers.eds_file import EdsFile
 from drivers.inverter_settings import InverterSettings
 from drivers.pdo_map import PdoLayout, read_layout
 from drivers.sdo import SdoChannel, object_name
-
-CONFIGURED_OBJECTS = {
-    0x1005: "COB-ID SYNC",
-    0x6007: "abort connection option code",
-    0x605A: "quick stop option code",
-    0x605B: "shutdown option code",
-    0x605C: "disable operation option code",
-    0x605D: "halt option code",
-    0x605E: "fault reaction option code",
-}
-"""Objects that are given the EDS's value where the EDS lists them: the SYNC the drive hears, and what it does
-by itself when something ends."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,24 +59,26 @@ def fixed_differences(sdo: SdoChannel, eds: EdsFile, settings: InverterSettings)
 
 
 def configurable_differences(
-    sdo: SdoChannel, eds: EdsFile, settings: InverterSettings, layouts: tuple[PdoLayout, ...]
+    sdo: SdoChannel,
+    settings: InverterSettings,
+    layouts: tuple[PdoLayout, ...],
+    given: tuple[DriveSetting, ...],
 ) -> Iterator[Difference]:
-    """Compare what configuring writes: PDO layouts, SYNC, option codes."""
+    """Compare what configuring writes and a drive keeps: PDO layouts, SYNC, option codes, torque slope.
+
+    What watches the host is written at every run and is off in a drive that has just been powered: that it
+    works is for `drivers.stop_proof` to show.
+    """
     for expected in layouts:
         found = read_layout(sdo.upload, expected.communication_index, expected.mapping_index)
         if found != expected:
             name = f"PDO 0x{expected.communication_index:04X}/0x{expected.mapping_index:04X}"
             yield Difference(settings.where, name, f"[{expected}]", f"[{found}]", "EDS")
-    for index in configured_objects(eds):
-        code, found_code = eds.default(index), sdo.upload(index)
-        if found_code != code:
-            name = f"{CONFIGURED_OBJECTS[index]} {object_name(index)}"
-            yield Difference(settings.where, name, str(code), str(found_code), "EDS")
-
-
-def configured_objects(eds: EdsFile) -> tuple[int, ...]:
-    """List those of `CONFIGURED_OBJECTS` that the EDS has."""
-    return tuple(index for index in CONFIGURED_OBJECTS if eds.has(index))
+    for setting in given:
+        if not setting.watches_host:
+            found_value = sdo.upload(setting.index, setting.subindex)
+            if found_value != setting.value:
+                yield Difference(settings.where, str(setting), str(setting.value), str(found_value), setting.source)
 
 
 def _identity(sdo: SdoChannel, eds: EdsFile, settings: InverterSettings) -> Iterator[Difference]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from drivers.cia402 import TorqueMode
@@ -30,6 +31,12 @@ class InverterSettings:
         Identity expected in object 0x1018; None for the EDS's.
     heartbeat_ms
         Heartbeat period, of the drive and of the host [ms].
+    rpdo_deadline_ms
+        Without an RPDO for so long the drive takes the host for dead [ms].
+    option_codes
+        Option codes by object, 0x6007 and 0x605A to 0x605E, where not the EDS's.
+    torque_slope_nm_per_s
+        Torque slope of profile torque mode, object 0x6087; None for the drive's own [Nm/s].
     sdo_timeout_s
         Longest wait for an SDO answer [s].
     state_timeout_s
@@ -45,6 +52,9 @@ class InverterSettings:
     vendor_id: int | None = None
     product_code: int | None = None
     heartbeat_ms: int = 100
+    rpdo_deadline_ms: int = 200
+    option_codes: Mapping[int, int] = field(default_factory=dict)
+    torque_slope_nm_per_s: float | None = None
     sdo_timeout_s: float = 0.5
     state_timeout_s: float = 2.0
 

@@ -8,6 +8,8 @@ What is done about pymodbus 3.16.1 here:
 - an answer it can't decode raises in the event loop, where nobody can catch it: `_Decoder` turns it into a
   value;
 - it retries and reconnects behind the caller's back: both are switched off, a lost PLC must be seen;
+- it does not say why there is no connection, and has no name of the server to check: `drivers.modbus_dial`
+  connects for it;
 - it logs to standard error where logging is not configured: a `NullHandler` ends that.
 """
 
@@ -17,12 +19,13 @@ import logging
 from collections.abc import Awaitable, Sequence
 from typing import Final
 
-from pymodbus.client import AsyncModbusTcpClient
 from pymodbus.constants import ExcCodes
 from pymodbus.exceptions import ModbusException
 from pymodbus.pdu import DecodePDU, ExceptionResponse, ModbusPDU
 
 from drivers.errors import BusDown, DeviceFault, DeviceTimeout, DriverError, ProtocolViolation
+from drivers.modbus_dial import Dial
+from drivers.modbus_security import ClientSecurity, own_role
 from drivers.register import RegisterKind
 
 logging.getLogger("pymodbus").addHandler(logging.NullHandler())
@@ -82,21 +85,31 @@ class ModbusLink:
         Modbus unit to talk to.
     timeout_s
         Time for connecting and for each answer [s].
+    security
+        How the connection is secured; None for plain Modbus TCP.
     """
 
-    __slots__ = ("_client", "_device_id", "_host", "_port", "_timeout_s")
+    __slots__ = ("_device_id", "_dial", "_host", "_port", "_security", "_timeout_s")
 
-    def __init__(self, host: str, port: int, device_id: int, timeout_s: float) -> None:
+    def __init__(
+        self, host: str, port: int, device_id: int, timeout_s: float, security: ClientSecurity | None = None
+    ) -> None:
         self._host = host
         self._port = port
         self._device_id = device_id
         self._timeout_s = timeout_s
-        self._client: AsyncModbusTcpClient | None = None
+        self._security = security
+        self._dial: Dial | None = None
 
     @property
     def place(self) -> str:
         """Where this link leads, for messages."""
         return f"PLC at {self._host}:{self._port} (device id {self._device_id})"
+
+    @property
+    def connected(self) -> bool:
+        """Whether there is a connection; one that was lost is none."""
+        return self._dial is not None and self._dial.client.connected
 
     async def open(self) -> None:
         """Connect.
@@ -105,24 +118,20 @@ class ModbusLink:
         ------
         BusDown
             If there is no server at the address.
+        ConfigMismatch
+            If TLS is asked for and fails: certificates, name or version, or a server without TLS.
         """
-        client = AsyncModbusTcpClient(
-            self._host, port=self._port, timeout=self._timeout_s, retries=0, reconnect_delay=0
-        )
-        client.ctx.framer.decoder = _Decoder(False)
-        if not await client.connect():
-            client.close()
-            raise BusDown(
-                f"{self.place}: expected a Modbus TCP server, no connection within {self._timeout_s:g} s. "
-                "Check [plc] host and port of the rig file, the network, and that the PLC runs."
-            )
-        self._client = client
+        self.close()
+        dial = Dial(self._host, self._port, self._timeout_s, self._security, self.place)
+        dial.client.ctx.framer.decoder = _Decoder(False)
+        await dial.open()
+        self._dial = dial
 
     def close(self) -> None:
         """Disconnect; safe to call when not connected."""
-        if self._client is not None:
-            self._client.close()
-        self._client = None
+        if self._dial is not None:
+            self._dial.close()
+        self._dial = None
 
     async def read(self, kind: RegisterKind, address: int, count: int) -> tuple[int, ...]:
         """Read ``count`` words, or bits as 0 and 1, from ``address`` on.
@@ -132,16 +141,16 @@ class ModbusLink:
         BusDown, DeviceTimeout, ProtocolViolation, DeviceFault
             If there is no connection, no answer, a wrong answer or an exception answer.
         """
-        client = self._connected()
+        dial = self._connected()
         requests = {
-            RegisterKind.COIL: client.read_coils,
-            RegisterKind.DISCRETE_INPUT: client.read_discrete_inputs,
-            RegisterKind.HOLDING_REGISTER: client.read_holding_registers,
-            RegisterKind.INPUT_REGISTER: client.read_input_registers,
+            RegisterKind.COIL: dial.client.read_coils,
+            RegisterKind.DISCRETE_INPUT: dial.client.read_discrete_inputs,
+            RegisterKind.HOLDING_REGISTER: dial.client.read_holding_registers,
+            RegisterKind.INPUT_REGISTER: dial.client.read_input_registers,
         }
         what = f"reading {count} {kind.value}(s) from address {address}"
         request = requests[kind](address, count=count, device_id=self._device_id)
-        answer = await self._answer(what, request, READ_CODE[kind])
+        answer = await self._answer(dial, what, request, READ_CODE[kind])
         came = answer.bits if kind.is_bit else answer.registers
         expected = (count + 7) // 8 * 8 if kind.is_bit else count  # bits travel in whole bytes
         if len(came) != expected:
@@ -156,34 +165,36 @@ class ModbusLink:
         BusDown, DeviceTimeout, ProtocolViolation, DeviceFault
             As for `read`; a `ProtocolViolation` too where Modbus can't write the kind.
         """
-        client = self._connected()
+        dial = self._connected()
         what = f"writing {list(words)} to {kind.value} {address}"
         if kind is RegisterKind.COIL:
             bits = [bool(word) for word in words]
-            request = client.write_coils(address, bits, device_id=self._device_id)
+            request = dial.client.write_coils(address, bits, device_id=self._device_id)
         elif kind is RegisterKind.HOLDING_REGISTER:
-            request = client.write_registers(address, list(words), device_id=self._device_id)
+            request = dial.client.write_registers(address, list(words), device_id=self._device_id)
         else:
             raise self._wrong_answer(what, "a kind that Modbus can write", kind.value)
-        answer = await self._answer(what, request, WRITE_CODE[kind])
+        answer = await self._answer(dial, what, request, WRITE_CODE[kind])
         if (answer.address, answer.count) != (address, len(words)):
             came = f"address {answer.address}, count {answer.count}"
             raise self._wrong_answer(what, f"address {address}, count {len(words)} confirmed", came)
 
-    def _connected(self) -> AsyncModbusTcpClient:
-        if self._client is None or not self._client.connected:
+    def _connected(self) -> Dial:
+        if self._dial is None or not self._dial.client.connected:
             raise BusDown(
                 f"{self.place}: expected an open connection, there is none. Connect first; if it was lost, "
                 "check the network and that the PLC runs."
             )
-        return self._client
+        return self._dial
 
-    async def _answer(self, what: str, request: Awaitable[ModbusPDU], function_code: int) -> ModbusPDU:
+    async def _answer(self, dial: Dial, what: str, request: Awaitable[ModbusPDU], function_code: int) -> ModbusPDU:
         """Wait for the answer and see that it is one."""
         try:
-            answer = await request
+            with dial.asking():
+                answer = await request
         except ModbusException as cause:  # its one way to say: nothing came
-            raise self._no_answer(what) from cause
+            raise self._no_answer(dial, what) from cause
+        dial.answered = True
         if isinstance(answer, _Undecodable):
             raise self._wrong_answer(what, "a Modbus answer", f"bytes {answer.frame.hex(' ')}")
         if isinstance(answer, ExceptionResponse):
@@ -192,21 +203,29 @@ class ModbusLink:
             raise self._wrong_answer(what, f"function {function_code}", f"function {answer.function_code}")
         return answer
 
-    def _no_answer(self, what: str) -> DriverError:
-        if self._client is not None and self._client.connected:
+    def _no_answer(self, dial: Dial, what: str) -> DriverError:
+        if dial.client.connected:
+            part = dial.client.ctx.recv_buffer
+            came = (
+                f"only {len(part)} bytes came that are no whole one ({part[:8].hex(' ')} ...)" if part else "none came"
+            )
             return DeviceTimeout(
-                f"{self.place}: {what}: expected an answer within {self._timeout_s:g} s, none came. "
+                f"{self.place}: {what}: expected an answer within {self._timeout_s:g} s, {came}. "
                 "Check that the PLC's program runs and that device_id in the register map is its own."
             )
-        return BusDown(
-            f"{self.place}: {what}: expected an answer, the connection was lost. "
-            "Check the network and that the PLC runs."
+        return dial.loss() or BusDown(
+            f"{self.place}: {what}: expected an answer, the connection was lost. Check the network, that the PLC "
+            "runs, and whether it wants TLS: then it needs [plc.security] in the rig file."
         )
 
     def _refused(self, what: str, code: int) -> DriverError:
         text = EXCEPTION_TEXT.get(code, "a code Modbus does not define")
         family = ProtocolViolation if code in OUR_REQUEST else DeviceFault
         cure = "Compare the register map with" if code in OUR_REQUEST else "Look at the diagnosis of"
+        if self._security is not None and code == ExcCodes.ILLEGAL_FUNCTION:
+            role = own_role(self._security.credentials)
+            text += f", or not from a client certificate {'without a role' if role is None else f'of role {role!r}'}"
+            cure = "Use a certificate with the role it takes, or compare the register map with"
         return family(
             f"{self.place}: {what}: expected it to be done, came exception {code} ({text}). {cure} the PLC's program."
         )

@@ -9,6 +9,9 @@ from drivers import emcy
 from drivers.errors import DeviceFault, DeviceTimeout, ProtocolViolation
 from drivers.heartbeat import HeartbeatMonitor, NmtState
 
+_CONNECTION_CLASSES = (0x8100, 0x8200)
+"""Error classes communication and protocol (CiA 301, table "Emergency error codes")."""
+
 _NMT_STATES = {state.value: state for state in NmtState}
 
 
@@ -30,6 +33,11 @@ class NodeMonitor:
         self._emergency: emcy.Emergency | None = None
         self._expected: NmtState | None = None
         self._beats = 0
+
+    @property
+    def emergency(self) -> emcy.Emergency | None:
+        """The first emergency that is not reset yet."""
+        return self._emergency
 
     def on_heartbeat(self, data: bytes, t_ns: int) -> None:
         """Take a heartbeat or boot-up frame.
@@ -67,6 +75,11 @@ class NodeMonitor:
     def forget_emergency(self) -> None:
         """Take the emergency for reset, as after a fault reset that the drive has confirmed."""
         self._emergency = None
+
+    def forget_lost_host(self) -> None:
+        """Take an emergency about the connection for gone: it was about a host before this one."""
+        if self._emergency is not None and self._emergency.code & 0xFF00 in _CONNECTION_CLASSES:
+            self._emergency = None
 
     def expect(self, state: NmtState | None) -> None:
         """Have `raise_if_unwell` refuse any other NMT state from now on."""

@@ -131,6 +131,11 @@ class PdoCodec:
     where
         Device or file, for messages.
 
+    Attributes
+    ----------
+    indices
+        Index of each mapped object, in the order of the frame.
+
     Raises
     ------
     ConfigMismatch
@@ -147,6 +152,7 @@ class PdoCodec:
                 f"{self._where} maps {self._struct.size} bytes, expected at most {MAX_PDO_BYTES}. "
                 f"Correct the mapping in 0x{layout.mapping_index:04X}."
             )
+        self.indices = tuple(mapped.index for mapped in layout.objects)
         self._positions = {mapped.index: n for n, mapped in enumerate(layout.objects)}
 
     def _type_of(self, mapped: MappedObject, types: Mapping[tuple[int, int], IntegerType]) -> IntegerType:

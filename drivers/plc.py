@@ -5,6 +5,7 @@
     connect          open, then compare the identity registers with the map
     read_status      one request per run of adjacent registers
     write            read back; what the registers then hold must be what was written
+    PRBS             started with torques that have passed the torque guard and with nothing else
     drive mode       requested, then waited for in the status: the PLC decides, not the request
 
 The registers are those of a map file: ``eds/plc.toml``, or the rig's own.
@@ -21,10 +22,12 @@ from typing import Final, Self, TypeVar
 
 from drivers.errors import ConfigMismatch, DeviceFault, DeviceTimeout, ProtocolViolation
 from drivers.modbus_link import ModbusLink
-from drivers.plc_map import require_usable
+from drivers.modbus_security import ClientSecurity
+from drivers.plc_map import from_si, require_usable, to_si
 from drivers.plc_types import ClutchState, DriveMode, PlcStatus, PlcWatchdog, PrbsSettings, PrbsSource
 from drivers.register import Value
 from drivers.register_map import RegisterMap, blocks_of
+from drivers.torque_guard import GuardedTorque
 
 Member = TypeVar("Member", bound=Enum)
 
@@ -38,6 +41,7 @@ STATUS: Final = (
     "torque_limit",
     "plc_count",
     "host_count_seen",
+    "prbs_torque",
     "prbs_enable",
     "prbs_amplitude",
     "prbs_divider",
@@ -47,6 +51,9 @@ STATUS: Final = (
 
 COUNTS: Final = 65536
 """The host's watchdog starts over here, so that it fits 16 bits."""
+
+GENERATOR_OFF: Final = PrbsSettings(False, 0.0, 1, 1, PrbsSource.HOST)
+"""The PLC's own generator stands still, whatever it was set to."""
 
 POLL_S: Final = 0.01
 """Pause between two looks at a drive mode that is changing [s]: about one PLC cycle."""
@@ -67,6 +74,8 @@ class Plc:
         Time for a drive mode to take effect [s].
     beat_timeout_s : float
         Time the PLC may leave a beat unseen [s].
+    security : ClientSecurity or None
+        How the connection is secured; None for plain Modbus TCP.
     clock_ns : callable
         Monotonic clock [ns]; stamps the status and times the two time-outs above.
 
@@ -84,6 +93,7 @@ class Plc:
         "_map",
         "_mode_timeout_s",
         "_seen_ns",
+        "_setting_prbs",
     )
 
     def __init__(
@@ -95,16 +105,18 @@ class Plc:
         timeout_s: float = 1.0,
         mode_timeout_s: float = 1.0,
         beat_timeout_s: float = 0.5,
+        security: ClientSecurity | None = None,
         clock_ns: Callable[[], int] = time.monotonic_ns,
     ) -> None:
         require_usable(register_map)
-        self._link = ModbusLink(host, port, register_map.device_id, timeout_s)
+        self._link = ModbusLink(host, port, register_map.device_id, timeout_s, security)
         self._map = register_map
         self._mode_timeout_s = mode_timeout_s
         self._beat_timeout_s = beat_timeout_s
         self._clock_ns = clock_ns
         self._host_count: int | None = None
         self._seen_ns = 0
+        self._setting_prbs = asyncio.Lock()  # who switches it off comes behind who still switches it on
 
     async def __aenter__(self) -> Self:
         """Connect; see `connect`."""
@@ -118,7 +130,7 @@ class Plc:
         self.close()
 
     async def connect(self) -> None:
-        """Open the connection and compare the PLC's identity with the map.
+        """Open the connection, or open it again, and compare the PLC's identity with the map.
 
         Raises
         ------
@@ -127,7 +139,7 @@ class Plc:
         DeviceTimeout
             If it does not answer.
         ConfigMismatch
-            If it is another PLC, or another version of its map. The connection is closed again.
+            If it is another PLC, or another version of its map, or TLS fails. The connection is closed again.
         """
         await self._link.open()
         try:
@@ -149,6 +161,7 @@ class Plc:
         BusDown, DeviceTimeout, ProtocolViolation, DeviceFault
             If it can't be read, or means nothing.
         """
+        t_ns = self._clock_ns()
         values = await self._read(STATUS)
         return PlcStatus(
             drive_mode=_member(DriveMode, values["drive_mode"]),
@@ -158,19 +171,49 @@ class Plc:
             torque_limit_nm=float(values["torque_limit"]),
             watchdog=PlcWatchdog(int(values["plc_count"]), int(values["host_count_seen"])),
             prbs=_prbs_settings(values),
-            t_ns=self._clock_ns(),
+            prbs_torque_nm=float(values["prbs_torque"]),
+            t_ns=t_ns,
         )
 
-    async def write_prbs(self, settings: PrbsSettings) -> None:
-        """Set the PLC's PRBS generator; it stands still while its settings change.
+    async def start_prbs(self, m1: GuardedTorque, m2: GuardedTorque, clock_divider: int, seed: int) -> PrbsSettings:
+        """Let the PLC's own generator run.
+
+        Parameters
+        ----------
+        m1, m2 : GuardedTorque
+            What each inverter will get of it at most, as the torque guard let it through; the PRBS parts of the two
+            together are the amplitude.
+        clock_divider : int
+            PLC cycles each level is held.
+        seed : int
+            First state of the register, 1 to 1023.
+
+        Returns
+        -------
+        PrbsSettings
+            What the PLC holds now, read back.
 
         Raises
         ------
         ConfigMismatch
             If a value does not fit its register. Nothing was written.
         ProtocolViolation, DeviceFault
-            If the PLC refuses a value, or holds another one afterwards.
+            If the PLC refuses a value, or holds another one afterwards. The generator stands still.
         """
+        return await self._set_prbs(PrbsSettings(True, m1.prbs_nm + m2.prbs_nm, clock_divider, seed, PrbsSource.PLC))
+
+    async def stop_prbs(self) -> PrbsSettings:
+        """Switch the PLC's own generator off: the host makes the PRBS, and nobody may add another.
+
+        Raises
+        ------
+        BusDown, DeviceTimeout, ProtocolViolation, DeviceFault
+            If it can't be confirmed to be off.
+        """
+        return await self._set_prbs(GENERATOR_OFF)
+
+    async def _set_prbs(self, settings: PrbsSettings) -> PrbsSettings:
+        """Write the generator's settings; it stands still while they change."""
         values: dict[str, Value] = {
             "prbs_amplitude": settings.amplitude_nm,
             "prbs_divider": settings.clock_divider,
@@ -178,10 +221,12 @@ class Plc:
             "prbs_source": settings.source.value,
         }
         words = self._encoded(values)
-        await self._write(self._encoded({"prbs_enable": False}))
-        await self._write(words)
-        if settings.enabled:
-            await self._write(self._encoded({"prbs_enable": True}))
+        async with self._setting_prbs:
+            await self._write(self._encoded({"prbs_enable": False}))
+            await self._write(words)
+            if settings.enabled:
+                await self._write(self._encoded({"prbs_enable": True}))
+        return settings
 
     async def request_drive_mode(self, mode: DriveMode) -> None:
         """Ask for a drive mode and wait until the PLC reports it.
@@ -251,11 +296,12 @@ class Plc:
             for name in block.names:
                 register = self._map[name]
                 offset = register.address - block.address
-                values[name] = register.decode(words[offset : offset + register.size])
+                values[name] = to_si(name, register, register.decode(words[offset : offset + register.size]))
         return values
 
     def _encoded(self, values: Mapping[str, Value]) -> dict[str, tuple[int, ...]]:
-        return {name: self._map[name].encode(value) for name, value in values.items()}
+        registers = {name: self._map[name] for name in values}
+        return {name: registers[name].encode(from_si(name, registers[name], value)) for name, value in values.items()}
 
     async def _write(self, words: Mapping[str, tuple[int, ...]]) -> None:
         """Write registers block by block and see that they then hold what was written."""

@@ -63,7 +63,23 @@ class PlcWatchdog:
 
 @dataclass(frozen=True, slots=True)
 class PlcStatus:
-    """Everything the PLC reports, as read at ``t_ns`` of the host's monotonic clock."""
+    """Everything the PLC reports.
+
+    Attributes
+    ----------
+    drive_mode, clutch, permissive
+        What the driveline is like, and whether torque is permitted.
+    speed_limit_rad_s, torque_limit_nm : float
+        Largest motor speed, and largest torque of one inverter [rad/s, Nm].
+    watchdog : PlcWatchdog
+        Life signs both ways.
+    prbs : PrbsSettings
+        The settings its own generator holds.
+    prbs_torque_nm : float
+        What its own generator puts out at the moment of reading, both inverters together [Nm].
+    t_ns : int
+        When the first of the requests for it left, on the host's monotonic clock: no value is older.
+    """
 
     drive_mode: DriveMode
     clutch: ClutchState
@@ -72,4 +88,9 @@ class PlcStatus:
     torque_limit_nm: float
     watchdog: PlcWatchdog
     prbs: PrbsSettings
+    prbs_torque_nm: float
     t_ns: int
+
+    def age_ns(self, now_ns: int) -> int:
+        """How old the oldest value may be at ``now_ns`` of the same clock [ns]."""
+        return now_ns - self.t_ns

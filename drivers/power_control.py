@@ -26,6 +26,10 @@ _POLL_PAUSE_S = 0.002
 """Between two reads of an object that has not followed yet; drives update these about once a ms."""
 
 
+_NO_TORQUE_PERMILLE = 10
+"""What counts as no torque: a reading at standstill is noisy [per mille of rated]."""
+
+
 class PowerControl:
     """Walks one drive through the CiA 402 state machine.
 
@@ -88,6 +92,52 @@ class PowerControl:
             self.raise_if_fault(state)
             state = self._step(state, TOWARDS_OPERATION[state])
 
+    def make_ready(self) -> None:
+        """Step to READY_TO_SWITCH_ON, where the power stage is off, from whatever state.
+
+        Raises
+        ------
+        DeviceFault
+            If the drive is in FAULT.
+        DeviceTimeout
+            If a step does not happen.
+        """
+        self.disable_voltage()
+        state = self._await(lambda state: state not in TORQUE_STATES, "without torque")
+        self.raise_if_fault(state)
+        self._step(PowerState.SWITCH_ON_DISABLED, Command.SHUTDOWN)
+
+    def quick_stop(self, sync: Callable[[], object]) -> None:
+        """Take the torque away as the quick stop option code 0x605A has it, and wait for the end of it.
+
+        Which state that is the code says: SWITCH_ON_DISABLED, or QUICK_STOP_ACTIVE at no torque (5 to 8).
+
+        Parameters
+        ----------
+        sync
+            Sends the command again, and SYNC: a simulated drive's ramp takes simulated time.
+
+        Raises
+        ------
+        DeviceTimeout
+            If the drive has not left OPERATION_ENABLED, or still reports a torque.
+        """
+        self._command(Command.QUICK_STOP)
+        self._await(lambda state: state is not PowerState.OPERATION_ENABLED, "out of operation")
+
+        def torque_permille() -> int:
+            sync()
+            return self._sdo.upload(0x6077)
+
+        torque = self._poll(torque_permille, lambda permille: abs(permille) <= _NO_TORQUE_PERMILLE)
+        state = self.state()
+        if abs(torque) > _NO_TORQUE_PERMILLE and state in TORQUE_STATES:
+            raise DeviceTimeout(
+                f"{self._where}: torque actual value 0x6077 is {torque / 10:g} % of rated "
+                f"{self._settings.state_timeout_s:g} s after a quick stop, in {state.value}, expected none. Compare "
+                "the quick stop option code 0x605A and the slope it names with the drive's manual."
+            )
+
     def disable_voltage(self) -> None:
         """Take the voltage off, from whatever state.
 
@@ -120,11 +170,12 @@ class PowerControl:
     def _command(self, command: Command) -> None:
         self._sdo.download(0x6040, 0, command.value)
 
-    def _state(self) -> PowerState:
+    def state(self) -> PowerState:
+        """Read the power state from the statusword."""
         return state_of(self._sdo.upload(0x6041))
 
     def _await(self, accept: Callable[[PowerState], bool], expected: str) -> PowerState:
-        state = self._poll(self._state, accept)
+        state = self._poll(self.state, accept)
         if not accept(state):
             raise DeviceTimeout(
                 f"{self._where}: power state is {state.value} after {self._settings.state_timeout_s:g} s, "
@@ -145,7 +196,7 @@ class PowerControl:
 
     def fault(self) -> str | None:
         """Read whether the drive is in a fault state: state, cause and cure in words, or None. Nothing is written."""
-        state = self._state()
+        state = self.state()
         return self._fault_of(state) if state in FAULT_STATES else None
 
     def _fault_of(self, state: PowerState) -> str:

@@ -64,7 +64,18 @@ class RegisterMap(MapTable):
     registers: dict[str, Register]
 
     def __getitem__(self, name: str) -> Register:
-        """Return an entry by name."""
+        """Return an entry by name.
+
+        Raises
+        ------
+        ConfigMismatch
+            If the map has none of that name.
+        """
+        if name not in self.registers:
+            raise ConfigMismatch(
+                f"register map {self.name!r}: expected a register {name}, it has {', '.join(sorted(self.registers))}. "
+                "Add it to the map file."
+            )
         return self.registers[name]
 
 

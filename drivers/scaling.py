@@ -41,12 +41,12 @@ class IntegerType(IntEnum):
     @property
     def low(self) -> int:
         """Least value."""
-        return -(1 << 8 * self.size_bytes - 1) if self.signed else 0
+        return _RANGE[self][0]
 
     @property
     def high(self) -> int:
         """Greatest value."""
-        return (1 << 8 * self.size_bytes - self.signed) - 1
+        return _RANGE[self][1]
 
     def encode(self, value: int, where: str) -> bytes:
         """Pack little-endian.
@@ -78,12 +78,24 @@ _SIZE_BYTES = {
 }
 
 
-def _nearest_count(exact: float, kind: IntegerType) -> int | None:
-    """Nearest integer, or None if it is not finite or outside the type."""
+def _range(kind: IntegerType) -> tuple[int, int]:
+    """Least and greatest value of a type."""
+    bits = 8 * kind.size_bytes
+    return (-(1 << bits - 1), (1 << bits - 1) - 1) if kind.signed else (0, (1 << bits) - 1)
+
+
+_RANGE = {kind: _range(kind) for kind in IntegerType}
+
+
+_INT16_RANGE, _INT32_RANGE = _RANGE[IntegerType.INTEGER16], _RANGE[IntegerType.INTEGER32]
+
+
+def _nearest_count(exact: float, low: int, high: int) -> int | None:
+    """Nearest integer, or None if it is not finite or outside the range."""
     if not math.isfinite(exact):
         return None
     count = round(exact)
-    return count if kind.low <= count <= kind.high else None
+    return count if low <= count <= high else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +123,7 @@ class TorqueScale:
             If the torque is not finite or does not fit.
         """
         exact = torque_nm * 1000.0 / self.rated_torque_nm
-        count = _nearest_count(exact, IntegerType.INTEGER16)
+        count = _nearest_count(exact, *_INT16_RANGE)
         if count is None:
             raise CommandRefused(
                 f"{where}: torque {torque_nm} Nm is {exact:.0f} per mille of rated "
@@ -179,7 +191,7 @@ class VelocityScale:
             If the speed is not finite or does not fit.
         """
         exact = speed_rad_s / self.rad_s_per_count
-        count = _nearest_count(exact, IntegerType.INTEGER32)
+        count = _nearest_count(exact, *_INT32_RANGE)
         if count is None:
             raise CommandRefused(
                 f"{where}: speed {speed_rad_s} rad/s is {exact:.0f} counts, expected -2147483648 to "

@@ -62,6 +62,23 @@ class SdoChannel:
             )
         return kind.decode(data)
 
+    def upload_text(self, index: int, subindex: int = 0) -> str:
+        """Read a VISIBLE_STRING, such as the device name 0x1008; one longer than 4 bytes comes in segments.
+
+        Raises
+        ------
+        DeviceTimeout, ConfigMismatch, ProtocolViolation
+            As `upload`; also if the text is no ASCII.
+        """
+        data: bytes = self._transfer(index, subindex, lambda: self._client.upload(index, subindex))
+        try:
+            return data.rstrip(b"\0").decode("ascii")
+        except UnicodeDecodeError as error:
+            raise ProtocolViolation(
+                f"{self._where}: object {object_name(index, subindex)} came with [{data.hex(' ')}], expected a text in "
+                "ASCII (VISIBLE_STRING, CiA 301). Check the device's firmware version."
+            ) from error
+
     def download(self, index: int, subindex: int, value: int) -> None:
         """Write an object; returns when the node has acknowledged it.
 
@@ -99,7 +116,7 @@ class SdoChannel:
             return transfer()
         except SdoAbortedError as error:
             raise ConfigMismatch(
-                f"{self._where}: object {name} refused with SDO abort ({error}), expected access as "
+                f"{self._where}: object {name} refused with SDO abort ({_in_words(error)}), expected access as "
                 "in the EDS. "
                 "Compare EDS and drive, and the value with the drive's manual."
             ) from error
@@ -114,3 +131,9 @@ class SdoChannel:
                 f"{self._where}: object {name}: {error}; expected the answer to this request. "
                 "Check the device's firmware version, and that no other SDO client talks to this node."
             ) from error
+
+
+def _in_words(abort: SdoAbortedError) -> str:
+    """Say what an abort code means; the library leaves one it does not know to the reader."""
+    known = abort.code in SdoAbortedError.CODES
+    return str(abort) if known else f"{abort}, a code outside CiA 301: see the drive's manual"

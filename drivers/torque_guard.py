@@ -116,6 +116,9 @@ class TorqueRequest:
         return not (self.base_m1_nm or self.prbs_m1_nm or self.base_m2_nm or self.prbs_m2_nm)
 
 
+_REQUEST_NAMES: Final = tuple(field.name for field in fields(TorqueRequest))
+
+
 @dataclass(frozen=True, slots=True)
 class GuardedTorque:
     """Torque of one inverter that has passed the guard; the only thing an inverter accepts.
@@ -276,10 +279,10 @@ class TorqueGuard:
 
 
 def _not_finite(request: TorqueRequest) -> Iterator[str]:
-    for field in fields(request):
-        value = getattr(request, field.name)
+    for name in _REQUEST_NAMES:
+        value = getattr(request, name)
         if not math.isfinite(value):
-            yield f"{field.name} is {value}, expected a finite number: look for NaN in its feedback"
+            yield f"{name} is {value}, expected a finite number: look for NaN in its feedback"
 
 
 def _magnitude_faults(request: TorqueRequest, limits: GuardLimits) -> Iterator[str]:

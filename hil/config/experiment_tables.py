@@ -5,7 +5,9 @@ Torques are of both inverters together. What every kind has:
 - ``duration_s``: length of the recorded part; getting to the start speed and ramping out come on top;
 - ``torque_nm``: the base torque never exceeds this magnitude, in any phase;
 - ``slew_nm_per_s``: nor does it change faster than this;
-- ``approach_timeout_s``: time in which the start speed must be reached.
+- ``approach_timeout_s``: time in which the start speed must be reached;
+- ``share_m1``: the part of the base torque that inverter m1 gives. A gain that is not what an inverter reports shows where
+  the two share differently from test to test.
 """
 
 from __future__ import annotations
@@ -21,6 +23,9 @@ from hil.config.table import NotNegative, Positive, Table
 APPROACH_TIMEOUT_S = 60.0
 """Time to reach the start speed where the file gives none [s]; it limits patience, not torque."""
 
+EVEN_SHARE = 0.5
+"""Both inverters give half: they drive one shaft, and equal currents heat them equally."""
+
 
 class ExperimentTable(Table):
     """What every kind of experiment has; see the module's text."""
@@ -29,6 +34,7 @@ class ExperimentTable(Table):
     torque_nm: Positive
     slew_nm_per_s: Positive
     approach_timeout_s: Positive = APPROACH_TIMEOUT_S
+    share_m1: Annotated[float, Field(ge=0, le=1)] = EVEN_SHARE
 
 
 class CruiseTable(ExperimentTable):

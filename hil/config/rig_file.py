@@ -4,30 +4,34 @@ Strict and frozen: a number is no text, an unknown key is a fault, and nothing t
 default. Rules that hold across keys stand beside the keys they concern; `hil.config.problems` reports all
 faults at once. Those across tables are looked at once every table is right by itself.
 
-The base torque of an experiment is that of both inverters together and is split evenly between them; so is
-the PRBS, unless ``[prbs] target`` says otherwise. The rules across keys check the worst case of each
+The base torque of an experiment is that of both inverters together and is split evenly between them, unless its
+``share_m1`` says otherwise; so is the PRBS, unless ``[prbs] target`` does. The rules across keys check the worst case of each
 experiment against the limits of the torque guard: what the run would refuse is refused before it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from enum import Enum
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import Field, model_validator
 
-from drivers.cia402 import TorqueMode
 from drivers.eds_file import EdsFile
 from drivers.errors import ConfigMismatch
 from drivers.plc_map import require_usable
 from drivers.plc_types import PrbsSource
 from drivers.register_map import RegisterMapError, load_register_map
 from drivers.torque_guard import GuardLimits
-from hil.config.experiment_tables import AnyExperiment
+from hil.config.experiment_tables import EVEN_SHARE, AnyExperiment
+from hil.config.inverter_table import InvertersTable
+from hil.config.inverter_table import InverterTable as InverterTable
+from hil.config.plc_tables import PlcTable as PlcTable
+from hil.config.plc_tables import SimulatedPlcSecurityTable
 from hil.config.problems import Fault, read_toml, refuse, validate
-from hil.config.table import ExistingFile, NotNegative, Positive, Table, TcpPort, Text, Unsigned32
+from hil.config.table import ExistingFile, NotNegative, Positive, Table, Text
 from hil.errors import RigFileError
 
 
@@ -40,62 +44,13 @@ class PrbsTarget(Enum):
     SHARED = "shared"
 
 
-def _mode_by_name(value: object) -> TorqueMode:
-    """Read a mode of operation by its name; its number would say nothing to a person."""
-    names = {mode.name.lower(): mode for mode in sorted(TorqueMode, key=lambda mode: mode.name)}
-    if not isinstance(value, str) or value not in names:
-        raise ValueError(" or ".join(map(repr, names)))
-    return names[value]
+_PARTS_M1 = {PrbsTarget.BOTH: 0.5, PrbsTarget.M1: 1.0, PrbsTarget.M2: 0.0}
 
 
 class CanTable(Table):
     """The CAN bus: ``url`` as the drivers read it."""
 
     url: Text
-
-
-class InverterTable(Table):
-    """One inverter: where it is, what it must identify as, and what it may give.
-
-    ``eds`` is relative to the rig file; without it the shipped ``inverter.eds`` counts.
-    """
-
-    node_id: Annotated[int, Field(ge=1, le=127)]
-    vendor_id: Unsigned32
-    product_code: Unsigned32
-    rated_torque_nm: Positive
-    torque_limit_nm: Positive
-    mode: Annotated[TorqueMode, BeforeValidator(_mode_by_name)]
-    heartbeat_ms: Annotated[int, Field(ge=10, le=65535)]
-    eds: ExistingFile | None = None
-
-    @model_validator(mode="after")
-    def _limit_within_rated(self) -> Self:
-        if self.torque_limit_nm > self.rated_torque_nm:
-            expected = f"at most rated_torque_nm of the same table ({self.rated_torque_nm:g})"
-            refuse([Fault("torque_limit_nm", expected, self.torque_limit_nm)])
-        return self
-
-
-class InvertersTable(Table):
-    """The two inverters on the motor shaft."""
-
-    m1: InverterTable
-    m2: InverterTable
-
-    @model_validator(mode="after")
-    def _two_nodes(self) -> Self:
-        if self.m1.node_id == self.m2.node_id:
-            refuse([Fault("m2.node_id", "another node id than m1", self.m2.node_id)])
-        return self
-
-
-class PlcTable(Table):
-    """The PLC. ``map`` is relative to the rig file; without it the shipped ``plc.toml`` counts."""
-
-    host: Text
-    port: TcpPort
-    map: ExistingFile | None = None
 
 
 class GuardTable(Table):
@@ -121,8 +76,7 @@ class PrbsTable(Table):
     @property
     def part_m1(self) -> float:
         """Part of the PRBS that inverter m1 carries, 0 to 1; m2 carries the rest."""
-        fixed = {PrbsTarget.BOTH: 0.5, PrbsTarget.M1: 1.0, PrbsTarget.M2: 0.0}
-        return fixed.get(self.target, self.share_m1 or 0.0)
+        return _PARTS_M1.get(self.target, self.share_m1 or 0.0)
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -157,6 +111,7 @@ class SimulationTable(Table):
     seed: Annotated[int, Field(ge=0)]
     speed_noise_rad_s: NotNegative
     torque_noise_permille: NotNegative
+    plc_security: SimulatedPlcSecurityTable | None = None
 
 
 class Rig(Table):
@@ -164,7 +119,7 @@ class Rig(Table):
 
     schema_id: Annotated[Literal["hil.rig/1"], Field(alias="schema")]
     name: Text
-    period_s: Annotated[float, Field(gt=0, le=1)]
+    period_s: Annotated[float, Field(ge=0.001, le=1)] = 0.01
     can: CanTable
     inverters: InvertersTable
     plc: PlcTable
@@ -175,8 +130,8 @@ class Rig(Table):
     simulation: SimulationTable | None = None
 
     @property
-    def guard_limits(self) -> GuardLimits:
-        """The limits of this rig's torque guard."""
+    def torque_limits(self) -> GuardLimits:
+        """What this rig may be asked for in all, whoever asks."""
         return GuardLimits(
             torque_limit_m1_nm=self.inverters.m1.torque_limit_nm,
             torque_limit_m2_nm=self.inverters.m2.torque_limit_nm,
@@ -186,9 +141,30 @@ class Rig(Table):
             feedback_timeout_s=self.guard.feedback_timeout_s,
         )
 
+    @property
+    def guard_limits(self) -> GuardLimits:
+        """The limits of this rig's torque guard: a PRBS that the PLC adds by itself is kept free under each."""
+        if self.prbs.source is PrbsSource.HOST:
+            return self.torque_limits
+        parts_nm = self._prbs_parts_nm()
+        return replace(
+            self.torque_limits,
+            torque_limit_m1_nm=self.inverters.m1.torque_limit_nm - parts_nm["m1"],
+            torque_limit_m2_nm=self.inverters.m2.torque_limit_nm - parts_nm["m2"],
+            sum_limit_nm=self.guard.sum_limit_nm - self.prbs.amplitude_nm,
+        )
+
     @model_validator(mode="after")
     def _within_limits(self) -> Self:
-        refuse([*self._guard_faults(), *self._prbs_faults(), *self._experiment_faults()])
+        refuse(
+            [
+                *self._guard_faults(),
+                *self._deadline_faults(),
+                *self._prbs_faults(),
+                *self._experiment_faults(),
+                *self._security_faults(),
+            ]
+        )
         return self
 
     def _prbs_parts_nm(self) -> dict[str, float]:
@@ -204,6 +180,19 @@ class Rig(Table):
             expected = f"at least one period ({self.period_s:g})"
             yield Fault("guard.feedback_timeout_s", expected, self.guard.feedback_timeout_s)
 
+    def _deadline_faults(self) -> Iterator[Fault]:
+        least_ms = 2000.0 * self.period_s
+        for name, table in (("m1", self.inverters.m1), ("m2", self.inverters.m2)):
+            if table.rpdo_deadline_ms < least_ms:
+                expected = f"at least two periods ({least_ms:g}), or one RPDO that is late stops the drive"
+                yield Fault(f"inverters.{name}.rpdo_deadline_ms", expected, table.rpdo_deadline_ms)
+
+    def _security_faults(self) -> Iterator[Fault]:
+        """See that the simulated PLC wants TLS if, and only if, the host speaks it."""
+        if self.simulation is not None and (self.plc.security is None) != (self.simulation.plc_security is None):
+            expected = "this table if and only if there is [plc.security]: both sides speak TLS, or neither"
+            yield Fault("simulation.plc_security", expected, self.simulation.plc_security and {})
+
     def _prbs_faults(self) -> Iterator[Fault]:
         largest_nm = max(self._prbs_parts_nm().values())
         if largest_nm > self.guard.prbs_limit_nm:
@@ -212,25 +201,38 @@ class Rig(Table):
                 f"but one carries {largest_nm:g}"
             )
             yield Fault("prbs.amplitude_nm", expected, self.prbs.amplitude_nm)
+        if self.prbs.source is PrbsSource.PLC:
+            yield from self._room_faults()
+
+    def _room_faults(self) -> Iterator[Fault]:
+        """See that a PRBS the PLC adds by itself leaves the guard something to guard."""
+        for rest_nm, of in self._torque_rests(EVEN_SHARE):
+            if rest_nm <= 0.0:
+                expected = f"less than {of} allows, since source is 'plc'"
+                yield Fault("prbs.amplitude_nm", expected, self.prbs.amplitude_nm)
 
     def _experiment_faults(self) -> Iterator[Fault]:
         for name, experiment in self.experiments.items():
             key = f"experiments.{name}"
-            for rest_nm, of in self._torque_rests():
+            for rest_nm, of in self._torque_rests(experiment.share_m1):
                 if experiment.torque_nm > rest_nm:
                     expected = f"at most {rest_nm:g}, what {of} leaves beside the PRBS"
                     yield Fault(f"{key}.torque_nm", expected, experiment.torque_nm)
-            fastest = 2.0 * self.guard.rate_limit_nm_per_s
+            fastest = self.guard.rate_limit_nm_per_s / max(experiment.share_m1, 1.0 - experiment.share_m1)
             if experiment.slew_nm_per_s > fastest:
-                expected = f"at most {fastest:g}, twice guard.rate_limit_nm_per_s"
+                expected = f"at most {fastest:g}, of which one inverter gets what guard.rate_limit_nm_per_s allows"
                 yield Fault(f"{key}.slew_nm_per_s", expected, experiment.slew_nm_per_s)
 
-    def _torque_rests(self) -> Iterator[tuple[float, str]]:
-        """Largest base torque of both inverters that each limit leaves beside the PRBS [Nm], and its key."""
+    def _torque_rests(self, share_m1: float) -> Iterator[tuple[float, str]]:
+        """Largest base torque of both inverters that each limit leaves beside the PRBS [Nm], and its key.
+
+        ``share_m1`` is the part of the base torque that inverter m1 gives, 0 to 1.
+        """
         parts_nm = self._prbs_parts_nm()
         yield self.guard.sum_limit_nm - self.prbs.amplitude_nm, "guard.sum_limit_nm"
-        yield 2.0 * (self.inverters.m1.torque_limit_nm - parts_nm["m1"]), "inverters.m1.torque_limit_nm"
-        yield 2.0 * (self.inverters.m2.torque_limit_nm - parts_nm["m2"]), "inverters.m2.torque_limit_nm"
+        for name, table, share in (("m1", self.inverters.m1, share_m1), ("m2", self.inverters.m2, 1.0 - share_m1)):
+            if share > 0.0:
+                yield (table.torque_limit_nm - parts_nm[name]) / share, f"inverters.{name}.torque_limit_nm"
 
 
 def read_rig(path: Path | str) -> Rig:

@@ -1,7 +1,7 @@
 """What a simulated node does with the host's heartbeat (CiA 301, object 1016h): notice that it has ended.
 
-Time is passed in with the frames a node receives; nothing here reads a clock. A node that receives nothing
-does nothing either, for its torque is put into effect by SYNC alone.
+Time is passed in; nothing here reads a clock. The node asks with the frames it takes and before each heartbeat of its
+own.
 """
 
 from __future__ import annotations

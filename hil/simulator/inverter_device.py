@@ -1,19 +1,19 @@
 """A CiA 402 inverter as a model: objects in, objects out. No bus, no clock, no thread.
 
-Simplifications: the torque follows its command at once (actuator dynamics belong to the plant); stopping of
-any kind takes the torque away at once; the torque offset is added in profile torque mode too, unsloped.
+Simplifications: the torque follows its command at once (actuator dynamics belong to the plant), but for slopes and
+limits; the torque offset is added in profile torque mode too, unsloped.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
-import numpy as np
+from collections.abc import Callable, Mapping
+from typing import Final
 
 from drivers.cia402 import (
     AUTOMATIC,
     FAULT_STATES,
     STATUSWORD_STATE_BITS,
+    TORQUE_STATES,
     Command,
     PowerState,
     StatusBit,
@@ -22,19 +22,39 @@ from drivers.cia402 import (
     next_state,
 )
 from drivers.emcy import Emergency
-from drivers.scaling import IntegerType, TorqueScale, VelocityScale
+from hil.simulator.dc_link import DcLink
+from hil.simulator.drive_sensors import DriveSensors
+from hil.simulator.error_list import ErrorList
 from hil.simulator.inverter_settings import SimulatedInverter
-
-GENERIC_ERROR = 0x01
-"""Bit of the error register, 0x1001."""
+from hil.simulator.stop_reactions import (
+    KNOWN_CODES,
+    STANDARD_CODES,
+    AbortConnection,
+    Ramp,
+    Stop,
+    halt_ramp,
+    stop_between,
+)
+from hil.simulator.torque_limits import Heat
 
 VALUE_RANGE_EXCEEDED = 0x06090030
 """SDO abort code."""
 
-PARAMETERS = (0x6071, 0x6072, 0x6087, 0x60B2)
-"""Objects that are held as written: target torque, max torque, torque slope, torque offset."""
+PARAMETERS: Final[Mapping[int, int]] = {0x6071: 0, 0x6072: 1000, 0x6087: 100_000, 0x60B2: 0, **STANDARD_CODES}
+"""Objects that are held as written, with the value of a drive whose EDS lists no such object: target torque, max
+torque, torque slope, torque offset, option codes."""
 
-_INT16 = IntegerType.INTEGER16
+QUICK_SLOPE_PERMILLE_PER_S = 10_000.0
+"""The drive's own slope for quick stops: rated torque within 100 ms."""
+
+UNDER_VOLTAGE, LOST_CONNECTION = 0x3220, 0x8100
+"""Error codes of CiA 402 and CiA 301."""
+
+_HALT = 1 << 8
+
+_REMOTE, _VOLTAGE_ENABLED = StatusBit.REMOTE.value, StatusBit.VOLTAGE_ENABLED.value
+_INTERNAL_LIMIT_ACTIVE, _WARNING = StatusBit.INTERNAL_LIMIT_ACTIVE.value, StatusBit.WARNING.value
+"""Bits as plain numbers, for one statusword at every SYNC."""
 
 
 class ObjectRefused(Exception):
@@ -66,34 +86,36 @@ class InverterDevice:
 
     def __init__(self, settings: SimulatedInverter, defaults: Mapping[int, int], seed: int) -> None:
         self._settings = settings
+        self._limits = settings.faults.limits
         self._defaults = defaults
-        self._random = np.random.default_rng([seed, settings.node_id])
-        self._torque_scale = TorqueScale(settings.rated_torque_nm)
-        where = f"simulated inverter, node {settings.node_id}"
-        self._velocity_scale = VelocityScale.from_object(defaults[0x60A9], where)
+        self._sensors = DriveSensors(settings, defaults[0x60A9], seed)
+        self._heat = Heat(self._limits)
+        self._dc_link = DcLink()
         self._steps = 0
+        self.added_nm = 0.0  # what another controller adds to the reference, past CANopen: the PLC's PRBS
+        self._readings = self._reading_of()
         self.hung = False
         self.reset()
 
     def reset(self) -> None:
         """Go through power-on: all values at their defaults, state SWITCH_ON_DISABLED or FAULT."""
         self.state = AUTOMATIC[PowerState.NOT_READY_TO_SWITCH_ON]
-        self._parameters = {index: self._defaults[index] for index in PARAMETERS}
+        self._parameters = {index: self._defaults.get(index, value) for index, value in PARAMETERS.items()}
         self._controlword = 0
         self._mode = 0
         self._error_code = 0
+        self._stop: Stop | None = None
         self._ramp = 0.0
-        self._torque = 0
+        self._torque = 0.0
         self._limited = False
-        self._torque_reading = 0
-        self._speed_reading = 0
-        self._emergencies: list[Emergency] = []
+        self._sensors.clear()
+        self._errors = ErrorList()
         self._meet_faults()
 
     @property
     def torque_nm(self) -> float:
-        """Torque in effect now [Nm]; zero outside OPERATION_ENABLED and when hung."""
-        return self._torque_scale.to_nm(self._torque)
+        """Torque in effect now [Nm]; zero in every state that carries none, and when hung."""
+        return self._torque * self._settings.rated_torque_nm / 1000.0
 
     def read(self, index: int, subindex: int = 0) -> int | None:
         """Give the present value of an object the device itself holds; None for any other."""
@@ -102,9 +124,12 @@ class InverterDevice:
             return faults.identity[subindex - 1]
         if index == 0x60A9:
             return faults.velocity_unit
+        if index == 0x1003:
+            return self._errors.history(subindex)
         if index in self._parameters:
             return self._parameters[index]
-        return self._reading(index)
+        reading = self._readings.get(index)
+        return None if reading is None else reading()
 
     def write(self, index: int, value: int) -> None:
         """Take a new value of an object; one the device does not act on is ignored.
@@ -114,10 +139,14 @@ class InverterDevice:
         ObjectRefused
             If the value is not allowed.
         """
+        if value not in KNOWN_CODES.get(index, (value,)):
+            raise ObjectRefused(VALUE_RANGE_EXCEEDED)
         if index == 0x6040:
             self._take_controlword(value)
         elif index == 0x6060:
             self._take_mode(value)
+        elif index == 0x1003:
+            self._errors.forget_history()
         elif index in self._parameters:
             self._parameters[index] = value
 
@@ -129,100 +158,170 @@ class InverterDevice:
         true_speed_rad_s
             Motor speed now [rad/s].
         period_s
-            Time until the next SYNC, for the torque slope [s].
+            Time until the next SYNC, for slopes, heat and DC link [s].
         """
         self._steps += 1
         self._meet_faults()
-        self._torque = self._torque_in_effect(period_s)
-        torque_noise, speed_noise = self._random.standard_normal(2)
-        reading = round(self._torque + self._settings.torque_noise_counts * torque_noise)
-        self._torque_reading = min(max(reading, _INT16.low), _INT16.high)  # a converter saturates
-        speed_rad_s = true_speed_rad_s + self._settings.speed_noise_rad_s * speed_noise
-        self._speed_reading = self._velocity_scale.to_raw(speed_rad_s, "simulated resolver")
+        self._dc_link.pass_time(period_s)
+        if self._dc_link.too_low:
+            self.fail(UNDER_VOLTAGE)
+        self._torque = self._torque_in_effect(true_speed_rad_s, period_s)
+        self._heat.pass_time(self._torque, period_s)
+        self._sensors.sample(true_speed_rad_s, self._torque)
 
-    def lose_bus(self) -> None:
-        """Act on abort connection option code 2 (0x6007): disable voltage."""
-        self._take_controlword(Command.DISABLE_VOLTAGE.value)
+    def lose_connection(self, error_code: int) -> None:
+        """Act on the abort connection option code, 0x6007: the host is gone, or has taken the bus away.
+
+        Parameters
+        ----------
+        error_code
+            Cause, for a drive that goes into fault; `LOST_CONNECTION` if there is no better one.
+        """
+        code = self._parameters[0x6007]
+        if code == AbortConnection.FAULT and self.state is not PowerState.SWITCH_ON_DISABLED:
+            self.fail(error_code)
+        elif code == AbortConnection.DISABLE_VOLTAGE:
+            self._take_controlword(Command.DISABLE_VOLTAGE.value)
+        elif code == AbortConnection.QUICK_STOP:
+            self._take_controlword(Command.QUICK_STOP.value)
+
+    def tell(self, error_code: int) -> None:
+        """Take an error that is no fault; it goes out as EMCY."""
+        self._errors.set(error_code)
+
+    def recover(self, error_code: int) -> None:
+        """Take an error that was no fault for gone."""
+        if self.state not in FAULT_STATES:
+            self._errors.clear(error_code)
+
+    def fail(self, error_code: int) -> None:
+        """Meet a fault: fault reaction as 0x605E has it, then FAULT."""
+        self._errors.set(error_code)
+        if self.state not in FAULT_STATES:
+            self._error_code = error_code
+            self._begin(stop_between(self.state, PowerState.FAULT_REACTION_ACTIVE, self._parameters))
 
     def take_emergencies(self) -> list[Emergency]:
         """Hand over the EMCY messages that are due."""
-        due, self._emergencies = self._emergencies, []
-        return due
+        return self._errors.take_due()
 
     def _meet_faults(self) -> None:
         faults = self._settings.faults
         if faults.hang_at_step == self._steps:
             self.hung = True
-            self._torque = 0
+            self._torque = 0.0
+        if faults.brown_out_at_step == self._steps:
+            self._dc_link.supplied = False
+        if faults.emcy is not None and faults.emcy.step == self._steps:
+            self.tell(faults.emcy.emcy_code)
         if faults.fault is not None and faults.fault.step == self._steps:
-            self._enter_fault(faults.fault.emcy_code)
+            self.fail(faults.fault.emcy_code)
 
-    def _enter_fault(self, code: int) -> None:
-        self._enter(AUTOMATIC[PowerState.FAULT_REACTION_ACTIVE])
-        self._error_code = code
-        self._emergencies.append(Emergency(code, self._error_register(), bytes(5)))
+    def _begin(self, stop: Stop) -> None:
+        """Stop as told; without torque or without a ramp that is over at once."""
+        if stop.ramp is Ramp.AT_ONCE or self._torque == 0.0:
+            self._enter(stop.final)
+        else:
+            self.state, self._stop = stop.passing, stop
 
     def _enter(self, state: PowerState) -> None:
-        self.state = state
+        self.state, self._stop = state, None
         if state is not PowerState.OPERATION_ENABLED:
             self._ramp = 0.0
-            self._torque = 0
+            self._torque = 0.0
             self._limited = False
 
     def _take_controlword(self, value: int) -> None:
         command = command_of(value, self._controlword)
         self._controlword = value
-        state = next_state(self.state, command)
-        if self.state is PowerState.FAULT and state is not PowerState.FAULT:
+        target = next_state(self.state, command)
+        if self.state is PowerState.FAULT and target is not self.state:
+            self._reset_fault(target)
+        elif target is PowerState.OPERATION_ENABLED:
+            self._enter(target)
+        elif target is not self.state and not self._on_the_way_to(target):
+            self._begin(stop_between(self.state, target, self._parameters))
+
+    def _on_the_way_to(self, target: PowerState) -> bool:
+        """Whether the ramp of this very command is under way: a command that is repeated does not begin it anew."""
+        return self._stop is not None and self._stop.final is target and self.state is PowerState.OPERATION_ENABLED
+
+    def _reset_fault(self, target: PowerState) -> None:
+        if not self._dc_link.too_low:  # the cause is still there
             self._error_code = 0
-            self._emergencies.append(Emergency(0, 0, bytes(5)))
-        self._enter(state)
+            self._errors.clear()
+            self._enter(target)
 
     def _take_mode(self, value: int) -> None:
         if value not in self._settings.supported_modes:
             raise ObjectRefused(VALUE_RANGE_EXCEEDED)
         self._mode = value
 
-    def _torque_in_effect(self, period_s: float) -> int:
-        if self.state is not PowerState.OPERATION_ENABLED or self.hung:
-            return 0
-        target = self._parameters[0x6071]
+    def _torque_in_effect(self, speed_rad_s: float, period_s: float) -> float:
+        if self.hung or self.state not in TORQUE_STATES:
+            return 0.0
+        if self._stop is not None:
+            return self._stopping(self._stop, period_s)
+        if self.state is not PowerState.OPERATION_ENABLED:
+            return 0.0
+        if self._controlword & _HALT:
+            self._ramp = self._halting(halt_ramp(self._parameters), period_s)
+            return self._ramp
         if self._mode == TorqueMode.PROFILE_TORQUE:
-            step = self._parameters[0x6087] * period_s
-            self._ramp += min(max(target - self._ramp, -step), step)
+            self._ramp = _towards(self._parameters[0x6071], self._ramp, self._slope(Ramp.SLOPE) * period_s)
         else:
-            self._ramp = target
-        wanted = round(self._ramp) + self._parameters[0x60B2]
-        limit = self._parameters[0x6072]
-        self._limited = abs(wanted) > limit
-        return min(max(wanted, -limit), limit)
+            self._ramp = self._parameters[0x6071]
+        added = round(self.added_nm * 1000.0 / self._settings.rated_torque_nm)
+        return self._within_limits(round(self._ramp) + self._parameters[0x60B2] + added, speed_rad_s)
 
-    def _reading(self, index: int) -> int | None:
-        match index:
-            case 0x1001:
-                return self._error_register()
-            case 0x603F:
-                return self._error_code
-            case 0x6040:
-                return self._controlword
-            case 0x6041:
-                return self._statusword()
-            case 0x6061:
-                return self._mode
-            case 0x606C:
-                return self._speed_reading
-            case 0x6076:
-                return round(self._settings.rated_torque_nm * 1000.0)
-            case 0x6077:
-                return self._torque_reading
-            case 0x6502:
-                return sum(mode.support_bit for mode in self._settings.supported_modes)
-        return None
+    def _stopping(self, stop: Stop, period_s: float) -> float:
+        torque = self._ramp = _towards(0.0, self._torque, self._slope(stop.ramp) * period_s)
+        if torque == 0.0:
+            self._enter(stop.final)
+        return torque
+
+    def _halting(self, ramp: Ramp, period_s: float) -> float:
+        return 0.0 if ramp is Ramp.AT_ONCE else _towards(0.0, self._torque, self._slope(ramp) * period_s)
+
+    def _slope(self, ramp: Ramp) -> float:
+        """Steepness [per mille of rated torque per second]."""
+        return QUICK_SLOPE_PERMILLE_PER_S if ramp is Ramp.QUICK else float(self._parameters[0x6087])
+
+    def _within_limits(self, wanted: int, speed_rad_s: float) -> float:
+        maximum = self._heat.limit_permille(self._parameters[0x6072]) * self._limits.weakening(speed_rad_s)
+        self._limited = abs(wanted) > maximum
+        return min(max(float(wanted), -maximum), maximum)
+
+    def _reading_of(self) -> dict[int, Callable[[], int]]:
+        """List the objects that only the device itself can tell."""
+        return {
+            0x1001: lambda: self._errors.register,
+            0x603F: lambda: self._error_code,
+            0x6040: lambda: self._controlword,
+            0x6041: self._statusword,
+            0x6061: lambda: self._mode,
+            0x606C: lambda: self._sensors.speed,
+            0x6076: lambda: round(self._settings.rated_torque_nm * 1000.0),
+            0x6077: lambda: self._sensors.torque,
+            0x6078: lambda: self._sensors.current,
+            0x6079: lambda: self._dc_link.millivolts,
+            0x6502: self._supported_modes,
+        }
+
+    def _supported_modes(self) -> int:
+        return sum(mode.support_bit for mode in self._settings.supported_modes)
 
     def _statusword(self) -> int:
-        limit = StatusBit.INTERNAL_LIMIT_ACTIVE if self._limited else 0
-        bits = StatusBit.VOLTAGE_ENABLED | StatusBit.REMOTE | limit
-        return STATUSWORD_STATE_BITS[self.state] | bits
+        bits = STATUSWORD_STATE_BITS[self.state] | _REMOTE
+        if not self._dc_link.too_low:
+            bits |= _VOLTAGE_ENABLED
+        if self._limited:
+            bits |= _INTERNAL_LIMIT_ACTIVE
+        if self._heat.derating:
+            bits |= _WARNING
+        return bits
 
-    def _error_register(self) -> int:
-        return GENERIC_ERROR if self.state in FAULT_STATES else 0
+
+def _towards(goal: float, value: float, most: float) -> float:
+    """Move a value towards a goal by at most so much."""
+    return value + min(max(goal - value, -most), most)

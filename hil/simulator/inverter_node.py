@@ -1,16 +1,20 @@
-"""A simulated inverter on the bus: object dictionary, NMT slave, heartbeat, EMCY and PDOs of one node.
+"""A simulated inverter on the bus: NMT slave, heartbeat, EMCY, PDOs and supervision of one node.
 
-``canopen.LocalNode`` holds the objects and answers SDO. NMT is done here, for the library's slave sends no
-boot-up message after a reset and its heartbeat timer outlives the bus. PDOs follow the configured mapping.
+NMT is done here, for the library's slave sends no boot-up message after a reset and its heartbeat timer outlives
+the bus. PDOs follow the configured mapping.
+
+It looks for its host (`hil.simulator.host_watch`) at every frame it takes and before each heartbeat of its own, so
+that it also notices when nothing comes any more.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import time
 from functools import partial
+from threading import RLock
 from typing import Any
 
-import canopen
+import numpy as np
 from canopen.sdo.exceptions import SdoAbortedError
 
 from drivers.can_link import CanLink, FrameCallback
@@ -19,60 +23,25 @@ from drivers.emcy import EMCY_COB_ID, Emergency
 from drivers.errors import ProtocolViolation
 from drivers.heartbeat import HEARTBEAT_COB_ID, NMT_COB_ID, HeartbeatProducer, NmtCommand, NmtState
 from drivers.pdo_map import PdoCodec
+from drivers.scaling import IntegerType
 from hil.simulator.heartbeat_consumer import HeartbeatConsumer
-from hil.simulator.inverter_device import PARAMETERS, InverterDevice, ObjectRefused
+from hil.simulator.host_watch import HEARTBEAT_ERROR, RPDO_TIMEOUT, HostWatch
+from hil.simulator.inverter_device import LOST_CONNECTION, PARAMETERS, InverterDevice, ObjectRefused
 from hil.simulator.inverter_settings import SimulatedInverter
+from hil.simulator.object_server import ObjectServer
 from hil.simulator.pdo_objects import PdoObjects
 
 _SDO_REQUEST_COB_ID = 0x600
 _CONSUMER_HEARTBEAT_TIME = (0x1016, 1)
 _PRODUCER_HEARTBEAT_TIME = 0x1017
 _PDO_LENGTH_ERROR = 0x8210
+"""Error code of CiA 301."""
+
+_STALE_STREAM = 1
+"""Of a node's random numbers: the reading noise has one of its own."""
 
 _NMT_COMMANDS = {bytes((command,)): command for command in NmtCommand}
-
-
-class _ObjectServer(canopen.LocalNode):
-    """The library's node, with the hooks it offers, but without its NMT slave.
-
-    Parameters
-    ----------
-    node_id
-        Node id.
-    eds
-        Its objects.
-    ignored_writes
-        Objects whose writes are acknowledged and forgotten.
-    on_read, on_write
-        Called with ``index``, ``subindex`` and, for a write, ``data``.
-    """
-
-    def __init__(
-        self,
-        node_id: int,
-        eds: EdsFile,
-        ignored_writes: frozenset[int],
-        on_read: Callable[..., int | None],
-        on_write: Callable[..., None],
-    ) -> None:
-        super().__init__(node_id, eds.dictionary)
-        self._ignored_writes = ignored_writes
-        self._read_callbacks = [on_read]
-        self._write_callbacks = [on_write]
-
-    def associate_network(self, network: canopen.Network) -> None:
-        super().associate_network(network)
-        network.unsubscribe(self.sdo.rx_cobid, self.sdo.on_request)
-        network.unsubscribe(NMT_COB_ID, self.nmt.on_command)
-
-    def answer(self, request: bytes, t_ns: int) -> None:
-        """Answer one SDO request."""
-        sdo: Any = self.sdo  # the library's server has no types
-        sdo.on_request(self.sdo.rx_cobid, request, t_ns)
-
-    def set_data(self, index: int, subindex: int, data: bytes, check_writable: bool = False) -> None:
-        if index not in self._ignored_writes:
-            super().set_data(index, subindex, data, check_writable)
+_INTEGERS = frozenset(IntegerType)
 
 
 class InverterNode:
@@ -86,25 +55,31 @@ class InverterNode:
         What the inverter is.
     seed
         Of its reading noise.
+    real_time
+        Whether the deadline of its RPDO is of the wall clock.
     """
 
-    def __init__(self, link: CanLink, settings: SimulatedInverter, seed: int) -> None:
+    def __init__(self, link: CanLink, settings: SimulatedInverter, seed: int, real_time: bool = False) -> None:
         self._link = link
         self._node_id = settings.node_id
-        self._ignored_writes = settings.faults.ignored_writes
+        self._faults = settings.faults
+        self._lock = RLock()  # frames are taken in one thread, the heartbeat is sent by another
         self._eds = EdsFile(settings.eds_path, settings.node_id)
-        defaults = {index: self._eds.default(index) for index in (*PARAMETERS, 0x60A9)}
-        self._device = InverterDevice(settings, defaults, seed)
-        self._server = self._serve_objects()
+        self._device = InverterDevice(settings, self._defaults(), seed)
+        self._random = np.random.default_rng([seed, settings.node_id, _STALE_STREAM])
+        self._server = ObjectServer(self._node_id, self._eds, settings.faults, self._on_read, self._on_write)
+        link.network.add_node(self._server)
         self._pdo_objects = PdoObjects(self._eds, self._value)
         self._producer: HeartbeatProducer | None = None
         self._rpdos: dict[int, PdoCodec] = {}
         self._tpdos: tuple[PdoCodec, ...] = ()
         self._pending: dict[int, bytes] = {}
+        self._last_sent: dict[int, bytes] = {}
         self._heard: set[int] = set()
         self._syncs = 0
+        self._off_bus = False
         self._state = NmtState.INITIALISING
-        self._host = HeartbeatConsumer()
+        self._host = HostWatch(real_time)
         link.subscribe(_SDO_REQUEST_COB_ID + self._node_id, self._on_sdo_request)
         link.subscribe(NMT_COB_ID, self._on_nmt)
         self._boot()
@@ -113,6 +88,10 @@ class InverterNode:
     def torque_nm(self) -> float:
         """Torque in effect now [Nm]."""
         return self._device.torque_nm
+
+    def add_torque(self, torque_nm: float) -> None:
+        """Take what another controller adds to the torque reference, past CANopen [Nm]; it holds until the next."""
+        self._device.added_nm = torque_nm
 
     def step(self, true_speed_rad_s: float, period_s: float) -> None:
         """Take one SYNC: put the RPDOs received since the last into effect, sample speed and torque.
@@ -124,56 +103,96 @@ class InverterNode:
         period_s
             Time until the next SYNC [s].
         """
-        self._syncs += 1
-        pending, self._pending = self._pending, {}
-        for cob_id, data in pending.items():
-            self._put_into_effect(self._rpdos[cob_id], data)
-        self._device.step(true_speed_rad_s, period_s)
-        if self._device.hung:
-            self._stop_heartbeat()
-        else:
-            self._send_emergencies()
+        with self._lock:
+            self._syncs += 1
+            self._host.pass_simulated_time(period_s)
+            self._meet_faults()
+            pending, self._pending = self._pending, {}
+            for cob_id, data in pending.items():
+                self._put_into_effect(self._rpdos[cob_id], data)
+            self._device.step(true_speed_rad_s, period_s)
+            if self._device.hung:
+                self._stop_heartbeat()
+            else:
+                self._send_emergencies()
 
     def look_for_host(self, now_ns: int) -> None:
-        """Leave OPERATIONAL, without torque, if the host's heartbeat is lost at ``now_ns``."""
-        if self._state is NmtState.OPERATIONAL and self._host.lost(now_ns):
-            self._device.lose_bus()
-            self._pending.clear()
-            self._state = NmtState.PRE_OPERATIONAL
+        """Act on a host that is gone at ``now_ns`` of the wall clock, or whose RPDO is overdue."""
+        with self._lock:
+            if self._dead:
+                return
+            if self._host.heartbeat_lost(now_ns):
+                self._lose_host(HEARTBEAT_ERROR)
+                if self._state is NmtState.OPERATIONAL:  # error behaviour 0x1029:1 is 0
+                    self._state = NmtState.PRE_OPERATIONAL
+            if self._host.rpdo_missed(now_ns) and self._state is NmtState.OPERATIONAL:
+                self._lose_host(RPDO_TIMEOUT)
 
     def send_feedback(self) -> None:
         """Send the TPDOs that are due at this SYNC, with the values `step` sampled."""
-        if self._device.hung or self._state is not NmtState.OPERATIONAL:
-            return
-        for tpdo in self._tpdos:
-            if self._syncs % tpdo.layout.transmission_type == 0:
-                values = tuple(self._value(mapped.index, mapped.subindex) for mapped in tpdo.layout.objects)
-                self._link.send(tpdo.layout.cob_id, tpdo.pack(values))
+        with self._lock:
+            if self._dead or self._state is not NmtState.OPERATIONAL:
+                return
+            for tpdo in self._tpdos:
+                if self._syncs % tpdo.layout.transmission_type == 0:
+                    self._send(tpdo.layout.cob_id, self._tpdo_data(tpdo))
 
     def close(self) -> None:
         """End the heartbeat; the link is its owner's to close."""
         self._stop_heartbeat()
 
-    def _serve_objects(self) -> _ObjectServer:
-        server = _ObjectServer(self._node_id, self._eds, self._ignored_writes, self._on_read, self._on_write)
-        self._link.network.add_node(server)
-        return server
+    @property
+    def _dead(self) -> bool:
+        """Whether it neither hears nor says anything."""
+        return self._device.hung or self._off_bus
+
+    def _defaults(self) -> dict[int, int]:
+        """Power-on values of what the device holds, from the EDS where it lists them."""
+        listed = {index: self._eds.default(index) for index in PARAMETERS if self._eds.has(index)}
+        return {**PARAMETERS, **listed, 0x60A9: self._eds.default(0x60A9)}
+
+    def _meet_faults(self) -> None:
+        if self._faults.reset_at_step == self._syncs:
+            self._restart()
+        if self._faults.bus_off_at_step == self._syncs:
+            self._device.lose_connection(LOST_CONNECTION)
+            self._pending.clear()
+            self._off_bus = True
+            self._stop_heartbeat()
+
+    def _tpdo_data(self, tpdo: PdoCodec) -> bytes:
+        cob_id = tpdo.layout.cob_id
+        if cob_id not in self._last_sent or not self._is_stale():
+            values = tuple(self._value(mapped.index, mapped.subindex) for mapped in tpdo.layout.objects)
+            self._last_sent[cob_id] = tpdo.pack(values)
+        return self._last_sent[cob_id]
+
+    def _is_stale(self) -> bool:
+        """Whether the next TPDO repeats the one before."""
+        if self._faults.stale_share > 0.0 and self._random.random() < self._faults.stale_share:
+            return True
+        return self._faults.stale_from_step is not None and self._syncs >= self._faults.stale_from_step
 
     def _boot(self) -> None:
         if not self._device.hung:
-            self._link.send(HEARTBEAT_COB_ID + self._node_id, bytes((NmtState.INITIALISING,)))
+            self._send(HEARTBEAT_COB_ID + self._node_id, bytes((NmtState.INITIALISING,)))
             self._state = NmtState.PRE_OPERATIONAL
             self._send_emergencies()
 
     def _on_nmt(self, data: bytes, t_ns: int) -> None:
         command = _NMT_COMMANDS.get(data[:1])
-        if self._device.hung or command is None or data[1:] not in (b"\0", bytes((self._node_id,))):
+        if self._dead or command is None or data[1:] not in (b"\0", bytes((self._node_id,))):
             return
+        with self._lock:
+            self._take_nmt(command)
+            self._send_emergencies()
+
+    def _take_nmt(self, command: NmtCommand) -> None:
         if command is NmtCommand.START:
             self._state = NmtState.OPERATIONAL
             self._start_pdos()
             return
-        self._device.lose_bus()
+        self._device.lose_connection(LOST_CONNECTION)
         self._pending.clear()
         if command is NmtCommand.STOP:
             self._state = NmtState.STOPPED
@@ -186,12 +205,16 @@ class InverterNode:
         self._stop_heartbeat()
         self._server.data_store.clear()
         self._device.reset()
-        self._host = HeartbeatConsumer()
+        self._host.clear()
+        self._pending.clear()
         self._boot()
 
     def _start_pdos(self) -> None:
         self._tpdos = self._pdo_objects.tpdos()
         self._rpdos = {rpdo.layout.cob_id: rpdo for rpdo in self._pdo_objects.rpdos()}
+        self._host.watch_rpdos(
+            {cob_id: self._pdo_objects.deadline_ms(rpdo.layout) for cob_id, rpdo in self._rpdos.items()}
+        )
         for cob_id in self._rpdos:
             self._hear(cob_id, partial(self._on_rpdo, cob_id))
 
@@ -201,11 +224,28 @@ class InverterNode:
             self._heard.add(cob_id)
 
     def _on_heartbeat(self, data: bytes, t_ns: int) -> None:
-        self._host.beat(t_ns)
+        with self._lock:
+            if not self._dead:
+                self._host.heartbeat.beat(t_ns)
+                self._recover(HEARTBEAT_ERROR)
 
     def _on_rpdo(self, cob_id: int, data: bytes, t_ns: int) -> None:
-        if self._state is NmtState.OPERATIONAL and cob_id in self._rpdos:
+        with self._lock:
+            if self._dead or self._state is not NmtState.OPERATIONAL or cob_id not in self._rpdos:
+                return
             self._pending[cob_id] = data
+            self._host.received(cob_id, t_ns)
+            self._recover(RPDO_TIMEOUT)
+
+    def _lose_host(self, error_code: int) -> None:
+        self._device.tell(error_code)
+        self._device.lose_connection(error_code)
+        self._pending.clear()
+        self._send_emergencies()
+
+    def _recover(self, error_code: int) -> None:
+        self._device.recover(error_code)
+        self._send_emergencies()
 
     def _put_into_effect(self, rpdo: PdoCodec, data: bytes) -> None:
         try:
@@ -214,20 +254,23 @@ class InverterNode:
             self._send_emergency(Emergency(_PDO_LENGTH_ERROR, 0, bytes(5)))
             return
         for mapped, value in zip(rpdo.layout.objects, values, strict=True):
-            if mapped.index not in self._ignored_writes:
+            if mapped.index not in self._server.ignored_writes:
                 self._device.write(mapped.index, value)
 
     def _on_sdo_request(self, data: bytes, t_ns: int) -> None:
-        self.look_for_host(t_ns)
-        if not self._device.hung and self._state is not NmtState.STOPPED:
-            self._server.answer(data, t_ns)
-            self._send_emergencies()
+        with self._lock:
+            self.look_for_host(t_ns)
+            if not self._dead and self._state is not NmtState.STOPPED:
+                self._server.answer(data, t_ns)
+                self._send_emergencies()
 
     def _on_read(self, *, index: int, subindex: int, od: Any) -> int | None:
         return self._device.read(index, subindex)
 
     def _on_write(self, *, index: int, subindex: int, od: Any, data: bytes) -> None:
-        value = self._eds.integer_type(index, subindex).decode(data)
+        if od.data_type not in _INTEGERS:
+            return
+        value = IntegerType(od.data_type).decode(data)
         try:
             self._pdo_objects.check_write(index, subindex, value)
             self._device.write(index, value)
@@ -236,8 +279,8 @@ class InverterNode:
         if index == _PRODUCER_HEARTBEAT_TIME:
             self._start_heartbeat(value / 1000.0)
         elif (index, subindex) == _CONSUMER_HEARTBEAT_TIME:
-            self._host = HeartbeatConsumer.from_object(value)
-            self._hear(self._host.cob_id, self._on_heartbeat)
+            self._host.heartbeat = HeartbeatConsumer.from_object(value)
+            self._hear(self._host.heartbeat.cob_id, self._on_heartbeat)
 
     def _value(self, index: int, subindex: int) -> int:
         value = self._device.read(index, subindex)
@@ -248,7 +291,16 @@ class InverterNode:
     def _start_heartbeat(self, period_s: float) -> None:
         self._stop_heartbeat()
         if period_s > 0.0:
-            self._producer = HeartbeatProducer(self._link.send, self._node_id, period_s, lambda: self._state)
+            self._producer = HeartbeatProducer(self._link.send, self._node_id, period_s, self._before_heartbeat)
+
+    def _before_heartbeat(self) -> NmtState:
+        """Look for the host, in the heartbeat's own thread, unless a frame is being taken: then that has looked."""
+        if self._lock.acquire(blocking=False):  # whoever ends the heartbeat holds it and waits for this thread
+            try:
+                self.look_for_host(time.monotonic_ns())
+            finally:
+                self._lock.release()
+        return self._state
 
     def _stop_heartbeat(self) -> None:
         if self._producer is not None:
@@ -260,4 +312,8 @@ class InverterNode:
             self._send_emergency(emergency)
 
     def _send_emergency(self, emergency: Emergency) -> None:
-        self._link.send(EMCY_COB_ID + self._node_id, emergency.encode())
+        self._send(EMCY_COB_ID + self._node_id, emergency.encode())
+
+    def _send(self, cob_id: int, data: bytes) -> None:
+        if not self._off_bus:
+            self._link.send(cob_id, data)

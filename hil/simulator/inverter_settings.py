@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from drivers.cia402 import TorqueMode
+from hil.simulator.torque_limits import DriveLimits
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,16 +27,28 @@ class FaultAtStep:
 
 @dataclass(frozen=True, slots=True)
 class InverterFaults:
-    """What is wrong with a simulated inverter; by default nothing.
+    """What is wrong with a simulated inverter; by default nothing. Steps count the SYNCs; 0 is power-on.
 
     Attributes
     ----------
     absent
         It is not on the bus at all.
     hang_at_step
-        At this SYNC, 0 from the start, its program stops while the link stays up: no torque, no answer.
+        Its program stops while the link stays up: no torque, no answer.
+    reset_at_step
+        It starts anew, with the values of its EDS.
+    bus_off_at_step
+        Its CAN controller leaves the bus; the drive notices and acts as 0x6007 says.
+    stale_from_step
+        Its TPDOs repeat what the one before this step said.
+    stale_share
+        Share of TPDOs that repeat what the one before them said, at random: a drive too slow for its SYNC.
     fault
         A fault it meets.
+    emcy
+        An emergency it tells, without a fault.
+    brown_out_at_step
+        Its DC link is no longer supplied.
     identity
         Another vendor-ID and product code than the EDS's.
     velocity_unit
@@ -43,14 +56,30 @@ class InverterFaults:
     ignored_writes
         Objects whose writes it acknowledges and forgets: 0x6060 for a mode that does not come, 0x6040 for a
         state machine that is stuck, 0x1A00 for a mapping that does not hold.
+    missing_objects, locked_objects
+        Objects of the EDS it does not have, and such as it does not let be written.
+    clock_drift_ppm
+        It samples by a clock of its own that runs slow by so much, instead of by SYNC [parts per million].
+    limits
+        Limits it sets itself.
     """
 
     absent: bool = False
     hang_at_step: int | None = None
+    reset_at_step: int | None = None
+    bus_off_at_step: int | None = None
+    stale_from_step: int | None = None
+    stale_share: float = 0.0
     fault: FaultAtStep | None = None
+    emcy: FaultAtStep | None = None
+    brown_out_at_step: int | None = None
     identity: tuple[int, int] | None = None
     velocity_unit: int | None = None
     ignored_writes: frozenset[int] = frozenset()
+    missing_objects: frozenset[int] = frozenset()
+    locked_objects: frozenset[int] = frozenset()
+    clock_drift_ppm: float = 0.0
+    limits: DriveLimits = field(default_factory=DriveLimits)
 
 
 @dataclass(frozen=True, slots=True)

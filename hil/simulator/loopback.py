@@ -1,7 +1,7 @@
 """Addresses a simulated rig may be served at: this machine's own, and no other.
 
-The CAN server has no authentication and a simulated PLC no certificates, so neither may be reached from
-outside.
+The CAN server has no authentication, and a simulated PLC certificates only where the rig file says so: neither may
+be reached from outside.
 """
 
 from __future__ import annotations

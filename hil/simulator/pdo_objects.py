@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from drivers.drive_settings import RPDO_EVENT_TIMER
 from drivers.eds_file import EdsFile
 from drivers.errors import ConfigMismatch
 from drivers.pdo_map import (
@@ -13,6 +14,7 @@ from drivers.pdo_map import (
     TPDO_MAPPING,
     MappedObject,
     PdoCodec,
+    PdoLayout,
     ReadObject,
     read_layout,
 )
@@ -67,6 +69,13 @@ class PdoObjects:
     def tpdos(self) -> tuple[PdoCodec, ...]:
         """Build the TPDOs that are switched on."""
         return self._codecs(TPDO_COMMUNICATION, TPDO_MAPPING)
+
+    def deadline_ms(self, rpdo: PdoLayout) -> int:
+        """Read the event timer of an RPDO, its deadline [ms]; 0 is none."""
+        index = rpdo.communication_index
+        if self._eds.dictionary.get_variable(index, RPDO_EVENT_TIMER) is None:
+            return 0
+        return self._read(index, RPDO_EVENT_TIMER)
 
     def _check_mapping(self, communication: int, mapping: int, subindex: int, value: int) -> None:
         if not self._read(communication, 1) & COB_ID_INVALID:

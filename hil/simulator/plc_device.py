@@ -3,8 +3,10 @@
 - A drive mode takes effect as it is requested, unless the PLC refuses it. Parallel mode closes the clutch,
   the other two open it.
 - The watchdog counts one per PLC cycle; the host's count is taken over as it is written.
-- The PRBS generator runs while it is enabled and the source is the PLC; it starts at the seed whenever one of
-  its settings is written.
+- The permissive needs nothing of the host until its first beat. From then on it is there while beats come, and
+  comes back with them.
+- The PRBS generator runs while it is enabled, the source is the PLC, and torque is permitted; it starts at the
+  seed whenever one of its settings is written.
 
 The device is stepped by the thread of the CAN bus and asked by that of the Modbus server: one lock for both.
 """
@@ -20,6 +22,7 @@ from typing import Final
 
 from drivers.plc_types import ClutchState, DriveMode, PrbsSource
 from drivers.register import Value
+from hil.simulator.plc_answers import Answers
 from hil.simulator.plc_prbs import CELLS, PlcPrbs
 
 IDENTITY: Final = MappingProxyType({"vendor_code": 0x00484944, "device_code": 0x2024, "map_version": 1})
@@ -51,7 +54,7 @@ class PlcSetup:
     host_timeout_s : float
         Simulated time without a beat, from a host that has begun to beat, after which the permissive is
         withdrawn [s]. Infinite by default: a simulation may run far ahead of a host that beats by the wall
-        clock.
+        clock. A served rig sets it, since its host beats by the cycles it makes the simulation run.
     """
 
     drive_mode: DriveMode = DriveMode.SERIES
@@ -74,7 +77,10 @@ class PlcFaults:
     mode_changes_at_s : float
         The driver selects electric mode.
     hangs_at_s : float
-        The PLC keeps its connections and answers nothing; for whoever serves it to carry out.
+        The PLC keeps its connections and answers nothing.
+    exceptions_at_s, late_at_s, half_at_s, resets_at_s, too_few_at_s : float
+        From then on it answers with exception 04, late, with half an answer, by resetting the connection, or with
+        one register less than was asked for. How it answers is for whoever serves it to carry out.
     refused_modes : frozenset of DriveMode
         The PLC takes the request and does not follow it.
     """
@@ -83,7 +89,24 @@ class PlcFaults:
     permissive_withdrawn_at_s: float = math.inf
     mode_changes_at_s: float = math.inf
     hangs_at_s: float = math.inf
+    exceptions_at_s: float = math.inf
+    late_at_s: float = math.inf
+    half_at_s: float = math.inf
+    resets_at_s: float = math.inf
+    too_few_at_s: float = math.inf
     refused_modes: frozenset[DriveMode] = frozenset()
+
+    def answers(self, time_s: float) -> Answers:
+        """Tell how the PLC answers at a simulated time [s]; of several faults the one that came last."""
+        begun = {
+            self.hangs_at_s: Answers.NOT,
+            self.exceptions_at_s: Answers.EXCEPTION,
+            self.late_at_s: Answers.LATE,
+            self.half_at_s: Answers.HALF,
+            self.resets_at_s: Answers.RESET,
+            self.too_few_at_s: Answers.TOO_FEW,
+        }
+        return begun[max(due)] if (due := [at_s for at_s in begun if at_s <= time_s]) else Answers.WELL
 
 
 _ACCEPTED: Final[Mapping[str, tuple[str, Callable[[Value], bool]]]] = MappingProxyType(
@@ -159,6 +182,12 @@ class PlcDevice:
         with self._lock:
             return self._prbs_nm()
 
+    @property
+    def answers(self) -> Answers:
+        """How the PLC answers now; for whoever serves it."""
+        with self._lock:
+            return self._faults.answers(self._time_s)
+
     def close_clutch(self) -> None:
         """Close the clutch now, whatever the drive mode."""
         with self._lock:
@@ -184,7 +213,7 @@ class PlcDevice:
             return {
                 **IDENTITY,
                 **self._held,
-                "permissive": self._permissive,
+                "permissive": self._permits(),
                 "drive_mode": self._drive_mode.value,
                 "clutch": self._clutch.value,
                 "speed_limit": self._setup.speed_limit_rad_s,
@@ -229,7 +258,10 @@ class PlcDevice:
         return PlcPrbs(float(held["prbs_amplitude"]), int(held["prbs_divider"]), int(held["prbs_seed"]))
 
     def _prbs_nm(self) -> float:
-        return 0.0 if self._prbs is None else self._prbs.torque_nm
+        return 0.0 if self._prbs is None or not self._permits() else self._prbs.torque_nm
+
+    def _permits(self) -> bool:
+        return self._permissive and self._time_s - self._seen_s <= self._setup.host_timeout_s
 
     def _cycle(self) -> None:
         self._cycles += 1
@@ -241,8 +273,7 @@ class PlcDevice:
             self._clutch = ClutchState.CLOSED
         if self._time_s >= self._faults.mode_changes_at_s:
             self._drive_mode = DriveMode.ELECTRIC
-        silent_s = self._time_s - self._seen_s
-        if self._time_s >= self._faults.permissive_withdrawn_at_s or silent_s > self._setup.host_timeout_s:
+        if self._time_s >= self._faults.permissive_withdrawn_at_s:
             self._permissive = False
 
 

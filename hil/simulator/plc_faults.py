@@ -16,5 +16,10 @@ PLC_KINDS: Final[Mapping[str, Kind[PlcFaults]]] = MappingProxyType(
         "permissive_withdrawn": Kind(True, lambda faults, when: replace(faults, permissive_withdrawn_at_s=when.at_s)),
         "mode_changes": Kind(True, lambda faults, when: replace(faults, mode_changes_at_s=when.at_s)),
         "hang": Kind(True, lambda faults, when: replace(faults, hangs_at_s=when.at_s)),
+        "exception": Kind(True, lambda faults, when: replace(faults, exceptions_at_s=when.at_s)),
+        "slow": Kind(True, lambda faults, when: replace(faults, late_at_s=when.at_s)),
+        "half_answer": Kind(True, lambda faults, when: replace(faults, half_at_s=when.at_s)),
+        "reset": Kind(True, lambda faults, when: replace(faults, resets_at_s=when.at_s)),
+        "wrong_width": Kind(True, lambda faults, when: replace(faults, too_few_at_s=when.at_s)),
     }
 )

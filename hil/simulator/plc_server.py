@@ -3,6 +3,8 @@
 Every request is answered from the device as it is at that moment; the server holds no values of its own. A
 write is decoded and put to the device, and refused with an exception code where the device refuses it.
 
+What a client may do, and how an answer can go wrong, is `hil.simulator.plc_session`'s.
+
 `serve_plc` runs in the caller's event loop; `PlcServer` brings a thread with a loop of its own, for callers
 that have none. Both report the port they listen on, which the system chooses where port 0 is asked for.
 """
@@ -19,13 +21,13 @@ from threading import Thread
 from types import TracebackType
 from typing import Final, Self
 
-from pymodbus.server import ModbusTcpServer
-from pymodbus.simulator import DataType, SimData, SimDevice
-
 from drivers.errors import BusDown
 from drivers.register_map import RegisterMap
+from hil.simulator.plc_access import PlcSecurity
+from hil.simulator.plc_answers import Answers
 from hil.simulator.plc_device import PlcDevice
 from hil.simulator.plc_registers import PlcRegisters
+from hil.simulator.plc_session import PlcTcpServer
 
 logging.getLogger("pymodbus").addHandler(logging.NullHandler())  # else it logs to standard error by itself
 
@@ -37,10 +39,11 @@ SETTLE_TURNS: Final = 5
 class ServedPlc:
     """A PLC that is being served: its port, and a way to let it hang."""
 
-    __slots__ = ("_paused", "port")
+    __slots__ = ("_device", "_paused", "port")
 
-    def __init__(self) -> None:
+    def __init__(self, device: PlcDevice) -> None:
         self.port = 0
+        self._device = device
         self._paused = False
 
     def pause(self) -> None:
@@ -51,14 +54,18 @@ class ServedPlc:
         """Answer again."""
         self._paused = False
 
-    def pass_packet(self, sending: bool, packet: bytes) -> bytes:
-        """Stand in every packet's way (pymodbus's ``trace_packet``); a paused PLC sends nothing."""
-        return b"" if sending and self._paused else packet
+    def answers(self) -> Answers:
+        """Tell how the PLC answers now: as its faults say, or not at all while it is paused."""
+        return Answers.NOT if self._paused else self._device.answers
 
 
 @asynccontextmanager
 async def serve_plc(
-    device: PlcDevice, register_map: RegisterMap, host: str = "127.0.0.1", port: int = 0
+    device: PlcDevice,
+    register_map: RegisterMap,
+    host: str = "127.0.0.1",
+    port: int = 0,
+    security: PlcSecurity | None = None,
 ) -> AsyncIterator[ServedPlc]:
     """Serve a PLC in the running event loop, for the time of the block.
 
@@ -70,6 +77,8 @@ async def serve_plc(
         Where each of its values is.
     host, port
         Address to listen on; the system chooses port 0.
+    security : PlcSecurity or None
+        Its certificate and what roles may do; None for plain Modbus TCP.
 
     Yields
     ------
@@ -81,13 +90,11 @@ async def serve_plc(
     BusDown
         If the address can't be listened on.
     ConfigMismatch
-        If the map has a register that the device knows nothing of.
+        If the map has a register that the device knows nothing of, or the files of its security can't be used.
     """
     registers = PlcRegisters(device, register_map)
-    served = ServedPlc()
-    placeholder = SimDevice(register_map.device_id, SimData(0, values=0, datatype=DataType.REGISTERS))
-    server = ModbusTcpServer(placeholder, address=(host, port), trace_packet=served.pass_packet)
-    server.context = registers
+    served = ServedPlc(device)
+    server = PlcTcpServer(registers, host, port, served.answers, security)
     if not await server.listen():
         raise BusDown(
             f"simulated PLC: expected to listen on {host}:{port}, can't. Is another program using the port? "
@@ -101,7 +108,7 @@ async def serve_plc(
         await _close(server, sockets)
 
 
-async def _close(server: ModbusTcpServer, sockets: Sequence[TransportSocket]) -> None:
+async def _close(server: PlcTcpServer, sockets: Sequence[TransportSocket]) -> None:
     """Stop listening and drop every connection, also one that is being accepted just now.
 
     Such a connection would stay open for ever: until asyncio has told pymodbus of it, closing the server does
@@ -124,17 +131,25 @@ class PlcServer:
 
     Parameters
     ----------
-    device, register_map, host, port
+    device, register_map, host, port, security
         As for `serve_plc`.
     """
 
-    __slots__ = ("_device", "_host", "_loop", "_map", "_port", "_ready", "_stop", "_thread")
+    __slots__ = ("_device", "_host", "_loop", "_map", "_port", "_ready", "_security", "_stop", "_thread")
 
-    def __init__(self, device: PlcDevice, register_map: RegisterMap, host: str = "127.0.0.1", port: int = 0) -> None:
+    def __init__(
+        self,
+        device: PlcDevice,
+        register_map: RegisterMap,
+        host: str = "127.0.0.1",
+        port: int = 0,
+        security: PlcSecurity | None = None,
+    ) -> None:
         self._device = device
         self._map = register_map
         self._host = host
         self._port = port
+        self._security = security
         self._ready: Future[ServedPlc] = Future()
         self._thread = Thread(target=self._run, name="plc-server", daemon=True)
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -200,6 +215,6 @@ class PlcServer:
 
     async def _serve(self) -> None:
         self._loop, self._stop = asyncio.get_running_loop(), asyncio.Event()
-        async with serve_plc(self._device, self._map, self._host, self._port) as served:
+        async with serve_plc(self._device, self._map, self._host, self._port, self._security) as served:
             self._ready.set_result(served)
             await self._stop.wait()

@@ -12,16 +12,18 @@ from dataclasses import dataclass, field
 from types import TracebackType
 from typing import Self
 
-import can
-
+from drivers.inline_bus import InlineBus
 from drivers.register_map import load_register_map
 from drivers.resources import data_file
 from hil.config.rig_file import InverterTable, Rig, SimulationTable
 from hil.errors import UsageError
+from hil.simulator.bus_faults import BusFaults
 from hil.simulator.can_bridge import CanBridge
+from hil.simulator.faulty_wire import FaultyWire
 from hil.simulator.inverter_settings import InverterFaults, SimulatedInverter
 from hil.simulator.loopback import Address, bus_address
 from hil.simulator.plant import Plant
+from hil.simulator.plc_access import PlcSecurity
 from hil.simulator.plc_device import PlcDevice, PlcFaults, PlcSetup
 from hil.simulator.plc_server import PlcServer
 from hil.simulator.simulated_rig import SimulatedRig
@@ -30,12 +32,17 @@ IN_PROCESS = "virtual:"
 """Beginning of the bus URLs that are served inside this process only."""
 
 
+HOST_TIMEOUT_S = 1.0
+"""Simulated time without a beat of the host after which the PLC permits no torque [s]: ten of the host's polls."""
+
+
 @dataclass(frozen=True, slots=True)
 class RigFaults:
     """What is wrong with the simulated devices; by default nothing."""
 
     m1: InverterFaults = field(default_factory=InverterFaults)
     m2: InverterFaults = field(default_factory=InverterFaults)
+    bus: BusFaults = field(default_factory=BusFaults)
     plc: PlcFaults = field(default_factory=PlcFaults)
 
 
@@ -56,7 +63,9 @@ class RigServer:
     faults
         What is wrong with the devices.
     seed
-        Of all reading noise; None for the one of the rig file.
+        Of all that is random; None for the one of the rig file.
+    real_time
+        Whether the drives watch for RPDOs by the wall clock, as real ones do, and not by simulated time.
 
     Raises
     ------
@@ -74,12 +83,14 @@ class RigServer:
         modbus: Address,
         faults: RigFaults | None = None,
         seed: int | None = None,
+        real_time: bool = False,
     ) -> None:
         self._plant = plant
         self._rig = rig
         self._simulation = required_simulation(rig)
         self._seed = self._simulation.seed if seed is None else seed
         self._faults = faults or RigFaults()
+        self._real_time = real_time
         self._bridged = None if bus_url.startswith(IN_PROCESS) else bus_address(bus_url)
         self._bus_url = bus_url
         self._modbus = modbus
@@ -96,6 +107,11 @@ class RigServer:
         """Address of the PLC; the port is known once the server runs."""
         return self._modbus
 
+    @property
+    def torque_nm(self) -> tuple[float, float]:
+        """Torques of the inverters in effect now [Nm], as the driveline feels them; while the rig is served."""
+        return self._slaves.torque_nm
+
     def __enter__(self) -> Self:
         with ExitStack() as stack:
             self._serve_plc(stack)  # before there is a SYNC that steps it
@@ -110,27 +126,34 @@ class RigServer:
 
     def _serve_bus(self, stack: ExitStack) -> None:
         channel = self._bus_url.removeprefix(IN_PROCESS) if self._bridged is None else str(uuid.uuid4())
-        bus = can.Bus(interface="virtual", channel=channel, ignore_config=True)
-        slaves = SimulatedRig(bus, self._plant, self._inverters(), self._rig.period_s, self._seed)
+        devices = channel
+        if self._faults.bus != BusFaults():
+            devices = str(uuid.uuid4())
+            stack.enter_context(FaultyWire(channel, devices, self._faults.bus, self._seed))
+        self._slaves = slaves = SimulatedRig(
+            InlineBus(devices), self._plant, self._inverters(), self._rig.period_s, self._seed, self._real_time
+        )
         stack.enter_context(slaves)
         slaves.add_step_callback(self._step_plc)
+        slaves.add_torque_from(self._plc_torque_nm)
         if self._bridged is not None:
             self._bus_url = stack.enter_context(CanBridge(self._bridged, channel)).url
 
     def _serve_plc(self, stack: ExitStack) -> None:
         register_map = load_register_map(self._rig.plc.map or data_file("plc.toml"))
-        self.plc_server = PlcServer(self.plc, register_map, self._modbus.host, self._modbus.port)
+        self.plc_server = PlcServer(
+            self.plc, register_map, self._modbus.host, self._modbus.port, plc_security(self._simulation)
+        )
         stack.enter_context(self.plc_server)
         self._modbus = Address(self._modbus.host, self.plc_server.port)
-        self._hang_plc_if_due(0.0)
 
     def _step_plc(self, time_s: float) -> None:
         self.plc.step(self._rig.period_s)
-        self._hang_plc_if_due(time_s)
 
-    def _hang_plc_if_due(self, time_s: float) -> None:
-        if time_s >= self._faults.plc.hangs_at_s:
-            self.plc_server.pause()
+    def _plc_torque_nm(self) -> tuple[float, float]:
+        """Share the PLC's own PRBS out to the inverters as the rig file says."""
+        prbs_nm, part_m1 = self.plc.prbs_torque_nm, self._rig.prbs.part_m1
+        return part_m1 * prbs_nm, (1.0 - part_m1) * prbs_nm
 
     def _inverters(self) -> tuple[SimulatedInverter, SimulatedInverter]:
         tables = self._rig.inverters
@@ -156,6 +179,12 @@ def required_simulation(rig: Rig) -> SimulationTable:
     return rig.simulation
 
 
+def plc_security(simulation: SimulationTable) -> PlcSecurity | None:
+    """Give the simulated PLC's certificate and roles; None where it speaks plain Modbus TCP."""
+    table = simulation.plc_security
+    return None if table is None else PlcSecurity(table.credentials, table.roles)
+
+
 def _inverter(table: InverterTable, simulation: SimulationTable, faults: InverterFaults) -> SimulatedInverter:
     return SimulatedInverter(
         node_id=table.node_id,
@@ -170,4 +199,4 @@ def _inverter(table: InverterTable, simulation: SimulationTable, faults: Inverte
 def _plc_setup(rig: Rig) -> PlcSetup:
     """Build a vehicle that permits what its own rig file may ask for."""
     largest_nm = max(rig.inverters.m1.torque_limit_nm, rig.inverters.m2.torque_limit_nm)
-    return PlcSetup(torque_limit_nm=largest_nm, period_s=rig.period_s)
+    return PlcSetup(torque_limit_nm=largest_nm, period_s=rig.period_s, host_timeout_s=HOST_TIMEOUT_S)

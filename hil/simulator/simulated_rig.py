@@ -16,6 +16,9 @@ from hil.simulator.plant import Plant
 StepCallback = Callable[[float], None]
 """``callback(time_s)``, called in the rig's own thread after each step."""
 
+TorqueSource = Callable[[], tuple[float, float]]
+"""What another controller adds to the torque references of m1 and m2 [Nm], asked at each SYNC."""
+
 
 class SimulatedRig:
     """The slaves' end of a bus.
@@ -36,6 +39,8 @@ class SimulatedRig:
         Simulated time of one SYNC [s].
     seed
         Of all reading noise.
+    real_time
+        Whether the drives watch for RPDOs by the wall clock, as real ones do, and not by simulated time.
     """
 
     def __init__(
@@ -45,15 +50,17 @@ class SimulatedRig:
         inverters: tuple[SimulatedInverter, SimulatedInverter],
         period_s: float = 0.01,
         seed: int = 0,
+        real_time: bool = False,
     ) -> None:
         self._plant = plant
         self._period_s = period_s
         self._callbacks: list[StepCallback] = []
+        self._added: TorqueSource = lambda: (0.0, 0.0)
         self._steps = 0
         self._link = CanLink(bus)
         m1, m2 = inverters
-        self._m1 = None if m1.faults.absent else InverterNode(self._link, m1, seed)
-        self._m2 = None if m2.faults.absent else InverterNode(self._link, m2, seed)
+        self._m1 = None if m1.faults.absent else InverterNode(self._link, m1, seed, real_time)
+        self._m2 = None if m2.faults.absent else InverterNode(self._link, m2, seed, real_time)
         self._nodes = tuple(node for node in (self._m1, self._m2) if node is not None)
         self._link.subscribe(SYNC_COB_ID, self._on_sync)
 
@@ -73,6 +80,10 @@ class SimulatedRig:
     def add_step_callback(self, callback: StepCallback) -> None:
         """Have ``callback(time_s)`` called after each step, in the rig's own thread."""
         self._callbacks.append(callback)
+
+    def add_torque_from(self, source: TorqueSource) -> None:
+        """Let another controller add to both torque references, past CANopen, such as a PLC its own PRBS."""
+        self._added = source
 
     def close(self) -> None:
         """Take the slaves off the bus and shut it down.
@@ -99,6 +110,9 @@ class SimulatedRig:
 
     def _on_sync(self, data: bytes, t_ns: int) -> None:
         speed_rad_s = self._plant.speed_rad_s
+        for node, added_nm in zip((self._m1, self._m2), self._added(), strict=True):
+            if node is not None:
+                node.add_torque(added_nm)
         for node in self._nodes:
             node.look_for_host(t_ns)
             node.step(speed_rad_s, self._period_s)

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from pydantic import BaseModel
 
-from drivers.inverter_check import CONFIGURED_OBJECTS
+from drivers.drive_settings import OPTION_CODES
 from drivers.plc_map import USED
 from estimator.diagnosis import evidence, holdout, judgement, noise, selection
 from estimator.diagnosis.where import locate
@@ -17,8 +17,8 @@ from estimator.physics import own_law
 from hil.config.experiment_tables import AnyExperiment
 from hil.config.model_file import read_model
 from hil.config.rig_file import Rig
-from hil.proof.challenge import CONCEALED
 from hil.proof.seal import seal
+from hil.proof.wire.challenge import CONCEALED
 from hil.recording.columns import UNITS
 from hil.recording.formats import FORMATS
 from hil.rig.sample import SampleFlag
@@ -68,7 +68,7 @@ def test_every_register_the_plc_must_have_is_listed() -> None:
     assert set(USED) <= names_in_code("supported-protocols.md")
 
 
-@pytest.mark.parametrize("index", [*CONFIGURED_OBJECTS, 0x1016, 0x1017, 0x1018, 0x1400, 0x1600, 0x1800, 0x1A00])
+@pytest.mark.parametrize("index", [*OPTION_CODES, 0x1005, 0x100C, 0x100D, 0x1016, 0x1017, 0x1018, 0x1400, 0x1600, 0x1800, 0x1A00])
 def test_every_object_that_is_configured_is_listed(index: int) -> None:
     page = text("supported-protocols.md")
     first, last = 0x605A, 0x605E

@@ -252,16 +252,33 @@ def test_frame_that_can_not_be_read_is_raised_once_and_receiving_goes_on(
         link.sync()
 
 
-def test_defect_of_a_subscriber_ends_receiving_and_is_raised_at_the_end(channel: str) -> None:
+@pytest.mark.parametrize("inline", [True, False], ids=["in the sender's thread", "in a thread of its own"])
+def test_defect_of_a_subscriber_ends_receiving_and_is_raised_at_the_end(channel: str, inline: bool) -> None:
     def fail(data: bytes, t_ns: int) -> None:
         raise ZeroDivisionError("a defect")
 
-    link = CanLink.open(f"virtual:{channel}")
+    link = CanLink.open(f"virtual:{channel}") if inline else CanLink(virtual_bus(channel))
     with virtual_bus(channel) as device:
         link.subscribe(0x185, fail)
         device.send(frame(0x185, b""))
-        link._thread.join(5.0)
+        if link._thread is not None:
+            link._thread.join(5.0)
     with pytest.raises(BusDown, match=r"receiving ended .a defect."):
         link.sync()
     with pytest.raises(ZeroDivisionError):
         link.close()
+
+
+def test_callback_that_can_not_answer_any_more_is_no_defect(channel: str) -> None:
+    """A simulated node may be taking a request while its link is closed: then it can't send the answer."""
+
+    def answer(data: bytes, t_ns: int) -> None:
+        raise BusDown("CAN bus is closed")
+
+    link = CanLink.open(f"virtual:{channel}")
+    with virtual_bus(channel) as device:
+        link.subscribe(0x605, answer)
+        device.send(frame(0x605, b""))
+    with pytest.raises(BusDown, match=r"receiving ended .CAN bus is closed"):
+        link.sync()
+    link.close()

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import asyncio
-import socket
+import re
+import time
 
 import pytest
 
 from drivers.errors import BusDown, DeviceFault, DeviceTimeout, DriverError, ProtocolViolation
 from drivers.modbus_link import EXCEPTION_TEXT, ModbusLink
 from drivers.register import RegisterKind
-from tests.drivers.modbus_peers import Answer, frame, peer
+from tests.drivers.modbus_peers import Answer, frame, free_port, peer
 
 HOLDING, COIL = RegisterKind.HOLDING_REGISTER, RegisterKind.COIL
 TIMEOUT_S = 0.1
@@ -40,12 +41,6 @@ def write_to(answer: Answer, kind: RegisterKind = HOLDING) -> None:
                 link.close()
 
     asyncio.run(run())
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 def test_words_arrive_in_the_order_of_addresses() -> None:
@@ -88,20 +83,41 @@ def test_a_wrong_answer_is_refused(pdu: bytes, expected: str) -> None:
     "answer",
     [
         lambda request: b"",
-        lambda request: b"HTTP/1.1 400 Bad Request\r\n\r\n",
         lambda request: frame(request, b"\x03\x04\x12\x34\xab\xcd", unit=9),
         lambda request: frame(request, b"\x03\x04\x12\x34\xab\xcd", transaction=4711),
     ],
-    ids=["silent", "not Modbus", "another unit", "another transaction"],
+    ids=["silent", "another unit", "another transaction"],
 )
 def test_no_answer_to_this_request_is_a_timeout(answer: Answer) -> None:
     with pytest.raises(DeviceTimeout, match=r"expected an answer within 0\.1 s, none came"):
         read_from(answer)
 
 
-def test_a_lost_connection_is_not_a_timeout() -> None:
-    with pytest.raises(BusDown, match="the connection was lost"):
-        read_from(lambda request: None)
+@pytest.mark.parametrize(
+    ("answer", "came"),
+    [
+        (lambda request: b"HTTP/1.1 400 Bad Request\r\n\r\n", "only 28 bytes came that are no whole one (48 54 54 50"),
+        (lambda request: frame(request, b"\x03\x04\x12\x34\xab\xcd")[:6], "only 6 bytes came that are no whole one"),
+    ],
+    ids=["not Modbus", "half an answer"],
+)
+def test_what_is_no_whole_answer_is_shown(answer: Answer, came: str) -> None:
+    with pytest.raises(DeviceTimeout, match=re.escape(f"expected an answer within 0.1 s, {came}")):
+        read_from(answer)
+
+
+def test_a_lost_connection_is_not_a_timeout_and_ends_the_wait_at_once() -> None:
+    async def run() -> float:
+        async with peer(lambda request: None) as port:
+            link = ModbusLink("127.0.0.1", port, 1, timeout_s=30.0)
+            await link.open()
+            began = time.monotonic()
+            with pytest.raises(BusDown, match=r"the connection was lost.*\[plc\.security\]"):
+                await link.read(HOLDING, 5, 2)
+            assert not link.connected
+            return time.monotonic() - began
+
+    assert asyncio.run(run()) < 10.0
 
 
 def test_a_confirmed_write_passes() -> None:

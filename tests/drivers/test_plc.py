@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import re
 from collections.abc import Awaitable, Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -16,10 +18,11 @@ from drivers.errors import (
     DeviceTimeout,
     ProtocolViolation,
 )
-from drivers.plc import Plc
+from drivers.plc import GENERATOR_OFF, Plc
 from drivers.plc_types import ClutchState, DriveMode, PlcWatchdog, PrbsSettings, PrbsSource
 from drivers.register_map import RegisterMap, load_register_map
 from drivers.resources import data_file
+from drivers.torque_guard import GuardedTorque, GuardLimits, TorqueGuard, TorqueRequest
 from hil.simulator.plc_device import PlcDevice, PlcFaults, PlcSetup
 from hil.simulator.plc_server import ServedPlc, serve_plc
 
@@ -44,6 +47,17 @@ class ImpatientClock(Clock):
     def __call__(self) -> int:
         self.now_ns += 30 * MS
         return self.now_ns
+
+
+def allowed(amplitude_nm: float) -> tuple[GuardedTorque, GuardedTorque]:
+    """A PRBS that a guard has let through, shared evenly."""
+    guard = TorqueGuard(GuardLimits(1e6, 1e6, 1e6, 1.0, 1e6, 1.0))
+    guard.enable()
+    return guard.check(TorqueRequest(0.0, amplitude_nm / 2, 0.0, amplitude_nm / 2), 0, 0)
+
+
+async def start(plc: Plc, settings: PrbsSettings = SETTINGS) -> PrbsSettings:
+    return await plc.start_prbs(*allowed(settings.amplitude_nm), settings.clock_divider, settings.seed)
 
 
 Talk = Callable[[Plc, ServedPlc], Awaitable[None]]
@@ -83,41 +97,90 @@ def test_the_status_in_si_units() -> None:
         assert status.torque_limit_nm == pytest.approx(333.3, abs=1e-9)
         assert status.watchdog == PlcWatchdog(plc_count=7, host_count_seen=0)
         assert status.prbs == PrbsSettings(False, 0.0, 1, 1, PrbsSource.HOST)
+        assert status.prbs_torque_nm == 0.0
         assert status.t_ns == 5 * MS
+        assert status.age_ns(7 * MS) == 2 * MS
 
     talk(device, conversation, clock=clock)
+
+
+def test_the_status_is_as_old_as_its_first_request() -> None:
+    clock = ImpatientClock()
+
+    async def conversation(plc: Plc, _: ServedPlc) -> None:
+        assert (await plc.read_status()).t_ns == 30 * MS
+
+    talk(PlcDevice(), conversation, clock=clock)
+
+
+def test_other_units_are_turned_into_the_driver_s_own(tmp_path: Path) -> None:
+    device = PlcDevice(PlcSetup(speed_limit_rad_s=3000.0, torque_limit_nm=0.4))
+
+    async def conversation(plc: Plc, _: ServedPlc) -> None:
+        status = await plc.read_status()
+        assert status.speed_limit_rad_s == pytest.approx(3000.0 * 2.0 * math.pi / 60.0)
+        assert status.torque_limit_nm == pytest.approx(400.0)
+        await start(plc)
+        assert device.values()["prbs_amplitude"] == pytest.approx(0.0605, rel=1e-6)
+        assert (await plc.read_status()).prbs.amplitude_nm == pytest.approx(60.5, rel=1e-6)
+
+    talk(device, conversation, map_=load_register_map(in_other_units(tmp_path)))
+
+
+def in_other_units(folder: Path) -> Path:
+    """The shipped map, its speeds in revolutions per minute and its torques in kNm."""
+    path = folder / "map.toml"
+    path.write_text(
+        MAP_TEXT.replace('unit = "rad/s"', 'unit = "1/min"').replace('unit = "Nm"', 'unit = "kNm"'), "utf-8"
+    )
+    return path
 
 
 def test_prbs_settings_arrive_and_the_generator_runs() -> None:
     device = PlcDevice()
 
     async def conversation(plc: Plc, _: ServedPlc) -> None:
-        await plc.write_prbs(SETTINGS)
-        assert (await plc.read_status()).prbs == SETTINGS
-        assert abs(device.prbs_torque_nm) == 60.5
-        off = PrbsSettings(False, 10.0, 1, 5, PrbsSource.HOST)
-        await plc.write_prbs(off)
-        assert (await plc.read_status()).prbs == off
-        assert device.prbs_torque_nm == 0.0
+        assert await start(plc) == SETTINGS
+        status = await plc.read_status()
+        assert status.prbs == SETTINGS
+        assert status.prbs_torque_nm == device.prbs_torque_nm
+        assert abs(status.prbs_torque_nm) == 60.5
+        assert await plc.stop_prbs() == GENERATOR_OFF
+        status = await plc.read_status()
+        assert status.prbs == GENERATOR_OFF
+        assert status.prbs_torque_nm == 0.0
+
+    talk(device, conversation)
+
+
+def test_who_switches_it_off_comes_behind_who_still_switches_it_on() -> None:
+    device = PlcDevice()
+
+    async def conversation(plc: Plc, _: ServedPlc) -> None:
+        on = asyncio.create_task(start(plc))
+        await asyncio.sleep(0)
+        await plc.stop_prbs()
+        await on
+        assert (await plc.read_status()).prbs == GENERATOR_OFF
 
     talk(device, conversation)
 
 
 def test_a_setting_that_does_not_fit_its_register_changes_nothing() -> None:
     async def conversation(plc: Plc, _: ServedPlc) -> None:
-        await plc.write_prbs(SETTINGS)
+        await start(plc)
         with pytest.raises(ConfigMismatch, match="expected a number that fits uint16, came 70000"):
-            await plc.write_prbs(PrbsSettings(False, 1.0, 70000, 1, PrbsSource.HOST))
+            await start(plc, replace(SETTINGS, clock_divider=70000))
         assert (await plc.read_status()).prbs == SETTINGS
 
     talk(PlcDevice(), conversation)
 
 
-@pytest.mark.parametrize(("divider", "seed", "amplitude_nm"), [(0, 1, 1.0), (1, 0, 1.0), (1, 1024, 1.0), (1, 1, -1.0)])
-def test_a_setting_the_plc_refuses_is_raised(divider: int, seed: int, amplitude_nm: float) -> None:
+@pytest.mark.parametrize("change", [{"clock_divider": 0}, {"seed": 0}, {"seed": 1024}, {"amplitude_nm": -1.0}])
+def test_a_setting_the_plc_refuses_is_raised(change: dict[str, int]) -> None:
     async def conversation(plc: Plc, _: ServedPlc) -> None:
         with pytest.raises(ProtocolViolation, match="illegal data value"):
-            await plc.write_prbs(PrbsSettings(True, amplitude_nm, divider, seed, PrbsSource.PLC))
+            await start(plc, replace(SETTINGS, **change))
         assert not (await plc.read_status()).prbs.enabled
 
     talk(PlcDevice(), conversation)
@@ -136,7 +199,8 @@ class LimitingPlc(PlcDevice):
 def test_a_setting_the_plc_quietly_changes_is_raised() -> None:
     async def conversation(plc: Plc, _: ServedPlc) -> None:
         with pytest.raises(ProtocolViolation, match=r"prbs_amplitude.*expected to read back .* as written, came"):
-            await plc.write_prbs(SETTINGS)
+            await start(plc)
+        assert not (await plc.read_status()).prbs.enabled
 
     talk(LimitingPlc(), conversation)
 
@@ -272,6 +336,27 @@ def test_words_that_mean_nothing_are_refused(tmp_path: Path) -> None:
 
 
 MAP_TEXT = data_file("plc.toml").read_text("utf-8")
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "expected"),
+    [
+        ("speed_limit", "km/h", "rad/s or 1/min or rpm or 1/s"),
+        ("torque_limit", "lbf ft", "Nm or kNm"),
+        ("prbs_amplitude", "%", "Nm or kNm"),
+        ("plc_count", "s", "1"),
+        ("permissive", "Nm", "1"),
+    ],
+)
+def test_a_unit_the_driver_can_t_work_with_is_refused(name: str, unit: str, expected: str) -> None:
+    registers = {**MAP.registers, name: MAP[name].model_copy(update={"unit": unit})}
+    with pytest.raises(ConfigMismatch, match=rf"register map .*: {name}: expected unit {expected}, came {unit}\."):
+        Plc("127.0.0.1", 1, MAP.model_copy(update={"registers": registers}))
+
+
+def test_a_register_the_map_does_not_have_is_named() -> None:
+    with pytest.raises(ConfigMismatch, match=r"expected a register oil_level, it has clutch, .*vendor_code\. Add it"):
+        MAP["oil_level"]
 
 
 def test_a_map_without_what_the_driver_needs_is_refused() -> None:

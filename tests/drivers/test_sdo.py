@@ -136,3 +136,82 @@ def test_closed_bus_is_bus_down(pair: Pair, write: bool) -> None:
     pair.link.close()
     with pytest.raises(BusDown, match="is closed"):
         pair.sdo.download(0x6071, 0, 0) if write else pair.sdo.upload(0x6071)
+
+
+def in_segments(text: bytes) -> Callable[[bytes], list[bytes]]:
+    """A node that gives an object in segments of 7 bytes with a toggle bit, CiA 301 7.2.4.3.6 and 7.2.4.3.7."""
+    rest = bytearray(text)
+
+    def answer(request: bytes) -> list[bytes]:
+        if request[0] >> 5 == 2:
+            return [b"\x41" + request[1:4] + len(text).to_bytes(4, "little")]
+        part = bytes(rest[:7])
+        del rest[:7]
+        command = request[0] & 0x10 | (7 - len(part)) << 1 | (not rest)
+        return [bytes([command]) + part.ljust(7, b"\0")]
+
+    return answer
+
+
+@pytest.mark.parametrize("text", ["Traction inverter", "14 characters.", "8 signs."])
+def test_text_comes_in_segments(pair: Pair, text: str) -> None:
+    pair.node.answers = in_segments(text.encode())
+    assert pair.sdo.upload_text(0x1008) == text
+    assert len(pair.node.requests) == 1 + -(-len(text) // 7)
+
+
+def test_short_text_comes_at_once_and_without_its_padding(pair: Pair) -> None:
+    pair.node.answers = lambda request: [uploaded(request, b"v1\0")]
+    assert pair.sdo.upload_text(0x100A) == "v1"
+
+
+def test_segment_with_the_wrong_toggle_bit_is_a_violation(pair: Pair) -> None:
+    good = in_segments(b"Traction inverter")
+
+    def answer(request: bytes) -> list[bytes]:
+        [frame] = good(request)
+        return [frame if request[0] >> 5 == 2 else bytes([frame[0] ^ 0x10]) + frame[1:]]
+
+    pair.node.answers = answer
+    with pytest.raises(ProtocolViolation, match=r"object 0x1008:00: .*[Tt]oggle"):
+        pair.sdo.upload_text(0x1008)
+
+
+def test_text_that_is_none_is_a_violation(pair: Pair) -> None:
+    pair.node.answers = lambda request: [uploaded(request, b"\xff\xfe")]
+    with pytest.raises(ProtocolViolation, match=r"came with \[ff fe\], expected a text in ASCII"):
+        pair.sdo.upload_text(0x1008)
+
+
+def test_object_in_segments_that_stop_coming_is_a_timeout(pair: Pair) -> None:
+    good = in_segments(b"Traction inverter")
+    pair.node.answers = lambda request: good(request) if request[0] >> 5 == 2 else []
+    with pytest.raises(DeviceTimeout, match="0x1008:00"):
+        pair.sdo.upload_text(0x1008)
+
+
+def test_abort_code_that_nobody_knows_is_said_to_be_the_maker_s(pair: Pair) -> None:
+    pair.node.answers = lambda request: [b"\x80" + request[1:4] + bytes.fromhex("01 00 00 ff")]
+    with pytest.raises(ConfigMismatch, match="0xFF000001, a code outside CiA 301: see the drive's manual"):
+        pair.sdo.upload(0x6077)
+
+
+ABORT_TEXTS = {
+    0x05030000: "toggle bit",
+    0x05040000: "Timeout",
+    0x06010002: "write a read only object",
+    0x06020000: "does not exist",
+    0x06040041: "cannot be mapped",
+    0x06040042: "PDO length exceeded",
+    0x06070010: "length code do not match",
+    0x06090011: "Subindex does not exist",
+    0x06090030: "Value range",
+    0x08000022: "present device state",
+}
+
+
+@pytest.mark.parametrize("code", ABORT_TEXTS)
+def test_abort_codes_come_as_text(pair: Pair, code: int) -> None:
+    pair.node.answers = lambda request: [b"\x80" + request[1:4] + code.to_bytes(4, "little")]
+    with pytest.raises(ConfigMismatch, match=f"0x{code:08X}, .*{ABORT_TEXTS[code]}"):
+        pair.sdo.download(0x6071, 0, 0)

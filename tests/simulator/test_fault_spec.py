@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from drivers.plc_types import ClutchState, DriveMode
 from hil.errors import UsageError
-from hil.simulator.fault_spec import DEVICES, NOBODY, OVERCURRENT, known_faults, rig_faults
+from hil.simulator.bus_faults import BusFaults, Since
+from hil.simulator.fault_sizes import Frames
+from hil.simulator.fault_spec import DEVICES, known_faults, rig_faults
+from hil.simulator.inverter_kinds import NOBODY, OVERCURRENT
 from hil.simulator.inverter_settings import FaultAtStep, InverterFaults
 from hil.simulator.plc_device import PlcDevice, PlcFaults
 from hil.simulator.rig_server import RigFaults
+from hil.simulator.torque_limits import DriveLimits
 
 PERIOD_S = 0.01
 
@@ -27,6 +33,27 @@ PERIOD_S = 0.01
         ("plc.clutch_closes@5", RigFaults(plc=PlcFaults(clutch_closes_at_s=5.0))),
         ("plc.permissive_withdrawn@5", RigFaults(plc=PlcFaults(permissive_withdrawn_at_s=5.0))),
         ("plc.mode_changes@5", RigFaults(plc=PlcFaults(mode_changes_at_s=5.0))),
+        ("m1.fault@0.07=0x3210", RigFaults(m1=InverterFaults(fault=FaultAtStep(7, 0x3210)))),
+        ("m1.emcy@0.07=33072", RigFaults(m1=InverterFaults(emcy=FaultAtStep(7, 0x8130)))),
+        ("m2.reset@1", RigFaults(m2=InverterFaults(reset_at_step=100))),
+        ("m2.bus_off@1", RigFaults(m2=InverterFaults(bus_off_at_step=100))),
+        ("m2.stale_pdo@1", RigFaults(m2=InverterFaults(stale_from_step=100))),
+        ("m2.stale_share=0.1", RigFaults(m2=InverterFaults(stale_share=0.1))),
+        ("m2.brown_out@1", RigFaults(m2=InverterFaults(brown_out_at_step=100))),
+        ("m1.clock_drift=-200", RigFaults(m1=InverterFaults(clock_drift_ppm=-200.0))),
+        ("m1.forgets=0x1A00", RigFaults(m1=InverterFaults(ignored_writes=frozenset({0x1A00})))),
+        ("m1.lacks=0x6072", RigFaults(m1=InverterFaults(missing_objects=frozenset({0x6072})))),
+        ("m1.locks=0x1600", RigFaults(m1=InverterFaults(locked_objects=frozenset({0x1600})))),
+        ("m1.field_weakening=90", RigFaults(m1=InverterFaults(limits=DriveLimits(base_speed_rad_s=90.0)))),
+        ("m1.weak_cooling=500", RigFaults(m1=InverterFaults(limits=DriveLimits(continuous_permille=500.0)))),
+        ("m1.coarse_torque=5", RigFaults(m1=InverterFaults(limits=DriveLimits(torque_step_permille=5)))),
+        ("bus.lose=0.01", RigFaults(bus=BusFaults(lose=Since(Frames(0.01), 0)))),
+        ("bus.corrupt@1=1:0x181", RigFaults(bus=BusFaults(corrupt=Since(Frames(1.0, 0x181), 100)))),
+        ("bus.repeat=0.5", RigFaults(bus=BusFaults(repeat=Since(Frames(0.5), 0)))),
+        ("bus.reorder=0.5:0", RigFaults(bus=BusFaults(reorder=Since(Frames(0.5, 0), 0)))),
+        ("bus.delay@2=0.003", RigFaults(bus=BusFaults(delay=Since(Frames(0.003), 200)))),
+        ("bus.jitter=0.001", RigFaults(bus=BusFaults(jitter=Since(Frames(0.001), 0)))),
+        ("bus.off@1", RigFaults(bus=BusFaults(off_at_step=100))),
         (" plc.hang@1e1 ", RigFaults(plc=PlcFaults(hangs_at_s=10.0))),
     ],
 )
@@ -43,6 +70,12 @@ def test_several_add_up() -> None:
     )
 
 
+def test_what_adds_up_may_come_with_several_sizes() -> None:
+    faults = rig_faults(["m1.lacks=0x6072", "m1.lacks=0x6007", "m1.weak_cooling=500", "m1.coarse_torque=5"], PERIOD_S)
+    assert faults.m1.missing_objects == {0x6007, 0x6072}
+    assert faults.m1.limits == DriveLimits(continuous_permille=500.0, torque_step_permille=5)
+
+
 def test_none_is_no_fault() -> None:
     assert rig_faults([], PERIOD_S) == RigFaults()
 
@@ -56,8 +89,20 @@ def test_what_is_not_known_is_refused_with_what_is(text: str) -> None:
     assert str(refusal.value) == f"fault {text!r}: expected one of {known_faults()}."
 
 
-def test_the_list_has_every_fault() -> None:
-    assert all(kind in known_faults() for kinds in DEVICES.values() for kind in kinds)
+def test_the_list_has_every_fault_as_it_is_written() -> None:
+    listed = known_faults()
+    for device, kinds in DEVICES.items():
+        for name, kind in kinds.items():
+            assert kind.written(name) in listed, f"{device}.{name}"
+    for written in ("absent,", "hang@S,", "fault@S[=CODE],", "emcy@S=CODE,", "lose[@S]=SHARE[:ID],", "lacks=INDEX,"):
+        assert written in listed
+
+
+def test_the_page_of_the_simulated_drives_has_every_fault() -> None:
+    page = (Path(__file__).resolve().parents[2] / "docs" / "supported-protocols.md").read_text(encoding="utf-8")
+    for device in ("m1", "bus"):
+        for name, kind in DEVICES[device].items():
+            assert f"`{kind.written(name)}`" in page, f"{device}.{name}"
 
 
 @pytest.mark.parametrize(
@@ -70,6 +115,21 @@ def test_the_list_has_every_fault() -> None:
         (["m1.hang@nan"], "0 or more, came 'nan'"),
         (["m1.hang@inf"], "0 or more, came 'inf'"),
         (["m1.hang@1", "m1.hang@2"], "expected m1.hang once, came twice"),
+        (["m1.lacks=0x6072", "m1.lacks=24690"], "expected m1.lacks once, came twice"),
+        (["bus.lose=0.1", "bus.lose=0.2"], "expected bus.lose once, came twice"),
+        (["m1.emcy@1"], r"expected an error code, 0x1000 to 0xFFFF, came none. Write m1.emcy@S=CODE"),
+        (["m1.emcy@1=0"], "expected an error code, 0x1000 to 0xFFFF, came '0'"),
+        (["m1.emcy@1=soon"], "expected an error code, .* came 'soon'"),
+        (["m1.hang@1=2"], "expected nothing after its name, came '=2'"),
+        (["m1.lacks"], "expected an object, 0x1000 to 0xFFFF, came none. Write m1.lacks=INDEX"),
+        (["m1.lacks=0x12345"], "expected an object"),
+        (["m1.clock_drift=nan"], "expected a number from -100000 to 100000 parts per million, came 'nan'"),
+        (["m1.coarse_torque=0"], "expected a number from 1 to 100 of rated torque, came '0'"),
+        (["bus.lose=1.5"], "expected a number from 0 to 1 of all, and :ID .*, came '1.5'"),
+        (["bus.lose=0.5:0x800"], "came '0.5:0x800'"),
+        (["bus.lose=0.5:"], "came '0.5:'"),
+        (["bus.delay=-1"], "expected a number from 0 to 10 s"),
+        (["bus.off"], "expected a moment in seconds, came none"),
     ],
 )
 def test_a_moment_too_many_or_too_few_is_refused(texts: list[str], said: str) -> None:

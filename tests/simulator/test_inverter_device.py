@@ -12,7 +12,7 @@ from drivers.cia402 import STATUSWORD_STATE_BITS, Command, PowerState, TorqueMod
 from hil.simulator.inverter_device import InverterDevice, ObjectRefused
 from hil.simulator.inverter_settings import FaultAtStep, InverterFaults, SimulatedInverter
 
-DEFAULTS = {0x6071: 0, 0x6072: 1000, 0x6087: 100_000, 0x60B2: 0, 0x60A9: 0xFDB44700}
+DEFAULTS = {0x60A9: 0xFDB44700, 0x6007: 2, 0x605A: 6, 0x605B: 0, 0x605C: 0, 0x605D: 1, 0x605E: 0}
 QUIET = SimulatedInverter(5, torque_noise_counts=0.0, speed_noise_rad_s=0.0)
 PERIOD_S = 0.01
 
@@ -80,7 +80,7 @@ def test_torque_flows_in_operation_enabled_alone(state: PowerState) -> None:
     assert made.torque_nm == (300.0 if state is PowerState.OPERATION_ENABLED else 0.0)
 
 
-@pytest.mark.parametrize("command", [Command.DISABLE_VOLTAGE, Command.QUICK_STOP, Command.SHUTDOWN, Command.SWITCH_ON])
+@pytest.mark.parametrize("command", [Command.DISABLE_VOLTAGE, Command.SHUTDOWN, Command.SWITCH_ON])
 def test_leaving_operation_enabled_takes_the_torque_away_at_once(command: Command) -> None:
     made = enabled()
     made.write(0x6071, 500)
@@ -172,7 +172,7 @@ def test_fault_comes_at_its_step_and_takes_the_torque_away() -> None:
     made.step(0.0, PERIOD_S)
     assert (made.torque_nm, made.read(0x1001)) == (60.0, 0)
     made.step(0.0, PERIOD_S)
-    assert (made.torque_nm, made.read(0x1001), made.state) == (0.0, 1, PowerState.FAULT)
+    assert (made.torque_nm, made.read(0x1001), made.state) == (0.0, 0x03, PowerState.FAULT)
 
 
 def test_hung_device_gives_no_torque() -> None:
@@ -197,7 +197,7 @@ def test_losing_the_bus_takes_the_torque_away() -> None:
     made = enabled()
     made.write(0x6071, 100)
     made.step(0.0, PERIOD_S)
-    made.lose_bus()
+    made.lose_connection(0x8130)
     assert made.torque_nm == 0.0
     assert made.state is PowerState.SWITCH_ON_DISABLED
 

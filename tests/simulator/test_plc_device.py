@@ -9,6 +9,7 @@ from drivers.register import Value
 from drivers.register_map import load_register_map
 from drivers.resources import data_file
 from estimator.signals.prbs import Prbs
+from hil.simulator.plc_answers import Answers
 from hil.simulator.plc_device import IDENTITY, PlcDevice, PlcFaults, PlcSetup, ValueRefusedError
 
 RUNNING: dict[str, Value] = {
@@ -109,6 +110,21 @@ class TestHostWatchdog:
             device.step(0.4)
         assert device.values()["permissive"] is True
 
+    def test_the_permissive_comes_back_with_the_beats(self) -> None:
+        device = PlcDevice(PlcSetup(host_timeout_s=0.5))
+        device.write({"host_count": 1})
+        device.step(0.6)
+        assert device.values()["permissive"] is False
+        device.write({"host_count": 2})
+        assert device.values()["permissive"] is True
+
+    def test_a_permissive_withdrawn_by_the_vehicle_does_not(self) -> None:
+        device = PlcDevice(PlcSetup(host_timeout_s=0.5))
+        device.write({"host_count": 1})
+        device.withdraw_permissive()
+        device.write({"host_count": 2})
+        assert device.values()["permissive"] is False
+
     def test_a_host_that_has_never_beaten_is_not_missed(self) -> None:
         device = PlcDevice(PlcSetup(host_timeout_s=0.5))
         device.step(60.0)
@@ -145,6 +161,17 @@ class TestPrbs:
         device.write({"prbs_seed": 5})
         assert self.levels(device, 50) == first
 
+    def test_it_is_silent_while_torque_is_not_permitted(self) -> None:
+        device = PlcDevice(PlcSetup(host_timeout_s=0.5))
+        device.write({**RUNNING, "host_count": 1})
+        assert 0.0 not in self.levels(device, 50)
+        device.step(0.01)
+        assert device.prbs_torque_nm == 0.0
+        device.write({"host_count": 2})
+        assert device.prbs_torque_nm != 0.0
+        device.withdraw_permissive()
+        assert device.prbs_torque_nm == 0.0
+
     @pytest.mark.parametrize("change", [{"prbs_enable": False}, {"prbs_source": "host"}])
     def test_it_is_silent_unless_enabled_and_the_source(self, change: dict[str, Value]) -> None:
         device = PlcDevice()
@@ -152,6 +179,31 @@ class TestPrbs:
         device.write(change)
         assert set(self.levels(device, 20)) == {0.0}
         assert device.values()["prbs_torque"] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("field", "answers"),
+    [
+        ("hangs_at_s", Answers.NOT),
+        ("exceptions_at_s", Answers.EXCEPTION),
+        ("late_at_s", Answers.LATE),
+        ("half_at_s", Answers.HALF),
+        ("resets_at_s", Answers.RESET),
+        ("too_few_at_s", Answers.TOO_FEW),
+    ],
+)
+def test_it_answers_well_until_a_fault_begins(field: str, answers: Answers) -> None:
+    device = PlcDevice(faults=PlcFaults(**{field: 0.5}))
+    device.step(0.49)
+    assert device.answers is Answers.WELL
+    device.step(0.01)
+    assert device.answers is answers
+    assert PlcDevice(faults=PlcFaults(**{field: 0.0})).answers is answers
+
+
+def test_of_two_faults_the_later_one_tells_how_it_answers() -> None:
+    faults = PlcFaults(late_at_s=1.0, half_at_s=2.0)
+    assert [faults.answers(at_s) for at_s in (0.0, 1.5, 2.5)] == [Answers.WELL, Answers.LATE, Answers.HALF]
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,112 @@
+"""The tables ``[inverters.NAME]`` of a rig file: where a drive is, what it may give, how it stops by itself."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Annotated, Any, Final, Self
+
+from pydantic import BeforeValidator, Field, model_validator
+
+from drivers.cia402 import TorqueMode
+from drivers.drive_settings import ABORT_CONNECTION
+from hil.config.problems import Fault, refuse
+from hil.config.table import ExistingFile, Positive, Table, Unsigned32
+
+
+def _mode_by_name(value: object) -> TorqueMode:
+    """Read a mode of operation by its name; its number would say nothing to a person."""
+    names = {mode.name.lower(): mode for mode in sorted(TorqueMode, key=lambda mode: mode.name)}
+    if not isinstance(value, str) or value not in names:
+        raise ValueError(" or ".join(map(repr, names)))
+    return names[value]
+
+
+OptionCode = Annotated[int, Field(ge=-32768, le=32767)]
+"""INTEGER16; the negative codes are the maker's own."""
+
+
+class OptionCodesTable(Table):
+    """What the drive does by itself when something ends, where it is not to be the EDS's (CiA 402-2)."""
+
+    abort_connection: Annotated[int, Field(ge=1, le=3)] | None = None
+    quick_stop: OptionCode | None = None
+    shutdown: OptionCode | None = None
+    disable_operation: OptionCode | None = None
+    halt: OptionCode | None = None
+    fault_reaction: OptionCode | None = None
+
+    @property
+    def by_object(self) -> dict[int, int]:
+        """The codes that are given, by object."""
+        codes = {index: getattr(self, name) for name, index in _OBJECTS.items()}
+        return {index: code for index, code in codes.items() if code is not None}
+
+
+_OBJECTS: Final[Mapping[str, int]] = MappingProxyType(
+    {
+        "abort_connection": ABORT_CONNECTION,
+        "quick_stop": 0x605A,
+        "shutdown": 0x605B,
+        "disable_operation": 0x605C,
+        "halt": 0x605D,
+        "fault_reaction": 0x605E,
+    }
+)
+
+_NODE_GUARDING: Final = ("guard_time_ms", "life_time_factor", "node_guarding")
+"""What a person might call it who comes from another master."""
+
+
+class InverterTable(Table):
+    """One inverter: where it is, what it must identify as, and what it may give.
+
+    ``eds`` is relative to the rig file; without it the shipped ``inverter.eds`` counts.
+    """
+
+    node_id: Annotated[int, Field(ge=1, le=127)]
+    vendor_id: Unsigned32
+    product_code: Unsigned32
+    rated_torque_nm: Positive
+    torque_limit_nm: Positive
+    mode: Annotated[TorqueMode, BeforeValidator(_mode_by_name)]
+    heartbeat_ms: Annotated[int, Field(ge=10, le=65535)]
+    rpdo_deadline_ms: Annotated[int, Field(ge=2, le=65535)] = 200
+    option_codes: OptionCodesTable = OptionCodesTable()
+    torque_slope_nm_per_s: Positive | None = None
+    eds: ExistingFile | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _no_node_guarding(cls, keys: Any) -> Any:
+        asked = [name for name in _NODE_GUARDING if isinstance(keys, Mapping) and name in keys]
+        refuse(
+            Fault(
+                name,
+                "no such key: node guarding needs remote frames and excludes the heartbeat (CiA 301), by which host "
+                "and drive watch each other here; heartbeat_ms sets its period",
+                keys[name],
+            )
+            for name in asked
+        )
+        return keys
+
+    @model_validator(mode="after")
+    def _limit_within_rated(self) -> Self:
+        if self.torque_limit_nm > self.rated_torque_nm:
+            expected = f"at most rated_torque_nm of the same table ({self.rated_torque_nm:g})"
+            refuse([Fault("torque_limit_nm", expected, self.torque_limit_nm)])
+        return self
+
+
+class InvertersTable(Table):
+    """The two inverters on the motor shaft."""
+
+    m1: InverterTable
+    m2: InverterTable
+
+    @model_validator(mode="after")
+    def _two_nodes(self) -> Self:
+        if self.m1.node_id == self.m2.node_id:
+            refuse([Fault("m2.node_id", "another node id than m1", self.m2.node_id)])
+        return self

@@ -1,0 +1,82 @@
+"""The object dictionary of a simulated node: ``canopen.LocalNode``, which holds the objects and answers SDO.
+
+A real drive's dictionary is not always its EDS's: objects can be missing, locked, or forget what is written. All of
+that is of SDO alone; the node itself reads its objects as they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import canopen
+
+from drivers.eds_file import EdsFile
+from drivers.heartbeat import NMT_COB_ID
+from hil.simulator.inverter_settings import InverterFaults
+
+NO_SUCH_OBJECT = 0x06020000
+READ_ONLY = 0x06010002
+"""SDO abort codes."""
+
+_DOWNLOAD, _UPLOAD = 1, 2
+"""Client command specifiers of the requests that name an object (CiA 301, 7.2.4.3)."""
+
+_ABORT = 0x80
+
+
+class ObjectServer(canopen.LocalNode):
+    """The library's node, with the hooks it offers, but without its NMT slave.
+
+    Parameters
+    ----------
+    node_id
+        Node id.
+    eds
+        Its objects.
+    faults
+        Objects it forgets, lacks or locks.
+    on_read, on_write
+        Called with ``index``, ``subindex``, ``od`` and, for a write, ``data``.
+    """
+
+    def __init__(
+        self,
+        node_id: int,
+        eds: EdsFile,
+        faults: InverterFaults,
+        on_read: Callable[..., int | None],
+        on_write: Callable[..., None],
+    ) -> None:
+        super().__init__(node_id, eds.dictionary)
+        self.ignored_writes = faults.ignored_writes
+        self._missing = faults.missing_objects
+        self._locked = faults.locked_objects
+        self._read_callbacks = [on_read]
+        self._write_callbacks = [on_write]
+
+    def associate_network(self, network: canopen.Network) -> None:
+        """Join a network; what is received comes through `answer`."""
+        super().associate_network(network)
+        network.unsubscribe(self.sdo.rx_cobid, self.sdo.on_request)
+        network.unsubscribe(NMT_COB_ID, self.nmt.on_command)
+
+    def answer(self, request: bytes, t_ns: int) -> None:
+        """Answer one SDO request."""
+        service, index = request[0] >> 5, int.from_bytes(request[1:3], "little")
+        if service in (_DOWNLOAD, _UPLOAD) and index in self._missing:
+            self._refuse(request, NO_SUCH_OBJECT)
+        elif service == _DOWNLOAD and index in self._locked:
+            self._refuse(request, READ_ONLY)
+        else:
+            sdo: Any = self.sdo  # the library's server has no types
+            sdo.on_request(self.sdo.rx_cobid, request, t_ns)
+
+    def set_data(self, index: int, subindex: int, data: bytes, check_writable: bool = False) -> None:
+        """Write an object, unless it is one that forgets."""
+        if index not in self.ignored_writes:
+            super().set_data(index, subindex, data, check_writable)
+
+    def _refuse(self, request: bytes, abort_code: int) -> None:
+        answer = bytes((_ABORT, *request[1:4])) + abort_code.to_bytes(4, "little")
+        self.network.send_message(self.sdo.tx_cobid, answer)

@@ -1,0 +1,150 @@
+"""What a drive is given at every configuration, who asks for it, and what is refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from drivers.drive_settings import drive_settings
+from drivers.eds_file import EdsFile
+from drivers.errors import ConfigMismatch
+from drivers.inverter import InverterSettings
+from drivers.pdo_map import RPDO_COMMUNICATION, RPDO_MAPPING
+from drivers.resources import data_file
+from tests.drivers.can_bench import M1, SIMULATED_M1, bench
+
+NODE_GUARDING = """
+[100C]
+ParameterName=Guard time
+ObjectType=0x7
+DataType=0x0006
+AccessType=rw
+DefaultValue={guard_ms}
+PDOMapping=0
+
+[100D]
+ParameterName=Life time factor
+ObjectType=0x7
+DataType=0x0005
+AccessType=rw
+DefaultValue={factor}
+PDOMapping=0
+"""
+
+
+def given(settings: InverterSettings) -> dict[tuple[int, int], tuple[int, str]]:
+    eds = EdsFile(settings.eds_path, settings.node_id)
+    rpdo = eds.pdo_carrying(RPDO_COMMUNICATION, RPDO_MAPPING, 0x6040)
+    listed = drive_settings(eds, settings, rpdo)
+    return {(each.index, each.subindex): (each.value, each.source) for each in listed}
+
+
+def changed_eds(folder: Path, *changes: tuple[str, str], more: str = "") -> Path:
+    text = data_file("inverter.eds").read_text()
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    path = folder / "changed.eds"
+    path.write_text(text + more)
+    return path
+
+
+def test_the_drive_is_made_to_watch_its_host_in_three_ways() -> None:
+    settings = given(replace(M1, rpdo_deadline_ms=150))
+    assert settings[0x1016, 1] == (127 << 16 | 500, "rig file")
+    assert settings[0x1400, 5] == (150, "rig file")
+    assert settings[0x6007, 0] == (2, "EDS")
+
+
+def test_option_codes_are_the_rig_file_s_or_else_the_eds_s() -> None:
+    settings = given(replace(M1, option_codes={0x605A: 5, 0x6007: 1}))
+    assert settings[0x605A, 0] == (5, "rig file")
+    assert settings[0x6007, 0] == (1, "rig file")
+    assert settings[0x605E, 0] == (0, "EDS")
+
+
+def test_torque_slope_is_written_in_per_mille_of_rated_torque_where_the_rig_file_gives_it() -> None:
+    assert (0x6087, 0) not in given(M1)
+    assert given(replace(M1, torque_slope_nm_per_s=300.0))[0x6087, 0] == (500, "rig file")
+
+
+@pytest.mark.parametrize("from_rig_file", [True, False])
+def test_a_drive_that_would_keep_its_torque_without_the_host_is_refused(from_rig_file: bool, tmp_path: Path) -> None:
+    head = "[6007]\nParameterName=Abort connection option code\nObjectType=0x7\nDataType=0x0003\nAccessType=rw\n"
+    settings = (
+        replace(M1, option_codes={0x6007: 0})
+        if from_rig_file
+        else replace(M1, eds_path=changed_eds(tmp_path, (f"{head}DefaultValue=2", f"{head}DefaultValue=0")))
+    )
+    with pytest.raises(ConfigMismatch, match=r"0x6007:00 is to be 0, no action .*the torque would stay without the ho"):
+        given(settings)
+
+
+@pytest.mark.parametrize("settings", [replace(M1, option_codes={0x605A: 1}), replace(M1, torque_slope_nm_per_s=1.0)])
+def test_a_value_for_an_object_the_drive_lacks_is_refused(settings: InverterSettings, tmp_path: Path) -> None:
+    eds = changed_eds(
+        tmp_path, ("[605A]", "[2F5A]"), ("[6087]", "[2F87]"), ("=0x605A", "=0x2F5A"), ("=0x6087", "=0x2F87")
+    )
+    with pytest.raises(ConfigMismatch, match=r"the rig file gives a value for .* which EDS .* does not have"):
+        given(replace(settings, eds_path=eds))
+
+
+def test_node_guarding_is_refused_with_the_reason(tmp_path: Path) -> None:
+    eds = changed_eds(tmp_path, more=NODE_GUARDING.format(guard_ms=100, factor=3))
+    with pytest.raises(
+        ConfigMismatch, match=r"node guarding is on \(guard time 0x100C:00 is 100 ms.*remote frames.*hea"
+    ):
+        given(replace(M1, eds_path=eds))
+
+
+@pytest.mark.parametrize("factor", [0, ""], ids=["zero", "blank"])
+def test_node_guarding_that_is_off_stays_off(tmp_path: Path, factor: int | str) -> None:
+    eds = changed_eds(tmp_path, more=NODE_GUARDING.format(guard_ms=100, factor=factor))
+    settings = given(replace(M1, eds_path=eds))
+    assert settings[0x100C, 0] == settings[0x100D, 0] == (0, "this program")
+
+
+def test_slope_and_codes_are_in_the_drive_after_configuring_and_in_the_list_before() -> None:
+    settings = replace(M1, torque_slope_nm_per_s=300.0, option_codes={0x605A: 5})
+    with bench(settings=settings) as rig:
+        found = [(each.what, each.expected, each.source) for each in rig.m1.check()]
+        assert found == [
+            ("quick stop option code 0x605A:00", "5", "rig file"),
+            ("torque slope 0x6087:00", "500", "rig file"),
+        ]
+        rig.m1.configure()
+        assert rig.m1.check() == ()
+        assert rig.m1._sdo.upload(0x6087) == 500
+        assert rig.m1._sdo.upload(0x1400, 5) == M1.rpdo_deadline_ms
+
+
+def test_a_drive_with_a_name_tells_it_in_segments(tmp_path: Path) -> None:
+    named = """
+[1008]
+ParameterName=Manufacturer device name
+ObjectType=0x7
+DataType=0x0009
+AccessType=const
+DefaultValue=Traction inverter
+PDOMapping=0
+"""
+    eds = changed_eds(tmp_path, more=named)
+    with bench(simulated=replace(SIMULATED_M1, eds_path=eds)) as rig:
+        assert rig.m1.device_name() == "Traction inverter"
+        with pytest.raises(ConfigMismatch, match=r"object 0x1008:00 refused .*Object does not exist"):
+            rig.m2.device_name()
+
+
+def test_a_drive_that_is_guarded_is_found_and_set_right(tmp_path: Path) -> None:
+    """Some other master left it on; the EDS has it off."""
+    eds = changed_eds(tmp_path, more=NODE_GUARDING.format(guard_ms=0, factor=0))
+    with bench(settings=replace(M1, eds_path=eds), simulated=replace(SIMULATED_M1, eds_path=eds)) as rig:
+        rig.m1._sdo.download(0x100C, 0, 100)
+        [difference] = rig.m1.check()
+        assert str(difference) == (
+            "inverter m1 (node 5): guard time (heartbeat instead) 0x100C:00 is 100, expected 0 (this program)"
+        )
+        rig.m1.configure()
+        assert rig.m1.check() == ()

@@ -1,0 +1,232 @@
+"""What the EDS checker says of a whole file, where one fault has consequences or is told once for many places."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from drivers.eds_check import EdsReport
+from drivers.eds_check.needs import CONFIGURED, NEEDS, Need
+from drivers.eds_finding import EdsFinding, Severity
+from tests.docs.pages import DOCS
+from tests.drivers.eds_bench import SHIPPED, E, N, W, checked, edited, line_of, without
+
+
+def places(report: EdsReport, severity: Severity) -> list[str]:
+    return [finding.place for finding in report.findings if finding.severity is severity]
+
+
+@pytest.mark.parametrize(
+    ("section", "severity"),
+    [("FileInfo", W), ("DeviceInfo", E), ("MandatoryObjects", W), ("OptionalObjects", W), ("ManufacturerObjects", W)],
+)
+def test_missing_section_is_named(tmp_path: Path, section: str, severity: Severity) -> None:
+    report = checked(tmp_path, without(section))
+    (finding,) = (each for each in report.findings if each.place == f"[{section}]")
+    assert (finding.severity, finding.line) == (severity, None)
+    assert report.usable is (severity is W)
+
+
+@pytest.mark.parametrize("index", ["1000", "1001"])
+def test_missing_mandatory_object_is_an_error(tmp_path: Path, index: str) -> None:
+    report = checked(tmp_path, without(index))
+    assert places(report, Severity.ERROR) == [f"[{index}]"]
+    assert places(report, Severity.WARNING) == [f"[MandatoryObjects] {int(index) - 999}"]
+
+
+@pytest.mark.parametrize("need", NEEDS, ids=lambda need: need.name)
+def test_drive_without_a_needed_object_is_no_drive_for_this_program(tmp_path: Path, need: Need) -> None:
+    index = f"{need.index:04X}"
+    report = checked(tmp_path, without(index))
+    assert not report.usable
+    assert f"[{index}]" in places(report, Severity.ERROR)
+
+
+def test_missing_sub_index_that_is_needed_is_an_error_of_its_object(tmp_path: Path) -> None:
+    (finding,) = (each for each in checked(tmp_path, without("1016sub1")).findings if each.severity is E)
+    assert finding.line == line_of(SHIPPED, "1016")
+    assert "consumer heartbeat time 0x1016:01" in finding.expected
+
+
+def test_list_entry_that_is_no_index(tmp_path: Path) -> None:
+    text = edited("OptionalObjects", "4=0x1016", "4=heartbeat")
+    report = checked(tmp_path, text)
+    assert places(report, W) == ["[OptionalObjects] 4", "[1016]"]
+    assert report.usable
+
+
+def test_object_described_but_not_listed_and_the_reverse(tmp_path: Path) -> None:
+    text = edited("OptionalObjects", "33=0x60A9", "33=0x60AA")
+    warnings = [each for each in checked(tmp_path, text).findings if each.severity is W]
+    assert [(each.place, each.line) for each in warnings] == [
+        ("[OptionalObjects] 33", line_of(text, "OptionalObjects", "33")),
+        ("[60A9]", line_of(text, "60A9")),
+    ]
+    assert checked(tmp_path, text).usable
+
+
+def test_object_listed_twice_or_in_another_list(tmp_path: Path) -> None:
+    text = edited("ManufacturerObjects", "SupportedObjects=0", "SupportedObjects=1\n1=0x6502", text=SHIPPED + "\n")
+    (finding,) = checked(tmp_path, text).findings
+    assert "listed once" in finding.expected
+    moved = edited("OptionalObjects", "35=0x6502\n", "", text=edited("OptionalObjects", "=35", "=34", text=text))
+    (finding,) = checked(tmp_path, moved).findings
+    assert (finding.place, finding.expected) == ("[ManufacturerObjects] 1", "0x6502 under [OptionalObjects]")
+
+
+def test_sub_index_without_its_object(tmp_path: Path) -> None:
+    text = SHIPPED + "\n[2000sub1]\nParameterName=x\nDataType=5\nAccessType=rw\n"
+    (finding,) = checked(tmp_path, text).findings
+    assert (finding.place, finding.severity) == ("[2000sub1]", W)
+
+
+def test_object_that_is_used_and_one_that_is_not(tmp_path: Path) -> None:
+    """The same fault is an error in the one and a warning in the other."""
+    vendors = "\n[2000]\nParameterName=x\nDataType=0x99\nAccessType=rw\n"
+    listed = edited("ManufacturerObjects", "SupportedObjects=0", "SupportedObjects=1\n1=0x2000", text=SHIPPED + "\n")
+    assert [each.severity for each in checked(tmp_path, listed + vendors).findings] == [W]
+    assert [
+        each.severity for each in checked(tmp_path, edited("1001", "DataType=0x0005", "DataType=0x99")).findings
+    ] == [E]
+
+
+COMPACT = "\n[2000]\nParameterName=x\nObjectType=8\nDataType=6\nAccessType=rw\nDefaultValue=7\n{}\n"
+
+
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [
+        ("CompactSubObj=3", []),
+        ("CompactSubObj=3\nSubNumber=0", []),
+        ("CompactSubObj=3\nSubNumber=4", ["0 beside CompactSubObj"]),
+        ("CompactSubObj=255", ["a number from 0 to 254"]),
+        ("CompactSubObj=few", ["sub-indices, or CompactSubObj"]),
+        ("CompactSubObj=3\n[2000Name]\nNrOfEntries=2\n1=one\n2=two", []),
+        ("CompactSubObj=3\n[2000Name]\nNrOfEntries=4", ["at most 3, CompactSubObj"]),
+        ("SubNumber=0", ["sub-indices, or CompactSubObj"]),
+    ],
+)
+def test_compact_description(tmp_path: Path, keys: str, said: list[str]) -> None:
+    listed = edited("ManufacturerObjects", "SupportedObjects=0", "SupportedObjects=1\n1=0x2000", text=SHIPPED + "\n")
+    findings = checked(tmp_path, listed + COMPACT.format(keys)).findings
+    assert [each.severity for each in findings] == [W] * len(said)
+    assert all(expected in finding.expected for expected, finding in zip(said, findings, strict=True))
+
+
+def test_sub_indices_of_a_variable_are_not_read(tmp_path: Path) -> None:
+    report = checked(tmp_path, edited("1016", "ObjectType=0x8", "ObjectType=0x7"))
+    assert any("since it has sub-indices" in each.expected and each.severity is E for each in report.findings)
+
+
+def test_missing_object_type_is_no_fault(tmp_path: Path) -> None:
+    """CiA 306: without the key it is a variable."""
+    assert checked(tmp_path, edited("6071", "ObjectType=0x7\n", "")).findings == ()
+
+
+def test_spelling_is_told_once(tmp_path: Path) -> None:
+    text = re.sub(r"(?m)^\[(\w+)\]$", lambda match: f"[{match[1].upper()}]", SHIPPED)
+    (finding,) = checked(tmp_path, text).findings
+    assert (finding.severity, finding.line) == (N, 1)
+    assert finding.found.endswith("more")
+
+
+def test_unknown_section_is_a_note(tmp_path: Path) -> None:
+    (finding,) = checked(tmp_path, SHIPPED + "\n[OptionalObject]\n").findings
+    assert (finding.severity, finding.place) == (N, "[OptionalObject]")
+
+
+def test_type_as_canfestivals_editor_describes_it(tmp_path: Path) -> None:
+    """It makes an object of each type with limits; the real type is the default of its sub-index 1."""
+    text = edited("1001", "DataType=0x0005", "DataType=0x00A0")
+    text += "\n[A0]\nParameterName=limited\n[A0sub1]\nParameterName=type\nDataType=0x0005\nDefaultValue=0x0005\n"
+    assert checked(tmp_path, text).findings == ()
+
+
+def test_no_baud_rate_at_all(tmp_path: Path) -> None:
+    text = re.sub(r"(BaudRate_\d+)=1", r"\1=0", SHIPPED)
+    (finding,) = checked(tmp_path, text).findings
+    assert "at least one BaudRate_" in finding.expected
+
+
+@pytest.mark.parametrize(("gone", "left"), [("1800", "1A00"), ("1A00", "1800"), ("1400", "1600"), ("1600", "1400")])
+def test_pdo_parameter_without_the_other(tmp_path: Path, gone: str, left: str) -> None:
+    report = checked(tmp_path, without(gone))
+    assert any(each.place == f"[{left}]" and f"0x{gone} beside it" in each.expected for each in report.findings)
+    assert not report.usable
+
+
+def test_mapping_over_eight_bytes_of_objects_that_are_not_there_or_not_filled(tmp_path: Path) -> None:
+    """Mapped: 2 bytes that can't be, 4 more than fit, and a fourth entry that is not described."""
+    text = edited("1A00sub2", "0x60770010", "0x20000120")
+    text = edited("1A00sub1", "0x60410010", "0x606C0020", text=text)
+    text = edited("1A00sub0", "DefaultValue=3", "DefaultValue=4", text=text)
+    said = [each.expected for each in checked(tmp_path, text).findings]
+    assert "at most 8 bytes mapped" in said
+    assert any("sub-index 4, for sub-index 0 counts 4" in each for each in said)
+    assert any(each.startswith("the index, sub-index and length of an object described") for each in said)
+
+
+@pytest.mark.parametrize(
+    ("mapping", "allowed", "wanted"),
+    [
+        ("1600", "1", ["alone in the RPDO"]),
+        ("1600", "0", ["a filler", "alone in the RPDO"]),
+        ("1A00", "1", ["a filler"]),
+    ],
+)
+def test_filler_in_a_mapping(tmp_path: Path, mapping: str, allowed: str, wanted: list[str]) -> None:
+    text = edited("DummyUsage", "Dummy0005=0", f"Dummy0005={allowed}")
+    text = edited(f"{mapping}sub0", "DefaultValue=3", "DefaultValue=4", text=text)
+    text = edited(mapping, "SubNumber=4", "SubNumber=5", text=text)
+    entry = "ObjectType=0x7\nDataType=0x0007\nAccessType=rw\nDefaultValue=0x00050008\n"
+    text += f"\n[{mapping}sub4]\nParameterName=Filler\n{entry}"
+    said = [each.expected for each in checked(tmp_path, text).findings if "8 bytes" not in each.expected]
+    assert len(said) == len(wanted)
+    assert all(any(want in each for each in said) for want in wanted)
+
+
+def test_node_guarding_is_an_error(tmp_path: Path) -> None:
+    """The drivers refuse it too: it excludes the heartbeat."""
+    described = "\n[{}]\nParameterName=x\nDataType={}\nAccessType=rw\nDefaultValue={}\n"
+    listed = edited("OptionalObjects", "SupportedObjects=35", "SupportedObjects=37\n36=0x100C\n37=0x100D")
+    off = listed + described.format("100C", 6, 0) + described.format("100D", 5, 0)
+    assert checked(tmp_path, off).findings == ()
+    blank = listed + described.format("100C", 6, "") + described.format("100D", 5, "")
+    assert checked(tmp_path, blank).usable
+    on = listed + described.format("100C", 6, 100) + described.format("100D", 5, 3)
+    assert places(checked(tmp_path, on), Severity.ERROR) == ["[100C] DefaultValue"]
+
+
+@pytest.mark.parametrize("mapping", ["1600", "1A00"])
+def test_no_pdo_that_carries_what_is_needed(tmp_path: Path, mapping: str) -> None:
+    needed = {"1600": "0x60B20010", "1A00": "0x60770010"}[mapping]
+    text = SHIPPED.replace(f"DefaultValue={needed}", "DefaultValue=0x60780010")
+    errors = [each for each in checked(tmp_path, text).findings if each.severity is E]
+    (finding,) = (each for each in errors if each.place == f"[{mapping}]")
+    assert "that maps 0x60" in finding.expected
+    assert "0x6078:00 (16 bit)" in finding.found
+
+
+def test_order_of_the_report_is_that_of_the_lines(tmp_path: Path) -> None:
+    text = edited("60A9", "DefaultValue=0xFDB44700", "DefaultValue=", text=edited("DeviceInfo", "BaudRate_10=0\n", ""))
+    lines = [each.line or 0 for each in checked(tmp_path, without("1001", text)).findings]
+    assert lines == sorted(lines)
+    assert lines[0] == 0
+
+
+def test_finding_reads_as_a_sentence() -> None:
+    finding = EdsFinding(E, 3, "[6071] DataType", "an integer", "'9'", "Correct it.")
+    assert str(finding) == "[6071] DataType: expected an integer, found '9'. Correct it."
+
+
+def test_needed_objects_are_those_of_the_documentation() -> None:
+    """Every row of the table marked "yes" is checked for, and nothing else is."""
+    table = (DOCS / "supported-protocols.md").read_text().partition("| object | name | used for | needed |")[2]
+    rows = [row.split("|") for row in table.partition("\n\n")[0].splitlines()[2:]]
+    needed = {index for row in rows if row[4].strip() == "yes" for index in re.findall(r"0x(\w{4})", row[1])}
+    pdos = {"1400", "1600", "1800", "1A00"}
+    assert needed - pdos == {f"{need.index:04X}" for need in NEEDS}
+    assert pdos <= needed
+    assert set(CONFIGURED).isdisjoint(need.index for need in NEEDS)

@@ -1,0 +1,205 @@
+"""Each rule of the EDS checker: the shipped file with one fault, found with its line, and nothing else found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from drivers.eds_finding import Severity
+from tests.drivers.eds_bench import E, N, W, checked, edited, line_of
+
+MORE = 20
+"""Lines put before the file, so that a line number counted from a section would be noticed."""
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One text replaced in one section, and the one finding it must give."""
+
+    section: str
+    old: str
+    new: str
+    severity: Severity
+    key: str
+    expected: str
+    found: str
+
+
+EDITS = [
+    # sections
+    Fault("FileInfo", "EDSVersion=4.0\n", "", N, "EDSVersion", "this key", "none"),
+    Fault(
+        "FileInfo",
+        "CreationDate=01-15-2025",
+        "CreationDate=15.01.2025",
+        N,
+        "CreationDate",
+        "mm-dd-yyyy",
+        "'15.01.2025'",
+    ),
+    Fault("FileInfo", "CreationTime=09:00AM", "CreationTime=21:00", N, "CreationTime", "AM or PM", "'21:00'"),
+    Fault("DeviceInfo", "VendorName", "Vendor", N, "VendorName", "this key", "none"),
+    Fault("DeviceInfo", "LSS_Supported=0\n", "", W, "LSS_Supported", "this key", "none"),
+    Fault("DeviceInfo", "LSS_Supported=0", "LSS_Supported=yes", W, "LSS_Supported", "0 to 1", "'yes'"),
+    Fault("DeviceInfo", "BaudRate_500=1", "BaudRate_500=500", W, "BaudRate_500", "0 or 1", "'500'"),
+    Fault("DeviceInfo", "BaudRate_800=0\n", "", W, "BaudRate_800", "0 or 1", "none"),
+    Fault("DeviceInfo", "Granularity=8", "Granularity=65", W, "Granularity", "0 to 64", "'65'"),
+    Fault("DeviceInfo", "Granularity=8", "Granularity=0", W, "Granularity", "8, so that", "no mapping, '0'"),
+    Fault("DeviceInfo", "NrOfRXPDO=1", "NrOfRXPDO=4", W, "NrOfRXPDO", "1, the RPDOs described", "'4'"),
+    Fault(
+        "DeviceInfo",
+        "0x000003E7",
+        "0x000003E8",
+        W,
+        "VendorNumber",
+        "0x000003E7, the default of 0x1018:01",
+        "'0x000003E8'",
+    ),
+    Fault("Comments", "Lines=8", "Lines=9", N, "Lines", "8, the comment lines", "'9'"),
+    # lists
+    Fault("OptionalObjects", "Objects=35", "Objects=34", W, "SupportedObjects", "35, the objects", "'34'"),
+    Fault("OptionalObjects", "SupportedObjects=35\n", "", W, "SupportedObjects", "35, the objects", "none"),
+    Fault("OptionalObjects", "35=0x6502", "36=0x6502", W, "", "keys 1 to 35 without a gap", "none with 35"),
+    # entries
+    Fault("6071", "ParameterName=Target torque\n", "", W, "ParameterName", "a name", "none"),
+    Fault("1018sub1", "ParameterName=Vendor-ID", "ParameterName=", W, "ParameterName", "a name", "none"),
+    Fault("6502", "ObjectType=0x7", "ObjectType=0x4", E, "ObjectType", "one of 0x7 (VAR)", "'0x4'"),
+    Fault("1018sub3", "ObjectType=0x7", "ObjectType=0x8", W, "ObjectType", "0x7 (VAR) for a sub-index", "'0x8'"),
+    Fault("1018", "SubNumber=5", "SubNumber=4", W, "SubNumber", "5, the sub-indices described", "'4'"),
+    Fault("1018", "SubNumber=5\n", "", W, "SubNumber", "5, the sub-indices described", "none"),
+    Fault("1018", "ObjectType=0x9\n", "", W, "ObjectType", "since it has sub-indices", "none"),
+    Fault("6071", "PDOMapping=1", "PDOMapping=1\nSubNumber=2", W, "SubNumber", "no sub-indices of", "'2'"),
+    Fault("1018sub0", "DefaultValue=4", "DefaultValue=5", W, "DefaultValue", "4, the highest sub-index", "'5'"),
+    Fault("1018sub3", "DataType=0x0007", "DataType=0x0017", E, "DataType", "a data type of CiA 301", "'0x0017'"),
+    Fault("6087", "DataType=0x0007", "DataType=U32", W, "DataType", "a data type of CiA 301", "'U32'"),
+    Fault("6078", "AccessType=ro\n", "", W, "AccessType", "one of ro, wo, rw", "none"),
+    Fault("6077", "AccessType=ro", "AccessType=r", E, "AccessType", "one of ro, wo, rw", "'r'"),
+    Fault("6087", "PDOMapping=0", "PDOMapping=no", W, "PDOMapping", "0 or 1", "'no'"),
+    Fault("6087", "PDOMapping=0", "PDOMapping=", W, "PDOMapping", "0 or 1", "a blank here"),
+    Fault(
+        "6040", "DataType=0x0006", "DataType=0x0003", W, "DataType", "0x0006 (UNSIGNED16) for controlword", "'0x0003'"
+    ),
+    # values
+    Fault("6072", "DefaultValue=1000", "DefaultValue=1000.0", E, "DefaultValue", "UNSIGNED16, 0 to 65535", "'1000.0'"),
+    Fault("6087", "DefaultValue=100000", "DefaultValue=0x1FFFFFFFF", W, "DefaultValue", "UNSIGNED32", "'0x1FFFFFFFF'"),
+    Fault(
+        "6072",
+        "DefaultValue=1000",
+        "DefaultValue=01000",
+        W,
+        "DefaultValue",
+        "without a leading 0",
+        "octal, 512: '01000'",
+    ),
+    Fault(
+        "6072",
+        "DefaultValue=1000",
+        "DefaultValue=0900",
+        E,
+        "DefaultValue",
+        "without a leading 0",
+        "no octal number '0900'",
+    ),
+    Fault(
+        "1014",
+        "$NODEID+0x80",
+        "0x80+$NODEID",
+        W,
+        "DefaultValue",
+        "$NODEID+0x80, the node id in front",
+        "'0x80+$NODEID'",
+    ),
+    Fault("1003sub0", "HighLimit=4", "HighLimit=256", W, "HighLimit", "UNSIGNED8, 0 to 255", "'256'"),
+    Fault("6007", "LowLimit=0", "LowLimit=4", W, "HighLimit", "at least LowLimit (4)", "'3'"),
+    Fault("6007", "DefaultValue=2", "DefaultValue=4", E, "DefaultValue", "at most HighLimit (3)", "'4'"),
+    Fault("6007", "DefaultValue=2", "DefaultValue=-1", E, "DefaultValue", "at least LowLimit (0)", "'-1'"),
+    Fault("1029sub1", "DefaultValue=0", "DefaultValue=3", W, "DefaultValue", "at most HighLimit (2)", "'3'"),
+    # PDOs
+    Fault("1400sub1", "$NODEID+0x200", "0x20000200", E, "DefaultValue", "11 bits", "'0x20000200'"),
+    Fault(
+        "1400sub1",
+        "$NODEID+0x200",
+        "$NODEID+0x600",
+        E,
+        "DefaultValue",
+        "an identifier a PDO may have",
+        "0x67F for node 127",
+    ),
+    Fault("1400sub1", "$NODEID+0x200", "0x80", E, "DefaultValue", "an identifier a PDO may have", "0x080 for node 127"),
+    Fault(
+        "1800sub1",
+        "$NODEID+0x180",
+        "$NODEID+0x200",
+        E,
+        "DefaultValue",
+        "another identifier than 0x1400",
+        "'$NODEID+0x200'",
+    ),
+    Fault("1A00sub2", "0x60770010", "0x60770008", E, "DefaultValue", "16 bit for 0x6077:00 (INTEGER16", "8 bit in"),
+    Fault(
+        "6077", "PDOMapping=1", "PDOMapping=0", E, "[1A00sub2] DefaultValue", "PDOMapping=1; 0x6077:00", "'0x60770010'"
+    ),
+    Fault("6071", "AccessType=rw", "AccessType=rwr", E, "[1600sub2] DefaultValue", "a RPDO may carry", "'0x60710010'"),
+    # needs
+    Fault("1000", "0x00020192", "0x00020191", W, "DefaultValue", "profile 402", "401 in '0x00020191'"),
+    Fault(
+        "1017",
+        "AccessType=rw",
+        "AccessType=ro",
+        E,
+        "AccessType",
+        "heartbeat time 0x1017:00 that can be written",
+        "'ro'",
+    ),
+    Fault("6061", "AccessType=ro", "AccessType=wo", E, "AccessType", "display 0x6061:00 that can be read", "'wo'"),
+    Fault("60A9", "DefaultValue=0xFDB44700", "DefaultValue=", E, "DefaultValue", "a unit of angle per time", "none"),
+    Fault("60A9", "0xFDB44700", "0xFD014700", E, "DefaultValue", "a unit of angle per time", "'0xFD014700'"),
+    Fault("605A", "DefaultValue=6", "DefaultValue=", E, "DefaultValue", "a value for 0x605A", "none"),
+    Fault("605E", "AccessType=rw", "AccessType=const", E, "AccessType", "0x605E that can be written", "'const'"),
+    Fault("6007", "DefaultValue=2", "DefaultValue=0", W, "DefaultValue", "there shall be no torque", "no action, '0'"),
+    Fault("1005", "0x00000080", "0x00000081", E, "DefaultValue", "the host sends SYNC with 0x080", "'0x00000081'"),
+    Fault("1005", "0x00000080", "0x40000080", E, "DefaultValue", "the drive does not", "'0x40000080'"),
+    Fault("1014", "$NODEID+0x80", "$NODEID+0x100", W, "DefaultValue", "$NODEID+0x80", "'$NODEID+0x100'"),
+    Fault("1800sub2", "DefaultValue=1", "DefaultValue=255", E, "DefaultValue", "1, feedback at every SYNC", "'255'"),
+    Fault("1800sub2", "DefaultValue=1", "DefaultValue=2", E, "DefaultValue", "1, feedback at every SYNC", "'2'"),
+    Fault(
+        "1400sub2", "DefaultValue=1", "DefaultValue=255", W, "DefaultValue", "takes effect at SYNC", "on arrival, '255'"
+    ),
+    Fault("1600sub1", "AccessType=rw", "AccessType=ro", E, "AccessType", "0x1600:01 that can be written", "'ro'"),
+    Fault(
+        "1400sub1",
+        "$NODEID+0x200",
+        "$NODEID+0x80000200",
+        W,
+        "DefaultValue",
+        "a PDO that is switched on",
+        "one switched off",
+    ),
+]
+
+
+def _id(each: object) -> str:
+    return (
+        f"{each.section} {each.new.strip() or 'without ' + each.old.strip()}" if isinstance(each, Fault) else str(each)
+    )
+
+
+@pytest.mark.parametrize("fault", EDITS, ids=_id)
+def test_one_fault_is_one_finding_with_its_line(tmp_path: Path, fault: Fault) -> None:
+    text = ";\n" * MORE + edited(fault.section, fault.old, fault.new)
+    report = checked(tmp_path, text)
+    (finding,) = report.findings
+    assert finding.severity is fault.severity
+    assert report.usable is (fault.severity is not Severity.ERROR)
+    section, _, key = fault.key.rpartition(" ")
+    section = section.strip("[]") or fault.section
+    assert finding.place == f"[{section}] {key}".strip()
+    assert fault.expected in finding.expected
+    assert fault.found in finding.found
+    there = key and any(
+        line.startswith(f"{key}=") for line in text.split(f"[{section}]\n")[1].split("\n[")[0].split("\n")
+    )
+    assert finding.line == line_of(text, section, key if there else "")
+    assert finding.advice.endswith(".")

@@ -1,0 +1,138 @@
+"""Another maker's drive, by its EDS and a few lines of the rig file: checked, configured, armed, under torque.
+
+The EDS has the habits of real ones: torque in PDO2, blank PDOMapping, wrong counts, capitals, decimal formulas.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from math import pi
+from pathlib import Path
+
+import pytest
+from canopen import import_od
+
+from drivers.cia402 import PowerState
+from drivers.eds_check import check_eds
+from drivers.eds_check.needs import NEEDS, Need
+from drivers.eds_file import EdsFile
+from drivers.eds_finding import Severity
+from drivers.errors import ConfigMismatch
+from drivers.inverter import Inverter
+from drivers.resources import data_file
+from hil.config.rig_file import read_rig
+from hil.rig.build import inverter_settings
+from hil.simulator.inverter_settings import FaultAtStep, InverterFaults, SimulatedInverter
+from hil.simulator.plant import RigidPlant
+from tests.drivers.can_bench import M1, Bench, bench, guarded
+from tests.drivers.eds_bench import without
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+OTHER_EDS = EXAMPLES / "other_drive.eds"
+OTHER = replace(
+    inverter_settings("m1", read_rig(EXAMPLES / "other_drive.toml").inverters.m1),
+    sdo_timeout_s=M1.sdo_timeout_s,
+)
+SIMULATED = SimulatedInverter(OTHER.node_id, OTHER.rated_torque_nm, eds_path=OTHER_EDS)
+COUNT_NM, COUNT_RAD_S = 0.45, 0.1 * 2 * pi / 60
+
+
+@pytest.fixture
+def other() -> Iterator[Bench]:
+    plant = RigidPlant(100.0, 0.5, speed_rad_s=150.0)
+    with bench(settings=OTHER, simulated=SIMULATED, plant=plant) as rig:
+        yield rig
+
+
+def test_its_habits_are_named_and_borne() -> None:
+    report = check_eds(OTHER_EDS)
+    assert report.usable
+    assert {finding.place for finding in report.findings if finding.severity is Severity.WARNING} == {
+        "[DEVICEINFO] BaudRate_800",
+        "[DEVICEINFO] NrOfRXPDO",
+        "[DEVICEINFO] NrOfTXPDO",
+        "[1018SUB0] PDOMapping",
+        "[OPTIONALOBJECTS] SupportedObjects",
+        "[1402SUB1] DefaultValue",
+        "[1800SUB1] DefaultValue",
+        "[1802SUB1] DefaultValue",
+        "[MANUFACTUREROBJECTS] SupportedObjects",
+        "[MANUFACTUREROBJECTS] 4",
+        "[2010] DefaultValue",
+    }
+
+
+@pytest.mark.filterwarnings("ignore:The 'warn' method")
+def test_the_library_alone_would_lose_every_sub_index() -> None:
+    """Why there is a reader of this project's own."""
+    with OTHER_EDS.open(encoding="latin-1") as file:
+        theirs = import_od(file, 11)
+    assert list(theirs[0x1601].values()) == []
+    assert len(list(EdsFile(OTHER_EDS, 11).dictionary[0x1601].values())) == 5
+
+
+def test_pdo_2_carries_torque_and_feedback() -> None:
+    eds = EdsFile(OTHER_EDS, 11)
+    rpdo = eds.pdo_carrying(0x1400, 0x1600, 0x6040, 0x6071, 0x60B2)
+    tpdo = eds.pdo_carrying(0x1800, 0x1A00, 0x6041, 0x6077, 0x606C)
+    assert (rpdo.communication_index, rpdo.cob_id) == (0x1401, 0x300 + 11)
+    assert (tpdo.communication_index, tpdo.cob_id) == (0x1801, 0x280 + 11)
+
+
+def test_compact_objects_and_texts_are_read() -> None:
+    dictionary = EdsFile(OTHER_EDS, 11).dictionary
+    assert [dictionary.get_variable(0x1003, n).data_type for n in range(9)] == [5, *[7] * 8]
+    assert dictionary.get_variable(0x1003, 0).default == 8
+    assert dictionary.get_variable(0x1008).default == "TX-4"
+    assert dictionary.get_variable(0x2000).default == 25.0
+
+
+def test_the_whole_way_to_torque(other: Bench) -> None:
+    assert other.m1.check() == ()
+    other.m1.configure()
+    other.m1.arm()
+    other.cycle(guarded(135.0, 13.5))
+    feedback = other.cycle(guarded(135.0, 13.5))
+    assert other.rig.torque_nm[0] == pytest.approx(148.5)
+    assert feedback.state is PowerState.OPERATION_ENABLED
+    assert feedback.torque_nm == pytest.approx(feedback.torque_raw * COUNT_NM)
+    assert feedback.torque_nm == pytest.approx(148.5, abs=5 * COUNT_NM)
+    assert feedback.speed_rad_s == pytest.approx(feedback.speed_raw * COUNT_RAD_S)
+    assert feedback.speed_rad_s == pytest.approx(150.0, abs=0.5)
+    other.m1.disarm()
+    assert other.rig.torque_nm[0] == 0.0
+    assert other.m1.check() == ()
+
+
+def test_drive_is_refused_with_the_shipped_eds(other: Bench) -> None:
+    """It is another device, another unit of speed, and its torque is in another PDO."""
+    with bench(settings=replace(OTHER, eds_path=None), simulated=SIMULATED) as rig:
+        with pytest.raises(ConfigMismatch, match="SI unit velocity 0x60A9"):
+            rig.m1.configure()
+        assert rig.rig.torque_nm[0] == 0.0
+
+
+@pytest.mark.parametrize("need", NEEDS, ids=lambda need: need.name)
+def test_what_the_checker_calls_needed_the_driver_does_not_do_without(need: Need, tmp_path: Path) -> None:
+    """An EDS without the object: this program stops at it, before there is torque, and names it."""
+    eds = tmp_path / "poor.eds"
+    eds.write_text(without(f"{need.index:04X}"))
+    in_fault = InverterFaults(fault=FaultAtStep(0, 0x4310)) if need.index == 0x603F else InverterFaults()
+    with pytest.raises(ConfigMismatch, match=f"0x{need.index:04X}"), bench(in_fault) as rig:
+        whole_way(rig, eds)
+
+
+def whole_way(rig: Bench, eds: Path) -> None:
+    """Drive m1 by another EDS, on the same link."""
+    m1 = Inverter(rig.link, replace(M1, eds_path=eds))
+    m1.check()
+    m1.fault()
+    m1.configure()
+    m1.arm()
+
+
+def test_shipped_eds_goes_the_whole_way() -> None:
+    """Without this the test above might fail for another reason than the missing object."""
+    with bench() as rig:
+        whole_way(rig, data_file("inverter.eds"))

@@ -1,0 +1,108 @@
+"""A dead host is noticed, or it is said that it is not; nothing of it commands torque."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from drivers.cia402 import PowerState
+from drivers.errors import ConfigMismatch, DeviceFault
+from drivers.resources import data_file
+from hil.simulator.inverter_settings import FaultAtStep, InverterFaults
+from tests.drivers.can_bench import M1, Bench, bench
+
+PERIOD_S = 0.001
+QUICK = replace(M1, rpdo_deadline_ms=50)
+
+
+def torques(rig: Bench) -> list[float]:
+    seen: list[float] = []
+    rig.rig.add_step_callback(lambda time_s: seen.append(rig.rig.torque_nm[0]))
+    return seen
+
+
+def test_drive_that_watches_its_host_is_proved_to_stop_without_any_torque() -> None:
+    with bench(settings=QUICK) as rig:
+        seen = torques(rig)
+        assert rig.m1.prove_stop(PERIOD_S) == ()
+        assert len(seen) > 5
+        assert set(seen) == {0.0}
+        assert rig.m1._power.state() is PowerState.SWITCH_ON_DISABLED
+
+
+@pytest.mark.parametrize("abort_connection", [1, 2, 3])
+def test_every_way_to_abort_the_connection_is_proved_and_a_fault_it_makes_is_reset(abort_connection: int) -> None:
+    settings = replace(QUICK, option_codes={0x6007: abort_connection})
+    with bench(settings=settings) as rig:
+        assert rig.m1.prove_stop(PERIOD_S) == ()
+        assert rig.m1._power.state() is PowerState.SWITCH_ON_DISABLED
+        assert rig.m1.fault() is None
+
+
+def test_drive_can_be_used_after_the_proof() -> None:
+    with bench(settings=QUICK) as rig:
+        rig.m1.prove_stop(PERIOD_S)
+        rig.m1.configure()
+        rig.m1.arm()
+        assert rig.cycle().state is PowerState.OPERATION_ENABLED
+        rig.m1.raise_if_faulted()
+
+
+def test_drive_that_does_nothing_without_its_host_is_found() -> None:
+    """It tells both losses, and would keep its torque: the option code does not hold."""
+    with bench(settings=QUICK) as rig:
+        node = rig.rig._m1
+        assert node is not None
+        node._device.lose_connection = lambda error_code: None  # type: ignore[method-assign]
+        differences = rig.m1.prove_stop(PERIOD_S)
+    assert [each.what for each in differences] == ["stop without commands", "stop without heartbeat"]
+    assert differences[0].found == (
+        "EMCY 0x8250 RPDO timeout: the host's command did not come in time (error register 0x11), "
+        "power state ready to switch on"
+    )
+
+
+def test_drive_that_does_not_notice_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("drivers.stop_proof.PATIENCE_S", 0.0)
+    with bench(settings=QUICK) as rig:
+        node = rig.rig._m1
+        assert node is not None
+        node.look_for_host = lambda now_ns: None  # type: ignore[method-assign]
+        differences = rig.m1.prove_stop(PERIOD_S)
+    assert [each.found for each in differences] == ["no EMCY, power state ready to switch on"] * 2
+    assert differences[0].expected == "an EMCY 0x81xx or 0x82xx within 50 ms, and READY TO SWITCH ON left"
+
+
+def test_drive_without_an_rpdo_deadline_is_said_to_have_none(tmp_path: Path) -> None:
+    eds = tmp_path / "no_deadline.eds"
+    text = data_file("inverter.eds").read_text()
+    start = text.index("[1400sub5]")
+    eds.write_text(text[:start] + text[text.index("\n[", start) + 1 :])
+    with bench(settings=replace(QUICK, eds_path=eds)) as rig:
+        [difference] = rig.m1.prove_stop(PERIOD_S)
+    assert difference.what == "stop without commands"
+    assert "none in the EDS" in difference.found
+
+
+def test_drive_in_fault_is_not_proved() -> None:
+    with bench(InverterFaults(fault=FaultAtStep(0, 0x2310)), settings=QUICK) as rig:
+        with pytest.raises(DeviceFault, match="power state is fault, error code 0x603F is 0x2310"):
+            rig.m1.prove_stop(PERIOD_S)
+
+
+def test_drive_that_somebody_drives_is_left_alone() -> None:
+    with bench(settings=QUICK) as rig:
+        rig.m1.configure()
+        rig.m1.arm()
+        with pytest.raises(DeviceFault, match="another program drives it"):
+            rig.m1.prove_stop(PERIOD_S)
+        assert rig.m1._power.state() is PowerState.OPERATION_ENABLED
+
+
+@pytest.mark.parametrize("locked", [0x1016, 0x1400])
+def test_drive_that_can_not_be_made_to_watch_is_refused(locked: int) -> None:
+    with bench(InverterFaults(locked_objects=frozenset({locked})), settings=QUICK) as rig:
+        with pytest.raises(ConfigMismatch, match=f"object 0x{locked:04X}.*0x06010002.*read only"):
+            rig.m1.prove_stop(PERIOD_S)
