@@ -28,10 +28,11 @@ test: lint
 campaign: $(READY)
 	$(BIN)/python -m pytest -n 2 -m campaign
 
-# Speed as ratios to scipy doing the same fit, growth with the length, memory: docs/benchmarks.md.
+# Speed as ratios to scipy, a bare C loop, raw python-can; growth with the length, memory: docs/benchmarks.md.
 bench: $(READY)
 	$(BIN)/python -m tests.benchmarks.fit
 	$(BIN)/python -m tests.benchmarks.diagnosis
+	$(BIN)/python -m tests.benchmarks.fieldbus
 
 lint: $(READY)
 	$(BIN)/ruff check .

@@ -1,4 +1,4 @@
-"""``hil check``: whether every device is there, and is the one the rig file describes."""
+"""``hil check``: whether every device is there and is the one the rig file describes, and whether an EDS is sound."""
 
 from __future__ import annotations
 
@@ -11,36 +11,77 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from drivers.eds_check import EdsReport, check_eds
 from drivers.errors import ConfigMismatch
-from hil.config.rig_file import read_rig
+from hil.config.rig_file import Rig, read_rig
+from hil.errors import InputError, UsageError
+from hil.report.eds_findings import eds_lines, eds_section, verdict
 from hil.rig.addresses import with_addresses
 from hil.rig.check import Finding, Verdict, check_rig
 
 app = typer.Typer(add_completion=False)
 
 
-@app.command(epilog="Example: hil check examples/rig.toml")
+@app.command(epilog="Examples: hil check examples/rig.toml; hil check --eds examples/other_drive.eds")
 def check(
-    rig: Annotated[Path, typer.Argument(metavar="RIG", help="Rig file.")],
+    rig: Annotated[Path | None, typer.Argument(metavar="RIG", help="Rig file.")] = None,
+    eds: Annotated[
+        list[Path] | None, typer.Option("--eds", metavar="FILE", help="EDS to check by itself; may be repeated.")
+    ] = None,
+    prove_stop: Annotated[
+        bool,
+        typer.Option(
+            "--prove-stop",
+            help="Play dead before drives that agree, and see that they stop. Configures them and leaves them "
+            "disabled; no torque is commanded. Not while another program drives them.",
+        ),
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")] = False,
     bus: Annotated[str | None, typer.Option(metavar="URL", help="CAN bus in place of the rig file's.")] = None,
     modbus: Annotated[str | None, typer.Option(metavar="HOST:PORT", help="PLC in place of the rig file's.")] = None,
 ) -> None:
     """Find both inverters and the PLC and compare them with rig file, EDS and register map.
 
-    Reads only: nothing is armed, no torque is commanded. Exit status 3 if a device is missing or differs.
+    Reads only, but for --prove-stop: nothing is armed, no torque is commanded. Exit status 3 if a device is
+    missing or differs.
+
+    With --eds, check such a file line by line against CiA 306 and against what this program needs of a drive:
+    exit status 2 if it can't be used. Without RIG no device is looked for.
     """
-    rig_file = with_addresses(read_rig(rig), bus, modbus)
-    findings = check_rig(rig_file)
+    if rig is None and not eds:
+        raise UsageError("expected a rig file, an EDS with --eds, or both, came neither. See: hil check --help")
+    if rig is None and (bus or modbus or prove_stop):
+        raise UsageError("--bus, --modbus and --prove-stop concern the rig's devices: expected a rig file beside them")
+    rig_file = None if rig is None else with_addresses(read_rig(rig), bus, modbus)
+    reports = tuple(check_eds(path) for path in eds or ())
+    findings = () if rig_file is None or not all(each.usable for each in reports) else check_rig(rig_file, prove_stop)
     if as_json:
-        typer.echo(json.dumps(_document(rig_file.name, findings), indent=2))
+        typer.echo(json.dumps(_document(rig_file, findings, reports), indent=2))
     else:
-        _print(rig_file.name, findings)
-    if bad := [finding.device for finding in findings if finding.verdict is not Verdict.AGREES]:
+        _print_eds(reports)
+        if rig_file is not None and findings:
+            _print(rig_file.name, findings)
+    _refuse(reports, rig_file, findings)
+
+
+def _refuse(reports: tuple[EdsReport, ...], rig: Rig | None, findings: tuple[Finding, ...]) -> None:
+    if unusable := [each for each in reports if not each.usable]:
+        raise InputError(
+            f"{'; '.join(f'EDS {each.path} is {verdict(each)}' for each in unusable)}: see above. "
+            "Mend a copy of the file, or take the one of the drive's firmware version."
+        )
+    bad = [finding.device for finding in findings if finding.verdict is not Verdict.AGREES]
+    if rig is not None and bad:
         raise ConfigMismatch(
-            f"rig {rig_file.name!r}: {', '.join(bad)}: expected all there and as described, see above. "
+            f"rig {rig.name!r}: {', '.join(bad)}: expected all there and as described, see above. "
             "Correct the rig file, or mend or connect the device it describes."
         )
+
+
+def _print_eds(reports: tuple[EdsReport, ...]) -> None:
+    for report in reports:
+        for line in eds_lines(report):
+            typer.echo(line)
 
 
 def _print(name: str, findings: tuple[Finding, ...]) -> None:
@@ -58,8 +99,12 @@ def _print(name: str, findings: tuple[Finding, ...]) -> None:
             console.print(f"{finding.device}: {note}", markup=False, highlight=False)
 
 
-def _document(name: str, findings: tuple[Finding, ...]) -> dict[str, Any]:
-    return {"schema": "hil.check/1", "rig": name, "devices": [_device(finding) for finding in findings]}
+def _document(rig: Rig | None, findings: tuple[Finding, ...], reports: tuple[EdsReport, ...]) -> dict[str, Any]:
+    files = [eds_section(report) for report in reports]
+    if rig is None or not findings:
+        return {"schema": "hil.eds_check/1", "files": files}
+    devices = [_device(finding) for finding in findings]
+    return {"schema": "hil.check/1", "rig": rig.name, "devices": devices} | ({"eds": files} if files else {})
 
 
 def _device(finding: Finding) -> dict[str, Any]:

@@ -56,9 +56,11 @@ def identify(
     from hil.config.model_file import read_model_for_recordings
     from hil.errors import ModelFileError
     from hil.recording import read_records
+    from hil.recording.timing_check import require_even_cycles
     from hil.report.outputs import publish, require_folder
 
     require_folder(out)
+    require_even_cycles(recordings)
     settings = Settings(sample_time_s=sample_time, samples=samples or None)
     file = None if model is None else read_model_for_recordings(model)
     if model is not None and file is not None and file.on_bench:

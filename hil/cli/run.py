@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
+from dataclasses import asdict, dataclass
 from enum import Enum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from drivers.can_link import CanLink
 from hil.cli.run_progress import RunProgress
 from hil.config.rig_file import Rig, read_rig
 from hil.errors import UsageError
@@ -17,11 +20,15 @@ from hil.recording.writer import RecordingWriter
 from hil.rig.addresses import with_addresses
 from hil.rig.build import open_devices
 from hil.rig.drive import RunSummary
+from hil.rig.experiments.base import Phase
 from hil.rig.metadata import run_metadata
 from hil.rig.pacing import FreePacer, Pacer, RealTimePacer, period_ns
 from hil.rig.plan import plan_run
+from hil.rig.realtime import NOT_ASKED, RealTimeGrants, real_time
 from hil.rig.session import run_plan
 from hil.rig.stop import StopRequest, stop_on_signals
+from hil.rig.timing import RunTiming, timing_lines
+from hil.rig.trace import BusTrace
 from hil.simulator.loopback import bus_address
 from hil.simulator.rig_server import IN_PROCESS, required_simulation
 
@@ -51,6 +58,12 @@ def run(
     pace: Annotated[Pace, typer.Option(help="By the wall clock, or as fast as a simulated rig answers.")] = Pace.REAL,
     bus: Annotated[str | None, typer.Option(metavar="URL", help="CAN bus in place of the rig file's.")] = None,
     modbus: Annotated[str | None, typer.Option(metavar="HOST:PORT", help="PLC in place of the rig file's.")] = None,
+    trace: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Bus trace beside it: every frame; .blf, .log (candump) or .asc; a new file."
+        ),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Run one experiment and record its measured part.
@@ -64,21 +77,72 @@ def run(
         return
     if out is None:
         raise UsageError("hil run: expected --out REC, a recording to write, or --dry-run; came neither.")
-    summary = _record(rig_file, experiment, out, _pacer(rig_file, pace), run_metadata(rig, experiment))
-    _report(summary, out, as_json)
+    metadata = {**run_metadata(rig, experiment), "pace": pace.value}
+    job = _Job(rig_file, experiment, out, trace, _pacer(rig_file, pace), metadata)
+    with real_time() if pace is Pace.REAL else nullcontext(NOT_ASKED) as grants:
+        summary = _record(job, grants)
+    _report(job, summary, grants, as_json)
 
 
-def _record(rig: Rig, experiment: str, out: Path, pacer: Pacer, metadata: dict[str, str]) -> RunSummary:
-    plan = plan_run(rig, experiment)
-    stop = StopRequest()
-    recorder = RecordingWriter(out, metadata)
+@dataclass(frozen=True, slots=True)
+class _Job:
+    """One run as it was asked for."""
+
+    rig: Rig
+    experiment: str
+    out: Path
+    trace: Path | None
+    pacer: Pacer
+    metadata: dict[str, str]
+
+
+def _record(job: _Job, grants: RealTimeGrants) -> RunSummary:
+    plan = plan_run(job.rig, job.experiment)
+    stop, timing = StopRequest(), RunTiming(job.pacer.period_ns)
+    recorder = RecordingWriter(job.out, {**job.metadata, "real_time": json.dumps(grants.as_json())})
     try:
-        with stop_on_signals(stop), recorder, open_devices(rig) as devices, RunProgress(plan) as progress:
-            return run_plan(devices, plan, pacer, recorder, stop, progress.show)
+        with (
+            stop_on_signals(stop),
+            recorder,
+            _described_at_the_end(recorder, timing),
+            open_devices(job.rig) as devices,
+            _traced(devices.link, job.trace) as trace,
+            RunProgress(plan) as progress,
+        ):
+
+            def show(phase: Phase, time_s: float) -> None:
+                if trace is not None:
+                    trace.raise_if_failed()
+                progress.show(phase, time_s)
+
+            return run_plan(devices, plan, job.pacer, recorder, stop, show, timing)
     except BaseException:
         if recorder.kept is not None:
             typer.echo(f"{recorder.kept} holds the {recorder.n_samples} samples up to there", err=True)
         raise
+
+
+@contextmanager
+def _described_at_the_end(recorder: RecordingWriter, timing: RunTiming) -> Iterator[None]:
+    """Put the timing into the recording, however the run ends."""
+    try:
+        yield
+    finally:
+        recorder.describe("timing", json.dumps(timing.as_json()))
+
+
+@contextmanager
+def _traced(link: CanLink, path: Path | None) -> Iterator[BusTrace | None]:
+    """Trace the bus until the end of the block, however it ends; None where no trace was asked for."""
+    if path is None:
+        yield None
+        return
+    with BusTrace(path) as trace:
+        link.trace_by(trace.take)
+        try:
+            yield trace
+        finally:
+            link.trace_by(None)
 
 
 def _pacer(rig: Rig, pace: Pace) -> Pacer:
@@ -90,14 +154,31 @@ def _pacer(rig: Rig, pace: Pace) -> Pacer:
     return FreePacer(period_ns(rig.period_s))
 
 
-def _report(summary: RunSummary, out: Path, as_json: bool) -> None:
+def _report(job: _Job, summary: RunSummary, grants: RealTimeGrants, as_json: bool) -> None:
+    timing = summary.timing
     if as_json:
-        typer.echo(json.dumps({"schema": "hil.run/1", "recording": str(out), **asdict(summary)}))
+        document = {
+            "schema": "hil.run/1",
+            "recording": str(job.out),
+            "trace": None if job.trace is None else str(job.trace),
+            "cycles": summary.cycles,
+            "recorded": summary.recorded,
+            "flagged": summary.flagged,
+            "most_late_ns": summary.most_late_ns,
+            "timing": timing.as_json(),
+            "real_time": grants.as_json(),
+        }
+        typer.echo(json.dumps(document))
         return
     typer.echo(
-        f"{out}: {summary.recorded} samples, {summary.flagged} flagged; "
+        f"{job.out}: {summary.recorded} samples, {summary.flagged} flagged; "
         f"latest cycle {summary.most_late_ns / 1e6:.1f} ms late"
     )
+    for line in timing_lines(timing):
+        typer.echo(f"  {line}")
+    typer.echo(f"  {grants.statement}")
+    if job.trace is not None:
+        typer.echo(f"{job.trace}: every frame of the bus")
 
 
 def _predict(rig: Rig, experiment: str, as_json: bool) -> None:

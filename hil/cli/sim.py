@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.markup import escape
 
 from hil.config.rig_file import Rig, read_rig
 from hil.rig.stop import StopRequest, stop_on_signals
@@ -44,9 +45,18 @@ def sim(
         list[str] | None,
         typer.Option(
             metavar="SPEC",
-            help=f"Let a device fail, where told after S seconds of simulated time: {known_faults()}. May be repeated.",
+            help=f"Let a device fail, where told after S seconds of simulated time: {escape(known_faults())}. "
+            "May be repeated.",
         ),
     ] = None,
+    real_time: Annotated[
+        bool,
+        typer.Option(
+            "--real-time",
+            help="Drives watch for the host's commands by the wall clock, as real ones do, and not by simulated time, "
+            "which stands still with the host. For hosts that keep the period.",
+        ),
+    ] = False,
     seed: Annotated[int | None, typer.Option(min=0, help="Of all that is random; else the rig file's.")] = None,
 ) -> None:
     """Serve two inverters, the PLC and the driveline to other programs on this machine.
@@ -62,6 +72,7 @@ def sim(
         modbus=_modbus(rig_file, modbus),
         faults=rig_faults(fault or (), rig_file.period_s),
         seed=seed,
+        real_time=real_time,
     )
     _serve(server)
 

@@ -6,8 +6,8 @@ Torques are of both inverters together. What every kind has:
 - ``torque_nm``: the base torque never exceeds this magnitude, in any phase;
 - ``slew_nm_per_s``: nor does it change faster than this;
 - ``approach_timeout_s``: time in which the start speed must be reached;
-- ``share_m1``: the part of the base torque that inverter m1 gives. A gain that is not what an inverter reports shows where
-  the two share differently from test to test.
+- ``share_m1``: the part of the base torque that inverter m1 gives. A gain that is not what an inverter reports shows
+  where the two share differently from test to test.
 """
 
 from __future__ import annotations

@@ -5,8 +5,8 @@ default. Rules that hold across keys stand beside the keys they concern; `hil.co
 faults at once. Those across tables are looked at once every table is right by itself.
 
 The base torque of an experiment is that of both inverters together and is split evenly between them, unless its
-``share_m1`` says otherwise; so is the PRBS, unless ``[prbs] target`` does. The rules across keys check the worst case of each
-experiment against the limits of the torque guard: what the run would refuse is refused before it.
+``share_m1`` says otherwise; so is the PRBS, unless ``[prbs] target`` does. The rules across keys check the worst case
+of each experiment against the limits of the torque guard: what the run would refuse is refused before it.
 """
 
 from __future__ import annotations

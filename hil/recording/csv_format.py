@@ -2,7 +2,7 @@
 
 - Floats are written as the shortest decimal that reads back to the same bits, integers without a point; that
   difference is how a reader tells them apart, so that CSV to Parquet and back loses nothing. Text that looks
-  like a number becomes one, and units and metadata have no place here.
+  like a number becomes one. Units have no place here; metadata stand in a file beside (`hil.recording.sidecar`).
 - A last line without line end is taken (RFC 4180 allows it): a file cut inside its very last number can't be
   told from a whole one. A cut anywhere else leaves a row with cells missing, and is refused.
 - A quoted cell must end on its line, so that a row is a line and every fault has its number.
@@ -22,6 +22,7 @@ import pyarrow.csv
 
 from hil.errors import RecordingError
 from hil.recording.format_hints import FormatHints
+from hil.recording.sidecar import read_sidecar
 from hil.recording.table import Column, Table
 
 DELIMITERS = ",;\t|"
@@ -53,7 +54,8 @@ def read(path: Path, hints: FormatHints) -> Table:
     if b"\n" not in content:
         return Table(path, {})  # refuses: no rows
     cells = _parse(path, content, names, delimiter)
-    return Table(path, {name: _column(cells[name]) for name in names}, first_line=FIRST_ROW_LINE)
+    columns = {name: _column(cells[name]) for name in names}
+    return Table(path, columns, metadata=read_sidecar(path), first_line=FIRST_ROW_LINE)
 
 
 def write(table: Table, path: Path) -> None:

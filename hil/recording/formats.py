@@ -11,21 +11,26 @@ from types import MappingProxyType
 from hil.errors import RecordingError
 from hil.recording import csv_format, mat_format, parquet_format
 from hil.recording.format_hints import FormatHints
+from hil.recording.sidecar import read_sidecar
 from hil.recording.table import Table
 
 
 @dataclass(frozen=True, slots=True)
 class Format:
-    """How one kind of file is read and written; ``write`` is None for a format that is only read."""
+    """How one kind of file is read and written.
+
+    ``write`` is None for a format that is only read, ``metadata`` for one whose metadata come with the table alone.
+    """
 
     read: Callable[[Path, FormatHints], Table]
     write: Callable[[Table, Path], None] | None
+    metadata: Callable[[Path], Mapping[str, str]] | None = None
 
 
 FORMATS: Mapping[str, Format] = MappingProxyType(
     {
-        ".csv": Format(csv_format.read, csv_format.write),
-        ".parquet": Format(parquet_format.read, parquet_format.write),
+        ".csv": Format(csv_format.read, csv_format.write, read_sidecar),
+        ".parquet": Format(parquet_format.read, parquet_format.write, parquet_format.read_metadata),
         ".mat": Format(mat_format.read, None),
     }
 )
@@ -49,6 +54,21 @@ def read_table(path: Path | str, hints: FormatHints | None = None) -> Table:
     except OSError as error:
         raise RecordingError(path, f"expected a readable file, came: {error.strerror}") from error
     return known.read(path, hints or FormatHints())
+
+
+def read_metadata(path: Path | str) -> Mapping[str, str]:
+    """Read what a recording says of itself, without its rows where the format allows.
+
+    Raises
+    ------
+    RecordingError
+        As `read_table`.
+    """
+    path = Path(path)
+    known = FORMATS.get(path.suffix.lower())
+    if known is None or known.metadata is None or not path.is_file():
+        return read_table(path).metadata
+    return known.metadata(path)
 
 
 def writer_for(path: Path) -> Callable[[Table, Path], None]:

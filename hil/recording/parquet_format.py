@@ -43,6 +43,23 @@ def read(path: Path, hints: FormatHints) -> Table:
     return Table(path, columns, units, _metadata(content.schema.metadata or {}))
 
 
+def read_metadata(path: Path) -> dict[str, str]:
+    """Read what a Parquet recording says of itself.
+
+    Raises
+    ------
+    RecordingError
+        If the file is no whole Parquet file.
+    """
+    try:
+        schema = pa.parquet.read_schema(path)
+    except (pa.ArrowException, OSError) as error:
+        raise RecordingError(
+            path, f"expected a whole Parquet file, came a damaged or truncated one ({error})"
+        ) from error
+    return _metadata(schema.metadata or {})
+
+
 def write(table: Table, path: Path) -> None:
     """Write a table with its units and metadata."""
     fields, arrays = [], []

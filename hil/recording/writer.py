@@ -21,6 +21,7 @@ from typing import Self, TextIO
 from hil.errors import RecordingError
 from hil.recording import columns
 from hil.recording.formats import read_table, write_table, writer_for
+from hil.recording.sidecar import require_no_sidecar, write_sidecar
 from hil.recording.table import Table
 from hil.rig.sample import Sample
 
@@ -37,7 +38,8 @@ class RecordingWriter:
     path : Path or str
         The recording to make; its suffix chooses the format.
     metadata : mapping of str to str
-        What the recording shall say of itself; CSV has no place for it.
+        What the recording shall say of itself; more can be said until it is closed, by `describe`. CSV has no
+        place for it: there it is in a file beside the recording (`hil.recording.sidecar`).
 
     Raises
     ------
@@ -55,6 +57,8 @@ class RecordingWriter:
 
     def __enter__(self) -> Self:
         writer_for(self.path)
+        if self.path.suffix.lower() == CSV:
+            require_no_sidecar(self.path)
         try:
             # Line-buffered: each row reaches the operating system when it is appended.
             self._file = self.part_path.open("x", buffering=1, encoding="utf-8", newline="\n")
@@ -73,6 +77,10 @@ class RecordingWriter:
     def kept(self) -> Path | None:
         """The file that holds what was appended, once the writer is closed; None where nothing was."""
         return next((path for path in (self.path, self.part_path) if self.n_samples and path.exists()), None)
+
+    def describe(self, key: str, value: str) -> None:
+        """Have the recording say one thing more of itself, such as how the run went."""
+        self._metadata[key] = value
 
     def append(self, sample: Sample) -> None:
         """Write one sample.
@@ -125,6 +133,7 @@ class RecordingWriter:
         if self.path.suffix.lower() == CSV:
             writer_for(self.path)
             self.part_path.rename(self.path)
+            write_sidecar(self.path, self._metadata)
             return
         rows = read_table(self.part_path)
         try:

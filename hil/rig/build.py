@@ -61,12 +61,25 @@ def connected_plc(table: PlcTable, loop: PlcLoop) -> Iterator[Plc]:
     BusDown, DeviceTimeout, ConfigMismatch
         See `open_devices`.
     """
-    plc = Plc(table.host, table.port, load_register_map(table.map or data_file("plc.toml")))
+    plc = plc_client(table)
     loop.call(plc.connect())
     try:
         yield plc
     finally:
         loop.call(_close(plc))
+
+
+def plc_client(table: PlcTable) -> Plc:
+    """Make the PLC's client, not connected yet.
+
+    Raises
+    ------
+    ConfigMismatch
+        If the register map can't be used.
+    """
+    register_map = load_register_map(table.map or data_file("plc.toml"))
+    security = None if table.security is None else table.security.client
+    return Plc(table.host, table.port, register_map, security=security)
 
 
 def inverter_settings(name: str, table: InverterTable) -> InverterSettings:
@@ -81,6 +94,9 @@ def inverter_settings(name: str, table: InverterTable) -> InverterSettings:
         vendor_id=table.vendor_id,
         product_code=table.product_code,
         heartbeat_ms=table.heartbeat_ms,
+        rpdo_deadline_ms=table.rpdo_deadline_ms,
+        option_codes=table.option_codes.by_object,
+        torque_slope_nm_per_s=table.torque_slope_nm_per_s,
     )
 
 

@@ -2,21 +2,29 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
+from pathlib import Path
 
 from drivers.can_link import CanLink
+from drivers.eds_check import check_eds
+from drivers.eds_finding import Severity
 from drivers.errors import DriverError
 from drivers.inverter import Inverter
 from drivers.inverter_check import Difference
+from drivers.plc_reader import Backoff, PlcReader
+from drivers.plc_types import PlcStatus
 from hil.config.rig_file import InverterTable, PlcTable, Rig
-from hil.rig.build import connected_plc, inverter_settings
+from hil.rig.build import inverter_settings, plc_client
 from hil.rig.fitness import Needs, reasons_against
-from hil.rig.plc_loop import PlcLoop
 
 NO_NEEDS = Needs(torque_of_one_nm=0.0)
 """A check asks for no torque."""
+
+PLC_BACKOFF = Backoff(first_s=0.1, longest_s=0.2, attempts=3)
+"""A person waits for a check: a connection lost once is made again, a PLC that is not there is soon said to be."""
 
 
 class Verdict(Enum):
@@ -52,12 +60,21 @@ class Finding:
     notes: tuple[str, ...] = ()
 
 
-def check_rig(rig: Rig) -> tuple[Finding, ...]:
-    """Look for the CAN bus, both inverters and the PLC; each, whatever is wrong with the others."""
-    return (*_can(rig), _plc(rig.plc))
+def check_rig(rig: Rig, prove_stop: bool = False) -> tuple[Finding, ...]:
+    """Look for the CAN bus, both inverters and the PLC; each, whatever is wrong with the others.
+
+    Parameters
+    ----------
+    rig
+        What to look for.
+    prove_stop
+        Whether an inverter that agrees is to show that it stops without its host (`Inverter.prove_stop`): it is
+        configured for that and left disabled, and no torque is commanded.
+    """
+    return (*_can(rig, prove_stop), _plc(rig.plc))
 
 
-def _can(rig: Rig) -> tuple[Finding, ...]:
+def _can(rig: Rig, prove_stop: bool) -> tuple[Finding, ...]:
     tables = {"m1": rig.inverters.m1, "m2": rig.inverters.m2}
     try:
         link = CanLink.open(rig.can.url)
@@ -70,18 +87,29 @@ def _can(rig: Rig) -> tuple[Finding, ...]:
         )
     with link:
         bus = Finding("can", rig.can.url, Verdict.AGREES)
-        return (bus, *(_inverter(link, name, table) for name, table in tables.items()))
+        return (bus, *(_inverter(link, name, table, prove_stop, rig.period_s) for name, table in tables.items()))
 
 
-def _inverter(link: CanLink, name: str, table: InverterTable) -> Finding:
+def _inverter(link: CanLink, name: str, table: InverterTable, prove_stop: bool, period_s: float) -> Finding:
     def compare() -> Finding:
         inverter = Inverter(link, inverter_settings(name, table))
         differences, fault = inverter.check(), inverter.fault()
+        if prove_stop and not differences and fault is None:
+            differences = inverter.prove_stop(period_s)
         verdict = Verdict.DIFFERS if differences else Verdict.AGREES
-        return Finding(name, address, verdict, differences, () if fault is None else (fault,))
+        notes = (*_eds_note(table.eds), *(() if fault is None else (fault,)))
+        return Finding(name, address, verdict, differences, notes)
 
     address = _node(table)
     return _or_failed(name, address, compare)
+
+
+def _eds_note(path: Path | None) -> tuple[str, ...]:
+    """Say that a rig's own EDS has errors, which may matter later than now."""
+    report = None if path is None else check_eds(path)
+    if report is None or report.usable:
+        return ()
+    return (f"EDS {path} has errors ({report.count(Severity.ERROR)}). See: hil check --eds {path}",)
 
 
 def _node(table: InverterTable) -> str:
@@ -90,12 +118,16 @@ def _node(table: InverterTable) -> str:
 
 def _plc(table: PlcTable) -> Finding:
     def compare() -> Finding:
-        with PlcLoop() as loop, connected_plc(table, loop) as plc:
-            status = loop.call(plc.read_status())
+        status = asyncio.run(_plc_status(table))
         return Finding("plc", address, Verdict.AGREES, notes=tuple(reasons_against(status, NO_NEEDS)))
 
     address = f"{table.host}:{table.port}"
     return _or_failed("plc", address, compare)
+
+
+async def _plc_status(table: PlcTable) -> PlcStatus:
+    async with PlcReader(plc_client(table), PLC_BACKOFF) as reader:
+        return await reader.read_status()
 
 
 def _or_failed(device: str, address: str, compare: Callable[[], Finding]) -> Finding:

@@ -13,10 +13,11 @@ from dataclasses import dataclass
 from drivers.can_link import CanLink
 from drivers.errors import DeviceTimeout
 from drivers.inverter import Inverter, InverterFeedback
-from drivers.torque_guard import GuardedTorque, TorqueGuard, TorqueRequest
+from drivers.torque_guard import TorqueGuard, TorqueRequest
 from hil.errors import RunAborted
 from hil.rig.pacing import NS_PER_S, Tick
 from hil.rig.sample import Sample, SampleFlag
+from hil.rig.timing import RunTiming
 
 
 @dataclass(slots=True)
@@ -55,9 +56,11 @@ class Cycle:
         Time between two cycles [ns].
     answer_timeout_s
         How long the inverters may take to answer a SYNC [s].
+    timing
+        Takes note of when cycles begin and answers come; a new one by default.
     """
 
-    __slots__ = ("_answer_timeout_s", "_first_ns", "_guard", "_link", "_m1", "_m2", "_period_ns")
+    __slots__ = ("_answer_timeout_ns", "_first_ns", "_guard", "_link", "_m1", "_m2", "timing")
 
     def __init__(
         self,
@@ -67,13 +70,14 @@ class Cycle:
         guard: TorqueGuard,
         period_ns: int,
         answer_timeout_s: float,
+        timing: RunTiming | None = None,
     ) -> None:
         self._link = link
         self._m1 = _Station("m1", m1, SampleFlag.M1_STALE)
         self._m2 = _Station("m2", m2, SampleFlag.M2_STALE)
         self._guard = guard
-        self._period_ns = period_ns
-        self._answer_timeout_s = answer_timeout_s
+        self.timing = timing or RunTiming(period_ns)
+        self._answer_timeout_ns = round(answer_timeout_s * NS_PER_S)
         self._first_ns: int | None = None
 
     @property
@@ -113,20 +117,30 @@ class Cycle:
         """
         self._refuse_if_unfit(tick)
         command_m1, command_m2 = self._guard.check(request, tick.due_ns, self._age_ns(tick.now_ns))
-        sync_ns, flags_answer = self._exchange(command_m1, command_m2, tick.now_ns)
-        if 2 * tick.late_ns > self._period_ns:
+        if self.timing.is_late(tick):
             flags |= SampleFlag.LATE
-        return self._sample(tick, request, time_s, sync_ns, flags | flags_answer)
-
-    def _exchange(self, to_m1: GuardedTorque, to_m2: GuardedTorque, now_ns: int) -> tuple[int, SampleFlag]:
-        self._m1.inverter.command(to_m1)
-        self._m2.inverter.command(to_m2)
+        self._m1.inverter.command(command_m1)
+        self._m2.inverter.command(command_m2)
         sync_ns = self._link.sync()
-        flags = self._m1.take(self._m1.inverter.await_feedback(sync_ns, self._answer_timeout_s), now_ns)
-        # Both answer the same SYNC: while the host waited for m1 in vain, m2 had its time too.
-        patience_s = 0.0 if flags else self._answer_timeout_s
-        flags |= self._m2.take(self._m2.inverter.await_feedback(sync_ns, patience_s), now_ns)
-        return sync_ns, flags
+        self.timing.begin(tick, sync_ns)
+        flags |= self._await_answers(sync_ns, tick.now_ns)
+        return self._sample(tick, request, time_s, sync_ns, flags)
+
+    def _await_answers(self, sync_ns: int, now_ns: int) -> SampleFlag:
+        """Wait for both: they answer the same SYNC, and the time they have is one and the same."""
+        age_m1_ns, flag_m1 = self._await_answer(self._m1, sync_ns, 0, now_ns)
+        _, flag_m2 = self._await_answer(self._m2, sync_ns, age_m1_ns, now_ns)
+        return flag_m1 | flag_m2 if flag_m1 or flag_m2 else SampleFlag.GOOD
+
+    def _await_answer(self, station: _Station, sync_ns: int, waited_ns: int, now_ns: int) -> tuple[int, SampleFlag]:
+        """Wait for one; return how long after the SYNC the waiting ended [ns], and what is against the answer."""
+        patience_ns = self._answer_timeout_ns - waited_ns
+        feedback = station.inverter.await_feedback(sync_ns, patience_ns / NS_PER_S)
+        age_ns = None if feedback is None else feedback.t_ns - sync_ns
+        if age_ns is None or age_ns > self._answer_timeout_ns:
+            feedback, age_ns = None, None
+        self.timing.answer(age_ns)
+        return self._answer_timeout_ns if age_ns is None else age_ns, station.take(feedback, now_ns)
 
     def _refuse_if_unfit(self, tick: Tick) -> None:
         if self._first_ns is None:
@@ -140,7 +154,7 @@ class Cycle:
         age_s = (tick.now_ns - self._last_ns(station)) / NS_PER_S
         if age_s <= timeout_s:
             return
-        if tick.late_ns > self._period_ns:
+        if tick.late_ns > self.timing.period_ns:
             raise RunAborted(
                 f"cycle {tick.cycle} began {tick.late_ns / NS_PER_S:.3f} s late, so that its feedback is "
                 f"{age_s:.3f} s old, expected at most {timeout_s:g} s (feedback_timeout_s). This machine was "

@@ -11,9 +11,11 @@ from hil.rig.excitation import NO_TORQUE
 from hil.rig.experiments.base import Phase
 from hil.rig.pacing import NS_PER_S, Pacer, Tick
 from hil.rig.plan import Plan
+from hil.rig.plc_prbs import PlcPrbs
 from hil.rig.plc_watch import PlcWatch
 from hil.rig.sample import Sample, SampleFlag
 from hil.rig.stop import StopRequest
+from hil.rig.timing import RunTiming
 
 SLEPT_THROUGH = SampleFlag.LATE | SampleFlag.M1_STALE | SampleFlag.M2_STALE
 """Flags of a cycle this machine was too late for: there was no SYNC, and the torque stood."""
@@ -45,8 +47,11 @@ class RunSummary:
         Recorded samples that are not good.
     most_late_ns
         Latest beginning of a cycle [ns].
+    timing
+        When cycles began and answers came.
     """
 
+    timing: RunTiming
     cycles: int = 0
     recorded: int = 0
     flagged: int = 0
@@ -65,6 +70,8 @@ class Drive:
         One exchange with both inverters.
     watch
         The PLC's permission.
+    prbs
+        The PLC's own generator, switched with the phases.
     pacer
         When each cycle begins.
     recorder
@@ -78,14 +85,18 @@ class Drive:
     plan: Plan
     cycle: Cycle
     watch: PlcWatch
+    prbs: PlcPrbs
     pacer: Pacer
     recorder: Recorder
     stop: StopRequest
     progress: Progress
-    _summary: RunSummary = field(default_factory=RunSummary)
+    _summary: RunSummary = field(init=False)
     _phase: Phase = Phase.APPROACH
     _phase_from: int = 0
     _last: Sample | None = None
+
+    def __post_init__(self) -> None:
+        self._summary = RunSummary(self.cycle.timing)
 
     def wake_up(self) -> None:
         """Cycle at zero torque until both inverters have answered; the cycle itself ends a wait in vain."""
@@ -113,7 +124,10 @@ class Drive:
             self._phase, self._phase_from = base.phase, tick.cycle
         time_s = self._seconds(tick.cycle - self._phase_from)
         request = self.plan.split.request(base.torque_nm, self.plan.prbs_nm(base.phase))
+        self.prbs.follow(tick, base.phase, self.watch.status)
         sample = self.cycle.step(tick, request, time_s, flags)
+        if self.plan.plc_prbs is not None:
+            sample = replace(sample, prbs_nm=self.prbs.known_nm(self.watch.news))
         if base.phase is Phase.MEASURE:
             self._record(sample)
         self.progress(base.phase, time_s)

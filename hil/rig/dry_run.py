@@ -96,6 +96,8 @@ def dry_run(rig: Rig, name: str) -> Prediction:
         phase = base.phase
         request = plan.split.request(base.torque_nm, plan.prbs_nm(phase))
         guard.check(request, tick.due_ns, feedback_age_ns=0)
+        if plan.plc_prbs is not None:  # not the host's to send, but there all the same
+            request = plan.split.request(base.torque_nm, plan.expected_plc_prbs_nm(phase))
         _note(prediction, phase, request, speed_rad_s)
         speed_rad_s = _next_speed(prediction.vehicle, rig.period_s, speed_rad_s, request)
     return prediction

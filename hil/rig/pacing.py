@@ -18,6 +18,19 @@ def period_ns(period_s: float) -> int:
     return round(period_s * NS_PER_S)
 
 
+def periods_used_up(late_ns: int, period_ns: int) -> int:
+    """Tell how many periods after a cycle's due time the next one is due: one, and those the cycle ran into.
+
+    A cycle that begins late by more than half a period has run into the next one.
+    """
+    return 1 + (late_ns + period_ns // 2) // period_ns
+
+
+def answer_timeout_ns(period_ns: int) -> int:
+    """How long a device may take to answer a SYNC: four fifths of a period; the rest is for what the host does [ns]."""
+    return period_ns * 4 // 5
+
+
 @dataclass(frozen=True, slots=True)
 class Tick:
     """The beginning of one cycle.
@@ -89,8 +102,8 @@ class RealTimePacer:
 
     @property
     def answer_timeout_s(self) -> float:
-        """Four fifths of a period: the rest is for what the host does with the answer [s]."""
-        return 0.8 * self._period_ns / NS_PER_S
+        """Four fifths of a period [s]; see `answer_timeout_ns`."""
+        return answer_timeout_ns(self._period_ns) / NS_PER_S
 
     @property
     def poll_patience_s(self) -> float:
@@ -106,7 +119,7 @@ class RealTimePacer:
             now_ns = time.monotonic_ns()
         late_ns = now_ns - due_ns
         tick = Tick(self._next_cycle, due_ns, late_ns)
-        used_up = 1 + (late_ns + self._period_ns // 2) // self._period_ns
+        used_up = periods_used_up(late_ns, self._period_ns)
         self._due_ns = due_ns + used_up * self._period_ns
         self._next_cycle += used_up
         return tick

@@ -7,30 +7,46 @@ from dataclasses import dataclass
 from drivers.plc_types import PrbsSource
 from estimator.signals.prbs import Prbs
 from hil.config.rig_file import Rig
-from hil.errors import UsageError
 from hil.rig.excitation import Split
 from hil.rig.experiments.base import Experiment, Phase
 from hil.rig.experiments.registry import build_experiment, experiment_table
 from hil.rig.fitness import Needs
-
-BASE_SHARE_M1 = 0.5
-"""Both inverters give half of the base torque: they drive one shaft, and equal currents heat them equally."""
+from hil.rig.plc_prbs import PlcPrbsOrder, guarded_prbs
 
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """What a run is made of. Experiment and PRBS have a state: a plan is for one run."""
+    """What a run is made of. Experiment and PRBS have a state: a plan is for one run.
+
+    Attributes
+    ----------
+    name, period_s, experiment
+        Which experiment, and the time between two cycles [s].
+    prbs
+        The PRBS as the host makes it; where the PLC does, one of the same amplitude to predict with.
+    plc_prbs
+        What the PLC's own generator is told; None where the host makes the PRBS.
+    split
+        Shares of the two inverters.
+    needs
+        What the run needs of the vehicle.
+    """
 
     name: str
     period_s: float
     experiment: Experiment
     prbs: Prbs
+    plc_prbs: PlcPrbsOrder | None
     split: Split
     needs: Needs
 
     def prbs_nm(self, phase: Phase) -> float:
-        """Next level of the PRBS [Nm]; it runs in the measured part only, and is zero outside it."""
-        return self.prbs.next() if phase is Phase.MEASURE else 0.0
+        """Next level of the PRBS the host sends [Nm]; it runs in the measured part only, and is zero outside it."""
+        return self.prbs.next() if phase is Phase.MEASURE and self.plc_prbs is None else 0.0
+
+    def expected_plc_prbs_nm(self, phase: Phase) -> float:
+        """Next level that the PLC may add, to predict with [Nm]: its range is right, its course is the PLC's own."""
+        return self.prbs.next() if phase is Phase.MEASURE and self.plc_prbs is not None else 0.0
 
 
 def plan_run(rig: Rig, name: str) -> Plan:
@@ -39,21 +55,24 @@ def plan_run(rig: Rig, name: str) -> Plan:
     Raises
     ------
     UsageError
-        If the rig file has no experiment of that name, or has the PRBS made by the PLC.
+        If the rig file has no experiment of that name.
+    CommandRefused
+        If the torque guard's limits don't allow the PRBS that the PLC is to make.
     """
-    if rig.prbs.source is not PrbsSource.HOST:
-        raise UsageError(
-            f"rig {rig.name!r}: prbs.source is {rig.prbs.source.value!r}, expected 'host': a PRBS the PLC "
-            'adds by itself would not pass the torque guard. Set source = "host" in [prbs].'
-        )
     table = experiment_table(rig, name)
-    split = Split(BASE_SHARE_M1, rig.prbs.part_m1)
+    split = Split(table.share_m1, rig.prbs.part_m1)
     largest = split.request(table.torque_nm, rig.prbs.amplitude_nm)
     return Plan(
         name=name,
         period_s=rig.period_s,
         experiment=build_experiment(rig, name),
         prbs=Prbs(rig.prbs.amplitude_nm, rig.prbs.cells, rig.prbs.clock_divider, rig.prbs.seed),
+        plc_prbs=_plc_prbs(rig, split) if rig.prbs.source is PrbsSource.PLC else None,
         split=split,
         needs=Needs(max(largest.total_m1_nm, largest.total_m2_nm)),
     )
+
+
+def _plc_prbs(rig: Rig, split: Split) -> PlcPrbsOrder:
+    m1, m2 = guarded_prbs(rig.torque_limits, split, rig.prbs.amplitude_nm)
+    return PlcPrbsOrder(m1, m2, rig.prbs.clock_divider, rig.prbs.seed)

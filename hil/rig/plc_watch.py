@@ -8,6 +8,7 @@ from the start of the poll.
 from __future__ import annotations
 
 from concurrent.futures import Future
+from dataclasses import replace
 
 from drivers.errors import DriverError
 from drivers.plc import Plc
@@ -51,7 +52,17 @@ class PlcWatch:
         self._patience_s = patience_s
         self._poll: Future[PlcStatus] | None = None
         self._asked_ns: int | None = None
-        self._answered_ns: int | None = None
+        self._news: PlcStatus | None = None
+
+    @property
+    def status(self) -> PlcStatus:
+        """Latest report, its ``t_ns`` in the cycle's time from the first cycle on."""
+        return self._latest
+
+    @property
+    def news(self) -> PlcStatus | None:
+        """The report that came in the present cycle, if one did."""
+        return self._news
 
     def look(self, tick: Tick, speed_rad_s: float) -> SampleFlag:
         """Poll if it is due, and judge what is known.
@@ -68,11 +79,12 @@ class PlcWatch:
         RunAborted
             If the vehicle is no longer fit, is faster than the PLC permits, or the PLC is silent.
         """
-        if self._answered_ns is None:
-            self._answered_ns = tick.now_ns
+        if self._asked_ns is None:  # what was reported before the run counts from here
+            self._latest = replace(self._latest, t_ns=tick.now_ns)
         self._start_if_due(tick.now_ns)
-        self._take_answer()
-        age_ns = tick.now_ns - self._answered_ns
+        self._news = self._take_answer()
+        self._latest = self._news or self._latest
+        age_ns = self._latest.age_ns(tick.now_ns)
         if age_ns > SILENT_AFTER_NS:
             raise RunAborted(
                 f"PLC: no answer for {age_ns / NS_PER_S:.2f} s, expected one every "
@@ -91,17 +103,18 @@ class PlcWatch:
         await self._plc.beat()
         return await self._plc.read_status()
 
-    def _take_answer(self) -> None:
-        if self._poll is None:
-            return
+    def _take_answer(self) -> PlcStatus | None:
+        """Take what a poll has brought, as old as the poll; the PLC's client stamps with a clock of its own."""
+        if self._poll is None or self._asked_ns is None:
+            return None
         try:
-            self._latest = self._poll.result(self._patience_s)
+            status = self._poll.result(self._patience_s)
         except DriverError as error:
             raise RunAborted(f"PLC: expected its status, came: {error}") from error
         except TimeoutError:
-            return  # under way; its age speaks when it takes too long
-        self._answered_ns = self._asked_ns
+            return None  # under way; its age speaks when it takes too long
         self._poll = None
+        return replace(status, t_ns=self._asked_ns)
 
     def _judge(self, speed_rad_s: float) -> None:
         reasons = list(changes(self._before, self._latest, self._needs))

@@ -6,12 +6,12 @@
     arm          both drives, each step confirmed
     wake up      zero torque until both have answered a SYNC; then the guard is enabled
     drive        the experiment, cycle by cycle; its measured part goes to the recording
-    disarm       in `ArmedDrives`, on every way out
+    disarm       in `ArmedDrives`, on every way out; then the PLC's generator off, where it was used (`PlcPrbs`)
 """
 
 from __future__ import annotations
 
-from drivers.plc_types import PlcStatus, PrbsSettings, PrbsSource
+from drivers.plc_types import PlcStatus
 from hil.errors import RunAborted
 from hil.rig.arming import ArmedDrives
 from hil.rig.build import Devices
@@ -20,11 +20,10 @@ from hil.rig.drive import Drive, Progress, Recorder, RunSummary
 from hil.rig.fitness import reasons_against
 from hil.rig.pacing import Pacer
 from hil.rig.plan import Plan
+from hil.rig.plc_prbs import PlcPrbs
 from hil.rig.plc_watch import PlcWatch
 from hil.rig.stop import StopRequest
-
-GENERATOR_OFF = PrbsSettings(False, 0.0, 1, 1, PrbsSource.HOST)
-"""The host makes the PRBS: the PLC's own generator must not add another."""
+from hil.rig.timing import RunTiming
 
 
 def run_plan(
@@ -34,6 +33,7 @@ def run_plan(
     recorder: Recorder,
     stop: StopRequest,
     progress: Progress,
+    timing: RunTiming | None = None,
 ) -> RunSummary:
     """Run a plan on an opened rig.
 
@@ -51,21 +51,26 @@ def run_plan(
         Ends the run at the next cycle when requested.
     progress
         Told of every cycle.
+    timing
+        Where the run's timing is kept, for a caller who wants it however the run ends.
 
     Raises
     ------
     RunAborted
-        If the vehicle is not fit or no longer, or a drive can't be confirmed disarmed.
+        If the vehicle is not fit or no longer, or a drive can't be confirmed disarmed, or the PLC's PRBS
+        generator off.
     DriverError
         What the devices raise; `CommandRefused` if the guard refused a torque.
     KeyboardInterrupt
         If `stop` was requested.
     """
     before = _prepare(devices, plan, stop)
-    with ArmedDrives(devices, stop):
-        cycle = Cycle(devices.link, devices.m1, devices.m2, devices.guard, pacer.period_ns, pacer.answer_timeout_s)
+    prbs = PlcPrbs(devices.plc_loop, devices.plc, plan.plc_prbs, pacer.poll_patience_s)
+    with prbs, ArmedDrives(devices, stop):
+        period_ns, patience_s = pacer.period_ns, pacer.answer_timeout_s
+        cycle = Cycle(devices.link, devices.m1, devices.m2, devices.guard, period_ns, patience_s, timing)
         watch = PlcWatch(devices.plc_loop, devices.plc, before, plan.needs, pacer.poll_patience_s)
-        drive = Drive(plan, cycle, watch, pacer, recorder, stop, progress)
+        drive = Drive(plan, cycle, watch, prbs, pacer, recorder, stop, progress)
         drive.wake_up()
         devices.guard.enable()
         return drive.run()
@@ -75,7 +80,7 @@ def _prepare(devices: Devices, plan: Plan, stop: StopRequest) -> PlcStatus:
     for inverter in (devices.m1, devices.m2):
         stop.raise_if_requested()
         inverter.configure()
-    devices.plc_loop.call(devices.plc.write_prbs(GENERATOR_OFF))
+    devices.plc_loop.call(devices.plc.stop_prbs())
     status = devices.plc_loop.call(devices.plc.read_status())
     if reasons := list(reasons_against(status, plan.needs)):
         raise RunAborted(f"PLC: {'; '.join(reasons)}. Nothing was armed; bring the vehicle into that state first.")

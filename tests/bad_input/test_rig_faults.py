@@ -24,7 +24,7 @@ from tests.rig.serving import served
 
 NOWHERE = ("--bus", "ws://127.0.0.1:9/", "--modbus", "127.0.0.1:9")
 
-WITHIN_S = 2.0
+WITHIN_S = 3.5
 """Of simulated time since power-on: inside the measured part of the short rig's reversal."""
 
 

@@ -20,7 +20,7 @@ from tests.bad_input.conftest import Refused, with_changes
         ),
         ([("port = 5020", "")], ["plc.port | expected this key | came nothing: add it"]),
         ([("cells = 10", "cellz = 10")], ["prbs.cellz | expected one of the known keys (amplitude_nm, cells"]),
-        ([("[guard] ", "[guard ")], ["line 39, column", "expected TOML"]),
+        ([("[guard] ", "[guard ")], ["line 48, column", "expected TOML"]),
         ([("hil.rig/1", "hil.rig/2")], ["schema | expected 'hil.rig/1' | came 'hil.rig/2'"]),
         ([('kind = "tip"', 'kind = "jump"')], ["experiments.tip.kind | expected one of 'cruise', 'reversal', 'tip'"]),
         ([("ws://127.0.0.1:54701/", "")], ["can.url | expected a text that is not empty | came ''"]),
@@ -79,7 +79,7 @@ def test_a_byte_order_mark_is_no_fault(tmp_path: Path, rig_text: str, capsys: py
 @pytest.mark.parametrize(
     ("key", "content", "said"),
     [
-        ("eds", "[DeviceInfo]\nfoo", ["rig.toml: inverters.m1.eds | expected an EDS | came: EDS", "parsing errors"]),
+        ("eds", "[DeviceInfo]\nfoo", ["rig.toml: inverters.m1.eds | expected an EDS | came: EDS", "lists no object"]),
         ("eds", "", ["rig.toml: inverters.m1.eds | expected an EDS", "no section [DeviceInfo]"]),
         (
             "map",

@@ -68,7 +68,9 @@ def test_every_register_the_plc_must_have_is_listed() -> None:
     assert set(USED) <= names_in_code("supported-protocols.md")
 
 
-@pytest.mark.parametrize("index", [*OPTION_CODES, 0x1005, 0x100C, 0x100D, 0x1016, 0x1017, 0x1018, 0x1400, 0x1600, 0x1800, 0x1A00])
+@pytest.mark.parametrize(
+    "index", [*OPTION_CODES, 0x1005, 0x100C, 0x100D, 0x1016, 0x1017, 0x1018, 0x1400, 0x1600, 0x1800, 0x1A00]
+)
 def test_every_object_that_is_configured_is_listed(index: int) -> None:
     page = text("supported-protocols.md")
     first, last = 0x605A, 0x605E

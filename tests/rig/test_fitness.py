@@ -17,6 +17,7 @@ FIT = PlcStatus(
     torque_limit_nm=400.0,
     watchdog=PlcWatchdog(0, 0),
     prbs=PrbsSettings(False, 0.0, 1, 1, PrbsSource.HOST),
+    prbs_torque_nm=0.0,
     t_ns=0,
 )
 NEEDS = Needs(400.0)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import pytest
 
 from drivers.errors import CommandRefused
-from drivers.plc_types import PrbsSource
 from hil.config.rig_file import read_rig
 from hil.errors import RunAborted, UsageError
 from hil.rig.dry_run import dry_run
@@ -27,11 +26,6 @@ def test_rig_without_experiments_says_so() -> None:
     bare = small_rig().model_copy(update={"experiments": {}})
     with pytest.raises(UsageError, match=r"\(none\)"):
         plan_run(bare, "cruise")
-
-
-def test_prbs_past_the_guard_is_refused() -> None:
-    with pytest.raises(UsageError, match=r"prbs\.source is 'plc', expected 'host'"):
-        plan_run(changed(small_rig(), {"prbs": {"source": PrbsSource.PLC}}), "cruise")
 
 
 @pytest.mark.parametrize("experiment", ["cruise", "reversal", "tip"])

@@ -45,6 +45,25 @@ def test_change_is_seen_at_the_next_poll_and_not_before() -> None:
             plc_watch.look(at(100), 0.0)
 
 
+def test_status_is_as_old_as_its_poll_in_the_time_of_the_cycle() -> None:
+    with watch(patience_s=5.0) as (_, plc_watch):
+        ages = []
+        for time_ms in range(0, 210, 10):
+            plc_watch.look(at(time_ms), 0.0)
+            ages.append(plc_watch.status.age_ns(time_ms * MS) // MS)
+    assert ages == [*range(0, 100, 10), *range(0, 100, 10), 0]
+
+
+def test_news_is_there_in_the_cycle_it_came_in_and_in_no_other() -> None:
+    with watch(patience_s=5.0) as (_, plc_watch):
+        came = []
+        for time_ms in range(0, 210, 10):
+            plc_watch.look(at(time_ms), 0.0)
+            came.append(plc_watch.news is not None)
+            assert plc_watch.news in (None, plc_watch.status)
+    assert [10 * k for k, news in enumerate(came) if news] == [0, 100, 200]
+
+
 def test_silent_plc_is_first_stale_then_the_end() -> None:
     with watch(patience_s=0.0) as (server, plc_watch):
         server.plc_server.pause()

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from drivers.plc import GENERATOR_OFF
 from estimator.signals.prbs import prbs_nm
 from hil.config.rig_file import PrbsTarget
 from hil.rig.build import open_devices
 from hil.rig.experiments.base import Phase
 from hil.rig.pacing import RealTimePacer, period_ns
 from hil.rig.sample import SampleFlag
-from hil.rig.session import GENERATOR_OFF
 from tests.rig.observer import assert_disarmed
 from tests.rig.serving import (
     DRAG_NM_S,

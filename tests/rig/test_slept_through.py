@@ -8,7 +8,7 @@ from hil.rig.sample import SampleFlag
 from tests.rig.observer import assert_disarmed
 from tests.rig.serving import Samples, fast, run_once, served
 
-GAP_AFTER = 160
+GAP_AFTER = 250
 """A cycle inside the measured part of the small rig's reversal."""
 
 

@@ -1,0 +1,227 @@
+"""From a bus trace back to the samples: the frames through the drivers' decoding, SYNC by SYNC.
+
+One SYNC is one cycle. Its command is what the last RPDOs before it carried, its answer the TPDO that came after it
+in time. So torque and speed are those the run recorded, to the bit; the references are what was on the bus, whole
+per mille of the rated torque, and the flags what the bus can tell: answers and cycles that were missing or late.
+
+A trace whose SYNC come at less than half the rig's period is one of a run that waited for no clock: each SYNC is a
+period then, and an answer is in time until the next one. Any other is laid on the schedule of `RealTimePacer`.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from statistics import median
+
+from drivers.can_link import SYNC_COB_ID
+from drivers.eds_file import EdsFile
+from drivers.errors import ProtocolViolation
+from drivers.inverter_pdos import command_codec, feedback_codec, feedback_receiver
+from drivers.inverter_settings import InverterSettings
+from drivers.scaling import TorqueScale
+from hil.config.rig_file import Rig
+from hil.errors import RecordingError
+from hil.rig.build import inverter_settings
+from hil.rig.drive import SLEPT_THROUGH
+from hil.rig.pacing import NS_PER_S, answer_timeout_ns, period_ns, periods_used_up
+from hil.rig.sample import Sample, SampleFlag
+from hil.rig.trace_file import read_frames
+
+Frame = tuple[int, bytes, int]
+"""Identifier, data and time [ns]."""
+
+LOOKED_AT = 1000
+"""SYNC by which it is judged whether the run waited for a clock."""
+
+
+class _Station:
+    """One inverter of the trace: the command before the next SYNC, the answer after the last one."""
+
+    def __init__(self, settings: InverterSettings, stale: SampleFlag) -> None:
+        eds = EdsFile(settings.eds_path, settings.node_id)
+        self._scale = TorqueScale(settings.rated_torque_nm)
+        self._rpdo = command_codec(eds, settings.where)
+        tpdo = feedback_codec(eds, settings.where)
+        self._receiver = feedback_receiver(eds, tpdo, self._scale)
+        self._receiver.start_anew()
+        self._base_at, self._prbs_at = self._rpdo.position(0x6071), self._rpdo.position(0x60B2)
+        self._stale = stale
+        self._answered = False
+        self.rpdo_cob_id, self.tpdo_cob_id = self._rpdo.layout.cob_id, tpdo.layout.cob_id
+        self._next = (0.0, 0.0)
+        self.base_nm, self.prbs_nm = 0.0, 0.0
+        self.torque_nm, self.speed_rad_s = math.nan, math.nan
+        self.cycles_old = 0
+
+    def take_command(self, data: bytes) -> None:
+        values = self._rpdo.unpack(data)
+        self._next = (self._scale.to_nm(values[self._base_at]), self._scale.to_nm(values[self._prbs_at]))
+
+    def begin(self) -> None:
+        self.base_nm, self.prbs_nm = self._next
+        self._answered = False
+
+    def take_answer(self, data: bytes, t_ns: int) -> None:
+        self._receiver.on_frame(data, t_ns)
+        feedback = self._receiver.latest
+        if feedback is not None and not self._answered:
+            self.torque_nm, self.speed_rad_s = feedback.torque_nm, feedback.speed_rad_s
+            self._answered = True
+
+    def end(self) -> SampleFlag:
+        """Close the cycle; the flag it deserves."""
+        self.cycles_old = 0 if self._answered else self.cycles_old + 1
+        return SampleFlag.GOOD if self._answered else self._stale
+
+
+@dataclass(slots=True)
+class _Clock:
+    """Numbers the SYNC of a trace."""
+
+    period_ns: int
+    paced: bool
+    _due_ns: int | None = None
+    _cycle: int = 0
+
+    def number(self, sync_ns: int) -> tuple[int, SampleFlag]:
+        """Give a SYNC's cycle, and whether it was late."""
+        due_ns = sync_ns if self._due_ns is None else self._due_ns
+        late_ns = sync_ns - due_ns if self.paced else 0
+        used_up = max(1, periods_used_up(late_ns, self.period_ns))
+        cycle, self._cycle = self._cycle, self._cycle + used_up
+        self._due_ns = due_ns + used_up * self.period_ns
+        return cycle, SampleFlag.LATE if 2 * late_ns > self.period_ns else SampleFlag.GOOD
+
+    def in_time(self, after_sync_ns: int) -> bool:
+        """Whether an answer that came so long after its SYNC counts."""
+        return not self.paced or after_sync_ns <= answer_timeout_ns(self.period_ns)
+
+
+@dataclass(slots=True)
+class _Reader:
+    """Turns frames into samples; time counts in cycles from the first SYNC."""
+
+    clock: _Clock
+    m1: _Station
+    m2: _Station
+    _sync_ns: int | None = None
+    _cycle: int = 0
+    _flags: SampleFlag = field(default=SampleFlag.GOOD)
+
+    def samples(self, frames: Iterable[Frame]) -> Iterator[Sample]:
+        commands = {station.rpdo_cob_id: station for station in (self.m1, self.m2)}
+        answers = {station.tpdo_cob_id: station for station in (self.m1, self.m2)}
+        for cob_id, data, t_ns in frames:
+            if cob_id == SYNC_COB_ID:
+                yield from self._end()
+                self._begin(t_ns)
+            elif cob_id in commands:
+                commands[cob_id].take_command(data)
+            elif cob_id in answers and self._sync_ns is not None and self.clock.in_time(t_ns - self._sync_ns):
+                answers[cob_id].take_answer(data, t_ns)
+        yield from self._end()
+
+    def _begin(self, sync_ns: int) -> None:
+        self._sync_ns = sync_ns
+        self._cycle, self._flags = self.clock.number(sync_ns)
+        self.m1.begin()
+        self.m2.begin()
+
+    def _end(self) -> Iterator[Sample]:
+        if self._sync_ns is None:
+            return
+        flags = self._flags | self.m1.end() | self.m2.end()
+        yield Sample(
+            cycle=self._cycle,
+            t_ns=self._sync_ns,
+            time_s=0.0,
+            torque_ref_m1_nm=self.m1.base_nm + self.m1.prbs_nm,
+            torque_ref_m2_nm=self.m2.base_nm + self.m2.prbs_nm,
+            prbs_nm=self.m1.prbs_nm + self.m2.prbs_nm,
+            torque_m1_nm=self.m1.torque_nm,
+            torque_m2_nm=self.m2.torque_nm,
+            speed_rad_s=self.m1.speed_rad_s,
+            age_ns=max(self.m1.cycles_old, self.m2.cycles_old) * self.clock.period_ns,
+            flags=flags,
+        )
+
+
+def replay(path: Path, rig: Rig, whole: bool = False) -> Iterator[Sample]:
+    """Read the samples of a bus trace.
+
+    Parameters
+    ----------
+    path
+        The trace.
+    rig
+        The rig it was recorded on: nodes, EDS, rated torques and period.
+    whole
+        Every cycle from the first SYNC, not only the measured part, where the PRBS runs.
+
+    Yields
+    ------
+    Sample
+        One per period, flagged where a cycle did not take place.
+
+    Raises
+    ------
+    RecordingError
+        If the file can't be read, a frame is not what the EDS says, or there is no measured part, or a second.
+    """
+    period = period_ns(rig.period_s)
+    clock = _Clock(period, paced=_is_paced(path, period))
+    m1 = _Station(inverter_settings("m1", rig.inverters.m1), SampleFlag.M1_STALE)
+    m2 = _Station(inverter_settings("m2", rig.inverters.m2), SampleFlag.M2_STALE)
+    every = _Reader(clock, m1, m2).samples(read_frames(path))
+    chosen = every if whole else _measured(path, every)
+    try:
+        yield from _evenly(chosen, period)
+    except ProtocolViolation as error:
+        raise RecordingError(path, f"{error} Or the rig file is not the one of this trace.") from error
+
+
+def _is_paced(path: Path, period: int) -> bool:
+    """Whether the SYNC of a trace followed a clock."""
+    every = (t_ns for cob_id, _, t_ns in read_frames(path) if cob_id == SYNC_COB_ID)
+    times = list(itertools.islice(every, LOOKED_AT + 1))
+    if len(times) < 2:
+        raise RecordingError(path, f"expected SYNC (0x{SYNC_COB_ID:03X}), came {len(times)}. Trace a run of cycles.")
+    return 2 * median(after - before for before, after in itertools.pairwise(times)) >= period
+
+
+def _measured(path: Path, samples: Iterable[Sample]) -> Iterator[Sample]:
+    """Choose the cycles in which the PRBS runs: it is at one of its two levels there, and at zero outside."""
+    stretches = 0
+    for has_prbs, stretch in itertools.groupby(samples, key=lambda sample: sample.prbs_nm != 0.0):
+        stretches += has_prbs
+        if stretches > 1:
+            raise RecordingError(path, "expected one measured part (PRBS, 0x60B2), came a second. Cut the trace.")
+        if has_prbs:
+            yield from stretch
+    if not stretches:
+        raise RecordingError(
+            path, "expected a measured part (PRBS, 0x60B2, not zero), came none. For every cycle: --all."
+        )
+
+
+def _evenly(samples: Iterable[Sample], period: int) -> Iterator[Sample]:
+    """Count time from the first sample, and put flagged ones where cycles are missing."""
+    first: int | None = None
+    last: Sample | None = None
+    for sample in samples:
+        first = sample.cycle if first is None else first
+        if last is not None:
+            for missing in range(last.cycle + 1, sample.cycle):
+                age_ns = last.age_ns + (missing - last.cycle) * period
+                stand_in = replace(last, cycle=missing, age_ns=age_ns, flags=last.flags | SLEPT_THROUGH)
+                yield _at(stand_in, first, period)
+        yield _at(sample, first, period)
+        last = sample
+
+
+def _at(sample: Sample, first: int, period: int) -> Sample:
+    return replace(sample, time_s=(sample.cycle - first) * period / NS_PER_S)

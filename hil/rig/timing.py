@@ -1,0 +1,131 @@
+"""What a run's cycles did in time: when they began, how far apart, and how long the answers took.
+
+Three times of every cycle, from the first with both inverters armed to the last:
+
+period     from one SYNC to the next
+lateness   from when the cycle was due to when it began
+reply age  from the SYNC to the arrival of an inverter's TPDO, each inverter counted by itself
+
+and three counts: cycles that were missed altogether, that began later than half a period, and answers that did
+not come in time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from hil.rig.histogram import Histogram
+from hil.rig.pacing import Tick
+
+SCHEMA = "hil.timing/1"
+
+QUANTILES = (("p50", 0.5), ("p99", 0.99), ("p99.9", 0.999))
+
+
+@dataclass(slots=True)
+class RunTiming:
+    """The timing record of one run.
+
+    Attributes
+    ----------
+    period_ns
+        What the period should be [ns].
+    period, lateness, reply_age
+        Histograms of the times above [ns].
+    cycles
+        Cycles that took place.
+    missed
+        Cycles that did not: this machine was too late for them.
+    late
+        Cycles that began later than half a period.
+    unanswered
+        Answers that did not come in time, of either inverter.
+    """
+
+    period_ns: int
+    period: Histogram = field(default_factory=Histogram)
+    lateness: Histogram = field(default_factory=Histogram)
+    reply_age: Histogram = field(default_factory=Histogram)
+    cycles: int = 0
+    missed: int = 0
+    late: int = 0
+    unanswered: int = 0
+    _last_cycle: int | None = None
+    _last_sync_ns: int | None = None
+
+    def begin(self, tick: Tick, sync_ns: int) -> None:
+        """Take note of a cycle that begins, and of its SYNC [ns]."""
+        self.cycles += 1
+        self.lateness.add(tick.late_ns)
+        self.late += self.is_late(tick)
+        if self._last_cycle is not None and self._last_sync_ns is not None:
+            self.missed += tick.cycle - self._last_cycle - 1
+            self.period.add(sync_ns - self._last_sync_ns)
+        self._last_cycle, self._last_sync_ns = tick.cycle, sync_ns
+
+    def is_late(self, tick: Tick) -> bool:
+        """Whether a cycle began later than half a period."""
+        return 2 * tick.late_ns > self.period_ns
+
+    def answer(self, age_ns: int | None) -> None:
+        """Take note of an inverter's answer: its age on arrival [ns], None where it did not come in time."""
+        if age_ns is None:
+            self.unanswered += 1
+        else:
+            self.reply_age.add(age_ns)
+
+    @property
+    def bad_share(self) -> float:
+        """Part of the cycles due that were missed or late or lacked an answer, 0 to 1.
+
+        From above: a cycle with two faults, such as no answer of either inverter, counts twice.
+        """
+        due = self.cycles + self.missed
+        return min(1.0, (self.missed + self.late + self.unanswered) / due) if due else 0.0
+
+    def as_json(self) -> dict[str, Any]:
+        """Give the record as a JSON document, ``hil.timing/1``: times in seconds, every bin that has a count."""
+        return {
+            "schema": SCHEMA,
+            "period_s": self.period_ns / 1e9,
+            "cycles": self.cycles,
+            "missed": self.missed,
+            "late": self.late,
+            "unanswered": self.unanswered,
+            "period": _histogram(self.period),
+            "lateness": _histogram(self.lateness),
+            "reply_age": _histogram(self.reply_age),
+        }
+
+
+def _histogram(histogram: Histogram) -> dict[str, Any]:
+    quantiles = {f"{name}_s": _seconds(histogram.quantile_ns(share)) for name, share in QUANTILES}
+    return {
+        "count": histogram.total,
+        **quantiles,
+        "max_s": _seconds(histogram.max_ns if histogram.total else None),
+        "bins": [[edge_ns / 1e9, count] for edge_ns, count in histogram.bins()],
+    }
+
+
+def _seconds(time_ns: int | None) -> float | None:
+    return None if time_ns is None else time_ns / 1e9
+
+
+def timing_lines(timing: RunTiming) -> list[str]:
+    """Tell the record in a few lines for people."""
+    rows = (("period", timing.period), ("lateness", timing.lateness), ("reply age", timing.reply_age))
+    lines = [f"{'[ms]':10}" + "".join(f"{name:>10}" for name in (*(name for name, _ in QUANTILES), "max"))]
+    for what, histogram in rows:
+        times_ns = [*(histogram.quantile_ns(share) for _, share in QUANTILES), histogram.max_ns]
+        lines.append(f"{what:10}" + "".join(f"{_milliseconds(time_ns):>10}" for time_ns in times_ns))
+    lines.append(
+        f"{timing.cycles} cycles, {timing.missed} missed, {timing.late} late by more than half a period, "
+        f"{timing.unanswered} answers missing"
+    )
+    return lines
+
+
+def _milliseconds(time_ns: int | None) -> str:
+    return "" if time_ns is None else f"{time_ns / 1e6:.3f}"

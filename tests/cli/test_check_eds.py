@@ -1,0 +1,115 @@
+"""``hil check --eds``: lines as a compiler writes them, JSON for a script, and exit status 2 for a file of no use."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from drivers.resources import data_file
+from hil.cli.main import run
+from tests.rig.serving import served
+
+OTHER = str(Path(__file__).resolve().parents[2] / "examples" / "other_drive.eds")
+SHIPPED = str(data_file("inverter.eds"))
+
+
+@pytest.fixture
+def faulty(tmp_path: Path) -> Path:
+    path = tmp_path / "faulty.eds"
+    text = Path(SHIPPED).read_text().replace("DefaultValue=0xFDB44700", "DefaultValue=fast")
+    path.write_text(text.replace("LSS_Supported=0\n", ""))
+    return path
+
+
+def test_shipped_eds_has_nothing_to_remark(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["check", "--eds", SHIPPED]) == 0
+    assert capsys.readouterr().out == f"{SHIPPED}: usable: nothing to remark\n"
+
+
+def test_warnings_are_told_and_borne(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["check", "--eds", OTHER]) == 0
+    printed = capsys.readouterr()
+    *lines, verdict = printed.out.splitlines()
+    assert verdict == f"{OTHER}: usable: 11 warnings, 2 notes"
+    assert len(lines) == 13
+    assert all(
+        re.match(rf"{re.escape(OTHER)}:\d+: (warning|note): \[?\w+.*: expected .*, found .*\.$", line) for line in lines
+    )
+    assert printed.err == ""
+
+
+def test_error_is_told_with_its_line(faulty: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["check", "--eds", str(faulty)]) == 2
+    printed = capsys.readouterr()
+    line = faulty.read_text().split("\n").index("DefaultValue=fast") + 1
+    assert f"{faulty}:{line}: error: [60A9] DefaultValue: expected a number of UNSIGNED32" in printed.out
+    assert f"error: EDS {faulty} is not usable: 2 errors, 1 warning: see above." in printed.err
+
+
+def test_json(faulty: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["check", "--eds", SHIPPED, "--eds", str(faulty), "--json"]) == 2
+    document = json.loads(capsys.readouterr().out)
+    assert document["schema"] == "hil.eds_check/1"
+    assert [(file["file"], file["usable"]) for file in document["files"]] == [(SHIPPED, True), (str(faulty), False)]
+    first = document["files"][1]["findings"][0]
+    assert first == {
+        "severity": "warning",
+        "line": 14,
+        "place": "[DeviceInfo] LSS_Supported",
+        "expected": "this key (CiA 306)",
+        "found": "none",
+        "advice": "Add it.",
+    }
+
+
+@pytest.mark.parametrize("options", [(), ("--json",)])
+def test_file_that_is_not_there(tmp_path: Path, options: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["check", "--eds", str(tmp_path / "none.eds"), *options]) == 2
+    printed = capsys.readouterr()
+    assert "No such file or directory" in printed.out
+    assert "none.eds is not usable: 1 error" in printed.err
+
+
+@pytest.mark.parametrize("content", [b"", b"\x00\x01\x02", "[DeviceInfo]".encode("utf-16"), b"[can]\n"])
+def test_file_that_is_no_eds(tmp_path: Path, content: bytes, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "no.eds"
+    path.write_bytes(content)
+    assert run(["check", "--eds", str(path)]) == 2
+    assert capsys.readouterr().out.startswith(f"{path}: error: file: expected ")
+
+
+def test_rig_and_eds_together(short_rig: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with served() as (server, _):
+        command = ["check", str(short_rig), "--bus", server.bus_url, "--modbus", str(server.modbus), "--eds", OTHER]
+        assert run(command) == 0
+        printed = capsys.readouterr().out
+        assert run([*command, "--json"]) == 0
+        document = json.loads(capsys.readouterr().out)
+    assert printed.count("agrees") == 4
+    assert f"{OTHER}: usable" in printed
+    assert document["schema"] == "hil.check/1"
+    assert len(document["devices"]) == 4
+    assert document["eds"][0]["usable"]
+
+
+def test_rig_is_not_looked_for_with_an_eds_of_no_use(
+    short_rig: Path, faulty: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["check", str(short_rig), "--bus", "ws://127.0.0.1:9/", "--eds", str(faulty)]) == 2
+    assert "m1" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ([], "expected a rig file, an EDS with --eds, or both"),
+        (["--eds", SHIPPED, "--bus", "virtual:x"], "expected a rig file beside them"),
+        (["--eds", SHIPPED, "--prove-stop"], "expected a rig file beside them"),
+    ],
+)
+def test_arguments_that_make_no_sense(arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["check", *arguments]) == 2
+    assert said in capsys.readouterr().err

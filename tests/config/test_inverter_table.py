@@ -1,0 +1,71 @@
+"""How a drive is to stop by itself, as the rig file has it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from hil.config.rig_file import read_rig
+from hil.rig.build import inverter_settings
+from tests.config.test_rig_file import changed, problems_of
+
+HEARTBEAT = r"(\[inverters\.m1\].*?heartbeat_ms = 100 [^\n]*\n)"
+
+
+def with_keys(folder: Path, *lines: str, tables: str = "") -> Path:
+    """The example with more keys for m1, and with a table after it."""
+    return changed(
+        folder, (HEARTBEAT, r"\1" + "\n".join(lines) + "\n"), (r"^\[inverters\.m2\]", f"{tables}\n[inverters.m2]")
+    )
+
+
+def test_without_a_word_the_eds_s_codes_count_and_the_deadline_is_200_ms(tmp_path: Path) -> None:
+    settings = inverter_settings("m1", read_rig(changed(tmp_path)).inverters.m1)
+    assert (settings.rpdo_deadline_ms, settings.option_codes, settings.torque_slope_nm_per_s) == (200, {}, None)
+
+
+def test_what_the_rig_file_gives_reaches_the_driver(tmp_path: Path) -> None:
+    codes = "[inverters.m1.option_codes]\nabort_connection = 3\nquick_stop = 5\nfault_reaction = -1\n"
+    path = with_keys(tmp_path, "rpdo_deadline_ms = 50", "torque_slope_nm_per_s = 900.0", tables=codes)
+    rig = read_rig(path)
+    settings = inverter_settings("m1", rig.inverters.m1)
+    assert (settings.rpdo_deadline_ms, settings.torque_slope_nm_per_s) == (50, 900.0)
+    assert settings.option_codes == {0x6007: 3, 0x605A: 5, 0x605E: -1}
+    assert rig.inverters.m2.option_codes.by_object == {}
+
+
+@pytest.mark.parametrize(
+    ("lines", "tables", "problem"),
+    [
+        ((), "[inverters.m1.option_codes]\nabort_connection = 0\n", "m1.option_codes.abort_connection | expected gr"),
+        ((), "[inverters.m1.option_codes]\nabort_connection = 4\n", "m1.option_codes.abort_connection | expected less"),
+        ((), "[inverters.m1.option_codes]\nhalt = 40000\n", "m1.option_codes.halt | expected less"),
+        ((), "[inverters.m1.option_codes]\nhalting = 1\n", "m1.option_codes.halting | expected"),
+        (("rpdo_deadline_ms = 1",), "", "m1.rpdo_deadline_ms | expected greater"),
+        (("rpdo_deadline_ms = 0.1",), "", "m1.rpdo_deadline_ms | expected a valid integer"),
+        (("rpdo_deadline_ms = 15",), "", "m1.rpdo_deadline_ms | expected at least two periods (20), or one RPDO"),
+        (("torque_slope_nm_per_s = 0.0",), "", "m1.torque_slope_nm_per_s | expected greater"),
+    ],
+)
+def test_what_can_not_be_is_refused_by_its_key(
+    lines: tuple[str, ...], tables: str, problem: str, tmp_path: Path
+) -> None:
+    [line] = problems_of(with_keys(tmp_path, *lines, tables=tables))
+    assert problem in line
+
+
+@pytest.mark.parametrize("key", ["guard_time_ms", "life_time_factor", "node_guarding"])
+def test_node_guarding_is_refused_with_the_reason(key: str, tmp_path: Path) -> None:
+    [line] = problems_of(with_keys(tmp_path, f"{key} = 100"))
+    assert line.startswith(f"inverters.m1.{key} | expected no such key: node guarding needs remote frames")
+    assert line.endswith("heartbeat_ms sets its period | came 100")
+
+
+def test_a_period_too_long_for_the_deadline_is_named_at_both_inverters(tmp_path: Path) -> None:
+    path = changed(tmp_path, (r"^period_s = 0.01 ", "period_s = 0.15 "))
+    problems = [line for line in problems_of(path) if "rpdo_deadline_ms" in line]
+    assert [line.split(" | ")[0] for line in problems] == [
+        "inverters.m1.rpdo_deadline_ms",
+        "inverters.m2.rpdo_deadline_ms",
+    ]

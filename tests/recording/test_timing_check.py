@@ -1,0 +1,92 @@
+"""Recordings whose cycles were too uneven are refused by identification, with what was counted."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from hil.cli.main import run as hil
+from hil.errors import RecordingError
+from hil.recording import Table, write_table
+from hil.recording.formats import read_metadata
+from hil.recording.sidecar import require_no_sidecar, sidecar_of, write_sidecar
+from hil.recording.timing_check import WORST_SHARE, require_even_cycles
+
+EVEN = {"cycles": 1000, "missed": 0, "late": 0, "unanswered": 0}
+
+
+@pytest.fixture
+def recorded(tmp_path: Path, own_table: Table) -> Callable[..., Path]:
+    def write(suffix: str, text: str) -> Path:
+        path = tmp_path / f"run{suffix}"
+        metadata = {"schema": "hil.recording/1", "timing": text}
+        write_table(replace(own_table, path=path, metadata=metadata), path)
+        if suffix == ".csv":
+            write_sidecar(path, metadata)
+        return path
+
+    return write
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+@pytest.mark.parametrize("fault", ["missed", "late", "unanswered"])
+def test_too_many_bad_cycles_are_refused_and_a_few_are_not(
+    recorded: Callable[..., Path], suffix: str, fault: str
+) -> None:
+    few = round(WORST_SHARE * 1000)
+    path = recorded(suffix, json.dumps({**EVEN, fault: few}))
+    require_even_cycles([path])
+    path.unlink()
+    sidecar_of(path).unlink(missing_ok=True)
+    path = recorded(suffix, json.dumps({**EVEN, fault: 2 * few}))
+    with pytest.raises(RecordingError, match=rf"at most 5% of the cycles .* {2 * few} .*Record again"):
+        require_even_cycles([path])
+
+
+@pytest.mark.parametrize("text", ["", "[]", '{"cycles": 3}', '{"cycles": "many", "missed": 0}'])
+def test_record_that_can_not_be_read_is_refused(recorded: Callable[..., Path], text: str) -> None:
+    with pytest.raises(RecordingError, match=r"metadata timing: expected a record hil\.timing/1"):
+        require_even_cycles([recorded(".parquet", text)])
+
+
+def test_recording_without_a_record_passes(tmp_path: Path, own_table: Table) -> None:
+    path = tmp_path / "run.csv"
+    write_table(own_table, path)
+    require_even_cycles([path])
+
+
+def test_identify_refuses_and_writes_nothing(
+    recorded: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = recorded(".csv", json.dumps({**EVEN, "late": 400}))
+    assert hil(["identify", str(path), "--out", str(tmp_path / "out")]) == 2
+    assert "400 late by more than half a period" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_file_beside_that_is_not_ours_is_left_alone(tmp_path: Path, own_table: Table) -> None:
+    path = tmp_path / "run.csv"
+    write_table(own_table, path)
+    sidecar_of(path).write_text('{"schema": "another", "timing": "x"}', encoding="utf-8")
+    assert read_metadata(path) == {}
+    with pytest.raises(RecordingError, match="describes another recording"):
+        require_no_sidecar(path)
+
+
+def test_damaged_file_beside_is_refused_by_name(tmp_path: Path, own_table: Table) -> None:
+    path = tmp_path / "run.csv"
+    write_table(own_table, path)
+    sidecar_of(path).write_text("{", encoding="utf-8")
+    with pytest.raises(RecordingError, match=r"run\.csv\.json: expected the description"):
+        read_metadata(path)
+
+
+def test_damaged_parquet_is_refused_by_name(tmp_path: Path) -> None:
+    path = tmp_path / "run.parquet"
+    path.write_bytes(b"PAR1")
+    with pytest.raises(RecordingError, match=r"run\.parquet: expected a whole Parquet file"):
+        read_metadata(path)

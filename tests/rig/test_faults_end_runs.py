@@ -1,0 +1,152 @@
+"""Faults as ``hil sim --fault`` takes them, in a run: it ends at zero torque and says why, or samples are flagged.
+
+Those of drives that hang, fault or are another from the start are looked at in ``test_session_ends_early.py``.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import pytest
+
+from drivers.errors import BusDown, ConfigMismatch, DeviceFault, DeviceTimeout, DriverError, ProtocolViolation
+from hil.errors import RunAborted
+from hil.rig.drive import RunSummary
+from hil.rig.sample import SampleFlag
+from hil.simulator.fault_spec import rig_faults
+from hil.simulator.rig_server import RigServer
+from tests.rig.observer import assert_disarmed
+from tests.rig.serving import Samples, fast, run_once, served, small_rig
+
+
+@pytest.fixture(scope="module")
+def within_s() -> float:
+    """A moment of simulated time in the middle of the measured part of the small rig's reversal."""
+    rig, samples = small_rig(), Samples()
+    with served(rig) as (_, connected):
+        run_once(connected, samples, experiment="reversal")
+    return samples.rows[50].cycle * rig.period_s
+
+
+def faulty(*texts: str) -> Any:
+    rig = small_rig()
+    return served(rig, rig_faults(texts, rig.period_s))
+
+
+def run_with(*texts: str, patience_s: float = 0.1) -> tuple[RunSummary, Samples]:
+    """Run with faults that do not end it; each answer that is lost costs the patience."""
+    samples = Samples()
+    with faulty(*texts) as (server, rig):
+        summary = run_once(rig, samples, experiment="reversal", pacer=fast(rig, patience_s))
+        assert_disarmed(server.bus_url, 1, 2)
+    return summary, samples
+
+
+@pytest.mark.parametrize(
+    ("fault", "error", "named"),
+    [
+        ("m2.reset@S", DeviceFault, r"inverter m2.*NMT state is INITIALISING, expected OPERATIONAL"),
+        ("m1.emcy@S=0x4210", DeviceFault, "inverter m1.*EMCY 0x4210 excess temperature of the device"),
+        ("m1.brown_out@S", DeviceFault, "inverter m1.*EMCY 0x3220 DC link under-voltage"),
+        ("m2.fault@S=0x7303", DeviceFault, "inverter m2.*EMCY 0x7303 resolver 1 fault"),
+        ("m1.stale_pdo@S", DeviceFault, r"inverter m1.*feedback stands still.*through 10 steps of the command"),
+        ("bus.corrupt@S=1:0x181", ProtocolViolation, "inverter m1.*frame of 7 bytes, expected 8"),
+        ("bus.corrupt@S=1:0x202", DeviceFault, "inverter m2.*EMCY 0x8210 PDO not processed: wrong length"),
+        ("bus.lose@S=1:0x182", DeviceTimeout, "inverter m2: no TPDO for 0.21"),
+        ("bus.lose@S=1:0x201", DeviceFault, "inverter m1.*EMCY 0x8250 RPDO timeout"),
+    ],
+)
+def test_fault_in_a_run_ends_it_with_its_reason_and_both_drives_disarmed(
+    fault: str, error: type[DriverError], named: str, within_s: float
+) -> None:
+    samples = Samples()
+    with faulty(fault.replace("@S", f"@{within_s}")) as (server, rig):
+        with pytest.raises(error, match=named):
+            run_once(rig, samples, experiment="reversal", pacer=fast(rig, answer_timeout_s=0.1))
+        assert server.torque_nm == (0.0, 0.0)
+    assert 0 < len(samples.rows) < 100
+
+
+@pytest.mark.parametrize(
+    ("fault", "error", "named"),
+    [
+        ("m1.lacks=0x6072", ConfigMismatch, r"inverter m1.*object 0x6072:00 refused.*Object does not exist"),
+        ("m2.locks=0x1A00", ConfigMismatch, r"inverter m2.*object 0x1A00:00 refused.*read only"),
+        ("m2.forgets=0x1016", ConfigMismatch, r"inverter m2.*object 0x1016:01 reads 0 .*after writing"),
+        ("bus.lose=1:0x581", DeviceTimeout, "inverter m1.*no SDO answer"),
+    ],
+)
+def test_drive_that_can_not_be_configured_is_not_armed(fault: str, error: type[DriverError], named: str) -> None:
+    samples = Samples()
+    with faulty(fault) as (server, rig):
+        with pytest.raises(error, match=named):
+            run_once(rig, samples)
+        assert server.torque_nm == (0.0, 0.0)
+    assert samples.rows == []
+
+
+def assert_torque_ends(server: RigServer, within_s: float = 5.0) -> None:
+    deadline_s = time.monotonic() + within_s
+    while server.torque_nm != (0.0, 0.0):
+        assert time.monotonic() < deadline_s, f"torque is still {server.torque_nm}"
+        time.sleep(0.01)
+
+
+def test_drive_that_leaves_the_bus_has_no_torque_and_the_other_is_disarmed(within_s: float) -> None:
+    with faulty(f"m1.bus_off@{within_s}") as (server, rig):
+        with pytest.raises(RunAborted, match=r"not every drive.*inverter m1") as caught:
+            run_once(rig, Samples(), experiment="reversal", pacer=fast(rig, answer_timeout_s=0.1))
+        assert_disarmed(server.bus_url, 2)
+        assert server.torque_nm == (0.0, 0.0)
+    assert isinstance(caught.value.__cause__, DeviceTimeout)
+
+
+def test_host_that_is_off_the_bus_disarms_nobody_but_the_drives_miss_it(within_s: float) -> None:
+    """The last resort: nothing the host sends arrives, and both drives stop for want of its heartbeat."""
+    with faulty(f"bus.off@{within_s}") as (server, rig):
+        with pytest.raises(RunAborted, match=r"not every drive.*bus-off.*cut the power") as caught:
+            run_once(rig, Samples(), experiment="reversal")
+        assert_torque_ends(server)
+    assert isinstance(caught.value.__cause__, BusDown)
+
+
+def test_lost_answers_are_flagged_and_the_run_goes_on() -> None:
+    summary, samples = run_with("bus.lose=0.1:0x181")
+    stale = [row for row in samples.rows if row.flags is SampleFlag.M1_STALE]
+    assert summary.recorded == 100
+    assert 2 <= len(stale) <= 25  # 100 draws of 0.1: outside with a chance below 1e-4
+    assert summary.flagged == len(stale)
+
+
+def test_the_same_seed_loses_the_same_frames() -> None:
+    flags = [[row.flags for row in run_with("bus.lose=0.1:0x182")[1].rows] for _ in range(2)]
+    assert flags[0] == flags[1]
+
+
+def test_repeated_frames_change_nothing() -> None:
+    clean, repeated = (run_with(*texts)[1] for texts in ([], ["bus.repeat=0.3"]))
+    for name in ("torque_m1_nm", "torque_m2_nm", "speed_rad_s", "flags"):
+        assert repeated.column(name) == clean.column(name)
+
+
+@pytest.mark.parametrize("fault", ["bus.reorder=0.2:0x181", "bus.delay=0.002", "bus.jitter=0.002"])
+def test_frames_that_come_late_within_the_patience_change_nothing(fault: str) -> None:
+    clean, late = (run_with(*texts, patience_s=5.0)[1] for texts in ([], [fault]))
+    for name in ("torque_m1_nm", "torque_m2_nm", "speed_rad_s", "flags"):
+        assert late.column(name) == clean.column(name)
+
+
+@pytest.mark.parametrize(
+    ("fault", "changes"),
+    [
+        ("m1.coarse_torque=20", "torque_m1_nm"),
+        ("m2.weak_cooling=20", "torque_m2_nm"),
+        ("m1.field_weakening=1", "torque_m1_nm"),
+        ("m1.clock_drift=5000", "speed_rad_s"),
+    ],
+)
+def test_limits_of_a_drive_are_seen_in_what_it_tells(fault: str, changes: str) -> None:
+    clean, limited = (run_with(*texts)[1] for texts in ([], [fault]))
+    assert limited.column(changes) != clean.column(changes)
+    assert {row.flags for row in limited.rows} == {SampleFlag.GOOD}

@@ -1,0 +1,53 @@
+"""Bounded histograms of times: quantiles from above, by a known part, and the longest time exactly."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hil.rig.histogram import Histogram
+
+WIDEST = 1.0 / 128.0
+
+
+def filled(times_ns: list[int]) -> Histogram:
+    histogram = Histogram()
+    for time_ns in times_ns:
+        histogram.add(time_ns)
+    return histogram
+
+
+@given(st.lists(st.integers(0, 10**12), min_size=1, max_size=200), st.sampled_from((0.01, 0.5, 0.99, 0.999, 1.0)))
+def test_quantile_is_the_nearest_rank_or_slightly_more(times_ns: list[int], share: float) -> None:
+    exact = sorted(times_ns)[max(1, math.ceil(share * len(times_ns))) - 1]
+    told = filled(times_ns).quantile_ns(share)
+    assert told is not None
+    assert exact <= told <= exact * (1.0 + WIDEST) + 1e-9
+    assert told <= max(times_ns)
+
+
+def test_the_longest_time_is_exact_and_nothing_is_lost() -> None:
+    times_ns = [round(x) for x in np.random.default_rng(3).lognormal(13.0, 3.0, 5000)]
+    histogram = filled(times_ns)
+    assert histogram.max_ns == max(times_ns)
+    assert histogram.total == sum(count for _, count in histogram.bins()) == 5000
+    edges = [edge for edge, _ in histogram.bins()]
+    assert edges == sorted(set(edges))
+
+
+def test_memory_does_not_grow_with_the_run() -> None:
+    histogram = filled([round(2.0 ** (k / 1000.0)) for k in range(63_000)])
+    assert len(histogram.bins()) < 7500
+
+
+def test_nothing_counted_has_no_quantile() -> None:
+    assert Histogram().quantile_ns(0.5) is None
+
+
+@pytest.mark.parametrize("time_ns", [-5, 0])
+def test_time_that_does_not_pass_counts_as_none(time_ns: int) -> None:
+    assert filled([time_ns]).bins() == [(0, 1)]

@@ -1,0 +1,230 @@
+"""Runs whose PRBS the PLC makes: in the measured part, inside the guard's limits, off on every way out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from drivers.errors import CommandRefused
+from drivers.plc_types import PrbsSource
+from drivers.register import Value
+from hil.config.rig_file import PrbsTarget, Rig
+from hil.errors import RunAborted
+from hil.rig.build import Devices, open_devices
+from hil.rig.drive import Progress
+from hil.rig.dry_run import dry_run
+from hil.rig.experiments.base import Phase
+from hil.rig.pacing import RealTimePacer, period_ns
+from hil.rig.plan import plan_run
+from hil.rig.stop import StopRequest
+from hil.simulator.plc_prbs import PlcPrbs as Generator
+from hil.simulator.rig_server import RigServer
+from tests.rig.observer import assert_disarmed
+from tests.rig.serving import Samples, changed, run, run_once, served, small_rig
+
+AMPLITUDE_NM = 120.0
+HALF_COUNT_NM = 0.5 * 600.0 / 1000.0
+"""Half of an inverter's torque count: 0.1 % of 600 Nm."""
+
+
+def plc_rig(**prbs: Any) -> Rig:
+    rig: Rig = changed(small_rig(), {"prbs": {"source": PrbsSource.PLC, **prbs}})
+    return rig
+
+
+def generator_of(server: RigServer) -> dict[str, Value]:
+    values = server.plc.values()
+    return {name: values[name] for name in ("prbs_enable", "prbs_source", "prbs_amplitude", "prbs_torque")}
+
+
+OFF: dict[str, Value] = {"prbs_enable": False, "prbs_source": "host", "prbs_amplitude": 0.0, "prbs_torque": 0.0}
+
+
+def half_way(action: Callable[[], object]) -> Progress:
+    def show(phase: Phase, time_s: float) -> None:
+        if phase is Phase.MEASURE and time_s == 0.5:
+            action()
+
+    return show
+
+
+def beyond_the_host(samples: Samples, inverter: str) -> np.ndarray:
+    """Torque of an inverter that the host did not ask for [Nm]."""
+    given, asked = samples.column(f"torque_{inverter}_nm"), samples.column(f"torque_ref_{inverter}_nm")
+    return np.array(given) - np.array(asked)
+
+
+@pytest.mark.parametrize(
+    ("target", "share_m1", "part_m1"),
+    [
+        (PrbsTarget.BOTH, None, 0.5),
+        (PrbsTarget.M1, None, 1.0),
+        (PrbsTarget.M2, None, 0.0),
+        (PrbsTarget.SHARED, 0.25, 0.25),
+    ],
+)
+def test_its_levels_are_on_the_shaft_shared_out_as_the_rig_file_says(
+    target: PrbsTarget, share_m1: float | None, part_m1: float
+) -> None:
+    samples = Samples()
+    with served(plc_rig(target=target, share_m1=share_m1, seed=5)) as (server, rig):
+        run_once(rig, samples)
+        assert_disarmed(server.bus_url, 1, 2)
+        assert generator_of(server) == OFF
+    expected = Generator(AMPLITUDE_NM, rig.prbs.clock_divider, rig.prbs.seed)
+    levels = np.zeros(len(samples.rows))
+    for k in range(len(levels)):
+        levels[k] = expected.torque_nm
+        expected.clock()
+    assert set(levels) == {AMPLITUDE_NM, -AMPLITUDE_NM}
+    for inverter, part in (("m1", part_m1), ("m2", 1.0 - part_m1)):
+        assert np.abs(beyond_the_host(samples, inverter) - part * levels).max() <= 2 * HALF_COUNT_NM + 1e-9
+
+
+def test_it_runs_in_the_measured_part_and_nowhere_else() -> None:
+    seen: dict[Phase, set[bool]] = {}
+    with served(plc_rig()) as (server, rig):
+
+        def show(phase: Phase, time_s: float) -> None:
+            seen.setdefault(phase, set()).add(server.plc.prbs_torque_nm != 0.0)
+
+        run_once(rig, Samples(), progress=show)
+    assert seen == {Phase.APPROACH: {False}, Phase.MEASURE: {True}, Phase.RELEASE: {False}, Phase.DONE: {False}}
+
+
+def test_the_recording_holds_what_the_plc_reported_and_nothing_made_up() -> None:
+    samples = Samples()
+    with served(plc_rig(seed=5)) as (_, rig):
+        run_once(rig, samples)
+    reported = np.array(samples.column("prbs_nm"))
+    known = np.isfinite(reported)
+    assert known.sum() == 10  # ten polls in the second it takes
+    on_the_shaft = beyond_the_host(samples, "m1") + beyond_the_host(samples, "m2")
+    assert np.abs(reported - on_the_shaft)[known].max() <= 4 * HALF_COUNT_NM + 1e-9
+    assert set(reported[known]) == {AMPLITUDE_NM, -AMPLITUDE_NM}
+
+
+def test_the_host_asks_for_the_base_torque_alone() -> None:
+    with served(plc_rig()) as (_, rig):
+        plan = plan_run(rig, "cruise")
+        assert plan.prbs_nm(Phase.MEASURE) == 0.0
+    assert plan.plc_prbs is not None
+    assert plan.plc_prbs.m1.prbs_nm + plan.plc_prbs.m2.prbs_nm == AMPLITUDE_NM
+
+
+class TestEveryWayOut:
+    def test_ctrl_c(self) -> None:
+        stop = StopRequest()
+        with served(plc_rig()) as (server, rig):
+            with pytest.raises(KeyboardInterrupt):
+                run_once(rig, Samples(), stop=stop, progress=half_way(stop.request))
+            assert_disarmed(server.bus_url, 1, 2)
+            assert generator_of(server) == OFF
+
+    def test_the_vehicle_is_no_longer_fit(self) -> None:
+        with served(plc_rig()) as (server, rig):
+            with pytest.raises(RunAborted, match="clutch is closed"):
+                run_once(rig, Samples(), progress=half_way(server.plc.close_clutch))
+            assert_disarmed(server.bus_url, 1, 2)
+            assert generator_of(server) == OFF
+
+    def test_a_plc_that_falls_silent(self) -> None:
+        with served(plc_rig()) as (server, rig):
+            with pytest.raises(RunAborted, match=r"generator confirmed off, came: .*What ended the run: PLC: ") as told:
+                run_once(rig, Samples(), progress=half_way(server.plc_server.pause))
+            assert_disarmed(server.bus_url, 1, 2)
+            assert server.plc.values()["prbs_enable"] is True
+        assert "Switch it off at the PLC before the drives are armed again" in str(told.value)
+        assert isinstance(told.value.__cause__, RunAborted)
+
+    def test_a_lost_connection_is_made_again_to_switch_it_off(self) -> None:
+        async def drop(devices: Devices) -> None:
+            devices.plc.close()
+
+        with served(plc_rig()) as (server, rig), open_devices(rig) as devices:
+            lose = half_way(lambda: devices.plc_loop.call(drop(devices)))
+            with pytest.raises(RunAborted, match=r"PLC: expected its status, came: .*expected an open connection"):
+                run(rig, devices, Samples(), progress=lose)
+            assert_disarmed(server.bus_url, 1, 2)
+            assert generator_of(server) == OFF
+
+
+class TestSomebodyElseWritesThere:
+    @pytest.mark.parametrize(
+        ("change", "named"),
+        [
+            ({"prbs_amplitude": 300.0}, "set to on, 300 Nm, .*expected on, 120 Nm, divider 2, seed 1, source plc"),
+            ({"prbs_enable": False}, "set to off, expected on, 120 Nm"),
+        ],
+    )
+    def test_while_it_runs(self, change: dict[str, Value], named: str) -> None:
+        with served(plc_rig()) as (server, rig):
+            with pytest.raises(RunAborted, match=named):
+                run_once(rig, Samples(), progress=half_way(lambda: server.plc.write(change)))
+            assert_disarmed(server.bus_url, 1, 2)
+            assert generator_of(server) == OFF
+
+    def test_while_the_host_makes_the_prbs(self) -> None:
+        running: dict[str, Value] = {"prbs_enable": True, "prbs_source": "plc", "prbs_amplitude": 50.0}
+        with served() as (server, rig):
+            with pytest.raises(RunAborted, match=r"set to on, 50 Nm, .*expected off"):
+                run_once(rig, Samples(), progress=half_way(lambda: server.plc.write(running)))
+            assert_disarmed(server.bus_url, 1, 2)
+
+
+def test_real_time_takes_the_same_path() -> None:
+    patient = {"guard": {"feedback_timeout_s": 1.0}, "experiments.cruise": {"duration_s": 0.5, "speed_rad_s": 0.0}}
+    samples = Samples()
+    with served(changed(plc_rig(), patient)) as (server, rig):
+        run_once(rig, samples, pacer=RealTimePacer(period_ns(rig.period_s)))
+        assert_disarmed(server.bus_url, 1, 2)
+        assert generator_of(server) == OFF
+    on_the_shaft = beyond_the_host(samples, "m1") + beyond_the_host(samples, "m2")
+    assert (np.abs(np.abs(on_the_shaft) - AMPLITUDE_NM) <= 4 * HALF_COUNT_NM + 1e-9).sum() > len(samples.rows) / 2
+    assert np.isnan(samples.column("prbs_nm")).sum() > len(samples.rows) / 2
+
+
+class TestTheGuard:
+    @pytest.mark.parametrize(
+        ("table", "limit", "named"),
+        [
+            ("guard", {"prbs_limit_nm": 59.0}, r"inverter m1: PRBS torque is -?60 Nm, expected at most 59 Nm"),
+            ("guard", {"sum_limit_nm": 119.0}, r"sum of both inverters is -?120 Nm, expected at most 119 Nm"),
+            ("inverters.m2", {"torque_limit_nm": 59.0}, r"inverter m2: base \+ PRBS torque is -?60 Nm"),
+        ],
+    )
+    def test_an_amplitude_beyond_a_limit_is_refused_before_anything_is_connected(
+        self, table: str, limit: dict[str, float], named: str
+    ) -> None:
+        with pytest.raises(CommandRefused, match=named):
+            plan_run(changed(plc_rig(), {table: limit}), "cruise")
+
+    def test_what_the_plc_adds_is_kept_free_under_every_limit(self) -> None:
+        host, plc = small_rig(), plc_rig(target=PrbsTarget.SHARED, share_m1=0.25)
+        kept, full = plc.guard_limits, host.guard_limits
+        assert kept.torque_limit_m1_nm == full.torque_limit_m1_nm - 30.0
+        assert kept.torque_limit_m2_nm == full.torque_limit_m2_nm - 90.0
+        assert kept.sum_limit_nm == full.sum_limit_nm - 120.0
+        assert plc.torque_limits == full == host.torque_limits
+
+    def test_a_base_torque_that_leaves_no_room_ends_the_run(self) -> None:
+        """400 Nm of each inverter, 60 Nm of it the PLC's: 341 Nm of base torque fit without the PRBS only."""
+        greedy = {
+            "experiments.reversal": {"swing_nm": 682.0, "torque_nm": 682.0, "share_m1": 0.5},
+            "guard": {"sum_limit_nm": 10_000.0},
+        }
+        with served(changed(plc_rig(), greedy)) as (server, rig):
+            with pytest.raises(RunAborted, match="expected at least the 401 Nm this experiment may ask for"):
+                run_once(rig, Samples(), experiment="reversal")
+            assert_disarmed(server.bus_url, 1, 2)
+        with pytest.raises(CommandRefused, match="expected at most 340 Nm either way"):
+            dry_run(rig, "reversal")
+
+    def test_a_dry_run_predicts_the_same_range_whoever_makes_it(self) -> None:
+        by_host, by_plc = dry_run(small_rig(), "cruise"), dry_run(plc_rig(), "cruise")
+        assert by_plc.torque_m1_nm == by_host.torque_m1_nm
+        assert by_plc.torque_m2_nm == by_host.torque_m2_nm
+        assert by_plc.speed_measured_rad_s == by_host.speed_measured_rad_s

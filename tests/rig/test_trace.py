@@ -1,0 +1,204 @@
+"""A run's bus trace beside its samples, and the samples rebuilt from it: torque and speed the same to the bit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import can
+import pytest
+
+from hil.errors import RecordingError
+from hil.rig.replay import replay
+from hil.rig.sample import Sample, SampleFlag
+from hil.rig.trace import SUFFIXES, BusTrace
+from hil.simulator.inverter_settings import InverterFaults
+from hil.simulator.rig_server import RigFaults
+from tests.rig.serving import changed, small_rig
+from tests.wire.traced import traced_run
+
+MS = 1_000_000
+RATED_NM = 600.0
+PERIOD_NS = 10 * MS
+SYNC, RPDO_M1, RPDO_M2, TPDO_M1, TPDO_M2 = 0x080, 0x201, 0x202, 0x181, 0x182
+ENABLED = 0x0237
+MEASURED = ("time_s", "torque_m1_nm", "torque_m2_nm", "speed_rad_s", "flags", "age_ns")
+
+
+def column(rows: list[Sample], name: str) -> list[float]:
+    return [getattr(row, name) for row in rows]
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_replay_gives_torque_and_speed_of_the_run(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"run{suffix}"
+    live = traced_run(path).rows
+    again = list(replay(path, small_rig()))
+    for name in MEASURED:
+        assert column(again, name) == column(live, name), name
+    for name in ("torque_ref_m1_nm", "torque_ref_m2_nm", "prbs_nm"):
+        count_nm = RATED_NM / 1000.0
+        assert column(again, name) == pytest.approx(column(live, name), abs=2.0 * count_nm)
+
+
+def test_replay_with_noise_and_stale_answers(tmp_path: Path) -> None:
+    """Readings that differ from cycle to cycle, so that a value of the wrong cycle would show."""
+    rig = changed(small_rig(), {"simulation": {"speed_noise_rad_s": 0.05, "torque_noise_permille": 2.0}})
+    path = tmp_path / "run.blf"
+    live = traced_run(path, rig, RigFaults(m2=InverterFaults())).rows
+    again = list(replay(path, rig))
+    assert len(set(column(live, "speed_rad_s"))) > len(live) // 2
+    for name in MEASURED:
+        assert column(again, name) == column(live, name), name
+
+
+def test_whole_trace_has_the_approach_and_the_way_out_too(tmp_path: Path) -> None:
+    path = tmp_path / "run.log"
+    measured = traced_run(path).rows
+    whole = list(replay(path, small_rig(), whole=True))
+    assert len(whole) > len(measured)
+    assert whole[0].time_s == 0.0
+    assert whole[-1].prbs_nm == 0.0
+
+
+def frames(*rows: tuple[int, int, bytes]) -> list[can.Message]:
+    """Frames of a trace: time [ms], identifier, data."""
+    return [
+        can.Message(timestamp=1.0 + ms / 1e3, arbitration_id=cob_id, data=data, is_extended_id=False)
+        for ms, cob_id, data in rows
+    ]
+
+
+def rpdo(prbs: int) -> bytes:
+    return b"\x0f\x00" + bytes(2) + prbs.to_bytes(2, "little", signed=True)
+
+
+def tpdo(torque: int) -> bytes:
+    return ENABLED.to_bytes(2, "little") + torque.to_bytes(2, "little", signed=True) + bytes(4)
+
+
+def cycle(ms: int, torque: int, answer_m2_ms: int = 1, prbs: int = 100) -> list[tuple[int, int, bytes]]:
+    """One cycle as it is on the bus; m2 answers so long after the SYNC."""
+    return [
+        (ms, RPDO_M1, rpdo(prbs)),
+        (ms, RPDO_M2, rpdo(prbs)),
+        (ms, SYNC, b""),
+        (ms + 1, TPDO_M1, tpdo(torque)),
+        (ms + answer_m2_ms, TPDO_M2, tpdo(torque)),
+    ]
+
+
+@pytest.fixture
+def written(tmp_path: Path) -> Callable[..., Path]:
+    def write(*rows: tuple[int, int, bytes]) -> Path:
+        path = tmp_path / "made.log"
+        with can.Logger(path) as logger:
+            for message in frames(*rows):
+                logger(message)
+        return path
+
+    return write
+
+
+def test_answer_after_its_time_does_not_count(written: Callable[..., Path]) -> None:
+    path = written(*cycle(0, 10), *cycle(10, 20, answer_m2_ms=9), *cycle(20, 30))
+    rows = list(replay(path, small_rig()))
+    assert column(rows, "torque_m2_nm") == [6.0, 6.0, 18.0]
+    assert column(rows, "flags") == [SampleFlag.GOOD, SampleFlag.M2_STALE, SampleFlag.GOOD]
+    assert column(rows, "age_ns") == [0, PERIOD_NS, 0]
+
+
+def test_cycles_that_did_not_take_place_are_flagged_rows(written: Callable[..., Path]) -> None:
+    path = written(*cycle(0, 10), *cycle(10, 20), *cycle(40, 30), *cycle(50, 40), *cycle(60, 50))
+    rows = list(replay(path, small_rig()))
+    assert column(rows, "time_s") == pytest.approx([0.00, 0.01, 0.02, 0.03, 0.04, 0.05, 0.06])
+    assert sum(bool(row.flags & SampleFlag.LATE) for row in rows) >= 2
+    assert [row.torque_m1_nm for row in rows if not row.flags] == [6.0, 12.0, 24.0, 30.0]
+
+
+def test_trace_of_a_run_without_a_clock_has_one_period_per_sync(written: Callable[..., Path]) -> None:
+    path = written(*cycle(0, 10), *cycle(2, 20), *cycle(4, 30, answer_m2_ms=15), *cycle(20, 40))
+    rows = list(replay(path, small_rig()))
+    assert column(rows, "time_s") == [0.0, 0.01, 0.02, 0.03]
+    assert not any(column(rows, "flags"))
+
+
+@pytest.mark.parametrize(
+    ("rows", "reason"),
+    [
+        ([], "expected SYNC"),
+        ([*cycle(0, 1, prbs=0), *cycle(10, 1, prbs=0)], "measured part .* came none"),
+        ([*cycle(0, 1), *cycle(10, 1, prbs=0), *cycle(20, 1), *cycle(30, 1)], "came a second"),
+        ([*cycle(0, 1), (3, TPDO_M1, b"\x00"), *cycle(10, 1)], "frame of 1 bytes.*rig file is not the one"),
+    ],
+)
+def test_trace_that_is_no_run_is_refused(
+    written: Callable[..., Path], rows: list[tuple[int, int, bytes]], reason: str
+) -> None:
+    with pytest.raises(RecordingError, match=reason):
+        list(replay(written(*rows), small_rig()))
+
+
+@pytest.mark.parametrize(("name", "content"), [("a.blf", b"LOGG"), ("a.blf", b"no such format"), ("a.log", b"x y z\n")])
+def test_file_that_is_no_trace_is_refused_by_name(tmp_path: Path, name: str, content: bytes) -> None:
+    path = tmp_path / name
+    path.write_bytes(content)
+    with pytest.raises(RecordingError, match=f"{name}: expected a bus trace"):
+        list(replay(path, small_rig()))
+
+
+def test_missing_and_misnamed_traces_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match="no such file"):
+        list(replay(tmp_path / "a.blf", small_rig()))
+    with pytest.raises(RecordingError, match=r"ends in one of \.blf, \.log, \.asc"):
+        list(replay(tmp_path / "a.pcap", small_rig()))
+
+
+def test_trace_is_never_overwritten_and_needs_a_place(tmp_path: Path) -> None:
+    kept = tmp_path / "kept.log"
+    kept.write_text("mine", encoding="utf-8")
+    for path, reason in (
+        (kept, "never overwritten"),
+        (tmp_path / "none" / "a.log", "expected a place to write"),
+        (tmp_path / "a.txt", "ends in one of"),
+    ):
+        with pytest.raises(RecordingError, match=reason), BusTrace(path):
+            pass
+    assert kept.read_text(encoding="utf-8") == "mine"
+
+
+class _FullDisk:
+    """A writer on a disk that is full."""
+
+    def on_message_received(self, message: can.Message) -> None:
+        raise OSError(28, "No space left on device")
+
+    def stop(self) -> None:
+        pass
+
+
+def test_disk_that_fills_up_is_told_and_the_cycle_goes_on(tmp_path: Path) -> None:
+    trace = BusTrace(tmp_path / "a.log")
+    trace.__enter__()
+    trace._writer.stop()
+    trace._writer = _FullDisk()
+    trace.take(can.Message(arbitration_id=1), 0)
+    trace._thread.join(5.0)
+    trace.take(can.Message(arbitration_id=1), 0)
+    for tell in (trace.raise_if_failed, lambda: trace.__exit__(None, None, None)):
+        with pytest.raises(RecordingError, match="No space left"):
+            tell()
+
+
+def test_trace_is_closed_and_kept_when_the_run_fails(tmp_path: Path) -> None:
+    path = tmp_path / "a.blf"
+
+    def fail() -> None:
+        with BusTrace(path) as trace:
+            trace.take(can.Message(arbitration_id=0x80, is_extended_id=False), 5)
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        fail()
+    with can.LogReader(path) as reader:
+        assert [message.arbitration_id for message in reader] == [0x80]
