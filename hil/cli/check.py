@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from drivers.eds_check import EdsReport, check_eds
+from drivers.datasheet.check import EdsReport, check_eds
 from drivers.errors import ConfigMismatch
 from hil.config.rig_file import Rig, read_rig
 from hil.errors import InputError, UsageError

@@ -12,7 +12,7 @@ from typing import Annotated
 
 import typer
 
-from drivers.can_link import CanLink
+from drivers.canopen.can_link import CanLink
 from hil.cli.run_progress import RunProgress
 from hil.config.rig_file import Rig, read_rig
 from hil.errors import UsageError

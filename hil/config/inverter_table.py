@@ -8,8 +8,8 @@ from typing import Annotated, Any, Final, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from drivers.cia402 import TorqueMode
-from drivers.drive_settings import ABORT_CONNECTION
+from drivers.inverter.cia402 import TorqueMode
+from drivers.inverter.drive_settings import ABORT_CONNECTION
 from hil.config.problems import Fault, refuse
 from hil.config.table import ExistingFile, Positive, Table, Unsigned32
 

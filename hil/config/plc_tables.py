@@ -10,8 +10,8 @@ from typing import Annotated
 
 from pydantic import Field
 
-from drivers.modbus_security import ClientSecurity, Credentials
-from drivers.register import Access
+from drivers.plc.modbus_security import ClientSecurity, Credentials
+from drivers.plc.register import Access
 from hil.config.table import ExistingFile, Table, TcpPort, Text
 
 

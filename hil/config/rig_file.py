@@ -19,11 +19,11 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from drivers.eds_file import EdsFile
+from drivers.datasheet.file import EdsFile
 from drivers.errors import ConfigMismatch
-from drivers.plc_map import require_usable
-from drivers.plc_types import PrbsSource
-from drivers.register_map import RegisterMapError, load_register_map
+from drivers.plc.map_needs import require_usable
+from drivers.plc.register_map import RegisterMapError, load_register_map
+from drivers.plc.types import PrbsSource
 from drivers.torque_guard import GuardLimits
 from hil.config.experiment_tables import EVEN_SHARE, AnyExperiment
 from hil.config.inverter_table import InvertersTable

@@ -7,8 +7,8 @@ from typing import Any
 
 import typer
 
-from drivers.eds_check import EdsReport
-from drivers.eds_finding import EdsFinding, Severity
+from drivers.datasheet.check import EdsReport
+from drivers.datasheet.finding import EdsFinding, Severity
 
 _COLOURS = {Severity.ERROR: "red", Severity.WARNING: "yellow", Severity.NOTE: "cyan"}
 

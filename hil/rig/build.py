@@ -9,11 +9,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from drivers.can_link import CanLink
-from drivers.inverter import Inverter
-from drivers.inverter_settings import InverterSettings
-from drivers.plc import Plc
-from drivers.register_map import load_register_map
+from drivers.canopen.can_link import CanLink
+from drivers.inverter.inverter import Inverter
+from drivers.inverter.settings import InverterSettings
+from drivers.plc.plc import Plc
+from drivers.plc.register_map import load_register_map
 from drivers.resources import data_file
 from drivers.torque_guard import TorqueGuard
 from hil.config.rig_file import InverterTable, PlcTable, Rig

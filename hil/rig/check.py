@@ -8,14 +8,14 @@ from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 
-from drivers.can_link import CanLink
-from drivers.eds_check import check_eds
-from drivers.eds_finding import Severity
+from drivers.canopen.can_link import CanLink
+from drivers.datasheet.check import check_eds
+from drivers.datasheet.finding import Severity
 from drivers.errors import DriverError
-from drivers.inverter import Inverter
-from drivers.inverter_check import Difference
-from drivers.plc_reader import Backoff, PlcReader
-from drivers.plc_types import PlcStatus
+from drivers.inverter.check import Difference
+from drivers.inverter.inverter import Inverter
+from drivers.plc.reader import Backoff, PlcReader
+from drivers.plc.types import PlcStatus
 from hil.config.rig_file import InverterTable, PlcTable, Rig
 from hil.rig.build import inverter_settings, plc_client
 from hil.rig.fitness import Needs, reasons_against

@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from drivers.can_link import CanLink
+from drivers.canopen.can_link import CanLink
 from drivers.errors import DeviceTimeout
-from drivers.inverter import Inverter, InverterFeedback
+from drivers.inverter.inverter import Inverter, InverterFeedback
 from drivers.torque_guard import TorqueGuard, TorqueRequest
 from hil.errors import RunAborted
 from hil.rig.pacing import NS_PER_S, Tick

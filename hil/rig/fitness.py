@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from drivers.plc_types import ClutchState, DriveMode, PlcStatus
+from drivers.plc.types import ClutchState, DriveMode, PlcStatus
 
 FIT_MODES = (DriveMode.SERIES, DriveMode.ELECTRIC)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from drivers.plc_types import PrbsSource
+from drivers.plc.types import PrbsSource
 from estimator.signals.prbs import Prbs
 from hil.config.rig_file import Rig
 from hil.rig.excitation import Split

@@ -21,8 +21,8 @@ from types import TracebackType
 from typing import Self
 
 from drivers.errors import BusDown, DriverError
-from drivers.plc import GENERATOR_OFF, Plc
-from drivers.plc_types import PlcStatus, PrbsSettings
+from drivers.plc.plc import GENERATOR_OFF, Plc
+from drivers.plc.types import PlcStatus, PrbsSettings
 from drivers.torque_guard import GuardedTorque, GuardLimits, TorqueGuard
 from hil.errors import RunAborted
 from hil.rig.excitation import Split

@@ -11,8 +11,8 @@ from concurrent.futures import Future
 from dataclasses import replace
 
 from drivers.errors import DriverError
-from drivers.plc import Plc
-from drivers.plc_types import PlcStatus
+from drivers.plc.plc import Plc
+from drivers.plc.types import PlcStatus
 from hil.errors import RunAborted
 from hil.rig.fitness import Needs, changes
 from hil.rig.pacing import NS_PER_S, Tick

@@ -17,11 +17,11 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from statistics import median
 
-from drivers.can_link import SYNC_COB_ID
-from drivers.eds_file import EdsFile
+from drivers.canopen.can_link import SYNC_COB_ID
+from drivers.datasheet.file import EdsFile
 from drivers.errors import ProtocolViolation
-from drivers.inverter_pdos import command_codec, feedback_codec, feedback_receiver
-from drivers.inverter_settings import InverterSettings
+from drivers.inverter.pdos import command_codec, feedback_codec, feedback_receiver
+from drivers.inverter.settings import InverterSettings
 from drivers.scaling import TorqueScale
 from hil.config.rig_file import Rig
 from hil.errors import RecordingError

@@ -11,7 +11,7 @@
 
 from __future__ import annotations
 
-from drivers.plc_types import PlcStatus
+from drivers.plc.types import PlcStatus
 from hil.errors import RunAborted
 from hil.rig.arming import ArmedDrives
 from hil.rig.build import Devices

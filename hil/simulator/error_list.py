@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from typing import Final
 
-from drivers.emcy import Emergency
+from drivers.canopen.emcy import Emergency
 
 GENERIC: Final = 0x01
 _CLASSES: Final = {0x2000: 0x02, 0x3000: 0x04, 0x4000: 0x08, 0x8100: 0x10, 0x8200: 0x10, 0x5000: 0x20, 0x6000: 0x20}

@@ -19,8 +19,8 @@ from typing import Self
 import can
 import numpy as np
 
-from drivers.can_link import SYNC_COB_ID
-from drivers.inline_bus import InlineBus
+from drivers.canopen.can_link import SYNC_COB_ID
+from drivers.canopen.inline_bus import InlineBus
 from hil.simulator.bus_faults import BusFaults, Since
 
 BUS_OFF_ERROR = 0x040

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Self
 
-from drivers.heartbeat import HEARTBEAT_COB_ID
+from drivers.canopen.heartbeat import HEARTBEAT_COB_ID
 
 NS_PER_MS = 1_000_000
 

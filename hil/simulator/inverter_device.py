@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Final
 
-from drivers.cia402 import (
+from drivers.canopen.emcy import Emergency
+from drivers.inverter.cia402 import (
     AUTOMATIC,
     FAULT_STATES,
     STATUSWORD_STATE_BITS,
@@ -21,7 +22,6 @@ from drivers.cia402 import (
     command_of,
     next_state,
 )
-from drivers.emcy import Emergency
 from hil.simulator.dc_link import DcLink
 from hil.simulator.drive_sensors import DriveSensors
 from hil.simulator.error_list import ErrorList

@@ -17,12 +17,12 @@ from typing import Any
 import numpy as np
 from canopen.sdo.exceptions import SdoAbortedError
 
-from drivers.can_link import CanLink, FrameCallback
-from drivers.eds_file import EdsFile
-from drivers.emcy import EMCY_COB_ID, Emergency
+from drivers.canopen.can_link import CanLink, FrameCallback
+from drivers.canopen.emcy import EMCY_COB_ID, Emergency
+from drivers.canopen.heartbeat import HEARTBEAT_COB_ID, NMT_COB_ID, HeartbeatProducer, NmtCommand, NmtState
+from drivers.canopen.pdo_map import PdoCodec
+from drivers.datasheet.file import EdsFile
 from drivers.errors import ProtocolViolation
-from drivers.heartbeat import HEARTBEAT_COB_ID, NMT_COB_ID, HeartbeatProducer, NmtCommand, NmtState
-from drivers.pdo_map import PdoCodec
 from drivers.scaling import IntegerType
 from hil.simulator.heartbeat_consumer import HeartbeatConsumer
 from hil.simulator.host_watch import HEARTBEAT_ERROR, RPDO_TIMEOUT, HostWatch

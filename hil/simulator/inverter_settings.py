@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from drivers.cia402 import TorqueMode
+from drivers.inverter.cia402 import TorqueMode
 from hil.simulator.torque_limits import DriveLimits
 
 

@@ -11,8 +11,8 @@ from typing import Any
 
 import canopen
 
-from drivers.eds_file import EdsFile
-from drivers.heartbeat import NMT_COB_ID
+from drivers.canopen.heartbeat import NMT_COB_ID
+from drivers.datasheet.file import EdsFile
 from hil.simulator.inverter_settings import InverterFaults
 
 NO_SUCH_OBJECT = 0x06020000

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from drivers.drive_settings import RPDO_EVENT_TIMER
-from drivers.eds_file import EdsFile
-from drivers.errors import ConfigMismatch
-from drivers.pdo_map import (
+from drivers.canopen.pdo_map import (
     COB_ID_INVALID,
     MAX_PDO_BYTES,
     RPDO_COMMUNICATION,
@@ -18,6 +15,9 @@ from drivers.pdo_map import (
     ReadObject,
     read_layout,
 )
+from drivers.datasheet.file import EdsFile
+from drivers.errors import ConfigMismatch
+from drivers.inverter.drive_settings import RPDO_EVENT_TIMER
 from hil.simulator.inverter_device import VALUE_RANGE_EXCEEDED, ObjectRefused
 
 NOT_MAPPABLE = 0x06040041

@@ -11,8 +11,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
-from drivers.modbus_security import Credentials
-from drivers.register import Access
+from drivers.plc.modbus_security import Credentials
+from drivers.plc.register import Access
 
 READ_CODES: Final = frozenset({1, 2, 3, 4})
 """Function codes that only read; Modbus Application Protocol V1.1b3, section 6. All others count as writing."""

@@ -20,8 +20,8 @@ from threading import Lock
 from types import MappingProxyType
 from typing import Final
 
-from drivers.plc_types import ClutchState, DriveMode, PrbsSource
-from drivers.register import Value
+from drivers.plc.register import Value
+from drivers.plc.types import ClutchState, DriveMode, PrbsSource
 from hil.simulator.plc_answers import Answers
 from hil.simulator.plc_prbs import CELLS, PlcPrbs
 

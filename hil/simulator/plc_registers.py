@@ -11,8 +11,8 @@ from pymodbus.simulator import DataType, SimData, SimDevice
 from pymodbus.simulator.simcore import SimCore
 
 from drivers.errors import ConfigMismatch, ProtocolViolation
-from drivers.register import Access, RegisterKind, Value
-from drivers.register_map import RegisterMap
+from drivers.plc.register import Access, RegisterKind, Value
+from drivers.plc.register_map import RegisterMap
 from hil.simulator.plc_device import PlcDevice, ValueRefusedError
 
 KIND: Final = {

@@ -22,7 +22,7 @@ from types import TracebackType
 from typing import Final, Self
 
 from drivers.errors import BusDown
-from drivers.register_map import RegisterMap
+from drivers.plc.register_map import RegisterMap
 from hil.simulator.plc_access import PlcSecurity
 from hil.simulator.plc_answers import Answers
 from hil.simulator.plc_device import PlcDevice

@@ -20,7 +20,7 @@ from pymodbus.server.requesthandler import ServerRequestHandler
 from pymodbus.simulator import DataType, SimData, SimDevice
 from pymodbus.transport import CommParams, CommType
 
-from drivers.modbus_security import role_of, server_context
+from drivers.plc.modbus_security import role_of, server_context
 from hil.simulator.plc_access import PlcSecurity
 from hil.simulator.plc_answers import LATE_BY_S, Answers
 from hil.simulator.plc_registers import PlcRegisters

@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 from types import TracebackType
 from typing import Self
 
-from drivers.inline_bus import InlineBus
-from drivers.register_map import load_register_map
+from drivers.canopen.inline_bus import InlineBus
+from drivers.plc.register_map import load_register_map
 from drivers.resources import data_file
 from hil.config.rig_file import InverterTable, Rig, SimulationTable
 from hil.errors import UsageError

@@ -8,7 +8,7 @@ from typing import Self
 
 import can
 
-from drivers.can_link import SYNC_COB_ID, CanLink
+from drivers.canopen.can_link import SYNC_COB_ID, CanLink
 from hil.simulator.inverter_node import InverterNode
 from hil.simulator.inverter_settings import SimulatedInverter
 from hil.simulator.plant import Plant

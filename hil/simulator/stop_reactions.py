@@ -21,7 +21,7 @@ from enum import Enum, IntEnum
 from types import MappingProxyType
 from typing import Final
 
-from drivers.cia402 import AUTOMATIC, PowerState
+from drivers.inverter.cia402 import AUTOMATIC, PowerState
 
 
 class Ramp(Enum):

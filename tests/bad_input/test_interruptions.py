@@ -12,7 +12,7 @@ from typing import Any, NoReturn
 
 import pytest
 
-from drivers.cia402 import PowerState
+from drivers.inverter.cia402 import PowerState
 from hil.cli.main import run
 from tests.cli.conftest import await_rows
 from tests.rig.observer import power_state

@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from drivers.cia402 import PowerState
+from drivers.inverter.cia402 import PowerState
 from hil.cli.main import run
 from hil.config.rig_file import read_rig
 from hil.recording import read_table

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from drivers.cia402 import TorqueMode
+from drivers.inverter.cia402 import TorqueMode
 from drivers.resources import data_file
 from hil.cli.main import run
 from hil.config.rig_file import read_rig

@@ -13,8 +13,8 @@ from typing import Any
 
 import pytest
 
-from drivers.can_link import CanLink
-from drivers.cia402 import TORQUE_STATES, PowerState, state_of
+from drivers.canopen.can_link import CanLink
+from drivers.inverter.cia402 import TORQUE_STATES, PowerState, state_of
 from hil.cli.main import run
 from hil.config.rig_file import read_rig
 from hil.simulator.fault_spec import rig_faults

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from drivers.modbus_security import ClientSecurity, Credentials
-from drivers.register import Access
+from drivers.plc.modbus_security import ClientSecurity, Credentials
+from drivers.plc.register import Access
 from hil.config.rig_file import read_rig
 from hil.errors import RigFileError
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from drivers.cia402 import TorqueMode
-from drivers.plc_types import PrbsSource
+from drivers.inverter.cia402 import TorqueMode
+from drivers.plc.types import PrbsSource
 from drivers.resources import data_file
 from drivers.torque_guard import GuardLimits
 from hil.config.experiment_tables import CruiseTable, ReversalTable, TipTable

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from pydantic import BaseModel
 
-from drivers.drive_settings import OPTION_CODES
-from drivers.plc_map import USED
+from drivers.inverter.drive_settings import OPTION_CODES
+from drivers.plc.map_needs import USED
 from estimator.diagnosis import evidence, holdout, judgement, noise, selection
 from estimator.diagnosis.where import locate
 from estimator.physics import own_law
@@ -78,7 +78,7 @@ def test_every_object_that_is_configured_is_listed(index: int) -> None:
 
 
 def test_every_402_object_in_the_drivers_is_listed() -> None:
-    sources = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "drivers").glob("*.py"))
+    sources = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "drivers").rglob("*.py"))
     used = set(re.findall(r"0x60[0-9A-F]{2}|0x6502", sources)) - {"0x605B", "0x605C", "0x605D"}
     assert len(used) > 15
     assert {index for index in used if index not in text("supported-protocols.md")} == set()

@@ -10,8 +10,8 @@ from typing import NoReturn
 
 import can
 
-from drivers.can_link import CanLink
-from drivers.inverter import Inverter, InverterFeedback, InverterSettings
+from drivers.canopen.can_link import CanLink
+from drivers.inverter.inverter import Inverter, InverterFeedback, InverterSettings
 from drivers.torque_guard import GuardedTorque, GuardLimits, TorqueGuard, TorqueRequest
 from hil.simulator.inverter_settings import InverterFaults, SimulatedInverter
 from hil.simulator.plant import Plant, RigidPlant

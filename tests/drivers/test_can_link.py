@@ -12,9 +12,9 @@ import pytest
 from can.interfaces.virtual import VirtualBus
 from can_remote import RemoteServer
 
-from drivers.can_link import HOST_NODE_ID, CanLink
+from drivers.canopen.can_link import HOST_NODE_ID, CanLink
+from drivers.canopen.remote_bus import BoundedRemoteBus
 from drivers.errors import BusDown, ProtocolViolation
-from drivers.remote_bus import BoundedRemoteBus
 from hil.simulator.can_bridge import CanBridge
 from hil.simulator.loopback import Address
 from tests.drivers.can_bench import frame, new_channel, virtual_bus
@@ -124,7 +124,7 @@ def test_bus_that_is_not_there_is_refused_with_advice(url: str) -> None:
 
 
 def test_server_that_says_nothing_is_refused_in_time(deaf_server: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("drivers.remote_bus._TIMEOUT_S", 0.05)
+    monkeypatch.setattr("drivers.canopen.remote_bus._TIMEOUT_S", 0.05)
     with pytest.raises(BusDown, match="timed out"):
         CanLink.open(deaf_server)
 
@@ -191,7 +191,7 @@ def test_server_that_hangs_does_not_hang_the_end(channel: str, monkeypatch: pyte
     """A stopped server process keeps its connections open and answers nothing, goodbye included."""
     with CanBridge(Address("127.0.0.1", 0), channel) as bridge:
         bus = BoundedRemoteBus(bridge.url)
-        monkeypatch.setattr("drivers.remote_bus._TIMEOUT_S", 0.05)
+        monkeypatch.setattr("drivers.canopen.remote_bus._TIMEOUT_S", 0.05)
         monkeypatch.setattr(bus.remote_protocol, "close", lambda: None)  # the goodbye gets lost
         bus.shutdown()
         assert bus.socket.fileno() == -1

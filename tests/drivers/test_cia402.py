@@ -6,7 +6,8 @@ import itertools
 
 import pytest
 
-from drivers.cia402 import (
+from drivers.errors import ProtocolViolation
+from drivers.inverter.cia402 import (
     AUTOMATIC,
     FAULT_STATES,
     STATUSWORD_STATE_BITS,
@@ -19,7 +20,6 @@ from drivers.cia402 import (
     next_state,
     state_of,
 )
-from drivers.errors import ProtocolViolation
 
 S, C = PowerState, Command
 

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from drivers.drive_settings import drive_settings
-from drivers.eds_file import EdsFile
+from drivers.canopen.pdo_map import RPDO_COMMUNICATION, RPDO_MAPPING
+from drivers.datasheet.file import EdsFile
 from drivers.errors import ConfigMismatch
-from drivers.inverter import InverterSettings
-from drivers.pdo_map import RPDO_COMMUNICATION, RPDO_MAPPING
+from drivers.inverter.drive_settings import drive_settings
+from drivers.inverter.inverter import InverterSettings
 from drivers.resources import data_file
 from tests.drivers.can_bench import M1, SIMULATED_M1, bench
 

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from drivers.eds_check import EdsReport
-from drivers.eds_check.needs import CONFIGURED, NEEDS, Need
-from drivers.eds_finding import EdsFinding, Severity
+from drivers.datasheet.check import EdsReport
+from drivers.datasheet.check.needs import CONFIGURED, NEEDS, Need
+from drivers.datasheet.finding import EdsFinding, Severity
 from tests.docs.pages import DOCS
 from tests.drivers.eds_bench import SHIPPED, E, N, W, checked, edited, line_of, without
 

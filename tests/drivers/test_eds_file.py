@@ -11,8 +11,8 @@ from canopen import import_od
 from canopen.objectdictionary import ObjectDictionary
 
 from drivers import resources
-from drivers.eds_check import check_eds
-from drivers.eds_file import EdsFile
+from drivers.datasheet.check import check_eds
+from drivers.datasheet.file import EdsFile
 from drivers.errors import ConfigMismatch
 from drivers.resources import data_file
 from drivers.scaling import IntegerType

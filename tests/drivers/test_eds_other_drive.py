@@ -13,13 +13,13 @@ from pathlib import Path
 import pytest
 from canopen import import_od
 
-from drivers.cia402 import PowerState
-from drivers.eds_check import check_eds
-from drivers.eds_check.needs import NEEDS, Need
-from drivers.eds_file import EdsFile
-from drivers.eds_finding import Severity
+from drivers.datasheet.check import check_eds
+from drivers.datasheet.check.needs import NEEDS, Need
+from drivers.datasheet.file import EdsFile
+from drivers.datasheet.finding import Severity
 from drivers.errors import ConfigMismatch
-from drivers.inverter import Inverter
+from drivers.inverter.cia402 import PowerState
+from drivers.inverter.inverter import Inverter
 from drivers.resources import data_file
 from hil.config.rig_file import read_rig
 from hil.rig.build import inverter_settings

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from drivers.emcy import Emergency, cause_of, decode
+from drivers.canopen.emcy import Emergency, cause_of, decode
 from drivers.errors import ProtocolViolation
 
 

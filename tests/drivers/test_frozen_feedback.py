@@ -6,10 +6,10 @@ import itertools
 
 import pytest
 
-from drivers.cia402 import PowerState
 from drivers.errors import DeviceFault
-from drivers.feedback import InverterFeedback
-from drivers.frozen_feedback import MOST_STEPS, STEP_PERMILLE, FrozenFeedback
+from drivers.inverter.cia402 import PowerState
+from drivers.inverter.feedback import InverterFeedback
+from drivers.inverter.frozen_feedback import MOST_STEPS, STEP_PERMILLE, FrozenFeedback
 
 _sequence = itertools.count(1)
 

@@ -6,9 +6,9 @@ import threading
 
 import pytest
 
+from drivers.canopen.heartbeat import HeartbeatMonitor, HeartbeatProducer, NmtCommand, NmtState, nmt_frame
+from drivers.canopen.node_monitor import NodeMonitor
 from drivers.errors import BusDown, DeviceFault, DeviceTimeout, ProtocolViolation
-from drivers.heartbeat import HeartbeatMonitor, HeartbeatProducer, NmtCommand, NmtState, nmt_frame
-from drivers.node_monitor import NodeMonitor
 
 MS = 1_000_000
 

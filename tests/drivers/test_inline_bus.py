@@ -8,7 +8,7 @@ from collections import defaultdict
 import can
 import pytest
 
-from drivers.inline_bus import InlineBus
+from drivers.canopen.inline_bus import InlineBus
 from tests.drivers.can_bench import frame, new_channel, virtual_bus
 
 

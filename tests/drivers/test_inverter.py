@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from drivers.can_link import CanLink
-from drivers.cia402 import PowerState, TorqueMode
+from drivers.canopen.can_link import CanLink
 from drivers.errors import CommandRefused, ConfigMismatch, DeviceTimeout, ProtocolViolation
-from drivers.inverter import Inverter
+from drivers.inverter.cia402 import PowerState, TorqueMode
+from drivers.inverter.inverter import Inverter
 from drivers.resources import data_file
 from hil.simulator.plant import RigidPlant
 from tests.drivers.can_bench import HASTY_M1, M1, Bench, bench, frame, guarded, new_channel, repeat

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from drivers.cia402 import PowerState, TorqueMode
 from drivers.errors import BusDown, ConfigMismatch, DeviceFault, DeviceTimeout
+from drivers.inverter.cia402 import PowerState, TorqueMode
 from hil.simulator.inverter_settings import FaultAtStep, InverterFaults
 from tests.drivers.can_bench import M1, SIMULATED_M1, Bench, bench, frame, guarded
 

@@ -9,8 +9,8 @@ import time
 import pytest
 
 from drivers.errors import BusDown, DeviceFault, DeviceTimeout, DriverError, ProtocolViolation
-from drivers.modbus_link import EXCEPTION_TEXT, ModbusLink
-from drivers.register import RegisterKind
+from drivers.plc.modbus_link import EXCEPTION_TEXT, ModbusLink
+from drivers.plc.register import RegisterKind
 from tests.drivers.modbus_peers import Answer, frame, free_port, peer
 
 HOLDING, COIL = RegisterKind.HOLDING_REGISTER, RegisterKind.COIL

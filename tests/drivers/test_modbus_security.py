@@ -11,7 +11,7 @@ from cryptography import x509
 from cryptography.hazmat.primitives.serialization import Encoding
 
 from drivers.errors import ConfigMismatch
-from drivers.modbus_security import Credentials, client_context, own_role, role_of, server_context, tls_failure
+from drivers.plc.modbus_security import Credentials, client_context, own_role, role_of, server_context, tls_failure
 from tests.wire.certificates import Authority, der_text
 
 

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from drivers.canopen.pdo_map import MappedObject, PdoCodec, PdoLayout, configuration_writes, read_layout
 from drivers.errors import CommandRefused, ConfigMismatch, ProtocolViolation
-from drivers.pdo_map import MappedObject, PdoCodec, PdoLayout, configuration_writes, read_layout
 from drivers.scaling import IntegerType
 
 TYPES = {

@@ -18,9 +18,9 @@ from drivers.errors import (
     DeviceTimeout,
     ProtocolViolation,
 )
-from drivers.plc import GENERATOR_OFF, Plc
-from drivers.plc_types import ClutchState, DriveMode, PlcWatchdog, PrbsSettings, PrbsSource
-from drivers.register_map import RegisterMap, load_register_map
+from drivers.plc.plc import GENERATOR_OFF, Plc
+from drivers.plc.register_map import RegisterMap, load_register_map
+from drivers.plc.types import ClutchState, DriveMode, PlcWatchdog, PrbsSettings, PrbsSource
 from drivers.resources import data_file
 from drivers.torque_guard import GuardedTorque, GuardLimits, TorqueGuard, TorqueRequest
 from hil.simulator.plc_device import PlcDevice, PlcFaults, PlcSetup

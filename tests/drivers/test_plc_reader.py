@@ -9,9 +9,9 @@ from contextlib import AsyncExitStack
 import pytest
 
 from drivers.errors import BusDown, ConfigMismatch, DeviceTimeout
-from drivers.plc import Plc
-from drivers.plc_reader import Backoff, PlcReader
-from drivers.register_map import RegisterMap, load_register_map
+from drivers.plc.plc import Plc
+from drivers.plc.reader import Backoff, PlcReader
+from drivers.plc.register_map import RegisterMap, load_register_map
 from drivers.resources import data_file
 from hil.simulator.plc_device import PlcDevice, PlcFaults
 from hil.simulator.plc_server import serve_plc

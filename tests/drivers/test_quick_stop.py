@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from drivers.cia402 import PowerState
 from drivers.errors import CommandRefused, DeviceTimeout
+from drivers.inverter.cia402 import PowerState
 from hil.simulator.inverter_settings import InverterFaults
 from tests.drivers.can_bench import M1, Bench, bench, guarded
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from drivers.errors import ConfigMismatch, ProtocolViolation
-from drivers.register import Access, Register, RegisterKind, Value, ValueType, WordOrder
+from drivers.plc.register import Access, Register, RegisterKind, Value, ValueType, WordOrder
 
 
 def register(

@@ -8,10 +8,9 @@ from pathlib import Path
 import pytest
 
 from drivers.errors import ConfigMismatch
-from drivers.plc_map import ENUMS, USED, require_usable
-from drivers.plc_types import DriveMode
-from drivers.register import RegisterKind
-from drivers.register_map import (
+from drivers.plc.map_needs import ENUMS, USED, require_usable
+from drivers.plc.register import RegisterKind
+from drivers.plc.register_map import (
     MOST_REGISTERS,
     Block,
     RegisterMap,
@@ -19,6 +18,7 @@ from drivers.register_map import (
     blocks_of,
     load_register_map,
 )
+from drivers.plc.types import DriveMode
 from drivers.resources import data_file
 
 SHIPPED = data_file("plc.toml")

@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from drivers.can_link import CanLink
-from drivers.eds_file import EdsFile
+from drivers.canopen.can_link import CanLink
+from drivers.canopen.sdo import SdoChannel
+from drivers.canopen.sdo_node import SdoNode
+from drivers.datasheet.file import EdsFile
 from drivers.errors import BusDown, CommandRefused, ConfigMismatch, DeviceTimeout, ProtocolViolation
-from drivers.sdo import SdoChannel
-from drivers.sdo_node import SdoNode
 from tests.drivers.can_bench import new_channel, virtual_bus
 
 NODE_ID = 5

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from drivers.cia402 import PowerState
 from drivers.errors import ConfigMismatch, DeviceFault
+from drivers.inverter.cia402 import PowerState
 from drivers.resources import data_file
 from hil.simulator.inverter_settings import FaultAtStep, InverterFaults
 from tests.drivers.can_bench import M1, Bench, bench
@@ -65,7 +65,7 @@ def test_drive_that_does_nothing_without_its_host_is_found() -> None:
 
 
 def test_drive_that_does_not_notice_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("drivers.stop_proof.PATIENCE_S", 0.0)
+    monkeypatch.setattr("drivers.inverter.stop_proof.PATIENCE_S", 0.0)
     with bench(settings=QUICK) as rig:
         node = rig.rig._m1
         assert node is not None

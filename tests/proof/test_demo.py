@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from drivers.can_link import CanLink
+from drivers.canopen.can_link import CanLink
 from drivers.errors import BusDown, ConfigMismatch
 from hil.cli import demo as demo_module
 from hil.cli.demo import _Demo

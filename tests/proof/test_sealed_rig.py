@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import pytest
 
 from drivers.errors import BusDown
-from drivers.plc_types import DriveMode
+from drivers.plc.types import DriveMode
 from hil.config.model_file import read_model
 from hil.config.rig_file import read_rig
 from hil.errors import RunAborted

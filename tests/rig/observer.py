@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import queue
 
-from drivers.can_link import CanLink
-from drivers.cia402 import PowerState, state_of
+from drivers.canopen.can_link import CanLink
+from drivers.inverter.cia402 import PowerState, state_of
 
 UPLOAD = 0x40
 DISARMED = (PowerState.SWITCH_ON_DISABLED, PowerState.READY_TO_SWITCH_ON)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from drivers.cia402 import PowerState
+from drivers.inverter.cia402 import PowerState
 from hil.rig.check import Verdict, check_rig
 from hil.simulator.inverter_settings import FaultAtStep, InverterFaults
 from hil.simulator.rig_server import RigFaults

@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import pytest
 
-from drivers.can_link import CanLink
+from drivers.canopen.can_link import CanLink
 from drivers.errors import CommandRefused, DeviceTimeout
 from drivers.torque_guard import TorqueRequest
 from hil.errors import RunAborted

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from drivers.plc_types import ClutchState, DriveMode, PlcStatus, PlcWatchdog, PrbsSettings, PrbsSource
+from drivers.plc.types import ClutchState, DriveMode, PlcStatus, PlcWatchdog, PrbsSettings, PrbsSource
 from hil.rig.fitness import Needs, changes, reasons_against
 
 FIT = PlcStatus(

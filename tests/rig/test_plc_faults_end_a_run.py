@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from drivers.errors import DriverError
-from drivers.plc import Plc
+from drivers.plc.plc import Plc
 from hil.errors import RunAborted
 from hil.rig.experiments.base import Phase
 from hil.simulator.fault_spec import rig_faults

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from drivers.errors import CommandRefused
-from drivers.plc_types import PrbsSource
-from drivers.register import Value
+from drivers.plc.register import Value
+from drivers.plc.types import PrbsSource
 from hil.config.rig_file import PrbsTarget, Rig
 from hil.errors import RunAborted
 from hil.rig.build import Devices, open_devices

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from drivers.can_link import CanLink
+from drivers.canopen.can_link import CanLink
 from drivers.errors import BusDown
 from estimator.errors import BadModel
 from estimator.physics.model import EffectValue, Parameter

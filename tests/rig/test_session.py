@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivers.plc import GENERATOR_OFF
+from drivers.plc.plc import GENERATOR_OFF
 from estimator.signals.prbs import prbs_nm
 from hil.config.rig_file import PrbsTarget
 from hil.rig.build import open_devices

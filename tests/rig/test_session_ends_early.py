@@ -7,7 +7,7 @@ from collections.abc import Callable
 import pytest
 
 from drivers.errors import BusDown, CommandRefused, ConfigMismatch, DeviceFault, DeviceTimeout, DriverError
-from drivers.plc_types import DriveMode
+from drivers.plc.types import DriveMode
 from hil.errors import RunAborted
 from hil.rig.build import open_devices
 from hil.rig.drive import Progress

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from drivers.plc_types import ClutchState, DriveMode
+from drivers.plc.types import ClutchState, DriveMode
 from hil.errors import UsageError
 from hil.simulator.bus_faults import BusFaults, Since
 from hil.simulator.fault_sizes import Frames

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import can
 import pytest
 
-from drivers.inline_bus import InlineBus
+from drivers.canopen.inline_bus import InlineBus
 from hil.simulator.bus_faults import BusFaults, Since
 from hil.simulator.fault_sizes import Frames
 from hil.simulator.faulty_wire import BUS_OFF_ERROR, FaultyWire

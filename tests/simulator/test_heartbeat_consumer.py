@@ -6,9 +6,9 @@ import time
 
 import pytest
 
-from drivers.cia402 import PowerState
+from drivers.canopen.heartbeat import HEARTBEAT_COB_ID
 from drivers.errors import DeviceFault
-from drivers.heartbeat import HEARTBEAT_COB_ID
+from drivers.inverter.cia402 import PowerState
 from hil.simulator.heartbeat_consumer import NS_PER_MS, HeartbeatConsumer
 from tests.drivers.can_bench import bench, guarded
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivers.cia402 import STATUSWORD_STATE_BITS, Command, PowerState, TorqueMode, next_state, state_of
+from drivers.inverter.cia402 import STATUSWORD_STATE_BITS, Command, PowerState, TorqueMode, next_state, state_of
 from hil.simulator.inverter_device import InverterDevice, ObjectRefused
 from hil.simulator.inverter_settings import FaultAtStep, InverterFaults, SimulatedInverter
 

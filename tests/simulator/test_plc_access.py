@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from drivers.modbus_security import Credentials
-from drivers.register import Access
+from drivers.plc.modbus_security import Credentials
+from drivers.plc.register import Access
 from hil.simulator.plc_access import PlcSecurity
 
 NO_FILES = Credentials(Path("ca"), Path("certificate"), Path("key"))

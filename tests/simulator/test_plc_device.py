@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from drivers.plc_types import ClutchState, DriveMode
-from drivers.register import Value
-from drivers.register_map import load_register_map
+from drivers.plc.register import Value
+from drivers.plc.register_map import load_register_map
+from drivers.plc.types import ClutchState, DriveMode
 from drivers.resources import data_file
 from estimator.signals.prbs import Prbs
 from hil.simulator.plc_answers import Answers

@@ -6,7 +6,7 @@ import socket
 
 import pytest
 
-from drivers.register_map import load_register_map
+from drivers.plc.register_map import load_register_map
 from drivers.resources import data_file
 from hil.simulator.fault_kind import Moment
 from hil.simulator.fault_spec import known_faults, rig_faults

@@ -14,7 +14,7 @@ from pymodbus.client import AsyncModbusTcpClient
 from pymodbus.constants import ExcCodes
 
 from drivers.errors import BusDown, ConfigMismatch
-from drivers.register_map import load_register_map
+from drivers.plc.register_map import load_register_map
 from drivers.resources import data_file
 from hil.simulator.plc_device import PlcDevice
 from hil.simulator.plc_server import PlcServer, serve_plc

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from drivers.can_link import CanLink
+from drivers.canopen.can_link import CanLink
 from drivers.errors import DeviceTimeout
 from hil.simulator.inverter_settings import InverterFaults
 from hil.simulator.plant import RigidPlant

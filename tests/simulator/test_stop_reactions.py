@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from drivers.cia402 import Command, PowerState, TorqueMode
+from drivers.inverter.cia402 import Command, PowerState, TorqueMode
 from hil.simulator.inverter_device import InverterDevice, ObjectRefused
 from tests.simulator.test_inverter_device import PERIOD_S, QUIET, device
 

@@ -9,10 +9,10 @@ from dataclasses import replace
 
 import pytest
 
-from drivers.can_link import CanLink
-from drivers.cia402 import PowerState
+from drivers.canopen.can_link import CanLink
 from drivers.errors import DeviceFault
-from drivers.inverter import Inverter
+from drivers.inverter.cia402 import PowerState
+from drivers.inverter.inverter import Inverter
 from hil.simulator.heartbeat_consumer import NS_PER_MS
 from hil.simulator.plant import RigidPlant
 from hil.simulator.rpdo_deadline import RpdoDeadline

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import pytest
 
-from drivers.cia402 import Command, StatusBit
+from drivers.inverter.cia402 import Command, StatusBit
 from hil.simulator.inverter_device import InverterDevice
 from hil.simulator.inverter_settings import InverterFaults
 from hil.simulator.torque_limits import DriveLimits, Heat

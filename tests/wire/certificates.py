@@ -11,7 +11,7 @@ from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import NameOID
 
-from drivers.modbus_security import Credentials
+from drivers.plc.modbus_security import Credentials
 
 ROLE = x509.ObjectIdentifier("1.3.6.1.4.1.50316.802.1")
 SERVER_NAME = "plc.test"

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from drivers.modbus_link import ModbusLink
-from drivers.modbus_security import ClientSecurity, Credentials, own_role
-from drivers.register import Access, RegisterKind
-from drivers.register_map import load_register_map
+from drivers.plc.modbus_link import ModbusLink
+from drivers.plc.modbus_security import ClientSecurity, Credentials, own_role
+from drivers.plc.register import Access, RegisterKind
+from drivers.plc.register_map import load_register_map
 from drivers.resources import data_file
 from hil.simulator.plc_access import PlcSecurity
 from hil.simulator.plc_device import PlcDevice

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from drivers.register_map import load_register_map
+from drivers.plc.register_map import load_register_map
 from drivers.resources import data_file
 from hil.simulator.plc_device import IDENTITY, PlcDevice, PlcFaults, PlcSetup
 from hil.simulator.plc_server import PlcServer

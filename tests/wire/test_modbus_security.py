@@ -11,12 +11,12 @@ from pathlib import Path
 
 import pytest
 
-import drivers.modbus_dial
+import drivers.plc.modbus_dial
 from drivers.errors import BusDown, ConfigMismatch, ProtocolViolation
-from drivers.modbus_link import ModbusLink
-from drivers.modbus_security import ClientSecurity, Credentials
-from drivers.register import Access, RegisterKind
-from drivers.register_map import load_register_map
+from drivers.plc.modbus_link import ModbusLink
+from drivers.plc.modbus_security import ClientSecurity, Credentials
+from drivers.plc.register import Access, RegisterKind
+from drivers.plc.register_map import load_register_map
 from drivers.resources import data_file
 from hil.simulator.plc_access import PlcSecurity
 from hil.simulator.plc_device import PlcDevice
@@ -159,7 +159,7 @@ class TestCertificates:
             context.maximum_version = newest
             return context
 
-        monkeypatch.setattr(drivers.modbus_dial, "client_context", bare)
+        monkeypatch.setattr(drivers.plc.modbus_dial, "client_context", bare)
         with pytest.raises(ConfigMismatch, match="closed without a word"):
             connect_and_read(plc.port, with_role(authority, "operator"))
 
@@ -193,7 +193,7 @@ async def _pump(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> N
 
 class TestOnlyOneSideSpeaksTls:
     def test_a_plain_plc(self, authority: Authority, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(drivers.modbus_dial, "HANDSHAKE_S", 1.0)
+        monkeypatch.setattr(drivers.plc.modbus_dial, "HANDSHAKE_S", 1.0)
         with PlcServer(PlcDevice(), MAP) as server:
             with pytest.raises(ConfigMismatch, match="nothing that is TLS: is it the port of plain Modbus TCP"):
                 connect_and_read(server.port, with_role(authority, "viewer"), timeout_s=1.0)
@@ -230,7 +230,7 @@ class TestOpensslAsPlc:
             context.load_verify_locations(credentials.ca)
             return context
 
-        monkeypatch.setattr(drivers.modbus_dial, "client_context", bare)
+        monkeypatch.setattr(drivers.plc.modbus_dial, "client_context", bare)
         with openssl_server(authority.issue(SERVER_NAME)) as port:
             with pytest.raises(ConfigMismatch, match="requires a client certificate and got none"):
                 connect_and_read(port, with_role(authority, "operator"))

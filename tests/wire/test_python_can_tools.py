@@ -25,7 +25,7 @@ from pathlib import Path
 import can
 import pytest
 
-from drivers.can_link import CanLink
+from drivers.canopen.can_link import CanLink
 from drivers.errors import BusDown
 from hil.rig.build import open_devices
 from hil.rig.trace import BusTrace

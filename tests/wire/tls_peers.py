@@ -13,7 +13,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from drivers.modbus_security import Credentials
+from drivers.plc.modbus_security import Credentials
 from tests.drivers.modbus_peers import free_port
 
 needs_openssl = pytest.mark.skipif(shutil.which("openssl") is None, reason="openssl is not installed")

@@ -1,0 +1,1 @@
+"""The CAN bus and CANopen services (CiA 301)."""

@@ -1,0 +1,134 @@
+"""Health of one node as the bus shows it: heartbeat, NMT state, emergencies."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+from drivers.canopen import emcy
+from drivers.canopen.heartbeat import HeartbeatMonitor, NmtState
+from drivers.errors import DeviceFault, DeviceTimeout, ProtocolViolation
+
+_CONNECTION_CLASSES = (0x8100, 0x8200)
+"""Error classes communication and protocol (CiA 301, table "Emergency error codes")."""
+
+_NMT_STATES = {state.value: state for state in NmtState}
+
+
+class NodeMonitor:
+    """Takes heartbeats and EMCY frames in the receive thread, judges them in the caller's.
+
+    Parameters
+    ----------
+    where
+        Device, for messages.
+    heartbeat_timeout_ns
+        Longest time without a heartbeat [ns].
+    """
+
+    def __init__(self, where: str, heartbeat_timeout_ns: int) -> None:
+        self._where = where
+        self._heartbeat = HeartbeatMonitor(where, heartbeat_timeout_ns, time.monotonic_ns())
+        self._changed = threading.Condition()
+        self._emergency: emcy.Emergency | None = None
+        self._expected: NmtState | None = None
+        self._beats = 0
+
+    @property
+    def emergency(self) -> emcy.Emergency | None:
+        """The first emergency that is not reset yet."""
+        return self._emergency
+
+    def on_heartbeat(self, data: bytes, t_ns: int) -> None:
+        """Take a heartbeat or boot-up frame.
+
+        Raises
+        ------
+        ProtocolViolation
+            If it is not one byte with an NMT state.
+        """
+        state = _NMT_STATES.get(data[0] & 0x7F) if len(data) == 1 else None
+        if state is None:
+            raise ProtocolViolation(
+                f"{self._where}: heartbeat [{data.hex(' ')}], expected one byte 00, 04, 05 or 7F. "
+                "Check the device's firmware version."
+            )
+        with self._changed:
+            self._heartbeat.beat(state, t_ns)
+            self._beats += 1
+            self._changed.notify_all()
+
+    def on_emergency(self, data: bytes, t_ns: int) -> None:
+        """Take an EMCY frame; the first that is not yet reset is kept, for it names the cause.
+
+        Raises
+        ------
+        ProtocolViolation
+            If it has not 8 bytes.
+        """
+        emergency = emcy.decode(data)
+        if emergency.is_reset:
+            self._emergency = None
+        elif self._emergency is None:
+            self._emergency = emergency
+
+    def forget_emergency(self) -> None:
+        """Take the emergency for reset, as after a fault reset that the drive has confirmed."""
+        self._emergency = None
+
+    def forget_lost_host(self) -> None:
+        """Take an emergency about the connection for gone: it was about a host before this one."""
+        if self._emergency is not None and self._emergency.code & 0xFF00 in _CONNECTION_CLASSES:
+            self._emergency = None
+
+    def expect(self, state: NmtState | None) -> None:
+        """Have `raise_if_unwell` refuse any other NMT state from now on."""
+        self._expected = state
+
+    def await_state(self, state: NmtState, timeout_s: float) -> None:
+        """Wait for a heartbeat, from now on, that reports ``state``.
+
+        Raises
+        ------
+        DeviceTimeout
+            If none comes in ``timeout_s``.
+        """
+        deadline = time.monotonic() + timeout_s
+        with self._changed:
+            first = self._beats
+            while self._beats == first or self._heartbeat.state is not state:
+                if not self._changed.wait(deadline - time.monotonic()):
+                    seen = self._heartbeat.state
+                    raise DeviceTimeout(
+                        f"{self._where}: last heartbeat reports {_title(seen)} after "
+                        f"{timeout_s:g} s, expected {state.title}. Check power, node id and wiring, and that "
+                        "the drive produces a heartbeat (0x1017)."
+                    )
+
+    def raise_if_unwell(self, now_ns: int) -> None:
+        """Check emergencies, heartbeat and NMT state at ``now_ns``.
+
+        Raises
+        ------
+        DeviceFault
+            If an emergency is active, or the node has left the NMT state it should be in.
+        DeviceTimeout
+            If the heartbeat is lost.
+        """
+        if self._emergency is not None:
+            raise DeviceFault(
+                f"{self._where}: {self._emergency}, expected none. Mend the cause at the drive, reset the fault."
+            )
+        with self._changed:
+            state = self._heartbeat.state
+        self._heartbeat.raise_if_lost(now_ns)
+        if self._expected is not None and state is not self._expected:
+            raise DeviceFault(
+                f"{self._where}: NMT state is {_title(state)}, expected "
+                f"{self._expected.title}. Something else reset or stopped the drive; configure it again."
+            )
+
+
+def _title(state: NmtState | None) -> str:
+    """Name a state; INITIALISING is 0, so truth tells nothing."""
+    return "nothing so far" if state is None else state.title

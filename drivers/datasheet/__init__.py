@@ -1,0 +1,1 @@
+"""Electronic data sheets (CiA 306): read, checked."""

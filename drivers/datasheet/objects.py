@@ -1,0 +1,176 @@
+"""The objects an EDS describes: sections ``[1018]``, ``[1018sub1]`` and ``[1018Name]`` put together.
+
+Read with the tolerance that vendors' files need: a missing ObjectType is VAR (CiA 306), or RECORD where
+there are sub-indices; a blank PDOMapping is 0; ``CompactSubObj`` is written out. What is wrong is for
+`drivers.datasheet.check` to tell; here it is None, and whoever needs it refuses.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+
+from drivers.datasheet.number import read_number
+from drivers.datasheet.text import EdsSection, EdsText
+from drivers.datasheet.types import DATA_TYPES, DOMAIN, UNSIGNED8, DataType
+
+OBJECT_SECTION = re.compile(r"[0-9a-f]{4}")
+SUB_SECTION = re.compile(r"([0-9a-f]{4})sub([0-9a-f]{1,2})")
+
+ACCESS_TYPES = ("ro", "wo", "rw", "rwr", "rww", "const")
+"""CiA 306: rwr may be mapped into a TPDO only, rww into an RPDO only."""
+
+
+class ObjectType(IntEnum):
+    """What an object is, CiA 301 table 42."""
+
+    NULL = 0
+    DOMAIN = 2
+    DEFTYPE = 5
+    DEFSTRUCT = 6
+    VAR = 7
+    ARRAY = 8
+    RECORD = 9
+
+    @property
+    def has_entries(self) -> bool:
+        """Whether it has sub-indices."""
+        return self in (ObjectType.ARRAY, ObjectType.RECORD)
+
+
+@dataclass(frozen=True, slots=True)
+class EdsEntry:
+    """One value of the object dictionary.
+
+    Attributes
+    ----------
+    index, subindex
+        Where it is.
+    section
+        The section that describes it; that of the whole object if it was written compactly.
+    name
+        ParameterName, or the section's name without one.
+    kind
+        Data type; None if it is missing or unknown.
+    access
+        One of `ACCESS_TYPES`; None if it is missing or another.
+    mappable
+        Whether a PDO may carry it.
+    default_text
+        DefaultValue as written; None if missing or blank.
+    """
+
+    index: int
+    subindex: int
+    section: EdsSection
+    name: str
+    kind: DataType | None
+    access: str | None
+    mappable: bool
+    default_text: str | None
+
+    def default(self, node_id: int) -> int | None:
+        """Default value of an integer; None if there is none that can be read and fits."""
+        return self._integer(self.default_text, node_id)
+
+    def limit(self, key: str, node_id: int) -> int | None:
+        """``LowLimit`` or ``HighLimit`` of an integer; None if there is none that can be read and fits."""
+        return self._integer(self.section.get(key), node_id)
+
+    def _integer(self, text: str | None, node_id: int) -> int | None:
+        if text is None or self.kind is None or not self.kind.is_integer:
+            return None
+        return self.kind.integer(text, node_id)
+
+
+@dataclass(frozen=True, slots=True)
+class EdsObject:
+    """One object: a variable has its one value as entry 0."""
+
+    index: int
+    section: EdsSection
+    object_type: ObjectType | None
+    entries: Mapping[int, EdsEntry]
+
+
+def read_objects(text: EdsText) -> dict[int, EdsObject]:
+    """Read all objects, in the order of their index."""
+    names = sorted(name for name in text.sections if OBJECT_SECTION.fullmatch(name))
+    subs = sub_sections(text)
+    return {int(name, 16): _object(text, name, subs.get(int(name, 16), {})) for name in names}
+
+
+def sub_sections(text: EdsText) -> dict[int, dict[int, EdsSection]]:
+    """Find the sections of sub-indices, by index and sub-index, whether their object is described or not."""
+    found: dict[int, dict[int, EdsSection]] = {}
+    for name, section in text.sections.items():
+        match = SUB_SECTION.fullmatch(name)
+        if match is not None:
+            found.setdefault(int(match[1], 16), {})[int(match[2], 16)] = section
+    return found
+
+
+def object_type(section: EdsSection, has_entries: bool) -> ObjectType | None:
+    """Read what an object is; None if ObjectType is none of CiA 301."""
+    written = section.get("ObjectType")
+    if written is None:
+        return ObjectType.RECORD if has_entries else ObjectType.VAR
+    number = read_number(written)
+    return ObjectType(number) if number in list(ObjectType) else None
+
+
+def data_type(text: EdsText, section: EdsSection) -> DataType | None:
+    """Read a data type; None if it is missing or unknown.
+
+    CANFestival's editor describes types with limits as objects ``[A0]`` whose sub-index 1 holds the real type.
+    """
+    code = read_number(section.get("DataType") or "")
+    if code is None or code in DATA_TYPES:
+        return None if code is None else DATA_TYPES[code]
+    described = text.section(f"{code:x}sub1")
+    real = None if described is None else read_number(described.get("DefaultValue") or "")
+    return None if real is None else DATA_TYPES.get(real)
+
+
+def _object(text: EdsText, name: str, subs: Mapping[int, EdsSection]) -> EdsObject:
+    section = text.sections[name]
+    index = int(name, 16)
+    compact = read_number(section.get("CompactSubObj") or "") or 0
+    kind = object_type(section, bool(subs) or compact > 0)
+    if kind is None or not kind.has_entries:
+        entries = {0: _entry(text, section, index, 0)}
+    else:
+        entries = {n: _entry(text, sub, index, n) for n, sub in subs.items()}
+        if compact:
+            entries = {**dict(_compact_entries(text, section, index, min(compact, 0xFE))), **entries}
+    return EdsObject(index, section, kind, dict(sorted(entries.items())))
+
+
+def _entry(text: EdsText, section: EdsSection, index: int, subindex: int) -> EdsEntry:
+    kind = data_type(text, section)
+    if kind is None and object_type(section, has_entries=False) is ObjectType.DOMAIN:
+        kind = DATA_TYPES[DOMAIN]
+    access = (section.get("AccessType") or "").lower()
+    return EdsEntry(
+        index=index,
+        subindex=subindex,
+        section=section,
+        name=section.get("ParameterName") or section.name,
+        kind=kind,
+        access=access if access in ACCESS_TYPES else None,
+        mappable=bool(read_number(section.get("PDOMapping") or "0")),
+        default_text=section.get("DefaultValue"),
+    )
+
+
+def _compact_entries(text: EdsText, section: EdsSection, index: int, count: int) -> Iterator[tuple[int, EdsEntry]]:
+    """Write out what ``CompactSubObj`` stands for (CiA 306): the number of entries, and as many alike."""
+    names = text.section(f"{section.name}Name")
+    unsigned8 = DATA_TYPES[UNSIGNED8]
+    yield 0, EdsEntry(index, 0, section, "NrOfObjects", unsigned8, "ro", mappable=False, default_text=str(count))
+    alike = _entry(text, section, index, 0)
+    for n in range(1, count + 1):
+        name = (None if names is None else names.get(str(n))) or f"{alike.name}{n}"
+        yield n, EdsEntry(index, n, section, name, alike.kind, alike.access, alike.mappable, alike.default_text)

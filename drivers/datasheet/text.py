@@ -1,0 +1,218 @@
+"""The text of an EDS: sections and keys with their line numbers, as they stand in the file.
+
+What can't be an EDS at all is refused. Everything else is read as well as can be, and what was odd about it
+is kept as findings: vendors' files have duplicate keys, stray lines, other encodings. Of two keys or sections
+of one name the first counts, as it does for the Windows functions that most EDS tools are built on.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from drivers.datasheet.finding import EdsFinding, Severity
+from drivers.errors import ConfigMismatch
+
+ADVICE = "Take the file from the drive's maker."
+NO_EDS = f"Expected an EDS as CiA 306 has it. {ADVICE}"
+MAX_BYTES = 16 << 20
+"""A drive's EDS has some 100 kB; a wrong file shall not fill the memory."""
+MAX_LINE_LENGTH = 255
+"""Characters in a line of an EDS (CiA 306)."""
+
+_UTF_16_MARKS = (b"\xff\xfe", b"\xfe\xff")
+_UTF_8_MARK = b"\xef\xbb\xbf"
+_LINE_ENDS = re.compile(r"\r\n|\n|\r")
+_INLINE_COMMENT = re.compile(r"\s;")
+
+
+class EdsUnreadable(ConfigMismatch):
+    """A file whose text can't be read at all.
+
+    Parameters
+    ----------
+    path
+        The file.
+    found
+        What came instead of an EDS.
+    advice
+        What to do, as a sentence.
+    """
+
+    def __init__(self, path: Path, found: str, advice: str = ADVICE) -> None:
+        self.found = found
+        self.advice = advice
+        super().__init__(f"EDS {path} can't be read: {found}. Expected an EDS as CiA 306 has it. {advice}")
+
+
+@dataclass(frozen=True, slots=True)
+class EdsKey:
+    """One ``name=value`` and its line."""
+
+    name: str
+    value: str
+    line: int
+
+
+@dataclass(frozen=True, slots=True)
+class EdsSection:
+    """One section: its name as written, its line, its keys by lower-case name."""
+
+    name: str
+    line: int
+    keys: dict[str, EdsKey] = field(default_factory=dict)
+
+    def get(self, key: str) -> str | None:
+        """Look up a key's value, whatever its case; None if it is missing or blank."""
+        found = self.keys.get(key.lower())
+        return (found.value or None) if found is not None else None
+
+    def line_of(self, key: str) -> int:
+        """Line of a key; that of the section if there is no such key."""
+        found = self.keys.get(key.lower())
+        return self.line if found is None else found.line
+
+
+@dataclass(frozen=True, slots=True)
+class EdsText:
+    """A file's sections by lower-case name, in the order of the file, and what is odd about its text."""
+
+    path: Path
+    sections: dict[str, EdsSection]
+    findings: tuple[EdsFinding, ...]
+
+    def section(self, name: str) -> EdsSection | None:
+        """Look up a section, whatever its case."""
+        return self.sections.get(name.lower())
+
+
+def read_eds_text(path: Path) -> EdsText:
+    """Read a file's text.
+
+    Raises
+    ------
+    EdsUnreadable
+        If it can't be opened, is no text of one byte per character, or is too large.
+    """
+    text, findings = _decode(path)
+    reader = _Reader()
+    reader.findings.extend((*findings, *_ends_of_lines(text)))
+    for number, line in enumerate(_LINE_ENDS.split(text), start=1):
+        reader.take(number, line)
+    return EdsText(path, reader.sections, tuple(reader.findings))
+
+
+def _decode(path: Path) -> tuple[str, list[EdsFinding]]:
+    try:
+        with path.open("rb") as file:
+            data = file.read(MAX_BYTES + 1)
+    except OSError as error:
+        raise EdsUnreadable(path, str(error.strerror)) from error
+    if len(data) > MAX_BYTES:
+        raise EdsUnreadable(path, f"more than {MAX_BYTES >> 20} MB")
+    if data.startswith(_UTF_16_MARKS):
+        raise EdsUnreadable(path, "UTF-16 text", "Save it as ANSI or ASCII text.")
+    if b"\0" in data:
+        line = data[: data.index(b"\0")].count(b"\n") + 1
+        raise EdsUnreadable(path, f"no text, for there is a byte 0 in line {line}")
+    findings = []
+    if data.startswith(_UTF_8_MARK):
+        data = data.removeprefix(_UTF_8_MARK)
+        findings.append(
+            _finding(Severity.WARNING, 1, "text", "ASCII", "a UTF-8 byte order mark", "Save it without the mark.")
+        )
+    return data.decode("latin-1"), findings
+
+
+def _ends_of_lines(text: str) -> Iterator[EdsFinding]:
+    ends = _LINE_ENDS.findall(text)
+    kinds = {end.replace("\r", "CR ").replace("\n", "LF").strip() for end in ends}
+    if len(kinds) > 1:
+        line = next(n for n, end in enumerate(ends, start=1) if end != ends[0])
+        found = f"{' and '.join(sorted(kinds))} mixed, first here"
+        yield _finding(Severity.NOTE, line, "text", "one kind of line end", found, "Save it with one kind.")
+    elif kinds == {"CR"}:
+        advice = "Save it with CR LF, which every tool reads."
+        yield _finding(Severity.WARNING, 1, "text", "lines that end with CR LF or LF", "CR alone", advice)
+
+
+def _finding(severity: Severity, line: int, place: str, expected: str, found: str, advice: str) -> EdsFinding:
+    return EdsFinding(severity, line, place, expected, found, advice)
+
+
+class _Reader:
+    """Takes line after line."""
+
+    def __init__(self) -> None:
+        self.sections: dict[str, EdsSection] = {}
+        self.findings: list[EdsFinding] = []
+        self._here: EdsSection | None = None
+        self._seen_foreign = False
+
+    def take(self, number: int, line: str) -> None:
+        """Take one line."""
+        stripped = line.strip()
+        if len(line) > MAX_LINE_LENGTH:
+            self._note(number, f"at most {MAX_LINE_LENGTH} characters in a line", str(len(line)), "Shorten it.")
+        if not line.isascii() and not self._seen_foreign:
+            self._seen_foreign = True
+            self._note(number, "ASCII", "other characters, first here", "Nothing to do unless a name looks odd.")
+        if not stripped or stripped.startswith(";"):
+            return
+        if stripped.startswith("#"):
+            self._warn(number, "a comment that begins with ;", "one with #", "It is left out; write ; instead.")
+        elif stripped.startswith("["):
+            self._take_header(number, stripped)
+        else:
+            self._take_key(number, stripped)
+
+    def _take_header(self, number: int, line: str) -> None:
+        name, closed, rest = line[1:].partition("]")
+        name = name.strip()
+        if not closed or not name:
+            self._here = EdsSection(line, number)  # what follows belongs to no section that can be named
+            self._err(number, "a section such as [1000]", repr(line), "Write its name between [ and ].")
+            return
+        if rest.strip() and not rest.strip().startswith(";"):
+            self._warn(number, f"nothing after [{name}]", repr(rest.strip()), "It is left out.")
+        known = self.sections.get(name.lower())
+        if known is None:
+            known = self.sections[name.lower()] = EdsSection(name, number)
+        else:
+            found = f"a second one; the first is in line {known.line}"
+            advice = "Keep one; where both have a key, the first counts."
+            self._warn(number, "one section of a name", found, advice, f"[{name}]")
+        self._here = known
+
+    def _take_key(self, number: int, line: str) -> None:
+        name, equals, value = (part.strip() for part in line.partition("="))
+        if self._here is None:
+            self._warn(number, "a section before it", repr(line), "It is left out; put it under its section.")
+            return
+        place = f"[{self._here.name}]"
+        if not equals or not name:
+            self._warn(number, "key=value", repr(line), "It is left out; mend the line.", place)
+            return
+        value = _INLINE_COMMENT.split(value, maxsplit=1)[0].strip()
+        value = "" if value.startswith(";") else value
+        known = self._here.keys.setdefault(name.lower(), EdsKey(name, value, number))
+        if known.line != number:
+            self._second_key(known, EdsKey(name, value, number), f"{place} {name}")
+
+    def _second_key(self, first: EdsKey, second: EdsKey, place: str) -> None:
+        expected = f"this key once; line {first.line} has it with {first.value!r}"
+        if first.value == second.value:
+            self._warn(second.line, expected, "it again", "Take one out.", place)
+        else:
+            self._err(second.line, expected, f"it again with {second.value!r}", "Keep the right one.", place)
+
+    def _err(self, line: int, expected: str, found: str, advice: str, place: str = "text") -> None:
+        self.findings.append(_finding(Severity.ERROR, line, place, expected, found, advice))
+
+    def _warn(self, line: int, expected: str, found: str, advice: str, place: str = "text") -> None:
+        self.findings.append(_finding(Severity.WARNING, line, place, expected, found, advice))
+
+    def _note(self, line: int, expected: str, found: str, advice: str, place: str = "text") -> None:
+        self.findings.append(_finding(Severity.NOTE, line, place, expected, found, advice))

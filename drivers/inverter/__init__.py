@@ -1,0 +1,1 @@
+"""A traction inverter in torque mode (CiA 402)."""

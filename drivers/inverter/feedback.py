@@ -1,0 +1,113 @@
+"""An inverter's TPDO turned into feedback, and the waiting for it."""
+
+from __future__ import annotations
+
+import threading
+import time
+from dataclasses import dataclass
+
+from drivers.canopen.pdo_map import PdoCodec
+from drivers.inverter.cia402 import PowerState, state_of
+from drivers.scaling import TorqueScale, VelocityScale
+
+
+@dataclass(frozen=True, slots=True)
+class InverterFeedback:
+    """What an inverter reported in one TPDO.
+
+    Attributes
+    ----------
+    torque_nm
+        Torque actual value, 0x6077 [Nm].
+    speed_rad_s
+        Velocity actual value, 0x606C [rad/s].
+    state
+        Power state from the statusword, 0x6041.
+    t_ns
+        Arrival on the host's monotonic clock [ns].
+    sequence
+        Counts the TPDOs received from this inverter, from 1.
+    torque_raw, speed_raw
+        The counts on the bus, so that a wrong scale can be corrected later.
+    """
+
+    torque_nm: float
+    speed_rad_s: float
+    state: PowerState
+    t_ns: int
+    sequence: int
+    torque_raw: int
+    speed_raw: int
+
+
+class FeedbackReceiver:
+    """Takes the TPDOs of one inverter where frames are received and hands the latest to the caller's thread.
+
+    Parameters
+    ----------
+    codec
+        The TPDO's layout; it must carry 0x6041, 0x6077 and 0x606C.
+    torque, velocity
+        Scales of 0x6077 and 0x606C.
+
+    Raises
+    ------
+    ConfigMismatch
+        If the TPDO lacks one of the objects.
+    """
+
+    def __init__(self, codec: PdoCodec, torque: TorqueScale, velocity: VelocityScale) -> None:
+        self._codec = codec
+        self._torque = torque
+        self._velocity = velocity
+        self._statusword_at = codec.position(0x6041)
+        self._torque_at = codec.position(0x6077)
+        self._speed_at = codec.position(0x606C)
+        self._arrived = threading.Condition()
+        self._sequence = 0
+        self._started = False
+        self.latest: InverterFeedback | None = None
+
+    def on_frame(self, data: bytes, t_ns: int) -> None:
+        """Take one TPDO; before `start_anew` its mapping is unknown, and it is left alone.
+
+        Raises
+        ------
+        ProtocolViolation
+            If it has not the length of its mapping, or the statusword is no state.
+        """
+        if not self._started:
+            return
+        values = self._codec.unpack(data)
+        torque_raw, speed_raw = values[self._torque_at], values[self._speed_at]
+        feedback = InverterFeedback(
+            torque_nm=self._torque.to_nm(torque_raw),
+            speed_rad_s=self._velocity.to_rad_s(speed_raw),
+            state=state_of(values[self._statusword_at]),
+            t_ns=t_ns,
+            sequence=self._sequence + 1,
+            torque_raw=torque_raw,
+            speed_raw=speed_raw,
+        )
+        with self._arrived:
+            self._sequence = feedback.sequence
+            self.latest = feedback
+            self._arrived.notify_all()
+
+    def start_anew(self) -> None:
+        """Take frames from now on, and forget what came before: mapping or state were other than now."""
+        with self._arrived:
+            self._started = True
+            self.latest = None
+
+    def await_after(self, after_ns: int, timeout_s: float) -> InverterFeedback | None:
+        """Wait for feedback that arrived after ``after_ns`` [ns]; None if there is none in time."""
+        latest = self.latest
+        if latest is not None and latest.t_ns > after_ns:
+            return latest
+        deadline = time.monotonic() + timeout_s
+        with self._arrived:
+            while self.latest is None or self.latest.t_ns <= after_ns:
+                if not self._arrived.wait(deadline - time.monotonic()):
+                    return None
+            return self.latest

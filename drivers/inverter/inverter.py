@@ -1,0 +1,338 @@
+"""A traction inverter on CANopen: CiA 402 torque modes, driven by SYNC.
+
+Order of use: ``check`` (reads only), ``configure``, ``arm``, then in each cycle ``command``, `CanLink.sync`,
+``await_feedback``, ``raise_if_faulted``; at the end, always, ``disarm``. Arming and disarming go by SDO and
+are confirmed object by object; ``canopen``'s own CiA 402 node is not used, for its mode setter reports
+success when the drive has not followed.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+from drivers.canopen.can_link import CanLink
+from drivers.canopen.emcy import EMCY_COB_ID
+from drivers.canopen.heartbeat import HEARTBEAT_COB_ID, NMT_COB_ID, NmtCommand, NmtState, nmt_frame
+from drivers.canopen.node_monitor import NodeMonitor
+from drivers.canopen.pdo_map import PdoLayout, configuration_writes
+from drivers.canopen.sdo import SdoChannel
+from drivers.canopen.sdo_node import SdoNode
+from drivers.datasheet.file import EdsFile
+from drivers.errors import CommandRefused, ConfigMismatch, DriverError
+from drivers.inverter.check import Difference, configurable_differences, fixed_differences
+from drivers.inverter.cia402 import Command
+from drivers.inverter.drive_settings import drive_settings
+from drivers.inverter.feedback import FeedbackReceiver, InverterFeedback
+from drivers.inverter.frozen_feedback import FrozenFeedback
+from drivers.inverter.pdos import command_codec, feedback_codec, feedback_receiver
+from drivers.inverter.power_control import PowerControl
+from drivers.inverter.settings import InverterSettings
+from drivers.inverter.stop_proof import StopProof
+from drivers.scaling import TorqueScale
+from drivers.torque_guard import GuardedTorque
+
+__all__ = ["Difference", "Inverter", "InverterFeedback", "InverterSettings"]
+
+
+class Inverter:
+    """One inverter on a link.
+
+    Parameters
+    ----------
+    link
+        The bus it is on.
+    settings
+        What the rig file says of it.
+
+    Raises
+    ------
+    ConfigMismatch
+        If the EDS can't be read, has no PDOs that carry the torque command and its feedback, or would have the
+        drive keep its torque without a host.
+    """
+
+    def __init__(self, link: CanLink, settings: InverterSettings) -> None:
+        self.settings = settings
+        self._link = link
+        self._where = settings.where
+        self._eds = EdsFile(settings.eds_path, settings.node_id)
+        self._torque = TorqueScale(settings.rated_torque_nm)
+        self._rpdo = command_codec(self._eds, self._where)
+        self._tpdo = feedback_codec(self._eds, self._where)
+        self._given = drive_settings(self._eds, settings, self._rpdo.layout)
+        node = SdoNode(settings.node_id, self._eds.dictionary)
+        link.network.add_node(node)
+        self._sdo = SdoChannel(node, self._eds, self._where, settings.sdo_timeout_s)
+        self._power = PowerControl(self._sdo, settings)
+        self._feedback = self._subscribe_feedback()
+        self._monitor = self._subscribe_monitor()
+        self._frozen = FrozenFeedback(self._where)
+        self._armed = False
+
+    @property
+    def latest(self) -> InverterFeedback | None:
+        """The last feedback received; None before the first after `configure`."""
+        return self._feedback.latest
+
+    def check(self) -> tuple[Difference, ...]:
+        """Compare the device with rig file and EDS; reads objects, writes none.
+
+        Returns
+        -------
+        tuple of Difference
+            Empty if everything agrees.
+
+        Raises
+        ------
+        DeviceTimeout
+            If the node does not answer.
+        ConfigMismatch
+            If it lacks an object of the EDS.
+        """
+        return (
+            *fixed_differences(self._sdo, self._eds, self.settings),
+            *configurable_differences(self._sdo, self.settings, self._layouts, self._given),
+        )
+
+    def fault(self) -> str | None:
+        """Tell what fault the drive is in: power state, error code in words, what to do; None without fault.
+
+        Reads objects, writes none.
+
+        Raises
+        ------
+        DeviceTimeout
+            If the node does not answer.
+        ProtocolViolation
+            If its statusword is none of CiA 402.
+        """
+        return self._power.fault()
+
+    def device_name(self) -> str:
+        """Read the name the maker gave the drive, object 0x1008; in segments, for it is a text.
+
+        Raises
+        ------
+        ConfigMismatch
+            If the drive has no such object: it is optional.
+        DeviceTimeout, ProtocolViolation
+            If the drive does not answer, or not with a text.
+        """
+        return self._sdo.upload_text(0x1008)
+
+    def configure(self) -> None:
+        """Give the device its PDO layout, option codes and what it watches the host by; start NMT operation.
+
+        Every write is read back; NMT OPERATIONAL is confirmed by the node's heartbeat.
+
+        Raises
+        ------
+        ConfigMismatch
+            If identity, rated torque, scale, limit or modes differ, or a write does not hold.
+        DeviceTimeout
+            If the node does not answer or does not become operational.
+        """
+        self._armed = False
+        self._frozen.start_anew()
+        self._monitor.expect(None)
+        self._send_nmt(NmtCommand.ENTER_PRE_OPERATIONAL)
+        if differences := tuple(fixed_differences(self._sdo, self._eds, self.settings)):
+            raise ConfigMismatch(
+                f"{'; '.join(map(str, differences))}. Correct the rig file, or connect the drive it describes."
+            )
+        for layout in self._layouts:
+            for index, subindex, value in configuration_writes(layout):
+                self._sdo.download_confirmed(index, subindex, value)
+        self._link.produce_heartbeat(self.settings.heartbeat_ms / 1000.0)  # before the drive listens for it
+        for setting in self._given:
+            self._sdo.download_confirmed(setting.index, setting.subindex, setting.value)
+        self._feedback.start_anew()
+        self._monitor.forget_lost_host()
+        self._send_nmt(NmtCommand.START)
+        self._monitor.await_state(NmtState.OPERATIONAL, self.settings.state_timeout_s)
+        self._monitor.expect(NmtState.OPERATIONAL)
+
+    def arm(self) -> None:
+        """Select the torque mode and step to OPERATION_ENABLED at zero torque, each step confirmed.
+
+        Raises
+        ------
+        ConfigMismatch
+            If the drive refuses the mode.
+        DeviceTimeout
+            If mode or state does not follow in time; both values are named.
+        DeviceFault
+            If the drive is in FAULT.
+        """
+        self._power.select_mode()
+        self._power.zero_targets()
+        self._power.enable_operation()
+        self._armed = True
+
+    def command(self, torque: GuardedTorque) -> None:
+        """Send one RPDO; the drive puts it into effect at the next SYNC.
+
+        Raises
+        ------
+        CommandRefused
+            If the drive is not armed, or the torque does not fit its object.
+        BusDown
+            If the bus is gone.
+        """
+        if not self._armed:
+            raise CommandRefused(
+                f"{self._where}: {torque.base_nm} Nm commanded while disarmed, expected arm() before. Nothing was sent."
+            )
+        base = self._torque.to_raw(torque.base_nm, self._where)
+        prbs = self._torque.to_raw(torque.prbs_nm, self._where)
+        self._frozen.commanded(base + prbs, self.latest)
+        self._send_rpdo(Command.ENABLE_OPERATION, base, prbs)
+
+    def await_feedback(self, after_ns: int, timeout_s: float) -> InverterFeedback | None:
+        """Wait for the TPDO received after ``after_ns``, the result of `CanLink.sync` [ns].
+
+        Returns
+        -------
+        InverterFeedback or None
+            None if none came in ``timeout_s``.
+        """
+        return self._feedback.await_after(after_ns, timeout_s)
+
+    def quick_stop(self) -> None:
+        """Stop as the quick stop option code 0x605A has it, confirmed by statusword and torque actual value.
+
+        A ramp of a second takes a second; `disarm` takes the torque away at once. The drive is disarmed after it.
+
+        Raises
+        ------
+        DeviceTimeout
+            If the drive does not follow.
+        """
+        self._armed = False
+        self._send_rpdo(Command.QUICK_STOP, 0, 0)  # overwrites the RPDO still waiting for SYNC
+        self._power.quick_stop(self._go_on_stopping)
+
+    def _go_on_stopping(self) -> None:
+        """Repeat the command with every SYNC, or the drive would take the host for dead before its ramp is over."""
+        self._send_rpdo(Command.QUICK_STOP, 0, 0)
+        self._link.sync()
+
+    def prove_stop(self, period_s: float) -> tuple[Difference, ...]:
+        """Let the host play dead and see that the drive notices: commands no torque, leaves the drive disabled.
+
+        Configures the drive as for a run, and brings it to READY TO SWITCH ON, with the power stage off.
+
+        Parameters
+        ----------
+        period_s
+            Time between two SYNCs [s].
+
+        Returns
+        -------
+        tuple of Difference
+            Empty if it is proved.
+
+        Raises
+        ------
+        DriverError
+            If the drive can't be configured or made ready.
+        """
+        proof = StopProof(
+            self._link,
+            self.settings,
+            self._power,
+            self._monitor,
+            self.configure,
+            lambda: self._send_rpdo(Command.SHUTDOWN, 0, 0),
+        )
+        return tuple(proof.run(self._given, period_s))
+
+    def disarm(self) -> None:
+        """Take the torque to zero and leave OPERATION_ENABLED, confirmed by the statusword.
+
+        Everything is tried before anything is raised; if the state can't be confirmed, the node is sent to
+        PRE-OPERATIONAL too, where its abort connection option (0x6007) takes the torque away.
+
+        Raises
+        ------
+        DriverError
+            The first of the steps' errors, the others as its notes.
+        """
+        self._armed = False
+        errors = _try_all(
+            # Overwrites the RPDO still waiting for SYNC: it would enable the drive again.
+            lambda: self._send_rpdo(Command.DISABLE_VOLTAGE, 0, 0),
+            self._power.zero_targets,
+            self._power.disable_voltage,
+        )
+        if errors:
+            errors += _try_all(lambda: self._send_nmt(NmtCommand.ENTER_PRE_OPERATIONAL))
+            for other in errors[1:]:
+                errors[0].add_note(str(other))
+            raise errors[0]
+
+    def reset_fault(self) -> None:
+        """Leave FAULT for SWITCH_ON_DISABLED, confirmed by the statusword; forgets the emergency.
+
+        Raises
+        ------
+        DeviceTimeout
+            If the fault does not go away: its cause is still there.
+        """
+        self._power.reset_fault()
+        self._monitor.forget_emergency()
+        self._feedback.start_anew()
+
+    def raise_if_faulted(self) -> None:
+        """Check the drive's health.
+
+        Raises
+        ------
+        DeviceFault
+            If the drive has sent an EMCY, is in FAULT, has left NMT OPERATIONAL, or sends the same feedback again and
+            again while its command changes.
+        DeviceTimeout
+            If its heartbeat is lost, or never came.
+        BusDown, ProtocolViolation
+            If the bus is gone, or a frame could not be read.
+        """
+        self._link.raise_if_failed()
+        self._monitor.raise_if_unwell(time.monotonic_ns())
+        self._frozen.raise_if_frozen()
+        if self.latest is not None:
+            self._power.raise_if_fault(self.latest.state)
+
+    @property
+    def _layouts(self) -> tuple[PdoLayout, PdoLayout]:
+        return self._rpdo.layout, self._tpdo.layout
+
+    def _subscribe_feedback(self) -> FeedbackReceiver:
+        receiver = feedback_receiver(self._eds, self._tpdo, self._torque)
+        self._link.subscribe(self._tpdo.layout.cob_id, receiver.on_frame)
+        return receiver
+
+    def _subscribe_monitor(self) -> NodeMonitor:
+        monitor = NodeMonitor(self._where, self.settings.heartbeat_timeout_ms * 1_000_000)
+        self._link.subscribe(HEARTBEAT_COB_ID + self.settings.node_id, monitor.on_heartbeat)
+        self._link.subscribe(EMCY_COB_ID + self.settings.node_id, monitor.on_emergency)
+        return monitor
+
+    def _send_nmt(self, command: NmtCommand) -> None:
+        self._link.send(NMT_COB_ID, nmt_frame(command, self.settings.node_id))
+
+    def _send_rpdo(self, command: Command, base: int, prbs: int) -> None:
+        values = {0x6040: command.value, 0x6071: base, 0x60B2: prbs}
+        data = self._rpdo.pack(tuple([values[index] for index in self._rpdo.indices]))
+        self._link.send(self._rpdo.layout.cob_id, data)
+
+
+def _try_all(*steps: Callable[[], None]) -> list[DriverError]:
+    """Run every step, also after one has failed; return what failed."""
+    errors = []
+    for step in steps:
+        try:
+            step()
+        except DriverError as error:
+            errors.append(error)
+    return errors

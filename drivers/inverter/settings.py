@@ -1,0 +1,73 @@
+"""What the host knows of an inverter before it talks to it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from drivers.inverter.cia402 import TorqueMode
+
+
+@dataclass(frozen=True, slots=True)
+class InverterSettings:
+    """One inverter as the rig file has it.
+
+    Attributes
+    ----------
+    name
+        Name in messages, such as ``m1``.
+    node_id
+        CANopen node id, 1 to 127.
+    rated_torque_nm
+        Motor rated torque; object 0x6076 must agree [Nm].
+    torque_limit_nm
+        Greatest torque that will be commanded; object 0x6072 must allow it [Nm].
+    mode
+        Mode of operation to run in.
+    eds_path
+        The drive's EDS; None for the one that is shipped.
+    vendor_id, product_code
+        Identity expected in object 0x1018; None for the EDS's.
+    heartbeat_ms
+        Heartbeat period, of the drive and of the host [ms].
+    rpdo_deadline_ms
+        Without an RPDO for so long the drive takes the host for dead [ms].
+    option_codes
+        Option codes by object, 0x6007 and 0x605A to 0x605E, where not the EDS's.
+    torque_slope_nm_per_s
+        Torque slope of profile torque mode, object 0x6087; None for the drive's own [Nm/s].
+    sdo_timeout_s
+        Longest wait for an SDO answer [s].
+    state_timeout_s
+        Longest wait for a change of mode, power state or NMT state [s].
+    """
+
+    name: str
+    node_id: int
+    rated_torque_nm: float
+    torque_limit_nm: float
+    mode: TorqueMode = TorqueMode.CYCLIC_SYNCHRONOUS_TORQUE
+    eds_path: Path | None = None
+    vendor_id: int | None = None
+    product_code: int | None = None
+    heartbeat_ms: int = 100
+    rpdo_deadline_ms: int = 200
+    option_codes: Mapping[int, int] = field(default_factory=dict)
+    torque_slope_nm_per_s: float | None = None
+    sdo_timeout_s: float = 0.5
+    state_timeout_s: float = 2.0
+
+    @property
+    def heartbeat_timeout_ms(self) -> int:
+        """Without a heartbeat for so long the other side counts as lost [ms].
+
+        Five periods, for a heartbeat has the bus's lowest priority; not below 0.5 s, for neither end is a
+        real-time system; not above the 16 bits of object 0x1016.
+        """
+        return min(max(5 * self.heartbeat_ms, 500), 0xFFFF)
+
+    @property
+    def where(self) -> str:
+        """The device's name in messages."""
+        return f"inverter {self.name} (node {self.node_id})"

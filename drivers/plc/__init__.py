@@ -1,0 +1,1 @@
+"""The PLC on Modbus TCP, by a register map."""

@@ -1,0 +1,237 @@
+"""A Modbus TCP connection that answers or raises: pymodbus's asyncio client, wrapped and not trusted.
+
+What is done about pymodbus 3.16.1 here:
+
+- a failed connection and a lost answer come back as values or as one catch-all exception: they are told apart
+  here, into `BusDown`, `DeviceTimeout` and `ProtocolViolation`;
+- it does not count the registers of an answer: they are counted here;
+- an answer it can't decode raises in the event loop, where nobody can catch it: `_Decoder` turns it into a
+  value;
+- it retries and reconnects behind the caller's back: both are switched off, a lost PLC must be seen;
+- it does not say why there is no connection, and has no name of the server to check: `drivers.plc.modbus_dial`
+  connects for it;
+- it logs to standard error where logging is not configured: a `NullHandler` ends that.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Awaitable, Sequence
+from typing import Final
+
+from pymodbus.constants import ExcCodes
+from pymodbus.exceptions import ModbusException
+from pymodbus.pdu import DecodePDU, ExceptionResponse, ModbusPDU
+
+from drivers.errors import BusDown, DeviceFault, DeviceTimeout, DriverError, ProtocolViolation
+from drivers.plc.modbus_dial import Dial
+from drivers.plc.modbus_security import ClientSecurity, own_role
+from drivers.plc.register import RegisterKind
+
+logging.getLogger("pymodbus").addHandler(logging.NullHandler())
+
+EXCEPTION_TEXT: Final[dict[int, str]] = {
+    ExcCodes.ILLEGAL_FUNCTION: "illegal function: the PLC does not know this request",
+    ExcCodes.ILLEGAL_ADDRESS: "illegal data address: the PLC has no such register, or it can't be written",
+    ExcCodes.ILLEGAL_VALUE: "illegal data value: the PLC does not accept this value",
+    ExcCodes.DEVICE_FAILURE: "server device failure: the PLC could not do it",
+    ExcCodes.ACKNOWLEDGE: "acknowledge: the PLC needs long for it",
+    ExcCodes.DEVICE_BUSY: "server device busy: the PLC is busy with something else",
+    ExcCodes.MEMORY_PARITY_ERROR: "memory parity error in the PLC",
+    ExcCodes.GATEWAY_PATH_UNAVIABLE: "gateway path unavailable: the gateway is misconfigured or overloaded",
+    ExcCodes.GATEWAY_NO_RESPONSE: "gateway target failed to respond: no device of this id behind the gateway",
+}
+"""Exception codes; Modbus Application Protocol V1.1b3, section 7."""
+
+OUR_REQUEST: Final = (ExcCodes.ILLEGAL_FUNCTION, ExcCodes.ILLEGAL_ADDRESS, ExcCodes.ILLEGAL_VALUE)
+"""Codes that say map and PLC disagree; all others are trouble inside the PLC."""
+
+
+READ_CODE: Final = {
+    RegisterKind.COIL: 1,
+    RegisterKind.DISCRETE_INPUT: 2,
+    RegisterKind.HOLDING_REGISTER: 3,
+    RegisterKind.INPUT_REGISTER: 4,
+}
+"""Function codes that read; ibid., section 6."""
+
+WRITE_CODE: Final = {RegisterKind.COIL: 15, RegisterKind.HOLDING_REGISTER: 16}
+"""Function codes that write several; ibid., 6.11 and 6.12."""
+
+
+class _Undecodable(ModbusPDU):
+    """Stands for an answer that is no Modbus PDU."""
+
+    def __init__(self, frame: bytes) -> None:
+        super().__init__()
+        self.frame = frame
+
+
+class _Decoder(DecodePDU):
+    """Gives an `_Undecodable` where pymodbus would raise inside the event loop."""
+
+    def decode(self, frame: bytes) -> ModbusPDU:
+        return super().decode(frame) or _Undecodable(frame)
+
+
+class ModbusLink:
+    """One connection to one Modbus TCP server, for one device id.
+
+    Parameters
+    ----------
+    host, port
+        Address of the server.
+    device_id
+        Modbus unit to talk to.
+    timeout_s
+        Time for connecting and for each answer [s].
+    security
+        How the connection is secured; None for plain Modbus TCP.
+    """
+
+    __slots__ = ("_device_id", "_dial", "_host", "_port", "_security", "_timeout_s")
+
+    def __init__(
+        self, host: str, port: int, device_id: int, timeout_s: float, security: ClientSecurity | None = None
+    ) -> None:
+        self._host = host
+        self._port = port
+        self._device_id = device_id
+        self._timeout_s = timeout_s
+        self._security = security
+        self._dial: Dial | None = None
+
+    @property
+    def place(self) -> str:
+        """Where this link leads, for messages."""
+        return f"PLC at {self._host}:{self._port} (device id {self._device_id})"
+
+    @property
+    def connected(self) -> bool:
+        """Whether there is a connection; one that was lost is none."""
+        return self._dial is not None and self._dial.client.connected
+
+    async def open(self) -> None:
+        """Connect.
+
+        Raises
+        ------
+        BusDown
+            If there is no server at the address.
+        ConfigMismatch
+            If TLS is asked for and fails: certificates, name or version, or a server without TLS.
+        """
+        self.close()
+        dial = Dial(self._host, self._port, self._timeout_s, self._security, self.place)
+        dial.client.ctx.framer.decoder = _Decoder(False)
+        await dial.open()
+        self._dial = dial
+
+    def close(self) -> None:
+        """Disconnect; safe to call when not connected."""
+        if self._dial is not None:
+            self._dial.close()
+        self._dial = None
+
+    async def read(self, kind: RegisterKind, address: int, count: int) -> tuple[int, ...]:
+        """Read ``count`` words, or bits as 0 and 1, from ``address`` on.
+
+        Raises
+        ------
+        BusDown, DeviceTimeout, ProtocolViolation, DeviceFault
+            If there is no connection, no answer, a wrong answer or an exception answer.
+        """
+        dial = self._connected()
+        requests = {
+            RegisterKind.COIL: dial.client.read_coils,
+            RegisterKind.DISCRETE_INPUT: dial.client.read_discrete_inputs,
+            RegisterKind.HOLDING_REGISTER: dial.client.read_holding_registers,
+            RegisterKind.INPUT_REGISTER: dial.client.read_input_registers,
+        }
+        what = f"reading {count} {kind.value}(s) from address {address}"
+        request = requests[kind](address, count=count, device_id=self._device_id)
+        answer = await self._answer(dial, what, request, READ_CODE[kind])
+        came = answer.bits if kind.is_bit else answer.registers
+        expected = (count + 7) // 8 * 8 if kind.is_bit else count  # bits travel in whole bytes
+        if len(came) != expected:
+            raise self._wrong_answer(what, f"{expected} values", f"{len(came)}")
+        return tuple(int(value) for value in came[:count])
+
+    async def write(self, kind: RegisterKind, address: int, words: Sequence[int]) -> None:
+        """Write words, or bits as 0 and 1, from ``address`` on.
+
+        Raises
+        ------
+        BusDown, DeviceTimeout, ProtocolViolation, DeviceFault
+            As for `read`; a `ProtocolViolation` too where Modbus can't write the kind.
+        """
+        dial = self._connected()
+        what = f"writing {list(words)} to {kind.value} {address}"
+        if kind is RegisterKind.COIL:
+            bits = [bool(word) for word in words]
+            request = dial.client.write_coils(address, bits, device_id=self._device_id)
+        elif kind is RegisterKind.HOLDING_REGISTER:
+            request = dial.client.write_registers(address, list(words), device_id=self._device_id)
+        else:
+            raise self._wrong_answer(what, "a kind that Modbus can write", kind.value)
+        answer = await self._answer(dial, what, request, WRITE_CODE[kind])
+        if (answer.address, answer.count) != (address, len(words)):
+            came = f"address {answer.address}, count {answer.count}"
+            raise self._wrong_answer(what, f"address {address}, count {len(words)} confirmed", came)
+
+    def _connected(self) -> Dial:
+        if self._dial is None or not self._dial.client.connected:
+            raise BusDown(
+                f"{self.place}: expected an open connection, there is none. Connect first; if it was lost, "
+                "check the network and that the PLC runs."
+            )
+        return self._dial
+
+    async def _answer(self, dial: Dial, what: str, request: Awaitable[ModbusPDU], function_code: int) -> ModbusPDU:
+        """Wait for the answer and see that it is one."""
+        try:
+            with dial.asking():
+                answer = await request
+        except ModbusException as cause:  # its one way to say: nothing came
+            raise self._no_answer(dial, what) from cause
+        dial.answered = True
+        if isinstance(answer, _Undecodable):
+            raise self._wrong_answer(what, "a Modbus answer", f"bytes {answer.frame.hex(' ')}")
+        if isinstance(answer, ExceptionResponse):
+            raise self._refused(what, answer.exception_code)
+        if answer.function_code != function_code:
+            raise self._wrong_answer(what, f"function {function_code}", f"function {answer.function_code}")
+        return answer
+
+    def _no_answer(self, dial: Dial, what: str) -> DriverError:
+        if dial.client.connected:
+            part = dial.client.ctx.recv_buffer
+            came = (
+                f"only {len(part)} bytes came that are no whole one ({part[:8].hex(' ')} ...)" if part else "none came"
+            )
+            return DeviceTimeout(
+                f"{self.place}: {what}: expected an answer within {self._timeout_s:g} s, {came}. "
+                "Check that the PLC's program runs and that device_id in the register map is its own."
+            )
+        return dial.loss() or BusDown(
+            f"{self.place}: {what}: expected an answer, the connection was lost. Check the network, that the PLC "
+            "runs, and whether it wants TLS: then it needs [plc.security] in the rig file."
+        )
+
+    def _refused(self, what: str, code: int) -> DriverError:
+        text = EXCEPTION_TEXT.get(code, "a code Modbus does not define")
+        family = ProtocolViolation if code in OUR_REQUEST else DeviceFault
+        cure = "Compare the register map with" if code in OUR_REQUEST else "Look at the diagnosis of"
+        if self._security is not None and code == ExcCodes.ILLEGAL_FUNCTION:
+            role = own_role(self._security.credentials)
+            text += f", or not from a client certificate {'without a role' if role is None else f'of role {role!r}'}"
+            cure = "Use a certificate with the role it takes, or compare the register map with"
+        return family(
+            f"{self.place}: {what}: expected it to be done, came exception {code} ({text}). {cure} the PLC's program."
+        )
+
+    def _wrong_answer(self, what: str, expected: str, came: str) -> ProtocolViolation:
+        return ProtocolViolation(
+            f"{self.place}: {what}: expected {expected}, came {came}. "
+            "Check that a PLC with this register map is at this address."
+        )

@@ -1,0 +1,332 @@
+"""The PLC over Modbus TCP: what it reports in SI units, and requests that are confirmed or raise.
+
+::
+
+    connect          open, then compare the identity registers with the map
+    read_status      one request per run of adjacent registers
+    write            read back; what the registers then hold must be what was written
+    PRBS             started with torques that have passed the torque guard and with nothing else
+    drive mode       requested, then waited for in the status: the PLC decides, not the request
+
+The registers are those of a map file: ``eds/plc.toml``, or the rig's own.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable, Iterable, Mapping
+from enum import Enum
+from types import TracebackType
+from typing import Final, Self, TypeVar
+
+from drivers.errors import ConfigMismatch, DeviceFault, DeviceTimeout, ProtocolViolation
+from drivers.plc.map_needs import from_si, require_usable, to_si
+from drivers.plc.modbus_link import ModbusLink
+from drivers.plc.modbus_security import ClientSecurity
+from drivers.plc.register import Value
+from drivers.plc.register_map import RegisterMap, blocks_of
+from drivers.plc.types import ClutchState, DriveMode, PlcStatus, PlcWatchdog, PrbsSettings, PrbsSource
+from drivers.torque_guard import GuardedTorque
+
+Member = TypeVar("Member", bound=Enum)
+
+NS_PER_S: Final = 1_000_000_000
+
+STATUS: Final = (
+    "permissive",
+    "drive_mode",
+    "clutch",
+    "speed_limit",
+    "torque_limit",
+    "plc_count",
+    "host_count_seen",
+    "prbs_torque",
+    "prbs_enable",
+    "prbs_amplitude",
+    "prbs_divider",
+    "prbs_seed",
+    "prbs_source",
+)
+
+COUNTS: Final = 65536
+"""The host's watchdog starts over here, so that it fits 16 bits."""
+
+GENERATOR_OFF: Final = PrbsSettings(False, 0.0, 1, 1, PrbsSource.HOST)
+"""The PLC's own generator stands still, whatever it was set to."""
+
+POLL_S: Final = 0.01
+"""Pause between two looks at a drive mode that is changing [s]: about one PLC cycle."""
+
+
+class Plc:
+    """The PLC of the rig; an asynchronous context manager that connects and disconnects.
+
+    Parameters
+    ----------
+    host, port
+        Address of its Modbus TCP server.
+    register_map : RegisterMap
+        What its registers mean.
+    timeout_s : float
+        Time for connecting and for each answer [s].
+    mode_timeout_s : float
+        Time for a drive mode to take effect [s].
+    beat_timeout_s : float
+        Time the PLC may leave a beat unseen [s].
+    security : ClientSecurity or None
+        How the connection is secured; None for plain Modbus TCP.
+    clock_ns : callable
+        Monotonic clock [ns]; stamps the status and times the two time-outs above.
+
+    Raises
+    ------
+    ConfigMismatch
+        If the map can't be used; see `drivers.plc.map_needs`.
+    """
+
+    __slots__ = (
+        "_beat_timeout_s",
+        "_clock_ns",
+        "_host_count",
+        "_link",
+        "_map",
+        "_mode_timeout_s",
+        "_seen_ns",
+        "_setting_prbs",
+    )
+
+    def __init__(
+        self,
+        host: str,
+        port: int,
+        register_map: RegisterMap,
+        *,
+        timeout_s: float = 1.0,
+        mode_timeout_s: float = 1.0,
+        beat_timeout_s: float = 0.5,
+        security: ClientSecurity | None = None,
+        clock_ns: Callable[[], int] = time.monotonic_ns,
+    ) -> None:
+        require_usable(register_map)
+        self._link = ModbusLink(host, port, register_map.device_id, timeout_s, security)
+        self._map = register_map
+        self._mode_timeout_s = mode_timeout_s
+        self._beat_timeout_s = beat_timeout_s
+        self._clock_ns = clock_ns
+        self._host_count: int | None = None
+        self._seen_ns = 0
+        self._setting_prbs = asyncio.Lock()  # who switches it off comes behind who still switches it on
+
+    async def __aenter__(self) -> Self:
+        """Connect; see `connect`."""
+        await self.connect()
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Disconnect."""
+        self.close()
+
+    async def connect(self) -> None:
+        """Open the connection, or open it again, and compare the PLC's identity with the map.
+
+        Raises
+        ------
+        BusDown
+            If no server is there.
+        DeviceTimeout
+            If it does not answer.
+        ConfigMismatch
+            If it is another PLC, or another version of its map, or TLS fails. The connection is closed again.
+        """
+        await self._link.open()
+        try:
+            await self._verify_identity()
+        except BaseException:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """Disconnect; safe to call twice."""
+        self._link.close()
+        self._host_count = None
+
+    async def read_status(self) -> PlcStatus:
+        """Read everything the PLC reports.
+
+        Raises
+        ------
+        BusDown, DeviceTimeout, ProtocolViolation, DeviceFault
+            If it can't be read, or means nothing.
+        """
+        t_ns = self._clock_ns()
+        values = await self._read(STATUS)
+        return PlcStatus(
+            drive_mode=_member(DriveMode, values["drive_mode"]),
+            clutch=_member(ClutchState, values["clutch"]),
+            permissive=bool(values["permissive"]),
+            speed_limit_rad_s=float(values["speed_limit"]),
+            torque_limit_nm=float(values["torque_limit"]),
+            watchdog=PlcWatchdog(int(values["plc_count"]), int(values["host_count_seen"])),
+            prbs=_prbs_settings(values),
+            prbs_torque_nm=float(values["prbs_torque"]),
+            t_ns=t_ns,
+        )
+
+    async def start_prbs(self, m1: GuardedTorque, m2: GuardedTorque, clock_divider: int, seed: int) -> PrbsSettings:
+        """Let the PLC's own generator run.
+
+        Parameters
+        ----------
+        m1, m2 : GuardedTorque
+            What each inverter will get of it at most, as the torque guard let it through; the PRBS parts of the two
+            together are the amplitude.
+        clock_divider : int
+            PLC cycles each level is held.
+        seed : int
+            First state of the register, 1 to 1023.
+
+        Returns
+        -------
+        PrbsSettings
+            What the PLC holds now, read back.
+
+        Raises
+        ------
+        ConfigMismatch
+            If a value does not fit its register. Nothing was written.
+        ProtocolViolation, DeviceFault
+            If the PLC refuses a value, or holds another one afterwards. The generator stands still.
+        """
+        return await self._set_prbs(PrbsSettings(True, m1.prbs_nm + m2.prbs_nm, clock_divider, seed, PrbsSource.PLC))
+
+    async def stop_prbs(self) -> PrbsSettings:
+        """Switch the PLC's own generator off: the host makes the PRBS, and nobody may add another.
+
+        Raises
+        ------
+        BusDown, DeviceTimeout, ProtocolViolation, DeviceFault
+            If it can't be confirmed to be off.
+        """
+        return await self._set_prbs(GENERATOR_OFF)
+
+    async def _set_prbs(self, settings: PrbsSettings) -> PrbsSettings:
+        """Write the generator's settings; it stands still while they change."""
+        values: dict[str, Value] = {
+            "prbs_amplitude": settings.amplitude_nm,
+            "prbs_divider": settings.clock_divider,
+            "prbs_seed": settings.seed,
+            "prbs_source": settings.source.value,
+        }
+        words = self._encoded(values)
+        async with self._setting_prbs:
+            await self._write(self._encoded({"prbs_enable": False}))
+            await self._write(words)
+            if settings.enabled:
+                await self._write(self._encoded({"prbs_enable": True}))
+        return settings
+
+    async def request_drive_mode(self, mode: DriveMode) -> None:
+        """Ask for a drive mode and wait until the PLC reports it.
+
+        Raises
+        ------
+        DeviceFault
+            If the PLC stays in another mode.
+        """
+        await self._write(self._encoded({"drive_mode_request": mode.value}))
+        deadline_ns = self._clock_ns() + int(self._mode_timeout_s * NS_PER_S)
+        while (current := await self._drive_mode()) is not mode:
+            if self._clock_ns() >= deadline_ns:
+                raise DeviceFault(
+                    f"{self._link.place}: drive mode is {current.value} after {self._mode_timeout_s:g} s, "
+                    f"expected {mode.value}. Look at the PLC for what keeps it from changing the mode."
+                )
+            await asyncio.sleep(POLL_S)
+
+    async def beat(self) -> None:
+        """Count the host's watchdog on by one, and see that the PLC has seen the beats before.
+
+        Raises
+        ------
+        DeviceTimeout
+            If the PLC has not seen the last beat for ``beat_timeout_s``: its program stands still.
+        """
+        now_ns = self._clock_ns()
+        if self._host_count is None:
+            self._seen_ns = now_ns
+        else:
+            await self._require_seen(self._host_count, now_ns)
+        count = 0 if self._host_count is None else (self._host_count + 1) % COUNTS
+        await self._write(self._encoded({"host_count": count}))
+        self._host_count = count
+
+    async def _require_seen(self, count: int, now_ns: int) -> None:
+        seen = (await self._read(("host_count_seen",)))["host_count_seen"]
+        if seen == count:
+            self._seen_ns = now_ns
+        elif now_ns - self._seen_ns > self._beat_timeout_s * NS_PER_S:
+            raise DeviceTimeout(
+                f"{self._link.place}: watchdog: expected beat {count} seen by the PLC within "
+                f"{self._beat_timeout_s:g} s, it has seen {seen}. Check that the PLC's program runs."
+            )
+
+    async def _drive_mode(self) -> DriveMode:
+        return _member(DriveMode, (await self._read(("drive_mode",)))["drive_mode"])
+
+    async def _verify_identity(self) -> None:
+        found = await self._read(self._map.identity)
+        wrong = [
+            f"{name} is {found[name]}, expected {expected}"
+            for name, expected in self._map.identity.items()
+            if found[name] != expected
+        ]
+        if wrong:
+            raise ConfigMismatch(
+                f"{self._link.place}: {'; '.join(wrong)}, as register map {self._map.name!r} says. "
+                "Check [plc] host and port of the rig file, or give the map of this PLC."
+            )
+
+    async def _read(self, names: Iterable[str]) -> dict[str, Value]:
+        values: dict[str, Value] = {}
+        for block in blocks_of(self._map, names):
+            words = await self._link.read(block.kind, block.address, block.count)
+            for name in block.names:
+                register = self._map[name]
+                offset = register.address - block.address
+                values[name] = to_si(name, register, register.decode(words[offset : offset + register.size]))
+        return values
+
+    def _encoded(self, values: Mapping[str, Value]) -> dict[str, tuple[int, ...]]:
+        registers = {name: self._map[name] for name in values}
+        return {name: registers[name].encode(from_si(name, registers[name], value)) for name, value in values.items()}
+
+    async def _write(self, words: Mapping[str, tuple[int, ...]]) -> None:
+        """Write registers block by block and see that they then hold what was written."""
+        for block in blocks_of(self._map, words):
+            sent = tuple(word for name in block.names for word in words[name])
+            await self._link.write(block.kind, block.address, sent)
+            held = await self._link.read(block.kind, block.address, block.count)
+            if held != sent:
+                raise ProtocolViolation(
+                    f"{self._link.place}: {', '.join(block.names)} ({block.kind.value} {block.address}): "
+                    f"expected to read back {list(sent)} as written, came {list(held)}. Look for a limit in "
+                    "the PLC's program, or for another host that writes there."
+                )
+
+
+def _member(members: type[Member], value: Value) -> Member:
+    """Turn an enum's name into its member; that it has one is checked when the map is taken over."""
+    return members(value)
+
+
+def _prbs_settings(values: Mapping[str, Value]) -> PrbsSettings:
+    return PrbsSettings(
+        enabled=bool(values["prbs_enable"]),
+        amplitude_nm=float(values["prbs_amplitude"]),
+        clock_divider=int(values["prbs_divider"]),
+        seed=int(values["prbs_seed"]),
+        source=_member(PrbsSource, values["prbs_source"]),
+    )

@@ -1,0 +1,122 @@
+"""Read a PLC that may go away and come back: for checking and monitoring, where nothing depends on one answer.
+
+A lost connection is made again, with pauses that double, and a bounded number of times. It only reads: what was to
+be written when a connection was lost, nobody knows to have arrived, so that writing again is a person's decision.
+A run does not use this; there a lost PLC ends it (`hil.rig.plc_watch`).
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable, Iterator
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Final, Self
+
+from drivers.errors import BusDown, ConfigMismatch, DeviceTimeout
+from drivers.plc.plc import Plc
+from drivers.plc.types import PlcStatus
+
+PASSING: Final = (BusDown, DeviceTimeout)
+"""What may be over at the next attempt; everything else is a PLC that is there and says so."""
+
+
+@dataclass(frozen=True, slots=True)
+class Backoff:
+    """Pauses between attempts.
+
+    Attributes
+    ----------
+    first_s, longest_s : float
+        Pause after the first failure, doubled after each further one up to the longest [s].
+    attempts : int
+        Attempts in all, the first one counted.
+
+    Raises
+    ------
+    ConfigMismatch
+        If there is no attempt, or a pause is not above zero or the longest shorter than the first.
+    """
+
+    first_s: float = 0.2
+    longest_s: float = 5.0
+    attempts: int = 6
+
+    def __post_init__(self) -> None:
+        if self.attempts < 1 or not 0.0 < self.first_s <= self.longest_s:
+            raise ConfigMismatch(
+                f"back-off: expected at least one attempt and 0 < first_s <= longest_s, came {self}. "
+                "Correct the caller."
+            )
+
+    def pauses_s(self) -> Iterator[float]:
+        """Give the pause after each attempt but the last [s]."""
+        return (min(self.first_s * 2.0**n, self.longest_s) for n in range(self.attempts - 1))
+
+
+class PlcReader:
+    """Reads the PLC's status whenever it can be read; an asynchronous context manager.
+
+    Parameters
+    ----------
+    plc : Plc
+        The client; the reader connects it, and disconnects it at the end.
+    backoff : Backoff
+        How long to try for one status.
+    sleep : callable
+        Waits so many seconds.
+    """
+
+    __slots__ = ("_backoff", "_connected", "_plc", "_sleep")
+
+    def __init__(
+        self,
+        plc: Plc,
+        backoff: Backoff | None = None,
+        sleep: Callable[[float], Awaitable[None]] = asyncio.sleep,
+    ) -> None:
+        self._plc = plc
+        self._backoff = backoff or Backoff()
+        self._sleep = sleep
+        self._connected = False
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._plc.close()
+
+    async def read_status(self) -> PlcStatus:
+        """Read the status; connect first where there is no connection, or no longer one.
+
+        Returns
+        -------
+        PlcStatus
+            Its ``t_ns`` is that of the attempt that succeeded.
+
+        Raises
+        ------
+        BusDown, DeviceTimeout
+            If the last attempt fails as well; what it failed with.
+        ConfigMismatch, ProtocolViolation, DeviceFault
+            At once: another attempt would find the same.
+        """
+        for pause_s in self._backoff.pauses_s():
+            try:
+                return await self._attempt()
+            except PASSING:
+                await self._sleep(pause_s)
+        return await self._attempt()
+
+    async def _attempt(self) -> PlcStatus:
+        try:
+            if not self._connected:
+                await self._plc.connect()
+            self._connected = True
+            return await self._plc.read_status()
+        except PASSING:
+            self._connected = False
+            self._plc.close()
+            raise

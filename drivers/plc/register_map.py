@@ -1,0 +1,190 @@
+"""The register map of a PLC: a TOML file, checked as a whole, and how to read it in few requests.
+
+A map file is refused with all its faults at once, each with its key. What one entry means on the bus is in
+`drivers.plc.register`.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Annotated, Final, Literal
+
+from pydantic import Field, ValidationError
+
+from drivers.errors import ConfigMismatch
+from drivers.plc.register import MapTable, Register, RegisterKind
+
+MOST_REGISTERS: Final = 125
+"""Registers that one request may read; Modbus Application Protocol V1.1b3, 6.3 and 6.4."""
+
+MOST_BITS: Final = 2000
+"""Coils or discrete inputs that one request may read; ibid., 6.1 and 6.2."""
+
+
+class RegisterMapError(ConfigMismatch):
+    """A map file is wrong: whoever wrote it is at fault.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    problems : tuple of str
+        One line each: ``key | expected ... | came ...``.
+    """
+
+    def __init__(self, path: Path, *problems: str) -> None:
+        self.path = path
+        self.problems = problems
+        super().__init__("\n".join(f"{path}: {problem}" for problem in problems))
+
+
+class RegisterMap(MapTable):
+    """A whole map file. The key ``schema`` is `schema_id` here: pydantic has a use of its own for that name.
+
+    Attributes
+    ----------
+    name : str
+        What PLC it is for; appears in messages.
+    device_id : int
+        Modbus unit the PLC answers as.
+    identity : dict
+        What the registers of these names must hold.
+    registers : dict
+        The entries by name.
+    """
+
+    schema_id: Annotated[Literal["hil.register_map/1"], Field(alias="schema")]
+    name: Annotated[str, Field(min_length=1)]
+    device_id: Annotated[int, Field(ge=0, le=255)]
+    identity: dict[str, int]
+    registers: dict[str, Register]
+
+    def __getitem__(self, name: str) -> Register:
+        """Return an entry by name.
+
+        Raises
+        ------
+        ConfigMismatch
+            If the map has none of that name.
+        """
+        if name not in self.registers:
+            raise ConfigMismatch(
+                f"register map {self.name!r}: expected a register {name}, it has {', '.join(sorted(self.registers))}. "
+                "Add it to the map file."
+            )
+        return self.registers[name]
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """Registers of one kind at adjacent addresses: what one request reads or writes."""
+
+    kind: RegisterKind
+    address: int
+    count: int
+    names: tuple[str, ...]
+
+
+def blocks_of(map_: RegisterMap, names: Iterable[str]) -> tuple[Block, ...]:
+    """Group registers into the fewest requests that touch no address outside them.
+
+    Parameters
+    ----------
+    map_ : RegisterMap
+        The map.
+    names : iterable of str
+        Registers wanted.
+
+    Returns
+    -------
+    tuple of Block
+        In the order of kind and address; no block is longer than one request may be.
+    """
+    ordered = sorted(names, key=lambda name: (map_[name].kind.value, map_[name].address))
+    blocks: list[Block] = []
+    for name in ordered:
+        register = map_[name]
+        last = blocks[-1] if blocks else None
+        if last and _continues(last, register):
+            blocks[-1] = Block(last.kind, last.address, last.count + register.size, (*last.names, name))
+        else:
+            blocks.append(Block(register.kind, register.address, register.size, (name,)))
+    return tuple(blocks)
+
+
+def _continues(block: Block, register: Register) -> bool:
+    most = MOST_BITS if block.kind.is_bit else MOST_REGISTERS
+    adjacent = block.kind is register.kind and block.address + block.count == register.address
+    return adjacent and block.count + register.size <= most
+
+
+def load_register_map(path: Path) -> RegisterMap:
+    """Read and check a map file.
+
+    Raises
+    ------
+    RegisterMapError
+        If it can't be read, is not TOML, or has any key wrong, missing or unknown, overlapping addresses, or
+        an identity that names no register; all faults at once.
+    """
+    try:
+        data = tomllib.loads(path.read_text("utf-8"))
+    except OSError as cause:
+        raise RegisterMapError(path, f"the file | expected a readable file | came: {cause.strerror}") from cause
+    except ValueError as cause:  # tomllib's own error, and text that is not UTF-8
+        raise RegisterMapError(path, f"the file | expected TOML in UTF-8 | came: {cause}") from cause
+    try:
+        map_ = RegisterMap.model_validate(data)
+    except ValidationError as cause:
+        raise RegisterMapError(path, *_problems(cause)) from cause
+    if faults := (*_overlaps(map_.registers), *_identity_faults(map_)):
+        raise RegisterMapError(path, *faults)
+    return map_
+
+
+def _problems(cause: ValidationError) -> Iterator[str]:
+    for detail in cause.errors():
+        key = ".".join(map(str, detail["loc"])) or "the file"
+        if detail["type"] == "missing":
+            yield f"{key} | expected this key | came nothing: add it"
+        elif detail["type"] == "extra_forbidden":
+            yield f"{key} | expected no such key | came this unknown key: mend or remove it"
+        else:
+            expected = detail["msg"].removeprefix("Input should be ")
+            came = "a table" if isinstance(detail["input"], Mapping) else repr(detail["input"])
+            yield f"{key} | expected {expected} | came {came}"
+
+
+def _overlaps(registers: Mapping[str, Register]) -> Iterator[str]:
+    for kind in RegisterKind:
+        of_kind = sorted(
+            ((name, register) for name, register in registers.items() if register.kind is kind),
+            key=lambda entry: entry[1].address,
+        )
+        for (before, first), (name, register) in pairwise(of_kind):
+            if register.address < first.end:
+                yield (
+                    f"registers.{name}.address | expected {first.end} or more, behind {before} | "
+                    f"came {register.address}"
+                )
+
+
+def _identity_faults(map_: RegisterMap) -> Iterator[str]:
+    if not map_.identity:
+        yield "identity | expected at least one register and what it must hold | came none"
+    for name, value in map_.identity.items():
+        if name not in map_.registers:
+            yield f"identity.{name} | expected the name of a register of this map | came {name!r}"
+        else:
+            yield from _value_faults(f"identity.{name}", map_[name], value)
+
+
+def _value_faults(key: str, register: Register, value: int) -> Iterator[str]:
+    try:
+        register.encode(value)
+    except ConfigMismatch:
+        yield f"{key} | expected a value that {register.type.value} holds | came {value}"
