@@ -22,7 +22,7 @@ from hil.rig.check import Finding, Verdict, check_rig
 app = typer.Typer(add_completion=False)
 
 
-@app.command(epilog="Examples: hil check examples/rig.toml; hil check --eds examples/other_drive.eds")
+@app.command(epilog="Example: hil check examples/rig.toml; hil check --eds examples/other_drive.eds")
 def check(
     rig: Annotated[Path | None, typer.Argument(metavar="RIG", help="Rig file.")] = None,
     eds: Annotated[

@@ -121,7 +121,8 @@ def _run(arguments: Sequence[str]) -> int:
 def _report(error: BaseException) -> int:
     status = exit_status(error)
     if status is not None:
-        _complain("interrupted" if isinstance(error, KeyboardInterrupt) else f"error: {error}")
+        notes = " ".join(("", *getattr(error, "__notes__", ())))
+        _complain(("interrupted" if isinstance(error, KeyboardInterrupt) else f"error: {error}") + notes)
         return status
     if hasattr(error, "format_message") and hasattr(error, "exit_code"):  # typer's own usage errors
         if message := error.format_message():  # empty where typer printed the help instead

@@ -52,9 +52,12 @@ def write_sidecar(recording: Path, metadata: Mapping[str, str]) -> None:
         return
     path = sidecar_of(recording)
     text = json.dumps({**metadata, SCHEMA_KEY: SCHEMA}, indent=1, ensure_ascii=False) + "\n"
+    unfinished = path.with_name(f".{path.name}.part")
     try:
-        path.write_text(text, encoding="utf-8")
+        unfinished.write_text(text, encoding="utf-8")
+        unfinished.replace(path)
     except OSError as error:
+        unfinished.unlink(missing_ok=True)
         raise RecordingError(
             path, f"expected room for the description, came: {error.strerror or error}. The recording itself is whole."
         ) from error

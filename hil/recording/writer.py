@@ -113,8 +113,13 @@ class RecordingWriter:
         self._file = None
         if self.n_samples == 0:
             self.part_path.unlink()
-        else:
+            return
+        try:
             self._publish()
+        except RecordingError as lost:
+            if error is None:
+                raise
+            error.add_note(str(lost))  # what ended the run comes first
 
     def _close(self, file: TextIO) -> None:
         try:

@@ -17,6 +17,7 @@ from drivers.inverter.cia402 import PowerState
 from hil.cli.main import run
 from hil.config.rig_file import read_rig
 from hil.recording import read_table
+from hil.recording.sidecar import sidecar_of
 from hil.simulator.fault_spec import rig_faults
 from tests.bad_input.conftest import Refused
 from tests.rig.observer import assert_disarmed, power_state
@@ -84,7 +85,7 @@ def test_what_goes_wrong_within_ends_the_run_and_keeps_the_recording(
     complaint = capsys.readouterr().err
     assert all(each in complaint for each in said), complaint
     assert 0 < len(read_table(out).columns["time_s"]) < 300
-    assert sorted(short_rig.parent.iterdir()) == [short_rig, out]
+    assert set(short_rig.parent.iterdir()) == {short_rig, out, sidecar_of(out)}
 
 
 def test_a_drive_that_faults_ends_the_run(short_rig: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -79,7 +79,7 @@ def test_every_object_that_is_configured_is_listed(index: int) -> None:
 
 def test_every_402_object_in_the_drivers_is_listed() -> None:
     sources = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "drivers").rglob("*.py"))
-    used = set(re.findall(r"0x60[0-9A-F]{2}|0x6502", sources)) - {"0x605B", "0x605C", "0x605D"}
+    used = set(re.findall(r"0x60[4-9A-F][0-9A-F]|0x6007|0x6502", sources)) - {"0x605B", "0x605C", "0x605D"}
     assert len(used) > 15
     assert {index for index in used if index not in text("supported-protocols.md")} == set()
 
