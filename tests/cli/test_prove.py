@@ -55,3 +55,17 @@ def test_the_key_of_another_set_is_not_overwritten(tmp_path: Path, capsys: pytes
     assert run(["prove", "make", str(tmp_path / "set"), "--key-file", str(key)]) == 2
     assert "not there yet" in capsys.readouterr().err
     assert key.read_text() == "mine"
+
+
+def test_a_rig_whose_clutch_is_closed_is_not_driven(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["prove", "wire", str(tmp_path), "--only", "clutch_closed"]) == 0
+    said = capsys.readouterr().out
+    assert "clutch is closed, expected open. Nothing was armed" in said
+    assert "1 of 1 rigs as they should be" in said
+
+
+@pytest.mark.campaign
+def test_what_is_concealed_in_the_rigs_is_found_over_the_wire(tmp_path: Path) -> None:
+    assert run(["prove", "wire", str(tmp_path)]) == 0
+    rigs = json.loads((tmp_path / "wire" / "wire.json").read_text())["rigs"]
+    assert [rig["case"] for rig in rigs if not rig["success"]] == []
