@@ -27,6 +27,10 @@ NEAR_FLOOR = 1.5
 NEAR_FLOOR_PROFILE = 1.15
 """The same for a profile over time, which follows whatever is slow: what it leaves is something else."""
 
+DETAIL = 0.005
+"""Share of the mismatch's power that a profile may leave above the noise beyond that: next to a mismatch of many times
+the noise it is a detail of the road or the line, whatever it is."""
+
 ABOVE_FLOOR = 1.25
 """A re-tuned nominal model whose error is above the floor by this factor does not explain a speed recording: the
 torque reading's own noise adds a few per cent, the estimate of the floor errs upward."""
@@ -90,10 +94,16 @@ def _leaves_too_much(selection: Selection, floor: float, profile_alone: bool) ->
     share = (before**2 - after**2) / (before**2 - min(level, after) ** 2)
     if not _reads_speed(selection):
         return f"{1.0 - share:.0%} of the mismatch" if share < MOST_OF_POSITION else ""
-    most = NEAR_FLOOR_PROFILE if profile_alone else NEAR_FLOOR
+    most = NEAR_FLOOR_PROFILE if profile_alone and not _leaves_a_detail(selection, floor) else NEAR_FLOOR
     if share < MOST or after > most * level:
         return f"{1.0 - share:.0%} of the mismatch, {after / level:.2g} times the noise"
     return ""
+
+
+def _leaves_a_detail(selection: Selection, floor: float) -> bool:
+    """Tell whether what an explanation leaves above the noise is next to nothing of the mismatch."""
+    before, after = selection.retuned.rms, selection.result.rms
+    return after**2 - min(floor, after) ** 2 <= DETAIL * (before**2 - min(floor, before) ** 2)
 
 
 def _reads_speed(selection: Selection) -> bool:
@@ -105,9 +115,10 @@ def _objection(selection: Selection, floor: float, unnamed: UnnamedLaw | None, r
     if unconverged(selection):
         return f"{named} rests on a fit that did not converge"
     profiles = [name for name in selection.chosen if EFFECTS[name].profile]
-    if leaves := _leaves_too_much(selection, floor, bool(profiles) and len(selection.chosen) == 1):
+    alone = bool(profiles) and len(selection.chosen) == 1
+    if leaves := _leaves_too_much(selection, floor, alone):
         return f"{named} would leave {leaves}"
-    if profiles and len(selection.chosen) == 1 and remaining is not None:  # an edge in what should be smooth
+    if alone and remaining is not None and not _leaves_a_detail(selection, floor):  # an edge in what should be smooth
         return f"{named} would leave {remaining.terms[0][0]} at the {remaining.element.value} unexplained"
     if unnamed is None or not _reads_speed(selection):  # a free-running position drifts as any flexible law does
         return ""

@@ -82,17 +82,17 @@ def has_edge(name: str, result: FitResult) -> bool:
 def null_inside(name: str, result: FitResult) -> bool:
     """Tell whether the interval of every decisive parameter of an effect includes its null.
 
-    Decisive are the amplitudes of a periodic effect, the first parameter that is fitted of another. A profile is
-    decided by its gain alone: it has no single parameter.
+    See ``Effect.decisive``. A profile is decided by its gain alone: it has no single parameter.
     """
     entry = EFFECTS[name]
     if entry.profile:
         return False
     nulls = {parameter.name: parameter.null for parameter in entry.parameters}
     fitted = [i for i, s in enumerate(result.problem.shared) if s.effect == name and s.low < s.high]
-    amplitudes = [i for i in fitted if result.problem.shared[i].name in entry.phases.values()]
+    names = entry.decisive or tuple(entry.phases.values())
+    decisive = [i for i in fitted if result.problem.shared[i].name in names]
     cov = covariance(result)
-    return all(_includes(result, cov, i, nulls[result.problem.shared[i].name]) for i in amplitudes or fitted[:1])
+    return all(_includes(result, cov, i, nulls[result.problem.shared[i].name]) for i in decisive or fitted[:1])
 
 
 def _includes(result: FitResult, cov: FloatArray, index: int, null: float) -> bool:

@@ -199,6 +199,9 @@ class Effect:
         Where the event is a step of a nominal parameter: of which.
     phases : mapping of str to str
         Own phase to the shared amplitude that it belongs to, for effects periodic in an angle.
+    decisive : tuple[str, ...]
+        Parameters of which at least one must differ from its null; by default the amplitudes of a periodic effect, the
+        first parameter that is fitted of another.
     implausible : callable
         Model, records and parameter values to the reason why such values are no case of this effect, or "".
     unresolved : callable
@@ -228,6 +231,7 @@ class Effect:
     event: bool = False
     step: Step | None = None
     phases: Mapping[str, str] = field(default_factory=dict)
+    decisive: tuple[str, ...] = ()
     implausible: Callable[[DrivelineModel, Sequence[Record], Mapping[str, float]], str] = always_plausible
     unresolved: Callable[[DrivelineModel, Sequence[Record], Mapping[str, float]], str] = always_plausible
     recognised: bool = False

@@ -63,5 +63,6 @@ EFFECT = Effect(
     scales=scales,
     starts=starts,
     sentence=sentence,
+    decisive=("inertia_kg_m2", "line_share"),
     implausible=implausible,
 )

@@ -9,6 +9,11 @@ from estimator.physics.model import DrivelineModel, Motion
 from estimator.signals.record import Record
 
 
+QUICKEST = 0.04
+"""Shortest time constant in lengths of the longest recording: a loss that is complete before anything can have warmed
+is a gain, or what a recording began with."""
+
+
 def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
     """Return 1 for the depth and the longest recording's length."""
     return (1.0, max(record.time_s[-1] - record.time_s[0] for record in records))
@@ -27,6 +32,14 @@ def sentence(values: Mapping[str, float], motion: Motion) -> str:
     )
 
 
+def implausible(model: DrivelineModel, records: Sequence[Record], values: Mapping[str, float]) -> str:
+    """Object to a loss that comes too soon for warmth."""
+    least_s = QUICKEST * scales(model, records)[1]
+    if values["time_constant_s"] > least_s:
+        return ""
+    return f"a loss with a time constant of {values['time_constant_s']:.2g} s is not from warming"
+
+
 EFFECT = Effect(
     name="torque_derating",
     element=Element.TORQUE_PATH,
@@ -35,7 +48,7 @@ EFFECT = Effect(
     source="magnet flux and temperature: Pyrhönen, Jokinen, Hrabovcová, Design of Rotating Electrical Machines, 2014",
     excited_by="a long pull at high torque",
     parameters=(
-        EffectParameter("depth", "", 0.0, -1.0, 1.0, "share of the torque that is lost in the end: d"),
+        EffectParameter("depth", "", 0.0, 0.0, 1.0, "share of the torque that is lost in the end: d"),
         EffectParameter("time_constant_s", "s", 1.0, 0.02, 10.0, "time constant of the decay: tau"),
     ),
     structures=EVERY_LINE,
@@ -45,4 +58,5 @@ EFFECT = Effect(
     scales=scales,
     starts=starts,
     sentence=sentence,
+    implausible=implausible,
 )

@@ -44,3 +44,9 @@ def test_a_carcass_that_damps_at_every_speed_is_no_tyre() -> None:
     assert implausible(LINE, driven, {**rolling, "creep_rad_s": 40.0}) == ""
     assert "beyond the top speed of 79" in implausible(LINE, driven, {**rolling, "creep_rad_s": 500.0})
     assert implausible(LINE, driven, {"wheel_share": 0.1, "relaxation_rad": 0.0, "creep_rad_s": 500.0}) == ""
+
+
+def test_a_loss_that_is_complete_at_once_is_not_from_warming() -> None:
+    implausible = EFFECTS["torque_derating"].implausible
+    assert implausible(LINE, RECORDS, {"depth": 0.2, "time_constant_s": 3.0}) == ""
+    assert "not from warming" in implausible(LINE, RECORDS, {"depth": 0.2, "time_constant_s": 0.6})
