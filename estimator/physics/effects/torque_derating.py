@@ -8,7 +8,6 @@ from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Elemen
 from estimator.physics.model import DrivelineModel, Motion
 from estimator.signals.record import Record
 
-
 QUICKEST = 0.04
 """Shortest time constant in lengths of the longest recording: a loss that is complete before anything can have warmed
 is a gain, or what a recording began with."""
