@@ -23,6 +23,7 @@ from hil.proof.campaign.matrix import confusion_svg
 from hil.proof.campaign.report import markdown, summary
 from hil.proof.campaign.score import right_columns, score
 from hil.proof.campaign.statistics import Row, confusion
+from hil.proof.options import add_work_options, parse_work
 
 RESULTS = "results.jsonl"
 
@@ -116,19 +117,14 @@ def _parser() -> argparse.ArgumentParser:
         "--kinds", default=ALL, help=f"{ALL}, {groups}, effects, or several joined by +; a list with commas"
     )
     parser.add_argument("--out", required=True, type=Path, help="folder for results, summary and the cases' files")
-    parser.add_argument("--jobs", type=int, default=1, help="cases at a time (default: %(default)s)")
-    parser.add_argument(
-        "--limit-s", type=float, default=LIMIT_S, help="seconds one command may take (default: %(default)g)"
-    )
+    add_work_options(parser, LIMIT_S, "cases")
     return parser
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run or resume a campaign; return the exit status."""
     parser = _parser()
-    options = parser.parse_args(arguments)
-    if options.jobs < 1:
-        parser.error(f"--jobs: expected 1 or more, came {options.jobs}")
+    options = parse_work(parser, arguments)
     try:
         planned = [(wanted, seed) for seed in parse_seeds(options.seeds) for wanted in parse_kinds(options.kinds)]
         rows = read_results(options.out / RESULTS)

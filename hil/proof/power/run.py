@@ -22,6 +22,7 @@ from hil.errors import RecordingError, UsageError
 from hil.proof.campaign.kinds import parse_seeds
 from hil.proof.campaign.run import LIMIT_S, RESULTS, read_results
 from hil.proof.campaign.statistics import Row
+from hil.proof.options import add_work_options, parse_work
 from hil.proof.power.bound import HYPOTHESES, LEVEL
 from hil.proof.power.picture import power_svg
 from hil.proof.power.report import markdown, summary
@@ -168,19 +169,14 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--duration-s", dest="samples", type=_samples, default=f"{DURATION_S:g}", help="of each recording"
     )
-    parser.add_argument("--jobs", type=int, default=1, help="trials at a time (default: %(default)s)")
-    parser.add_argument(
-        "--limit-s", type=float, default=LIMIT_S, help="seconds one command may take (default: %(default)g)"
-    )
+    add_work_options(parser, LIMIT_S, "trials")
     return parser
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run or resume a study; return the exit status."""
     parser = _parser()
-    options = parser.parse_args(arguments)
-    if options.jobs < 1:
-        parser.error(f"--jobs: expected 1 or more, came {options.jobs}")
+    options = parse_work(parser, arguments)
     study = Study(options.alpha, options.multiples, options.samples)
     try:
         buses = [(effect, seed) for seed in parse_seeds(options.seeds) for effect in parse_effects(options.effects)]

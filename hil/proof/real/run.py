@@ -18,6 +18,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from hil.errors import HilError
+from hil.proof.options import add_work_options, parse_work
 from hil.proof.real.case_file import ROOM, CaseFile, RunEntry, case_folders, read_case
 from hil.proof.real.judge import Agreement, median_agreement
 from hil.proof.real.one_run import make_run
@@ -159,7 +160,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="python -m hil.proof.real",
         description="Diagnose real recordings with part of their physics concealed, and judge by what is known.",
-        epilog="Example: python -m hil.proof.real emps friction_joint --data ../shared/data --out out/real",
+        epilog="Example: python -m hil.proof.real emps friction_joint --data recordings --out out/real",
     )
     parser.add_argument("names", nargs="*", metavar="NAME", help="cases (default: all)")
     parser.add_argument(
@@ -169,19 +170,14 @@ def _parser() -> argparse.ArgumentParser:
         help="folder of the recordings (default: the environment's HIL_DATA)",
     )
     parser.add_argument("--out", required=True, type=Path, help=f"folder for {FILE_NAME} and the diagnoses")
-    parser.add_argument("--jobs", type=int, default=1, help="runs at a time (default: %(default)s)")
-    parser.add_argument(
-        "--limit-s", type=float, default=LIMIT_S, help="seconds one command may take (default: %(default)g)"
-    )
+    add_work_options(parser, LIMIT_S, "runs")
     return parser
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run or resume; return the exit status."""
     parser = _parser()
-    options = parser.parse_args(arguments)
-    if options.jobs < 1:
-        parser.error(f"--jobs: expected 1 or more, came {options.jobs}")
+    options = parse_work(parser, arguments)
     if options.data is None:
         parser.error("--data: expected the folder of the recordings, came neither it nor HIL_DATA")
 
