@@ -131,15 +131,7 @@ class CanLink:
         BusDown
             If it can't be opened.
         """
-        try:
-            bus = BoundedRemoteBus(url) if url.startswith(("ws:", "wss:")) else _python_can_bus(url)
-        except _OPENING_ERRORS as error:
-            raise BusDown(
-                f"CAN bus {url!r} can't be opened: {error or type(error).__name__}. Expected virtual:NAME, "
-                "ws://HOST:PORT/ with a server running there (hil sim), or INTERFACE:CHANNEL?bitrate=... of "
-                "a connected adapter. Check the bus URL of the rig file."
-            ) from error
-        return cls(bus)
+        return cls(open_bus(url))
 
     def subscribe(self, cob_id: int, callback: FrameCallback) -> None:
         """Have ``callback`` called for every frame with this identifier, where frames are received."""
@@ -288,6 +280,24 @@ class CanLink:
         traceback: TracebackType | None,
     ) -> None:
         self.close()
+
+
+def open_bus(url: str) -> can.BusABC:
+    """Open the bus a URL names, as `CanLink.open` takes it.
+
+    Raises
+    ------
+    BusDown
+        If it can't be opened.
+    """
+    try:
+        return BoundedRemoteBus(url) if url.startswith(("ws:", "wss:")) else _python_can_bus(url)
+    except _OPENING_ERRORS as error:
+        raise BusDown(
+            f"CAN bus {url!r} can't be opened: {error or type(error).__name__}. Expected virtual:NAME, "
+            "ws://HOST:PORT/ with a server running there (hil sim), or INTERFACE:CHANNEL?bitrate=... of "
+            "a connected adapter. Check the bus URL of the rig file."
+        ) from error
 
 
 def _python_can_bus(url: str) -> can.BusABC:

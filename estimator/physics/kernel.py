@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from estimator.compiled import compiled, inlined
+from estimator.compiled import brief, compiled, inlined
 from estimator.physics.effects import (
     actuator_lag,
     aerodynamic_drag,
@@ -555,6 +555,29 @@ def integrate(
         integrate_masses(2, *given, *wanted)
     else:
         integrate_masses(3, *given, *wanted)
+
+
+@brief
+def integrate_period(
+    masses: int,
+    sample_time_s: float,
+    substeps: int,
+    sign_width: float,
+    first: int,
+    start_s: float,
+    torque: FloatArray,
+    load: FloatArray,
+    angle: FloatArray,
+    p: FloatArray,
+    state: FloatArray,
+    output: int,
+    sensor: bool,
+    out: FloatArray,
+    slopes: FloatArray,
+) -> None:
+    """Do what ``integrate`` does, for a rig that is stepped period by period."""
+    given = (sample_time_s, substeps, sign_width, first, start_s, torque, load, angle, p)
+    integrate(masses, *given, state, output, sensor, out, slopes)
 
 
 @compiled

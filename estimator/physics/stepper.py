@@ -71,7 +71,7 @@ class Stepper:
         self._angle[-1] = self._state[kernel.ANGLE]
         self._angle[-2] = self._angle[-1] - self._state[kernel.SPEED] * self._period_s  # the kernel goes straight on
         last = self._torque.size - 1
-        kernel.integrate(
+        kernel.integrate_period(
             self._masses,
             self._period_s,
             self._substeps,

@@ -31,7 +31,9 @@ def sim(
     rig: Annotated[Path, typer.Argument(metavar="RIG", help=r"Rig file with a table \[simulation].")],
     bus: Annotated[
         str | None,
-        typer.Option(metavar="URL", help="Serve the CAN bus at ws://127.0.0.1:PORT/; else where RIG says."),
+        typer.Option(
+            metavar="URL", help="Serve the CAN bus at ws://127.0.0.1:PORT/ or socketcan:vcan0; else as in RIG."
+        ),
     ] = None,
     modbus: Annotated[
         str | None,

@@ -5,6 +5,8 @@ Current is what makes the torque; above the base speed a part of it weakens the 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from drivers.scaling import IntegerType, VelocityScale
@@ -12,6 +14,18 @@ from hil.simulator.inverter_settings import SimulatedInverter
 from hil.simulator.sample_clock import SampleClock
 
 _INT16 = IntegerType.INTEGER16
+
+DRAWN_AT_ONCE = 512
+
+
+def _normal(random: np.random.Generator) -> Iterator[float]:
+    """Draw standard normal numbers for ever.
+
+    Many at once: for every array it fills numpy gives the interpreter lock away and takes it back, and a thread that
+    waits for the lock would hardly ever get it (see ``estimator.compiled.brief``).
+    """
+    while True:
+        yield from random.standard_normal(DRAWN_AT_ONCE).tolist()
 
 
 class DriveSensors:
@@ -34,11 +48,11 @@ class DriveSensors:
         Velocity actual value, 0x606C [counts].
     """
 
-    __slots__ = ("_clock", "_random", "_settings", "_velocity_scale", "current", "speed", "torque")
+    __slots__ = ("_clock", "_noise", "_settings", "_velocity_scale", "current", "speed", "torque")
 
     def __init__(self, settings: SimulatedInverter, si_unit_velocity: int, seed: int) -> None:
         self._settings = settings
-        self._random = np.random.default_rng([seed, settings.node_id])
+        self._noise = _normal(np.random.default_rng([seed, settings.node_id]))
         where = f"simulated inverter, node {settings.node_id}"
         self._velocity_scale = VelocityScale.from_object(si_unit_velocity, where)
         self._clock = SampleClock(settings.faults.clock_drift_ppm)
@@ -59,7 +73,7 @@ class DriveSensors:
             Torque in effect [per mille of rated].
         """
         speed_rad_s, torque = self._clock.sample(true_speed_rad_s, torque_permille)
-        torque_noise, speed_noise = self._random.standard_normal(2).tolist()  # floats: numpy's scalars are slow
+        torque_noise, speed_noise = next(self._noise), next(self._noise)
         torque += self._settings.torque_noise_counts * torque_noise
         self.torque = self._converted(torque)
         self.current = self._converted(torque / self._settings.faults.limits.weakening(true_speed_rad_s))

@@ -131,6 +131,10 @@ class InverterDevice:
         reading = self._readings.get(index)
         return None if reading is None else reading()
 
+    def reader(self, index: int) -> Callable[[], int] | None:
+        """Give what reads an object that only the device itself can tell, for whoever reads it often; else None."""
+        return self._readings.get(index)
+
     def write(self, index: int, value: int) -> None:
         """Take a new value of an object; one the device does not act on is ignored.
 

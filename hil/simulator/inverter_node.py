@@ -10,6 +10,7 @@ that it also notices when nothing comes any more.
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from functools import partial
 from threading import RLock
 from typing import Any
@@ -74,7 +75,9 @@ class InverterNode:
         self._rpdos: dict[int, PdoCodec] = {}
         self._tpdos: tuple[PdoCodec, ...] = ()
         self._pending: dict[int, bytes] = {}
+        self._sources: dict[int, tuple[Callable[[], int], ...]] = {}
         self._last_sent: dict[int, bytes] = {}
+        self._told: set[int] = set()
         self._heard: set[int] = set()
         self._syncs = 0
         self._off_bus = False
@@ -163,8 +166,7 @@ class InverterNode:
     def _tpdo_data(self, tpdo: PdoCodec) -> bytes:
         cob_id = tpdo.layout.cob_id
         if cob_id not in self._last_sent or not self._is_stale():
-            values = tuple(self._value(mapped.index, mapped.subindex) for mapped in tpdo.layout.objects)
-            self._last_sent[cob_id] = tpdo.pack(values)
+            self._last_sent[cob_id] = tpdo.pack(tuple([read() for read in self._sources[cob_id]]))
         return self._last_sent[cob_id]
 
     def _is_stale(self) -> bool:
@@ -211,6 +213,10 @@ class InverterNode:
 
     def _start_pdos(self) -> None:
         self._tpdos = self._pdo_objects.tpdos()
+        self._sources = {
+            tpdo.layout.cob_id: tuple(self._source(each.index, each.subindex) for each in tpdo.layout.objects)
+            for tpdo in self._tpdos
+        }
         self._rpdos = {rpdo.layout.cob_id: rpdo for rpdo in self._pdo_objects.rpdos()}
         self._host.watch_rpdos(
             {cob_id: self._pdo_objects.deadline_ms(rpdo.layout) for cob_id, rpdo in self._rpdos.items()}
@@ -238,14 +244,17 @@ class InverterNode:
             self._recover(RPDO_TIMEOUT)
 
     def _lose_host(self, error_code: int) -> None:
+        self._told.add(error_code)
         self._device.tell(error_code)
         self._device.lose_connection(error_code)
         self._pending.clear()
         self._send_emergencies()
 
     def _recover(self, error_code: int) -> None:
-        self._device.recover(error_code)
-        self._send_emergencies()
+        if error_code in self._told:
+            self._told.remove(error_code)
+            self._device.recover(error_code)
+            self._send_emergencies()
 
     def _put_into_effect(self, rpdo: PdoCodec, data: bytes) -> None:
         try:
@@ -281,6 +290,9 @@ class InverterNode:
         elif (index, subindex) == _CONSUMER_HEARTBEAT_TIME:
             self._host.heartbeat = HeartbeatConsumer.from_object(value)
             self._hear(self._host.heartbeat.cob_id, self._on_heartbeat)
+
+    def _source(self, index: int, subindex: int) -> Callable[[], int]:
+        return self._device.reader(index) or partial(self._value, index, subindex)
 
     def _value(self, index: int, subindex: int) -> int:
         value = self._device.read(index, subindex)

@@ -12,6 +12,9 @@ from dataclasses import dataclass, field
 from types import TracebackType
 from typing import Self
 
+import can
+
+from drivers.canopen.can_link import open_bus
 from drivers.canopen.inline_bus import InlineBus
 from drivers.plc.register_map import load_register_map
 from drivers.resources import data_file
@@ -30,6 +33,10 @@ from hil.simulator.simulated_rig import SimulatedRig
 
 IN_PROCESS = "virtual:"
 """Beginning of the bus URLs that are served inside this process only."""
+
+SOCKETCAN = "socketcan:vcan"
+"""Beginning of the bus URLs of the Linux kernel's virtual buses. A simulated drive on a real one could answer in the
+place of a drive that carries torque."""
 
 
 HOST_TIMEOUT_S = 1.0
@@ -57,7 +64,7 @@ class RigServer:
         The rig file the simulated rig agrees with; it must have a table ``[simulation]``.
     bus_url
         Where the CAN bus is served: ``ws://127.0.0.1:PORT/`` for other processes, ``virtual:NAME`` for this
-        one.
+        one, ``socketcan:vcan0`` on a bus of the kernel.
     modbus
         Where the PLC is served. Port 0 takes a free one, here as in ``bus_url``.
     faults
@@ -91,7 +98,12 @@ class RigServer:
         self._seed = self._simulation.seed if seed is None else seed
         self._faults = faults or RigFaults()
         self._real_time = real_time
-        self._bridged = None if bus_url.startswith(IN_PROCESS) else bus_address(bus_url)
+        self._bridged = None if bus_url.startswith((IN_PROCESS, SOCKETCAN)) else bus_address(bus_url)
+        if bus_url.startswith(SOCKETCAN) and self._faults.bus != BusFaults():
+            raise UsageError(
+                f"bus {bus_url!r}: expected faults of the devices alone, came faults of the bus: frames of the "
+                "kernel's own bus are out of reach. Serve it at ws://127.0.0.1:0/ for them."
+            )
         self._bus_url = bus_url
         self._modbus = modbus
         self._stack = ExitStack()
@@ -126,18 +138,29 @@ class RigServer:
 
     def _serve_bus(self, stack: ExitStack) -> None:
         channel = self._bus_url.removeprefix(IN_PROCESS) if self._bridged is None else str(uuid.uuid4())
-        devices = channel
-        if self._faults.bus != BusFaults():
-            devices = str(uuid.uuid4())
-            stack.enter_context(FaultyWire(channel, devices, self._faults.bus, self._seed))
         self._slaves = slaves = SimulatedRig(
-            InlineBus(devices), self._plant, self._inverters(), self._rig.period_s, self._seed, self._real_time
+            self._devices_bus(channel, stack),
+            self._plant,
+            self._inverters(),
+            self._rig.period_s,
+            self._seed,
+            self._real_time,
         )
         stack.enter_context(slaves)
         slaves.add_step_callback(self._step_plc)
         slaves.add_torque_from(self._plc_torque_nm)
         if self._bridged is not None:
             self._bus_url = stack.enter_context(CanBridge(self._bridged, channel)).url
+
+    def _devices_bus(self, channel: str, stack: ExitStack) -> can.BusABC:
+        """Open the devices' end of the bus."""
+        if self._bus_url.startswith(SOCKETCAN):
+            return open_bus(self._bus_url)
+        if self._faults.bus == BusFaults():
+            return InlineBus(channel)
+        devices = str(uuid.uuid4())
+        stack.enter_context(FaultyWire(channel, devices, self._faults.bus, self._seed))
+        return InlineBus(devices)
 
     def _serve_plc(self, stack: ExitStack) -> None:
         register_map = load_register_map(self._rig.plc.map or data_file("plc.toml"))

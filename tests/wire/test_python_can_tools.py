@@ -27,12 +27,19 @@ import pytest
 
 from drivers.canopen.can_link import CanLink
 from drivers.errors import BusDown
+from hil.config.rig_file import read_rig
+from hil.errors import UsageError
+from hil.rig.addresses import with_addresses
 from hil.rig.build import open_devices
+from hil.rig.check import Verdict, check_rig
 from hil.rig.trace import BusTrace
+from hil.simulator.bus_faults import BusFaults
 from hil.simulator.can_bridge import CanBridge
 from hil.simulator.loopback import Address
+from hil.simulator.plant_factory import plant_for
+from hil.simulator.rig_server import RigFaults, RigServer
 from tests.drivers.can_bench import virtual_bus
-from tests.rig.serving import Samples, run, served
+from tests.rig.serving import EXAMPLE, Samples, run, served
 from tests.wire.traced import traced_run
 
 ANY_PORT = Address("127.0.0.1", 0)
@@ -174,3 +181,37 @@ def test_frames_travel_over_socketcan() -> None:
         message = device.recv(PATIENCE_S)
     assert message is not None
     assert (message.arbitration_id, bytes(message.data)) == (0x80, b"")
+
+
+def test_a_simulated_rig_on_a_bus_of_the_kernel_says_when_there_is_none() -> None:
+    server = rig_server("socketcan:vcan93")
+    with pytest.raises(BusDown, match="'socketcan:vcan93' can't be opened"), server:
+        pass
+
+
+@pytest.mark.parametrize(
+    ("url", "faults", "wanted"),
+    [
+        ("socketcan:can0", RigFaults(), r"expected ws://HOST:PORT/"),  # real drives may be on it
+        (f"socketcan:{INTERFACE}", RigFaults(bus=BusFaults(off_at_step=5)), "came faults of the bus"),
+    ],
+)
+def test_a_simulated_rig_is_not_served_where_it_must_not_be(url: str, faults: RigFaults, wanted: str) -> None:
+    with pytest.raises(UsageError, match=wanted):
+        rig_server(url, faults)
+
+
+@pytest.mark.skipif(
+    not Path(f"/sys/class/net/{INTERFACE}").exists(),
+    reason=f"no SocketCAN interface {INTERFACE} here (modprobe vcan; ip link add dev {INTERFACE} type vcan)",
+)
+def test_a_simulated_rig_is_driven_over_socketcan() -> None:
+    with rig_server(f"socketcan:{INTERFACE}") as server:
+        rig = with_addresses(read_rig(EXAMPLE), server.bus_url, str(server.modbus))
+        findings = check_rig(rig)
+    assert [finding.verdict for finding in findings] == [Verdict.AGREES] * 4
+
+
+def rig_server(bus_url: str, faults: RigFaults | None = None) -> RigServer:
+    rig = read_rig(EXAMPLE)
+    return RigServer(plant_for(rig, []), rig, bus_url, ANY_PORT, faults)
