@@ -8,7 +8,7 @@ changes with time or angle, but not with the state, is set once per sub-step.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from estimator.compiled import brief, compiled, inlined
 from estimator.physics.effects import (
@@ -558,26 +558,9 @@ def integrate(
 
 
 @brief
-def integrate_period(
-    masses: int,
-    sample_time_s: float,
-    substeps: int,
-    sign_width: float,
-    first: int,
-    start_s: float,
-    torque: FloatArray,
-    load: FloatArray,
-    angle: FloatArray,
-    p: FloatArray,
-    state: FloatArray,
-    output: int,
-    sensor: bool,
-    out: FloatArray,
-    slopes: FloatArray,
-) -> None:
-    """Do what ``integrate`` does, for a rig that is stepped period by period."""
-    given = (sample_time_s, substeps, sign_width, first, start_s, torque, load, angle, p)
-    integrate(masses, *given, state, output, sensor, out, slopes)
+def integrate_period(*given: Any) -> None:
+    """Do what ``integrate`` does, with its arguments, for a rig that is stepped period by period."""
+    integrate(*given)
 
 
 @compiled

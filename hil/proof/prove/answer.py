@@ -12,11 +12,11 @@ import shutil
 import tempfile
 import time
 from collections.abc import Mapping
-from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any
 
 from hil.proof.command import CommandFailed, run_hil
+from hil.proof.prove.each import each
 from hil.proof.prove.make import Progress
 from hil.proof.prove.manifest import (
     CASES,
@@ -47,16 +47,11 @@ def answer(folder: Path, jobs: int, progress: Progress, limit_s: float = LIMIT_S
     """
     cases = read_commitments(folder)
     answered: dict[str, Any] = _answered(folder, cases)
-    waiting = {name: shown for name, shown in cases.items() if name not in answered}
-    pool = ThreadPoolExecutor(jobs)
-    try:
-        running = {pool.submit(_answer_one, folder, name, shown, limit_s): name for name, shown in waiting.items()}
-        for done in as_completed(running):
-            answered[running[done]] = done.result()
-            write_list(folder / VERDICTS_LIST, dict(sorted(answered.items())))
-            progress(f"{running[done]} answered", len(answered), len(cases))
-    finally:
-        pool.shutdown(cancel_futures=True)
+    waiting = [name for name in cases if name not in answered]
+    for name, entry in each(lambda name: _answer_one(folder, name, cases[name], limit_s), waiting, jobs):
+        answered[name] = entry
+        write_list(folder / VERDICTS_LIST, dict(sorted(answered.items())))
+        progress(f"{name} answered", len(answered), len(cases))
     return digest_of(answered)
 
 

@@ -6,7 +6,6 @@ import json
 import tempfile
 import zlib
 from collections.abc import Mapping
-from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,7 @@ from hil.proof.campaign.score import score
 from hil.proof.command import CommandFailed
 from hil.proof.fresh import fresh_over_floor
 from hil.proof.prove.answer import FAULT, LIMIT_S
+from hil.proof.prove.each import each
 from hil.proof.prove.make import Progress
 from hil.proof.prove.manifest import (
     CASES,
@@ -64,14 +64,9 @@ def judge_set(folder: Path, key: bytes, jobs: int, progress: Progress, verdicts:
             f"{folder}: expected a verdict for every case, none for {', '.join(missing)}. hil prove run DIR"
         )
     rows: dict[str, Row] = {}
-    pool = ThreadPoolExecutor(jobs)
-    try:
-        running = {pool.submit(_judge_one, folder, key, name, cases[name], answered[name]): name for name in cases}
-        for done in as_completed(running):
-            rows[running[done]] = done.result()
-            progress(f"{running[done]} opened", len(rows), len(cases))
-    finally:
-        pool.shutdown(cancel_futures=True)
+    for name, row in each(lambda name: _judge_one(folder, key, name, cases[name], answered[name]), list(cases), jobs):
+        rows[name] = row
+        progress(f"{name} opened", len(rows), len(cases))
     return [rows[name] for name in sorted(rows)]
 
 

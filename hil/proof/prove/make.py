@@ -13,12 +13,12 @@ import json
 import tempfile
 import zlib
 from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 
 from hil.errors import UsageError
 from hil.proof.make_case import write_recording, write_shown
 from hil.proof.prove.draw import Drawn, draw
+from hil.proof.prove.each import each
 from hil.proof.prove.manifest import CASES, COMMITMENTS, SEALED, digests_of, write_list
 from hil.proof.prove.vault import lock
 from hil.proof.seal import seal
@@ -57,14 +57,9 @@ def make(folder: Path, cases: int, seed: int, key: bytes, jobs: int, progress: P
 def _made(folder: Path, drawn: list[Drawn], key: bytes, jobs: int, progress: Progress) -> dict[str, object]:
     (folder / SEALED).mkdir(parents=True)
     listed: dict[str, object] = {}
-    pool = ThreadPoolExecutor(jobs)
-    try:
-        running = {pool.submit(_make_one, folder, each, key): each.name for each in drawn}
-        for number, done in enumerate(as_completed(running), start=1):
-            listed[running[done]] = done.result()
-            progress(f"{running[done]} made", number, len(drawn))
-    finally:
-        pool.shutdown(cancel_futures=True)
+    for case, entry in each(lambda case: _make_one(folder, case, key), drawn, jobs):
+        listed[case.name] = entry
+        progress(f"{case.name} made", len(listed), len(drawn))
     return dict(sorted(listed.items()))
 
 
