@@ -75,15 +75,6 @@ class RunTiming:
         else:
             self.reply_age.add(age_ns)
 
-    @property
-    def bad_share(self) -> float:
-        """Part of the cycles due that were missed or late or lacked an answer, 0 to 1.
-
-        From above: a cycle with two faults, such as no answer of either inverter, counts twice.
-        """
-        due = self.cycles + self.missed
-        return min(1.0, (self.missed + self.late + self.unanswered) / due) if due else 0.0
-
     def as_json(self) -> dict[str, Any]:
         """Give the record as a JSON document, ``hil.timing/1``: times in seconds, every bin that has a count."""
         return {

@@ -34,7 +34,6 @@ def test_answers_are_counted_by_age_or_as_missing() -> None:
     timing.answer(2 * MS)
     timing.answer(None)
     assert (timing.reply_age.max_ns, timing.reply_age.total, timing.unanswered) == (2 * MS, 1, 1)
-    assert timing.bad_share == 1.0
 
 
 def test_document_has_the_histograms_and_their_quantiles() -> None:
