@@ -42,7 +42,7 @@ lint: $(READY)
 
 lock:   # needs `pip install uv`; writes names, versions and hashes only
 	uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-emit-find-links \
-	    --no-header --no-annotate --group dev pyproject.toml -o requirements.lock
+	    --no-header --no-annotate --group dev --group docs pyproject.toml -o requirements.lock
 
 clean:
 	rm -rf .venv out
