@@ -21,14 +21,14 @@ from enum import Enum
 import numpy as np
 
 from estimator.errors import BadSetting, NotExciting
-from estimator.identification.adaptation import Adaptation, DecreasingThenConstantTrace
 from estimator.identification.excitation import SAMPLES_PER_PARAMETER
 from estimator.identification.linear_model import LinearModel, Orders
-from estimator.identification.modes import Mode, continuous, resonance
-from estimator.identification.oefo import Oefo
-from estimator.identification.output_error import OutputErrorFit, fit_output_error
-from estimator.identification.recursive import Estimate, Trajectory
-from estimator.identification.spectral import SpectralEstimate, spectral_estimate
+from estimator.identification.modes.modes import Mode, continuous, resonance
+from estimator.identification.offline.output_error import OutputErrorFit, fit_output_error
+from estimator.identification.online.adaptation import Adaptation, DecreasingThenConstantTrace
+from estimator.identification.online.oefo import Oefo
+from estimator.identification.online.recursive import Estimate, Trajectory
+from estimator.identification.spectral.welch import SpectralEstimate, spectral_estimate
 from estimator.signals.decimate import decimate
 from estimator.signals.record import FloatArray, Record
 from estimator.signals.settings import Requirement, is_positive, require

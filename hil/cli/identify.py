@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 
     from estimator.identification.identify import Identification, Settings
     from estimator.identification.linear_model import ComplexArray, LinearModel
-    from estimator.identification.modes import Mode
-    from estimator.identification.spectral import SpectralEstimate
+    from estimator.identification.modes.modes import Mode
+    from estimator.identification.spectral.welch import SpectralEstimate
     from estimator.physics.model import DrivelineModel
     from estimator.signals.record import Record
 
@@ -93,7 +93,7 @@ def _identified(records: Sequence[Record], settings: Settings) -> list[Identific
 
 def nominal_resonance(model: DrivelineModel) -> Mode | None:
     """Return the mode a nominal model expects; None for a structure that does not oscillate."""
-    from estimator.identification.modes import two_mass_resonance
+    from estimator.identification.modes.modes import two_mass_resonance
     from estimator.physics.model import Structure
 
     return two_mass_resonance(**model.values()) if model.structure is Structure.TWO_MASS else None

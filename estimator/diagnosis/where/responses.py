@@ -11,7 +11,7 @@ from estimator.diagnosis.intervals import Z95
 from estimator.diagnosis.result import Response
 from estimator.diagnosis.where.spectrum import SEGMENT
 from estimator.errors import NotExciting
-from estimator.identification.spectral import SpectralEstimate, spectral_estimate
+from estimator.identification.spectral.welch import SpectralEstimate, spectral_estimate
 from estimator.physics.fit import FitResult
 from estimator.physics.model import Structure
 from estimator.signals.record import FloatArray, Record

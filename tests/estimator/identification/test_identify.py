@@ -16,7 +16,7 @@ from estimator.identification.identify import (
     observation_filter,
 )
 from estimator.identification.linear_model import LinearModel, Orders
-from estimator.identification.recursive import Status
+from estimator.identification.online.recursive import Status
 from estimator.signals.decimate import Decimator
 from tests.estimator.identification.driveline import Cruise, cruise
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import cont2discrete
 
 from estimator.identification.linear_model import LinearModel
-from estimator.identification.modes import antiresonances, modes, resonance, two_mass_resonance
+from estimator.identification.modes.modes import antiresonances, modes, resonance, two_mass_resonance
 from tests.estimator.identification import driveline
 
 T_S = 0.02

@@ -7,15 +7,15 @@ import pytest
 from scipy.signal import lfilter
 
 from estimator.errors import BadModel, BadSetting, BadShape
-from estimator.identification.adaptation import (
+from estimator.identification.linear_model import LinearModel, Orders
+from estimator.identification.online.adaptation import (
     Adaptation,
     ConstantForgetting,
     DecreasingGain,
     DecreasingThenConstantTrace,
 )
-from estimator.identification.linear_model import LinearModel, Orders
-from estimator.identification.oefo import Filtering, Oefo
-from estimator.identification.recursive import Reason, RecursiveEstimator, Status
+from estimator.identification.online.oefo import Filtering, Oefo
+from estimator.identification.online.recursive import Reason, RecursiveEstimator, Status
 from estimator.signals.prbs import prbs_nm
 from estimator.signals.record import BoolArray, FloatArray
 
@@ -282,7 +282,7 @@ def test_the_last_stable_filter_keeps_filtering() -> None:
 
 @pytest.mark.parametrize("na", [1, 2, 3, 4, 7])
 def test_stability_is_judged_as_by_the_roots(na: int) -> None:
-    from estimator.identification.oefo_kernel import is_stable
+    from estimator.identification.online.oefo_kernel import is_stable
 
     rng = np.random.default_rng(na)
     verdicts = set()

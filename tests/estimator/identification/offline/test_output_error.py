@@ -5,8 +5,8 @@ import pytest
 
 from estimator.errors import NotExciting
 from estimator.identification.linear_model import LinearModel, Orders
-from estimator.identification.output_error import OutputErrorFit, fit_output_error
-from estimator.identification.starts import arx, candidates, stabilised, steiglitz_mcbride
+from estimator.identification.offline.output_error import OutputErrorFit, fit_output_error
+from estimator.identification.offline.starts import arx, candidates, stabilised, steiglitz_mcbride
 from estimator.signals.prbs import prbs_nm
 from estimator.signals.record import BoolArray, FloatArray, Record
 

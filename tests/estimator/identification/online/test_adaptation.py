@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from estimator.errors import BadSetting
-from estimator.identification.adaptation import (
+from estimator.identification.linear_model import Orders
+from estimator.identification.online.adaptation import (
     Adaptation,
     ConstantForgetting,
     DecreasingGain,
@@ -16,8 +17,7 @@ from estimator.identification.adaptation import (
     GainLaw,
     VariableForgetting,
 )
-from estimator.identification.linear_model import Orders
-from estimator.identification.oefo import Oefo
+from estimator.identification.online.oefo import Oefo
 from estimator.signals.record import FloatArray
 
 MOVING_AVERAGE = Orders(na=0, nb=3, nk=1)  # no outputs in the regressor: phi is known beforehand

@@ -1,4 +1,4 @@
-"""The compiled loop behind :mod:`estimator.identification.oefo`; one code for a block and for one sample.
+"""The compiled loop behind :mod:`estimator.identification.online.oefo`; one code for a block and for one sample.
 
 All state lives in the caller's arrays. F is kept as U D U^T (U unit upper triangular, D diagonal) and updated
 after G. J. Bierman, Factorization Methods for Discrete Sequential Estimation (Academic Press, 1977), chapter
@@ -35,7 +35,7 @@ HELD_SAMPLES = 4  # samples until the regressor is free of torques that were hel
 # Columns of `out` after theta.
 OUT_Y_HAT, OUT_E_PRIOR, OUT_E_POST = 0, 1, 2
 
-# Reasons, as in estimator.identification.recursive.Reason.
+# Reasons, as in estimator.identification.online.recursive.Reason.
 NONE, TOO_FEW_SAMPLES, NOT_EXCITED, UNSTABLE = 0, 1, 2, 3
 
 SETTLING = 10.0  # good samples per parameter before an estimate is called one
@@ -218,7 +218,7 @@ def oefo_block(
     """Run the samples of a block through equations (1) to (7).
 
     ``work`` has shape (4, na+nb): phi, Phi, g and room for the factors. The other shapes are those of
-    :class:`estimator.identification.oefo.Oefo`.
+    :class:`estimator.identification.online.oefo.Oefo`.
     """
     n, na = theta.shape[0], orders[NA]
     phi, Phi, g = work[0], work[1], work[2]

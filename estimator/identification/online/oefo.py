@@ -40,10 +40,10 @@ from enum import Enum
 import numpy as np
 
 from estimator.errors import BadModel, BadShape
-from estimator.identification import oefo_kernel as kernel
-from estimator.identification.adaptation import Adaptation, DecreasingThenConstantTrace
 from estimator.identification.linear_model import LinearModel, Orders
-from estimator.identification.recursive import Estimate, Reason, ReasonArray, Trajectory
+from estimator.identification.online import oefo_kernel as kernel
+from estimator.identification.online.adaptation import Adaptation, DecreasingThenConstantTrace
+from estimator.identification.online.recursive import Estimate, Reason, ReasonArray, Trajectory
 from estimator.signals.record import BoolArray, FloatArray
 from estimator.signals.settings import Requirement, require
 

@@ -27,7 +27,7 @@ from scipy.signal import lfilter
 
 from estimator.identification.excitation import require_excitation
 from estimator.identification.linear_model import LinearModel, Orders, free_response
-from estimator.identification.starts import candidates, delayed
+from estimator.identification.offline.starts import candidates, delayed
 from estimator.identification.triangular import solve_least_squares
 from estimator.signals.record import BoolArray, FloatArray, Record
 

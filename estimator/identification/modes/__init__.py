@@ -1,0 +1,1 @@
+"""From a linear model to what an engineer means: modes, their uncertainty, physical parameters."""

@@ -1,0 +1,1 @@
+"""Models fitted to a whole recording, and what says whether to believe them."""

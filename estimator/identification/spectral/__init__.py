@@ -1,0 +1,1 @@
+"""What the data say by frequency, without a model."""
