@@ -384,12 +384,15 @@ def moved(x: State, dx: State, h: float) -> State:
 
 
 @inlined
-def runge_kutta(masses: int, now: Conditions, x: State, p: FloatArray, h: float) -> State:
-    """Return the state after one sub-step under constant conditions."""
-    first = rates(masses, now, x, p)
-    second = rates(masses, now, moved(x, first, 0.5 * h), p)
-    third = rates(masses, now, moved(x, second, 0.5 * h), p)
-    fourth = rates(masses, now, moved(x, third, h), p)
+def runge_kutta(masses: int, now: Conditions, torque: float, rise: float, x: State, p: FloatArray, h: float) -> State:
+    """Return the state after one sub-step under constant conditions and a torque of this mean and rise [Nm]."""
+    begin = with_torque(now, torque - 0.5 * rise)
+    middle = with_torque(now, torque)
+    end = with_torque(now, torque + 0.5 * rise)
+    first = rates(masses, begin, x, p)
+    second = rates(masses, middle, moved(x, first, 0.5 * h), p)
+    third = rates(masses, middle, moved(x, second, 0.5 * h), p)
+    fourth = rates(masses, end, moved(x, third, h), p)
     x = moved(x, first, h / 6.0)
     x = moved(x, second, h / 3.0)
     x = moved(x, third, h / 3.0)
@@ -404,6 +407,12 @@ def entry(x: State, output: int) -> float:
     if output == LOAD_SPEED:
         return x.load_speed
     return x.twist if output == TWIST else x.angle
+
+
+@inlined
+def travelled(x: State, output: int) -> float:
+    """Return the angle whose rate is the output [rad]: what a filter's input has been in the mean is its change."""
+    return x.angle if output == SPEED else x.angle - x.twist - x.middle_twist
 
 
 @inlined
@@ -476,18 +485,19 @@ def integrate_masses(
             if varying or j == 0:
                 middle = angle[k] + turn * (j + 0.5) * length
                 now = conditions(masses, start_s + place * sample_time_s, h, middle, load[k], sign_width, p)
-            supplied = torque[k]
+            supplied, rise = torque[k], 0.0
             if late:
                 source = place + (place + begun) * p[DRIFT] - delay
-                supplied = transport_delay.delayed_mean(torque, before_all, source, length)
-            mean, lagged = actuator_lag.step(supplied, lagged, p[LAG], h)
-            before = entry(x, output)
-            x = runge_kutta(masses, with_torque(now, mean), x, p, h)
+                supplied, rise = transport_delay.delayed(torque, before_all, source, length)
+            mean, rise, lagged = actuator_lag.step(supplied, rise, lagged, p[LAG], h)
+            before, begun_at = entry(x, output), x
+            x = runge_kutta(masses, now, mean, rise, x, p, h)
             after = entry(x, output)
             slope = (after - before) / h
             if filtering:
-                read = reading(before, angle[k] + turn * j * length, p)
-                ends = reading(after, angle[k] + turn * (j + 1) * length, p)
+                bow = travelled(x, output) / h - travelled(begun_at, output) / h - 0.5 * (before + after)
+                read = reading(before + bow, angle[k] + turn * j * length, p)
+                ends = reading(after + bow, angle[k] + turn * (j + 1) * length, p)
                 filtered = speed_filter.step(read, ends, filtered, p[FILTER], h)
             if steep and j == 0:
                 slopes[1, k] = slope

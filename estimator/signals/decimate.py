@@ -10,7 +10,7 @@ The model between u and y survives any linear filter that both pass through. Two
 
 The same causal loop serves the rig on line, sample by sample, and a recording as a block, with equal bits.
 
-Masks: a sample that is not okay, or not finite, is replaced by the last good one and spoils every output
+Masks: a sample that is not okay, or no number up to 1e30, is replaced by the last good one and spoils every output
 whose low-pass window holds it. It also enters the running mean; while more than half of that mean is such
 held values, outputs stay spoilt. The first outputs, whose window reaches back before the recording, are
 spoilt too.
@@ -104,6 +104,16 @@ class Decimator:
         self._counters[SPOILT] = self._taps.shape[0]
         self._level = np.zeros(5)
         self._window = np.zeros((2, self._taps.shape[0]))
+
+    @property
+    def share(self) -> float:
+        """Weight of a new sample in the running means of the high-pass."""
+        return self._share
+
+    @property
+    def taps(self) -> FloatArray:
+        """Taps of the low-pass, shape (L,), a copy."""
+        return self._taps.copy()
 
     @property
     def delay_samples(self) -> int:

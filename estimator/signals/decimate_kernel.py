@@ -24,14 +24,15 @@ HELD_U = 2
 HELD_Y = 3
 CONTAMINATION = 4
 
+LARGEST = 1e30  # beyond it a value is no measurement, as for the estimators; the means can't overflow below
 UNTRUSTED = 0.5  # share of held values in a running mean from which on it is not trusted
 
 
 @compiled
 def _take(u: float, y: float, okay: bool, level: FloatArray) -> bool:
     """Hold the last good value in place of one that can't be used; tell whether both could be."""
-    u_fits = np.isfinite(u)
-    y_fits = okay and np.isfinite(y)
+    u_fits = abs(u) <= LARGEST
+    y_fits = okay and abs(y) <= LARGEST
     if u_fits:
         level[HELD_U] = u
     if y_fits:

@@ -15,13 +15,22 @@ FASTEST_S = 1e-9
 
 
 @compiled
-def step(torque: float, lagged: float, time_constant: float, step_s: float) -> tuple[float, float]:
-    """Return the mean of the lagged torque over a step of constant input, and its value at the end (exact)."""
+def step(
+    torque: float, rise: float, lagged: float, time_constant: float, step_s: float
+) -> tuple[float, float, float]:
+    """Return the lagged torque over a step of constant input as a straight line, and its value at the end (exact).
+
+    The line has the mean and the first moment of the decay: mean and rise from end to end [Nm]. Without a lag the
+    input's own rise is passed on; behind one it counts no more.
+    """
     if time_constant < FASTEST_S:
-        return torque, torque
-    decay = math.exp(-step_s / time_constant)
+        return torque, rise, torque
+    turns = step_s / time_constant
+    decay = math.exp(-turns)
     difference = lagged - torque
-    return torque + difference * time_constant / step_s * (1.0 - decay), torque + difference * decay
+    mean = (1.0 - decay) / turns
+    moment = (1.0 - decay * (1.0 + turns)) / (turns * turns)
+    return torque + difference * mean, 12.0 * difference * (moment - 0.5 * mean), torque + difference * decay
 
 
 def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from estimator.physics.effects import transport_delay
 from estimator.physics.effects.actuator_lag import step
-from estimator.physics.effects.transport_delay import delayed_mean
 from estimator.physics.layout import flat
 from estimator.physics.simulate import Grid, Start, simulate
 from estimator.signals.record import FloatArray
@@ -41,21 +41,25 @@ def test_a_fractional_delay_of_an_integrator_lies_between_in_proportion(fraction
 
 
 @pytest.mark.parametrize(
-    ("start", "length", "mean"),
+    ("start", "length", "mean", "jump", "share"),
     [
-        (0.0, 1.0, 1.0),
-        (0.25, 0.5, 1.0),
-        (0.5, 1.0, 1.5),  # half of 1 and half of 2
-        (1.75, 1.0, 3.5),  # a quarter of 2 and three quarters of 4
-        (1.9, 0.2, 3.0),
-        (-3.0, 1.0, 7.0),  # before the first sample
-        (-0.5, 1.0, 4.0),  # half of 7 and half of 1
-        (2.5, 0.5, 4.0),
-        (5.5, 0.5, 4.0),  # after the last
+        (0.0, 1.0, 1.0, 0.0, 0.0),
+        (0.25, 0.5, 1.0, 0.0, 0.0),
+        (0.5, 1.0, 1.5, 1.0, 0.5),  # half of 1 and half of 2
+        (1.75, 1.0, 3.5, 2.0, 0.75),  # a quarter of 2 and three quarters of 4
+        (1.9, 0.2, 3.0, 2.0, 0.5),
+        (-3.0, 1.0, 7.0, 0.0, 0.0),  # before the first sample
+        (-0.5, 1.0, 4.0, -6.0, 0.5),  # half of 7 and half of 1
+        (2.5, 0.5, 4.0, 0.0, 0.0),
+        (5.5, 0.5, 4.0, 0.0, 0.0),  # after the last
     ],
 )
-def test_the_mean_of_a_held_torque(start: float, length: float, mean: float) -> None:
-    assert delayed_mean(np.array([1.0, 2.0, 4.0]), 7.0, start, length) == pytest.approx(mean, rel=1e-12)
+def test_a_held_torque_as_a_line(start: float, length: float, mean: float, jump: float, share: float) -> None:
+    """The rise is that of the line with the jump's first moment, integral of ``jump (r - 1/2)`` behind the jump."""
+    moment = jump * 0.5 * (share - share**2)
+    expected = (mean, 12.0 * moment)  # a line of rise R has the first moment R / 12
+    found = transport_delay.delayed(np.array([1.0, 2.0, 4.0]), 7.0, start, length)
+    assert found == pytest.approx(expected, rel=1e-12, abs=1e-12)
 
 
 def test_no_sub_step_reads_beyond_the_last_sample() -> None:
@@ -67,7 +71,7 @@ def test_no_sub_step_reads_beyond_the_last_sample() -> None:
         for substeps in range(1, 60):
             start = samples - 1 + (substeps - 1) * (1.0 / substeps)
             late.append(start + 1.0 / substeps > samples)
-            assert delayed_mean(memory[:samples], 0.0, start, 1.0 / substeps) == 7.0
+            assert transport_delay.delayed(memory[:samples], 0.0, start, 1.0 / substeps)[0] == 7.0
     assert any(late)
 
 
@@ -75,7 +79,10 @@ def test_no_sub_step_reads_beyond_the_last_sample() -> None:
 def test_a_lagged_step_is_the_exponential(length_s: float) -> None:
     tau = 0.03
     decay = np.exp(-length_s / tau)
-    mean, end = step(40.0, 10.0, tau, length_s)
+    mean, rise, end = step(40.0, 0.0, 10.0, tau, length_s)
+    place = (np.arange(20_000) + 0.5) / 20_000
+    torque = 40.0 - 30.0 * np.exp(-place * length_s / tau)
+    assert rise == pytest.approx(12.0 * float(np.mean(torque * (place - 0.5))), rel=1e-4)
     assert end == pytest.approx(40.0 - 30.0 * decay)
     assert mean == pytest.approx(40.0 - 30.0 * tau / length_s * (1.0 - decay))
 

@@ -1,0 +1,161 @@
+"""The compiled loop behind :mod:`estimator.identification.tracking.follow`; one code for a block and for one sample."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from estimator.compiled import compiled
+from estimator.identification.linear_model import ComplexArray
+from estimator.identification.tracking.pole_kernel import DAMPING, FREQUENCY_HZ, HEIGHT, dominant, mode_gradient
+from estimator.signals.record import BoolArray, FloatArray, IntArray
+
+# Rows of `past`: newest value first.
+Y_HAT = 0
+Y_HAT_F = 1  # filtered by 1 / A_hat
+INPUT = 2
+INPUT_F = 3
+
+# Places in `structure`.
+NA, NB, NK = 0, 1, 2
+
+# Places in `heard`: the residual as the resonance hears it.
+ONCE_RE, ONCE_IM, TWICE_RE, TWICE_IM = 0, 1, 2, 3  # filtered by the pole, and once more
+DENSITY = 4  # its density there, as the variance of a white residual [output unit squared]
+COUNT = 5  # samples in that mean
+
+# Places in `numbers`.
+SAMPLE_TIME_S, LOWEST_HZ, HIGHEST_HZ, LARGEST_DAMPING, MEMORY, LARGEST_VARIANCE = 0, 1, 2, 3, 4, 5
+
+# Columns of `out`: those of a mode, then
+FREQUENCY_STD_HZ, DAMPING_STD = 3, 4
+
+USABLE, TOO_FEW_SAMPLES = 0, 1  # values of estimator.identification.online.recursive.Reason
+
+
+@compiled
+def shift_in(row: FloatArray, value: float) -> None:
+    """Put a value in front; the oldest drops out."""
+    for i in range(row.shape[0] - 1, 0, -1):
+        row[i] = row[i - 1]
+    row[0] = value
+
+
+@compiled
+def recursive_part(value: float, a: FloatArray, row: FloatArray) -> float:
+    """Return the next output of 1 / A, given its last ones in row."""
+    for i in range(a.shape[0]):
+        value -= a[i] * row[i]
+    return value
+
+
+@compiled
+def fill_gradient(structure: IntArray, outputs: FloatArray, inputs: FloatArray, psi: FloatArray) -> None:
+    """Set psi(t-1) = [-yhat(t-1) .. , u(t-nk) ..] from rows that hold them, the input's row with u(t) in front."""
+    na = structure[NA]
+    for i in range(na):
+        psi[i] = -outputs[i]
+    for j in range(structure[NB]):
+        psi[na + j] = inputs[structure[NK] + j]
+
+
+@compiled
+def spread(P: FloatArray, psi: FloatArray, K: FloatArray, density: float, v: FloatArray) -> None:
+    """P <- (I - K psi^T) P (I - K psi^T)^T + density K K^T; v is room, shape (n,)."""
+    n = psi.shape[0]
+    c = density
+    for i in range(n):
+        v[i] = 0.0
+        for j in range(n):
+            v[i] += P[i, j] * psi[j]
+    for i in range(n):
+        c += psi[i] * v[i]
+    for i in range(n):
+        for j in range(i + 1):
+            P[i, j] += c * K[i] * K[j] - v[i] * K[j] - K[i] * v[j]
+            P[j, i] = P[i, j]
+
+
+@compiled
+def hear(e: float, pole: complex, memory: float, heard: FloatArray) -> None:
+    """Take a residual into its density at the resonance: passed twice through 1 / (1 - pole q^-1)."""
+    once = pole * complex(heard[ONCE_RE], heard[ONCE_IM]) + e
+    twice = pole * complex(heard[TWICE_RE], heard[TWICE_IM]) + once
+    heard[ONCE_RE], heard[ONCE_IM], heard[TWICE_RE], heard[TWICE_IM] = once.real, once.imag, twice.real, twice.imag
+    r2 = pole.real**2 + pole.imag**2
+    white = (1.0 + r2) / (1.0 - r2) ** 3  # sum over k of (k + 1)^2 r^(2 k): what a white residual of variance 1 gives
+    heard[COUNT] = min(heard[COUNT] + 1.0, memory)
+    heard[DENSITY] += ((twice.real**2 + twice.imag**2) / white - heard[DENSITY]) / heard[COUNT]
+
+
+@compiled
+def form(P: FloatArray, gradient: FloatArray) -> float:
+    """Return the standard deviation of a quantity with that gradient over the first parameters."""
+    total = 0.0
+    for i in range(gradient.shape[0]):
+        for j in range(gradient.shape[0]):
+            total += gradient[i] * P[i, j] * gradient[j]
+    return np.sqrt(total) if total > 0.0 else np.nan
+
+
+@compiled
+def follow_block(
+    u: FloatArray,
+    theta: FloatArray,
+    y_hat: FloatArray,
+    e_prior: FloatArray,
+    used: BoolArray,
+    reason: np.ndarray,
+    structure: IntArray,
+    numbers: FloatArray,
+    before: FloatArray,
+    stable: FloatArray,
+    P: FloatArray,
+    past: FloatArray,
+    heard: FloatArray,
+    work: FloatArray,
+    roots: ComplexArray,
+    out: FloatArray,
+) -> None:
+    """Follow the estimates of a block.
+
+    Parameters
+    ----------
+    u, theta, y_hat, e_prior, used, reason
+        The block: input and trajectory.
+    before, stable
+        theta of the last sample, shape (n,); the last stable A_hat, shape (na,).
+    P, past, heard
+        State, shapes (n, n), (4, depth), (6,).
+    work, roots
+        Room, shapes (6, n), (na,).
+    out
+        Filled, shape (N, 5).
+    """
+    na, n = structure[NA], theta.shape[1]
+    psi, K, v, frequency, damping, mode = work[0], work[1], work[2], work[3, :na], work[4, :na], work[5, :3]
+    band = numbers[LOWEST_HZ : LARGEST_DAMPING + 1]
+    for t in range(u.shape[0]):
+        shift_in(past[INPUT], u[t] if np.isfinite(u[t]) else past[INPUT, 0])
+        shift_in(past[INPUT_F], recursive_part(past[INPUT, 0], stable, past[INPUT_F]))
+        if reason[t] == TOO_FEW_SAMPLES:
+            fill_gradient(structure, past[Y_HAT], past[INPUT], psi)
+        else:
+            fill_gradient(structure, past[Y_HAT_F], past[INPUT_F], psi)
+        if used[t] and e_prior[t] != 0.0:
+            for i in range(n):
+                K[i] = (theta[t, i] - before[i]) / e_prior[t]
+            spread(P, psi, K, heard[DENSITY], v)
+        before[:] = theta[t]
+        found = -1
+        if reason[t] == USABLE:
+            stable[:] = theta[t, :na]
+            found = dominant(theta[t], na, structure[NK], numbers[SAMPLE_TIME_S], band, roots, mode)
+        shift_in(past[Y_HAT], y_hat[t])
+        shift_in(past[Y_HAT_F], recursive_part(y_hat[t], stable, past[Y_HAT_F]))
+        out[t] = np.nan
+        if found >= 0:
+            if used[t]:
+                hear(e_prior[t], roots[found], numbers[MEMORY], heard)
+            mode_gradient(roots, found, numbers[SAMPLE_TIME_S], frequency, damping)
+            out[t, FREQUENCY_HZ], out[t, DAMPING], out[t, HEIGHT] = mode[0], mode[1], mode[2]
+            out[t, FREQUENCY_STD_HZ], out[t, DAMPING_STD] = form(P, frequency), form(P, damping)
