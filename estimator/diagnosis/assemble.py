@@ -10,17 +10,21 @@ import numpy as np
 from estimator.diagnosis.chain import Chain
 from estimator.diagnosis.evidence import gain_from_squares
 from estimator.diagnosis.holdout import Examiner
-from estimator.diagnosis.intervals import Z95, interval, reported_covariance
+from estimator.diagnosis.intervals import Z95, interval, reported_covariance, rescaled, told_both_ways
 from estimator.diagnosis.result import Estimated, Evidence, FoundEffect, Interval, Profile, Retuned
 from estimator.diagnosis.selection import Selection
 from estimator.diagnosis.trial import Trial
 from estimator.physics.catalogue import EFFECTS
+from estimator.physics.effect import Element
 from estimator.physics.effects import road_grade
 from estimator.physics.fit import FitResult, local_part
 from estimator.physics.model import DrivelineModel, EffectValue, parameter_unit, unit
 from estimator.physics.steps import moments_of
 from estimator.physics.unknowns import LOAD_TORQUE
 from estimator.signals.record import FloatArray
+
+IN_PROPORTION = frozenset({"inertia", "stiffness", "damping", "torque", "quadratic_drag"})
+"""Dimensions that change with the torque where every torque of the line is told another way."""
 
 PROFILE_POINTS_S = 1.0
 """A profile is reported every second."""
@@ -109,10 +113,20 @@ def rms_of(errors: Sequence[FloatArray]) -> float:
 
 def _parameters(name: str, result: FitResult, cov: FloatArray, model: DrivelineModel) -> dict[str, Estimated]:
     """Return what was fitted, and what was held; a held value at its null only where a model file needs it."""
-    units = {parameter.name: parameter.unit(model.motion) for parameter in EFFECTS[name].parameters}
+    entry, factor = EFFECTS[name], rescaled(result)
+    units = {parameter.name: parameter.unit(model.motion) for parameter in entry.parameters}
+    factors = {
+        parameter.name: factor
+        for parameter in entry.parameters
+        if parameter.dimension in IN_PROPORTION and entry.element is not Element.TORQUE_PATH
+    }
     left_out = {parameter.name: parameter.null for parameter in EFFECTS[name].parameters if parameter.optional}
     return {
-        shared.name: Estimated(float(result.x[i]) * shared.scale, interval(result, cov, i), units[shared.name])
+        shared.name: Estimated(
+            float(result.x[i]) * shared.scale,
+            told_both_ways(interval(result, cov, i), factors.get(shared.name, 1.0)),
+            units[shared.name],
+        )
         for i, shared in enumerate(result.problem.shared)
         if shared.effect == name and shared.low < shared.high
     } | {
@@ -153,9 +167,9 @@ def _profile_size(result: FitResult, cov: FloatArray, model: DrivelineModel) -> 
 
 def retuned_parameters(result: FitResult, model: DrivelineModel) -> dict[str, Retuned]:
     """Return every nominal parameter before and after; one trusted exactly stays what it was."""
-    cov = reported_covariance(result)
+    cov, factor = reported_covariance(result), rescaled(result)
     fitted = {
-        shared.name: (float(result.x[i]) * shared.scale, interval(result, cov, i))
+        shared.name: (float(result.x[i]) * shared.scale, told_both_ways(interval(result, cov, i), factor))
         for i, shared in enumerate(result.problem.shared)
         if not shared.effect
     }

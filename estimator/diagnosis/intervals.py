@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy import stats
 
 from estimator.diagnosis.evidence import residuals_by_record
 from estimator.diagnosis.noise import correlation_length, unpredictable
+from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult
 from estimator.signals.record import BoolArray, FloatArray
 
@@ -39,12 +41,27 @@ def reported_covariance(result: FitResult) -> FloatArray:
     noise. It pulls the unknowns as an error would that keeps its value for ``COHERENT_S``: its mean square times that
     many samples takes the place of the noise's variance in ``sigma^2 (J'J)^-1``.
     """
-    coherent = max(result.rms**2 - unpredictable(residuals_by_record(result)) ** 2, 0.0)
-    samples = COHERENT_S / min(record.sample_time_s for record in result.problem.records)
     free = _free(result)
     full = covariance(result)
-    full[np.ix_(free, free)] += coherent * samples * _bread(result.jacobian[:, free])
+    full[np.ix_(free, free)] += coherent_variance(result) * _bread(result.jacobian[:, free])
     return full
+
+
+def coherent_variance(result: FitResult) -> float:
+    """Return the mean square of the error that is no noise, times the samples for which it keeps its value."""
+    coherent = max(result.rms**2 - unpredictable(residuals_by_record(result)) ** 2, 0.0)
+    return coherent * COHERENT_S / min(record.sample_time_s for record in result.problem.records)
+
+
+def chance_of_coherent(before: FitResult, after: FitResult) -> float:
+    """Return how probable it is that an error which is no noise gives a larger model what it gains.
+
+    The likelihood-ratio test of nested fits, chi-squared with as many degrees as unknowns were added, its variance that
+    of the error which the larger one leaves: noise, and what keeps its value for ``COHERENT_S``.
+    """
+    variance = unpredictable(residuals_by_record(after)) ** 2 + coherent_variance(after)
+    added = max(after.free_count - before.free_count, 1)
+    return float(stats.chi2.sf((before.squares - after.squares) / variance, added))
 
 
 def _free(result: FitResult) -> BoolArray:
@@ -97,3 +114,19 @@ def interval(result: FitResult, cov: FloatArray, index: int) -> tuple[float, flo
     spread = Z95 * float(np.sqrt(max(cov[index, index], 0.0)))
     x = float(result.x[index])
     return (shared.scale * max(x - spread, shared.low), shared.scale * min(x + spread, shared.high))
+
+
+def rescaled(result: FitResult) -> float:
+    """Return the factor on every torque of the line in the other way to tell the same motion; 1 where there is none."""
+    factor = 1.0
+    for name, entry in EFFECTS.items():
+        values = {s.name: float(result.x[i]) * s.scale for i, s in enumerate(result.problem.shared) if s.effect == name}
+        if values:
+            factor *= entry.rescaled(values)
+    return factor
+
+
+def told_both_ways(ci95: tuple[float, float], factor: float) -> tuple[float, float]:
+    """Return the interval that holds a torque, or what is in proportion to one, in both ways to tell the motion."""
+    low, high = ci95
+    return (min(low, low * factor), max(high, high * factor))

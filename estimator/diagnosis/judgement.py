@@ -18,6 +18,9 @@ from estimator.signals.record import OutputKind
 MOST = 0.8
 """Share of the mismatch's power, above the noise floor, that an explanation must take away."""
 
+MOST_VISIBLE = 0.9
+"""The same where what it leaves is seen above the noise."""
+
 MOST_OF_POSITION = 0.5
 """The same where a position is read, whose error has no floor to speak of."""
 
@@ -95,7 +98,8 @@ def _leaves_too_much(selection: Selection, floor: float, profile_alone: bool) ->
     if not _reads_speed(selection):
         return f"{1.0 - share:.0%} of the mismatch" if share < MOST_OF_POSITION else ""
     most = NEAR_FLOOR_PROFILE if profile_alone and not _leaves_a_detail(selection, floor) else NEAR_FLOOR
-    if share < MOST or after > most * level:
+    seen = after > NEAR_FLOOR_PROFILE * level
+    if share < (MOST_VISIBLE if seen else MOST) or after > most * level:
         return f"{1.0 - share:.0%} of the mismatch, {after / level:.2g} times the noise"
     return ""
 

@@ -18,11 +18,11 @@ from dataclasses import dataclass, field, replace
 from estimator.diagnosis.evidence import VERY_STRONG, Gain, gain, information, residuals_by_record
 from estimator.diagnosis.holdout import Examiner, HoldOut
 from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects, Progress, effects_of, with_effect
-from estimator.diagnosis.intervals import Z95
+from estimator.diagnosis.intervals import Z95, chance_of_coherent, reported_covariance
 from estimator.diagnosis.lookalikes import lookalikes
 from estimator.diagnosis.noise import unpredictable
 from estimator.diagnosis.screening import Look, Screen, promising
-from estimator.diagnosis.trial import Trial, has_edge, null_inside, ranks, scan_choices, values_of
+from estimator.diagnosis.trial import Trial, has_edge, healed_in, null_inside, ranks, scan_choices, values_of
 from estimator.diagnosis.unnamed import UnnamedLaw, best_unnamed
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult
@@ -287,6 +287,8 @@ class Selector:
             return "its interval includes the value at which it does nothing"
         if EFFECTS[name].event and not has_edge(name, result):
             return "it would act in whole recordings or not at all: no moment is seen at which it begins or ends"
+        if healed := healed_in(name, result):
+            return f"it would begin and end within recording {healed}, and such a change does not go back"
         values = values_of(name, result)
         entry, given = EFFECTS[name], (self.bench.model, self.bench.records, values)
         return entry.implausible(*given) or entry.unresolved(*given) or None
@@ -300,11 +302,22 @@ class Selector:
             if trial.result.squares > most:
                 return None
             simpler = self._simpler(trial, trials, current)
-            if self._weighty(simpler.name, simpler.effects, simpler.result, current, retuned) and self._holds_out(
-                simpler, current
-            ):
+            weighty = self._weighty(simpler.name, simpler.effects, simpler.result, current, retuned)
+            if weighty and self._beyond_rest(simpler, current) and self._holds_out(simpler, current):
                 return self._examined(simpler, current)
         return None
+
+    def _beyond_rest(self, trial: Trial, current: FitResult) -> bool:
+        """Tell whether an effect beside others gains more than what they leave would give to any.
+
+        What a chosen law leaves because it is written another way than nature's is no noise: it keeps its sign for
+        long. An event finds a stretch of it to follow: its moments were sought, so that its size has to stand out.
+        """
+        if len(trial.effects) == 1:
+            return True
+        if EFFECTS[trial.name].event:
+            return not null_inside(trial.name, trial.result, reported_covariance(trial.result), len(self.names))
+        return chance_of_coherent(current, trial.result) * len(self.names) <= SIGNIFICANT
 
     def _most_unresolved(self, trials: Mapping[str, Trial], current: FitResult) -> float:
         """Return the squared error that an effect too small to tell leaves; infinity without one that beats chance."""

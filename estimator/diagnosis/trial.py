@@ -7,11 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import stats
 
 from estimator.diagnosis.evidence import VERY_STRONG, Gain, information
 from estimator.diagnosis.holdout import HoldOut
 from estimator.diagnosis.hypotheses import Effects
-from estimator.diagnosis.intervals import covariance, interval
+from estimator.diagnosis.intervals import Z95, covariance, interval
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult
 from estimator.physics.own_scan import MOST_CELLS
@@ -79,10 +80,22 @@ def has_edge(name: str, result: FitResult) -> bool:
     )
 
 
-def null_inside(name: str, result: FitResult) -> bool:
+def healed_in(name: str, result: FitResult) -> str:
+    """Return a recording within which a lasting step begins and ends; "" where there is none."""
+    step = EFFECTS[name].step
+    if step is None or not step.lasting:
+        return ""
+    for record, (from_s, to_s) in zip(result.problem.records, moments_of(result, name), strict=True):
+        if to_s > from_s and inside(record, from_s) and inside(record, to_s):
+            return record.name
+    return ""
+
+
+def null_inside(name: str, result: FitResult, cov: FloatArray | None = None, hypotheses: int = 1) -> bool:
     """Tell whether the interval of every decisive parameter of an effect includes its null.
 
-    See ``Effect.decisive``. A profile is decided by its gain alone: it has no single parameter.
+    See ``Effect.decisive``. A profile is decided by its gain alone: it has no single parameter. The interval is that of
+    95 % for all ``hypotheses`` together (Bonferroni), by the covariance of the noise where no other is given.
     """
     entry = EFFECTS[name]
     if entry.profile:
@@ -91,8 +104,9 @@ def null_inside(name: str, result: FitResult) -> bool:
     fitted = [i for i, s in enumerate(result.problem.shared) if s.effect == name and s.low < s.high]
     names = entry.decisive or tuple(entry.phases.values())
     decisive = [i for i in fitted if result.problem.shared[i].name in names]
-    cov = covariance(result)
-    return all(_includes(result, cov, i, nulls[result.problem.shared[i].name]) for i in decisive or fitted[:1])
+    cov = covariance(result) if cov is None else cov
+    wider = (float(stats.norm.isf(0.025 / hypotheses)) / Z95) ** 2
+    return all(_includes(result, wider * cov, i, nulls[result.problem.shared[i].name]) for i in decisive or fitted[:1])
 
 
 def _includes(result: FitResult, cov: FloatArray, index: int, null: float) -> bool:

@@ -111,6 +111,11 @@ def in_any_recording(_model: DrivelineModel, _records: Sequence[Record]) -> Unte
     return None
 
 
+def told_one_way(_values: Mapping[str, float]) -> float:
+    """Know no other way to tell the same motion."""
+    return 1.0
+
+
 MOMENTS = (
     EffectParameter("from_s", "s", 0.0, 0.0, math.inf, "moment it begins: t_1, of each recording", True, True),
     EffectParameter("to_s", "s", 0.0, 0.0, math.inf, "moment it ends: t_2, of each recording", True, True),
@@ -144,10 +149,13 @@ class Step:
     of : callable
         Model to the parameter's name.
     relative : bool
+    lasting : bool
+        True where it does not go back within a recording.
     """
 
     of: Callable[[DrivelineModel], str]
     relative: bool = False
+    lasting: bool = False
 
     def turned(self, nominal: float, size: float) -> tuple[float, float]:
         """Return value and size of the same step told the other way round: changed is what was not."""
@@ -207,6 +215,9 @@ class Effect:
     unresolved : callable
         The same, to the reason why such values are too small to tell from another way of sampling, or "". Where such
         an effect explains most, nothing that explains less is named in its place.
+    rescaled : callable
+        Parameter values to the factor that every torque of the line takes in the other way to tell the same motion; 1
+        where there is none.
     recognised : bool
         True where it is recognised in the raw data before any fit (repeated, lost, quantised samples).
     """
@@ -234,6 +245,7 @@ class Effect:
     decisive: tuple[str, ...] = ()
     implausible: Callable[[DrivelineModel, Sequence[Record], Mapping[str, float]], str] = always_plausible
     unresolved: Callable[[DrivelineModel, Sequence[Record], Mapping[str, float]], str] = always_plausible
+    rescaled: Callable[[Mapping[str, float]], float] = told_one_way
     recognised: bool = False
 
     @property

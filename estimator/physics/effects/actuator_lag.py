@@ -15,9 +15,7 @@ FASTEST_S = 1e-9
 
 
 @compiled
-def step(
-    torque: float, rise: float, lagged: float, time_constant: float, step_s: float
-) -> tuple[float, float, float]:
+def step(torque: float, rise: float, lagged: float, time_constant: float, step_s: float) -> tuple[float, float, float]:
     """Return the lagged torque over a step of constant input as a straight line, and its value at the end (exact).
 
     The line has the mean and the first moment of the decay: mean and rise from end to end [Nm]. Without a lag the

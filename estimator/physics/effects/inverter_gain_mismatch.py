@@ -33,10 +33,19 @@ def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | N
     )
 
 
+def rescaled(values: Mapping[str, float]) -> float:
+    """Return what every torque is multiplied by where the other inverter is the wrong one: only their ratio shows."""
+    return 1.0 / (values["gain_m1"] * values["gain_m2"])
+
+
 def sentence(values: Mapping[str, float], motion: Motion) -> str:
-    """Say what was found."""
-    wrong = "m1" if values["gain_m1"] != 1.0 else "m2"
-    return f"the true torque of inverter {wrong} is {values[f'gain_{wrong}']:.3g} times its reading"
+    """Say what was found, and the other way to tell it."""
+    wrong, right = ("m1", "m2") if values["gain_m1"] != 1.0 else ("m2", "m1")
+    gain = values[f"gain_{wrong}"]
+    return (
+        f"the true torque of inverter {wrong} is {gain:.3g} times its reading; or that of {right} is {1.0 / gain:.3g} "
+        "times, with every inertia, stiffness and friction changed alike: their ratio is what the recordings tell"
+    )
 
 
 EFFECT = Effect(
@@ -58,4 +67,5 @@ EFFECT = Effect(
     starts=starts,
     testable=testable,
     sentence=sentence,
+    rescaled=rescaled,
 )

@@ -40,7 +40,7 @@ EFFECT = Effect(
     equivalent=(),
     contains=(),
     event=True,
-    step=Step(lambda _model: "k", relative=True),
+    step=Step(lambda _model: "k", relative=True, lasting=True),
     scales=scales,
     starts=starts,
     sentence=sentence,

@@ -94,6 +94,27 @@ def road() -> FoundEffect:
     return found
 
 
+@pytest.mark.parametrize("wrong", ["gain_m1", "gain_m2"])
+def test_whichever_inverter_is_wrong_the_intervals_hold_the_line(wrong: str) -> None:
+    """Only the ratio of the gains shows: the other one may be wrong, and every inertia and friction with it."""
+    records, gain = [], 0.9
+    for seed, share in ((1, 0.5), (2, 0.65)):
+        torque, other = drive_torque(seed, 1200), random_steps(1200, seed + 20, size_nm=20.0, hold=7)
+        read = np.column_stack([share * torque + other, (1.0 - share) * torque - other])
+        true = read @ np.where(np.array(["gain_m1", "gain_m2"]) == wrong, gain, 1.0)
+        record = linear_record(ONE_MASS, true, Start(5.0, 0.0, 2.0), sigma=SIGMA, seed=seed, name=f"run_{seed}")
+        records.append(replace(record, torque_nm=read))
+    selection, examiner = assembled(records, "inverter_gain_mismatch")
+    (found,) = found_effects(selection, LINE, examiner)
+    (told,) = found.parameters
+    other_way = 1.0 / found.parameters[told].value
+    assert (found.parameters[told].value if told == wrong else other_way) == pytest.approx(gain, rel=0.01)
+    for name, parameter in retuned_parameters(selection.result, LINE).items():
+        low, high = parameter.ci95
+        assert low <= ONE_MASS[name] <= high
+        assert high / low >= 1.0 / gain - 0.01
+
+
 class TestAnEffect:
     def test_it_has_value_interval_and_unit(self, friction: FoundEffect) -> None:
         (name,) = friction.parameters

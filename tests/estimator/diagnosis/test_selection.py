@@ -26,7 +26,7 @@ from estimator.diagnosis.selection import (
     Selection,
     Selector,
 )
-from estimator.diagnosis.trial import Trial, has_edge, null_inside, scan_choices
+from estimator.diagnosis.trial import Trial, has_edge, healed_in, null_inside, scan_choices
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult
 from estimator.physics.own_scan import MOST_CELLS
@@ -276,6 +276,14 @@ class TestEvents:
 
     def test_it_begins_and_ends_inside_a_recording(self, braked: Selection) -> None:
         assert has_edge("brake_drag", braked.result)
+
+    def test_a_brake_may_be_let_go_a_crack_does_not_heal(
+        self, braked: Selection, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        assert healed_in("brake_drag", braked.result) == ""
+        as_crack = replace(EFFECTS["brake_drag"], step=EFFECTS["stiffness_change"].step)
+        monkeypatch.setattr("estimator.diagnosis.trial.EFFECTS", {"brake_drag": as_crack})
+        assert healed_in("brake_drag", braked.result) == "run_1"
 
     def test_they_are_paid_for(self, braked: Selection) -> None:
         trial = braked.accepted["brake_drag"]

@@ -121,7 +121,7 @@ class TestJacobian:
             assert np.max(np.abs(jacobian[:, j] - central)) < 2e-3 * np.max(np.abs(central))
 
     def test_at_the_upper_bound_the_difference_is_taken_inwards(self) -> None:
-        """Within a period the output is linear in a delay but for the motor's decay; in the next its slope is another."""
+        """Within a period the output is linear in a delay but for the decay; in the next with another slope."""
         rec = linear_record(ONE_MASS, random_steps(300, 8, hold=2), Start(0.0, 0.0, 0.0))
         delay = (Shared("transport_delay", "delay_s", 0.01, 0.0, 1.0, 1.0),)
         problem = make_problem(model(ONE_MASS), [rec], delay)
