@@ -19,8 +19,8 @@ import math
 import numpy as np
 
 from estimator.compiled import compiled
-from estimator.physics import kernel
 from estimator.physics.effects import backlash, stiffness_nonlinearity
+from estimator.physics.kernel import slots, state_vector
 from estimator.physics.laws import beyond_gap, share_inside
 from estimator.physics.motion import measured_speed
 from estimator.signals.record import FloatArray, Record
@@ -59,7 +59,11 @@ def simulate(
     """
     imposed = _imposed(record)
     twist, rate = imposed - imposed[0] + twist_rad, _rate(record)
-    motion: dict[int, FloatArray] = {kernel.TWIST: twist, kernel.SPEED: rate, kernel.ANGLE: imposed - imposed[0]}
+    motion: dict[int, FloatArray] = {
+        state_vector.TWIST: twist,
+        state_vector.SPEED: rate,
+        state_vector.ANGLE: imposed - imposed[0],
+    }
     if output != TORQUE:
         return motion[output] if output in motion else np.zeros(twist.shape)
     out: FloatArray = np.empty_like(twist)
@@ -92,19 +96,19 @@ def respond(
     out: FloatArray,
 ) -> None:
     """Fill ``out`` with the torque under an imposed twist [rad] and its rate [rad/s]; all of shape (N,)."""
-    inside, loading = beyond_gap(twist[0], p[kernel.GAP]), 0.0
+    inside, loading = beyond_gap(twist[0], p[slots.GAP]), 0.0
     for k in range(twist.shape[0]):
-        broken = share_inside(time_s[k], period_s, p[kernel.CRACK_FROM], p[kernel.CRACK_TO])
-        stiffness = p[kernel.K] * (1.0 + broken * p[kernel.CRACK])
+        broken = share_inside(time_s[k], period_s, p[slots.CRACK_FROM], p[slots.CRACK_TO])
+        stiffness = p[slots.K] * (1.0 + broken * p[slots.CRACK])
         before = inside
         inside = behind_gap(twist[k], before, loading, stiffness, p)
         loading = slid(loading, inside - before, p)
         share = 1.0
-        if p[kernel.GAP] > 0.0:
+        if p[slots.GAP] > 0.0:
             moved = twist[k] - twist[k - 1] if k > 0 else 0.0
             share = min(max((inside - before) / moved, 0.0), 1.0) if moved != 0.0 else 0.0
-            share *= backlash.damping_share(inside, p[kernel.CONTACT])
-        out[k] = carried(inside, loading, stiffness, p) + share * p[kernel.C] * rate[k]
+            share *= backlash.damping_share(inside, p[slots.CONTACT])
+        out[k] = carried(inside, loading, stiffness, p) + share * p[slots.C] * rate[k]
 
 
 @compiled
@@ -114,9 +118,9 @@ def behind_gap(twist: float, before: float, loading: float, stiffness: float, p:
     ``before`` and ``loading`` are their part and the slider's loading so far. On the way from there the torque only
     rises with their part, so that one of the three cases holds.
     """
-    if p[kernel.GAP] <= 0.0:
+    if p[slots.GAP] <= 0.0:
         return twist
-    half = 0.5 * float(p[kernel.GAP])
+    half = 0.5 * float(p[slots.GAP])
     low, high = twist - half, twist + half
     if carried(low, slid(loading, low - before, p), stiffness, p) >= 0.0:
         return low
@@ -134,14 +138,14 @@ def behind_gap(twist: float, before: float, loading: float, stiffness: float, p:
 @compiled
 def slid(loading: float, change: float, p: FloatArray) -> float:
     """Return a slider's loading after a change of its twist [rad]: the law of ``shaft_hysteresis``, solved exactly."""
-    if p[kernel.SLIDER] == 0.0 or change == 0.0:
+    if p[slots.SLIDER] == 0.0 or change == 0.0:
         return loading
     towards = math.copysign(1.0, change)
-    return towards + (loading - towards) * math.exp(-abs(change) / float(p[kernel.YIELD]))
+    return towards + (loading - towards) * math.exp(-abs(change) / float(p[slots.YIELD]))
 
 
 @compiled
 def carried(inside: float, loading: float, stiffness: float, p: FloatArray) -> float:
     """Return the torque of spring and slider [Nm]."""
-    factor = stiffness_nonlinearity.factor(inside, p[kernel.HARDENING], p[kernel.SHAPE])
-    return stiffness * inside * factor + float(p[kernel.SLIDER]) * loading
+    factor = stiffness_nonlinearity.factor(inside, p[slots.HARDENING], p[slots.SHAPE])
+    return stiffness * inside * factor + float(p[slots.SLIDER]) * loading

@@ -16,8 +16,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimator.compiled import compiled
-from estimator.physics import kernel
 from estimator.physics.effect import Element
+from estimator.physics.kernel import integration, state_vector
 from estimator.physics.own_law import OwnLaw
 from estimator.signals.record import FloatArray, Record
 
@@ -212,9 +212,9 @@ def trajectory(
     """Fill ``motion``, shape (3, S - first + 1), with motor speed, load speed and twist, and the state behind them."""
     out, slopes = np.empty(torque.shape[0]), np.zeros((2, 0))
     for row in range(1 if masses == 1 else 3):
-        output = kernel.SPEED if row == 0 else (kernel.LOAD_SPEED if row == 1 else kernel.TWIST)
+        output = state_vector.SPEED if row == 0 else (state_vector.LOAD_SPEED if row == 1 else state_vector.TWIST)
         state[:] = begin
-        kernel.integrate(
+        integration.integrate(
             masses, step_s, 1, sign_width, first, start_s, torque, load, angle, p, state, output, False, out, slopes
         )
         motion[row, :-1] = out[first:]

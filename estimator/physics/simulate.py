@@ -10,7 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from estimator.errors import BadModel
-from estimator.physics import joint, kernel, own_law, own_law_run
+from estimator.physics import joint, own_law, own_law_run
+from estimator.physics.kernel import integration, sensing, slots, state_vector
 from estimator.physics.model import DrivelineModel, Structure, natural_frequencies_rad_s
 from estimator.physics.motion import reverses, speed_scale
 from estimator.physics.torque_path import shaft_torque
@@ -38,9 +39,9 @@ MASSES = {Structure.ONE_MASS: 1, Structure.TWO_MASS: 2, Structure.THREE_MASS: 3}
 """How many inertias the kernel has for a structure."""
 
 _OUTPUT_STATE = {
-    (OutputKind.SPEED, Location.MOTOR): kernel.SPEED,
-    (OutputKind.SPEED, Location.LOAD): kernel.LOAD_SPEED,
-    (OutputKind.POSITION, Location.MOTOR): kernel.ANGLE,
+    (OutputKind.SPEED, Location.MOTOR): state_vector.SPEED,
+    (OutputKind.SPEED, Location.LOAD): state_vector.LOAD_SPEED,
+    (OutputKind.POSITION, Location.MOTOR): state_vector.ANGLE,
 }
 
 
@@ -171,7 +172,7 @@ def simulate(
     p, start, extra_load_nm
         See ``Case``.
     output : int, optional
-        State to return (``kernel.SPEED`` ...), without the sensor; the recorded output by default.
+        State to return (``state_vector.SPEED`` ...), without the sensor; the recorded output by default.
 
     Returns
     -------
@@ -198,7 +199,7 @@ def simulate_each(grid: Grid, record: Record, cases: Sequence[Case], output: int
     shape = (len(cases), record.time_s.size)
     slopes = np.zeros((shape[0], 2, shape[1] if output is None and record.offset_s is not None else 0))
     out = np.empty(shape)
-    kernel.integrate_each(
+    integration.integrate_each(
         MASSES[grid.structure],
         record.sample_time_s,
         grid.substeps,
@@ -210,7 +211,7 @@ def simulate_each(grid: Grid, record: Record, cases: Sequence[Case], output: int
         np.array([case.p for case in cases]),
         np.array([each.state for each in inputs]),
         wanted,
-        output is None and wanted != kernel.ANGLE,
+        output is None and wanted != state_vector.ANGLE,
         out,
         slopes,
     )
@@ -262,7 +263,7 @@ def _under_laws(grid: Grid, record: Record, case: Case, output: int, recorded: b
     ).under(laws, given.state)
     slopes = np.zeros((2, run.torque.size if recorded and record.offset_s is not None else 0))
     out = np.empty_like(run.torque)
-    kernel.integrate(
+    integration.integrate(
         masses,
         run.step_s,
         1,
@@ -275,7 +276,7 @@ def _under_laws(grid: Grid, record: Record, case: Case, output: int, recorded: b
         case.p,
         given.state.copy(),
         output,
-        recorded and output != kernel.ANGLE,
+        recorded and output != state_vector.ANGLE,
         out,
         slopes,
     )
@@ -287,14 +288,14 @@ def _under_laws(grid: Grid, record: Record, case: Case, output: int, recorded: b
 
 PERIODIC = np.array(
     [
-        kernel.RIPPLE,
-        kernel.RIPPLE_SHARE,
-        kernel.CARDAN,
-        kernel.CARDAN_ANGLE,
-        kernel.CARDAN_SHARE,
-        kernel.IMBALANCE,
-        kernel.RESOLVER_ONCE,
-        kernel.RESOLVER_TWICE,
+        slots.RIPPLE,
+        slots.RIPPLE_SHARE,
+        slots.CARDAN,
+        slots.CARDAN_ANGLE,
+        slots.CARDAN_SHARE,
+        slots.IMBALANCE,
+        slots.RESOLVER_ONCE,
+        slots.RESOLVER_TWICE,
     ]
 )
 """Amplitudes of the laws that are periodic in the motor's angle."""
@@ -304,7 +305,7 @@ def initial_state(start: Start, torque_nm: float, angle_rad: float, p: FloatArra
     """Return the kernel's state at the start: what is not unknown follows from the rest as if it were steady."""
     return np.array(
         [
-            *kernel.State(
+            *state_vector.State(
                 angle=start.angle_rad,
                 speed=start.speed_rad_s,
                 twist=start.twist_rad,
@@ -317,8 +318,8 @@ def initial_state(start: Start, torque_nm: float, angle_rad: float, p: FloatArra
                 middle_speed=start.middle_speed_rad_s,
                 traction=start.load_torque_nm,
             ),
-            torque_nm + p[kernel.LAGGED_BEFORE],
-            kernel.reading(start.speed_rad_s, angle_rad, p) + p[kernel.FILTERED_BEFORE],
+            torque_nm + p[slots.LAGGED_BEFORE],
+            sensing.reading(start.speed_rad_s, angle_rad, p) + p[slots.FILTERED_BEFORE],
         ]
     )
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from estimator.errors import BadModel
-from estimator.physics import kernel, own_law
+from estimator.physics import own_law
 from estimator.physics.effects import transport_delay
+from estimator.physics.kernel import integration, sensing, state_vector
 from estimator.physics.layout import flat, slot
 from estimator.physics.model import DrivelineModel
 from estimator.physics.simulate import MASSES, Start, initial_state, substeps_for
@@ -30,9 +31,13 @@ class Stepper:
         Length of a step [s].
     load_torque_nm : float
         Constant load torque [Nm].
+    speed_rad_s : float
+        Speed of the whole line at the beginning [rad/s].
     """
 
-    def __init__(self, model: DrivelineModel, period_s: float, load_torque_nm: float = 0.0) -> None:
+    def __init__(
+        self, model: DrivelineModel, period_s: float, load_torque_nm: float = 0.0, speed_rad_s: float = 0.0
+    ) -> None:
         self._masses = MASSES[model.structure]
         self._p = flat(model)
         if laws := own_law.active(self._p):
@@ -49,29 +54,32 @@ class Stepper:
         self._angle = np.zeros(history)
         self._out = np.zeros(history)
         self._slopes = np.zeros((2, 0))
-        self._state = initial_state(Start(load_torque_nm, 0.0, 0.0), 0.0, 0.0, self._p)
+        start = Start(load_torque_nm, 0.0, speed_rad_s, load_speed_rad_s=speed_rad_s, middle_speed_rad_s=speed_rad_s)
+        self._state = initial_state(start, 0.0, 0.0, self._p)
 
     @property
     def speed_rad_s(self) -> float:
         """Motor speed now, as the sensor shows it [rad/s]."""
         state = self._state
-        read = kernel.reading(state[kernel.SPEED], state[kernel.ANGLE], self._p)
-        return float(kernel.shown(read, state[kernel.FILTERED], self._p))
+        read = sensing.reading(state[state_vector.SPEED], state[state_vector.ANGLE], self._p)
+        return float(sensing.shown(read, state[state_vector.FILTERED], self._p))
 
     @property
     def angle_rad(self) -> float:
         """Motor angle now [rad]."""
-        return float(self._state[kernel.ANGLE])
+        return float(self._state[state_vector.ANGLE])
 
     def step(self, *torque_nm: float) -> None:
         """Let the torque of each input [Nm] act for one period."""
         now = np.array([self._steps * self._period_s])
         self._torque[:-1] = self._torque[1:]
         self._torque[-1] = shaft_torque(np.array([torque_nm]), now, self._p)[0]
-        self._angle[-1] = self._state[kernel.ANGLE]
-        self._angle[-2] = self._angle[-1] - self._state[kernel.SPEED] * self._period_s  # the kernel goes straight on
+        self._angle[-1] = self._state[state_vector.ANGLE]
+        self._angle[-2] = (
+            self._angle[-1] - self._state[state_vector.SPEED] * self._period_s
+        )  # it goes straight on
         last = self._torque.size - 1
-        kernel.integrate_period(
+        integration.integrate_period(
             self._masses,
             self._period_s,
             self._substeps,
@@ -83,7 +91,7 @@ class Stepper:
             self._angle,
             self._p,
             self._state,
-            kernel.SPEED,
+            state_vector.SPEED,
             False,
             self._out,
             self._slopes,

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimator.physics import kernel
 from estimator.physics.effects.shaft_hysteresis import loading_rate
+from estimator.physics.kernel import conditions, rates, sensing, slots
 from estimator.physics.layout import flat_values
 from estimator.physics.torque_path import shaft_torque
 from estimator.signals.record import FloatArray
@@ -36,7 +36,7 @@ def friction(name: str) -> Callable[[Values], Curve]:
     def curve(values: Values) -> Curve:
         p = flat_values(BUS, {name: values})
         with_it, without = (
-            np.array([kernel.motor_friction(w, each, 0.05) for w in SPEEDS]) for each in (p, flat_values(BUS, {}))
+            np.array([rates.motor_friction(w, each, 0.05) for w in SPEEDS]) for each in (p, flat_values(BUS, {}))
         )
         return Curve("motor speed [rad/s]", "friction [Nm]", (("without", SPEEDS, without), ("with", SPEEDS, with_it)))
 
@@ -50,8 +50,8 @@ def drag(name: str, speeds: FloatArray) -> Callable[[Values], Curve]:
         lines = []
         for label, effects in (("without", {}), ("with", {name: values})):
             p = flat_values(BUS, effects)
-            now = kernel.conditions(2, 0.0, 1e-3, 0.0, 0.0, 0.05, p)
-            lines.append((label, speeds, np.array([kernel.load_drag(w, w, now, p) for w in speeds])))
+            now = conditions.conditions(2, 0.0, 1e-3, 0.0, 0.0, 0.05, p)
+            lines.append((label, speeds, np.array([rates.load_drag(w, w, now, p) for w in speeds])))
         return Curve("load speed [rad/s]", "drag [Nm]", tuple(lines))
 
     return curve
@@ -64,7 +64,7 @@ def shaft(name: str) -> Callable[[Values], Curve]:
         lines = []
         for label, effects in (("without", {}), ("with", {name: values})):
             p = flat_values(BUS, effects)
-            torque = np.array([kernel.shaft_torque(twist, 0.0, 0.0, p, p[kernel.K]) for twist in TWISTS])
+            torque = np.array([rates.shaft_torque(twist, 0.0, 0.0, p, p[slots.K]) for twist in TWISTS])
             lines.append((label, 1e3 * TWISTS, torque))
         return Curve("twist [mrad]", "shaft torque [Nm]", tuple(lines))
 
@@ -192,7 +192,7 @@ def reading(name: str) -> Callable[[Values], Curve]:
     def curve(values: Values) -> Curve:
         speeds = np.linspace(-5.0, 5.0, 401)
         p = flat_values(BUS, {name: values})
-        read = np.array([kernel.shown(w, w, p) for w in speeds])
+        read = np.array([sensing.shown(w, w, p) for w in speeds])
         return Curve("motor speed [rad/s]", "reading [rad/s]", (("without", speeds, speeds), ("with", speeds, read)))
 
     return curve

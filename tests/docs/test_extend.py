@@ -54,7 +54,7 @@ def extended(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_the_page_has_an_example_of_each_kind() -> None:
     assert len(TRIALS) == 4
-    assert sum(block.language == "diff" for block in EXTEND) == 5
+    assert sum(block.language == "diff" for block in EXTEND) == 6
 
 
 @pytest.mark.parametrize("number", range(len(TRIALS)), ids=["effect", "law", "experiment", "format"])

@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.compiled import compiled
-from estimator.physics import kernel
+from estimator.physics.kernel import integration
 from estimator.signals.record import FloatArray
 
 
 class Setting(NamedTuple):
-    """What the kernel is told alike in every block, and room for its answers; see ``kernel.integrate``."""
+    """What the kernel is told alike in every block, and room for its answers; see ``integration.integrate``."""
 
     masses: int
     sample_time_s: float
@@ -138,7 +138,7 @@ def by_torques(
 def run_block(setting: Setting, first: int, torques: Torques, p: FloatArray, state: FloatArray) -> float:
     """Simulate a block from ``state``, leave there its last state, and return its mean output."""
     torque, load = torques
-    kernel.integrate(
+    integration.integrate(
         setting.masses,
         setting.sample_time_s,
         setting.substeps,

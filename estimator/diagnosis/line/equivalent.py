@@ -21,8 +21,8 @@ from estimator.diagnosis.line.kalman import Chain, Filtered, run_filter, run_smo
 from estimator.diagnosis.line.motion import Motion
 from estimator.diagnosis.line.places import FORCES, Place, places, size_at
 from estimator.diagnosis.line.tangent import LOAD, MOTOR
-from estimator.physics import kernel
 from estimator.physics.fit import FitResult
+from estimator.physics.kernel import state_vector
 from estimator.signals.record import FloatArray
 
 SLOWEST, FASTEST = 1e-3, 1e2
@@ -122,13 +122,13 @@ def smooth(line: Line, place: Place, rate: float, size: float, floor: float) -> 
     run_smoother(chain, kept, estimates, variance)
     later = np.vstack([estimates[1:], estimates[-1:]])
     middle = 0.5 * (estimates + later)
-    names = {kernel.SPEED: "speed", kernel.TWIST: "twist", kernel.LOAD_SPEED: "load_speed"}
+    names = {state_vector.SPEED: "speed", state_vector.TWIST: "twist", state_vector.LOAD_SPEED: "load_speed"}
     moved = {
         names[state]: getattr(line.motion, names[state]) + middle[:, i]
         for i, state in enumerate(line.tangent.states)
         if state in names
     }
-    if kernel.LOAD_SPEED not in line.tangent.states:
+    if state_vector.LOAD_SPEED not in line.tangent.states:
         moved["load_speed"] = moved["speed"]
     return Input(estimates[:, -1], np.sqrt(np.maximum(variance, 0.0)), replace(line.motion, **moved))
 

@@ -6,10 +6,10 @@ import numpy as np
 
 from estimator.diagnosis.line.differences import Nudges, Setting, linearise
 from estimator.diagnosis.line.tangent import Tangent
-from estimator.physics import kernel
 from estimator.physics.catalogue import BUILT_IN
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult, start_of
+from estimator.physics.kernel import slots, state_vector
 from estimator.physics.layout import slot
 from estimator.physics.model import Structure, natural_frequencies_rad_s
 from estimator.physics.motion import speed_scale, torque_scale
@@ -54,9 +54,9 @@ def tangent(result: FitResult, index: int, length: int) -> Tangent:
     if problem.grid.structure is Structure.JOINT:
         return _of_joint(result)
     record, p = problem.records[index], result.p_of(index).copy()
-    p[kernel.QUANTISATION] = 0.0  # steps have no slope; their size is noise here
+    p[slots.QUANTISATION] = 0.0  # steps have no slope; their size is noise here
     direct = p.copy()
-    direct[[kernel.DELAY, kernel.LAG, kernel.DRIFT]] = 0.0  # a disturbance acts on the shaft, behind the torque path
+    direct[[slots.DELAY, slots.LAG, slots.DRIFT]] = 0.0  # a disturbance acts on the shaft, behind the torque path
     start, angle = start_of(problem, result.x, index), motor_angle(record)
     torque = shaft_torque(record.torque_nm, record.time_s - record.time_s[0], p)
     states = active_states(problem.grid.structure, p, record.kind)
@@ -86,7 +86,7 @@ def _setting(result: FitResult, record: Record, angle: FloatArray) -> Setting:
         sign_width=grid.sign_width,
         angle=angle,
         output=output,
-        sensor=output != kernel.ANGLE,
+        sensor=output != state_vector.ANGLE,
         out=np.zeros(angle.size),
         slopes=np.zeros((2, 0)),  # no room: not wanted
     )
@@ -125,21 +125,21 @@ def is_linear(p: FloatArray) -> bool:
 
 def active_states(structure: Structure, p: FloatArray, kind: OutputKind) -> tuple[int, ...]:
     """Return which entries of the kernel's state can move the output of a model."""
-    states = [kernel.ANGLE] if kind is OutputKind.POSITION else []
-    states.append(kernel.SPEED)
+    states = [state_vector.ANGLE] if kind is OutputKind.POSITION else []
+    states.append(state_vector.SPEED)
     if structure is not Structure.ONE_MASS:
-        states += [kernel.TWIST, kernel.LOAD_SPEED]
-    names = kernel.State._fields
+        states += [state_vector.TWIST, state_vector.LOAD_SPEED]
+    names = state_vector.State._fields
     if structure is Structure.THREE_MASS:
         states += [names.index("middle_twist"), names.index("middle_speed")]
-    if p[kernel.SLIDER] != 0.0:
+    if p[slots.SLIDER] != 0.0:
         states.append(names.index("loading"))
-    if p[kernel.SLIP] > 0.0:
+    if p[slots.SLIP] > 0.0:
         states.append(names.index("vehicle_speed"))
-    if p[kernel.BRANCH_INERTIA] > 0.0:
+    if p[slots.BRANCH_INERTIA] > 0.0:
         states += [names.index("branch_twist"), names.index("branch_speed")]
-    if p[kernel.FILTER] > 0.0:
-        states.append(kernel.FILTERED)
+    if p[slots.FILTER] > 0.0:
+        states.append(state_vector.FILTERED)
     return tuple(states)
 
 
@@ -148,8 +148,8 @@ def _scales(result: FitResult, states: tuple[int, ...]) -> FloatArray:
     speed, torque = speed_scale(records), torque_scale(records)
     stiffness = float(result.p[slot("", "k")])
     twist = torque / stiffness if stiffness > 0.0 else 1.0
-    names = kernel.State._fields
-    sizes = dict.fromkeys(range(kernel.STATES), speed)
+    names = state_vector.State._fields
+    sizes = dict.fromkeys(range(state_vector.STATES), speed)
     sizes |= {names.index(name): twist for name in ("twist", "branch_twist", "middle_twist")}
-    sizes |= {names.index("loading"): 1.0, kernel.ANGLE: 1.0}
+    sizes |= {names.index("loading"): 1.0, state_vector.ANGLE: 1.0}
     return np.array([sizes[state] for state in states])

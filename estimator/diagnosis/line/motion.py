@@ -8,8 +8,8 @@ import numpy as np
 
 from estimator.diagnosis.line.averages import block_mean
 from estimator.diagnosis.line.tangent import LOAD, MOTOR
-from estimator.physics import kernel
 from estimator.physics.fit import FitResult, start_of
+from estimator.physics.kernel import state_vector
 from estimator.physics.model import Structure
 from estimator.physics.simulate import motor_angle, simulate
 from estimator.signals.record import FloatArray, Record
@@ -61,7 +61,7 @@ def motion_of(result: FitResult, index: int) -> Motion:
 
 def states_of(result: FitResult, index: int, force: Force = NO_FORCE) -> dict[str, FloatArray]:
     """Simulate every state of one recording at a fit; the angle is by the recording's own output."""
-    wanted = (kernel.SPEED, kernel.TWIST, kernel.LOAD_SPEED)
+    wanted = (state_vector.SPEED, state_vector.TWIST, state_vector.LOAD_SPEED)
     speed, twist, load_speed = (simulated(result, index, force, state) for state in wanted)
     if result.problem.grid.structure is Structure.ONE_MASS:
         load_speed = speed

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from estimator.errors import BadModel, BadShape
-from estimator.physics import joint, kernel
+from estimator.physics import joint
 from estimator.physics.fit import fit, make_problem
+from estimator.physics.kernel import state_vector
 from estimator.physics.layout import flat_values
 from estimator.physics.model import DrivelineModel, Parameter, Structure, natural_frequencies_rad_s, parameter_unit
 from estimator.physics.simulate import Start, grid_for, motor_angle, output_state, simulate
@@ -109,10 +110,10 @@ def test_motion_is_what_was_imposed() -> None:
     record = recording(0.3 + up_and_down(0.1))
     grid, p = grid_for(MODEL, [record]), flat_values(MODEL.values(), {})
     start = Start(0.0, 0.0, 0.0, 0.02)
-    assert simulate(grid, record, p, start, output=kernel.TWIST) == pytest.approx(up_and_down(0.1) + 0.02)
-    assert simulate(grid, record, p, start, output=kernel.ANGLE) == pytest.approx(motor_angle(record))
-    assert np.all(simulate(grid, record, p, start, output=kernel.LOAD_SPEED) == 0.0)
-    speed = simulate(grid, record, p, start, output=kernel.SPEED)
+    assert simulate(grid, record, p, start, output=state_vector.TWIST) == pytest.approx(up_and_down(0.1) + 0.02)
+    assert simulate(grid, record, p, start, output=state_vector.ANGLE) == pytest.approx(motor_angle(record))
+    assert np.all(simulate(grid, record, p, start, output=state_vector.LOAD_SPEED) == 0.0)
+    speed = simulate(grid, record, p, start, output=state_vector.SPEED)
     assert speed[100:400] == pytest.approx(np.full(300, 0.2), rel=1e-6)
 
 

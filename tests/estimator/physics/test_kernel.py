@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.physics import kernel
+from estimator.physics.kernel import conditions, state_vector
 from estimator.physics.layout import flat
 from estimator.physics.simulate import Grid, Start, grid_for, simulate
 from estimator.signals.record import FloatArray, Location, OutputKind
@@ -76,7 +76,7 @@ class TestDryFriction:
         return simulate(self.GRID, record(torque), flat(self.LINE), start, output=state)
 
     def test_coasting_stops_at_the_time_of_the_closed_formula(self) -> None:
-        speed = self.run(np.zeros(700), Start(0.0, 0.0, self.W_0), kernel.SPEED)
+        speed = self.run(np.zeros(700), Start(0.0, 0.0, self.W_0), state_vector.SPEED)
         time_s = np.arange(700) * SAMPLE_TIME_S
         stop_s = self.J * self.W_0 / self.T_C
         expected = np.maximum(self.W_0 - self.T_C / self.J * time_s, 0.0)
@@ -85,7 +85,7 @@ class TestDryFriction:
         np.testing.assert_allclose(speed[:-210], expected[:-210], rtol=0, atol=1e-9)  # until 0.1 s before the stop
 
     def test_coasting_covers_the_distance_of_the_closed_formula(self) -> None:
-        angle = self.run(np.zeros(700), Start(0.0, 0.0, self.W_0), kernel.ANGLE)
+        angle = self.run(np.zeros(700), Start(0.0, 0.0, self.W_0), state_vector.ANGLE)
         assert angle[-1] == pytest.approx(self.J * self.W_0**2 / (2 * self.T_C), abs=1e-3)
         assert angle[-1] == angle[-50]
 
@@ -98,19 +98,19 @@ class TestDryFriction:
         assert first_still == pytest.approx(stop_s, abs=1.5 * SAMPLE_TIME_S)
 
     def test_a_mass_at_rest_creeps_no_faster_than_the_rounded_sign_allows(self) -> None:
-        speed = self.run(np.full(300, 0.5 * self.T_C), Start(0.0, 0.0, 0.0), kernel.SPEED)
-        width = max(1e-3, self.T_C * SAMPLE_TIME_S / 10 / (kernel.STICK_STABILITY * self.J))
+        speed = self.run(np.full(300, 0.5 * self.T_C), Start(0.0, 0.0, 0.0), state_vector.SPEED)
+        width = max(1e-3, self.T_C * SAMPLE_TIME_S / 10 / (conditions.STICK_STABILITY * self.J))
         assert speed[-1] == pytest.approx(width * np.arctanh(0.5), rel=1e-9)
         assert speed.max() == speed[-1]
 
     def test_torque_above_friction_accelerates_by_the_difference(self) -> None:
-        speed = self.run(np.full(300, 1.5 * self.T_C), Start(0.0, 0.0, 0.0), kernel.SPEED)
+        speed = self.run(np.full(300, 1.5 * self.T_C), Start(0.0, 0.0, 0.0), state_vector.SPEED)
         assert (speed[-1] - speed[100]) / (199 * SAMPLE_TIME_S) == pytest.approx(0.5 * self.T_C / self.J, rel=1e-9)
 
     def test_strong_friction_on_a_light_mass_stays_stable(self) -> None:
         line = model({"J_M": 1e-3, "b_M": 0.0}, effects={"coulomb_friction_motor": {"friction_nm": 50.0}})
         speed = simulate(Grid(line.structure, 1, 1e-6), record(np.full(300, 25.0)), flat(line), Start(0.0, 0.0, 0.0))
-        width = 50.0 * SAMPLE_TIME_S / (kernel.STICK_STABILITY * 1e-3)
+        width = 50.0 * SAMPLE_TIME_S / (conditions.STICK_STABILITY * 1e-3)
         assert speed[-1] == pytest.approx(width * np.arctanh(0.5), rel=1e-6)
 
 
@@ -153,8 +153,8 @@ class TestBacklash:
 
     def test_inside_the_gap_each_mass_goes_its_own_way(self) -> None:
         torque = 3.2
-        load = self.run(np.full(40, torque), Start(0.0, 0.0, 0.0), kernel.LOAD_SPEED)
-        motor = self.run(np.full(40, torque), Start(0.0, 0.0, 0.0), kernel.SPEED)
+        load = self.run(np.full(40, torque), Start(0.0, 0.0, 0.0), state_vector.LOAD_SPEED)
+        motor = self.run(np.full(40, torque), Start(0.0, 0.0, 0.0), state_vector.SPEED)
         contact_s = np.sqrt(self.GAP * self.VALUES["J_M"] / torque)  # (T / 2 J_M) t^2 = gap / 2
         free = int(contact_s / SAMPLE_TIME_S) + 1
         assert free == 23
@@ -169,7 +169,7 @@ class TestBacklash:
         rec = record(torque, np.ones(torque.size))
         load = np.repeat([0.0, -100.0], 2500)  # with the constant 50 Nm, always the torque's own opposite
         grid = replace(grid_for(line, [rec]), substeps=20)
-        twist = simulate(grid, rec, flat(line), Start(50.0, 0.0, 0.0), load, output=kernel.TWIST)
+        twist = simulate(grid, rec, flat(line), Start(50.0, 0.0, 0.0), load, output=state_vector.TWIST)
         edge = 50.0 / still["k"] + 0.5 * self.GAP
         assert twist[2499] == pytest.approx(edge, rel=1e-3)
         assert twist[-1] == pytest.approx(-edge, rel=1e-3)
@@ -177,7 +177,8 @@ class TestBacklash:
     def test_an_impact_keeps_momentum_and_creates_no_energy(self) -> None:
         start = Start(0.0, 0.0, 2.0)
         motor, load, twist = (
-            self.run(np.zeros(200), start, state) for state in (kernel.SPEED, kernel.LOAD_SPEED, kernel.TWIST)
+            self.run(np.zeros(200), start, state)
+            for state in (state_vector.SPEED, state_vector.LOAD_SPEED, state_vector.TWIST)
         )
         j_m, j_l, k = (self.VALUES[name] for name in ("J_M", "J_L", "k"))
         np.testing.assert_allclose(j_m * motor + j_l * load, j_m * 2.0, rtol=1e-12)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.physics import kernel
+from estimator.physics.kernel import sensing, state_vector
 from estimator.physics.layout import flat_values
 from estimator.physics.simulate import Grid, simulate
 from estimator.signals.record import FloatArray, Location, OutputKind
@@ -52,7 +52,7 @@ def test_the_read_angle_is_off_by_the_amplitudes_told() -> None:
     speed = 2.0 * np.pi
     angle = np.linspace(0.0, 2.0 * np.pi, 4001)
     p = flat_values(TWO_MASS, {"resolver_error": {"once_rad": 0.02, "twice_rad": 0.03}})
-    read = np.array([kernel.reading(speed, phi, p) for phi in angle])
+    read = np.array([sensing.reading(speed, phi, p) for phi in angle])
     step = np.diff(angle) * 0.5 * (read[1:] + read[:-1]) / speed
     off = np.concatenate([[0.0], np.cumsum(step)]) - angle
     np.testing.assert_allclose(off, 0.02 * np.sin(angle) + 0.03 * np.sin(2.0 * angle), atol=1e-6)
@@ -116,7 +116,7 @@ def test_a_measured_position_does_not_pass_the_speed_sensor() -> None:
 def test_a_state_asked_for_is_the_true_one() -> None:
     grid = Grid(model(TWO_MASS).structure, SUBSTEPS, SIGN_WIDTH)
     p = flat_values(TWO_MASS, {"speed_filter": {"time_constant_s": 0.05}})
-    out = simulate(grid, measured(), p, START, output=kernel.SPEED)
+    out = simulate(grid, measured(), p, START, output=state_vector.SPEED)
     np.testing.assert_array_equal(out, kernel_output({}, measured()))
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from estimator.physics import kernel
+from estimator.physics.kernel import state_vector
 from estimator.physics.layout import flat_values
 from estimator.physics.model import Structure
 from estimator.physics.simulate import Grid, Start, simulate
@@ -49,12 +49,12 @@ def states(rhs: reference.Rhs, events_s: tuple[float, ...] = ()) -> FloatArray:
     return reference.solve(rhs, start, Held.of(TORQUE, SAMPLE_TIME_S), TIME_S, events_s)
 
 
-def three_mass_output(effects: dict[str, dict[str, float]], output: int = kernel.SPEED) -> FloatArray:
+def three_mass_output(effects: dict[str, dict[str, float]], output: int = state_vector.SPEED) -> FloatArray:
     grid = Grid(Structure.THREE_MASS, SUBSTEPS, SIGN_WIDTH)
     return simulate(grid, measured(), flat_values(THREE_MASS, effects), START, output=output)
 
 
-@pytest.mark.parametrize("state", [kernel.ANGLE, kernel.SPEED, kernel.TWIST, kernel.LOAD_SPEED])
+@pytest.mark.parametrize("state", [state_vector.ANGLE, state_vector.SPEED, state_vector.TWIST, state_vector.LOAD_SPEED])
 def test_three_masses_follow_newtons_law(state: int) -> None:
     expected = states(three_masses())[:, state]
     out = three_mass_output({}, state)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from estimator.physics import kernel
 from estimator.physics.effects.backlash import damping_share
 from estimator.physics.effects.shaft_hysteresis import loading_rate
 from estimator.physics.effects.stiffness_nonlinearity import factor
+from estimator.physics.kernel import rates, slots
 from estimator.physics.laws import beyond_gap, inertia_while, share_inside, smooth_sign
 from estimator.physics.layout import flat_values
 from estimator.signals.record import FloatArray
@@ -18,7 +18,7 @@ TWISTS = np.linspace(0.0, 0.2, 41)
 
 
 def shaft_torque(twist: float, rate: float, p: FloatArray, loading: float = 0.0) -> float:
-    return kernel.shaft_torque(twist, rate, loading, p, p[kernel.K])
+    return rates.shaft_torque(twist, rate, loading, p, p[slots.K])
 
 
 def torques(twists: FloatArray, hardening: float, shape: float) -> FloatArray:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from estimator.errors import BadModel
-from estimator.physics import kernel
+from estimator.physics.kernel import state_vector
 from estimator.physics.layout import flat, slot
 from estimator.physics.model import Structure, natural_frequencies_rad_s
 from estimator.physics.simulate import (
@@ -101,9 +101,9 @@ def test_dry_friction_changes_sign_within_a_share_of_the_top_speed_of_what_rever
 @pytest.mark.parametrize(
     ("kind", "location", "state"),
     [
-        (OutputKind.SPEED, Location.MOTOR, kernel.SPEED),
-        (OutputKind.SPEED, Location.LOAD, kernel.LOAD_SPEED),
-        (OutputKind.POSITION, Location.MOTOR, kernel.ANGLE),
+        (OutputKind.SPEED, Location.MOTOR, state_vector.SPEED),
+        (OutputKind.SPEED, Location.LOAD, state_vector.LOAD_SPEED),
+        (OutputKind.POSITION, Location.MOTOR, state_vector.ANGLE),
     ],
 )
 def test_the_output_is_a_state(kind: OutputKind, location: Location, state: int) -> None:

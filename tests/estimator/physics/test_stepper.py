@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.physics import kernel
 from estimator.physics.catalogue import EFFECTS as CATALOGUE
+from estimator.physics.kernel import state_vector
 from estimator.physics.layout import flat
 from estimator.physics.model import DrivelineModel, Parameter, Structure
 from estimator.physics.simulate import Start, grid_for, simulate
@@ -103,7 +103,7 @@ def test_the_stepper_equals_the_simulation_from_rest(name: str) -> None:
     line = LINES[name]
     rec = record(TORQUE, np.ones(TORQUE.size))
     speed, angle = stepped(line)
-    for column, output in ((speed, None), (angle, kernel.ANGLE)):
+    for column, output in ((speed, None), (angle, state_vector.ANGLE)):
         whole = simulated(line, rec, output)
         np.testing.assert_allclose(column, whole, rtol=0, atol=1e-9 * np.ptp(whole))
 
@@ -114,7 +114,7 @@ def test_the_stepper_turns_periodic_effects_by_its_own_angle(name: str) -> None:
     line = model(TWO_MASS, effects={effect_of(name): PERIODIC[name]})
     speed, angle = stepped(line)
     rec = record(TORQUE, angle, kind=OutputKind.POSITION)
-    whole = simulated(line, rec, kernel.SPEED)
+    whole = simulated(line, rec, state_vector.SPEED)
     true = stepped(model(TWO_MASS))[0]
     if name == "resolver_error":  # a position does not pass the speed sensor
         off = 0.1 * np.cos(angle) + 2.0 * 0.05 * np.cos(2.0 * angle)

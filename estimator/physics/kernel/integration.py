@@ -1,0 +1,226 @@
+"""The one compiled driveline simulation.
+
+Chain of one sub-step: torque on the shaft -> delay -> lag -> motor -> shaft -> load -> sensor. Fixed-step Runge-Kutta
+of fourth order; the torque of a sub-step is a straight line with the exact mean and first moment of the delayed,
+lagged, zero-order-held input over it. What changes with time or angle, but not with the state, is set once per
+sub-step.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from estimator.compiled import brief, compiled, inlined
+from estimator.physics.effects import actuator_lag, speed_filter, transport_delay
+from estimator.physics.kernel import slots
+from estimator.physics.kernel.conditions import conditions, is_varying, with_torque
+from estimator.physics.kernel.rates import rates
+from estimator.physics.kernel.sensing import entry, reading, shown, travelled
+from estimator.physics.kernel.state_vector import FILTERED, LAGGED, Conditions, State
+from estimator.signals.record import FloatArray
+
+RADIANS_PER_STEP_OF_MODE = 0.6
+"""Integration step in radians of the extra mode, which is seen through the motor's inertia only."""
+
+
+@inlined
+def moved(x: State, dx: State, h: float) -> State:
+    """Return a state moved along its derivative for a time [s]."""
+    return State(
+        x.angle + h * dx.angle,
+        x.speed + h * dx.speed,
+        x.twist + h * dx.twist,
+        x.load_speed + h * dx.load_speed,
+        x.loading + h * dx.loading,
+        x.vehicle_speed + h * dx.vehicle_speed,
+        x.branch_twist + h * dx.branch_twist,
+        x.branch_speed + h * dx.branch_speed,
+        x.middle_twist + h * dx.middle_twist,
+        x.middle_speed + h * dx.middle_speed,
+        x.traction + h * dx.traction,
+    )
+
+
+@inlined
+def runge_kutta(masses: int, now: Conditions, torque: float, rise: float, x: State, p: FloatArray, h: float) -> State:
+    """Return the state after one sub-step under constant conditions and a torque of this mean and rise [Nm]."""
+    begin = with_torque(now, torque - 0.5 * rise)
+    middle = with_torque(now, torque)
+    end = with_torque(now, torque + 0.5 * rise)
+    first = rates(masses, begin, x, p)
+    second = rates(masses, middle, moved(x, first, 0.5 * h), p)
+    third = rates(masses, middle, moved(x, second, 0.5 * h), p)
+    fourth = rates(masses, end, moved(x, third, h), p)
+    x = moved(x, first, h / 6.0)
+    x = moved(x, second, h / 3.0)
+    x = moved(x, third, h / 3.0)
+    return moved(x, fourth, h / 6.0)
+
+
+@inlined
+def unpacked(state: FloatArray) -> State:
+    """Return the mechanical part of the state array."""
+    return State(
+        state[0], state[1], state[2], state[3], state[4], state[5], state[6], state[7], state[8], state[9], state[10]
+    )
+
+
+@inlined
+def integrate_masses(
+    masses: int,
+    sample_time_s: float,
+    substeps: int,
+    sign_width: float,
+    first: int,
+    start_s: float,
+    torque: FloatArray,
+    load: FloatArray,
+    angle: FloatArray,
+    p: FloatArray,
+    state: FloatArray,
+    output: int,
+    sensor: bool,
+    out: FloatArray,
+    slopes: FloatArray,
+) -> None:
+    """Do what ``integrate`` does, for a number of masses that is known when it is compiled."""
+    if p[slots.BRANCH_INERTIA] > 0.0:
+        turn_of_mode = 2.0 * math.pi * p[slots.BRANCH_FREQUENCY] * sample_time_s
+        substeps = max(substeps, math.ceil(turn_of_mode / RADIANS_PER_STEP_OF_MODE))
+    h = sample_time_s / substeps
+    length = 1.0 / substeps
+    delay, begun = p[slots.DELAY] / sample_time_s, start_s / sample_time_s
+    before_all = torque[0] + p[slots.DELAYED_BEFORE]
+    varying, filtering = is_varying(p), p[slots.FILTER] > 0.0
+    late = p[slots.DELAY] != 0.0 or p[slots.DRIFT] != 0.0
+    steep = slopes.shape[1] > 0
+    slope = 0.0
+    n = torque.shape[0]
+    x = unpacked(state)
+    lagged, filtered = state[LAGGED], state[FILTERED]
+    now = conditions(masses, start_s, h, 0.0, 0.0, sign_width, p)
+    for k in range(first, n):
+        turn = angle[k + 1] - angle[k] if k + 1 < n else angle[k] - angle[k - 1]
+        value = entry(x, output)
+        out[k] = shown(reading(value, angle[k], p), filtered, p) if sensor else value
+        if steep:
+            slopes[0, k] = slope
+        for j in range(substeps):
+            place = k + j * length
+            if varying or j == 0:
+                middle = angle[k] + turn * (j + 0.5) * length
+                now = conditions(masses, start_s + place * sample_time_s, h, middle, load[k], sign_width, p)
+            supplied, rise = torque[k], 0.0
+            if late:
+                source = place + (place + begun) * p[slots.DRIFT] - delay
+                supplied, rise = transport_delay.delayed(torque, before_all, source, length)
+            mean, rise, lagged = actuator_lag.step(supplied, rise, lagged, p[slots.LAG], h)
+            before, begun_at = entry(x, output), x
+            x = runge_kutta(masses, now, mean, rise, x, p, h)
+            after = entry(x, output)
+            slope = (after - before) / h
+            if filtering:
+                bow = travelled(x, output) / h - travelled(begun_at, output) / h - 0.5 * (before + after)
+                read = reading(before + bow, angle[k] + turn * j * length, p)
+                ends = reading(after + bow, angle[k] + turn * (j + 1) * length, p)
+                filtered = speed_filter.step(read, ends, filtered, p[slots.FILTER], h)
+            if steep and j == 0:
+                slopes[1, k] = slope
+    for i, last in enumerate(x):
+        state[i] = last
+    state[LAGGED], state[FILTERED] = lagged, filtered
+
+
+@compiled
+def integrate(
+    masses: int,
+    sample_time_s: float,
+    substeps: int,
+    sign_width: float,
+    first: int,
+    start_s: float,
+    torque: FloatArray,
+    load: FloatArray,
+    angle: FloatArray,
+    p: FloatArray,
+    state: FloatArray,
+    output: int,
+    sensor: bool,
+    out: FloatArray,
+    slopes: FloatArray,
+) -> None:
+    """Simulate samples ``first`` to the end of ``torque``; row k of ``out`` is the state entry before torque k acts.
+
+    Parameters
+    ----------
+    masses : int
+        1, 2 or 3.
+    sample_time_s : float
+        Sampling period [s].
+    substeps : int
+        Integration steps per period.
+    sign_width : float
+        Speed within which dry friction changes sign [rad/s].
+    first : int
+        Sample to start at; earlier torques are only seen through the delay.
+    start_s : float
+        Time of sample 0, for laws over time [s].
+    torque, load : ndarray, shape (N,)
+        Torque on the motor shaft before delay and lag, held over each period, and load torque [Nm].
+    angle : ndarray, shape (N,)
+        Motor angle at each sample, which periodic laws take their phase from [rad].
+    p : ndarray, shape (layout.SIZE,)
+        Parameters of the superset model.
+    state : ndarray, shape (STATES,)
+        Start state; the end state afterwards.
+    output : int
+        Which state is the output.
+    sensor : bool
+        Whether the output is seen through the speed sensor.
+    out : ndarray, shape (N,)
+        Filled from ``first`` on.
+    slopes : ndarray, shape (2, N) or (2, 0)
+        Where it has room: slope of the output just before and just after each sample [unit of the output / s].
+    """
+    given = (sample_time_s, substeps, sign_width, first, start_s, torque, load, angle, p)
+    wanted = (state, output, sensor, out, slopes)
+    if masses == 1:
+        integrate_masses(1, *given, *wanted)
+    elif masses == 2:
+        integrate_masses(2, *given, *wanted)
+    else:
+        integrate_masses(3, *given, *wanted)
+
+
+@brief
+def integrate_period(*given: Any) -> None:
+    """Do what ``integrate`` does, with its arguments, for a rig that is stepped period by period."""
+    integrate(*given)
+
+
+@compiled
+def integrate_each(
+    masses: int,
+    sample_time_s: float,
+    substeps: int,
+    sign_width: float,
+    start_s: float,
+    torque: FloatArray,
+    load: FloatArray,
+    angle: FloatArray,
+    p: FloatArray,
+    state: FloatArray,
+    output: int,
+    sensor: bool,
+    out: FloatArray,
+    slopes: FloatArray,
+) -> None:
+    """Do what ``integrate`` does for every row of ``torque``, ``load``, ``p``, ``state``, ``out`` and ``slopes``.
+
+    One call for many simulations: threads do not wait for the interpreter in between.
+    """
+    given = (sample_time_s, substeps, sign_width, 0, start_s)
+    for i in range(torque.shape[0]):
+        rows = (torque[i], load[i], angle, p[i], state[i])
+        integrate(masses, *given, *rows, output, sensor, out[i], slopes[i])

@@ -1,0 +1,133 @@
+"""The equations of motion, with the law of every effect at its place."""
+
+from __future__ import annotations
+
+import math
+
+from estimator.compiled import inlined
+from estimator.physics.effects import (
+    aerodynamic_drag,
+    backlash,
+    shaft_hysteresis,
+    stiffness_nonlinearity,
+    stribeck_friction,
+    tyre_slip,
+)
+from estimator.physics.kernel import slots
+from estimator.physics.kernel.state_vector import Conditions, State
+from estimator.physics.laws import beyond_gap, dry_friction
+from estimator.signals.record import FloatArray
+
+
+@inlined
+def motor_friction(speed: float, p: FloatArray, width: float) -> float:
+    """Return the torque of every friction law at the motor [Nm], viscous included."""
+    return (
+        float(p[slots.B_M]) * speed
+        + dry_friction(speed, p[slots.COULOMB], width)
+        + stribeck_friction.law(speed, p[slots.STRIBECK], p[slots.STRIBECK_COULOMB], p[slots.STRIBECK_SPEED], width)
+        + float(p[slots.QUADRATIC]) * speed * abs(speed)
+    )
+
+
+@inlined
+def shaft_torque(twist: float, rate: float, loading: float, p: FloatArray, stiffness: float) -> float:
+    """Return the torque the shaft carries [Nm] at a twist [rad], its rate [rad/s] and the hysteresis' loading [-]."""
+    damping = float(p[slots.C] * p[slots.LINE_SHARE] ** 2) * rate
+    loaded = twist
+    if p[slots.GAP] > 0.0:
+        loaded = beyond_gap(twist, p[slots.GAP])
+        damping *= backlash.damping_share(loaded, p[slots.CONTACT])
+    if p[slots.SLIDER_INSIDE] > 0.0:
+        stiffness = max(stiffness - p[slots.SLIDER_INSIDE] * p[slots.SLIDER] / p[slots.YIELD], 0.0)
+    elastic = stiffness * loaded * stiffness_nonlinearity.factor(loaded, p[slots.HARDENING], p[slots.SHAPE])
+    return float(elastic) + damping + float(p[slots.SLIDER]) * loading
+
+
+@inlined
+def rates(masses: int, now: Conditions, x: State, p: FloatArray) -> State:
+    """Return the time derivative of the mechanical state under the conditions ``now``."""
+    drive = now.torque - motor_friction(x.speed, p, now.width_motor)
+    branch_acceleration = branch_rate(x.branch_twist, x.speed - x.branch_speed, p)
+    drive -= float(p[slots.BRANCH_INERTIA]) * branch_acceleration
+    if masses == 1:
+        drag = load_drag(x.speed, x.speed, now, p) + now.load
+        acceleration = (drive - drag) / now.inertia_motor
+        return State(
+            x.speed, acceleration, 0.0, 0.0, 0.0, 0.0, x.speed - x.branch_speed, branch_acceleration, 0.0, 0.0, 0.0
+        )
+    rate = x.speed - (x.middle_speed if masses == 3 else x.load_speed)
+    joint_rate = now.joint_rate * x.speed
+    shaft = shaft_torque(x.twist + now.joint_angle, rate + joint_rate, x.loading, p, now.stiffness)
+    shaft = shaft * now.shaft_factor + now.shaft_extra
+    pull = shaft
+    reaction = shaft * (1.0 + now.joint_rate)  # a joint that turns unevenly passes on power, not torque
+    middle_twist, middle_speed = 0.0, 0.0
+    if masses == 3:
+        middle_twist = x.middle_speed - x.load_speed
+        pull = float(p[slots.K_2]) * x.middle_twist + float(p[slots.C_2]) * middle_twist
+        middle_speed = (shaft - pull) / p[slots.J_2]
+    load, vehicle, traction = load_rates(pull, now, x, p)
+    return State(
+        x.speed,
+        (drive - reaction) / now.inertia_motor,
+        rate,
+        load,
+        sliding(x.loading, rate, now, p),
+        vehicle,
+        x.speed - x.branch_speed,
+        branch_acceleration,
+        middle_twist,
+        middle_speed,
+        traction,
+    )
+
+
+@inlined
+def sliding(loading: float, rate: float, now: Conditions, p: FloatArray) -> float:
+    """Return how fast the slider inside the shaft loads [1/s]; 0 where there is none."""
+    if p[slots.SLIDER] == 0.0:
+        return 0.0
+    sharpness, unloading = p[slots.SHARPNESS], p[slots.UNLOADING]
+    return shaft_hysteresis.loading_rate(loading, rate, now.yield_twist, sharpness, unloading, now.fastest)
+
+
+@inlined
+def branch_rate(twist: float, rate: float, p: FloatArray) -> float:
+    """Return the acceleration of the extra mode's inertia on its spring [rad/s^2]; 0 where there is none."""
+    if p[slots.BRANCH_INERTIA] <= 0.0:
+        return 0.0
+    frequency = 2.0 * math.pi * float(p[slots.BRANCH_FREQUENCY])
+    return frequency * (frequency * twist + 2.0 * float(p[slots.BRANCH_DAMPING]) * rate)
+
+
+@inlined
+def load_drag(wheel: float, vehicle: float, now: Conditions, p: FloatArray) -> float:
+    """Return what slows the load down [Nm]: dry friction at the wheel, viscous and air drag at the vehicle."""
+    dry = dry_friction(wheel, now.dry_load, now.width_load)
+    return dry + now.viscous_load * vehicle + aerodynamic_drag.law(vehicle, p[slots.AERO])
+
+
+@inlined
+def load_rates(pull: float, now: Conditions, x: State, p: FloatArray) -> tuple[float, float, float]:
+    """Return the accelerations of the load and, where the tyre slips, of the vehicle [rad/s^2]; the traction's rate."""
+    wheel = x.load_speed
+    if p[slots.SLIP] <= 0.0:
+        return (pull - load_drag(wheel, wheel, now, p) - now.load) / now.inertia_load, 0.0, 0.0
+    vehicle = x.vehicle_speed
+    slip, creep, relaxation = p[slots.SLIP], p[slots.SLIP_SPEED], p[slots.RELAXATION]
+    share, rate = float(p[slots.SLIP_WHEEL]), 0.0
+    if relaxation > 0.0:
+        traction = x.traction
+        inertia = share * now.inertia_load
+        rate = tyre_slip.build_up(wheel - vehicle, abs(vehicle), traction, slip, relaxation, inertia, now.fastest)
+        steepest = inertia * now.fastest
+        traction += tyre_slip.carcass(wheel - vehicle, vehicle, slip, creep, relaxation, p[slots.CARCASS], steepest)
+    else:
+        steepest = now.fastest * now.inertia_load
+        slope, share = tyre_slip.coupling(vehicle, slip, creep, share, steepest)
+        traction = slope * (wheel - vehicle)
+    dry = dry_friction(wheel, now.dry_load, now.width_load)
+    drag = load_drag(wheel, vehicle, now, p) - dry
+    wheel_rate = (pull - dry - traction) / (share * now.inertia_load)
+    return wheel_rate, (traction - drag - now.load) / ((1.0 - share) * now.inertia_load), rate

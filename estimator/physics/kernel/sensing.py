@@ -1,0 +1,43 @@
+"""From the state to what is recorded of it."""
+
+from __future__ import annotations
+
+import math
+
+from estimator.compiled import inlined
+from estimator.physics.effects import resolver_error
+from estimator.physics.kernel import slots
+from estimator.physics.kernel.state_vector import LOAD_SPEED, SPEED, TWIST, State
+from estimator.signals.record import FloatArray
+
+
+@inlined
+def entry(x: State, output: int) -> float:
+    """Return the state that is an output: ANGLE, SPEED, TWIST or LOAD_SPEED."""
+    if output == SPEED:
+        return x.speed
+    if output == LOAD_SPEED:
+        return x.load_speed
+    return x.twist if output == TWIST else x.angle
+
+
+@inlined
+def travelled(x: State, output: int) -> float:
+    """Return the angle whose rate is the output [rad]: what a filter's input has been in the mean is its change."""
+    return x.angle if output == SPEED else x.angle - x.twist - x.middle_twist
+
+
+@inlined
+def reading(speed: float, angle: float, p: FloatArray) -> float:
+    """Return the speed that the resolver gives [rad/s] at a motor angle [rad]."""
+    once, twice = p[slots.RESOLVER_ONCE], p[slots.RESOLVER_TWICE]
+    return speed * resolver_error.slope(angle, once, p[slots.RESOLVER_ONCE_PHASE], twice, p[slots.RESOLVER_TWICE_PHASE])
+
+
+@inlined
+def shown(read: float, filtered: float, p: FloatArray) -> float:
+    """Return what is recorded of a reading: filtered, without its sign, quantised, as the sensor has it [rad/s]."""
+    value = filtered if p[slots.FILTER] > 0.0 else read
+    value += float(p[slots.BLIND]) * (abs(value) - value)
+    step = float(p[slots.QUANTISATION])
+    return step * math.floor(value / step + 0.5) if step > 0.0 else value

@@ -1,0 +1,72 @@
+"""What moves, and what holds during one sub-step."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+ANGLE, SPEED, TWIST, LOAD_SPEED = 0, 1, 2, 3
+"""Mechanical states that can be an output; see ``State``."""
+
+STATES = 13
+"""Length of the state array: ``State``, then the lagged torque [Nm] and the filtered reading [rad/s]."""
+
+LAGGED, FILTERED = 11, 12
+
+
+class State(NamedTuple):
+    """Mechanical state.
+
+    Attributes
+    ----------
+    angle, speed : float
+        Of the motor [rad, rad/s].
+    twist : float
+        Of the (first) shaft [rad].
+    load_speed : float
+        Of the load, or of the wheels where the tyre slips [rad/s].
+    loading : float
+        Of the shaft's slider, from -1 to 1.
+    vehicle_speed, traction : float
+        Of the vehicle behind the tyre [rad/s], and the torque of a tyre that has to roll to build it up [Nm].
+    branch_twist, branch_speed : float
+        Of the extra mode [rad, rad/s].
+    middle_twist, middle_speed : float
+        Twist of the second shaft [rad] and speed of the mass before it [rad/s].
+    """
+
+    angle: float
+    speed: float
+    twist: float
+    load_speed: float
+    loading: float
+    vehicle_speed: float
+    branch_twist: float
+    branch_speed: float
+    middle_twist: float
+    middle_speed: float
+    traction: float
+
+
+class Conditions(NamedTuple):
+    """What holds during one sub-step: torques [Nm], inertias, stiffness, friction, widths of a sign change [rad/s].
+
+    And what the step can follow: the fastest decay [1/s] and, given the friction inside the shaft, the shortest twist
+    over which it yields [rad].
+    """
+
+    torque: float
+    load: float
+    torque_factor: float
+    shaft_extra: float
+    shaft_factor: float
+    joint_angle: float
+    joint_rate: float
+    inertia_motor: float
+    inertia_load: float
+    stiffness: float
+    viscous_load: float
+    dry_load: float
+    width_motor: float
+    width_load: float
+    fastest: float
+    yield_twist: float
