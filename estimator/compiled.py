@@ -56,3 +56,15 @@ def brief(function: Function) -> Function:
     woken, find it taken, and begin to wait anew (CPython's ``take_gil``). A heartbeat came 0.4 s late by that.
     """
     return cast(Function, numba.njit(cache=True, error_model="numpy")(function))
+
+
+def borrowing(function: Function) -> Function:
+    """Compile a function into whatever calls it, for functions that only read and write arrays they are given.
+
+    It counts no references to them. In a loop over views of one vector that counting, two atomic operations per array
+    and call, took six times as long as the arithmetic (a recursive estimator of eight parameters: 0.7 us and 0.12 us).
+    Nothing of it may make an array, or return one.
+    """
+    return cast(
+        Function, numba.njit(cache=True, nogil=True, error_model="numpy", forceinline=True, _nrt=False)(function)
+    )

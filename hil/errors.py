@@ -7,6 +7,7 @@
      |    +-- RigFileError
      |    +-- ModelFileError
      |    +-- RecordingError
+     |    +-- StoreError
      |    +-- UsageError
      +-- RunAborted           a run was ended by the rig's state: exit status 3
 
@@ -57,6 +58,10 @@ class ModelFileError(FileProblem):
 
 class RecordingError(FileProblem):
     """The recording is wrong."""
+
+
+class StoreError(FileProblem):
+    """The store of runs can't be read or written."""
 
 
 class RunAborted(HilError):

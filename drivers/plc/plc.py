@@ -89,6 +89,7 @@ class Plc:
         "_beat_timeout_s",
         "_clock_ns",
         "_host_count",
+        "_latest",
         "_link",
         "_map",
         "_mode_timeout_s",
@@ -115,8 +116,14 @@ class Plc:
         self._beat_timeout_s = beat_timeout_s
         self._clock_ns = clock_ns
         self._host_count: int | None = None
+        self._latest: PlcStatus | None = None
         self._seen_ns = 0
         self._setting_prbs = asyncio.Lock()  # who switches it off comes behind who still switches it on
+
+    @property
+    def latest(self) -> PlcStatus | None:
+        """The last status read; None before the first."""
+        return self._latest
 
     async def __aenter__(self) -> Self:
         """Connect; see `connect`."""
@@ -163,7 +170,7 @@ class Plc:
         """
         t_ns = self._clock_ns()
         values = await self._read(STATUS)
-        return PlcStatus(
+        self._latest = PlcStatus(
             drive_mode=_member(DriveMode, values["drive_mode"]),
             clutch=_member(ClutchState, values["clutch"]),
             permissive=bool(values["permissive"]),
@@ -174,6 +181,7 @@ class Plc:
             prbs_torque_nm=float(values["prbs_torque"]),
             t_ns=t_ns,
         )
+        return self._latest
 
     async def start_prbs(self, m1: GuardedTorque, m2: GuardedTorque, clock_divider: int, seed: int) -> PrbsSettings:
         """Let the PLC's own generator run.

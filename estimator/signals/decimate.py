@@ -19,14 +19,16 @@ spoilt too.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.signal import firwin
 
 from estimator.errors import BadShape
 from estimator.signals.decimate_kernel import SPOILT, decimate_block
-from estimator.signals.record import BoolArray, FloatArray, Record
+from estimator.signals.record import BoolArray, FloatArray, IntArray, Record
 from estimator.signals.settings import Requirement, is_positive, require
 
 HALF_LENGTH = 8
@@ -159,6 +161,14 @@ class Decimator:
             out_okay,
         )
         return Decimated(out[0, :n].copy(), out[1, :n].copy(), out_okay[:n].copy())
+
+    def state(self) -> dict[str, FloatArray | IntArray]:
+        """Return the state, copied."""
+        return {"counters": self._counters.copy(), "level": self._level.copy(), "window": self._window.copy()}
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Go on from a state of a decimator with the same settings."""
+        self._counters[:], self._level[:], self._window[:] = state["counters"], state["level"], state["window"]
 
 
 def decimate(record: Record, factor: int, high_pass_hz: float = 0.3) -> Record:

@@ -65,6 +65,8 @@ def diagnose(
     from hil.report.diagnosis_json import diagnosis_text
     from hil.report.diagnosis_text import diagnosis_summary
     from hil.report.outputs import publish, require_folder
+    from hil.store import attach_to_runs
+    from hil.store.entry import DIAGNOSIS, MODEL
 
     require_folder(out)
     file = read_model_for_recordings(model)
@@ -81,6 +83,9 @@ def diagnose(
             "report.html": lambda path: path.write_text(diagnosis_page(diagnosis), encoding="utf-8"),
         },
     )
+    results = {DIAGNOSIS: out / "diagnosis.json", MODEL: out / "augmented.toml"}
+    for complaint in attach_to_runs([*recordings, *(holdout or ())], results):
+        typer.echo(complaint, err=True)
     if as_json:
         typer.echo(text, nl=False)
     else:

@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import typer
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
-    from estimator.identification.identify import Identification, Settings
-    from estimator.identification.linear_model import ComplexArray, LinearModel
-    from estimator.identification.modes.modes import Mode
-    from estimator.identification.spectral.welch import SpectralEstimate
+    from estimator.identification.compare import Compared
+    from estimator.identification.identify import Settings
+    from estimator.identification.offline.orders import OrderChoice
+    from estimator.identification.study import Study
     from estimator.physics.model import DrivelineModel
     from estimator.signals.record import Record
 
-SCHEMA = "hil.identification/1"
-FILE_NAME = "identification.json"
+PAGE = "report.html"
 
 app = typer.Typer(add_completion=False)
 
@@ -28,7 +25,7 @@ app = typer.Typer(add_completion=False)
 @app.command(epilog="Example: hil identify run_1.csv run_2.csv --out identified --model bus.toml")
 def identify(
     recordings: list[Path] = typer.Argument(..., metavar="REC...", help="Recordings to identify from."),
-    out: Path = typer.Option(..., "--out", metavar="DIR", help=f"Folder for {FILE_NAME}; made where missing."),
+    out: Path = typer.Option(..., "--out", metavar="DIR", help="Folder for the results; made where missing."),
     model: Path | None = typer.Option(
         None,
         "--model",
@@ -44,164 +41,106 @@ def identify(
         metavar="SECONDS",
         help="Sampling period of the models; a multiple of the recording's.",
     ),
-    as_json: bool = typer.Option(False, "--json", help=f"Print {FILE_NAME} instead of the table."),
+    order: str = typer.Option("4", "--order", metavar="N|auto", help="nA = nB; auto: what the data pay for."),
+    delay: str = typer.Option("1", "--delay", metavar="N|auto", help="Total delay in samples; auto: what fits."),
+    estimator: list[str] = typer.Option(
+        [], "--estimator", metavar="NAME", help="Another recursive estimator to compare on the same data; repeatable."
+    ),
+    as_json: bool = typer.Option(False, "--json", help="Print identification.json instead of the table."),
 ) -> None:
-    """Identify the driveline from each recording: models, resonance, damping.
+    """Identify the driveline from each recording: models, resonance, damping, physical parameters.
 
-    Writes DIR/identification.json with theta, A, B, poles, zeros and the spectral estimate of each recording.
+    Writes DIR/identification.json with theta, A, B, poles, zeros, intervals, tests and the spectral estimate of each
+    recording, and DIR/report.html.
     """
-    from rich.console import Console
-
+    from estimator.identification.compare import compare
     from estimator.identification.identify import Settings
     from hil.config.model_file import read_model_for_recordings
     from hil.errors import ModelFileError
     from hil.recording import read_records
     from hil.recording.timing_check import require_even_cycles
-    from hil.report.outputs import publish, require_folder
+    from hil.report.identification.choices import chosen_estimators, chosen_orders, start_values
+    from hil.report.outputs import require_folder
+    from hil.store import attach_to_runs
+    from hil.store.entry import IDENTIFICATION
 
     require_folder(out)
     require_even_cycles(recordings)
     settings = Settings(sample_time_s=sample_time, samples=samples or None)
+    entries = chosen_estimators(estimator)
     file = None if model is None else read_model_for_recordings(model)
     if model is not None and file is not None and file.on_bench:
         raise ModelFileError(
             model, "structure | expected a driveline, which torque moves | came 'joint': diagnose or simulate it"
         )
     records = read_records(recordings, None if file is None else file.signals)
-    results = _identified(records, settings)
-    nominal = None if file is None else nominal_resonance(file.model)
-    text = identification_text(results, settings, nominal)
-    publish(out, {FILE_NAME: lambda path: path.write_text(text, encoding="utf-8")})
-    if as_json:
-        typer.echo(text, nl=False)
-    else:
-        Console().print(summary(results, nominal))
-        typer.echo(f"all of it: {out / FILE_NAME}")
+    settings, choice = chosen_orders(settings, order, delay, records)
+    expected = None if file is None else file.model
+    start = start_values(estimator, expected)
+    studies = _identified(records, settings)
+    compared = [
+        compare(record, each.found, settings, name, entry, start)
+        for record, each in zip(records, studies, strict=True)
+        for name, entry in entries.items()
+    ]
+    _publish(out, records, settings, studies, expected, choice, compared, as_json=as_json)
+    for complaint in attach_to_runs(recordings, {IDENTIFICATION: out / "identification.json"}):
+        typer.echo(complaint, err=True)
 
 
-def _identified(records: Sequence[Record], settings: Settings) -> list[Identification]:
-    """Identify from each, with a bar on standard error where that is a terminal."""
+def _identified(records: Sequence[Record], settings: Settings) -> list[Study]:
+    """Identify from each and question it, with a bar on standard error where that is a terminal."""
     from rich.console import Console
     from rich.progress import track
 
     from estimator.identification.identify import identify as identify_record
+    from estimator.identification.study import study
 
     console = Console(stderr=True)
-    bar = track(records, "identifying", console=console, transient=True, disable=not console.is_terminal)
-    return [identify_record(record, settings) for record in bar]
+    bar = partial(track, console=console, transient=True, disable=not console.is_terminal)
+    results = [identify_record(record, settings) for record in bar(records, "identifying")]
+    pairs = list(zip(records, results, strict=True))
+    return [
+        study(record, found, settings, [other for other in results if other is not found])
+        for record, found in bar(pairs, "questioning")
+    ]
 
 
-def nominal_resonance(model: DrivelineModel) -> Mode | None:
-    """Return the mode a nominal model expects; None for a structure that does not oscillate."""
-    from estimator.identification.modes.modes import two_mass_resonance
-    from estimator.physics.model import Structure
+def _publish(
+    out: Path,
+    records: Sequence[Record],
+    settings: Settings,
+    studies: Sequence[Study],
+    model: DrivelineModel | None,
+    choice: OrderChoice | None,
+    compared: Sequence[Compared],
+    *,
+    as_json: bool,
+) -> None:
+    from rich.console import Console
 
-    return two_mass_resonance(**model.values()) if model.structure is Structure.TWO_MASS else None
+    from hil.figures.experiments import beside
+    from hil.report.identification.document import FILE_NAME, identification_text
+    from hil.report.identification.page import identification_page
+    from hil.report.identification.terminal import compared_summary, summary
+    from hil.report.outputs import publish
 
-
-def identification_text(results: Iterable[Identification], settings: Settings, nominal: Mode | None) -> str:
-    """Return the text of identification.json.
-
-    Coefficients are written with all their digits, so that a model read back is the same to the bit.
-    """
-    document = {
-        "schema": SCHEMA,
-        "settings": {
-            "na": settings.orders.na,
-            "nb": settings.orders.nb,
-            "nk": settings.orders.nk,
-            "sample_time_s": settings.sample_time_s,
-            "high_pass_hz": settings.high_pass_hz,
-            "samples": settings.samples,
-            "filter_part": settings.filter_part.value,
-            "band_hz": list(settings.band_hz),
+    models = [beside(record, each.found, model) for record, each in zip(records, studies, strict=True)]
+    nominal = models[0].reference_mode
+    text = identification_text([each.found for each in studies], settings, nominal, studies, choice, compared)
+    page = identification_page(models, studies, choice, compared)
+    publish(
+        out,
+        {
+            FILE_NAME: lambda path: path.write_text(text, encoding="utf-8"),
+            PAGE: lambda path: path.write_text(page, encoding="utf-8"),
         },
-        "nominal_resonance": _mode(nominal),
-        "recordings": [_recording(result) for result in results],
-    }
-    return json.dumps(document, indent=1, allow_nan=False) + "\n"
-
-
-def _recording(result: Identification) -> dict[str, Any]:
-    estimate, batch = result.estimate, result.batch
-    online = _model(result.online, result.online_resonance) | {
-        "status": estimate.status.value,
-        "reason": estimate.reason.message,
-        "samples_used": int(result.trajectory.used.sum()),
-    }
-    offline = _model(batch.model, result.batch_resonance) | {
-        "covariance": batch.covariance.tolist(),
-        "rms": batch.rms,
-        "fit_percent": batch.fit_percent,
-        "samples_used": batch.n_samples,
-    }
-    return {
-        "name": result.name,
-        "output": result.data.kind.value,
-        "online": online,
-        "batch": offline,
-        "filter_L": result.L.tolist(),
-        "spectral": None if result.spectral is None else _spectral(result.spectral),
-    }
-
-
-def _model(model: LinearModel, resonance: Mode | None) -> dict[str, Any]:
-    return {
-        "theta": model.theta.tolist(),
-        "A": model.A.tolist(),
-        "B": model.B.tolist(),
-        "sample_time_s": model.sample_time_s,
-        "poles": _pairs(model.poles),
-        "zeros": _pairs(model.zeros),
-        "resonance": _mode(resonance),
-    }
-
-
-def _pairs(roots: ComplexArray) -> list[list[float]]:
-    return [[float(root.real), float(root.imag)] for root in roots]
-
-
-def _mode(mode: Mode | None) -> dict[str, float] | None:
-    return None if mode is None else {"frequency_hz": mode.frequency_hz, "damping": mode.damping}
-
-
-def _spectral(estimate: SpectralEstimate) -> dict[str, Any]:
-    import numpy as np
-
-    from hil.report.numbers import json_number
-
-    return {
-        "frequency_hz": [json_number(f) for f in estimate.frequency_hz.tolist()],
-        "magnitude": [json_number(m) for m in np.abs(estimate.response).tolist()],
-        "phase_rad": [json_number(p) for p in np.angle(estimate.response).tolist()],
-        "magnitude_std": [json_number(s) for s in estimate.magnitude_std.tolist()],
-        "coherence": [json_number(c) for c in estimate.coherence.tolist()],
-        "n_averages": estimate.n_averages,
-    }
-
-
-def summary(results: Iterable[Identification], nominal: Mode | None) -> Table:
-    """Return the table for a terminal: resonance and damping of each recording, on line and off line."""
-    from rich.table import Table
-
-    table = Table(title="Resonance and damping", title_justify="left")
-    for heading in ("recording", "on line", "", "off line", "", "fit", "on-line status"):
-        table.add_column(heading)
-    for result in results:
-        fit = f"{result.batch.fit_percent:.1f} %"
-        online, offline = _shown(result.online_resonance), _shown(result.batch_resonance)
-        table.add_row(result.name, *online, *offline, fit, _status(result))
-    if nominal is not None:
-        table.add_section()
-        table.add_row("model file", "", "", *_shown(nominal), "", "")
-    return table
-
-
-def _shown(mode: Mode | None) -> tuple[str, str]:
-    return ("none", "") if mode is None else (f"{mode.frequency_hz:.2f} Hz", f"{mode.damping:.3f}")
-
-
-def _status(result: Identification) -> str:
-    estimate = result.estimate
-    message = estimate.reason.message
-    return f"{estimate.status.value}: {message}" if message else estimate.status.value
+    )
+    if as_json:
+        typer.echo(text, nl=False)
+        return
+    console = Console()
+    console.print(summary(studies, nominal))
+    if compared:
+        console.print(compared_summary(compared))
+    typer.echo(f"all of it: {out / FILE_NAME}    report: {out / PAGE}")

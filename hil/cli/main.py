@@ -8,16 +8,15 @@ from __future__ import annotations
 
 import importlib
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from enum import IntEnum
-from typing import TYPE_CHECKING
 
 from hil import __version__
+from hil.cli.call import Call
+from hil.cli.overview import overview
+from hil.cli.silence import silence
 from hil.errors import HilError, InputError
 from hil.rig.stop import interrupt_on_signals
-
-if TYPE_CHECKING:
-    import typer
 
 
 class ExitStatus(IntEnum):
@@ -35,47 +34,25 @@ COMMANDS: dict[str, str] = {
     "prove": "The proof: sealed cases, answered and opened, with a scoreboard.",
     "sim": "Serve the simulated slaves: two inverters, PLC, driveline.",
     "check": "Find every device, compare it with rig file and EDS; commands no torque.",
+    "commission": "Lead through commissioning: checks, experiments, models, report.",
     "run": "Run one experiment and record it.",
-    "replay": "Rebuild the samples of a run from its bus trace.",
+    "monitor": "Watch a rig live; start, mark and stop experiments.",
+    "replay": "Play a recording or a bus trace through the on-line estimate.",
+    "convert": "Between the recording formats, and from bus traces.",
+    "runs": "The runs of a folder: list, show, compare, note, delete, export.",
     "identify": "Identify the driveline from recordings.",
+    "paper": "The paper's figures from eight experiments on the simulated rig, or from recordings.",
     "diagnose": "Locate the mismatch and name the missing physics.",
     "simulate": "Free-run simulation from the measured torques.",
     "compare": "Simulation against recording, in figures and plots.",
     "effects": "The catalogue of effects.",
+    "rig": "Write a new rig file from a few answers; its schema for editors.",
+    "model": "The schema of model files, for editors.",
+    "completion": "Print the completion script of a shell.",
+    "bugreport": "Pack what a supporter needs, without secrets.",
+    "export": "Write the on-line estimator as Structured Text for the PLC.",
 }
 """Each command's line in ``hil --help``; the command itself is ``app`` in ``hil.cli.<name>``."""
-
-
-def _overview() -> typer.Typer:
-    """Build the group that prints help and refuses unknown names, without importing any command."""
-    import typer
-
-    app = typer.Typer(
-        no_args_is_help=True,
-        add_completion=False,
-        help="Identify a driveline over its fieldbus and name the physics its model left out.",
-        epilog="Start with: hil demo. Each command has --help with an example.",
-    )
-
-    @app.callback(invoke_without_command=True)
-    def version(
-        version: bool = typer.Option(False, "--version", help="Print the version and exit."),
-    ) -> None:
-        if version:
-            typer.echo(f"hil {__version__}")
-            raise typer.Exit
-
-    for name, line in COMMANDS.items():
-        app.command(name, help=line)(lambda: None)
-    return app
-
-
-def _application(arguments: Sequence[str]) -> tuple[Callable[..., object], list[str], str]:
-    """Choose what runs: the named command's own application, or the overview."""
-    if arguments and arguments[0] in COMMANDS:
-        name = arguments[0]
-        return importlib.import_module(f"hil.cli.{name}").app, list(arguments[1:]), f"hil {name}"
-    return _overview(), list(arguments), "hil"
 
 
 def exit_status(error: BaseException) -> ExitStatus | None:
@@ -95,8 +72,15 @@ def exit_status(error: BaseException) -> ExitStatus | None:
     return next((status for family, status in families if isinstance(error, family)), None)
 
 
-def run(arguments: Sequence[str]) -> int:
+def run(line: Sequence[str], keep_log: bool = False) -> int:
     """Run one command line.
+
+    Parameters
+    ----------
+    line
+        Its words, without the program's name.
+    keep_log
+        Whether the user's log tells of it (`hil.support.command_log`).
 
     Returns
     -------
@@ -105,14 +89,26 @@ def run(arguments: Sequence[str]) -> int:
         none of ours is a defect and is raised with its traceback.
     """
     try:
-        return _run(arguments)
+        return _run(Call.parse(line, COMMANDS), keep_log)
     except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001 - the one place that maps errors to statuses
         return _report(error)
 
 
-def _run(arguments: Sequence[str]) -> int:
-    app, rest, name = _application(arguments)
-    result = app(rest, prog_name=name, standalone_mode=False)
+def _run(call: Call, keep_log: bool) -> int:
+    if call.command not in COMMANDS:
+        sys.stdout.write(f"hil {__version__}\n" if call.command == "--version" else overview(COMMANDS))
+        return ExitStatus.DONE if call.command else ExitStatus.BAD_INPUT
+    from hil.support.command_log import level_of, logged
+
+    level = level_of(call.log_level)
+    with logged(call.command, call.arguments, level if keep_log else "off"), silence(call.silent):
+        return _called(call)
+
+
+def _called(call: Call) -> int:
+    """Import the command that is called, it alone, and carry it out."""
+    app = importlib.import_module(f"hil.cli.{call.command}").app
+    result = app(list(call.arguments), prog_name=f"hil {call.command}", standalone_mode=False)
     if result == ExitStatus.INTERRUPTED:  # what typer makes of Ctrl-C
         raise KeyboardInterrupt
     return result if isinstance(result, int) else ExitStatus.DONE
@@ -143,4 +139,4 @@ def _complain(text: str) -> None:
 def main() -> None:
     """Entry point of the console script ``hil``."""
     interrupt_on_signals()
-    sys.exit(run(sys.argv[1:]))
+    sys.exit(run(sys.argv[1:], keep_log=True))

@@ -1,43 +1,135 @@
-"""``hil replay``: a bus trace through the drivers' decoding, back to the samples of the run."""
+"""``hil replay``: a recording or a bus trace through the on-line chain; a trace back to the samples of the run, too."""
 
 from __future__ import annotations
 
+import json
+import time
 from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+
+from hil.errors import UsageError
+
+if TYPE_CHECKING:
+    from estimator.identification.identify import Settings
+    from hil.rig.live_course import Course
+    from hil.rig.live_replay import Pace, Told
+
+SCHEMA = "hil.replay/1"
 
 app = typer.Typer(add_completion=False)
 
 
-@app.command(epilog="Example: hil replay cruise.blf --rig examples/rig.toml --out again.csv")
+@app.command(
+    epilog="Example: hil replay cruise.csv --speed 10. From a bus trace, and the recording back from it: "
+    "hil replay cruise.blf --rig examples/rig.toml --out again.csv"
+)
 def replay(
-    trace: Path = typer.Argument(..., metavar="TRACE", help="Bus trace of a run: .blf, .log (candump) or .asc."),
-    rig: Path = typer.Option(..., "--rig", metavar="RIG", help="Rig file of the run."),
-    out: Path = typer.Option(..., "--out", metavar="REC", help="Recording to write, .csv or .parquet; a new file."),
-    every: bool = typer.Option(False, "--all", help="Every cycle from the first SYNC, not only the measured part."),
-    as_json: bool = typer.Option(False, "--json", help="Print the result as JSON."),
+    recording: Annotated[
+        Path, typer.Argument(metavar="REC", help="Recording, or bus trace of a run: .blf, .log (candump) or .asc.")
+    ],
+    speed: Annotated[
+        float | None, typer.Option(metavar="X", help="Multiple of real time; as fast as it goes without it.")
+    ] = None,
+    estimate: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Where the course of the estimate goes, as JSON.")
+    ] = None,
+    model: Annotated[
+        Path | None, typer.Option(metavar="MODEL", help="Model file: how to read a foreign recording.")
+    ] = None,
+    sample_time: Annotated[
+        float, typer.Option(metavar="SECONDS", help="Sampling period of the models; a multiple of the recording's.")
+    ] = 0.02,
+    rig: Annotated[Path | None, typer.Option(metavar="RIG", help="Rig file of the run; for a bus trace.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="REC", help="Recording to rebuild from a bus trace; a new file.")
+    ] = None,
+    every: Annotated[
+        bool, typer.Option("--all", help="Every cycle of a bus trace from the first SYNC, not only the measured part.")
+    ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
-    """Rebuild a recording from a bus trace; opens no bus.
+    """Play a recording through the on-line chain: the estimates and alarms of the run, to the bit; opens no bus.
 
-    Torque and speed are those the run recorded, to the bit. References are what was on the bus: whole per mille of
-    the rated torque. The PLC is not on this bus, so no sample is flagged for it.
+    From a bus trace, torque and speed are those the run recorded, to the bit; references are what was on the bus:
+    whole per mille of the rated torque. The PLC is not on this bus, so no sample is flagged for it.
     """
-    import json
+    from hil.report.outputs import publish
+    from hil.rig.live import tracking_settings
+    from hil.rig.live_replay import Pace, is_trace
 
+    if speed is not None and not speed > 0:
+        raise UsageError(f"--speed: expected a multiple of real time above 0, came {speed:g}")
+    settings, pace = tracking_settings(sample_time), Pace(speed)
+    begun_s = time.perf_counter()
+    if is_trace(recording):
+        _require(recording, "a bus trace", {"--rig": rig}, {"--model": model})
+        course, result = _play_trace(recording, rig or Path(), out, every, settings, pace)
+    else:
+        _require(recording, "a recording", {}, {"--rig": rig, "--out": out, "--all": every or None})
+        course, result = _play_recording(recording, model, settings, pace)
+    took_s = time.perf_counter() - begun_s
+    if estimate is not None:
+        publish(estimate.absolute().parent, {estimate.name: course.write})
+    if as_json:
+        rate = course.samples / took_s
+        typer.echo(json.dumps({"schema": SCHEMA, **result, "samples_per_s": rate, "online": course.summary()}))
+        return
+    if out is not None:
+        typer.echo(f"{out}: {result['recorded']} samples, {result['flagged']} flagged")
+    typer.echo(f"{recording}: {course.samples} samples in {took_s:.2f} s; {course.statement}")
+    for alarm in course.alarms:
+        typer.echo(f"  alarm: {alarm.statement}")
+
+
+def _require(path: Path, what: str, needed: dict[str, object], senseless: dict[str, object]) -> None:
+    for option, value in needed.items():
+        if value is None:
+            raise UsageError(f"{path}: expected {option} with {what}, came none")
+    for option, value in senseless.items():
+        if value is not None:
+            hint = " To rewrite a recording: hil convert." if option == "--out" else ""
+            raise UsageError(f"{path}: expected no {option} with {what}, came one.{hint}")
+
+
+def _play_recording(path: Path, model: Path | None, settings: Settings, pace: Pace) -> tuple[Course, dict[str, Any]]:
+    from hil.config.model_file import read_model_for_recordings
+    from hil.recording import read_record
+    from hil.rig.live_replay import play_record
+
+    signals = None if model is None else read_model_for_recordings(model).signals
+    record = read_record(path, signals)
+    course = play_record(record, settings, pace, _show(pace))
+    flagged = int((~record.okay).sum())
+    return course, {"recording": str(path), "recorded": course.samples, "flagged": flagged}
+
+
+def _play_trace(
+    path: Path, rig_path: Path, out: Path | None, every: bool, settings: Settings, pace: Pace
+) -> tuple[Course, dict[str, Any]]:
     from hil.config.rig_file import read_rig
     from hil.recording import RecordingWriter
-    from hil.rig.metadata import run_metadata
+    from hil.rig.live_replay import play_samples
+    from hil.rig.metadata import replay_metadata
     from hil.rig.replay import replay as replayed
 
-    samples = list(replayed(trace, read_rig(rig), whole=every))  # all of them before any is written
-    metadata = {**run_metadata(rig, f"replay of {trace.name}"), "replayed_from": trace.name}
-    with RecordingWriter(out, metadata) as recorder:
-        for sample in samples:
-            recorder.append(sample)
+    rig = read_rig(rig_path)
+    samples = list(replayed(path, rig, whole=every))  # all of them before any is written
+    course = play_samples(samples, rig.period_s, settings, pace, _show(pace))
+    if out is not None:
+        with RecordingWriter(out, replay_metadata(rig_path, path, samples[0].t_ns)) as recorder:
+            for sample in samples:
+                recorder.append(sample)
     flagged = sum(bool(sample.flags) for sample in samples)
-    if as_json:
-        typer.echo(
-            json.dumps({"schema": "hil.replay/1", "recording": str(out), "recorded": len(samples), "flagged": flagged})
-        )
-    else:
-        typer.echo(f"{out}: {len(samples)} samples, {flagged} flagged")
+    return course, {"recording": None if out is None else str(out), "recorded": len(samples), "flagged": flagged}
+
+
+def _show(pace: Pace) -> Told:
+    """Return what shows the estimate as it goes: on a terminal, where the eye can follow."""
+    from rich.console import Console
+
+    console = Console(stderr=True)
+    if pace.speed is None or not console.is_terminal:
+        return lambda course, time_s: None
+    return lambda course, time_s: console.print(f"{time_s:8.1f} s  {course.statement}", end="\r", highlight=False)

@@ -8,19 +8,21 @@ from contextlib import contextmanager, nullcontext
 from dataclasses import asdict, dataclass
 from enum import Enum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from drivers.canopen.can_link import CanLink
 from hil.cli.run_progress import RunProgress
 from hil.config.rig_file import Rig, read_rig
-from hil.errors import UsageError
+from hil.errors import HilError, UsageError
 from hil.recording.writer import RecordingWriter
+from hil.report.outputs import publish
 from hil.rig.addresses import with_addresses
 from hil.rig.build import open_devices
 from hil.rig.drive import RunSummary
 from hil.rig.experiments.base import Phase
+from hil.rig.live_course import course_path
 from hil.rig.metadata import run_metadata
 from hil.rig.pacing import FreePacer, Pacer, RealTimePacer, period_ns
 from hil.rig.plan import plan_run
@@ -31,7 +33,11 @@ from hil.rig.timing import RunTiming, timing_lines
 from hil.rig.trace import BusTrace
 from hil.simulator.loopback import bus_address
 from hil.simulator.rig_server import IN_PROCESS, required_simulation
+from hil.store import register_run
+from hil.store.entry import COMPLETE, ONLINE
 
+if TYPE_CHECKING:
+    from hil.rig.live import LiveEstimate
 app = typer.Typer(add_completion=False)
 
 
@@ -64,9 +70,12 @@ def run(
             metavar="FILE", help="Bus trace beside it: every frame; .blf, .log (candump) or .asc; a new file."
         ),
     ] = None,
+    estimate: Annotated[
+        bool, typer.Option(help="Estimate while driving; its course goes beside the recording: .online.json.")
+    ] = True,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
-    """Run one experiment and record its measured part.
+    """Run one experiment, record its measured part, and follow the resonance while driving.
 
     The drives are at zero torque and disarmed on every way out, Ctrl-C included; the recording then holds
     everything up to there.
@@ -78,10 +87,33 @@ def run(
     if out is None:
         raise UsageError("hil run: expected --out REC, a recording to write, or --dry-run; came neither.")
     metadata = {**run_metadata(rig, experiment), "pace": pace.value}
-    job = _Job(rig_file, experiment, out, trace, _pacer(rig_file, pace), metadata)
+    live = live_estimate(rig_file, out) if estimate else None
+    job = _Job(rig_file, experiment, out, trace, pacer_for(rig_file, pace), metadata, live)
     with real_time() if pace is Pace.REAL else nullcontext(NOT_ASKED) as grants:
         summary = _record(job, grants)
     _report(job, summary, grants, as_json)
+
+
+def live_estimate(rig: Rig, recording: Path) -> LiveEstimate:
+    """Make what estimates a run while it goes on.
+
+    Raises
+    ------
+    UsageError
+        If its file is there already, or the rig's period does not divide that of the models.
+    """
+    from estimator.errors import BadSetting
+    from hil.rig.live import LiveEstimate, tracking_chain
+
+    if course_path(recording).exists():
+        raise UsageError(
+            f"{course_path(recording)}: expected no such file, came one of an earlier run. Move it away, or choose "
+            "another name with --out."
+        )
+    try:
+        return LiveEstimate(tracking_chain(rig.period_s))
+    except BadSetting as error:
+        raise UsageError(f"{error} Or record without an estimate: --no-estimate.") from error
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,12 +126,15 @@ class _Job:
     trace: Path | None
     pacer: Pacer
     metadata: dict[str, str]
+    live: LiveEstimate | None
 
 
 def _record(job: _Job, grants: RealTimeGrants) -> RunSummary:
     plan = plan_run(job.rig, job.experiment)
     stop, timing = StopRequest(), RunTiming(job.pacer.period_ns)
     recorder = RecordingWriter(job.out, {**job.metadata, "real_time": json.dumps(grants.as_json())})
+    observers = () if job.live is None else (job.live,)
+    ended_by = COMPLETE
     try:
         with (
             stop_on_signals(stop),
@@ -113,13 +148,30 @@ def _record(job: _Job, grants: RealTimeGrants) -> RunSummary:
             def show(phase: Phase, time_s: float) -> None:
                 if trace is not None:
                     trace.raise_if_failed()
-                progress.show(phase, time_s)
+                progress.show(phase, time_s, None if job.live is None else job.live.latest)
 
-            return run_plan(devices, plan, job.pacer, recorder, stop, show, timing)
-    except BaseException:
+            return run_plan(devices, plan, job.pacer, recorder, stop, show, timing, observers)
+    except BaseException as error:
+        ended_by = "interrupted" if isinstance(error, KeyboardInterrupt) else str(error) or type(error).__name__
         if recorder.kept is not None:
             typer.echo(f"{recorder.kept} holds the {recorder.n_samples} samples up to there", err=True)
         raise
+    finally:
+        if job.live is not None and recorder.kept is not None:
+            beside = course_path(job.out)
+            publish(beside.parent, {beside.name: job.live.course.write})
+        _register(job, recorder, ended_by)
+
+
+def _register(job: _Job, recorder: RecordingWriter, ended_by: str) -> None:
+    """Enter the run into the store beside its recording, which stays whole where that can't be done."""
+    if recorder.kept != job.out:
+        return
+    results = {} if job.live is None else {ONLINE: course_path(job.out)}
+    try:
+        register_run(job.out, ended_by, results=results)
+    except HilError as error:
+        typer.echo(f"{error}\n{job.out} is whole; 'hil runs rebuild --store {job.out.parent}' enters it.", err=True)
 
 
 @contextmanager
@@ -145,7 +197,14 @@ def _traced(link: CanLink, path: Path | None) -> Iterator[BusTrace | None]:
             link.trace_by(None)
 
 
-def _pacer(rig: Rig, pace: Pace) -> Pacer:
+def pacer_for(rig: Rig, pace: Pace) -> Pacer:
+    """Make the pacer of one run.
+
+    Raises
+    ------
+    UsageError
+        If it is to be fast and the rig is none that is simulated on this machine.
+    """
     if pace is Pace.REAL:
         return RealTimePacer(period_ns(rig.period_s))
     required_simulation(rig)
@@ -167,6 +226,7 @@ def _report(job: _Job, summary: RunSummary, grants: RealTimeGrants, as_json: boo
             "most_late_ns": summary.most_late_ns,
             "timing": timing.as_json(),
             "real_time": grants.as_json(),
+            "online": None if job.live is None else job.live.course.summary(),
         }
         typer.echo(json.dumps(document))
         return
@@ -179,6 +239,10 @@ def _report(job: _Job, summary: RunSummary, grants: RealTimeGrants, as_json: boo
     typer.echo(f"  {grants.statement}")
     if job.trace is not None:
         typer.echo(f"{job.trace}: every frame of the bus")
+    if job.live is not None and summary.recorded:
+        typer.echo(f"{course_path(job.out)}: {job.live.course.statement}")
+        for alarm in job.live.course.alarms:
+            typer.echo(f"  alarm: {alarm.statement}")
 
 
 def _predict(rig: Rig, experiment: str, as_json: bool) -> None:

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from types import TracebackType
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from hil.rig.experiments.base import Phase
+from hil.rig.live_course import statement
 from hil.rig.plan import Plan
+
+if TYPE_CHECKING:
+    from estimator.identification.online.online_estimate import OnlineEstimate
 
 SHOW_EVERY_S = 0.1
 """Time between two changes of the bar [s of the run]; the cycle has better things to do."""
@@ -31,10 +35,11 @@ class RunProgress:
             BarColumn(),
             TextColumn("{task.completed:.1f} of {task.total:.1f} s"),
             TimeElapsedColumn(),
+            TextColumn("{task.fields[estimate]}"),
             console=console,
             disable=not console.is_terminal,
         )
-        self._task = self._bar.add_task(plan.name, total=plan.experiment.duration_s)
+        self._task = self._bar.add_task(plan.name, total=plan.experiment.duration_s, estimate="")
         self._name = plan.name
         self._shown: tuple[Phase, float] | None = None
 
@@ -47,10 +52,11 @@ class RunProgress:
     ) -> None:
         self._bar.stop()
 
-    def show(self, phase: Phase, time_s: float) -> None:
-        """Take note of one cycle: its phase and the time since the phase began [s]."""
+    def show(self, phase: Phase, time_s: float, estimate: OnlineEstimate | None = None) -> None:
+        """Take note of one cycle: its phase, the time since the phase began [s], and the estimate, if there is one."""
         if self._shown is not None and self._shown[0] is phase and time_s - self._shown[1] < SHOW_EVERY_S:
             return
         self._shown = (phase, time_s)
         measured_s = time_s if phase is Phase.MEASURE else None
-        self._bar.update(self._task, description=f"{self._name}: {phase.value}", completed=measured_s)
+        told = "" if estimate is None else statement(estimate)
+        self._bar.update(self._task, description=f"{self._name}: {phase.value}", completed=measured_s, estimate=told)

@@ -7,13 +7,14 @@ Torques are of both inverters together. What every kind has:
 - ``slew_nm_per_s``: nor does it change faster than this;
 - ``approach_timeout_s``: time in which the start speed must be reached;
 - ``share_m1``: the part of the base torque that inverter m1 gives. A gain that is not what an inverter reports shows
-  where the two share differently from test to test.
+  where the two share differently from test to test;
+- ``prbs``: whether the PRBS is superposed on the recorded part.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Annotated, Literal, Self
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -35,6 +36,7 @@ class ExperimentTable(Table):
     slew_nm_per_s: Positive
     approach_timeout_s: Positive = APPROACH_TIMEOUT_S
     share_m1: Annotated[float, Field(ge=0, le=1)] = EVEN_SHARE
+    prbs: bool = True
 
 
 class CruiseTable(ExperimentTable):
@@ -71,7 +73,43 @@ class TipTable(ExperimentTable):
         return self
 
 
-AnyExperiment = Annotated[CruiseTable | ReversalTable | TipTable, Field(discriminator="kind")]
+class PulsesTable(ExperimentTable):
+    """Pulses of ``step_nm`` both ways from standstill, ``step_s`` the shortest, without a speed controller.
+
+    Ends where the speed exceeds ``most_speed_rad_s``. ``torque_nm`` may be left out: it is ``step_nm`` then. No PRBS.
+    """
+
+    kind: Literal["pulses"]
+    step_nm: Positive
+    step_s: Positive
+    most_speed_rad_s: Positive
+    prbs: Literal[False] = False
+
+    @model_validator(mode="before")
+    @classmethod
+    def _torque_is_the_step(cls, keys: Any) -> Any:
+        known = isinstance(keys, Mapping) and "step_nm" in keys
+        return {"torque_nm": keys["step_nm"], **keys} if known else keys
+
+    @model_validator(mode="after")
+    def _step_within_torque(self) -> Self:
+        refuse(_part_above_torque("step_nm", self.step_nm, self.torque_nm))
+        return self
+
+
+class RestTable(ExperimentTable):
+    """Zero torque at standstill, armed: what the readings show of themselves. No torque, no slew, no PRBS."""
+
+    kind: Literal["rest"]
+    torque_nm: Annotated[float, Field(ge=0, le=0)] = 0.0
+    slew_nm_per_s: Annotated[float, Field(ge=0, le=0)] = 0.0
+    prbs: Literal[False] = False
+
+
+DrivenTable = CruiseTable | ReversalTable | TipTable
+"""Kinds that a speed control leads up to."""
+
+AnyExperiment = Annotated[DrivenTable | PulsesTable | RestTable, Field(discriminator="kind")]
 
 
 def _part_above_torque(key: str, value_nm: float, torque_nm: float) -> Iterator[Fault]:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Annotated, Any, Final, Self
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 
 from drivers.inverter.cia402 import TorqueMode
 from drivers.inverter.drive_settings import ABORT_CONNECTION
@@ -69,7 +69,11 @@ class InverterTable(Table):
     product_code: Unsigned32
     rated_torque_nm: Positive
     torque_limit_nm: Positive
-    mode: Annotated[TorqueMode, BeforeValidator(_mode_by_name)]
+    mode: Annotated[
+        TorqueMode,
+        BeforeValidator(_mode_by_name),
+        WithJsonSchema({"enum": [mode.name.lower() for mode in TorqueMode], "type": "string"}),
+    ]
     heartbeat_ms: Annotated[int, Field(ge=10, le=65535)]
     rpdo_deadline_ms: Annotated[int, Field(ge=2, le=65535)] = 200
     option_codes: OptionCodesTable = OptionCodesTable()

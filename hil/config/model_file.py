@@ -21,6 +21,7 @@ from tomlkit.items import InlineTable, Table
 
 from estimator.errors import BadModel
 from estimator.physics.model import DrivelineModel, EffectValue, Motion, Parameter, Structure, parameter_unit
+from hil.config.file_schema import FileKind, schema_line
 from hil.config.laws import LawTable, install_laws, moved
 from hil.config.problems import Fault, problem_lines, read_toml, refuse
 from hil.errors import ModelFileError
@@ -69,7 +70,9 @@ class _Geometry(_Strict):
     gear_ratio: float = Field(gt=0)
 
 
-class _Document(_Strict):
+class ModelDocument(_Strict):
+    """The file's tables, before the model is made of them."""
+
     schema_: Literal["hil.model/1"] = Field(alias="schema")
     structure: Annotated[Structure, Field(strict=False)]
     motion: Annotated[Motion, Field(strict=False)] = Motion.ROTATION
@@ -107,9 +110,9 @@ def read_model(path: Path | str) -> ModelFile:
     problems: list[str] = []
     document = model = None
     try:
-        document = _Document.model_validate(content)
+        document = ModelDocument.model_validate(content)
     except ValidationError as error:
-        problems += problem_lines(_Document, error)
+        problems += problem_lines(ModelDocument, error)
     install_laws(path, {} if document is None else document.laws)
     known = {} if document is not None else _table(content.get("laws"))
     try:
@@ -234,7 +237,7 @@ def _as_toml(model: DrivelineModel, signals: SignalsConfig | None, laws: Mapping
         document["laws"] = _laws_table(laws)
     if signals is not None:
         document["signals"] = _signals_table(signals)
-    return tomlkit.dumps(document)
+    return f"{schema_line(FileKind.MODEL)}\n{tomlkit.dumps(document)}"
 
 
 def _effects_table(model: DrivelineModel) -> Table:

@@ -4,7 +4,8 @@ Read: file -> ``Table`` (columns, units, metadata) -> ``estimator.signals.record
 Write: one ``Sample`` per cycle through ``RecordingWriter``, or a whole table by ``write_table``.
 """
 
-from hil.recording.formats import read_table, write_table
+from hil.recording.formats import read_table
+from hil.recording.publish import write_table
 from hil.recording.read_all import read_records
 from hil.recording.signals import read_record
 from hil.recording.signals_config import SignalsConfig

@@ -26,3 +26,19 @@ UNITS: Final = MappingProxyType(
     }
 )
 """Column to unit, in the order a recording of the rig has them; ``flags`` is a bit field without unit."""
+
+COMMENTS: Final = MappingProxyType(
+    {
+        TIME: "time since the first recorded cycle",
+        "torque_ref_nm": "torque reference of both inverters, PRBS included",
+        TORQUE_M1: "torque actual value of inverter m1 (0x6077)",
+        TORQUE_M2: "torque actual value of inverter m2 (0x6077)",
+        SPEED: "motor speed from the resolver (0x606C)",
+        "prbs_nm": "PRBS part of the torque reference (0x60B2)",
+        FLAGS: "quality: 0 good, 1 m1 stale, 2 m2 stale, 4 cycle late, 8 PLC stale, added up",
+        "torque_ref_m1_nm": "torque reference of inverter m1",
+        "torque_ref_m2_nm": "torque reference of inverter m2",
+        "age_s": "age of the oldest value of the row",
+    }
+)
+"""Column to what it holds, for formats that have a place for it."""

@@ -1,8 +1,9 @@
 """CSV: one header line, one line per row, nothing else.
 
 - Floats are written as the shortest decimal that reads back to the same bits, integers without a point; that
-  difference is how a reader tells them apart, so that CSV to Parquet and back loses nothing. Text that looks
-  like a number becomes one. Units have no place here; metadata stand in a file beside (`hil.recording.sidecar`).
+  difference is how a reader tells them apart, so that CSV to Parquet and back loses nothing. Units, metadata and the
+  kind of columns whose cells do not tell it stand in a file beside (`hil.recording.sidecar`); without that file text
+  that looks like a number becomes one.
 - A last line without line end is taken (RFC 4180 allows it): a file cut inside its very last number can't be
   told from a whole one. A cut anywhere else leaves a row with cells missing, and is refused.
 - A quoted cell must end on its line, so that a row is a line and every fault has its number.
@@ -22,7 +23,8 @@ import pyarrow.csv
 
 from hil.errors import RecordingError
 from hil.recording.format_hints import FormatHints
-from hil.recording.sidecar import read_sidecar
+from hil.recording.kinds import Kind, as_text
+from hil.recording.sidecar import SCHEMA_KEY, TYPES_KEY, UNITS_KEY, Sidecar, read_sidecar, write_sidecar
 from hil.recording.table import Column, Table
 
 DELIMITERS = ",;\t|"
@@ -34,6 +36,11 @@ BLOCK_BYTES = 1 << 22
 """pyarrow parses this much at once; also the longest line it can take."""
 
 FIRST_ROW_LINE = 2
+
+TRUTH = pa.array(["True", "False"])
+
+TABLE_KEYS = frozenset({SCHEMA_KEY, UNITS_KEY, TYPES_KEY})
+"""Keys that have a meaning of their own in the file beside, and so can't be metadata."""
 
 
 def read(path: Path, hints: FormatHints) -> Table:
@@ -54,12 +61,13 @@ def read(path: Path, hints: FormatHints) -> Table:
     if b"\n" not in content:
         return Table(path, {})  # refuses: no rows
     cells = _parse(path, content, names, delimiter)
-    columns = {name: _column(cells[name]) for name in names}
-    return Table(path, columns, metadata=read_sidecar(path), first_line=FIRST_ROW_LINE)
+    said = read_sidecar(path)
+    columns = {name: _column(cells[name], said.types.get(name)) for name in names}
+    return Table(path, columns, said.units, said.metadata, FIRST_ROW_LINE)
 
 
 def write(table: Table, path: Path) -> None:
-    """Write a table as CSV; units and metadata are left out.
+    """Write a table as CSV, and what it says of itself beside it.
 
     Raises
     ------
@@ -70,6 +78,13 @@ def write(table: Table, path: Path) -> None:
     with path.open("w", encoding="utf-8", newline="") as file:
         file.write(",".join(map(_quoted, table.columns)) + "\n")
         file.writelines(",".join(row) + "\n" for row in zip(*columns, strict=True))
+    write_sidecar(path, description_of(table))
+
+
+def description_of(table: Table) -> Sidecar:
+    """Return what has to stand beside a table that is written as CSV."""
+    types = {name: Kind.of(column) for name, column in table.columns.items() if not _tells_its_kind(column)}
+    return Sidecar({key: value for key, value in table.metadata.items() if key not in TABLE_KEYS}, table.units, types)
 
 
 def _utf8(path: Path, encoding: str) -> bytes:
@@ -144,22 +159,34 @@ def _broken_line(content: bytes, expected: int, delimiter: str) -> str:
     return f"expected lines shorter than {BLOCK_BYTES} bytes, came a longer one"
 
 
-def _column(cells: pa.ChunkedArray) -> Column:
-    """Turn text into int64, float64, or leave it, whichever is the first to fit every cell."""
+def _column(cells: pa.ChunkedArray, kind: Kind | None = None) -> Column:
+    """Turn text into the kind it is said to be; unsaid into int64, float64 or text, whichever first fits every cell."""
+    if kind is Kind.TEXT:
+        return as_text(cells.to_pylist())
+    if kind is Kind.BOOLEAN and pa.compute.all(pa.compute.is_in(cells, TRUTH)).as_py():
+        return np.asarray(pa.compute.equal(cells, "True").to_numpy())
     trimmed = pa.compute.utf8_trim_whitespace(cells)
-    for kind in (pa.int64(), pa.float64()):
+    for numeric in (pa.int64(), pa.float64()):
         try:
-            return np.asarray(pa.compute.cast(trimmed, kind).to_numpy())
+            return np.asarray(pa.compute.cast(trimmed, numeric).to_numpy())
         except pa.ArrowInvalid:
             continue
-    return np.array(trimmed.to_pylist(), dtype=object)
+    return as_text(trimmed.to_pylist())
+
+
+def _tells_its_kind(column: Column) -> bool:
+    """Whether the cells alone lead a reader to the same column."""
+    if Kind.of(column) is not Kind.TEXT:
+        return Kind.of(column) is not Kind.BOOLEAN
+    read = _column(pa.chunked_array([pa.array(column, type=pa.string())]))
+    return Kind.of(read) is Kind.TEXT and bool(np.all(read == column))
 
 
 def _cells(table: Table, path: Path, name: str) -> Iterable[str]:
     column = table.columns[name]
     if column.dtype != object:
         return map(repr, column.tolist())
-    texts = [str(cell) for cell in column]
+    texts = column.tolist()
     broken = next((row for row, text in enumerate(texts) if "\n" in text or "\r" in text), None)
     if broken is not None:
         raise RecordingError(
@@ -171,5 +198,6 @@ def _cells(table: Table, path: Path, name: str) -> Iterable[str]:
 
 
 def _quoted(text: str) -> str:
-    """Quote a text with anything in it that a reader could take for a delimiter."""
-    return '"' + text.replace('"', '""') + '"' if any(c in text for c in f'{DELIMITERS}"') else text
+    """Quote a text with anything in it that a reader could take for a delimiter, or that would leave a line empty."""
+    unclear = not text or any(c in text for c in f'{DELIMITERS}"')
+    return '"' + text.replace('"', '""') + '"' if unclear else text

@@ -1,17 +1,20 @@
-"""The recording formats, by file name suffix. A new one is a file with ``read`` and ``write`` and a line."""
+"""The recording formats, by file name suffix. A new one is a file with ``read`` and ``write`` and a line.
+
+Writing is in `hil.recording.publish`.
+"""
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 
 from hil.errors import RecordingError
-from hil.recording import csv_format, mat_format, parquet_format
+from hil.recording import csv_format, hdf5_format, mat_format, mdf_format, parquet_format
+from hil.recording.checksum import require_whole
 from hil.recording.format_hints import FormatHints
-from hil.recording.sidecar import read_sidecar
+from hil.recording.sidecar import read_sidecar_metadata, sidecar_of
 from hil.recording.table import Table
 
 
@@ -20,18 +23,24 @@ class Format:
     """How one kind of file is read and written.
 
     ``write`` is None for a format that is only read, ``metadata`` for one whose metadata come with the table alone.
+    ``beside`` names the file that belongs to a recording in a format that has no place for all there is to say.
     """
 
     read: Callable[[Path, FormatHints], Table]
     write: Callable[[Table, Path], None] | None
     metadata: Callable[[Path], Mapping[str, str]] | None = None
+    beside: Callable[[Path], Path] | None = None
 
 
 FORMATS: Mapping[str, Format] = MappingProxyType(
     {
-        ".csv": Format(csv_format.read, csv_format.write, read_sidecar),
+        ".csv": Format(csv_format.read, csv_format.write, read_sidecar_metadata, sidecar_of),
         ".parquet": Format(parquet_format.read, parquet_format.write, parquet_format.read_metadata),
-        ".mat": Format(mat_format.read, None),
+        ".mf4": Format(mdf_format.read, mdf_format.write, mdf_format.read_metadata),
+        ".mdf": Format(mdf_format.read, None, mdf_format.read_metadata),
+        ".h5": Format(hdf5_format.read, hdf5_format.write, hdf5_format.read_metadata),
+        ".hdf5": Format(hdf5_format.read, hdf5_format.write, hdf5_format.read_metadata),
+        ".mat": Format(mat_format.read, mat_format.write, mat_format.read_metadata),
     }
 )
 
@@ -42,18 +51,14 @@ def read_table(path: Path | str, hints: FormatHints | None = None) -> Table:
     Raises
     ------
     RecordingError
-        If the file can't be opened, its suffix is unknown, or its content is at fault.
+        If the file can't be opened, its suffix is unknown, its content is at fault, or not what its checksum says.
     """
     path = Path(path)
-    known = FORMATS.get(path.suffix.lower())
-    if known is None:
-        raise RecordingError(path, f"expected a recording ({', '.join(FORMATS)}), came {path.suffix!r}")
-    try:
-        with path.open("rb"):
-            pass
-    except OSError as error:
-        raise RecordingError(path, f"expected a readable file, came: {error.strerror}") from error
-    return known.read(path, hints or FormatHints())
+    known = _known(path)
+    _require_readable(path)
+    table = known.read(path, hints or FormatHints())
+    require_whole(table)
+    return table
 
 
 def read_metadata(path: Path | str) -> Mapping[str, str]:
@@ -62,17 +67,18 @@ def read_metadata(path: Path | str) -> Mapping[str, str]:
     Raises
     ------
     RecordingError
-        As `read_table`.
+        As `read_table`, but for the checksum.
     """
     path = Path(path)
-    known = FORMATS.get(path.suffix.lower())
-    if known is None or known.metadata is None or not path.is_file():
+    known = _known(path)
+    if known.metadata is None:
         return read_table(path).metadata
+    _require_readable(path)
     return known.metadata(path)
 
 
-def writer_for(path: Path) -> Callable[[Table, Path], None]:
-    """Return what writes a new recording of that name.
+def writer_for(path: Path, replace: bool = False) -> Callable[[Table, Path], None]:
+    """Return what writes a recording of that name, a new one unless it may replace another.
 
     Raises
     ------
@@ -83,28 +89,39 @@ def writer_for(path: Path) -> Callable[[Table, Path], None]:
     if known is None or known.write is None:
         writable = ", ".join(suffix for suffix, form in FORMATS.items() if form.write)
         raise RecordingError(path, f"expected a name that ends in one of {writable}, came {path.suffix!r}")
-    if path.exists():
-        raise RecordingError(
-            path, "expected a new name, came one that exists: a recording is never overwritten. Move it away."
-        )
+    if not replace:
+        _require_new(path, known)
+    elif path.is_dir():
+        raise RecordingError(path, "expected the name of a recording, came a folder. Choose another name.")
     if not path.parent.is_dir():
         raise RecordingError(path, f"expected an existing folder, came {path.parent}. Make it first.")
     return known.write
 
 
-def write_table(table: Table, path: Path | str) -> None:
-    """Write a new recording, whole or not at all.
+def _known(path: Path) -> Format:
+    known = FORMATS.get(path.suffix.lower())
+    if known is None:
+        raise RecordingError(path, f"expected a recording ({', '.join(FORMATS)}), came {path.suffix!r}")
+    return known
 
-    Raises
-    ------
-    RecordingError
-        As :func:`writer_for`, or if the format can't hold the content.
-    """
-    path = Path(path)
-    write = writer_for(path)
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+
+def _require_readable(path: Path) -> None:
     try:
-        write(table, part)
-        part.rename(path)
-    finally:
-        part.unlink(missing_ok=True)
+        with path.open("rb"):
+            pass
+    except OSError as error:
+        raise RecordingError(path, f"expected a readable file, came: {error.strerror}") from error
+
+
+def _require_new(path: Path, known: Format) -> None:
+    try:
+        if path.exists():
+            raise RecordingError(
+                path, "expected a new name, came one that exists: a recording is never overwritten. Move it away."
+            )
+        if known.beside is not None and (beside := known.beside(path)).exists():
+            raise RecordingError(
+                beside, "expected a new name, came one that exists: it describes another recording. Move it away."
+            )
+    except OSError as error:
+        raise RecordingError(path, f"expected a place to write, came: {error.strerror or error}") from error

@@ -1,25 +1,26 @@
-"""MATLAB .mat, versions 4 to 7: the numeric vectors of one length are the columns, scalars are metadata.
+"""MATLAB .mat: versions 4 to 7 are read here, version 7.3 is read and written by `hil.recording.mat73_format`.
 
-A .mat file is a bag of variables. The length that most vectors share is taken as that of the recording (the
-longest, where two are equally frequent); vectors of other lengths are left out.
+A .mat file is a bag of variables: the numeric vectors of the length that most of them share are the columns, scalars
+are metadata.
 """
 
 from __future__ import annotations
 
 import zlib
-from collections import Counter
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-import scipy.io
-from scipy.io.matlab import MatReadError
 
 from hil.errors import RecordingError
+from hil.recording import mat73_format
 from hil.recording.format_hints import FormatHints
-from hil.recording.table import Column, Table
+from hil.recording.kinds import as_column
+from hil.recording.shared_length import columns_of_shared_length
+from hil.recording.table import Table
 
-DAMAGED = (MatReadError, ValueError, TypeError, IndexError, KeyError, OSError, zlib.error)
-"""What scipy raises on a file that is cut or no .mat file."""
+DAMAGED = (ValueError, TypeError, IndexError, KeyError, OSError, NotImplementedError, zlib.error)
+"""What scipy raises, beside its own, on a file that is cut or no .mat file."""
 
 
 def read(path: Path, hints: FormatHints) -> Table:
@@ -28,26 +29,38 @@ def read(path: Path, hints: FormatHints) -> Table:
     Raises
     ------
     RecordingError
-        If the file is damaged, of version 7.3, or holds no numeric vector.
+        If the file is damaged, or holds no numeric vector.
     """
+    import scipy.io
+    from scipy.io.matlab import MatReadError
+
+    if is_version_73(path):
+        return mat73_format.read(path)
     try:
         variables = scipy.io.loadmat(path)
-    except NotImplementedError as error:
-        raise RecordingError(
-            path, "expected MATLAB version 4 to 7, came version 7.3 (HDF5). Save it again with -v7."
-        ) from error
-    except DAMAGED as error:
+    except (*DAMAGED, MatReadError) as error:
         raise RecordingError(path, f"expected a whole .mat file, came a damaged or truncated one ({error})") from error
-    numeric = {
-        name: value for name, value in variables.items() if isinstance(value, np.ndarray) and value.dtype.kind in "fiub"
-    }
+    arrays = {name: value for name, value in variables.items() if isinstance(value, np.ndarray)}
+    numeric = {name: value for name, value in arrays.items() if value.dtype.kind in "fiub"}
     vectors = {name: v.ravel() for name, v in numeric.items() if v.size > 1 and max(v.shape) == v.size}
     scalars = {name: repr(value.item()) for name, value in numeric.items() if value.size == 1}
-    counts = Counter(vector.size for vector in vectors.values())
-    length = max(counts, key=lambda size: (counts[size], size), default=0)
-    columns = {name: _column(vector) for name, vector in vectors.items() if vector.size == length}
-    return Table(path, columns, metadata=scalars)
+    chosen, remarks = columns_of_shared_length(vectors)
+    other = [f"{name}: left out, it is no vector of numbers" for name in arrays if name not in {**vectors, **scalars}]
+    columns = {name: as_column(vector) for name, vector in chosen.items()}
+    return Table(path, columns, metadata=scalars, remarks=(*remarks, *other))
 
 
-def _column(vector: Column) -> Column:
-    return vector.astype(np.float64 if vector.dtype.kind == "f" else np.int64)
+def read_metadata(path: Path) -> Mapping[str, str]:
+    """Read what a .mat recording says of itself."""
+    return mat73_format.read_metadata(path) if is_version_73(path) else read(path, FormatHints()).metadata
+
+
+def write(table: Table, path: Path) -> None:
+    """Write a table, as version 7.3."""
+    mat73_format.write(table, path)
+
+
+def is_version_73(path: Path) -> bool:
+    """Whether a .mat file is HDF5 inside; its header says so (MAT-File Format, version 7.3)."""
+    with path.open("rb") as file:
+        return file.read(len(mat73_format.TITLE)) == mat73_format.TITLE

@@ -11,7 +11,8 @@ import pyarrow.parquet
 
 from hil.errors import RecordingError
 from hil.recording.format_hints import FormatHints
-from hil.recording.table import Column, Table
+from hil.recording.kinds import Column, as_column, as_text
+from hil.recording.table import Table
 
 UNIT_KEY = b"unit"
 
@@ -28,7 +29,7 @@ def read(path: Path, hints: FormatHints) -> Table:
         If the file is no whole Parquet file, or holds no rows.
     """
     try:
-        with pa.parquet.ParquetFile(path) as file:
+        with pa.parquet.ParquetFile(path, page_checksum_verification=True) as file:
             content = file.read()
     except (pa.ArrowException, OSError) as error:
         raise RecordingError(
@@ -69,7 +70,7 @@ def write(table: Table, path: Path) -> None:
         fields.append(pa.field(name, array.type, metadata=None if unit is None else {UNIT_KEY: unit.encode()}))
         arrays.append(array)
     schema = pa.schema(fields, metadata=dict(table.metadata) or None)
-    pa.parquet.write_table(pa.Table.from_arrays(arrays, schema=schema), path)
+    pa.parquet.write_table(pa.Table.from_arrays(arrays, schema=schema), path, write_page_checksum=True)
 
 
 def _metadata(raw: Mapping[bytes, bytes]) -> dict[str, str]:
@@ -81,11 +82,11 @@ def _metadata(raw: Mapping[bytes, bytes]) -> dict[str, str]:
 
 
 def _column(cells: pa.ChunkedArray) -> Column:
-    """Turn a column into int64, float64 (a null is NaN) or text."""
+    """Turn a column into one of the four kinds; a null is NaN, in a text empty."""
     kind = cells.type
-    if pa.types.is_floating(kind) or pa.types.is_null(kind):
-        return np.asarray(cells.cast(pa.float64()).to_numpy(), dtype=np.float64)
-    if pa.types.is_integer(kind) or pa.types.is_boolean(kind):
-        wide = pa.float64() if cells.null_count else pa.int64()
-        return np.asarray(cells.cast(wide, safe=False).to_numpy())
-    return np.array(["" if cell is None else str(cell) for cell in cells.to_pylist()], dtype=object)
+    is_whole = pa.types.is_integer(kind) or pa.types.is_boolean(kind)
+    if pa.types.is_floating(kind) or pa.types.is_null(kind) or (is_whole and cells.null_count):
+        return np.asarray(cells.cast(pa.float64(), safe=False).to_numpy(), dtype=np.float64)
+    if is_whole:
+        return as_column(np.asarray(cells.to_numpy()))
+    return as_text(["" if cell is None else str(cell) for cell in cells.to_pylist()])

@@ -1,19 +1,41 @@
 """What a CSV recording says of itself, in a JSON file beside it: ``run.csv`` has ``run.csv.json``.
 
-CSV has no place for metadata, and a comment line would keep other programs from reading the recording. Where the file
-is not there, or is some other program's, the recording is read as one that says nothing.
+CSV has no place for units, types and metadata, and a comment line would keep other programs from reading the recording.
+Where the file is not there, or is some other program's, the recording is read as one that says nothing.
+
+Metadata are keys of their own; ``units`` holds the unit of each column, ``types`` the kind of those columns whose cells
+do not tell it: truth values, and texts that could be read as numbers.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from hil.errors import RecordingError
+from hil.recording.kinds import Kind
 
 SCHEMA_KEY, SCHEMA = "schema", "hil.recording/1"
 """By which a file of ours is told from any other of that name."""
+
+UNITS_KEY, TYPES_KEY = "units", "types"
+
+
+@dataclass(frozen=True, slots=True)
+class Sidecar:
+    """What stands beside a CSV recording."""
+
+    metadata: Mapping[str, str] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
+    types: Mapping[str, Kind] = field(default_factory=dict)
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether there is nothing to say."""
+        return not (self.metadata or self.units or self.types)
 
 
 def sidecar_of(recording: Path) -> Path:
@@ -21,26 +43,7 @@ def sidecar_of(recording: Path) -> Path:
     return recording.with_name(f"{recording.name}.json")
 
 
-def require_no_sidecar(recording: Path) -> None:
-    """Refuse to make a recording beside which another one's description lies.
-
-    Raises
-    ------
-    RecordingError
-        If it is there.
-    """
-    path = sidecar_of(recording)
-    try:
-        taken = path.exists()
-    except OSError as error:
-        raise RecordingError(recording, f"expected a place to write, came: {error.strerror}") from error
-    if taken:
-        raise RecordingError(
-            path, "expected a new name, came one that exists: it describes another recording. Move it away."
-        )
-
-
-def write_sidecar(recording: Path, metadata: Mapping[str, str]) -> None:
+def write_sidecar(recording: Path, said: Sidecar) -> None:
     """Write what a recording says of itself; nothing where it says nothing.
 
     Raises
@@ -48,22 +51,22 @@ def write_sidecar(recording: Path, metadata: Mapping[str, str]) -> None:
     RecordingError
         If the disk does not take it.
     """
-    if not metadata:
+    if said.is_empty:
         return
     path = sidecar_of(recording)
-    text = json.dumps({**metadata, SCHEMA_KEY: SCHEMA}, indent=1, ensure_ascii=False) + "\n"
+    tables = {UNITS_KEY: dict(said.units), TYPES_KEY: {name: kind.value for name, kind in said.types.items()}}
+    document = {**said.metadata, SCHEMA_KEY: SCHEMA, **{key: table for key, table in tables.items() if table}}
+    text = json.dumps(document, indent=1, ensure_ascii=False) + "\n"
     unfinished = path.with_name(f".{path.name}.part")
     try:
         unfinished.write_text(text, encoding="utf-8")
         unfinished.replace(path)
     except OSError as error:
         unfinished.unlink(missing_ok=True)
-        raise RecordingError(
-            path, f"expected room for the description, came: {error.strerror or error}. The recording itself is whole."
-        ) from error
+        raise RecordingError(path, f"expected room for the description, came: {error.strerror or error}.") from error
 
 
-def read_sidecar(recording: Path) -> dict[str, str]:
+def read_sidecar(recording: Path) -> Sidecar:
     """Read what a recording says of itself; empty where no file of ours is beside it.
 
     Raises
@@ -73,13 +76,26 @@ def read_sidecar(recording: Path) -> dict[str, str]:
     """
     path = sidecar_of(recording)
     if not path.is_file():
-        return {}
+        return Sidecar()
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
+        if not isinstance(content, dict) or content.get(SCHEMA_KEY) != SCHEMA:
+            return Sidecar()
+        types = {name: Kind(kind) for name, kind in _texts(content.get(TYPES_KEY)).items()}
     except (OSError, ValueError) as error:
         raise RecordingError(
             path, f"expected the description of {recording.name}, came: {error}. Mend it, or move it away."
         ) from error
-    if not isinstance(content, dict) or content.get(SCHEMA_KEY) != SCHEMA:
+    return Sidecar(_texts(content), _texts(content.get(UNITS_KEY)), types)
+
+
+def read_sidecar_metadata(recording: Path) -> Mapping[str, str]:
+    """Read the metadata alone; see :func:`read_sidecar`."""
+    return read_sidecar(recording).metadata
+
+
+def _texts(content: Any) -> dict[str, str]:
+    """Return the entries of a JSON object that are texts."""
+    if not isinstance(content, dict):
         return {}
     return {key: value for key, value in content.items() if isinstance(value, str)}

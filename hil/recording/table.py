@@ -1,6 +1,6 @@
 """What a recording file holds: named columns of equal length, units and metadata; nothing of their meaning.
 
-A column is numeric (float64 or int64) where every cell is a number, else text. Text is kept, for a recording
+A column is numeric (float64, int64, bool) where every cell is a number, else text. Text is kept, for a recording
 may carry columns nobody asks for; it is refused, with its place, when such a column is read as numbers.
 """
 
@@ -10,14 +10,13 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hil.errors import RecordingError
+from hil.recording.kinds import Column as Column
 
-Column = NDArray[Any]
 FloatArray = NDArray[np.float64]
 
 LARGEST = 1e30
@@ -36,13 +35,15 @@ class Table:
     path : Path
         The file it is from, for messages; its stem is the recording's name.
     columns : mapping of name to ndarray, shape (N,)
-        float64, int64, or object (text).
+        float64, int64, bool, or object (text).
     units : mapping of column name to unit
-        Of the columns whose unit is known; CSV knows none.
+        Of the columns whose unit is known.
     metadata : mapping of str to str
-        What else the file says of itself; CSV says nothing.
+        What else the file says of itself.
     first_line : int or None
         Line of the first row in a text file; None where rows have no lines.
+    remarks : tuple of str
+        What its reader had to leave out or mend, one line each.
 
     Raises
     ------
@@ -55,6 +56,7 @@ class Table:
     units: Mapping[str, str] = field(default_factory=dict)
     metadata: Mapping[str, str] = field(default_factory=dict)
     first_line: int | None = None
+    remarks: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         lengths = {name: column.shape[0] for name, column in self.columns.items()}

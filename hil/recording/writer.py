@@ -20,8 +20,12 @@ from typing import Self, TextIO
 
 from hil.errors import RecordingError
 from hil.recording import columns
-from hil.recording.formats import read_table, write_table, writer_for
-from hil.recording.sidecar import require_no_sidecar, write_sidecar
+from hil.recording.checksum import sealed
+from hil.recording.csv_format import description_of
+from hil.recording.formats import read_table, writer_for
+from hil.recording.publish import write_table
+from hil.recording.samples import cells_of
+from hil.recording.sidecar import write_sidecar
 from hil.recording.table import Table
 from hil.rig.sample import Sample
 
@@ -57,8 +61,6 @@ class RecordingWriter:
 
     def __enter__(self) -> Self:
         writer_for(self.path)
-        if self.path.suffix.lower() == CSV:
-            require_no_sidecar(self.path)
         try:
             # Line-buffered: each row reaches the operating system when it is appended.
             self._file = self.part_path.open("x", buffering=1, encoding="utf-8", newline="\n")
@@ -135,14 +137,15 @@ class RecordingWriter:
             file.truncate(file.read().rfind(b"\n") + 1)
 
     def _publish(self) -> None:
-        if self.path.suffix.lower() == CSV:
+        rows = read_table(self.part_path)
+        table = Table(self.path, rows.columns, columns.UNITS, self._metadata)
+        if self.path.suffix.lower() == CSV:  # the part file is the recording: it only gets its name
             writer_for(self.path)
             self.part_path.rename(self.path)
-            write_sidecar(self.path, self._metadata)
+            write_sidecar(self.path, description_of(sealed(table)))
             return
-        rows = read_table(self.part_path)
         try:
-            write_table(Table(self.path, rows.columns, columns.UNITS, self._metadata), self.path)
+            write_table(table, self.path)
         except OSError as error:
             raise RecordingError(
                 self.path,
@@ -153,15 +156,5 @@ class RecordingWriter:
 
 
 def _row(sample: Sample) -> str:
-    """Format one row in the order of ``columns.UNITS``."""
-    floats = (
-        sample.time_s,
-        sample.torque_ref_nm,
-        sample.torque_m1_nm,
-        sample.torque_m2_nm,
-        sample.speed_rad_s,
-        sample.prbs_nm,
-    )
-    references = (sample.torque_ref_m1_nm, sample.torque_ref_m2_nm, sample.age_ns / 1e9)
-    cells = [*(repr(float(x)) for x in floats), str(int(sample.flags)), *(repr(float(x)) for x in references)]
-    return ",".join(cells) + "\n"
+    """Format one row in the order of ``columns.UNITS``; a float as the shortest decimal that reads back to it."""
+    return ",".join(map(repr, cells_of(sample))) + "\n"

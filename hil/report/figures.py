@@ -1,11 +1,12 @@
 """Plotly figures as pieces of HTML: signals over time in panels that zoom together, and spectra.
 
-Colours are of the set of Okabe and Ito (2008), told apart by people with any common colour blindness. A model
-has one colour throughout, in the signals, their errors and the spectra.
+Colours are those of `hil.figures.palette`, safe for the colour-blind. A model has one colour throughout, in the
+signals, their errors and the spectra.
 """
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
@@ -15,8 +16,10 @@ import plotly.graph_objects as go
 import scipy.signal
 from plotly.offline import get_plotlyjs
 from plotly.subplots import make_subplots
+from plotly.utils import PlotlyJSONEncoder
 
 from estimator.signals.record import FloatArray
+from hil.figures.palette import BLACK, BLUE, GREEN, GREY, ORANGE, PALE, PURPLE, VERMILION, faded
 from hil.report.decimate import extremes
 
 Interval = tuple[float, float]
@@ -25,18 +28,18 @@ Interval = tuple[float, float]
 class Style(Enum):
     """Colour, width and dash of a line."""
 
-    MEASURED = ("#b4bac1", 4.5, "solid")  # wide and pale, under the simulations
-    NOMINAL = ("#666666", 1.2, "dot")
-    BEFORE = ("#d55e00", 1.3, "solid")
-    AFTER = ("#0072b2", 1.3, "solid")
-    FIRST_INPUT = ("#222222", 1.2, "solid")
-    SECOND_INPUT = ("#009e73", 1.2, "dash")
-    THIRD_INPUT = ("#cc79a7", 1.2, "dot")
+    MEASURED = (PALE, 4.5, "solid")  # wide and pale, under the simulations
+    NOMINAL = (GREY, 1.2, "dot")
+    BEFORE = (VERMILION, 1.3, "solid")
+    AFTER = (BLUE, 1.3, "solid")
+    FIRST_INPUT = (BLACK, 1.2, "solid")
+    SECOND_INPUT = (GREEN, 1.2, "dash")
+    THIRD_INPUT = (PURPLE, 1.2, "dot")
 
 
 INPUT_STYLES = (Style.FIRST_INPUT, Style.SECOND_INPUT, Style.THIRD_INPUT)
 
-SHADE = "#e69f00"
+SHADE = ORANGE
 PANEL_PX = 230
 LEGEND_PX = 130
 AXIS_TITLE_PX = 54
@@ -101,8 +104,11 @@ def input_lines(torque_nm: FloatArray) -> tuple[Line, ...]:
 
 
 def plotly_script() -> str:
-    """Return plotly itself as a script element, to stand in the page once."""
-    return f"<script>{get_plotlyjs()}</script>"
+    """Return plotly itself as an element, to stand in the page once.
+
+    It is no script yet: `page.js` makes it one when the page stands, for its megabytes take a browser a second or two.
+    """
+    return f'<script type="text/plain" id="plotly">{get_plotlyjs()}</script>'
 
 
 def time_figure(
@@ -170,7 +176,7 @@ def band_figure(name: str, x: FloatArray, y: FloatArray, low: FloatArray, high: 
     colour, width, _ = Style.AFTER.value
     edge = {"mode": "lines", "line": {"width": 0, "color": colour}, "showlegend": False, "hoverinfo": "skip"}
     figure.add_trace(go.Scatter(x=x, y=low, **edge))
-    figure.add_trace(go.Scatter(x=x, y=high, fill="tonexty", fillcolor="rgba(0,114,178,0.2)", **edge))
+    figure.add_trace(go.Scatter(x=x, y=high, fill="tonexty", fillcolor=faded(colour, 0.2), **edge))
     figure.add_trace(
         go.Scatter(x=x, y=y, mode="lines", line={"color": colour, "width": width}, name="found, 95 % band")
     )
@@ -193,16 +199,24 @@ def _scatter(line: Line, x: FloatArray, y: FloatArray, *, first: bool) -> go.Sca
     )
 
 
-def figure_html(figure: go.Figure, name: str, height_px: int, top_px: int = TOP_PX) -> str:
-    """Return a figure as a piece of HTML with the page's look; ``name`` is unique in the page."""
+def figure_html(figure: go.Figure, name: str, height_px: int, top_px: int = TOP_PX, hover: str = "x unified") -> str:
+    """Return a figure as a piece of HTML with the page's look; ``name`` is unique in the page.
+
+    ``hover`` is what a pointer shows: all of one abscissa, or the ``closest`` point.
+    """
     inside_px = height_px - top_px - LEGEND_PX + TOP_PX
     figure.update_layout(
         template="plotly_white",
         height=height_px,
         margin={"l": 64, "r": 12, "t": top_px, "b": LEGEND_PX - TOP_PX},
         legend={"orientation": "h", "yanchor": "top", "y": -AXIS_TITLE_PX / inside_px, "x": 0},
-        hovermode="x unified",
+        hovermode=hover,
         font={"family": "system-ui, sans-serif", "size": 13},
     )
-    html: str = figure.to_html(full_html=False, include_plotlyjs=False, config=CONFIG, div_id=name)
-    return html
+    text = json.dumps({**figure.to_plotly_json(), "config": CONFIG}, cls=PlotlyJSONEncoder, separators=(",", ":"))
+    data = text.replace("<", "\\u003c")  # no text of a figure can end the script element it stands in
+    return (
+        f'<figure class="plot"><div class="plotly-graph-div" id="{name}" data-figure="{name}-data" tabindex="0" '
+        f'role="group" aria-label="figure {name}" style="height:{height_px}px"></div>'
+        f'<script type="application/json" id="{name}-data">{data}</script></figure>'
+    )

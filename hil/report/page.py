@@ -1,12 +1,25 @@
-"""One self-contained HTML page from pieces: style and scripts inside, nothing is fetched."""
+"""One self-contained HTML page from pieces: style and scripts inside, nothing is fetched.
+
+A page can be read with a keyboard alone: a link over what is the same on every page, a list of its sections, figures
+that take keys (`page.js`). Figures are drawn one by one, those in view first, so that a long page opens at once.
+"""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from html import escape
 from importlib.resources import files
 
 from hil.report.figures import plotly_script
+
+FEWEST_LISTED = 3
+"""Sections from which on a page begins with a list of them."""
+
+KEYS = (
+    "A figure that has the focus takes keys: + and - zoom, the arrows move, 1 to 9 show or hide a line, 0 shows all "
+    "again."
+)
 
 
 def page(title: str, body: Iterable[str], footer: str, *, plots: bool = True) -> str:
@@ -14,26 +27,52 @@ def page(title: str, body: Iterable[str], footer: str, *, plots: bool = True) ->
 
     ``plots`` brings the script that draws figures along, which is megabytes.
     """
-    style = files("hil.report").joinpath("page.css").read_text(encoding="utf-8")
+    style, behaviour = (_file(name) for name in ("page.css", "page.js"))
     script = plotly_script() if plots else ""
+    sections = "\n".join(body)
+    keys = f'<p class="note keys">{escape(KEYS)}</p>\n' if plots else ""
     return (
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{escape(title)}</title>\n<style>\n{style}</style>\n{script}\n</head>\n<body>\n<main>\n"
-        + "\n".join(body)
-        + f"\n<footer>{escape(footer)}</footer>\n</main>\n</body>\n</html>\n"
+        f"<title>{escape(title)}</title>\n<style>\n{style}</style>\n</head>\n<body>\n"
+        '<a class="skip" href="#main">Skip to the content</a>\n'
+        f'{_contents(sections)}<main id="main" tabindex="-1">\n{sections}\n'
+        f"<footer>{keys}<p>{escape(footer)}</p></footer>\n</main>\n{script}<script>\n{behaviour}</script>\n</body>\n</html>\n"
     )
 
 
+def _file(name: str) -> str:
+    return files("hil.report").joinpath(name).read_text(encoding="utf-8")
+
+
+def _contents(sections: str) -> str:
+    """List the sections of a page as links; nothing where there are few."""
+    found = re.findall(r'<section id="([^"]+)">\n<h2>(.*?)</h2>', sections)  # as `section` makes them
+    if len(found) < FEWEST_LISTED:
+        return ""
+    links = "".join(f'<li><a href="#{name}">{title}</a></li>' for name, title in found)
+    return f'<nav aria-label="Sections"><ul>{links}</ul></nav>\n'
+
+
 def section(title: str, *pieces: str) -> str:
-    """Frame pieces of HTML under a heading."""
+    """Frame pieces of HTML under a heading; the page's titles must differ, its addresses are made of them."""
     inside = "\n".join(pieces)
-    return f"<section>\n<h2>{escape(title)}</h2>\n{inside}\n</section>"
+    return f'<section id="{_address(title)}">\n<h2>{escape(title)}</h2>\n{inside}\n</section>'
+
+
+def _address(title: str) -> str:
+    return re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-") or "section"
 
 
 def paragraph(text: str, kind: str = "") -> str:
     """Put text into a paragraph of a CSS class."""
     return f'<p class="{kind}">{escape(text)}</p>' if kind else f"<p>{escape(text)}</p>"
+
+
+def details(summary: str, *pieces: str) -> str:
+    """Fold pieces of HTML away under a line that opens them; on paper they are open."""
+    inside = "\n".join(pieces)
+    return f"<details>\n<summary>{escape(summary)}</summary>\n{inside}\n</details>"
 
 
 def table(headings: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequence[int] = ()) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
@@ -31,6 +31,13 @@ class Recorder(Protocol):
 
 Progress = Callable[[Phase, float], None]
 """Called once per cycle with the phase and the time since it began [s]."""
+
+Observer = Callable[[Sample, Phase], None]
+"""Given every sample after its cycle's work: frames sent, answers taken, row recorded.
+
+In the measured part it sees what the recording holds, stand-ins for cycles that did not take place included. The
+beginning of the next cycle has to wait for what it takes of time; an error it raises ends the run at zero torque.
+"""
 
 
 @dataclass(slots=True)
@@ -80,6 +87,8 @@ class Drive:
         Ends the run at the next cycle when requested.
     progress
         Told of every cycle.
+    observers
+        Given every sample.
     """
 
     plan: Plan
@@ -90,6 +99,7 @@ class Drive:
     recorder: Recorder
     stop: StopRequest
     progress: Progress
+    observers: Sequence[Observer] = ()
     _summary: RunSummary = field(init=False)
     _phase: Phase = Phase.APPROACH
     _phase_from: int = 0
@@ -130,6 +140,8 @@ class Drive:
             sample = replace(sample, prbs_nm=self.prbs.known_nm(self.watch.news))
         if base.phase is Phase.MEASURE:
             self._record(sample)
+        else:
+            self._show(sample)
         self.progress(base.phase, time_s)
 
     def _stand_still(self) -> Tick:
@@ -165,6 +177,11 @@ class Drive:
         self.recorder.append(sample)
         self._summary.recorded += 1
         self._summary.flagged += bool(sample.flags)
+        self._show(sample)
+
+    def _show(self, sample: Sample) -> None:
+        for observer in self.observers:
+            observer(sample, self._phase)
 
     def _seconds(self, cycles: int) -> float:
         """Time of a number of cycles [s]; one division, so that 7 times 10 ms is 0.07 exactly."""

@@ -1,4 +1,4 @@
-"""What a recording says of itself: experiment, the whole rig file, and which EDS the scales are from."""
+"""What a recording says of itself: experiment, the whole rig file and its checksum, which EDS the scales are from."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from pathlib import Path
 from drivers.resources import data_file
 from hil import __version__
 from hil.config.rig_file import read_rig
+from hil.recording.checksum import RIG_CHECKSUM, RIG_TEXT, text_sha256
 
 
 def run_metadata(rig_path: Path, experiment: str) -> dict[str, str]:
@@ -27,16 +28,42 @@ def run_metadata(rig_path: Path, experiment: str) -> dict[str, str]:
         If the rig file can't be read.
     """
     inverters = read_rig(rig_path).inverters
+    text = rig_path.read_text(encoding="utf-8")
     shipped = data_file("inverter.eds")
     return {
         "schema": "hil.recording/1",
         "hil_version": __version__,
         "experiment": experiment,
         "started_utc": datetime.now(UTC).isoformat(timespec="seconds"),
-        "rig_file": rig_path.read_text(encoding="utf-8"),
+        RIG_TEXT: text,
+        RIG_CHECKSUM: text_sha256(text),
         "eds_m1_sha256": _sha256(inverters.m1.eds or shipped),
         "eds_m2_sha256": _sha256(inverters.m2.eds or shipped),
     }
+
+
+EARLIEST_NS = 946_684_800 * 1_000_000_000
+"""The year 2000: a time before it is none of a calendar, but counted from the beginning of a trace."""
+
+
+def replay_metadata(rig_path: Path, trace: Path, first_ns: int) -> dict[str, str]:
+    """Describe a recording that is rebuilt from a bus trace.
+
+    Parameters
+    ----------
+    rig_path
+        The rig file of the run.
+    trace
+        The trace.
+    first_ns
+        Time of its first sample [ns]; since 1970 where the trace says so, and then it is the start of the run.
+    """
+    metadata = {**run_metadata(rig_path, f"replay of {trace.name}"), "replayed_from": trace.name}
+    del metadata["started_utc"]  # it began long before now
+    if first_ns >= EARLIEST_NS:
+        started = datetime.fromtimestamp(first_ns / 1e9, UTC)
+        metadata["started_utc"] = started.isoformat(timespec="seconds")
+    return metadata
 
 
 def _sha256(path: Path) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 from drivers.plc.types import PrbsSource
 from estimator.signals.prbs import Prbs
@@ -14,6 +15,22 @@ from hil.rig.fitness import Needs
 from hil.rig.plc_prbs import PlcPrbsOrder, guarded_prbs
 
 
+class Levels(Protocol):
+    """Where the levels of a PRBS come from, one per cycle."""
+
+    def next(self) -> float:
+        """Level of this cycle [Nm]."""
+        ...
+
+
+class NoPrbs:
+    """The levels of an experiment without a PRBS."""
+
+    def next(self) -> float:
+        """Zero [Nm]."""
+        return 0.0
+
+
 @dataclass(frozen=True, slots=True)
 class Plan:
     """What a run is made of. Experiment and PRBS have a state: a plan is for one run.
@@ -23,7 +40,8 @@ class Plan:
     name, period_s, experiment
         Which experiment, and the time between two cycles [s].
     prbs
-        The PRBS as the host makes it; where the PLC does, one of the same amplitude to predict with.
+        The PRBS as the host makes it; where the PLC does, one of the same amplitude to predict with; none where the
+        experiment has none.
     plc_prbs
         What the PLC's own generator is told; None where the host makes the PRBS.
     split
@@ -35,7 +53,7 @@ class Plan:
     name: str
     period_s: float
     experiment: Experiment
-    prbs: Prbs
+    prbs: Levels
     plc_prbs: PlcPrbsOrder | None
     split: Split
     needs: Needs
@@ -61,16 +79,20 @@ def plan_run(rig: Rig, name: str) -> Plan:
     """
     table = experiment_table(rig, name)
     split = Split(table.share_m1, rig.prbs.part_m1)
-    largest = split.request(table.torque_nm, rig.prbs.amplitude_nm)
+    largest = split.request(table.torque_nm, rig.prbs.amplitude_nm if table.prbs else 0.0)
     return Plan(
         name=name,
         period_s=rig.period_s,
         experiment=build_experiment(rig, name),
-        prbs=Prbs(rig.prbs.amplitude_nm, rig.prbs.cells, rig.prbs.clock_divider, rig.prbs.seed),
-        plc_prbs=_plc_prbs(rig, split) if rig.prbs.source is PrbsSource.PLC else None,
+        prbs=_levels(rig) if table.prbs else NoPrbs(),
+        plc_prbs=_plc_prbs(rig, split) if table.prbs and rig.prbs.source is PrbsSource.PLC else None,
         split=split,
         needs=Needs(max(largest.total_m1_nm, largest.total_m2_nm)),
     )
+
+
+def _levels(rig: Rig) -> Prbs:
+    return Prbs(rig.prbs.amplitude_nm, rig.prbs.cells, rig.prbs.clock_divider, rig.prbs.seed)
 
 
 def _plc_prbs(rig: Rig, split: Split) -> PlcPrbsOrder:

@@ -11,12 +11,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from drivers.plc.types import PlcStatus
 from hil.errors import RunAborted
 from hil.rig.arming import ArmedDrives
 from hil.rig.build import Devices
 from hil.rig.cycle import Cycle
-from hil.rig.drive import Drive, Progress, Recorder, RunSummary
+from hil.rig.drive import Drive, Observer, Progress, Recorder, RunSummary
 from hil.rig.fitness import reasons_against
 from hil.rig.pacing import Pacer
 from hil.rig.plan import Plan
@@ -34,6 +36,7 @@ def run_plan(
     stop: StopRequest,
     progress: Progress,
     timing: RunTiming | None = None,
+    observers: Sequence[Observer] = (),
 ) -> RunSummary:
     """Run a plan on an opened rig.
 
@@ -53,6 +56,8 @@ def run_plan(
         Told of every cycle.
     timing
         Where the run's timing is kept, for a caller who wants it however the run ends.
+    observers
+        Given every sample after its cycle's work; see `hil.rig.drive.Observer`.
 
     Raises
     ------
@@ -70,7 +75,7 @@ def run_plan(
         period_ns, patience_s = pacer.period_ns, pacer.answer_timeout_s
         cycle = Cycle(devices.link, devices.m1, devices.m2, devices.guard, period_ns, patience_s, timing)
         watch = PlcWatch(devices.plc_loop, devices.plc, before, plan.needs, pacer.poll_patience_s)
-        drive = Drive(plan, cycle, watch, prbs, pacer, recorder, stop, progress)
+        drive = Drive(plan, cycle, watch, prbs, pacer, recorder, stop, progress, observers)
         drive.wake_up()
         devices.guard.enable()
         return drive.run()

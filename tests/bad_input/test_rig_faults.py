@@ -18,7 +18,9 @@ from hil.cli.main import run
 from hil.config.rig_file import read_rig
 from hil.recording import read_table
 from hil.recording.sidecar import sidecar_of
+from hil.rig.live_course import course_path
 from hil.simulator.fault_spec import rig_faults
+from hil.store import store_of
 from tests.bad_input.conftest import Refused
 from tests.rig.observer import assert_disarmed, power_state
 from tests.rig.serving import served
@@ -85,7 +87,7 @@ def test_what_goes_wrong_within_ends_the_run_and_keeps_the_recording(
     complaint = capsys.readouterr().err
     assert all(each in complaint for each in said), complaint
     assert 0 < len(read_table(out).columns["time_s"]) < 300
-    assert set(short_rig.parent.iterdir()) == {short_rig, out, sidecar_of(out)}
+    assert set(short_rig.parent.iterdir()) == {short_rig, out, sidecar_of(out), course_path(out), store_of(out.parent)}
 
 
 def test_a_drive_that_faults_ends_the_run(short_rig: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -69,7 +69,7 @@ def test_writes_the_identification_of_every_recording(recordings: list[Path], tm
         assert entry["online"]["samples_used"] == 1024
         spectral = entry["spectral"]
         assert {len(spectral[key]) for key in ("frequency_hz", "magnitude", "phase_rad", "coherence")} == {128}
-    assert [path.name for path in (tmp_path / "made" / "out").iterdir()] == ["identification.json"]
+    assert sorted(path.name for path in (tmp_path / "made" / "out").iterdir()) == ["identification.json", "report.html"]
 
 
 def test_the_models_read_back_are_those_of_the_estimator_to_the_bit(recordings: list[Path], tmp_path: Path) -> None:
@@ -127,6 +127,67 @@ def test_samples_and_period_can_be_chosen(recordings: list[Path], tmp_path: Path
     assert entry["online"]["samples_used"] == entry["batch"]["samples_used"] > 1024
 
 
+def test_each_entry_says_how_sure_it_is_and_what_speaks_against_it(recordings: list[Path], tmp_path: Path) -> None:
+    assert run(arguments(recordings, tmp_path)) == 0
+    frequency_hz, damping = true_resonance()
+    for entry in json.loads((tmp_path / "identification.json").read_text())["recordings"]:
+        interval = entry["resonance_interval"]
+        low, high = interval["frequency_hz"]["ci95"]
+        assert low < entry["batch"]["resonance"]["frequency_hz"] < high
+        assert interval["frequency_hz"]["value"] == pytest.approx(frequency_hz, rel=0.01)
+        assert interval["damping"]["std"] < 0.1 * damping
+        assert len(entry["third_order"]["poles"]) == 3
+        validation = entry["validation"]
+        assert validation["own"]["fit_percent"] == pytest.approx(entry["batch"]["fit_percent"], abs=1.0)
+        assert [unseen["name"] for unseen in validation["unseen"]] == [
+            n for n in ("run_1", "run_2") if n != entry["name"]
+        ]
+        assert set(validation["independence"]) == {"lag", "correlation", "bound", "p_value"}
+        assert not entry["feedback"]["detected"]
+        J_M = entry["physical"]["parameters"]["J_M"]
+        assert (J_M["unit"], J_M["determined"]) == ("kg m^2", True)
+        assert J_M["value"] == pytest.approx(1.6, rel=0.1)
+
+
+def test_the_report_says_what_was_identified(recordings: list[Path], tmp_path: Path) -> None:
+    model = tmp_path / "bus.toml"
+    model.write_text(MODEL)
+    assert run(arguments(recordings, tmp_path, "--model", str(model), "--estimator", "rls", "--estimator", "ekf")) == 0
+    page = (tmp_path / "report.html").read_text()
+    wanted = (
+        "Resonance at 8.2",
+        "From 2 recordings",
+        "Physical parameters",
+        "<h2>All recordings",
+        "<h2>Recording run_2",
+        "Recursive estimators compared",
+        "model file",
+        "free-run fit",
+    )
+    assert [text for text in wanted if text not in page] == []
+    assert page.count('class="plotly-graph-div"') == 2 + 5 * 2
+    compared = json.loads((tmp_path / "identification.json").read_text())["compared"]
+    assert [(each["recording"], each["estimator"]) for each in compared] == [
+        (name, estimator) for name in ("run_1", "run_2") for estimator in ("rls", "ekf")
+    ]
+
+
+def test_order_and_delay_are_chosen_where_they_are_left_open(
+    recordings: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(arguments(recordings, tmp_path, "--order", "3", "--delay", "auto", "--json")) == 0
+    document = json.loads(capsys.readouterr().out)
+    candidates = document["order_choice"]["candidates"]
+    assert sorted(each["nk"] for each in candidates) == [0, 1, 2, 3]
+    assert {each["na"] for each in candidates} == {3}
+    assert candidates[0]["criterion"] == 0.0 == min(each["criterion"] for each in candidates)
+    assert document["settings"]["nk"] == candidates[0]["nk"]
+    # the next sample's torque is in a low-passed one already: a delay of 2 or 3 can only be worse
+    assert candidates[0]["nk"] in (0, 1)
+    assert document["recordings"][0]["batch"]["fit_percent"] > 80.0
+    assert "Order and delay" in (tmp_path / "report.html").read_text()
+
+
 def test_help_has_an_example(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["identify", "--help"]) == 0
     assert "Example: hil identify run_1.csv" in capsys.readouterr().out
@@ -138,6 +199,10 @@ def test_help_has_an_example(capsys: pytest.CaptureFixture[str]) -> None:
         (("--sample-time", "0.015"), "sampled every 0.01 s, expected a whole fraction"),
         (("--samples", "-3"), "samples is -3, expected 1 or more"),
         (("--model", "nowhere.toml"), "nowhere.toml"),
+        (("--order", "0"), "--order: expected a whole number from 1 on, or auto, came '0'"),
+        (("--delay", "late"), "--delay: expected a whole number from 0 on, or auto, came 'late'"),
+        (("--estimator", "magic"), "--estimator: expected one of oefo, rls"),
+        (("--estimator", "ekf"), "Give a two-mass model file by --model"),
     ],
 )
 def test_wrong_use_is_refused_and_nothing_written(

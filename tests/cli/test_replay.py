@@ -11,6 +11,7 @@ from hil.cli.main import run
 from hil.config.rig_file import read_rig
 from hil.recording.formats import read_table
 from hil.rig.trace import SUFFIXES
+from tests.estimator.identification.tracking.drives import Line, drives
 from tests.rig.serving import served
 
 MEASURED = ("time_s", "torque_m1_nm", "torque_m2_nm", "speed_rad_s")
@@ -67,3 +68,50 @@ def test_trace_that_can_not_be_read_writes_nothing(
     assert run(["replay", str(trace), "--rig", str(short_rig), "--out", str(out)]) == 2
     assert "bus.log: expected a bus trace" in capsys.readouterr().err
     assert not out.exists()
+
+
+def test_replay_of_a_run_is_the_run_to_the_bit(
+    short_rig: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    live, trace = tmp_path / "live.csv", tmp_path / "bus.blf"
+    assert record(short_rig, live, trace) == 0
+    assert "live.online.json" in capsys.readouterr().out
+    course = (tmp_path / "live.online.json").read_bytes()
+    again, from_bus = tmp_path / "again.json", tmp_path / "bus.json"
+    assert run(["replay", str(live), "--estimate", str(again), "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["schema"] == "hil.replay/1"
+    assert document["online"]["samples"] == document["recorded"] == 300
+    assert document["samples_per_s"] > 0
+    assert again.read_bytes() == course
+    assert run(["replay", str(trace), "--rig", str(short_rig), "--estimate", str(from_bus)]) == 0
+    assert from_bus.read_bytes() == course
+
+
+def test_replay_of_a_recording_tells_resonance_and_alarms(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    recording = tmp_path / "drive.csv"
+    drive = drives(4, 1, 75.0, (Line(), Line(45.0, k=3360.0)))[0]
+    columns = (drive.time_s, *drive.torque_nm.T, drive.output)
+    rows = [",".join(map(repr, row)) for row in zip(*(column.tolist() for column in columns), strict=True)]
+    recording.write_text("\n".join(["time_s,torque_m1_nm,torque_m2_nm,speed_rad_s", *rows]) + "\n", encoding="utf-8")
+    assert run(["replay", str(recording), "--speed", "1000"]) == 0
+    printed = capsys.readouterr()
+    assert "resonance 7.3" in printed.out
+    assert "alarm: resonance_hz changed from 8.2" in printed.out
+    assert printed.err == ""
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        (("bus.blf",), "expected --rig with a bus trace"),
+        (("r.csv", "--out", "again.csv"), "hil convert"),
+        (("r.csv", "--all"), "expected no --all with a recording"),
+        (("r.csv", "--speed", "0"), "above 0"),
+    ],
+)
+def test_options_that_make_no_sense_are_refused(
+    options: tuple[str, ...], expected: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["replay", *options]) == 2
+    assert expected in capsys.readouterr().err

@@ -136,3 +136,33 @@ def test_dry_run_as_json(short_rig: Path, capsys: pytest.CaptureFixture[str]) ->
 def test_help_has_an_example(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["run", "--help"]) == 0
     assert "hil run examples/rig.toml cruise" in capsys.readouterr().out
+
+
+def test_estimates_beside_the_recording(short_rig: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with served(read_rig(short_rig)) as (server, _):
+        addresses = ("--bus", server.bus_url, "--modbus", str(server.modbus))
+        options = ("--out", str(tmp_path / "r.csv"), "--pace", "fast", *addresses)
+        assert run(["run", str(short_rig), "reversal", *options, "--json"]) == 0
+    course = json.loads((tmp_path / "r.online.json").read_text(encoding="utf-8"))
+    assert course["schema"] == "hil.online/1"
+    assert course["samples"] == 300
+    assert len(course["course"]["resonance_hz"]) == course["estimates"] == 150
+    assert course["alarms"] == []
+    summary = json.loads(capsys.readouterr().out)["online"]
+    assert summary == {name: value for name, value in course.items() if name != "course"}
+
+
+def test_records_without_an_estimate(short_rig: Path, tmp_path: Path) -> None:
+    with served(read_rig(short_rig)) as (server, _):
+        addresses = ("--bus", server.bus_url, "--modbus", str(server.modbus))
+        options = ("--out", str(tmp_path / "r.csv"), "--pace", "fast", "--no-estimate", *addresses)
+        assert run(["run", str(short_rig), "reversal", *options]) == 0
+    assert not (tmp_path / "r.online.json").exists()
+
+
+def test_course_is_never_overwritten(short_rig: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    kept = tmp_path / "r.online.json"
+    kept.write_text("mine", encoding="utf-8")
+    assert run(["run", str(short_rig), "cruise", "--out", str(tmp_path / "r.csv"), *NOWHERE]) == 2
+    assert "r.online.json" in capsys.readouterr().err
+    assert kept.read_text(encoding="utf-8") == "mine"

@@ -2,34 +2,21 @@
 
 from __future__ import annotations
 
-import importlib
-import shlex
-
-import click
 import pytest
-import typer
 
 from hil.cli.main import COMMANDS
+from tests.cli.command_lines import command, parse
 from tests.docs.pages import DOCS, ROOT, command_lines, mentioned_commands, pages
 
 SHOWN = sorted({line for page in pages() for line in command_lines(page)})
 MENTIONED = sorted({line for page in pages() for line in mentioned_commands(page)})
 
 
-def command(name: str) -> click.Command:
-    built: click.Command = typer.main.get_command(importlib.import_module(f"hil.cli.{name}").app)
-    return built
-
-
-def parse(line: str) -> None:
-    """Parse a whole command line as the program would, without carrying it out."""
-    _, name, *arguments = shlex.split(line, comments=True)
-    assert name in COMMANDS, f"no such command: {line}"
-    command(name).make_context(name, arguments)
-
-
 def options(name: str) -> set[str]:
-    return {option for parameter in command(name).params for option in parameter.opts} | {"--help"}
+    """Return the options of a command, those of its own commands included."""
+    own = command(name)
+    parts = (own, *getattr(own, "commands", {}).values())
+    return {option for part in parts for parameter in part.params for option in parameter.opts} | {"--help"}
 
 
 @pytest.mark.parametrize("line", SHOWN)
@@ -41,7 +28,7 @@ def test_a_shown_command_line_parses(line: str) -> None:
 def test_a_mentioned_command_and_its_options_exist(line: str) -> None:
     _, name, *words = line.split()
     if name.startswith("-"):
-        assert name in {"--help", "--version"}
+        assert name in {"--help", "--version", "--quiet", "--log-level"}
         return
     assert name in COMMANDS
     assert {word for word in words if word.startswith("--")} <= options(name)

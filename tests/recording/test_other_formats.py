@@ -1,4 +1,4 @@
-"""Parquet, .mat and the registry: what is read, what is refused, and that nothing is overwritten."""
+"""Parquet, older .mat and the registry: what is read, what is refused, and that nothing is overwritten."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import scipy.io
 
 from hil.errors import RecordingError
 from hil.recording import Table, read_table, write_table
+from hil.recording.checksum import CHECKSUM, data_sha256
 from hil.recording.formats import FORMATS
 
 
@@ -19,7 +20,7 @@ def test_parquet_keeps_units_and_metadata(tmp_path: Path, own_table: Table) -> N
     write_table(own_table, tmp_path / "run.parquet")
     table = read_table(tmp_path / "run.parquet")
     assert dict(table.units) == dict(own_table.units)
-    assert dict(table.metadata) == dict(own_table.metadata)
+    assert dict(table.metadata) == {**own_table.metadata, CHECKSUM: data_sha256(own_table.columns)}
 
 
 def test_parquet_of_other_programs_is_read(tmp_path: Path) -> None:
@@ -92,13 +93,6 @@ def test_a_truncated_mat_file_is_refused(tmp_path: Path, kept: int) -> None:
         read_table(tmp_path / "cut.mat")
 
 
-def test_mat_version_7_3_is_refused_with_the_cure(tmp_path: Path) -> None:
-    header = b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM"
-    (tmp_path / "new.mat").write_bytes(header + b"\x89HDF\r\n\x1a\n" * 20)
-    with pytest.raises(RecordingError, match="Save it again with -v7"):
-        read_table(tmp_path / "new.mat")
-
-
 def test_a_mat_file_without_vectors_is_refused(tmp_path: Path) -> None:
     scipy.io.savemat(tmp_path / "drive.mat", {"gain": 1.0})
     with pytest.raises(RecordingError, match="empty or truncated"):
@@ -118,7 +112,7 @@ def test_a_folder_is_no_recording(tmp_path: Path) -> None:
 
 
 def test_an_unknown_suffix_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(RecordingError, match=r"\.csv, \.parquet, \.mat.*came '\.xlsx'"):
+    with pytest.raises(RecordingError, match=r"\.csv, \.parquet, \.mf4.*came '\.xlsx'"):
         read_table(tmp_path / "run.xlsx")
 
 
@@ -130,7 +124,7 @@ def test_suffixes_are_read_in_any_case(tmp_path: Path, own_table: Table) -> None
 @pytest.mark.parametrize(
     ("name", "said"),
     [
-        ("run.mat", "ends in one of .csv, .parquet"),
+        ("run.mdf", "ends in one of .csv, .parquet"),
         ("run.txt", "ends in one of .csv, .parquet"),
         ("taken.csv", "a recording is never overwritten"),
         ("nowhere/run.csv", "expected an existing folder"),

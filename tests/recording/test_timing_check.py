@@ -13,7 +13,7 @@ from hil.cli.main import run as hil
 from hil.errors import RecordingError
 from hil.recording import Table, write_table
 from hil.recording.formats import read_metadata
-from hil.recording.sidecar import require_no_sidecar, sidecar_of, write_sidecar
+from hil.recording.sidecar import sidecar_of
 from hil.recording.timing_check import WORST_SHARE, require_even_cycles
 
 EVEN = {"cycles": 1000, "missed": 0, "late": 0, "unanswered": 0}
@@ -25,8 +25,6 @@ def recorded(tmp_path: Path, own_table: Table) -> Callable[..., Path]:
         path = tmp_path / f"run{suffix}"
         metadata = {"schema": "hil.recording/1", "timing": text}
         write_table(replace(own_table, path=path, metadata=metadata), path)
-        if suffix == ".csv":
-            write_sidecar(path, metadata)
         return path
 
     return write
@@ -70,11 +68,13 @@ def test_identify_refuses_and_writes_nothing(
 
 def test_file_beside_that_is_not_ours_is_left_alone(tmp_path: Path, own_table: Table) -> None:
     path = tmp_path / "run.csv"
-    write_table(own_table, path)
+    write_table(replace(own_table, units={}, metadata={}), path)
     sidecar_of(path).write_text('{"schema": "another", "timing": "x"}', encoding="utf-8")
     assert read_metadata(path) == {}
+    path.unlink()
     with pytest.raises(RecordingError, match="describes another recording"):
-        require_no_sidecar(path)
+        write_table(own_table, path)
+    assert list(tmp_path.iterdir()) == [sidecar_of(path)]
 
 
 def test_damaged_file_beside_is_refused_by_name(tmp_path: Path, own_table: Table) -> None:

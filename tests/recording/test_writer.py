@@ -10,7 +10,11 @@ import pytest
 
 from hil.errors import RecordingError
 from hil.recording import RecordingWriter, columns, read_record, read_table
+from hil.recording.checksum import CHECKSUM, data_sha256
+from hil.recording.formats import FORMATS
 from hil.rig.sample import Sample, SampleFlag
+
+WRITABLE = [suffix for suffix, form in FORMATS.items() if form.write]
 
 
 def sample(k: int) -> Sample:
@@ -41,7 +45,7 @@ def check(path: Path, n: int) -> None:
     assert table.n_rows == n
 
 
-@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+@pytest.mark.parametrize("suffix", WRITABLE)
 def test_a_run_is_recorded_to_the_bit(tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"run{suffix}"
     with RecordingWriter(path, {"rig": "bench"}) as writer:
@@ -54,11 +58,12 @@ def test_a_run_is_recorded_to_the_bit(tmp_path: Path, suffix: str) -> None:
     assert record.okay.tolist() == [k not in (0, 3) for k in range(30)]
 
 
-def test_parquet_carries_units_and_metadata(tmp_path: Path) -> None:
-    with RecordingWriter(tmp_path / "run.parquet", {"rig": "bench"}) as writer:
+@pytest.mark.parametrize("suffix", WRITABLE)
+def test_a_recording_carries_units_metadata_and_checksum(tmp_path: Path, suffix: str) -> None:
+    with RecordingWriter(tmp_path / f"run{suffix}", {"schema": "hil.recording/1", "rig": "bench"}) as writer:
         writer.append(sample(1))
-    table = read_table(tmp_path / "run.parquet")
-    assert dict(table.metadata) == {"rig": "bench"}
+    table = read_table(tmp_path / f"run{suffix}")
+    assert dict(table.metadata) == {"schema": "hil.recording/1", "rig": "bench", CHECKSUM: data_sha256(table.columns)}
     assert dict(table.units) == dict(columns.UNITS)
 
 
@@ -115,7 +120,7 @@ def test_the_rest_of_a_killed_run_is_not_overwritten(tmp_path: Path) -> None:
     assert (tmp_path / "run.part.csv").read_text() == "theirs"
 
 
-@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+@pytest.mark.parametrize("suffix", WRITABLE)
 def test_a_name_taken_during_the_run_costs_no_sample(tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"run{suffix}"
 
@@ -131,7 +136,7 @@ def test_a_name_taken_during_the_run_costs_no_sample(tmp_path: Path, suffix: str
     check(tmp_path / "run.part.csv", 12)
 
 
-@pytest.mark.parametrize("name", ["run.mat", "run.xyz", "nowhere/run.csv"])
+@pytest.mark.parametrize("name", ["run.mdf", "run.xyz", "nowhere/run.csv"])
 def test_a_recording_that_cannot_be_made_is_refused_before_the_run(tmp_path: Path, name: str) -> None:
     with pytest.raises(RecordingError, match="expected"), RecordingWriter(tmp_path / name):
         pass

@@ -31,6 +31,7 @@ class Reader(HTMLParser):
         if tag not in VOID:
             self.open.append(tag)
         self.fetched += [f"{tag} {key}={value}" for key, value in attrs if key in ("src", "href", "data", "action")]
+        self.fetched = [each for each in self.fetched if not each.startswith("a href=#")]  # a place in the page
         if tag == "h2":
             self.sections.append("")
 

@@ -4,7 +4,8 @@
 
     torque, output  ->  high-pass, low-pass, every M-th sample   (estimator.signals.decimate)
                     ->  recursive estimator                      (Oefo, or any other)
-                    ->  poles, resonance, damping                (tracking.resonance)
+                    ->  poles, resonance, damping, how sure      (tracking.follow)
+                    ->  has the resonance changed?               (tracking.watch)
 
 One code for a sample and for a block: what a rig computed while driving comes out of its recording again, to the
 bit. Nothing in the loop raises on a value; the estimate's status says what is wrong with it.
@@ -12,7 +13,8 @@ bit. Nothing in the loop raises on a value; the estimate's status says what is w
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -22,9 +24,13 @@ from estimator.identification.identify import Settings
 from estimator.identification.online.oefo import Filtering, Oefo
 from estimator.identification.online.online_estimate import OnlineEstimate, OnlineTrajectory
 from estimator.identification.online.recursive import RecursiveEstimator
-from estimator.identification.tracking.resonance import resonances
-from estimator.signals.decimate import Decimator
+from estimator.identification.tracking.follow import Follower
+from estimator.identification.tracking.watch import ChangeWatch, WatchSettings
+from estimator.signals.decimate import Decimated, Decimator
 from estimator.signals.record import BoolArray, FloatArray, Record
+
+VERSION = 1
+"""Of a saved state; goes up when a part changes its meaning."""
 
 EstimatorFactory = Callable[[Settings, FloatArray | None], RecursiveEstimator]
 """Makes a recursive estimator from the settings and L (None: there is no batch model yet)."""
@@ -52,6 +58,8 @@ class OnlineChain:
         the filter follows the estimate.
     estimator : callable, optional
         Makes another recursive estimator than OEFO.
+    watch : WatchSettings, optional
+        How a change of the resonance is watched for.
 
     Raises
     ------
@@ -65,14 +73,19 @@ class OnlineChain:
         sample_time_s: float,
         L: FloatArray | None = None,
         estimator: EstimatorFactory = oefo,
+        watch: WatchSettings | None = None,
     ) -> None:
         self.settings = settings
         factor = _factor(settings, sample_time_s)
         self._decimator = Decimator(sample_time_s, factor, settings.high_pass_hz)
         self._estimator = estimator(settings, L)
+        self._follower = Follower(self._estimator.orders, settings.sample_time_s, settings.band_hz)
+        self._watch = ChangeWatch(self._estimator.orders, settings.sample_time_s, watch)
         self._seen = 0
         self._factor = factor
         self._one = (np.zeros(1), np.zeros(1), np.zeros(1), np.zeros(1, dtype=np.bool_))
+        # An empty block compiles every loop now, so that the first cycle on the rig does not wait for it.
+        self.run_block(np.empty(0), np.empty(0), np.empty(0), np.empty(0, dtype=np.bool_))
 
     @property
     def delay_s(self) -> float:
@@ -100,17 +113,22 @@ class OnlineChain:
         """
         times, torques, outputs, mask = self._one
         times[0], torques[0], outputs[0], mask[0] = time_s, torque_nm, output, okay
-        kept = self.run_block(times, torques, outputs, mask)
-        return kept[0] if len(kept) else None
+        kept_times, kept = self._kept_times(times), self._decimator.run(torques, outputs, mask)
+        return self._estimated(kept_times, kept)[0] if kept.u.size else None
 
     def run(self, record: Record) -> OnlineTrajectory:
-        """Take a whole recording, with the same bits as sample by sample.
+        """Take a whole recording, with the same bits as sample by sample."""
+        return self.run_block(record.time_s, self.torque_of(record), record.output, record.okay)
 
-        Where no torque had been read yet the torque is passed on as missing: a rig can not look ahead.
+    @staticmethod
+    def torque_of(record: Record) -> FloatArray:
+        """Return a recording's total torque as a rig would have passed it on, shape (N,) [Nm].
+
+        It is missing where none had been read yet: a recording has the first that was read there, and a rig can not
+        look ahead.
         """
-        torque_nm = record.total_torque_nm
         unread = np.logical_and.accumulate(~record.torque_trusted.all(axis=1))
-        return self.run_block(record.time_s, np.where(unread, np.nan, torque_nm), record.output, record.okay)
+        return np.where(unread, np.nan, record.total_torque_nm)
 
     def run_block(
         self, time_s: FloatArray, torque_nm: FloatArray, output: FloatArray, okay: BoolArray
@@ -128,24 +146,66 @@ class OnlineChain:
                 "one shape (N,). Give every signal one value per sample."
             )
         kept = self._decimator.run(torque_nm, output, okay)
-        times = time_s[-self._seen % self._factor :: self._factor] - self.delay_s
+        return self._estimated(self._kept_times(time_s), kept)
+
+    def state(self) -> dict[str, Any]:
+        """Return everything the chain remembers: text, numbers and arrays, each name with its part in front.
+
+        ``numpy.savez(path, **state)`` keeps it as it is; lists of the same numbers are restored as well.
+        """
+        kept: dict[str, Any] = {"version": VERSION, "settings": repr((self.settings, self._watch.settings))}
+        for part, holder in self._parts.items():
+            kept |= {f"{part}.{name}": value for name, value in holder.state().items()}
+        return kept | {"seen": self._seen}
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Take up a saved state: what follows has the bits it would have had without the break.
+
+        Raises
+        ------
+        BadSetting
+            If the state is not that of a chain of this version with these settings, or lacks a part.
+        """
+        own = self.state()
+        for name in ("version", "settings"):
+            if str(np.asarray(state.get(name))) != str(own[name]):
+                raise BadSetting(
+                    f"on-line chain: the state's {name} is {state.get(name)}, expected {own[name]}. Restore it into a "
+                    "chain with the settings of the one that was saved."
+                )
+        if missing := sorted(own.keys() - state.keys()):
+            raise BadSetting(f"on-line chain: the state has no {', '.join(missing)}, expected every part of one saved.")
+        for part, holder in self._parts.items():
+            holder.restore({name.removeprefix(f"{part}."): state[name] for name in own if name.startswith(f"{part}.")})
+        self._seen = int(np.asarray(state["seen"]))
+
+    @property
+    def _parts(self) -> dict[str, Any]:
+        parts = (self._decimator, self._estimator, self._follower, self._watch)
+        return dict(zip(("decimator", "estimator", "follower", "watch"), parts, strict=True))
+
+    def _kept_times(self, time_s: FloatArray) -> FloatArray:
+        """Pick the moments of the samples kept of the next block, the low-pass's delay taken out."""
+        kept = time_s[-self._seen % self._factor :: self._factor] - self.delay_s
         self._seen = (self._seen + time_s.shape[0]) % self._factor
+        return kept
+
+    def _estimated(self, times: FloatArray, kept: Decimated) -> OnlineTrajectory:
         estimates = self._estimator.run(kept.u, kept.y, kept.okay)
-        orders, period_s = self._estimator.orders, self._decimator.sample_time_s
-        found = resonances(estimates, orders, period_s, self.settings.band_hz)
-        unknown = np.full(len(estimates), np.nan)
+        found = self._follower.run(kept.u, estimates)
+        watched = self._watch.run(times, kept.u, kept.y, estimates, found)
         return OnlineTrajectory(
             time_s=times,
             estimates=estimates,
-            frequency_hz=found[0],
-            damping=found[1],
-            height=found[2],
-            frequency_std_hz=unknown,
-            damping_std=unknown,
-            alarms=(),
-            alarm_at=(),
-            orders=orders,
-            sample_time_s=period_s,
+            frequency_hz=found.frequency_hz,
+            damping=found.damping,
+            height=found.height,
+            frequency_std_hz=found.frequency_std_hz,
+            damping_std=found.damping_std,
+            alarms=watched.alarms,
+            alarm_at=watched.alarm_at,
+            orders=self._estimator.orders,
+            sample_time_s=self._decimator.sample_time_s,
         )
 
 

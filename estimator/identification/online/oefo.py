@@ -39,15 +39,12 @@ from enum import Enum
 
 import numpy as np
 
-from estimator.errors import BadModel, BadShape
-from estimator.identification.linear_model import LinearModel, Orders
+from estimator.errors import BadModel
+from estimator.identification.linear_model import Orders
 from estimator.identification.online import oefo_kernel as kernel
-from estimator.identification.online.adaptation import Adaptation, DecreasingThenConstantTrace
-from estimator.identification.online.recursive import Estimate, Reason, ReasonArray, Trajectory
-from estimator.signals.record import BoolArray, FloatArray
-from estimator.signals.settings import Requirement, require
-
-_REASONS = tuple(Reason)
+from estimator.identification.online.adaptation import Adaptation
+from estimator.identification.online.regression import RegressionEstimator
+from estimator.signals.record import FloatArray
 
 
 class Filtering(Enum):
@@ -57,8 +54,10 @@ class Filtering(Enum):
     ADAPTED = "adapted"
 
 
-class Oefo:
+class Oefo(RegressionEstimator):
     """The estimator with its state; memory does not grow.
+
+    ``y_hat`` is the output simulated from the torque alone, with the parameters of each moment.
 
     Parameters
     ----------
@@ -72,6 +71,8 @@ class Oefo:
         ADAPTED replaces L by each stable A_hat.
     start_up_samples : int
         Good samples at the start that are learnt from without the filter, Phi = phi.
+    theta : ndarray, shape (na+nb,), optional
+        Start values; zero by default. Choose a small initial gain with them.
 
     Raises
     ------
@@ -79,6 +80,8 @@ class Oefo:
         If ``start_up_samples`` is negative.
     BadModel
         If L does not start with 1, is not finite, or has a root on or outside the unit circle.
+    BadShape
+        If ``theta`` is not na + nb finite numbers.
     """
 
     def __init__(
@@ -88,178 +91,28 @@ class Oefo:
         adaptation: Adaptation | None = None,
         filtering: Filtering = Filtering.FIXED,
         start_up_samples: int = 0,
+        theta: FloatArray | None = None,
     ) -> None:
-        start_up = Requirement("start_up_samples", start_up_samples, start_up_samples >= 0, "0 or more")
-        require("OEFO", (start_up,))
-        self._orders = Orders() if orders is None else orders
-        law = (DecreasingThenConstantTrace() if adaptation is None else adaptation).law
-        n = self._orders.n_parameters
-        self._L = self._filter(_checked(L), filtering)
-        self._theta = np.zeros(n)
-        self._U, self._D = np.eye(n), np.full(n, law.initial_gain)
-        self._law = law.as_array()
-        self._live = np.array([law.lambda1, 0.0, 0.0, 0.0, 0.0])
-        depth = max(self._orders.na, self._orders.nk + self._orders.nb, self._L.shape[0])
-        self._past = np.zeros((4, depth))
-        self._work = np.zeros((4, n))
-        adapt = 1 if filtering is Filtering.ADAPTED else 0
-        self._structure = np.array([self._orders.na, self._orders.nb, self._orders.nk, adapt, start_up_samples])
-        self._one = (np.zeros(1), np.zeros(1), np.ones(1, dtype=np.bool_))
-        self._one_out = _outputs(1, n)
-        # An empty block compiles the loop now, so that the first cycle on the rig does not wait for it.
-        self.run(np.empty(0), np.empty(0), np.empty(0, dtype=np.bool_))
-
-    def _filter(self, L: FloatArray, filtering: Filtering) -> FloatArray:
-        """Return L as the loop's own array; adapted, it has the length of A_hat from the start."""
-        if filtering is Filtering.FIXED:
-            return L
-        own = np.zeros(self._orders.na + 1)
-        if L.shape[0] > own.shape[0]:
-            raise BadModel(
-                f"OEFO: L has order {L.shape[0] - 1}, expected at most na = {own.shape[0] - 1} where A_hat "
-                "takes its place. Lower the order of L or keep it fixed."
-            )
-        own[: L.shape[0]] = L
-        return own
-
-    @property
-    def orders(self) -> Orders:
-        """Structure of the model."""
-        return self._orders
-
-    @property
-    def theta(self) -> FloatArray:
-        """Present parameters, shape (na+nb,), a copy."""
-        return self._theta.copy()
-
-    @property
-    def F(self) -> FloatArray:
-        """Adaptation gain, shape (na+nb, na+nb), symmetric positive definite."""
-        product: FloatArray = (self._U * self._D) @ self._U.T
-        return product
-
-    @property
-    def L(self) -> FloatArray:
-        """Denominator of the filter in use, a copy."""
-        return self._L.copy()
-
-    @property
-    def undetermined(self) -> tuple[str, ...]:
-        """Names of the parameters that still owe more than a tenth to their start value."""
-        weak = np.diag(self.F) >= kernel.LEARNT * self._law[kernel.INITIAL_GAIN]
-        return tuple(name for name, is_weak in zip(self._orders.names, weak, strict=True) if is_weak)
-
-    def model(self, sample_time_s: float) -> LinearModel:
-        """Return the present parameters as a model with the sampling period of the samples [s]."""
-        return LinearModel.from_theta(self.theta, self._orders, sample_time_s)
-
-    def update(self, u: float, y: float, okay: bool = True) -> Estimate:
-        """Take one sample; correct ``theta`` by the filtered output error.
-
-        Parameters
-        ----------
-        u : float
-            Total torque of this sample [Nm].
-        y : float
-            Speed of this sample [rad/s].
-        okay : bool
-            False masks the sample: time advances, ``theta`` does not change. A value that is not finite masks
-            it too.
-
-        Returns
-        -------
-        Estimate
-            Parameters, status with reason, and errors.
-
-        Notes
-        -----
-        Cost O((na+nb)^2); memory constant. Never raises on a value.
-        """
-        self._one[0][0], self._one[1][0], self._one[2][0] = u, y, okay
-        self._advance(*self._one, *self._one_out)
-        out, used, reason = self._one_out
-        n = self._theta.shape[0]
-        y_hat, e_prior, e_post = out[0, n:].tolist()
-        return Estimate(self._theta.copy(), _REASONS[reason[0]], bool(used[0]), y_hat, e_prior, e_post)
-
-    def run(self, u: FloatArray, y: FloatArray, okay: BoolArray) -> Trajectory:
-        """Take a block of samples, with the same bits as one by one.
-
-        Parameters
-        ----------
-        u, y, okay : ndarray, shape (N,)
-            Input, output, mask. They are not changed.
-
-        Returns
-        -------
-        Trajectory
-            Every estimate of the block.
-
-        Raises
-        ------
-        BadShape
-            If the three do not have one shape (N,).
-        """
-        if not (u.ndim == 1 and u.shape == y.shape == okay.shape):
-            raise BadShape(
-                f"OEFO: u, y and okay have the shapes {u.shape}, {y.shape}, {okay.shape}, expected one shape "
-                "(N,). Give every signal one value per sample."
-            )
-        n = self._theta.shape[0]
-        out, used, reason = _outputs(u.shape[0], n)
-        self._advance(
-            np.ascontiguousarray(u, dtype=np.float64),
-            np.ascontiguousarray(y, dtype=np.float64),
-            np.ascontiguousarray(okay, dtype=np.bool_),
-            out,
-            used,
-            reason,
-        )
-        y_hat, e_prior, e_post = (out[:, n + column] for column in range(3))
-        return Trajectory(out[:, :n], y_hat, e_prior, e_post, used, reason)
-
-    def _advance(
-        self,
-        u: FloatArray,
-        y: FloatArray,
-        okay: BoolArray,
-        out: FloatArray,
-        used: BoolArray,
-        reason: ReasonArray,
-    ) -> None:
-        kernel.oefo_block(
-            u,
-            y,
-            okay,
-            self._structure,
-            self._law,
-            self._live,
-            self._theta,
-            self._U,
-            self._D,
-            self._L,
-            self._past,
-            self._work,
-            out,
-            used,
-            reason,
+        orders = Orders() if orders is None else orders
+        super().__init__(
+            "oefo",
+            kernel.block,
+            kernel.N_ROWS,
+            orders,
+            adaptation,
+            L=_of_length(L, orders.na + 1) if filtering is Filtering.ADAPTED else L,
+            adapts_filter=filtering is Filtering.ADAPTED,
+            start_up_samples=start_up_samples,
+            theta=theta,
         )
 
 
-def _outputs(n_samples: int, n_parameters: int) -> tuple[FloatArray, BoolArray, ReasonArray]:
-    out = np.zeros((n_samples, n_parameters + 3))
-    return out, np.zeros(n_samples, dtype=np.bool_), np.zeros(n_samples, dtype=np.int8)
-
-
-def _checked(L: FloatArray) -> FloatArray:
-    """Return a copy of L, or refuse one that could not filter."""
-    own = np.array(L, dtype=np.float64)
-    if own.ndim != 1 or own.shape[0] == 0 or not np.isfinite(own).all() or own[0] != 1.0:
-        raise BadModel(f"OEFO: L is {L}, expected finite coefficients 1, l_1, l_2 .. of a polynomial in q^-1.")
-    largest = float(np.abs(np.roots(own)).max(initial=0.0))
-    if largest >= 1.0:
+def _of_length(L: FloatArray, length: int) -> FloatArray:
+    """Return L with zeros behind it: where A_hat will take its place, it has the length of A_hat from the start."""
+    given = np.array(L, dtype=np.float64)
+    if given.ndim != 1 or given.shape[0] > length:
         raise BadModel(
-            f"OEFO: L has a root of magnitude {largest:.4g}, expected all inside the unit circle. Take A "
-            "of a stable output-error model."
+            f"oefo: L has order {given.size - 1}, expected at most na = {length - 1} where A_hat "
+            "takes its place. Lower the order of L or keep it fixed."
         )
-    return own
+    return np.concatenate([given, np.zeros(length - given.shape[0])])

@@ -8,9 +8,10 @@ reason.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from enum import Enum, IntEnum
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +37,7 @@ class Reason(IntEnum):
     TOO_FEW_SAMPLES = 1
     NOT_EXCITED = 2
     UNSTABLE = 3
+    CONSTANT_OUTPUT = 4
 
     @property
     def status(self) -> Status:
@@ -53,6 +55,7 @@ _STATUS = {
     Reason.TOO_FEW_SAMPLES: Status.UNESTIMATED,
     Reason.NOT_EXCITED: Status.UNESTIMATED,
     Reason.UNSTABLE: Status.INVALID,
+    Reason.CONSTANT_OUTPUT: Status.UNESTIMATED,
 }
 
 _MESSAGES = {
@@ -60,7 +63,14 @@ _MESSAGES = {
     Reason.TOO_FEW_SAMPLES: "too few good samples yet; wait, or look why samples are masked",
     Reason.NOT_EXCITED: "the samples do not determine every parameter; switch the PRBS on or raise it",
     Reason.UNSTABLE: "the estimated A has a pole on or outside the unit circle; wait, or lower its order",
+    Reason.CONSTANT_OUTPUT: "the measured output never changes; check the sensor and its scale",
 }
+
+
+def statement(reason: Reason, undetermined: tuple[str, ...]) -> str:
+    """Return the message of a reason with the names of the parameters it is about; empty where nothing is wrong."""
+    names = ", ".join(undetermined) if reason.status is Status.UNESTIMATED else ""
+    return f"{names}: {reason.message}" if names else reason.message
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,7 +86,7 @@ class Estimate:
     used : bool
         False if this sample was masked; theta did not change and the errors are 0.
     y_hat : float
-        Predicted output, a posteriori [output unit].
+        Predicted output, a posteriori [output unit]: a simulation or one step ahead, as the estimator says.
     e_prior, e_post : float
         Prediction error with the parameters before and after this sample [output unit].
     """
@@ -105,6 +115,10 @@ class Trajectory:
     used : ndarray of bool, shape (N,)
     reason : ndarray of int, shape (N,)
         Values of :class:`Reason`.
+    extra : ndarray, shape (N, m)
+        What the estimator holds beside theta (noise model, masses and stiffness); m is often 0.
+    extra_names : tuple of str
+        Names of its columns.
     """
 
     theta: FloatArray
@@ -113,6 +127,8 @@ class Trajectory:
     e_post: FloatArray
     used: BoolArray
     reason: ReasonArray
+    extra: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+    extra_names: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return int(self.theta.shape[0])
@@ -147,6 +163,11 @@ class RecursiveEstimator(Protocol):
         """Names of the parameters the samples so far do not determine."""
         ...
 
+    @property
+    def extra_names(self) -> tuple[str, ...]:
+        """Names of what it holds beside theta; see :attr:`Trajectory.extra`."""
+        ...
+
     def update(self, u: float, y: float, okay: bool = True) -> Estimate:
         """Take one sample."""
         ...
@@ -157,4 +178,16 @@ class RecursiveEstimator(Protocol):
 
     def model(self, sample_time_s: float) -> LinearModel:
         """Return the present parameters as a model."""
+        ...
+
+    def statement(self, reason: Reason) -> str:
+        """Return what is wrong with an estimate of that reason, naming the parameters, and what to do."""
+        ...
+
+    def state(self) -> dict[str, Any]:
+        """Return everything it remembers, as plain arrays; :mod:`estimator.identification.online.state`."""
+        ...
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Take up a saved state; what follows has the bits it would have had without the break."""
         ...

@@ -5,56 +5,28 @@ Electroacoustics 15, 1967)::
 
     G(f) = S_yu(f) / S_uu(f),        coherence(f) = |S_yu|^2 / (S_uu S_yy)
 
-Random error of the magnitude (J. S. Bendat and A. G. Piersol, Random Data, chapter "Statistical errors in
-advanced estimates"), for n_d independent averages; the same number, in radians, is that of the phase::
-
-    std|G| / |G| = sqrt((1 - coherence) / (2 n_d coherence))
-
 Half-overlapping Hann segments are not independent; Welch's formula gives ``n_d = K / (1 + 2 rho^2 (K-1)/K)``
 for K of them, with rho = 1/6 the correlation of the window with itself half its length on.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.signal import get_window
 
 from estimator.errors import NotExciting
 from estimator.identification.linear_model import ComplexArray
+from estimator.identification.spectral.estimate import SpectralEstimate, SpectralMethod, from_spectra
 from estimator.signals.record import BoolArray, FloatArray, Record
 from estimator.signals.settings import Requirement, require
+
+__all__ = ["SpectralEstimate", "good_segments", "spectral_estimate"]
 
 HANN_OVERLAP_CORRELATION = 1.0 / 6.0
 """sum w(t) w(t + n/2) / sum w(t)^2 of a Hann window of n samples: (1/16) / (3/8)."""
 
 FEWEST_SEGMENTS = 3
 """Fewer segments than this say nothing of the coherence: that of a single one is 1 whatever the data."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class SpectralEstimate:
-    """Transfer function by frequency; all arrays of shape (M,), frequency 0 left out.
-
-    Attributes
-    ----------
-    frequency_hz : ndarray
-    response : ndarray of complex
-        Output unit per input unit.
-    coherence : ndarray
-        0 to 1.
-    magnitude_std : ndarray
-        Standard deviation of ``|response|``; infinite where the coherence is 0.
-    n_averages : float
-        Independent averages.
-    """
-
-    frequency_hz: FloatArray
-    response: ComplexArray
-    coherence: FloatArray
-    magnitude_std: FloatArray
-    n_averages: float
 
 
 def good_segments(okay: BoolArray, length: int) -> list[int]:
@@ -108,11 +80,5 @@ def _estimate(u: ComplexArray, y: ComplexArray, length: int, sample_time_s: floa
     s_yu = np.mean(y * np.conj(u), axis=0)
     k = u.shape[0]
     n_averages = k / (1.0 + 2.0 * HANN_OVERLAP_CORRELATION**2 * (k - 1) / k)
-    tiny = np.finfo(np.float64).tiny
-    response = s_yu / np.maximum(s_uu, tiny)
-    coherence = np.minimum(np.abs(s_yu) ** 2 / np.maximum(s_uu * s_yy, tiny), 1.0)
     frequency_hz = np.fft.rfftfreq(length, sample_time_s)[1:].astype(np.float64)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        std = np.abs(response) * np.sqrt((1.0 - coherence) / (2.0 * n_averages * coherence))
-    std[coherence == 0.0] = np.inf
-    return SpectralEstimate(frequency_hz, response, coherence, std, float(n_averages))
+    return from_spectra(frequency_hz, s_yu, s_uu, s_yy, n_averages, SpectralMethod.WELCH)

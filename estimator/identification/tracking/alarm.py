@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+NORMAL_95 = 1.959963984540054
+"""Standard deviations that hold 95 % of a normal distribution, either way."""
+
 
 @dataclass(frozen=True, slots=True)
 class Level:
@@ -12,6 +15,16 @@ class Level:
 
     value: float
     ci95: tuple[float, float]
+
+    @classmethod
+    def of(cls, value: float, std: float) -> Level:
+        """Make the level of a normal estimate with its standard deviation."""
+        return cls(value, (value - NORMAL_95 * std, value + NORMAL_95 * std))
+
+    @property
+    def statement(self) -> str:
+        """Value and interval, four significant digits."""
+        return f"{self.value:.4g} ({self.ci95[0]:.4g} to {self.ci95[1]:.4g})"
 
     def as_json(self) -> dict[str, Any]:
         """Return the level as it stands in a file."""
@@ -25,13 +38,16 @@ class Alarm:
     Attributes
     ----------
     time_s : float
-        When it was found [s].
+        The moment of the recording at which it was found [s]; the chain's delay comes on top.
     changed_between_s : tuple of float
         The change lies between these two moments [s].
     quantity : str
         What changed, its unit at the end: ``resonance_hz``.
     before, after : Level
         Value before and since.
+    settled : bool
+        False while the estimate is on its way: ``after`` is then where it has got to. The same alarm comes once more
+        when it has settled.
     statistic, threshold : float
         The evidence, and what it had to exceed.
     false_alarms_per_hour : float
@@ -43,9 +59,20 @@ class Alarm:
     quantity: str
     before: Level
     after: Level
+    settled: bool
     statistic: float
     threshold: float
     false_alarms_per_hour: float
+
+    @property
+    def statement(self) -> str:
+        """One line for a reader at the rig."""
+        change = (self.after.value / self.before.value - 1.0) * 100.0
+        return (
+            f"{self.quantity} changed from {self.before.statement} to {self.after.statement} ({change:+.1f} %) between "
+            f"{self.changed_between_s[0]:.1f} and {self.changed_between_s[1]:.1f} s; found at {self.time_s:.1f} s"
+            f"{'' if self.settled else ', the estimate had not settled yet'}"
+        )
 
     def as_json(self) -> dict[str, Any]:
         """Return the record as it stands in a file."""
@@ -55,6 +82,7 @@ class Alarm:
             "quantity": self.quantity,
             "before": self.before.as_json(),
             "after": self.after.as_json(),
+            "settled": self.settled,
             "evidence": {
                 "statistic": self.statistic,
                 "threshold": self.threshold,

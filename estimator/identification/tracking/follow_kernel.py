@@ -11,7 +11,7 @@ from estimator.signals.record import BoolArray, FloatArray, IntArray
 
 # Rows of `past`: newest value first.
 Y_HAT = 0
-Y_HAT_F = 1  # filtered by 1 / A_hat
+Y_HAT_F = 1  # filtered by the resonance's pair of poles
 INPUT = 2
 INPUT_F = 3
 
@@ -21,15 +21,20 @@ NA, NB, NK = 0, 1, 2
 # Places in `heard`: the residual as the resonance hears it.
 ONCE_RE, ONCE_IM, TWICE_RE, TWICE_IM = 0, 1, 2, 3  # filtered by the pole, and once more
 DENSITY = 4  # its density there, as the variance of a white residual [output unit squared]
-COUNT = 5  # samples in that mean
+COUNT = 5  # samples heard so far
+
+# Places in `pair`: 1 + l_1 q^-1 + l_2 q^-2 of the resonance's poles, and what the others amplify there.
+L_1, L_2, OTHERS = 0, 1, 2
+
+LEAST_DISTANCE = 0.1  # of the other poles: one that passes by the resonance, while the estimate moves, is no gain
 
 # Places in `numbers`.
-SAMPLE_TIME_S, LOWEST_HZ, HIGHEST_HZ, LARGEST_DAMPING, MEMORY, LARGEST_VARIANCE = 0, 1, 2, 3, 4, 5
+SAMPLE_TIME_S, LOWEST_HZ, HIGHEST_HZ, LARGEST_DAMPING, MEMORY, FEWEST = 0, 1, 2, 3, 4, 5
 
 # Columns of `out`: those of a mode, then
 FREQUENCY_STD_HZ, DAMPING_STD = 3, 4
 
-USABLE, TOO_FEW_SAMPLES = 0, 1  # values of estimator.identification.online.recursive.Reason
+USABLE = 0  # estimator.identification.online.recursive.Reason.NONE
 
 
 @compiled
@@ -41,21 +46,34 @@ def shift_in(row: FloatArray, value: float) -> None:
 
 
 @compiled
-def recursive_part(value: float, a: FloatArray, row: FloatArray) -> float:
-    """Return the next output of 1 / A, given its last ones in row."""
-    for i in range(a.shape[0]):
-        value -= a[i] * row[i]
-    return value
+def through_pair(value: float, pair: FloatArray, row: FloatArray) -> float:
+    """Return the next output of the pair's 1 / (1 + l_1 q^-1 + l_2 q^-2), given its last ones in row."""
+    return float(value - pair[L_1] * row[0] - pair[L_2] * row[1])
 
 
 @compiled
-def fill_gradient(structure: IntArray, outputs: FloatArray, inputs: FloatArray, psi: FloatArray) -> None:
-    """Set psi(t-1) = [-yhat(t-1) .. , u(t-nk) ..] from rows that hold them, the input's row with u(t) in front."""
+def take_pair(roots: ComplexArray, found: int, pair: FloatArray) -> None:
+    """Take the resonance's poles into the gradient's filter; an unstable pair leaves the last one in place."""
+    pole = roots[found]
+    magnitude = abs(pole)
+    if not magnitude < 1.0:
+        return
+    pair[L_1], pair[L_2] = -2.0 * pole.real, magnitude * magnitude
+    others = 1.0 + 0.0j
+    for i in range(roots.shape[0]):
+        if i != found and abs(roots[i] - pole.conjugate()) > 1e-9:
+            others *= 1.0 - roots[i] * pole.conjugate() / magnitude
+    pair[OTHERS] = 1.0 / max(abs(others), LEAST_DISTANCE)
+
+
+@compiled
+def fill_gradient(structure: IntArray, gain: float, outputs: FloatArray, inputs: FloatArray, psi: FloatArray) -> None:
+    """Set psi(t-1) = gain [-yhat(t-1) .. , u(t-nk) ..] from rows that hold them, the input's with u(t) in front."""
     na = structure[NA]
     for i in range(na):
-        psi[i] = -outputs[i]
+        psi[i] = -gain * outputs[i]
     for j in range(structure[NB]):
-        psi[na + j] = inputs[structure[NK] + j]
+        psi[na + j] = gain * inputs[structure[NK] + j]
 
 
 @compiled
@@ -63,6 +81,12 @@ def spread(P: FloatArray, psi: FloatArray, K: FloatArray, density: float, v: Flo
     """P <- (I - K psi^T) P (I - K psi^T)^T + density K K^T; v is room, shape (n,)."""
     n = psi.shape[0]
     c = density
+    reach = 0.0
+    for i in range(n):
+        reach += K[i] * psi[i]
+    if abs(reach) > 1.0:  # no correction takes back more than the error it was made for
+        for i in range(n):
+            psi[i] /= abs(reach)
     for i in range(n):
         v[i] = 0.0
         for j in range(n):
@@ -83,8 +107,8 @@ def hear(e: float, pole: complex, memory: float, heard: FloatArray) -> None:
     heard[ONCE_RE], heard[ONCE_IM], heard[TWICE_RE], heard[TWICE_IM] = once.real, once.imag, twice.real, twice.imag
     r2 = pole.real**2 + pole.imag**2
     white = (1.0 + r2) / (1.0 - r2) ** 3  # sum over k of (k + 1)^2 r^(2 k): what a white residual of variance 1 gives
-    heard[COUNT] = min(heard[COUNT] + 1.0, memory)
-    heard[DENSITY] += ((twice.real**2 + twice.imag**2) / white - heard[DENSITY]) / heard[COUNT]
+    heard[COUNT] += 1.0
+    heard[DENSITY] += ((twice.real**2 + twice.imag**2) / white - heard[DENSITY]) / min(heard[COUNT], memory)
 
 
 @compiled
@@ -108,7 +132,7 @@ def follow_block(
     structure: IntArray,
     numbers: FloatArray,
     before: FloatArray,
-    stable: FloatArray,
+    pair: FloatArray,
     P: FloatArray,
     past: FloatArray,
     heard: FloatArray,
@@ -122,25 +146,24 @@ def follow_block(
     ----------
     u, theta, y_hat, e_prior, used, reason
         The block: input and trajectory.
-    before, stable
-        theta of the last sample, shape (n,); the last stable A_hat, shape (na,).
-    P, past, heard
-        State, shapes (n, n), (4, depth), (6,).
+    before, pair, P, past, heard
+        State: theta of the last sample, shape (n,); shapes (3,), (n, n), (4, depth), (6,).
     work, roots
         Room, shapes (6, n), (na,).
     out
         Filled, shape (N, 5).
     """
     na, n = structure[NA], theta.shape[1]
-    psi, K, v, frequency, damping, mode = work[0], work[1], work[2], work[3, :na], work[4, :na], work[5, :3]
+    psi, K, v = work[0, :n], work[1, :n], work[2, :n]
+    frequency, damping, mode = work[3, :na], work[4, :na], work[5, :3]
     band = numbers[LOWEST_HZ : LARGEST_DAMPING + 1]
     for t in range(u.shape[0]):
         shift_in(past[INPUT], u[t] if np.isfinite(u[t]) else past[INPUT, 0])
-        shift_in(past[INPUT_F], recursive_part(past[INPUT, 0], stable, past[INPUT_F]))
-        if reason[t] == TOO_FEW_SAMPLES:
-            fill_gradient(structure, past[Y_HAT], past[INPUT], psi)
+        shift_in(past[INPUT_F], through_pair(past[INPUT, 0], pair, past[INPUT_F]))
+        if heard[COUNT] > 0.0:
+            fill_gradient(structure, pair[OTHERS], past[Y_HAT_F], past[INPUT_F], psi)
         else:
-            fill_gradient(structure, past[Y_HAT_F], past[INPUT_F], psi)
+            fill_gradient(structure, 1.0, past[Y_HAT], past[INPUT], psi)
         if used[t] and e_prior[t] != 0.0:
             for i in range(n):
                 K[i] = (theta[t, i] - before[i]) / e_prior[t]
@@ -148,14 +171,16 @@ def follow_block(
         before[:] = theta[t]
         found = -1
         if reason[t] == USABLE:
-            stable[:] = theta[t, :na]
             found = dominant(theta[t], na, structure[NK], numbers[SAMPLE_TIME_S], band, roots, mode)
-        shift_in(past[Y_HAT], y_hat[t])
-        shift_in(past[Y_HAT_F], recursive_part(y_hat[t], stable, past[Y_HAT_F]))
-        out[t] = np.nan
         if found >= 0:
+            take_pair(roots, found, pair)
             if used[t]:
                 hear(e_prior[t], roots[found], numbers[MEMORY], heard)
-            mode_gradient(roots, found, numbers[SAMPLE_TIME_S], frequency, damping)
+        shift_in(past[Y_HAT], y_hat[t])
+        shift_in(past[Y_HAT_F], through_pair(y_hat[t], pair, past[Y_HAT_F]))
+        out[t] = np.nan
+        if found >= 0:
             out[t, FREQUENCY_HZ], out[t, DAMPING], out[t, HEIGHT] = mode[0], mode[1], mode[2]
+        if found >= 0 and heard[COUNT] >= numbers[FEWEST]:
+            mode_gradient(roots, found, numbers[SAMPLE_TIME_S], frequency, damping)
             out[t, FREQUENCY_STD_HZ], out[t, DAMPING_STD] = form(P, frequency), form(P, damping)

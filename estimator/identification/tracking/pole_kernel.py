@@ -1,11 +1,12 @@
-"""Poles and the dominant mode of a model in a compiled loop: what ``modes.resonance`` says, fast enough for every sample.
+"""Poles and the dominant mode of a model in a compiled loop: ``modes.resonance``, fast enough for every sample.
 
 Roots by simultaneous iteration (Weierstrass; E. Durand 1960, I. O. Kerner, Numer. Math. 8, 1966)::
 
     z_i  <-  z_i - A(z_i) / prod_{j != i} (z_i - z_j)
 
-always from the same starting points, which lie on no axis of symmetry, so that the poles of a model depend on the
-model alone, and not on those before it. Quadratic convergence: a model of order four takes about ten rounds.
+It converges quadratically: from the poles of the sample before in two or three rounds. Two real poles that become a
+pair can't be found so, since real values stay real; then, and at the start, the rounds begin at points that lie on no
+axis of symmetry, and take about ten.
 """
 
 from __future__ import annotations
@@ -17,7 +18,10 @@ from estimator.identification.linear_model import ComplexArray
 from estimator.signals.record import FloatArray
 
 ROUNDS = 60
-"""Rounds allowed; only poles that (nearly) coincide take so many."""
+"""Rounds allowed from the fixed points; only poles that (nearly) coincide take so many."""
+
+WARM_ROUNDS = 6
+"""Rounds allowed from the poles of the sample before."""
 
 CONVERGED = 1e-13
 """Change of a pole by which it is taken as found; poles of interest have a magnitude near 1."""
@@ -32,36 +36,60 @@ FREQUENCY_HZ, DAMPING, HEIGHT = 0, 1, 2
 
 
 @compiled
-def find_poles(a: FloatArray, z: ComplexArray) -> bool:
-    """Set z, shape (na,), to the roots of z^na + a_1 z^(na-1) + ... + a_na; tell whether they were found."""
+def ratio(x: complex, y: complex) -> complex:
+    """Return x / y; no number where y is 0, while the compiled division of complex numbers would raise."""
+    squared = y.real * y.real + y.imag * y.imag
+    real, imag = x.real * y.real + x.imag * y.imag, x.imag * y.real - x.real * y.imag
+    return complex(real / squared, imag / squared)
+
+
+@compiled
+def go_round(a: FloatArray, z: ComplexArray) -> float:
+    """Do one round; return the largest change of a pole."""
     n = a.shape[0]
-    point = 1.0 + 0.0j
+    largest = 0.0
     for i in range(n):
+        value = 1.0 + 0.0j
+        apart = 1.0 + 0.0j
+        for j in range(n):
+            value = value * z[i] + a[j]
+            if j != i:
+                apart *= z[i] - z[j]
+        step = ratio(value, apart)
+        z[i] -= step
+        change = abs(step.real) + abs(step.imag)
+        largest = change if not change <= largest else largest  # NaN goes through
+    return largest
+
+
+@compiled
+def find_poles(a: FloatArray, z: ComplexArray) -> bool:
+    """Set z, shape (na,), to the roots of z^na + a_1 z^(na-1) + ... + a_na; tell whether they were found.
+
+    ``z`` holds the poles of the sample before; zeros where there are none.
+    """
+    for _ in range(WARM_ROUNDS):
+        change = go_round(a, z)
+        if change < CONVERGED:
+            return True
+        if not change < 1.0:
+            break
+    point = 1.0 + 0.0j
+    for i in range(a.shape[0]):
         z[i] = point
         point *= START
-    largest = np.inf
+    change = np.inf
     for _ in range(ROUNDS):
-        largest = 0.0
-        for i in range(n):
-            value = 1.0 + 0.0j
-            for j in range(n):
-                value = value * z[i] + a[j]
-            apart = 1.0 + 0.0j
-            for j in range(n):
-                if j != i:
-                    apart *= z[i] - z[j]
-            step = value / apart
-            z[i] -= step
-            largest = max(largest, abs(step.real) + abs(step.imag))
-        if largest < CONVERGED:
+        change = go_round(a, z)
+        if change < CONVERGED:
             break
-    return largest < COINCIDING
+    return change < COINCIDING
 
 
 @compiled
 def height(b: FloatArray, nk: int, z: ComplexArray, i: int) -> float:
     """Return |residue of B / A at pole i| / distance of the pole from the unit circle."""
-    q = 1.0 / z[i]
+    q = ratio(1.0 + 0.0j, z[i])
     numerator = 0.0 + 0.0j
     for j in range(b.shape[0] - 1, -1, -1):
         numerator = numerator * q + b[j]
@@ -69,8 +97,8 @@ def height(b: FloatArray, nk: int, z: ComplexArray, i: int) -> float:
         numerator *= q
     for j in range(z.shape[0]):
         if j != i:
-            numerator /= 1.0 - z[j] * q
-    return abs(numerator) / max(1.0 - abs(z[i]), 1e-12)
+            numerator = ratio(numerator, 1.0 - z[j] * q)
+    return float(abs(numerator) / max(1.0 - abs(z[i]), 1e-12))
 
 
 @compiled
@@ -86,7 +114,7 @@ def dominant(
     band_hz
         Lowest and highest natural frequency [Hz], largest damping ratio; shape (3,).
     z
-        Filled with the poles, shape (na,).
+        Poles of the sample before; filled with the present ones, shape (na,).
     mode
         Filled with natural frequency [Hz], damping ratio and height, shape (3,).
 
@@ -101,7 +129,7 @@ def dominant(
     for i in range(na):
         if z[i].imag <= 1e-9 * abs(z[i]):  # a real pole does not oscillate, at whatever sampled frequency
             continue
-        s = np.log(z[i]) / sample_time_s
+        s = np.log(z[i]) * (1.0 / sample_time_s)
         frequency_hz = abs(s) / (2.0 * np.pi)
         damping = -s.real / abs(s)
         if not (band_hz[0] <= frequency_hz <= band_hz[1] and abs(damping) < band_hz[2]):
@@ -124,11 +152,11 @@ def mode_gradient(z: ComplexArray, i: int, sample_time_s: float, frequency: Floa
     for j in range(n):
         if j != i:
             slope *= z[i] - z[j]
-    s = np.log(z[i]) / sample_time_s
+    s = np.log(z[i]) * (1.0 / sample_time_s)
     magnitude = abs(s)
     power = 1.0 + 0.0j
     for k in range(n - 1, -1, -1):
-        ds = -power / slope / (z[i] * sample_time_s)
+        ds = -ratio(power, slope * z[i] * sample_time_s)
         along = (s.real * ds.real + s.imag * ds.imag) / magnitude
         frequency[k] = along / (2.0 * np.pi)
         damping[k] = -ds.real / magnitude + s.real * along / (magnitude * magnitude)

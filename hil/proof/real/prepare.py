@@ -13,7 +13,8 @@ import numpy as np
 
 from estimator.signals.record import BoolArray
 from hil.proof.real.case_file import CaseFile, RealFileError, RecordingEntry
-from hil.recording.formats import read_table, write_table
+from hil.recording.formats import read_table
+from hil.recording.publish import write_table
 from hil.recording.table import Column, Table
 
 

@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
-from hil.config.experiment_tables import AnyExperiment, CruiseTable, ReversalTable, TipTable
+from hil.config.experiment_tables import (
+    AnyExperiment,
+    CruiseTable,
+    DrivenTable,
+    PulsesTable,
+    RestTable,
+    ReversalTable,
+    TipTable,
+)
 from hil.config.rig_file import Rig
 from hil.errors import UsageError
 from hil.rig.experiments.approach import Approach
 from hil.rig.experiments.base import Experiment, MeasureLaw
 from hil.rig.experiments.cruise import Cruise
+from hil.rig.experiments.open_loop import MOVING_RAD_S, OpenLoop
+from hil.rig.experiments.pulses import Pulses, Rest
 from hil.rig.experiments.reversal import Reversal
 from hil.rig.experiments.staged import StagedExperiment, TorqueBounds
 from hil.rig.experiments.tip import Tip
@@ -40,6 +50,17 @@ def build_experiment(rig: Rig, name: str) -> Experiment:
         If the rig file has none of that name.
     """
     table = experiment_table(rig, name)
+    match table:
+        case PulsesTable():
+            course = Pulses(table.step_nm, table.step_s, table.duration_s)
+            return OpenLoop(course, table.slew_nm_per_s, table.most_speed_rad_s, rig.period_s)
+        case RestTable():
+            return OpenLoop(Rest(table.duration_s), 0.0, MOVING_RAD_S, rig.period_s)
+    return _staged(rig, table)
+
+
+def _staged(rig: Rig, table: DrivenTable) -> Experiment:
+    """Build an experiment that is led up to by a speed control."""
     law = _law(table, rig.vehicle.inertia_kg_m2, rig.period_s)
     approach = Approach(
         speed_rad_s=law.start_speed_rad_s,
@@ -51,7 +72,7 @@ def build_experiment(rig: Rig, name: str) -> Experiment:
     return StagedExperiment(law, approach, TorqueBounds(table.torque_nm, table.slew_nm_per_s), rig.period_s)
 
 
-def _law(table: AnyExperiment, inertia_kg_m2: float, period_s: float) -> MeasureLaw:
+def _law(table: DrivenTable, inertia_kg_m2: float, period_s: float) -> MeasureLaw:
     match table:
         case CruiseTable():
             return Cruise(table.speed_rad_s, table.duration_s, inertia_kg_m2, table.torque_nm, period_s)

@@ -103,6 +103,14 @@ def test_an_infinite_torque_is_held_and_spoils_though_the_sample_says_okay() -> 
     assert kept.okay[117:].all()
 
 
+def test_values_whose_difference_overflows_leave_no_trace_in_the_means() -> None:
+    u = tone(3.0, 400)
+    u[200:202] = 1.7e308, -1.7e308
+    kept = Decimator(SAMPLE_TIME_S, 2).run(u, tone(8.2, 400), np.ones(400, dtype=bool))
+    assert np.isfinite(kept.u).all()
+    assert kept.okay[118:].all()
+
+
 def test_after_a_long_gap_the_mean_is_not_trusted_at_once() -> None:
     y, okay = tone(8.2, 2000), np.ones(2000, dtype=bool)
     okay[400:1000] = False

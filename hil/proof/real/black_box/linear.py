@@ -19,7 +19,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from estimator.identification.linear_model import LinearModel, Orders, free_response
-from estimator.identification.offline.output_error import MOST_EVALUATIONS, REFUSED
+from estimator.identification.offline.problem import MOST_EVALUATIONS, REFUSED
 from estimator.identification.offline.starts import candidates
 from estimator.signals.record import FloatArray, OutputKind
 from hil.proof.real.black_box.series import Stretch

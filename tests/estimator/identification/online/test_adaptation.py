@@ -7,18 +7,24 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from estimator.errors import BadSetting
+from estimator.errors import BadSetting, BadShape
 from estimator.identification.linear_model import Orders
 from estimator.identification.online.adaptation import (
+    PROFILES,
     Adaptation,
     ConstantForgetting,
+    ConstantGain,
+    ConstantTrace,
     DecreasingGain,
     DecreasingThenConstantTrace,
     GainLaw,
     VariableForgetting,
+    VariableForgettingThenConstantTrace,
 )
 from estimator.identification.online.oefo import Oefo
+from estimator.identification.online.recursive import Reason, Status
 from estimator.signals.record import FloatArray
+from tests.estimator.identification.online.cases import LINEAR, linear_data
 
 MOVING_AVERAGE = Orders(na=0, nb=3, nk=1)  # no outputs in the regressor: phi is known beforehand
 
@@ -100,7 +106,7 @@ def test_the_gain_stays_symmetric_and_positive_through_hours(profile: Adaptation
     estimator = after(profile, hard)
     np.testing.assert_allclose(estimator.F, estimator.F.T, rtol=1e-12)
     assert np.isfinite(estimator.F).all()
-    assert (estimator._D > 0).all()  # F = U D U^T is positive definite if D is
+    assert (estimator._memory["D"] > 0).all()  # F = U D U^T is positive definite if D is
 
 
 @pytest.mark.parametrize(
@@ -112,8 +118,89 @@ def test_the_gain_stays_symmetric_and_positive_through_hours(profile: Adaptation
         ({"initial_gain": 1.0, "lambda0": 1.5}, "lambda0"),
         ({"initial_gain": 1.0, "trace": -0.1}, "trace"),
         ({"initial_gain": 1.0, "alpha": 0.5}, "alpha"),
+        ({"initial_gain": 1.0, "lambda2": 0.5}, "lambda2"),
     ],
 )
 def test_gains_out_of_range_are_refused(law: dict[str, float], named: str) -> None:
     with pytest.raises(BadSetting, match=f"adaptation gain: {named} is"):
         GainLaw(**law)
+
+
+def test_a_constant_trace_is_held_from_the_first_sample(u: FloatArray) -> None:
+    profile = ConstantTrace(initial_gain=0.1, lambda1=0.9)
+    F = 0.1 * np.eye(3)
+    for n, row in enumerate(regressors(u[:50])):
+        following = np.linalg.inv(np.linalg.inv(F) + np.outer(row, row) / 0.9)  # equation (5), divided by lambda_1
+        F = following * 0.3 / np.trace(following)
+        np.testing.assert_allclose(after(profile, u[: n + 1]).F, F, rtol=1e-9, atol=1e-12)
+
+
+def test_a_constant_gain_stays_and_corrects_along_the_gradient(u: FloatArray) -> None:
+    estimator = after(ConstantGain(0.05), u)
+    assert np.array_equal(estimator.F, 0.05 * np.eye(3))
+    y = np.random.default_rng(3).normal(size=300)
+    estimator = Oefo(np.ones(1), MOVING_AVERAGE, ConstantGain(0.05))
+    theta = np.zeros(3)
+    for row, value in zip(regressors(u), y, strict=True):
+        theta = theta + 0.05 * row * (value - theta @ row) / (1 + 0.05 * row @ row)
+    np.testing.assert_allclose(estimator.run(u, y, np.ones(300, dtype=bool)).theta[-1], theta, rtol=1e-9)
+
+
+def test_variable_forgetting_forgets_until_the_trace_is_held(u: FloatArray) -> None:
+    profile = VariableForgettingThenConstantTrace(0.9, 0.95, 0.993, trace=0.05)
+    forgetting = VariableForgetting(0.9, 0.95)
+    before = next(n for n in range(5, 300) if np.trace(after(profile, u[:n]).F) <= 0.05 * (1 + 1e-9))
+    np.testing.assert_allclose(after(profile, u[: before - 1]).F, after(forgetting, u[: before - 1]).F, rtol=1e-12)
+    assert np.trace(after(profile, u).F) == pytest.approx(0.05, rel=1e-12)
+
+
+FAST = {ConstantTrace: ConstantTrace(0.2), ConstantGain: ConstantGain(0.2)}
+
+
+@pytest.mark.parametrize("profile", PROFILES, ids=lambda profile: profile.__name__)
+def test_with_every_profile_the_truth_is_found_and_the_status_told(profile: type[Adaptation]) -> None:
+    u, y, okay = linear_data(8000)
+    estimator = Oefo(np.ones(1), LINEAR.orders, FAST.get(profile, profile()))
+    block = estimator.run(u, y, okay)
+    assert block[20].reason is Reason.TOO_FEW_SAMPLES
+    assert block[7999].status is Status.ESTIMATED
+    np.testing.assert_allclose(block.theta[-1], LINEAR.theta, atol=0.01)
+    quiet = Oefo(np.ones(1), LINEAR.orders, FAST.get(profile, profile()))
+    nothing = np.zeros(500)
+    assert quiet.run(nothing, nothing, np.ones(500, dtype=bool))[499].reason is Reason.NOT_EXCITED
+
+
+def test_a_start_near_the_truth_with_a_small_initial_gain_stays_near_it() -> None:
+    u, y, okay = linear_data(200, noise=0.3)
+    near = LINEAR.theta + 0.02
+    known = Oefo(LINEAR.A, LINEAR.orders, DecreasingGain(0.001), theta=near).run(u, y, okay)
+    unknown = Oefo(LINEAR.A, LINEAR.orders, DecreasingGain(1000.0)).run(u, y, okay)
+    assert np.abs(known.theta[:50] - LINEAR.theta).max() < 0.1
+    assert np.abs(unknown.theta[:50] - LINEAR.theta).max() > 0.3
+
+
+# A gain that does not fall lets theta wander with the noise; filtered by 1 / L the observations are ten times larger.
+SLOW = {ConstantTrace: ConstantTrace(1e-5), ConstantGain: ConstantGain(1e-5)}
+
+
+@pytest.mark.parametrize("profile", PROFILES, ids=lambda profile: profile.__name__)
+@pytest.mark.parametrize("excited", [True, False, None], ids=["excited", "not excited", "now and then"])
+def test_three_hours_at_10_ms_leave_the_gain_sound(profile: type[Adaptation], excited: bool | None) -> None:
+    n = 1_100_000
+    u, y = (np.tile(each, 20)[:n] for each in linear_data(55_000, noise=0.1)[:2])
+    if excited is not True:
+        silent = np.full(n, True) if excited is False else np.arange(n) // 100_000 % 2 == 1
+        u, y = np.where(silent, 0.0, u), np.where(silent, 1e-3 * y, y)
+    estimator = Oefo(LINEAR.A, LINEAR.orders, SLOW.get(profile, profile()), start_up_samples=40)
+    block = estimator.run(u, y, np.ones(n, dtype=bool))
+    assert np.isfinite(block.theta).all()
+    assert np.isfinite(estimator.F).all()
+    np.testing.assert_allclose(estimator.F, estimator.F.T, rtol=1e-9, atol=1e-300)
+    assert (estimator._memory["D"] > 0).all()
+    if excited is True:
+        np.testing.assert_allclose(estimator.theta, LINEAR.theta, atol=0.05)
+
+
+def test_a_start_of_the_wrong_shape_is_refused() -> None:
+    with pytest.raises(BadShape, match=r"oefo: theta\(0\) is \[1\.\], expected 4 finite numbers"):
+        Oefo(LINEAR.A, LINEAR.orders, theta=np.ones(1))

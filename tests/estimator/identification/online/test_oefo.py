@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from estimator.compiled import brief
 from estimator.errors import BadModel, BadSetting, BadShape
 from estimator.identification.linear_model import LinearModel, Orders
 from estimator.identification.online.adaptation import (
@@ -16,6 +17,7 @@ from estimator.identification.online.adaptation import (
 )
 from estimator.identification.online.oefo import Filtering, Oefo
 from estimator.identification.online.recursive import Reason, RecursiveEstimator, Status
+from estimator.identification.online.regression_kernel import is_stable
 from estimator.signals.prbs import prbs_nm
 from estimator.signals.record import BoolArray, FloatArray
 
@@ -280,10 +282,13 @@ def test_the_last_stable_filter_keeps_filtering() -> None:
     assert unstable_seen > 20
 
 
+@brief
+def judge(a: FloatArray, n: int, room: FloatArray) -> bool:
+    return is_stable(a, n, room)
+
+
 @pytest.mark.parametrize("na", [1, 2, 3, 4, 7])
 def test_stability_is_judged_as_by_the_roots(na: int) -> None:
-    from estimator.identification.online.oefo_kernel import is_stable
-
     rng = np.random.default_rng(na)
     verdicts = set()
     for _ in range(300):
@@ -291,19 +296,9 @@ def test_stability_is_judged_as_by_the_roots(na: int) -> None:
         roots = np.concatenate([half, half.conj(), rng.uniform(-1.05, 1.05, na % 2)])
         polynomial = np.real(np.poly(roots))
         expected = bool(np.abs(np.roots(polynomial)).max() < 1)
-        assert is_stable(polynomial[1:].copy(), np.zeros(na)) is expected
+        assert bool(judge(polynomial[1:].copy(), na, np.zeros(na))) is expected
         verdicts.add(expected)
     assert verdicts == {True, False}
-
-
-def test_memory_does_not_grow() -> None:
-    u, y, okay = data(300)
-    estimator = Oefo(TRUTH.A, ORDERS)
-    sizes = []
-    for _ in range(3):
-        estimator.run(u, y, okay)
-        sizes.append(sum(value.nbytes for value in vars(estimator).values() if isinstance(value, np.ndarray)))
-    assert sizes[0] == sizes[1] == sizes[2]
 
 
 def test_it_offers_the_interface_of_every_recursive_estimator() -> None:

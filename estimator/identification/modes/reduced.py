@@ -1,0 +1,116 @@
+"""The third-order equivalent: what the paper's pole-zero map shows of its fourth-order models.
+
+A drive of two masses has three states: one rigid motion and one twist with its rate. A model of fourth order that fits
+it holds one more, which a zero nearly cancels or which stands for what the sampling did. Balanced truncation (B. C.
+Moore, IEEE Trans. Automatic Control 26, 1981) leaves out the states that are both hard to reach from the input and
+hard to see in the output. Its error is bounded at every frequency (D. F. Enns, 1984)::
+
+    |G(f) - G_r(f)|  <=  2 (sigma_(r+1) + ... + sigma_n)
+
+with sigma the Hankel singular values; the bound tells what the left-out order was worth.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import solve_discrete_lyapunov
+
+from estimator.errors import BadModel, BadShape
+from estimator.identification.linear_model import LinearModel
+from estimator.identification.modes.continuous import numerator_of, state_space
+from estimator.identification.modes.propagate import propagate, square_root
+from estimator.signals.record import FloatArray
+
+THIRD = 3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reduced:
+    """A model of lower order and what it left out.
+
+    Attributes
+    ----------
+    model : LinearModel
+        Of the order asked for, or of the original one where that is no higher.
+    covariance : ndarray, shape (n, n), or None
+        Of its theta; None if that of the original was not given.
+    hankel : ndarray
+        Hankel singular values of the original, largest first [output unit per input unit].
+    largest_error : float
+        Bound of the change of the frequency response at any frequency [output unit per input unit].
+    """
+
+    model: LinearModel
+    covariance: FloatArray | None
+    hankel: FloatArray
+    largest_error: float
+
+
+def third_order(model: LinearModel, covariance: FloatArray | None = None) -> Reduced:
+    """Return the third-order equivalent of a stable model.
+
+    Parameters
+    ----------
+    model : LinearModel
+        Estimate, of any order.
+    covariance : ndarray, shape (na+nb, na+nb), optional
+        Of its theta.
+
+    Raises
+    ------
+    BadModel
+        If the model is not stable: an unstable one has no Hankel singular values.
+    BadShape
+        If the covariance is not that of theta.
+    """
+    return reduce_order(model, THIRD, covariance)
+
+
+def reduce_order(model: LinearModel, order: int, covariance: FloatArray | None = None) -> Reduced:
+    """As :func:`third_order`, for any order above 0."""
+    if not model.is_stable:
+        raise BadModel(
+            f"linear model: poles of radius {np.sort(np.abs(model.poles))[::-1].round(4).tolist()}, expected all below "
+            "1: an unstable model has no equivalent of lower order. Use the last stable estimate."
+        )
+    n = model.orders.n_parameters
+    if covariance is not None and covariance.shape != (n, n):
+        raise BadShape(f"linear model: its covariance has shape {covariance.shape}, expected ({n}, {n}).")
+    theta, hankel = _truncated(model, order)
+    reduced = _as_model(theta, model, order)
+    spread = None
+    if covariance is not None:
+        spread = propagate(lambda x: _truncated(_like(x, model), order)[0], model.theta, covariance)[1]
+    return Reduced(reduced, spread, hankel, 2.0 * float(np.sum(hankel[order:])))
+
+
+def _like(theta: FloatArray, model: LinearModel) -> LinearModel:
+    return LinearModel.from_theta(theta, model.orders, model.sample_time_s)
+
+
+def _as_model(theta: FloatArray, original: LinearModel, order: int) -> LinearModel:
+    n = min(order, original.orders.n_states)
+    a, b = tuple(theta[:n].tolist()), tuple(theta[n:].tolist())
+    return LinearModel(a, b, min(original.nk, 1), original.sample_time_s)
+
+
+def _truncated(model: LinearModel, order: int) -> tuple[FloatArray, FloatArray]:
+    """Return theta of the truncated model and the Hankel singular values.
+
+    With a delay of 1 or more theta is ``[a_1 .. a_r, b_1 .. b_r]``, without ``[a_1 .. a_r, b_0 .. b_r]``.
+    """
+    A, B, C, D = state_space(model)
+    reach = square_root(np.asarray(solve_discrete_lyapunov(A, B @ B.T), dtype=np.float64))
+    see = square_root(np.asarray(solve_discrete_lyapunov(A.T, C.T @ C), dtype=np.float64))
+    left, hankel, right_t = np.linalg.svd(see.T @ reach)
+    kept = min(order, A.shape[0])
+    scale = 1.0 / np.sqrt(np.maximum(hankel[:kept], np.finfo(np.float64).tiny))
+    to_kept = scale[:, np.newaxis] * (see @ left[:, :kept]).T
+    from_kept = reach @ right_t[:kept].T * scale
+    A_r, B_r, C_r = to_kept @ A @ from_kept, to_kept @ B, C @ from_kept
+    denominator = np.real(np.poly(A_r))
+    numerator = numerator_of(A_r, B_r, C_r, D)
+    theta = np.concatenate([denominator[1:], numerator[1:] if model.nk >= 1 else numerator])
+    return np.asarray(theta, dtype=np.float64), np.asarray(hankel, dtype=np.float64)

@@ -1,0 +1,158 @@
+"""Order and delay: how many coefficients the data pay for.
+
+All candidates are fitted to the same data, whitened by one noise model, that of the richest candidate. So the
+residual's own correlation is in the comparison, and the Bayesian information criterion (G. Schwarz, Annals of
+Statistics 6, 1978) counts independent samples::
+
+    BIC = N ln(mean of w^2) + (number of parameters) ln N
+
+On a coloured residual, N independent samples would be counted where there are far fewer, and the order come out too
+high. So it does where the load drifts: a slow pole more, with its free response, fits the drift. Both signals
+therefore pass a high-pass at the lower end of the band in which a driveline resounds. Cross-validation stands beside
+it: the free-run fit on recordings that took no part.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import chain
+
+import numpy as np
+
+from estimator.errors import BadSetting
+from estimator.identification.linear_model import LinearModel, Orders
+from estimator.identification.offline.box_jenkins import fit_box_jenkins, whitened_by
+from estimator.identification.offline.free_run import free_run
+from estimator.identification.offline.noise_model import NoiseModel
+from estimator.identification.offline.output_error import problem_of
+from estimator.identification.offline.problem import Problem
+from estimator.identification.offline.starts import candidates as starts
+from estimator.signals.decimate import decimate
+from estimator.signals.record import FloatArray, Record
+
+DEFAULT = tuple(Orders(n, n, nk) for nk in (1, 2, 3) for n in (2, 3, 4, 5))
+"""Second to fifth order, a delay of one to three samples."""
+
+
+LOWEST_HZ = 2.0
+"""Corner of the high-pass before orders are compared [Hz]; a drive's resonance is looked for from there on."""
+
+
+SETTLING = 5.0
+"""Time constants of the high-pass that are left out: a constant acceleration leaves a transient there, which a further
+pole would be taken to explain."""
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """One structure and how it did.
+
+    Attributes
+    ----------
+    orders : Orders
+    criterion : float
+        BIC less that of the best.
+    rms : float
+        Of the whitened simulation error [output unit].
+    unseen_fit_percent : float
+        Free-run fit over all recordings held out; NaN if there are none.
+    model : LinearModel
+    """
+
+    orders: Orders
+    criterion: float
+    rms: float
+    unseen_fit_percent: float
+    model: LinearModel
+
+
+@dataclass(frozen=True, slots=True)
+class OrderChoice:
+    """Every candidate, the best by the criterion first."""
+
+    candidates: tuple[Candidate, ...]
+
+    @property
+    def chosen(self) -> Orders:
+        """Orders of the best candidate."""
+        return self.candidates[0].orders
+
+    @property
+    def statement(self) -> str:
+        """The choice, how clear it is, and what unseen recordings say of it."""
+        best, *rest = self.candidates
+        text = f"na = {best.orders.na}, nb = {best.orders.nb}, nk = {best.orders.nk}"
+        text += f", by a BIC {rest[0].criterion:.1f} below the next." if rest else "."
+        if np.isnan(best.unseen_fit_percent):
+            return text
+        winner = max(self.candidates, key=lambda candidate: candidate.unseen_fit_percent)
+        agree = (
+            "which is best there too"
+            if winner is best
+            else (
+                f"best there is na = {winner.orders.na}, nb = {winner.orders.nb}, nk = {winner.orders.nk} with "
+                f"{winner.unseen_fit_percent:.1f} %"
+            )
+        )
+        return f"{text} Free-run fit on unseen recordings {best.unseen_fit_percent:.1f} %, {agree}."
+
+
+def select_orders(record: Record, among: Sequence[Orders] = DEFAULT, unseen: Sequence[Record] = ()) -> OrderChoice:
+    """Choose order and delay.
+
+    Parameters
+    ----------
+    record : Record
+        Of the period of the models; the slow part need not have been removed.
+    among : sequence of Orders
+        The candidates.
+    unseen : sequence of Record
+        For cross-validation; prepared alike.
+
+    Raises
+    ------
+    BadSetting
+        If there is no candidate.
+    NotExciting
+        If the data do not determine the richest candidate.
+    """
+    if not among:
+        raise BadSetting("order selection: 0 candidates, expected one or more. Give the orders to choose from.")
+    richest = max(among, key=lambda orders: (orders.n_parameters, -orders.nk))
+    record, *unseen = (_prepared(one) for one in (record, *unseen))
+    problem, _ = problem_of(record, richest)
+    noise = fit_box_jenkins(record, richest).noise
+    found = [_candidate(replace(problem, orders=orders), noise, unseen) for orders in among]
+    least = min(candidate.criterion for candidate in found)
+    ranked = sorted(found, key=lambda candidate: candidate.criterion)
+    return OrderChoice(tuple(replace(candidate, criterion=candidate.criterion - least) for candidate in ranked))
+
+
+def _prepared(record: Record) -> Record:
+    """Return a recording without its slow part and without the high-pass's own settling."""
+    passed = decimate(record, 1, LOWEST_HZ)
+    settled = np.arange(passed.okay.shape[0]) * passed.sample_time_s >= SETTLING / (2.0 * np.pi * LOWEST_HZ)
+    return replace(passed, okay=passed.okay & settled)
+
+
+def _solved(problem: Problem, first: Sequence[LinearModel] = ()) -> FloatArray:
+    usual = starts(problem.u, problem.y, problem.okay, problem.orders, problem.sample_time_s)
+    return problem.solve(chain(first, usual))
+
+
+def _candidate(plain: Problem, noise: NoiseModel, unseen: Sequence[Record]) -> Candidate:
+    """Fit one structure to the whitened data, from the minimum of the plain data."""
+    whitened = whitened_by(plain, noise)
+    x = _solved(whitened, [plain.model(_solved(plain))])
+    model, rest = whitened.model(x), whitened.residual(x)
+    power, n = float(np.mean(rest**2)), rest.shape[0]
+    runs = [free_run(model, other, noise).fit_percent for other in unseen]
+    return Candidate(
+        orders=plain.orders,
+        criterion=n * float(np.log(max(power, np.finfo(np.float64).tiny)))
+        + plain.orders.n_parameters * float(np.log(n)),
+        rms=float(np.sqrt(power)),
+        unseen_fit_percent=float(np.mean(runs)) if runs else float("nan"),
+        model=model,
+    )

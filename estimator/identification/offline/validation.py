@@ -1,0 +1,173 @@
+"""Whether a model is right: free run first, then whether what it leaves has to do with the input.
+
+An output-error model is judged by its transfer function, so by the independence of residual and past input; whiteness
+of the residual is a matter of the noise model, and its autocorrelation is shown beside without a verdict (L. Ljung,
+System Identification, 2nd ed., section 16.6). Both signals are made white first, the residual by its own
+autoregression D and the input by one of its own (G. E. P. Box, G. M. Jenkins, Time Series Analysis, "prewhitening"),
+so that under independence each correlation is normal with variance 1 / N, whatever the colours, and those at m lags
+together::
+
+    r(tau) = sum w(t) v(t - tau) / sqrt(sum w^2 sum v^2),      N sum r(tau)^2 ~ chi-square(m)
+
+From one sample of delay on (past input) they tell that B / A is wrong; below (the input answers the residual, at once
+or later) they tell of feedback.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2
+
+from estimator.identification.modes.propagate import CONFIDENCE, QUANTILE
+from estimator.identification.offline.free_run import FreeRun, free_run
+from estimator.identification.offline.linear_fit import LinearFit
+from estimator.identification.offline.noise_model import fit_noise, reach
+from estimator.signals.record import BoolArray, FloatArray, IntArray, Record
+
+LAGS = 25
+"""Lags looked at to either side: half a second at 20 ms, the decay time of a drive's resonance."""
+
+
+LEAST_DELAY = 1
+"""Samples before which held torque can't act on a sampled speed."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CorrelationTest:
+    """Correlations by lag with the bound that 95 % of them keep if there is none.
+
+    Attributes
+    ----------
+    lag : ndarray of int, shape (m,)
+        Samples.
+    correlation : ndarray, shape (m,)
+    bound : float
+        95 % of independent correlations are smaller in size.
+    p_value : float
+        Probability of correlations like these if there are none: of their sum of squares, which sees many small
+        ones, or of the largest, which sees a single one; the smaller, counted twice for the choice.
+    """
+
+    lag: IntArray
+    correlation: FloatArray
+    bound: float
+    p_value: float
+
+    @property
+    def is_independent(self) -> bool:
+        """Tell whether the correlations are no larger than chance makes them, with 95 % confidence."""
+        return self.p_value > 1.0 - CONFIDENCE
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Validation:
+    """What can be said for and against a fit.
+
+    Attributes
+    ----------
+    own : FreeRun
+        On the recording it was fitted to.
+    unseen : tuple of FreeRun
+        On others: cross-validation.
+    independence : CorrelationTest
+        Residual against past input; the judge of B / A.
+    feedback : CorrelationTest
+        Residual against input too late to have caused it.
+    autocorrelation : CorrelationTest
+        Of the free-run residual, not whitened; shown, no judge of B / A.
+    """
+
+    own: FreeRun
+    unseen: tuple[FreeRun, ...]
+    independence: CorrelationTest
+    feedback: CorrelationTest
+    autocorrelation: CorrelationTest
+
+    @property
+    def statement(self) -> str:
+        """The result in a few sentences, the free-run fit first."""
+        others = "".join(f"; on {run.name}, unseen, {run.fit_percent:.1f} %" for run in self.unseen)
+        judged = "independent of" if self.independence.is_independent else "correlated with"
+        verdict = "the model holds" if self.independence.is_independent else "it misses a part of the response"
+        return (
+            f"Free-run fit {self.own.fit_percent:.1f} %{others} (one step ahead {self.own.one_step_fit_percent:.1f} %, "
+            f"which is no measure of a model to simulate with). The residual is {judged} the past input "
+            f"(p = {self.independence.p_value:.2g}): {verdict}."
+        )
+
+
+def validate(fit: LinearFit, record: Record, unseen: Sequence[Record] = (), lags: int = LAGS) -> Validation:
+    """Validate a fit on its own recording and on others.
+
+    Parameters
+    ----------
+    fit : LinearFit
+        Of any off-line estimator.
+    record : Record
+        The recording it was fitted to.
+    unseen : sequence of Record
+        Prepared alike, not used for the fit.
+    lags : int
+        Lags of each test [samples].
+
+    Raises
+    ------
+    BadModel
+        If a recording is sampled at another period than the model, or the model is unstable.
+    """
+    own = free_run(fit.model, record, fit.noise)
+    okay = record.okay & np.isfinite(own.error)
+    error = np.where(okay, own.error, 0.0)
+    white_error, white_input, both = _prewhitened(error, record.total_torque_nm, okay, record.sample_time_s)
+    first = min(fit.model.nk, LEAST_DELAY)
+    ahead, behind = np.arange(first, first + lags), np.arange(-lags, first)
+    return Validation(
+        own=own,
+        unseen=tuple(free_run(fit.model, other, fit.noise) for other in unseen),
+        independence=correlation_test(white_error, white_input, both, ahead),
+        feedback=correlation_test(white_error, white_input, both, behind),
+        autocorrelation=correlation_test(error, error, okay, np.arange(1, lags + 1)),
+    )
+
+
+def _prewhitened(
+    error: FloatArray, u: FloatArray, okay: BoolArray, sample_time_s: float
+) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """Return residual and input, each whitened by its own autoregression, and where both have their past."""
+    everywhere = np.ones_like(okay)
+    order = reach(sample_time_s)
+    of_error, of_input = fit_noise(error, okay, order), fit_noise(u - u.mean(), everywhere, order)
+    both = of_error.complete(okay) & of_input.complete(everywhere)
+    return of_error.whiten(error), of_input.whiten(u - u.mean()), both
+
+
+def correlation_test(e: FloatArray, x: FloatArray, okay: BoolArray, lags: IntArray) -> CorrelationTest:
+    """Correlate ``e(t)`` with ``x(t - lag)`` where both samples are good.
+
+    Parameters
+    ----------
+    e, x : ndarray, shape (N,)
+        At least one of them white, for bound and p-value to hold.
+    okay : ndarray of bool, shape (N,)
+    lags : ndarray of int, shape (m,)
+        Negative: x after e.
+    """
+    e, x = np.where(okay, e, 0.0), np.where(okay, x, 0.0)
+    n = max(int(np.count_nonzero(okay)), 1)
+    size = float(np.sqrt((e @ e) * (x @ x)))
+    if size == 0.0:
+        return CorrelationTest(lags, np.zeros(lags.shape), QUANTILE / np.sqrt(n), 1.0)
+    r = np.array([_product(e, x, int(lag)) for lag in lags]) / size
+    together = float(chi2.sf(n * float(r @ r), lags.shape[0]))
+    largest = lags.shape[0] * float(chi2.sf(n * float(np.max(r**2)), 1))
+    return CorrelationTest(lags, r, float(QUANTILE / np.sqrt(n)), min(1.0, 2.0 * min(together, largest)))
+
+
+def _product(e: FloatArray, x: FloatArray, lag: int) -> float:
+    """Return sum of e(t) x(t - lag)."""
+    if lag >= 0:
+        return float(e[lag:] @ x[: x.shape[0] - lag])
+    return float(e[:lag] @ x[-lag:])

@@ -1,0 +1,61 @@
+"""The threshold of an alarm, from the rate of false ones.
+
+The rule: two statistics in a row beyond a threshold h, on the same side. Each is standardised with the mean m and the
+standard deviation s of n reference statistics, ``tau = (x - m) / (s sqrt(1 + 1/n))``. Where nothing changes, and the
+statistics are independent and normal, m and s are as random as they are known to be::
+
+    m ~ N(0, 1/n),   (n - 1) s^2 ~ chi^2(n - 1),   P(both beyond h) = 2 E[ Q(h s sqrt(1 + 1/n) + m)^2 ]
+
+Q the normal tail. That expectation, over the reference too, times the statistics per hour is the expected number of
+false alarms in an hour; a run of three counts twice, so that it is an upper bound.
+
+Two beyond a lower threshold instead of one beyond a higher: a single bump of the road is no alarm, and the rate rests
+on the bulk of the distribution, two standard deviations and a half out, and not on tails five out that nobody knows.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import brentq
+from scipy.special import roots_hermitenorm
+from scipy.stats import chi2, norm
+
+from estimator.errors import BadSetting
+
+HIGHEST = 40.0
+"""No threshold is sought above."""
+
+QUANTILES = 4000
+"""Points at which the distribution of s is taken."""
+
+
+def false_pairs(threshold: float, n_reference: int) -> float:
+    """Return the probability that two statistics in a row are beyond a threshold, on the same side."""
+    nodes, weights = roots_hermitenorm(60)
+    weights = weights / weights.sum()
+    probability = (np.arange(QUANTILES) + 0.5) / QUANTILES
+    s = np.sqrt(chi2.ppf(probability, n_reference - 1) / (n_reference - 1))
+    limit = threshold * np.sqrt(1.0 + 1.0 / n_reference) * s[:, np.newaxis] + nodes / np.sqrt(n_reference)
+    return float(2.0 * (norm.sf(limit) ** 2 @ weights).mean())
+
+
+def threshold_for(false_alarms_per_hour: float, statistics_per_hour: float, n_reference: int) -> float:
+    """Return the threshold that has at most so many false alarms an hour.
+
+    Raises
+    ------
+    BadSetting
+        If no threshold does.
+    """
+    wanted = false_alarms_per_hour / statistics_per_hour
+    if not 0.0 < wanted < false_pairs(0.0, n_reference):
+        raise BadSetting(
+            f"alarm: false_alarms_per_hour is {false_alarms_per_hour}, expected above 0 and below "
+            f"{statistics_per_hour * false_pairs(0.0, n_reference):.4g}, what no threshold at all has."
+        )
+    if false_pairs(HIGHEST, n_reference) > wanted:
+        raise BadSetting(
+            f"alarm: false_alarms_per_hour is {false_alarms_per_hour}, fewer than a reference of {n_reference} blocks "
+            "can promise. Take a longer reference."
+        )
+    return float(brentq(lambda h: false_pairs(h, n_reference) - wanted, 0.0, HIGHEST, xtol=1e-9))

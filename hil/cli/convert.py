@@ -1,0 +1,127 @@
+"""``hil convert``: a recording, or a bus trace, into another format."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from hil.recording.table import Table
+
+app = typer.Typer(add_completion=False)
+
+
+@app.command(
+    epilog="Example: hil convert cruise.csv cruise.mf4. A bus trace: hil convert cruise.blf cruise.parquet "
+    "--rig examples/rig.toml"
+)
+def convert(
+    source: Path = typer.Argument(
+        ..., metavar="IN", help="Recording (.csv, .parquet, .mf4, .mdf, .h5, .mat) or bus trace (.log, .blf, .asc)."
+    ),
+    target: Path = typer.Argument(..., metavar="OUT", help="Recording to write: .csv, .parquet, .mf4, .h5 or .mat."),
+    rig: Path | None = typer.Option(None, "--rig", metavar="RIG", help="Rig file of the run; a bus trace needs it."),
+    every: bool = typer.Option(False, "--all", help="Of a trace: every cycle, not only the measured part."),
+    force: bool = typer.Option(False, "--force", help="Replace OUT where it exists."),
+    encoding: str = typer.Option("utf-8", metavar="NAME", help="Of a text IN, such as latin-1."),
+    delimiter: str = typer.Option("", metavar="CHARACTER", help="Of a CSV IN, where its header does not tell it."),
+    as_json: bool = typer.Option(False, "--json", help="Print the result as JSON."),
+) -> None:
+    """Convert between the recording formats without loss, or say on standard error what is lost.
+
+    OUT is read back and compared with IN, bit for bit, before it gets its name. Units, rig file, settings and the
+    checksum of the data go along.
+    """
+    import json
+
+    from hil.recording import write_table
+
+    _require_room(target, force)
+    table = _trace(source, rig, every) if _is_trace(source) else _recording(source, rig, every, encoding, delimiter)
+    lost: list[str] = []
+    write_table(table, target, replace=force, on_loss=lost.extend)
+    for line in (*(f"{source}: {remark}" for remark in table.remarks), *(f"{target}: lost: {what}" for what in lost)):
+        typer.echo(line, err=True)
+    if as_json:
+        typer.echo(json.dumps(_document(source, target, table, lost)))
+        return
+    typer.echo(f"{target}: {table.n_rows} rows, {len(table.columns)} columns{', not all of it' if lost else ''}")
+    for line in _said(target):
+        typer.echo(f"  {line}")
+
+
+def _require_room(target: Path, force: bool) -> None:
+    """Refuse before anything is read; whatever else can be wrong with the name is told by what writes."""
+    from hil.errors import UsageError
+
+    if target.is_file() and not force:
+        raise UsageError(f"{target}: expected a new name, came one that exists. Replace it with --force.")
+
+
+def _is_trace(source: Path) -> bool:
+    from hil.rig.trace import SUFFIXES
+
+    return source.suffix.lower() in SUFFIXES
+
+
+def _recording(source: Path, rig: Path | None, every: bool, encoding: str, delimiter: str) -> Table:
+    from pydantic import ValidationError
+
+    from hil.errors import UsageError
+    from hil.recording import read_table
+    from hil.recording.format_hints import FormatHints
+
+    if rig is not None or every:
+        raise UsageError(f"{source}: expected a bus trace with --rig or --all, came a recording. Leave them out.")
+    try:
+        hints = FormatHints(encoding=encoding, delimiter=delimiter)
+    except ValidationError as error:
+        first = error.errors()[0]
+        reason = str(first["msg"]).removeprefix("Value error, ")
+        raise UsageError(f"--{first['loc'][0]}: expected {reason}, came {first['input']!r}") from error
+    return read_table(source, hints)
+
+
+def _trace(source: Path, rig: Path | None, every: bool) -> Table:
+    from hil.config.rig_file import read_rig
+    from hil.errors import UsageError
+    from hil.recording.samples import table_of
+    from hil.rig.metadata import replay_metadata
+    from hil.rig.replay import replay
+
+    if rig is None:
+        raise UsageError(
+            f"{source}: expected --rig RIG beside a bus trace: its EDS files say which bits are torque and speed, "
+            "came none."
+        )
+    samples = list(replay(source, read_rig(rig), whole=every))
+    return table_of(samples, source, replay_metadata(rig, source, samples[0].t_ns if samples else 0))
+
+
+def _document(source: Path, target: Path, table: Table, lost: list[str]) -> dict[str, Any]:
+    from hil.recording.formats import read_metadata
+    from hil.recording.kinds import Kind
+
+    return {
+        "schema": "hil.convert/1",
+        "input": str(source),
+        "output": str(target),
+        "rows": table.n_rows,
+        "columns": [
+            {"name": name, "kind": Kind.of(column).value, "unit": table.units.get(name)}
+            for name, column in table.columns.items()
+        ],
+        "metadata": dict(read_metadata(target)),
+        "remarks": list(table.remarks),
+        "lost": lost,
+    }
+
+
+def _said(target: Path) -> list[str]:
+    """Say what the recording says of itself."""
+    from hil.recording.formats import read_metadata
+    from hil.recording.self_description import self_description
+
+    return self_description(read_metadata(target))

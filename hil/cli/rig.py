@@ -1,0 +1,123 @@
+"""``hil rig``: a rig file from a few answers, and its schema for editors."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from hil.config.new_rig.answers import Ask
+    from hil.config.new_rig.questions import Question
+
+app = typer.Typer(add_completion=False, no_args_is_help=True)
+
+Text = Annotated[str | None, typer.Option(metavar="VALUE")]
+
+
+@app.callback(epilog="Example: hil rig new rig.toml --simulated --yes")
+def rig() -> None:
+    """Write a rig file, or its schema for an editor."""
+
+
+@app.command(
+    epilog="Example: hil rig new rig.toml. In a script: hil rig new rig.toml --yes --plc 192.168.0.10:502 --vendor-id "
+    "0x3E7 --product-code 0x402 --rated-torque-nm 600 --torque-limit-nm 100 --inertia-kg-m2 100 --speed-rad-s 60"
+)
+def new(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="The rig file; a new one.")] = Path("rig.toml"),
+    simulated: Annotated[
+        bool, typer.Option("--simulated", help="For the simulated rig of hil sim: every answer has a default.")
+    ] = False,
+    yes: Annotated[bool, typer.Option("--yes", help="Ask nothing: defaults stand for what is not given.")] = False,
+    name: Text = None,
+    can: Text = None,
+    period_s: Text = None,
+    plc: Text = None,
+    node_m1: Text = None,
+    node_m2: Text = None,
+    vendor_id: Text = None,
+    product_code: Text = None,
+    mode: Text = None,
+    rated_torque_nm: Text = None,
+    torque_limit_nm: Text = None,
+    inertia_kg_m2: Text = None,
+    speed_rad_s: Text = None,
+) -> None:
+    """Ask what is connected, and write a rig file with a comment on every key; never over one that is there.
+
+    Asks for what is not given as an option, and again where an answer does not fit. On a vehicle nothing that limits
+    torque has a default. Guard, PRBS and experiments follow from the torque limit. rig.schema.json is written beside
+    it, for editors.
+    """
+    from hil.config.file_schema import FileKind
+    from hil.config.new_rig.answers import answers
+    from hil.config.new_rig.text import rig_text
+    from hil.config.schema import schema_text
+    from hil.errors import UsageError
+    from hil.support.new_file import refuse_existing, write_new
+
+    refuse_existing(file)
+    given = {
+        "name": name,
+        "can": can,
+        "period_s": period_s,
+        "plc": plc,
+        "node_m1": node_m1,
+        "node_m2": node_m2,
+        "vendor_id": vendor_id,
+        "product_code": product_code,
+        "mode": mode,
+        "rated_torque_nm": rated_torque_nm,
+        "torque_limit_nm": torque_limit_nm,
+        "inertia_kg_m2": inertia_kg_m2,
+        "speed_rad_s": speed_rad_s,
+    }
+    if not yes and not sys.stdin.isatty():
+        raise UsageError("expected someone at a terminal to ask, or --yes, came neither. See: hil rig new --help")
+    ask = None if yes else _asker(simulated)
+    found = answers({key: text for key, text in given.items() if text is not None}, simulated, ask)
+    write_new(file, rig_text(found, file.name, simulated))
+    typer.echo(f"{file}: written. Go through it, then: hil check {file}")
+    schema = file.with_name(FileKind.RIG.value)
+    if not schema.exists():
+        write_new(schema, schema_text(FileKind.RIG))
+        typer.echo(f"{schema}: written, for editors")
+
+
+@app.command(epilog="Example: hil rig schema --out rig.schema.json")
+def schema(
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="FILE", help="File to write; else it is printed.")
+    ] = None,
+) -> None:
+    """Print the JSON schema of rig files, for editors that read `#:schema ./rig.schema.json`."""
+    from hil.config.file_schema import FileKind
+    from hil.config.schema import schema_text
+    from hil.report.outputs import publish
+
+    text = schema_text(FileKind.RIG)
+    if out is None:
+        typer.echo(text, nl=False)
+    else:
+        publish(out.parent, {out.name: lambda path: path.write_text(text, encoding="utf-8")})
+
+
+def _asker(simulated: bool) -> Ask:
+    """Ask at the terminal; the first words say how."""
+    kind = "the simulated rig of hil sim" if simulated else "a vehicle; for the simulated rig: --simulated"
+    typer.echo(f"A rig file for {kind}. Enter takes what stands in [brackets]; Ctrl-C writes nothing.")
+
+    def ask(question: Question, default: str, wrong: str) -> str:
+        from hil.errors import UsageError
+
+        if wrong:
+            typer.echo(f"  {wrong}")
+        try:
+            return input(f"{question.asks}{f' [{default}]' if default else ''}: ")
+        except EOFError as end:
+            raise UsageError(f"{question.asks}: expected an answer, came the end of the input") from end
+
+    return ask

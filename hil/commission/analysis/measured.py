@@ -1,0 +1,52 @@
+"""A measured number with its 95 % interval, from the scatter of repeats."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import t as student
+
+from estimator.signals.record import FloatArray
+
+Z95 = 1.959963984540054
+"""97.5 % point of the normal distribution."""
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """A value and half the width of its 95 % interval; infinite where the data don't tell."""
+
+    value: float
+    ci95: float
+
+    def is_within(self, low: float, high: float) -> bool | None:
+        """Tell whether the value lies in a range: None where the interval is on both sides of a limit."""
+        if low <= self.value - self.ci95 and self.value + self.ci95 <= high:
+            return True
+        if self.value + self.ci95 < low or self.value - self.ci95 > high:
+            return False
+        return None
+
+    @property
+    def is_seen(self) -> bool:
+        """Whether zero is outside the interval."""
+        return abs(self.value) > self.ci95
+
+    def shown(self, unit: str = "", scale: float = 1.0) -> str:
+        """Return ``3.1 ± 0.4 %``: the interval with two digits, the value with as many places."""
+        value, spread = scale * self.value, scale * self.ci95
+        if not math.isfinite(spread) or not math.isfinite(value):
+            return "not determined"
+        places = 0 if spread <= 0.0 else max(0, 1 - math.floor(math.log10(spread)))
+        return f"{value:.{places}f} ± {spread:.{places}f} {unit}".rstrip()
+
+
+def of_repeats(values: FloatArray) -> Measured:
+    """Return the mean of independent repeats, shape (n,), and its interval by Student's t; n = 1 tells nothing."""
+    n = values.shape[0]
+    if n < 2:
+        return Measured(float(np.mean(values)) if n else math.nan, math.inf)
+    spread = float(student.ppf(0.975, n - 1) * np.std(values, ddof=1) / math.sqrt(n))
+    return Measured(float(np.mean(values)), spread)

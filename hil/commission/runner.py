@@ -1,0 +1,239 @@
+"""Drive one ordered run: predicted, banded, recorded, entered into the store, and noted in the step's record.
+
+Everything that commands torque goes through here, and from here through `plan_run`, `run_plan` and the torque guard.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Hashable
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Protocol
+
+from estimator.physics.model import DrivelineModel
+from hil.commission.band import WithinBand, margin_rad_s
+from hil.commission.order import Order, RigSource
+from hil.commission.predict import Prediction, predict
+from hil.commission.record import RunRecord
+from hil.config.rig_file import Rig
+from hil.errors import StoreError
+from hil.recording.checksum import RIG_CHECKSUM, RIG_TEXT, text_sha256
+from hil.recording.writer import RecordingWriter
+from hil.rig.build import open_devices
+from hil.rig.dry_run import Range
+from hil.rig.experiments.base import Phase
+from hil.rig.metadata import run_metadata
+from hil.rig.pacing import Pacer
+from hil.rig.plan import Plan, plan_run
+from hil.rig.realtime import RealTimeGrants
+from hil.rig.sample import Sample
+from hil.rig.session import run_plan
+from hil.rig.stop import StopRequest, stop_on_signals
+from hil.rig.timing import RunTiming
+from hil.store import register_run
+
+RUNS = "runs"
+"""Folder of the recordings, and of the store of runs, inside that of the commissioning."""
+
+
+class Shows(Protocol):
+    """Shows how a run goes on."""
+
+    def show(self, phase: Phase, time_s: float) -> None:
+        """Take note of one cycle: its phase and the time since the phase began [s]."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Conditions:
+    """What a run is driven under: pacing, real-time scheduling, progress.
+
+    Attributes
+    ----------
+    pace
+        Its name, for the recording.
+    pacer
+        Makes a fresh pacer.
+    scheduling
+        Asks for real-time scheduling for the time of a block.
+    progress
+        Shows a run for the time of a block.
+    """
+
+    pace: str
+    pacer: Callable[[Rig], Pacer]
+    scheduling: Callable[[], AbstractContextManager[RealTimeGrants]]
+    progress: Callable[[Plan], AbstractContextManager[Shows]]
+
+
+@dataclass(slots=True)
+class _Seen:
+    """Ranges of what was measured over a whole run."""
+
+    torque_m1_nm: Range = field(default_factory=Range)
+    torque_m2_nm: Range = field(default_factory=Range)
+    speed_rad_s: Range = field(default_factory=Range)
+    speed_measured_rad_s: Range = field(default_factory=Range)
+    last_rad_s: float = 0.0
+    cycles: int = 0
+    recorded: int = 0
+    flagged: int = 0
+
+    def take(self, sample: Sample, phase: Phase) -> None:
+        self.cycles += 1
+        self.last_rad_s = sample.speed_rad_s
+        self.torque_m1_nm.see(sample.torque_m1_nm)
+        self.torque_m2_nm.see(sample.torque_m2_nm)
+        self.speed_rad_s.see(sample.speed_rad_s)
+        if phase is Phase.MEASURE:
+            self.speed_measured_rad_s.see(sample.speed_rad_s)
+            self.recorded += 1
+            self.flagged += bool(sample.flags)
+
+    def as_json(self) -> dict[str, list[float]]:
+        ranges = {
+            "torque_m1_nm": self.torque_m1_nm,
+            "torque_m2_nm": self.torque_m2_nm,
+            "speed_rad_s": self.speed_rad_s,
+            "speed_measured_rad_s": self.speed_measured_rad_s,
+        }
+        return {name: [seen.low, seen.high] for name, seen in ranges.items() if seen.low <= seen.high}
+
+
+@dataclass(frozen=True, slots=True)
+class Runner:
+    """Runs orders of one commissioning.
+
+    Attributes
+    ----------
+    source
+        The user's rig file.
+    folder
+        Of the commissioning.
+    conditions
+        How runs are driven.
+    """
+
+    source: RigSource
+    folder: Path
+    conditions: Conditions
+    _predicted: dict[tuple[Hashable, ...], Prediction] = field(default_factory=dict)
+
+    def predict(self, order: Order, model: DrivelineModel, speed_rad_s: float) -> Prediction:
+        """Predict an order for a vehicle that rolls at a speed [rad/s]; the same one is predicted once."""
+        rig, text = self.source.ordered(order)
+        start_rad_s = 0.0 if order.from_standstill else round(speed_rad_s, 2)
+        key = (text, model.structure, *model.values().values(), start_rad_s)
+        if key not in self._predicted:
+            self._predicted[key] = predict(rig, order.name, model, start_rad_s)
+        return self._predicted[key]
+
+    def run(
+        self,
+        step: str,
+        order: Order,
+        model: DrivelineModel,
+        speed_rad_s: float,
+        note: Callable[[RunRecord], None],
+    ) -> RunRecord:
+        """Drive an order.
+
+        Parameters
+        ----------
+        step
+            Name of the step that ordered it.
+        model
+            What it is predicted with.
+        speed_rad_s
+            Speed the vehicle was last seen at.
+        note
+            Told of the run, also of one that was ended early.
+
+        Raises
+        ------
+        RunAborted, DriverError, RecordingError, KeyboardInterrupt
+            As `hil.rig.session.run_plan`; also if the speed leaves its band.
+        """
+        rig, text = self.source.ordered(order)
+        prediction = self.predict(order, model, speed_rad_s)
+        path, seen = self._free_path(step, order), _Seen()
+
+        def record(whole: bool) -> RunRecord:
+            return RunRecord(
+                name=order.name,
+                recording=str(path.relative_to(self.folder)) if path.exists() else None,
+                whole=whole,
+                seconds=round(seen.cycles * rig.period_s, 3),
+                predicted=prediction.as_json(),
+                measured=seen.as_json(),
+                flagged=seen.flagged,
+                recorded=seen.recorded,
+                prbs_nm=rig.prbs.amplitude_nm if rig.experiments[order.name].prbs else 0.0,
+                last_rad_s=seen.last_rad_s,
+            )
+
+        try:
+            self._drive(rig, text, order, prediction, path, seen, step)
+        except BaseException as error:
+            note(record(False))
+            _enter_ended(path, error)
+            raise
+        run = record(True)
+        note(run)
+        register_run(path)
+        return run
+
+    def _drive(
+        self, rig: Rig, text: str, order: Order, prediction: Prediction, path: Path, seen: _Seen, step: str
+    ) -> None:
+        pacer, stop = self.conditions.pacer(rig), StopRequest()
+        timing = RunTiming(pacer.period_ns)
+        plan = _banded(plan_run(rig, order.name), prediction, order.least_margin_rad_s)
+        metadata = run_metadata(self.source.path, order.name) | {
+            RIG_TEXT: text,
+            RIG_CHECKSUM: text_sha256(text),
+            "commissioning_step": step,
+            "pace": self.conditions.pace,
+        }
+        path.parent.mkdir(parents=True, exist_ok=True)
+        recorder = RecordingWriter(path, metadata)
+        with (
+            stop_on_signals(stop),
+            recorder,
+            self.conditions.scheduling() as grants,
+            self.conditions.progress(plan) as progress,
+            open_devices(rig) as devices,
+        ):
+            recorder.describe("real_time", json.dumps(grants.as_json()))
+            try:
+                run_plan(devices, plan, pacer, recorder, stop, progress.show, timing, (seen.take,))
+            finally:
+                recorder.describe("timing", json.dumps(timing.as_json()))
+
+    def _free_path(self, step: str, order: Order) -> Path:
+        """Return a recording's name that is not taken, also not by what a killed run left."""
+        number = 1
+        while True:
+            stem = f"{step}-{order.name}" + (f"-{number}" if number > 1 else "")
+            path = self.folder / RUNS / f"{stem}.parquet"
+            if not path.exists() and not path.with_name(f"{stem}.part.csv").exists():
+                return path
+            number += 1
+
+
+def _banded(plan: Plan, prediction: Prediction, least_margin_rad_s: float) -> Plan:
+    low, high = prediction.speed_rad_s.low, prediction.speed_rad_s.high
+    margin = margin_rad_s(low, high, least_margin_rad_s)
+    return replace(plan, experiment=WithinBand(plan.experiment, low - margin, high + margin, margin, plan.period_s))
+
+
+def _enter_ended(path: Path, error: BaseException) -> None:
+    """Enter what there is of a run that was ended early; what ended it is told first."""
+    if not path.exists():
+        return
+    try:
+        register_run(path, str(error) or type(error).__name__)
+    except StoreError as lost:
+        error.add_note(str(lost))

@@ -1,0 +1,135 @@
+"""The state file of a commissioning: ``commission.json`` (schema ``hil.commission/1``), whole after every change.
+
+It is written beside itself and moved over the old one, so that neither an interruption nor a full disk nor the end of
+power leaves half of it.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+from hil import __version__
+from hil.commission.record import Status, StepRecord, now_utc
+from hil.errors import UsageError
+
+SCHEMA: Final = "hil.commission/1"
+FILE_NAME: Final = "commission.json"
+
+
+@dataclass(slots=True)
+class State:
+    """A commissioning as far as it is.
+
+    Attributes
+    ----------
+    folder
+        Where the file and everything beside it is.
+    rig_name, rig_path, rig_text
+        The rig file as of the last call.
+    steps
+        Record of every step, by name, in order.
+    notes
+        What was decided about the whole, such as keeping results after the rig file was changed.
+    """
+
+    folder: Path
+    rig_name: str
+    rig_path: str
+    rig_text: str
+    steps: dict[str, StepRecord]
+    started_utc: str = field(default_factory=now_utc)
+    notes: list[dict[str, str]] = field(default_factory=list)
+
+    @property
+    def path(self) -> Path:
+        """The state file."""
+        return self.folder / FILE_NAME
+
+    def document(self) -> dict[str, Any]:
+        """Return the content of the file."""
+        return {
+            "schema": SCHEMA,
+            "hil_version": __version__,
+            "rig_name": self.rig_name,
+            "rig_path": self.rig_path,
+            "rig_text": self.rig_text,
+            "started_utc": self.started_utc,
+            "updated_utc": now_utc(),
+            "notes": self.notes,
+            "steps": {name: record.as_json() for name, record in self.steps.items()},
+        }
+
+    def save(self) -> None:
+        """Write the file, whole or not at all.
+
+        Raises
+        ------
+        OSError
+            If the disk does not take it; the file before it is still there.
+        """
+        text = json.dumps(self.document(), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+        part = self.path.with_name(f".{FILE_NAME}.{os.getpid()}.part")
+        try:
+            with part.open("w", encoding="utf-8") as file:
+                file.write(text)
+                file.flush()
+                os.fsync(file.fileno())
+            part.replace(self.path)
+        finally:
+            part.unlink(missing_ok=True)
+
+    @property
+    def outside(self) -> int:
+        """How many findings are outside their limits."""
+        return sum(finding.within is False for record in self.steps.values() for finding in record.findings)
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether every step is done, or was skipped for a reason."""
+        return all(record.status.is_settled for record in self.steps.values())
+
+
+def load_state(folder: Path, names: Iterable[str]) -> State | None:
+    """Read the state of a folder; None where there is none. A step that is new to it is pending.
+
+    Raises
+    ------
+    UsageError
+        If the file is none of a commissioning, or damaged.
+    """
+    path = folder / FILE_NAME
+    if not path.exists():
+        return None
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+        if document["schema"] != SCHEMA:
+            raise ValueError(f"schema {document['schema']!r}")
+        steps = {name: _step(document["steps"].get(name)) for name in names}
+        return State(
+            folder=folder,
+            rig_name=document["rig_name"],
+            rig_path=document["rig_path"],
+            rig_text=document["rig_text"],
+            steps=steps,
+            started_utc=document["started_utc"],
+            notes=document["notes"],
+        )
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise UsageError(
+            f"{path}: expected the state of a commissioning ({SCHEMA}), came a file that can't be read as one: "
+            f"{error}. Move it away to begin anew in this folder (its recordings stay), or choose another by --out."
+        ) from error
+
+
+def _step(document: Any) -> StepRecord:
+    if document is None:
+        return StepRecord()
+    record = StepRecord.from_json(document)
+    if record.status is Status.RUNNING:  # the program was killed, or its machine went down
+        record.end(Status.INTERRUPTED, "the program ended without a word: it was killed, or the machine went down")
+    return record

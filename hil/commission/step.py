@@ -1,0 +1,150 @@
+"""What a step of the commissioning is, and the job it is given to do."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from estimator.physics.model import DrivelineModel
+from hil.commission.finding import Finding
+from hil.commission.model_json import model_from_json
+from hil.commission.order import Order, RigSource
+from hil.commission.predict import Prediction, rigid_model
+from hil.commission.record import RunRecord, StepRecord
+from hil.commission.runner import Runner
+from hil.commission.state import State
+from hil.config.rig_file import Rig
+
+MODEL_STEPS = ("validation", "scales")
+"""Steps whose evidence has a ``model``, the better one first."""
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What a step came to: findings for people, evidence for the steps after it and for the report."""
+
+    findings: Sequence[Finding]
+    evidence: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(slots=True)
+class Job:
+    """What the steps work with.
+
+    Attributes
+    ----------
+    source, rig
+        The user's rig file, and what it says.
+    state
+        Everything known so far.
+    runner
+        Drives runs.
+    nominal
+        The user's own model of the driveline, where there is one.
+    travel_m_per_rad
+        Way the vehicle makes per radian of the motor shaft [m].
+    travel_is_given
+        Whether the user said so; else it is assumed.
+    say
+        Told what goes on.
+    progress
+        Told of long computations: what, and the share done.
+    """
+
+    source: RigSource
+    rig: Rig
+    state: State
+    runner: Runner
+    nominal: DrivelineModel | None
+    travel_m_per_rad: float
+    travel_is_given: bool
+    say: Callable[[str], None]
+    progress: Callable[[str, float], None]
+
+    @property
+    def folder(self) -> Path:
+        """Where everything goes."""
+        return self.state.folder
+
+    def evidence(self, step: str) -> Mapping[str, Any]:
+        """Return a step's evidence; empty where it was not done."""
+        return self.state.steps[step].evidence
+
+    def model(self) -> DrivelineModel:
+        """Return the best model of the driveline known so far, to predict with."""
+        if self.nominal is not None:
+            return self.nominal
+        for step in MODEL_STEPS:
+            if "model" in self.evidence(step):
+                return model_from_json(self.evidence(step)["model"])
+        return rigid_model(self.rig)
+
+    def predict(self, order: Order, speed_rad_s: float = 0.0) -> Prediction:
+        """Predict a run with that model, of a vehicle that rolls at a speed [rad/s]."""
+        return self.runner.predict(order, self.model(), speed_rad_s)
+
+    def rolling_rad_s(self) -> float:
+        """Speed at the end of the last run [rad/s]; the vehicle may have been braked since."""
+        runs = [
+            (record.started_utc, i, run) for record in self.state.steps.values() for i, run in enumerate(record.runs)
+        ]
+        return max(runs, key=lambda each: each[:2])[2].last_rad_s if runs else 0.0
+
+    def run(self, step: str, order: Order) -> RunRecord:
+        """Drive a run of a step, or return it where it was already driven whole in this attempt."""
+        record = self.state.steps[step]
+        known = record.run(order.name)
+        if known is not None and known.prbs_nm in (0.0, order.prbs.get("amplitude_nm", known.prbs_nm)):
+            return known
+
+        def note(run: RunRecord) -> None:
+            record.runs.append(run)
+            self.state.save()
+
+        return self.runner.run(step, order, self.model(), self.rolling_rad_s(), note)
+
+    def recording(self, run: RunRecord) -> Path:
+        """Return the path of a run's recording."""
+        return self.folder / (run.recording or "")
+
+    def runs_of(self, step: str) -> list[RunRecord]:
+        """Return the whole runs of a step."""
+        return [run for run in self.state.steps[step].runs if run.whole]
+
+
+def _no_orders(job: Job) -> Sequence[Order]:
+    return ()
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One step.
+
+    Attributes
+    ----------
+    name
+        As on the command line.
+    title
+        As in headings.
+    about
+        Says what it is about to do.
+    do
+        Does it.
+    orders
+        The runs it will drive; none where it commands no torque.
+    needs
+        Steps it builds on.
+    """
+
+    name: str
+    title: str
+    about: Callable[[Job], str]
+    do: Callable[[Job], Outcome]
+    orders: Callable[[Job], Sequence[Order]] = _no_orders
+    needs: tuple[str, ...] = ()
+
+    def record(self, job: Job) -> StepRecord:
+        """Return its record."""
+        return job.state.steps[self.name]

@@ -1,0 +1,146 @@
+"""Identification: the paper's recursive estimate and the batch model of every PRBS run, side by side."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from estimator.identification.identify import Identification, Settings
+from estimator.identification.identify import identify as identify_record
+from estimator.identification.modes.modes import Mode
+from estimator.identification.online.recursive import Status as OnlineStatus
+from hil.commission.analysis.measured import of_repeats
+from hil.commission.finding import Finding
+from hil.commission.readings import record_of, rounded
+from hil.commission.step import Job, Outcome, Step
+from hil.errors import UsageError
+
+SPREAD = 0.02
+"""Largest standard deviation of the resonance between runs, relative: what the paper's runs agree to in its figures."""
+
+AGREEMENT = 0.02
+"""On-line and batch estimate of one run agree within this, relative: DESIGN's trials gave 1 to 2.2 %."""
+
+LEAST_FIT_PERCENT = 70.0
+"""Free-run fit of a batch model: below, a third of the speed's course is not the model's."""
+
+DRAWN_HZ = (0.5, 25.0)
+
+
+def cruises(job: Job) -> list[Any]:
+    """Return the PRBS runs at constant speed.
+
+    Raises
+    ------
+    UsageError
+        If there are fewer than two.
+    """
+    runs = [run for run in job.runs_of("experiments") if run.name.startswith("cruise")]
+    if len(runs) < 2:
+        raise UsageError(
+            f"commissioning in {job.folder}: expected PRBS runs to work with, came {len(runs)} (experiments is "
+            f"{job.state.steps['experiments'].status.value}). Drive them: --repeat experiments; or skip this step."
+        )
+    return runs
+
+
+def _settings(job: Job) -> Settings:
+    return Settings(sample_time_s=2.0 * job.rig.period_s)
+
+
+def _about(job: Job) -> str:
+    return "identifies the driveline from each PRBS run, on line and off line. Computes; commands no torque."
+
+
+def _do(job: Job) -> Outcome:
+    runs = cruises(job)
+    found: list[Identification] = []
+    for i, run in enumerate(runs):
+        job.progress(f"identifying {run.name}", i / len(runs))
+        found.append(identify_record(record_of(job.recording(run)), _settings(job)))
+    job.progress("identified", 1.0)
+    modes = [each.batch_resonance for each in found]
+    evidence = {"runs": [_evidence(each, run.name) for each, run in zip(found, runs, strict=True)]}
+    return Outcome([*_resonance_findings(modes), *_quality_findings(found)], evidence)
+
+
+def _resonance_findings(modes: list[Mode | None]) -> list[Finding]:
+    known = [mode for mode in modes if mode is not None]
+    look = "Look at the coherence in the report; raise the amplitude, or repeat on a better road"
+    findings = [Finding("runs with a resonance", str(len(modes)), str(len(known)), len(known) == len(modes), look)]
+    if len(known) < 2:
+        return findings
+    frequency = np.array([mode.frequency_hz for mode in known])
+    damping = np.array([mode.damping for mode in known])
+    spread = float(np.std(frequency, ddof=1) / np.mean(frequency))
+    return [
+        *findings,
+        Finding(
+            "resonance, mean of the runs",
+            f"the same within {100.0 * SPREAD:g} % (standard deviation)",
+            f"{of_repeats(frequency).shown('Hz')}; between runs {100.0 * spread:.2f} %",
+            spread <= SPREAD,
+            "See whether it goes with speed or time: the diagnosis looks for what does",
+        ),
+        Finding("damping, mean of the runs", "–", of_repeats(damping).shown(), None),
+    ]
+
+
+def _quality_findings(found: list[Identification]) -> list[Finding]:
+    pairs = [(each.online_resonance, each.batch_resonance) for each in found]
+    both = [(a.frequency_hz, b.frequency_hz) for a, b in pairs if a is not None and b is not None]
+    worst = max((abs(a / b - 1.0) for a, b in both), default=float("nan"))
+    estimated = sum(each.estimate.status is OnlineStatus.ESTIMATED for each in found)
+    fits = [each.batch.fit_percent for each in found]
+    return [
+        Finding(
+            "on line against off line, resonance",
+            f"within {100.0 * AGREEMENT:g} % in every run",
+            f"{100.0 * worst:.2f} % at worst" if both else "nothing to compare",
+            bool(both) and len(both) == len(found) and worst <= AGREEMENT,
+            "The on-line estimate needs more excitation, or longer runs",
+        ),
+        Finding("runs whose on-line estimate stands", str(len(found)), str(estimated), estimated == len(found)),
+        Finding(
+            "free-run fit of the batch models",
+            f"at least {LEAST_FIT_PERCENT:g} %",
+            f"{min(fits):.1f} to {max(fits):.1f} %",
+            min(fits) >= LEAST_FIT_PERCENT,
+            "A linear model of four poles does not tell the whole: see the diagnosis",
+        ),
+    ]
+
+
+def _evidence(found: Identification, run: str) -> dict[str, Any]:
+    frequency = np.geomspace(*DRAWN_HZ, 160)
+    frequency = frequency[frequency < 0.5 / found.data.sample_time_s]
+    spectral = found.spectral
+    return {
+        "run": run,
+        "batch": _model(found.batch.model, found.batch_resonance) | {"fit_percent": found.batch.fit_percent},
+        "online": _model(found.online, found.online_resonance) | {"status": found.estimate.status.value},
+        "frequency_hz": rounded(frequency),
+        "magnitude": rounded(np.abs(found.batch.model.response(frequency))),
+        "spectral": None
+        if spectral is None
+        else {
+            "frequency_hz": rounded(spectral.frequency_hz),
+            "magnitude": rounded(np.abs(spectral.response)),
+            "coherence": rounded(spectral.coherence),
+        },
+    }
+
+
+def _model(model: Any, mode: Mode | None) -> dict[str, Any]:
+    return {
+        "theta": model.theta.tolist(),
+        "nk": model.nk,
+        "sample_time_s": model.sample_time_s,
+        "poles": [[float(z.real), float(z.imag)] for z in model.poles],
+        "zeros": [[float(z.real), float(z.imag)] for z in model.zeros],
+        "resonance": None if mode is None else [mode.frequency_hz, mode.damping],
+    }
+
+
+STEP = Step("identification", "Identification", _about, _do, needs=("experiments",))

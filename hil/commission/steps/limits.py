@@ -1,0 +1,182 @@
+"""Limits: the torque guard refuses what is beyond each limit of the rig file, and the PLC permits what will be asked.
+
+No torque is commanded and no bus is used for the guard: it is asked, with the limits a run would have.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from drivers.errors import CommandRefused
+from drivers.torque_guard import NS_PER_S, GuardLimits, TorqueGuard, TorqueRequest
+from hil.commission.finding import Finding
+from hil.commission.order import Order
+from hil.commission.predict import rigid_model
+from hil.commission.step import Job, Outcome, Step
+from hil.commission.steps import experiments
+from hil.rig.build import open_devices
+from hil.rig.excitation import NO_TORQUE
+from hil.rig.plan import plan_run
+
+BEYOND = 1.001
+"""A probe is so many times its limit: by less than any drive resolves."""
+
+RAMP_S = 0.01
+"""A probe of magnitudes is reached by steps of a period that the rate limit allows."""
+
+DEFECT = "Connect nothing; this is a defect of the program: report it"
+
+
+@dataclass(frozen=True, slots=True)
+class Probe:
+    """A request at a limit, which passes, and one beyond it, which is refused."""
+
+    what: str
+    limit: str
+    at: TorqueRequest
+    beyond: TorqueRequest
+    age_at_ns: int = 0
+    age_beyond_ns: int = 0
+
+
+def _about(job: Job) -> str:
+    return (
+        "asks the torque guard for a little more than each limit of the rig file and sees it refuse, and compares the "
+        "PLC's limits with what the runs to come need. Commands no torque."
+    )
+
+
+def _do(job: Job) -> Outcome:
+    limits = job.rig.guard_limits
+    findings = [_probed(limits, probe) for probe in _probes(limits)]
+    return Outcome([*findings, _rate(limits), _silent(limits), *_plc(job)])
+
+
+def _probes(limits: GuardLimits) -> Iterator[Probe]:
+    both = (("m1", limits.torque_limit_m1_nm), ("m2", limits.torque_limit_m2_nm))
+    for name, limit_nm in both:
+        largest_nm = min(limit_nm, limits.sum_limit_nm)
+        if largest_nm == limit_nm:
+            what = f"torque of {name}"
+            yield Probe(what, f"{limit_nm:g} Nm", _base(name, limit_nm), _base(name, BEYOND * limit_nm))
+    each_nm = limits.sum_limit_nm / 2.0
+    if each_nm <= min(limit_nm for _, limit_nm in both):
+        at, beyond = (TorqueRequest(part, 0.0, part, 0.0) for part in (each_nm, BEYOND * each_nm))
+        yield Probe("sum of both", f"{limits.sum_limit_nm:g} Nm", at, beyond)
+    for name, limit_nm in both:
+        if limits.prbs_limit_nm <= min(limit_nm, limits.sum_limit_nm):
+            at, beyond = (_prbs(name, factor * limits.prbs_limit_nm) for factor in (1.0, BEYOND))
+            yield Probe(f"PRBS of {name}", f"{limits.prbs_limit_nm:g} Nm", at, beyond)
+    old_ns = round(limits.feedback_timeout_s * NS_PER_S)
+    late = round(BEYOND * old_ns)
+    yield Probe("age of the feedback", f"{limits.feedback_timeout_s:g} s", NO_TORQUE, NO_TORQUE, old_ns, late)
+
+
+def _base(name: str, torque_nm: float) -> TorqueRequest:
+    return TorqueRequest(torque_nm, 0.0, 0.0, 0.0) if name == "m1" else TorqueRequest(0.0, 0.0, torque_nm, 0.0)
+
+
+def _prbs(name: str, torque_nm: float) -> TorqueRequest:
+    return TorqueRequest(0.0, torque_nm, 0.0, 0.0) if name == "m1" else TorqueRequest(0.0, 0.0, 0.0, torque_nm)
+
+
+def _probed(limits: GuardLimits, probe: Probe) -> Finding:
+    passes = _passes(limits, probe.at, probe.age_at_ns)
+    refuses = not _passes(limits, probe.beyond, probe.age_beyond_ns)
+    measured = f"{'passes' if passes else 'refused'} at it, {'refused' if refuses else 'passes'} 0.1 % beyond"
+    expected = f"passes at {probe.limit}, refused beyond"
+    return Finding(f"guard: {probe.what}", expected, measured, passes and refuses, DEFECT, True)
+
+
+def _passes(limits: GuardLimits, request: TorqueRequest, age_ns: int) -> bool:
+    """Ask a fresh guard, led up to the request as slowly as its rate limit wants."""
+    guard = TorqueGuard(limits)
+    guard.enable()
+    largest = max(abs(request.base_m1_nm), abs(request.base_m2_nm))
+    steps = max(1, math.ceil(largest / (limits.rate_limit_nm_per_s * min(RAMP_S, limits.feedback_timeout_s))))
+    period_ns = round(min(RAMP_S, limits.feedback_timeout_s) * NS_PER_S)
+    try:
+        for i in range(steps + 1):
+            share = i / steps
+            part = TorqueRequest(share * request.base_m1_nm, 0.0, share * request.base_m2_nm, 0.0)
+            guard.check(part if i < steps else request, i * period_ns, age_ns)
+    except CommandRefused:
+        return False
+    return True
+
+
+def _rate(limits: GuardLimits) -> Finding:
+    """See that a base torque one period after zero passes as far as the rate limit allows, and no further."""
+    period_s = min(RAMP_S, limits.feedback_timeout_s)
+    allowed_nm = limits.rate_limit_nm_per_s * period_s
+
+    def jumps(torque_nm: float) -> bool:
+        guard = TorqueGuard(limits)
+        guard.enable()
+        guard.check(NO_TORQUE, 0, 0)
+        try:
+            guard.check(_base("m1", torque_nm), round(period_s * NS_PER_S), 0)
+        except CommandRefused:
+            return False
+        return True
+
+    passes, refuses = jumps(allowed_nm), not jumps(BEYOND * allowed_nm)
+    measured = f"{'passes' if passes else 'refused'} at it, {'refused' if refuses else 'passes'} 0.1 % beyond"
+    expected = f"passes at {limits.rate_limit_nm_per_s:g} Nm/s, refused beyond"
+    return Finding("guard: rate of the base torque", expected, measured, passes and refuses, DEFECT, True)
+
+
+def _silent(limits: GuardLimits) -> Finding:
+    guard = TorqueGuard(limits)
+    try:
+        guard.check(_base("m1", 1.0), 0, 0)
+    except CommandRefused:
+        measured, within = "refused", True
+    else:
+        measured, within = "passes", False
+    return Finding("guard: any torque before it is enabled", "refused", measured, within, DEFECT, True)
+
+
+def _plc(job: Job) -> Iterator[Finding]:
+    """Compare what the PLC permits with what the largest of the runs to come need."""
+    with open_devices(job.rig) as devices:
+        status = devices.plc_loop.call(devices.plc.read_status())
+    orders = experiments.orders(job)
+    if not orders:
+        return
+    needed_nm = max(plan_run(job.source.ordered(order)[0], order.name).needs.torque_of_one_nm for order in orders)
+    yield Finding(
+        "PLC: torque limit of one inverter",
+        f"at least {needed_nm:g} Nm",
+        f"{status.torque_limit_nm:g} Nm",
+        status.torque_limit_nm >= needed_nm,
+        "Have the PLC permit as much, or lower torque_nm and amplitude_nm in the rig file",
+        True,
+    )
+    fastest = max(_fastest_rad_s(job, order) for order in _fastest_of_each_kind(orders))
+    yield Finding(
+        "PLC: speed limit",
+        f"at least {fastest:.1f} rad/s",
+        f"{status.speed_limit_rad_s:g} rad/s",
+        status.speed_limit_rad_s >= fastest,
+        "Have the PLC permit as much, or lower the speeds of the experiments in the rig file",
+        True,
+    )
+
+
+def _fastest_of_each_kind(orders: Sequence[Order]) -> list[Order]:
+    """Choose one order of each kind: of those that hold a speed, the fastest."""
+    by_kind: dict[str, Order] = {}
+    for order in sorted(orders, key=lambda order: abs(float(order.table.get("speed_rad_s", 0.0)))):
+        by_kind[order.table["kind"]] = order
+    return list(by_kind.values())
+
+
+def _fastest_rad_s(job: Job, order: Order) -> float:
+    speed = job.runner.predict(order, rigid_model(job.rig), 0.0).speed_rad_s
+    return max(abs(speed.low), abs(speed.high))
+
+
+STEP = Step("limits", "Limits", _about, _do, needs=("devices",))

@@ -1,0 +1,77 @@
+"""What an estimator on a PLC is made of: the settings of the host's on-line chain, and the chain's own numbers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from estimator.errors import BadSetting
+from estimator.identification.excitation import SAMPLES_PER_PARAMETER
+from estimator.identification.identify import Settings
+from estimator.identification.online.chain import OnlineChain, oefo
+from estimator.identification.online.oefo import Oefo
+from estimator.signals.decimate import Decimator
+from estimator.signals.record import FloatArray
+
+PLC_WORD = 32767
+"""Largest INT of IEC 61131-3: array sizes and counters on the PLC stay below it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlcEstimator:
+    """The estimator that is exported: what `OnlineChain` is on the host, from the same three settings.
+
+    Attributes
+    ----------
+    settings : Settings
+        Orders, periods, high-pass and adaptation profile.
+    cycle_s : float
+        Period of the PLC task that calls the estimator [s]; the models' period is a whole multiple of it.
+    L : ndarray or None
+        Denominator ``1, l_1 ..`` of the observation filter; None: it follows each stable A.
+    origin : str
+        Where the settings come from, for the head of the text.
+
+    Raises
+    ------
+    BadSetting
+        If ``cycle_s`` does not divide the models' period, or a counter would not fit a PLC's INT.
+    BadModel
+        If L is no stable polynomial.
+    """
+
+    settings: Settings = field(default_factory=Settings)
+    cycle_s: float = 0.01
+    L: FloatArray | None = None
+    origin: str = "the defaults"
+
+    def __post_init__(self) -> None:
+        OnlineChain(self.settings, self.cycle_s, self.L)
+        taps = self.decimator().taps.shape[0]
+        if taps > PLC_WORD:
+            raise BadSetting(
+                f"PLC estimator: its low-pass has {taps} taps, expected at most {PLC_WORD}, the largest INT of a "
+                f"PLC. Call it less often than every {self.cycle_s:g} s."
+            )
+
+    @property
+    def adapts_filter(self) -> bool:
+        """Whether the observation filter follows the estimate."""
+        return self.L is None
+
+    @property
+    def factor(self) -> int:
+        """Cycles per sample of the model."""
+        return round(self.settings.sample_time_s / self.cycle_s)
+
+    @property
+    def start_up_samples(self) -> int:
+        """Good samples at the start that are learnt from without the filter."""
+        return SAMPLES_PER_PARAMETER * self.settings.orders.n_parameters
+
+    def decimator(self) -> Decimator:
+        """Return the host's own decimator of these settings, ready for samples."""
+        return Decimator(self.cycle_s, self.factor, self.settings.high_pass_hz)
+
+    def oefo(self) -> Oefo:
+        """Return the host's own estimator of these settings, ready for samples."""
+        return oefo(self.settings, self.L)

@@ -1,0 +1,1 @@
+"""The paper's figures from eight on-road-like experiments, or from any recordings; with the truth where it is known."""

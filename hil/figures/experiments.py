@@ -1,0 +1,76 @@
+"""The set of experiments the figures are made of: driven now on the simulated rig, or recorded before."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from estimator.identification.identify import Identification, Settings, identify
+from estimator.physics.model import DrivelineModel, Structure
+from estimator.signals.record import Record
+from hil.figures.line import TwoMassLine
+from hil.figures.local_model import LocalModel, Reference
+from hil.figures.road.conditions import draw_conditions
+from hil.figures.road.drive import Driven, drive
+from hil.recording import read_record
+from hil.rig.drive import Progress
+from hil.rig.stop import StopRequest
+
+TRUTH, MODEL_FILE = "truth", "model file"
+
+
+def drive_all(
+    folder: Path,
+    seed: int,
+    count: int,
+    duration_s: float,
+    stop: StopRequest,
+    progress: Callable[[int], Progress] = lambda number: lambda phase, time_s: None,
+) -> list[Driven]:
+    """Drive ``count`` experiments of one seed, ``run_1.csv`` and on.
+
+    Parameters
+    ----------
+    folder
+        Gets the recordings.
+    duration_s
+        Length of each recording [s].
+    stop
+        Ends the run under way, and all, when requested.
+    progress
+        Gives what is told of every cycle of an experiment, by its number from 0.
+
+    Raises
+    ------
+    RunAborted, DriverError, KeyboardInterrupt
+        As `hil.rig.session.run_plan`.
+    """
+    conditions = draw_conditions(seed, count)
+    return [
+        drive(folder / f"run_{number + 1}.csv", each, duration_s, stop, progress(number))
+        for number, each in enumerate(conditions)
+    ]
+
+
+def driven_models(driven: Sequence[Driven], settings: Settings) -> list[LocalModel]:
+    """Identify from every experiment that was driven; the truth goes along."""
+    models = []
+    for each in driven:
+        record = read_record(each.path)
+        models.append(LocalModel(record, identify(record, settings), Reference(TRUTH, each.line)))
+    return models
+
+
+def recorded_models(
+    records: Sequence[Record], settings: Settings, expected: DrivelineModel | None = None
+) -> list[LocalModel]:
+    """Identify from recordings; beside them what a two-mass model file expects."""
+    return [beside(record, identify(record, settings), expected) for record in records]
+
+
+def beside(record: Record, found: Identification, expected: DrivelineModel | None) -> LocalModel:
+    """Put what a model file expects beside what was identified; nothing where it is no two-mass drive."""
+    reference = None
+    if expected is not None and expected.structure is Structure.TWO_MASS:
+        reference = Reference(MODEL_FILE, TwoMassLine.of(expected.values()))
+    return LocalModel(record, found, reference)

@@ -1,0 +1,259 @@
+"""The full-screen view: draws the latest snapshot a few times a second, and turns keys into orders."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import threading
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from types import FrameType
+from typing import Any, ClassVar
+
+from textual.app import App, ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import Container
+from textual.events import Resize
+from textual.widgets import Static
+
+from hil.monitor import head_panels
+from hil.monitor.dialogs import Choice, HelpDialog, MarkDialog, StartDialog
+from hil.monitor.layout import CSS, LEAST_COLUMNS, LEAST_ROWS, PAGES, WIDE_COLUMNS, WIDE_ROWS, pages
+from hil.monitor.messages import Kind, Mark, Notice, Quit, Reset, Start, Stop
+from hil.monitor.panel import Panel
+from hil.monitor.snapshot import Activity
+from hil.monitor.source import LONGEST_END_S, Source
+from hil.monitor.state import LiveState
+from hil.rig.stop import STOP_SIGNALS
+
+DRAW_EVERY_S = 0.125
+"""Eight pictures a second."""
+
+INTERRUPTED = 130
+"""Exit status, as `hil.cli.main` has it; that module is not to be imported from below."""
+
+GRACE_S = LONGEST_END_S + 5.0
+"""Time from a stop signal to an end without ceremony [s]."""
+
+KEYS = "e start  SPACE stop  m mark  r reset  1-5/TAB page  +/- time  ? help  q quit"
+
+REPLAY_KEYS = "1-5/TAB page  +/- time  ? help  q quit   (a recording: nothing to drive)"
+
+HELP = """\
+e         choose an experiment of the rig file and start it; asks first
+SPACE, x  stop at once: zero torque, drives disarmed
+m         mark this moment; the mark goes into the recording
+r         reset the drives' faults, configure them again; at rest only
+1 to 5    overview, model, resonance, bus, log; TAB the next
++ -       signals over a shorter or a longer time
+q         quit; a run ends at zero torque first; Ctrl-C does the same
+
+STALE: older than it should be. LATE: the cycle began late.
+Twist: estimated from torque and speed with a two-mass model, ± two
+standard deviations as the filter reckons them; a backlash's free play
+is not in it."""
+
+
+class MonitorApp(App[None]):
+    """The view.
+
+    Parameters
+    ----------
+    source
+        What is watched.
+    state
+        What is known of it.
+    choices
+        Experiments that can be started.
+    out
+        Folder of their recordings, for the dialog.
+    page
+        The first page, one of `PAGES`.
+    picture
+        A file to draw the screen into, and after how many seconds; the view ends after it.
+    """
+
+    CSS = CSS
+    ENABLE_COMMAND_PALETTE = False
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("e", "start", "Start"),
+        Binding("space,x", "stop", "Stop"),
+        Binding("m", "mark", "Mark"),
+        Binding("r", "reset", "Reset"),
+        Binding("q", "leave", "Quit"),
+        Binding("ctrl+c,ctrl+q", "interrupt", "Interrupt", priority=True),
+        Binding("question_mark", "help", "Help"),
+        Binding("plus,equals_sign", "zoom(-1)", "Shorter window"),
+        Binding("minus", "zoom(1)", "Longer window"),
+        Binding("tab", "turn(1)", "Next page", priority=True),
+        Binding("shift+tab", "turn(-1)", "Page before", priority=True),
+        *(Binding(str(number + 1), f"page('{name}')", name) for number, name in enumerate(PAGES)),
+    ]
+
+    def __init__(
+        self,
+        source: Source,
+        state: LiveState,
+        choices: Sequence[Choice] = (),
+        out: str = "",
+        page: str = PAGES[0],
+        picture: tuple[Path, float] | None = None,
+    ) -> None:
+        super().__init__(ansi_color=True)
+        self._source = source
+        self._state = state
+        self._choices = choices
+        self._out = out
+        self._picture = picture
+        self._page = page
+        self._leaving = False
+        self._handlers: dict[int, Any] = {}
+        self.interrupted = False
+
+    def compose(self) -> ComposeResult:
+        """Lay the screen out."""
+        yield Panel(head_panels.headline, "headline")
+        yield from pages()
+        yield Static("", id="too-small")
+        yield Panel(head_panels.message, "message")
+        yield Static(KEYS if self._source.can_drive else REPLAY_KEYS, classes="keys")
+
+    def on_mount(self) -> None:
+        """Begin to draw."""
+        self.action_page(self._page)
+        self.set_interval(DRAW_EVERY_S, self._tick)
+        if self._picture is not None:
+            self.set_timer(self._picture[1], self._take_picture)
+        self._events = asyncio.get_running_loop()
+        if threading.current_thread() is threading.main_thread():
+            for number in STOP_SIGNALS:
+                if signal.getsignal(number) is not signal.SIG_IGN:  # as under nohup
+                    self._handlers[number] = signal.signal(number, self._on_signal)
+
+    def on_unmount(self) -> None:
+        """Give the signals back."""
+        for number, handler in self._handlers.items():
+            signal.signal(number, handler)
+        self._handlers.clear()
+
+    def _on_signal(self, number: int, frame: FrameType | None) -> None:
+        """Quit; a terminal that is gone may hold the screen's last words up for ever, so the end is seen to."""
+        threading.Thread(target=_end_for_good, name="last resort", daemon=True).start()
+        self._events.call_soon_threadsafe(self.action_interrupt)
+
+    def on_resize(self, event: Resize) -> None:
+        """Fit the layout to the terminal."""
+        columns, rows = event.size
+        small = columns < LEAST_COLUMNS or rows < LEAST_ROWS
+        self.screen_stack[0].set_class(small, "small")
+        self.screen_stack[0].set_class(columns >= WIDE_COLUMNS and rows >= WIDE_ROWS, "wide")
+        text = (
+            f"The terminal has {columns} x {rows}; the view needs {LEAST_COLUMNS} x {LEAST_ROWS}. Make it larger.\n"
+            "SPACE still stops, q still quits."
+        )
+        self.screen_stack[0].query_one("#too-small", Static).update(text)
+
+    def _tick(self) -> None:
+        for report in self._source.poll():
+            self._state.take(report)
+        self._draw()
+        if self._state.ended is not None and (self._leaving or self._state.ended.error is not None):
+            self.exit()
+
+    def _draw(self) -> None:
+        snapshot = self._state.snapshot()
+        for panel in self.screen_stack[0].query(Panel):
+            panel.show(snapshot)
+
+    def _take_picture(self) -> None:
+        if self._picture is None:
+            return
+        path, _ = self._picture
+        path.write_text(self.export_screenshot(title="hil monitor"), encoding="utf-8")
+        self.action_leave()
+
+    def action_page(self, name: str) -> None:
+        """Show a page."""
+        self._page = name
+        for container in self.screen_stack[0].query(".page").results(Container):
+            container.set_class(container.id == name, "shown")
+        self.call_after_refresh(self._draw)
+
+    def action_turn(self, by: int) -> None:
+        """Show the next page, or the one before; in a dialog the key is the dialog's."""
+        if len(self.screen_stack) > 1:
+            (self.screen.focus_next if by > 0 else self.screen.focus_previous)()
+            return
+        self.action_page(PAGES[(PAGES.index(self._page) + by) % len(PAGES)])
+
+    def action_zoom(self, by: int) -> None:
+        """Let the plots of the signals reach back further, or less far."""
+        self._state.zoom(by)
+        self._draw()
+
+    def action_start(self) -> None:
+        """Ask which experiment, and start it."""
+        if self._refuse(self._state.activity is Activity.LISTENING, "only a rig that is listened to can be started"):
+            return
+        if self._refuse(bool(self._choices), "the rig file has no [experiments]"):
+            return
+        self.push_screen(StartDialog(self._choices, self._out), self._start)
+
+    def _start(self, name: str | None) -> None:
+        if name is None or self._state.activity is not Activity.LISTENING:
+            return
+        self._state.starting(name)
+        self._source.send(Start(name))
+
+    def action_stop(self) -> None:
+        """Stop at once."""
+        self._source.send(Stop())
+        self._state.stopping("stop: zero torque, disarming")
+
+    def action_mark(self) -> None:
+        """Mark this moment."""
+        t_ns = time.monotonic_ns()
+        if self._refuse(self._state.is_driving, "a mark goes into a recording; nothing is being recorded"):
+            return
+        self.push_screen(MarkDialog(), lambda text: None if text is None else self._source.send(Mark(t_ns, text)))
+
+    def action_reset(self) -> None:
+        """Reset the drives' faults."""
+        if self._refuse(self._state.activity is Activity.LISTENING, "stop first: faults are reset at rest"):
+            return
+        self._state.take(Notice(time.monotonic_ns(), Kind.INFO, "reset of the drives' faults asked for"))
+        self._source.send(Reset())
+
+    def action_help(self) -> None:
+        """Show the keys."""
+        self.push_screen(HelpDialog(HELP))
+
+    def action_leave(self) -> None:
+        """Quit: at once where nothing can drive, else when the rig's process has said that it has ended."""
+        if self._leaving or not self._source.can_drive or self._state.ended is not None:
+            self.exit()
+            return
+        self._leaving = True
+        self._source.send(Quit())
+        self._state.say("ending: zero torque, drives disarmed")
+        self._state.stopping("ending: zero torque, disarming")
+
+    def action_interrupt(self) -> None:
+        """Quit as by Ctrl-C."""
+        self.interrupted = True
+        self.action_leave()
+
+    def _refuse(self, allowed: bool, why_not: str) -> bool:
+        """Tell why a key does nothing now; True where it does nothing."""
+        allowed = allowed and self._source.can_drive
+        if not allowed:
+            self._state.say(why_not if self._source.can_drive else "a recording is played: there is no rig to drive")
+        return not allowed
+
+
+def _end_for_good() -> None:
+    """End this program if it has not ended by itself; the rig's process then ends its run without it."""
+    time.sleep(GRACE_S)
+    os._exit(INTERRUPTED)

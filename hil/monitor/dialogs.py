@@ -1,0 +1,113 @@
+"""Dialogs: which experiment to start, what a mark says, the keys."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import Vertical
+from textual.screen import ModalScreen
+from textual.widgets import Input, OptionList, Static
+from textual.widgets.option_list import Option
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """An experiment as it is offered: its name, and what it will command, in words."""
+
+    name: str
+    summary: str
+
+
+class StartDialog(ModalScreen[str | None]):
+    """Choose an experiment, see what torque it commands, confirm by another key; gives its name or None."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("escape", "back", "Back"),
+        Binding("y", "confirm", "Yes", priority=True),
+    ]
+
+    def __init__(self, choices: Sequence[Choice], out: str) -> None:
+        super().__init__()
+        self._choices = {choice.name: choice for choice in choices}
+        self._out = out
+        self._chosen: str | None = None
+
+    def compose(self) -> ComposeResult:
+        """Offer the experiments."""
+        with Vertical(classes="dialog"):
+            yield Static("Start an experiment: arrows and Enter choose, Esc goes back", classes="lead")
+            yield OptionList(*(Option(f"  {name}", id=name) for name in self._choices))
+            yield Static("", id="summary")
+            yield Static("", id="question")
+
+    def on_option_list_option_highlighted(self, event: OptionList.OptionHighlighted) -> None:
+        """Tell what the experiment under the bar would command."""
+        name = str(event.option.id)
+        self._chosen = None
+        for option in event.option_list.options:
+            pointer = ">" if option.id == name else " "
+            event.option_list.replace_option_prompt(str(option.id), f"{pointer} {option.id}")
+        self.query_one("#summary", Static).update(self._choices[name].summary)
+        self.query_one("#question", Static).update("")
+
+    def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
+        """Ask once more."""
+        self._chosen = str(event.option.id)
+        question = f"Arm both drives and run {self._chosen}, recorded in {self._out}? Press y for yes, Esc for no."
+        self.query_one("#question", Static).update(question)
+
+    def action_confirm(self) -> None:
+        """Start what was chosen; without a choice the key does nothing."""
+        if self._chosen is not None:
+            self.dismiss(self._chosen)
+
+    def action_back(self) -> None:
+        """Start nothing."""
+        self.dismiss(None)
+
+
+class MarkDialog(ModalScreen[str | None]):
+    """Ask what a mark says; Enter with nothing is a mark too. Gives the text, or None for no mark."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [Binding("escape", "back", "Back")]
+
+    def compose(self) -> ComposeResult:
+        """Ask."""
+        with Vertical(classes="dialog"):
+            yield Static("Mark (its time is that of the key m). What happened?", classes="lead")
+            yield Input(placeholder="mark", max_length=200)
+            yield Static("Enter keeps it, Esc drops it. Ctrl-C ends the run, as everywhere.")
+
+    def on_input_submitted(self, event: Input.Submitted) -> None:
+        """Keep it."""
+        self.dismiss(event.value.strip() or "mark")
+
+    def action_back(self) -> None:
+        """Drop it."""
+        self.dismiss(None)
+
+
+class HelpDialog(ModalScreen[None]):
+    """The keys, and what the words mean."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("escape,question_mark,enter,q", "back", "Back"),
+        Binding("space,x", "app.stop", "Stop"),
+    ]
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self._text = text
+
+    def compose(self) -> ComposeResult:
+        """Show them."""
+        with Vertical(classes="dialog"):
+            yield Static(self._text)
+
+    def action_back(self) -> None:
+        """Go back."""
+        self.dismiss(None)

@@ -1,0 +1,165 @@
+"""The estimate behind the view: fed by what comes, asked for what is drawn. It is that of `hil run`, to the bit."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from estimator.errors import EstimatorError
+from estimator.identification.modes.modes import Mode
+from estimator.identification.online.online_estimate import OnlineEstimate
+from estimator.identification.online.recursive import Status
+from estimator.identification.tracking.alarm import Alarm
+from hil.monitor.ring import Ring
+from hil.monitor.snapshot import ComplexArray, Estimation, History, Model
+from hil.rig.live import LiveEstimate, tracking_chain
+from hil.rig.sample import Sample
+
+HISTORY_EVERY_NS = 250_000_000
+"""Time between two points of the history [ns]."""
+
+HISTORY_POINTS = 2400
+"""Ten minutes of measuring."""
+
+TRAIL_EVERY = 2
+"""A set of poles is kept of every so many points of the history."""
+
+TRAIL_MODELS = 60
+
+RESPONSE_POINTS = 160
+
+KEPT_ALARMS = 20
+
+NS_PER_S = 1_000_000_000
+
+
+class LiveEstimation:
+    """Estimates a run while it goes on, and keeps what was before.
+
+    Parameters
+    ----------
+    period_s
+        Time between two samples [s].
+    is_ready
+        Whether the chain may be used already; samples wait until then.
+    """
+
+    def __init__(self, period_s: float, is_ready: Callable[[], bool] = lambda: True) -> None:
+        self._is_ready = is_ready
+        self._waiting: list[Sample] = []
+        self._period_s = period_s
+        self._live_estimate: LiveEstimate | None = None
+        self._history = Ring(HISTORY_POINTS, 5)
+        self._trail: deque[ComplexArray] = deque(maxlen=TRAIL_MODELS)
+        self._alarms: deque[Alarm] = deque(maxlen=KEPT_ALARMS)
+        self._refused: str | None = None
+        self._kept_ns = 0
+        self._points = 0
+        self._live = False
+
+    @property
+    def _latest(self) -> OnlineEstimate | None:
+        return None if self._live_estimate is None else self._live_estimate.latest
+
+    @property
+    def resonance(self) -> Mode | None:
+        """The present resonance; None while there is none to be used."""
+        return None if self._latest is None else self._latest.resonance
+
+    def begin(self) -> None:
+        """Begin anew with the next sample: a run is about to be measured. The history goes on."""
+        self._live_estimate, self._refused = None, None
+        self._waiting = []
+        self._trail.clear()
+        self._live = True
+        try:
+            self._live_estimate = LiveEstimate(tracking_chain(self._period_s))
+        except EstimatorError as error:
+            self._refused = str(error)
+
+    def end(self) -> None:
+        """Note that the run is over; its last estimate stays."""
+        self._live = False
+
+    def take(self, samples: Sequence[Sample]) -> tuple[Alarm, ...]:
+        """Take measured samples in order; give the alarms they set off."""
+        live = self._live_estimate
+        if live is None:
+            return ()
+        self._waiting += samples
+        if not self._waiting or not self._is_ready():
+            return ()
+        samples, self._waiting = self._waiting, []
+        n_alarms = len(live.course.alarms)
+        for sample in samples:
+            live(sample)
+            if live.latest is not None:
+                self._remember(live.latest, sample.t_ns)
+        alarms = tuple(live.course.alarms[n_alarms:])
+        for alarm in alarms:
+            if self._alarms and not self._alarms[-1].settled:  # it comes once more, settled
+                self._alarms.pop()
+            self._alarms.append(alarm)
+        return alarms
+
+    def _remember(self, latest: OnlineEstimate, t_ns: int) -> None:
+        mode = latest.resonance
+        if mode is None or abs(t_ns - self._kept_ns) < HISTORY_EVERY_NS:
+            return
+        self._kept_ns = t_ns
+        self._history.append(
+            (t_ns / NS_PER_S, mode.frequency_hz, latest.frequency_std_hz, mode.damping, latest.damping_std)
+        )
+        if self._points % TRAIL_EVERY == 0:
+            self._trail.append(latest.model.poles)
+        self._points += 1
+
+    def look(self, now_ns: int) -> Estimation:
+        """Tell what is known; ``now_ns`` is the samples' present time [ns]."""
+        latest = self._latest
+        mode = None if latest is None else latest.resonance
+        return Estimation(
+            status=self._status(),
+            live=self._live,
+            resonance_hz=math.nan if mode is None else mode.frequency_hz,
+            resonance_std_hz=math.nan if latest is None else latest.frequency_std_hz,
+            damping=math.nan if mode is None else mode.damping,
+            damping_std=math.nan if latest is None else latest.damping_std,
+            history=self._shown_history(now_ns),
+            model=self._shown_model(),
+            alarms=tuple(self._alarms),
+        )
+
+    def _status(self) -> str:
+        if self._refused is not None:
+            return f"no estimate: {self._refused}"
+        if self._latest is None:
+            if self._waiting:
+                return "the estimator is being compiled: once, and again after an update"
+            return "waits for samples" if self._live else "no run yet"
+        estimate = self._latest.estimate
+        if estimate.status is Status.ESTIMATED and self._latest.resonance is None:
+            return "estimated, no resonance in the band"
+        return estimate.status.value + (f": {estimate.reason.message}" if estimate.reason.message else "")
+
+    def _shown_history(self, now_ns: int) -> History:
+        rows = self._history.rows()
+        return History(rows[:, 0] - now_ns / NS_PER_S, *(rows[:, column] for column in range(1, 5)))
+
+    def _shown_model(self) -> Model | None:
+        if self._latest is None or self._latest.estimate.status is Status.UNESTIMATED:
+            return None
+        model = self._latest.model
+        low, high = 0.5, 0.5 / model.sample_time_s
+        frequency_hz = np.geomspace(low, high, RESPONSE_POINTS)
+        return Model(
+            frequency_hz=frequency_hz,
+            gain=np.abs(model.response(frequency_hz)),
+            poles=model.poles,
+            zeros=model.zeros,
+            trail=np.concatenate(self._trail) if self._trail else np.empty(0, dtype=np.complex128),
+            sample_time_s=model.sample_time_s,
+        )

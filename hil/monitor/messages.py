@@ -1,0 +1,209 @@
+"""What the rig's process and the view tell each other; plain values that can be sent from one to the other.
+
+::
+
+    rig  -> view   Samples, Health, Notice, Ready, Began, Over, Lost, Ended
+    view -> rig    Start, Stop, Mark, Reset, Quit
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+from drivers.plc.types import PlcStatus
+from hil.rig.experiments.base import Phase
+from hil.rig.sample import Sample
+
+
+@dataclass(frozen=True, slots=True)
+class Samples:
+    """Samples since the last message, oldest first, each with its phase; None while nothing is driven."""
+
+    rows: tuple[tuple[Sample, Phase | None], ...]
+    lost: int = 0  # samples not sent since the view did not take them; they are in the recording all the same
+
+
+@dataclass(frozen=True, slots=True)
+class NodeHealth:
+    """One inverter, as the bus shows it.
+
+    Attributes
+    ----------
+    node_id
+        CANopen node.
+    power
+        State of its power stage in the words of CiA 402; None before the first TPDO.
+    nmt
+        NMT state of its last heartbeat; None where there was none.
+    heartbeat_age_s, heartbeat_limit_s
+        Time since that heartbeat, and the longest that is right [s]; the age is None where there was none.
+    tpdo_age_s
+        Time since its last TPDO [s]; None where there was none.
+    emergency
+        The active EMCY in words, or None.
+    n_emergencies
+        EMCY frames since the monitor began, resets not counted.
+    trouble
+        Why it could not be configured, or None.
+    """
+
+    node_id: int
+    power: str | None
+    nmt: str | None
+    heartbeat_age_s: float | None
+    heartbeat_limit_s: float
+    tpdo_age_s: float | None
+    emergency: str | None
+    n_emergencies: int
+    trouble: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class PlcHealth:
+    """The PLC: its last status, how old that is [s], and what keeps the next from coming."""
+
+    status: PlcStatus | None
+    age_s: float | None
+    trouble: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class TimingHealth:
+    """The cycle since the present stretch (listening, or one run) began; times in seconds, NaN while there is none."""
+
+    period_s: float
+    cycles: int
+    missed: int
+    late: int
+    unanswered: int
+    lateness_p50_s: float
+    lateness_p99_s: float
+    lateness_max_s: float
+    reply_p50_s: float
+    reply_p99_s: float
+    reply_max_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Health:
+    """Both inverters, the PLC and the cycle."""
+
+    m1: NodeHealth
+    m2: NodeHealth
+    plc: PlcHealth
+    timing: TimingHealth
+
+
+class Kind(Enum):
+    """What a line of the log is about; the value is what stands before it."""
+
+    INFO = "info"
+    RUN = "run"
+    MARK = "mark"
+    EMCY = "EMCY"
+    ALARM = "ALARM"
+    FAULT = "FAULT"
+
+
+@dataclass(frozen=True, slots=True)
+class Notice:
+    """One thing that happened, on the host's monotonic clock [ns]."""
+
+    t_ns: int
+    kind: Kind
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Began:
+    """An experiment begins; ``recording`` is where it will be."""
+
+    experiment: str
+    recording: str
+    duration_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Over:
+    """An experiment is over, the drives are disarmed.
+
+    Attributes
+    ----------
+    experiment
+        Its name.
+    recording
+        Where its samples are; None where there are none.
+    samples, flagged
+        How many, and how many of them are not good.
+    stopped
+        Whether someone asked for its end.
+    reason
+        What ended it before its time; None where it ran to its end or was stopped.
+    run_id
+        Its number in the run store; None where it is not in there.
+    """
+
+    experiment: str
+    recording: str | None
+    samples: int
+    flagged: int
+    stopped: bool
+    reason: str | None
+    run_id: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Lost:
+    """The bus is gone; the rig's process goes on trying."""
+
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Ready:
+    """The rig is there (again) and is listened to."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ended:
+    """Nothing follows: the source has ended, by itself or since it was asked to.
+
+    ``error`` says why it could not go on.
+    """
+
+    error: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """Start an experiment of the rig file."""
+
+    experiment: str
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """End the experiment at once, at zero torque."""
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """Something worth remembering happened at ``t_ns`` of the host's monotonic clock."""
+
+    t_ns: int
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Reset:
+    """Reset the drives' faults and configure them again; while nothing is driven."""
+
+
+@dataclass(frozen=True, slots=True)
+class Quit:
+    """End: the experiment first, at zero torque, then the rig's process."""
+
+
+Report = Samples | Health | Notice | Ready | Began | Over | Lost | Ended
+Order = Start | Stop | Mark | Reset | Quit

@@ -1,0 +1,125 @@
+"""From what the command line asked for to what the view needs: a source, what is known of it, what can be started."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from drivers.errors import DriverError
+from estimator.physics.twist import Shaft
+from hil.config.model_file import read_model
+from hil.config.rig_file import Rig
+from hil.errors import HilError, RecordingError, UsageError
+from hil.monitor.dialogs import Choice
+from hil.monitor.host import Job
+from hil.monitor.replay_source import ReplaySource, recorded_samples
+from hil.monitor.source import RigSource, Source
+from hil.monitor.state import LiveState
+from hil.monitor.warm_up import WarmUp
+from hil.report.outputs import require_folder
+from hil.rig.dry_run import dry_run
+from hil.rig.replay import replay
+from hil.rig.sample import Sample
+from hil.rig.trace import SUFFIXES
+from hil.simulator.rig_server import required_simulation
+from hil.simulator.simulation_model import simulation_model
+
+
+@dataclass(frozen=True, slots=True)
+class Opening:
+    """What the view is made of."""
+
+    source: Source
+    state: LiveState
+    choices: tuple[Choice, ...] = ()
+
+
+def open_rig(rig_path: Path, rig: Rig, out: Path, simulate: bool, model: Path | None) -> Opening:
+    """Prepare to watch a rig; nothing is connected before the source is entered.
+
+    Raises
+    ------
+    UsageError
+        If a rig without ``[simulation]`` is to be simulated, or nothing can be written to the folder.
+    ModelFileError
+        If the model file is wrong, or not of two masses.
+    """
+    if simulate:
+        required_simulation(rig)
+    require_folder(out)
+    warm = WarmUp(rig.period_s)
+    state = LiveState(rig.name, rig.period_s, _shaft(model, rig), can_drive=True, is_ready=warm.is_done)
+    source = RigSource(Job(rig_path.absolute(), rig, out.absolute(), simulate))
+    return Opening(source, state, tuple(Choice(name, _summary(rig, name)) for name in rig.experiments))
+
+
+def open_recording(path: Path, rig: Rig | None, speed: float, model: Path | None) -> Opening:
+    """Prepare to play a recording, or a bus trace with the rig file it is of.
+
+    Raises
+    ------
+    UsageError
+        If a bus trace comes without its rig file.
+    RecordingError
+        If the file can't be read.
+    ModelFileError
+        As `open_rig`.
+    """
+    if path.suffix.lower() in SUFFIXES:
+        if rig is None:
+            raise UsageError(f"{path}: expected its rig file as well: hil monitor RIG --replay {path.name}; came none")
+        samples = list(replay(path, rig, whole=True))
+        measured = _has_prbs
+    else:
+        samples = recorded_samples(path)
+        measured = _always
+    if len(samples) < 2:
+        raise RecordingError(path, f"expected samples to play, came {len(samples)}. Record again.")
+    period_s = float(np.median(np.diff([sample.time_s for sample in samples])))
+    warm = WarmUp(period_s)
+    state = LiveState(path.name, period_s, _shaft(model, rig), can_drive=False, is_ready=warm.is_done)
+    return Opening(ReplaySource(path.name, samples, speed, measured), state)
+
+
+def _has_prbs(sample: Sample) -> bool:
+    """Whether a sample of a bus trace is of the measured part: only there the PRBS runs."""
+    return sample.prbs_nm != 0.0
+
+
+def _always(sample: Sample) -> bool:
+    """Whether a sample of a recording is: nothing else is recorded."""
+    return True
+
+
+def _shaft(model: Path | None, rig: Rig | None) -> Shaft | None:
+    """Numbers of the shaft: of the model file, else of the simulation; None where there are none."""
+    if model is not None:
+        shaft = Shaft.of_model(read_model(model).model, model.name)
+        if shaft is None:
+            raise UsageError(
+                f"{model}: expected structure 'two_mass' and motion 'rotation' for the twist, came another"
+            )
+        return shaft
+    if rig is None or rig.simulation is None:
+        return None
+    return Shaft.of_model(simulation_model(rig.simulation), "[simulation]")
+
+
+def _summary(rig: Rig, name: str) -> str:
+    """Tell what an experiment would command, and what to expect."""
+    table = rig.experiments[name]
+    lines = [
+        f"{table.kind}: {table.duration_s:g} s are recorded, after the approach.",
+        f"Base torque at most ±{table.torque_nm:g} Nm, PRBS ±{rig.prbs.amplitude_nm:g} Nm, both inverters together.",
+    ]
+    try:
+        prediction = dry_run(rig, name)
+    except (HilError, DriverError) as error:
+        lines.append(f"Prediction: {error}")
+    else:
+        speed = prediction.speed_rad_s
+        length_s = prediction.cycles * prediction.period_s
+        lines.append(f"Predicted: {length_s:.0f} s in all, speed {speed.low:.1f} to {speed.high:.1f} rad/s.")
+    return "\n".join(lines)

@@ -1,0 +1,48 @@
+"""One panel of the screen: asks a drawing function for as many lines as it has room for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from rich.text import Text
+from textual.widget import Widget
+
+from hil.monitor.snapshot import Snapshot
+
+Draw = Callable[[Snapshot, int, int], list[str]]
+"""``draw(snapshot, width, height)``: at most ``height`` lines of at most ``width`` characters."""
+
+STRONG = ("ALARM", "FAULT", "EMCY", "STALE", "TROUBLE", "LOST", "NO PERMIT", "WITHDRAWN", "ENDED EARLY")
+"""Words that are set in bold: what they say is in the word, not in its look."""
+
+
+class Panel(Widget):
+    """Draws the latest snapshot; nothing until there is one.
+
+    Parameters
+    ----------
+    draw
+        What gives its lines.
+    name
+        Its name and its CSS class.
+    """
+
+    def __init__(self, draw: Draw, name: str) -> None:
+        super().__init__(name=name, classes=f"panel {name}")
+        self._draw = draw
+        self._snapshot: Snapshot | None = None
+
+    def show(self, snapshot: Snapshot) -> None:
+        """Draw another snapshot."""
+        self._snapshot = snapshot
+        if self.is_on_screen:
+            self.refresh()
+
+    def render(self) -> Text:
+        """Draw for the present size."""
+        width, height = self.size
+        if self._snapshot is None or width <= 0 or height <= 0:
+            return Text("")
+        text = Text("\n".join(self._draw(self._snapshot, width, height)), no_wrap=True, end="")
+        text.highlight_words(STRONG, "bold")
+        return text

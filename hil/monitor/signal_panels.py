@@ -1,0 +1,81 @@
+"""Panels of the signals: torque, speed, PRBS and twist over the last seconds."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hil.monitor.plot import Range, nice_range, strip, time_axis, title
+from hil.monitor.snapshot import Signals, Snapshot
+
+FloatArray = NDArray[np.float64]
+
+
+ROOM_FOR_PARTS = 60
+"""Characters from which on the torque's title has each inverter's."""
+
+
+@dataclass(frozen=True, slots=True)
+class Trace:
+    """One signal as it is drawn.
+
+    Attributes
+    ----------
+    name, unit
+        For the title.
+    values
+        Shape (N,).
+    least
+        Smallest span of its axis [unit].
+    now
+        Its present value, in words.
+    """
+
+    name: str
+    unit: str
+    values: FloatArray
+    least: float
+    now: str
+
+
+def torque(snapshot: Snapshot, width: int, height: int) -> list[str]:
+    """Draw the total torque as both inverters report it."""
+    s = snapshot.signals
+    total_nm, reference_nm = _latest(s.torque_nm), _latest(s.reference_nm)
+    parts = f"m1 {s.torque_m1_nm:.1f} m2 {s.torque_m2_nm:.1f} " if width >= ROOM_FOR_PARTS else ""
+    now = f"{total_nm:.1f} ({parts}ref {reference_nm:.1f})"
+    return _draw(s, Trace("torque [Nm]", "Nm", s.torque_nm, 10.0, now), width, height)
+
+
+def speed(snapshot: Snapshot, width: int, height: int) -> list[str]:
+    """Draw the motor speed."""
+    s = snapshot.signals
+    return _draw(s, Trace("speed [rad/s]", "rad/s", s.speed_rad_s, 1.0, f"{_latest(s.speed_rad_s):.2f}"), width, height)
+
+
+def prbs(snapshot: Snapshot, width: int, height: int) -> list[str]:
+    """Draw the part of the reference that is PRBS."""
+    s = snapshot.signals
+    return _draw(s, Trace("PRBS [Nm]", "Nm", s.prbs_nm, 10.0, f"{_latest(s.prbs_nm):.0f}"), width, height)
+
+
+def twist(snapshot: Snapshot, width: int, height: int) -> list[str]:
+    """Draw the estimated twist of the shaft, and below it the time axis of all."""
+    s = snapshot.signals
+    mrad = 1e3 * s.twist_rad
+    now = f"{_latest(mrad):.1f} ±{2e3 * s.twist_std_rad:.1f}" if math.isfinite(s.twist_std_rad) else "--"
+    lines = _draw(s, Trace(f"twist [mrad], {s.twist_of}", "mrad", mrad, 2.0, now), width, height - 1)
+    return [*lines, time_axis(s.window_s, width)]
+
+
+def _draw(signals: Signals, trace: Trace, width: int, height: int) -> list[str]:
+    y_range = nice_range(trace.values, trace.least)
+    plot = strip(signals.time_s, trace.values, Range(-signals.window_s, 0.0), y_range, width, height - 1)
+    return [title(trace.name, trace.now.replace("nan", "--"), width), *plot]
+
+
+def _latest(values: FloatArray) -> float:
+    return float(values[-1]) if values.size else math.nan

@@ -1,0 +1,250 @@
+"""From reports to what is drawn: the whole knowledge of the view, without a screen and without a clock of its own."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from estimator.physics.twist import Shaft, TwistFilter
+from hil.monitor.live_estimation import LiveEstimation
+from hil.monitor.messages import Began, Ended, Health, Kind, Lost, Notice, Over, Ready, Report, Samples
+from hil.monitor.ring import Ring
+from hil.monitor.snapshot import Activity, Headline, Signals, Snapshot
+from hil.rig.experiments.base import Phase
+from hil.rig.sample import Sample
+
+WINDOWS_S = (1.0, 2.0, 5.0, 10.0, 20.0, 60.0)
+"""What the plots of the signals may reach back [s]: from single levels of the PRBS to a whole tip-in."""
+
+FIRST_WINDOW = 2
+
+KEPT_NOTICES = 200
+
+RETUNE_SHARE = 0.02
+"""Change of the resonance by which the twist filter takes new numbers: computing its gain is not for every sample."""
+
+NO_MODEL = "no model: give --model"
+
+NS_PER_S = 1_000_000_000
+
+
+class LiveState:
+    """Takes reports, gives snapshots.
+
+    Parameters
+    ----------
+    rig
+        Name for the screen.
+    period_s
+        Time between two samples [s].
+    shaft
+        Two-mass model for the twist; None for no twist.
+    can_drive
+        Whether there is a rig that takes orders.
+    is_ready
+        Whether the estimator may be used already.
+    """
+
+    def __init__(
+        self,
+        rig: str,
+        period_s: float,
+        shaft: Shaft | None,
+        can_drive: bool,
+        is_ready: Callable[[], bool] = lambda: True,
+    ) -> None:
+        self._ring = Ring(math.ceil(WINDOWS_S[-1] / period_s), 6)
+        self._window = FIRST_WINDOW
+        self._model_shaft = shaft
+        self._twist = None if shaft is None else TwistFilter(shaft, period_s)
+        self._tuned_hz = math.nan
+        self._estimation = LiveEstimation(period_s, is_ready)
+        self._health: Health | None = None
+        self._log: deque[Notice] = deque(maxlen=KEPT_NOTICES)
+        self._now_ns = 0
+        self._latest: Sample | None = None
+        self._can_drive = can_drive
+        self._headline = Headline(rig, Activity.CONNECTING, "", "", math.nan, math.nan, "", "")
+        self.runs: list[Over] = []
+        self.ended: Ended | None = None
+
+    @property
+    def activity(self) -> Activity:
+        """What is going on."""
+        return self._headline.activity
+
+    @property
+    def is_driving(self) -> bool:
+        """Whether an experiment is under way."""
+        return self.activity in (Activity.STARTING, Activity.RUNNING, Activity.STOPPING)
+
+    def zoom(self, by: int) -> None:
+        """Let the plots of the signals reach back further, or less far."""
+        self._window = min(max(self._window + by, 0), len(WINDOWS_S) - 1)
+
+    def say(self, text: str) -> None:
+        """Put a message for the operator on the screen."""
+        self._headline = replace(self._headline, message=text)
+
+    def stopping(self, text: str) -> None:
+        """Note that the run has been told to stop."""
+        if self.is_driving:
+            self._headline = replace(self._headline, activity=Activity.STOPPING, message=text)
+
+    def starting(self, experiment: str) -> None:
+        """Note that a run has been ordered."""
+        self._headline = replace(
+            self._headline, activity=Activity.STARTING, experiment=experiment, phase="arming", message=""
+        )
+
+    def take(self, report: Report) -> None:
+        """Take one report."""
+        match report:
+            case Samples():
+                self._take_samples(report)
+            case Health():
+                self._health = report
+            case Notice():
+                self._note(report)
+            case Began():
+                self._begin(report)
+            case Over():
+                self._end(report)
+            case Ready() | Lost() | Ended():
+                self._turn(report)
+
+    def snapshot(self) -> Snapshot:
+        """Give the picture of now."""
+        return Snapshot(
+            headline=self._headline,
+            signals=self._signals(),
+            estimation=self._estimation.look(self._now_ns),
+            health=self._health,
+            log=tuple(self._log),
+            now_ns=self._now_ns,
+            runs=len(self.runs),
+            can_drive=self._can_drive,
+        )
+
+    def _take_samples(self, report: Samples) -> None:
+        if report.lost:
+            self._tell(Kind.INFO, f"{report.lost} samples not shown: this terminal did not take them in time")
+        measured = [sample for sample, phase in report.rows if phase is Phase.MEASURE]
+        for sample, _ in report.rows:
+            self._keep(sample)
+        for alarm in self._estimation.take(measured):
+            self._note(Notice(self._now_ns, Kind.ALARM, alarm.statement))
+        self._retune()
+        sample, phase = report.rows[-1]
+        self._latest = sample
+        if phase is not None and self.is_driving:
+            self._headline = replace(self._headline, phase=phase.value, phase_s=sample.time_s)
+        elif self.activity is Activity.REPLAYING:
+            self._headline = replace(self._headline, phase_s=sample.time_s)
+
+    def _keep(self, sample: Sample) -> None:
+        torque_nm = sample.torque_m1_nm + sample.torque_m2_nm
+        okay = not sample.flags and math.isfinite(torque_nm) and math.isfinite(sample.speed_rad_s)
+        twist_rad = math.nan if self._twist is None else self._twist.step(torque_nm, sample.speed_rad_s, okay)
+        if not okay:
+            torque_nm, speed_rad_s = math.nan, math.nan
+        else:
+            speed_rad_s = sample.speed_rad_s
+        self._now_ns = sample.t_ns
+        self._ring.append(
+            (sample.t_ns / NS_PER_S, torque_nm, sample.torque_ref_nm, sample.prbs_nm, speed_rad_s, twist_rad)
+        )
+
+    def _retune(self) -> None:
+        """Let the twist follow the resonance: k and c from it, the inertias from the model."""
+        mode = self._estimation.resonance
+        if mode is None or self._twist is None or self._model_shaft is None or mode.damping <= 0.0:
+            return
+        if not abs(mode.frequency_hz / self._tuned_hz - 1.0) < RETUNE_SHARE:
+            self._tuned_hz = mode.frequency_hz
+            self._twist.use(self._model_shaft.with_resonance(mode))
+
+    def _signals(self) -> Signals:
+        window_s, latest, rows = WINDOWS_S[self._window], self._latest, self._ring.rows()
+        rows = rows[np.searchsorted(rows[:, 0], self._now_ns / NS_PER_S - window_s) :]
+        return Signals(
+            time_s=rows[:, 0] - self._now_ns / NS_PER_S,
+            torque_nm=rows[:, 1],
+            reference_nm=rows[:, 2],
+            prbs_nm=rows[:, 3],
+            speed_rad_s=rows[:, 4],
+            twist_rad=rows[:, 5],
+            torque_m1_nm=math.nan if latest is None else latest.torque_m1_nm,
+            torque_m2_nm=math.nan if latest is None else latest.torque_m2_nm,
+            window_s=window_s,
+            twist_of=NO_MODEL if self._twist is None else f"k, c: {self._twist.shaft.source}",
+            twist_std_rad=math.nan if self._twist is None else self._twist.twist_std_rad,
+        )
+
+    def _begin(self, report: Began) -> None:
+        self._estimation.begin()
+        self._headline = replace(
+            self._headline,
+            activity=Activity.RUNNING if self._can_drive else Activity.REPLAYING,
+            experiment=report.experiment,
+            phase="",
+            phase_s=0.0,
+            duration_s=report.duration_s,
+            recording=report.recording,
+            message="",
+        )
+        if self._can_drive:
+            self._tell(Kind.RUN, f"{report.experiment} begins, recorded as {report.recording}")
+
+    def _end(self, report: Over) -> None:
+        self._estimation.end()
+        self.runs.append(report)
+        activity = Activity.LISTENING if self._can_drive else Activity.PLAYED
+        self._headline = replace(
+            self._headline, activity=activity, experiment="", phase="", phase_s=math.nan, recording=""
+        )
+        text = (
+            outcome(report) if self._can_drive else f"{report.samples} samples played, {report.flagged} of them flagged"
+        )
+        self._tell(Kind.FAULT if report.reason else Kind.RUN, text)
+        self.say(text)
+
+    def _turn(self, report: Ready | Lost | Ended) -> None:
+        """Take note that the rig is there, that its bus is lost, or that nothing follows."""
+        match report:
+            case Ready():
+                if self.activity is Activity.LOST:
+                    self._tell(Kind.INFO, "the bus is there again")
+                self._headline = replace(self._headline, activity=Activity.LISTENING)
+            case Lost():
+                if self.activity is not Activity.LOST:
+                    self._tell(Kind.FAULT, report.reason)
+                self._headline = replace(self._headline, activity=Activity.LOST, message=report.reason)
+            case Ended():
+                self.ended = report
+                self._headline = replace(self._headline, activity=Activity.ENDED, message=report.error or "")
+
+    def _note(self, notice: Notice) -> None:
+        self._log.append(notice)
+        if notice.kind is not Kind.INFO:
+            self.say(f"{notice.kind.value}: {notice.text}")
+
+    def _tell(self, kind: Kind, text: str) -> None:
+        self._log.append(Notice(self._now_ns, kind, text))
+
+
+def outcome(over: Over) -> str:
+    """Tell in one line how a run went."""
+    kept = "nothing recorded"
+    if over.recording is not None:
+        number = "" if over.run_id is None else f", run {over.run_id}"
+        kept = f"{over.samples} samples in {over.recording}{number}"
+        if over.flagged:
+            kept += f", {over.flagged} flagged"
+    if over.reason is not None:
+        return f"{over.experiment} ENDED EARLY: {over.reason} ({kept})"
+    return f"{over.experiment} {'stopped by the operator' if over.stopped else 'done'}: {kept}"

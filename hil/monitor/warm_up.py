@@ -1,0 +1,72 @@
+"""Compiling ahead: the on-line chain takes seconds the first time, and neither screen nor run shall wait for it.
+
+The machine code goes to a cache on disk (`estimator.compiled`), so that another process can make it, at low priority;
+in this one compiling would keep the interpreter from the screen. What is left to do here is to load it.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import threading
+
+from estimator.errors import EstimatorError
+from hil.rig.live import tracking_chain
+
+SAMPLES = 64
+
+NICE = 10
+"""The cycle and the screen come first."""
+
+
+class WarmUp:
+    """Makes the on-line chain ready, from a thread that begins at once and ends with the program.
+
+    Parameters
+    ----------
+    period_s
+        Time between two samples [s].
+    """
+
+    def __init__(self, period_s: float) -> None:
+        self._period_s = period_s
+        self._failed: Exception | None = None
+        self._thread = threading.Thread(target=self._run, name="compiling", daemon=True)
+        self._thread.start()
+
+    def is_done(self) -> bool:
+        """Tell whether the chain is ready.
+
+        Raises
+        ------
+        Exception
+            What it failed with: a defect.
+        """
+        if self._failed is not None:
+            raise self._failed
+        return not self._thread.is_alive()
+
+    def _run(self) -> None:
+        process = multiprocessing.get_context("spawn").Process(target=_compile, args=(self._period_s,), daemon=True)
+        process.start()
+        process.join()
+        try:
+            run_once(self._period_s)
+        except Exception as error:  # noqa: BLE001 - raised where someone asks: a thread's own is lost
+            self._failed = error
+
+
+def run_once(period_s: float) -> None:
+    """Run the chain on nothing; a period that has no chain has none to compile, and the view says so in a run."""
+    try:
+        chain = tracking_chain(period_s)
+    except EstimatorError:
+        return
+    for number in range(SAMPLES):
+        chain.push(number * period_s, 0.0, 0.0)
+
+
+def _compile(period_s: float) -> None:
+    if hasattr(os, "nice"):
+        os.nice(NICE)
+    run_once(period_s)

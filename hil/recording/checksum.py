@@ -1,0 +1,99 @@
+"""A checksum of what a recording holds, the same in every format, by which damage is told.
+
+SHA-256 over the columns in the order of their names. Of each: its name, the word for its kind (`hil.recording.kinds`)
+and its cells; a float as IEEE 754 binary64 and an integer as 64 bit two's complement, both little-endian, a truth
+value as one byte, a text as UTF-8. Every name, kind and text is preceded by its length in bytes, every column by its
+number of cells; lengths are unsigned 64 bit little-endian. All NaN are one, 0x7FF8000000000000: sign and payload of a
+NaN mean nothing here.
+
+The order of columns is left out, and units and metadata are: a unit can be put right without the data being others.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from hil.errors import RecordingError
+from hil.recording.kinds import Column, Kind
+from hil.recording.table import Table
+
+CHECKSUM = "data_sha256"
+"""Key of the metadata it is kept under."""
+
+RIG_TEXT, RIG_CHECKSUM = "rig_file", "rig_sha256"
+
+_SHOWN = 12
+"""Digits of a checksum that a message shows."""
+
+
+def data_sha256(columns: Mapping[str, Column]) -> str:
+    """Return the checksum of columns, hexadecimal."""
+    digest = hashlib.sha256()
+    for name in sorted(columns):
+        column, kind = columns[name], Kind.of(columns[name])
+        for text in (name, kind.value):
+            digest.update(_counted(text))
+        digest.update(_length(column.size))
+        digest.update(_cells(column, kind))
+    return digest.hexdigest()
+
+
+def text_sha256(text: str) -> str:
+    """Return the checksum of a text as UTF-8, hexadecimal."""
+    return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
+
+
+def sealed(table: Table) -> Table:
+    """Return a table with its checksum among its metadata; one that says nothing of itself stays as it is."""
+    if not (table.metadata or table.units):
+        return table
+    return replace(table, metadata={**table.metadata, CHECKSUM: data_sha256(table.columns)})
+
+
+def require_whole(table: Table) -> None:
+    """Refuse a table that is not what it was when it was written; one without a checksum passes.
+
+    Raises
+    ------
+    RecordingError
+        With what was expected and what came.
+    """
+    said = table.metadata
+    problems = []
+    if CHECKSUM in said and (came := data_sha256(table.columns)) != said[CHECKSUM]:
+        problems.append(
+            f"expected the data it was written with, SHA-256 {said[CHECKSUM][:_SHOWN]}…, came {came[:_SHOWN]}…: "
+            f"it is damaged, or was changed since. Take a copy that is whole; if you changed it yourself, remove "
+            f"{CHECKSUM} from what it says of itself (of a CSV: move {table.path.name}.json away)."
+        )
+    rig = said.get(RIG_TEXT, "")
+    if RIG_CHECKSUM in said and (came := text_sha256(rig)) != said[RIG_CHECKSUM]:
+        problems.append(
+            f"expected the rig file it was recorded with, SHA-256 {said[RIG_CHECKSUM][:_SHOWN]}…, came "
+            f"{came[:_SHOWN]}…: what it says of itself is damaged. Take a copy that is whole."
+        )
+    if problems:
+        raise RecordingError(table.path, *problems)
+
+
+def _cells(column: Column, kind: Kind) -> bytes:
+    if kind is Kind.FLOAT:
+        return np.where(np.isnan(column), np.nan, column).astype("<f8").tobytes()
+    if kind is Kind.INTEGER:
+        return column.astype("<i8").tobytes()
+    if kind is Kind.BOOLEAN:
+        return column.astype("u1").tobytes()
+    return b"".join(_counted(cell) for cell in column.tolist())
+
+
+def _counted(text: str) -> bytes:
+    raw = text.encode("utf-8", "surrogatepass")
+    return _length(len(raw)) + raw
+
+
+def _length(count: int) -> bytes:
+    return count.to_bytes(8, "little")

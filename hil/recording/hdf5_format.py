@@ -1,0 +1,138 @@
+"""HDF5: ``/columns/<name>`` with an attribute ``unit`` each, and ``/recording_json`` (`hil.recording.description`).
+
+Every dataset of numbers carries Fletcher's checksum of each of its chunks, which HDF5 itself verifies. Of another
+program's file the vectors of numbers or texts, wherever they are, and the fields of tables are the columns, by their
+path.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from hil.errors import RecordingError
+from hil.recording.description import SCHEMA, described_table, description_of, metadata_of
+from hil.recording.format_hints import FormatHints
+from hil.recording.hdf5_file import reading, write_whole
+from hil.recording.kinds import Column, Kind, as_column, is_column
+from hil.recording.shared_length import columns_of_shared_length
+from hil.recording.table import Table
+
+File: TypeAlias = Any
+Dataset: TypeAlias = Any
+"""Those of h5py, which has no types."""
+
+DESCRIPTION = "recording_json"
+COLUMNS = "columns"
+
+
+def read(path: Path, hints: FormatHints) -> Table:
+    """Read an HDF5 recording; hints are for text formats and play no part.
+
+    Raises
+    ------
+    RecordingError
+        If the file is damaged, or holds no vector.
+    """
+    with reading(path, "HDF5") as file:
+        return _own(path, file) if _is_own(file) else _foreign(path, file)
+
+
+def read_metadata(path: Path) -> dict[str, str]:
+    """Read what an HDF5 recording says of itself."""
+    with reading(path, "HDF5") as file:
+        return metadata_of(path, _description(file)) if _is_own(file) else _attributes(file)
+
+
+def write(table: Table, path: Path) -> None:
+    """Write a table with its units and metadata.
+
+    Raises
+    ------
+    RecordingError
+        If a text holds a NUL.
+    """
+    stored_as = {name: _link(number, name) for number, name in enumerate(table.columns)}
+
+    def fill(file: File) -> None:
+        file.attrs["schema"] = SCHEMA
+        group = file.create_group(COLUMNS, track_order=True)
+        for name, column in table.columns.items():
+            _require_no_nul(table.path, name, column)
+            _write_column(group, stored_as[name], column, table.units.get(name))
+        file.create_dataset(DESCRIPTION, data=description_of(table, stored_as))
+
+    write_whole(path, fill)
+
+
+def _write_column(group: File, name: str, column: Column, unit: str | None) -> None:
+    import h5py
+
+    if Kind.of(column) is Kind.TEXT:  # HDF5 has no checksum for texts of any length
+        dataset = group.create_dataset(name, data=column, compression="gzip", dtype=h5py.string_dtype())
+    else:
+        dataset = group.create_dataset(name, data=column, compression="gzip", fletcher32=True)
+    if unit is not None:
+        dataset.attrs["unit"] = unit
+
+
+def _require_no_nul(path: Path, name: str, column: Column) -> None:
+    row = next((k for k, cell in enumerate(column) if "\0" in cell), None) if Kind.of(column) is Kind.TEXT else None
+    if row is not None:
+        raise RecordingError(
+            path, f"column {name}, row {row + 1}: expected a text without NUL, which ends one in HDF5. Write Parquet."
+        )
+
+
+def _link(number: int, name: str) -> str:
+    """Name a dataset: like the column, where HDF5 takes that."""
+    return name if not set("/\0") & set(name) and name not in ("", ".") else f"column {number + 1}"
+
+
+def _is_own(file: File) -> bool:
+    return file.attrs.get("schema") == SCHEMA and DESCRIPTION in file
+
+
+def _description(file: File) -> str:
+    return bytes(file[DESCRIPTION][()]).decode("utf-8")
+
+
+def _own(path: Path, file: File) -> Table:
+    return described_table(path, _description(file), lambda stored_as, _: _cells(file[COLUMNS][stored_as]))
+
+
+def _cells(dataset: Dataset) -> Column:
+    return as_column(dataset[()].ravel())
+
+
+def _foreign(path: Path, file: File) -> Table:
+    vectors: dict[str, Column] = {}
+    units: dict[str, str] = {}
+    remarks: list[str] = []
+
+    def take(name: str, entry: Any) -> None:
+        if not hasattr(entry, "dtype"):
+            return
+        fields = {f"{name}/{field}": entry[field] for field in entry.dtype.names or ()} if entry.ndim == 1 else {}
+        found = fields or ({name: entry[()].ravel()} if entry.size > 1 and max(entry.shape) == entry.size else {})
+        usable = {key: values for key, values in found.items() if is_column(values)}
+        vectors.update({key: as_column(values) for key, values in usable.items()})
+        if name in usable and (unit := _unit(entry)):
+            units[name] = unit
+        if not usable:
+            remarks.append(f"{name}: left out, it is no vector of numbers or texts")
+
+    file.visititems(take)
+    chosen, others = columns_of_shared_length(vectors)
+    return Table(path, chosen, units, _attributes(file), remarks=(*others, *remarks))
+
+
+def _unit(dataset: Dataset) -> str:
+    found = next((dataset.attrs[key] for key in ("unit", "units") if key in dataset.attrs), "")
+    return str(as_column(np.array([found]))[0])
+
+
+def _attributes(file: File) -> dict[str, str]:
+    return {name: str(value) for name, value in file.attrs.items() if np.ndim(value) == 0}

@@ -1,0 +1,181 @@
+"""MATLAB .mat, version 7.3: HDF5 behind a header of 512 bytes, every dataset with the class MATLAB gives it.
+
+The header and the attributes are those MATLAB writes (MAT-File Format, "Version 7.3"; attributes as ``save -v7.3``
+leaves them, also described by hdf5storage): `MATLAB_class` of every variable, `MATLAB_int_decode` where the class is
+not HDF5's type, `MATLAB_empty` where there is nothing. MATLAB's arrays are column-major: a column of N is a dataset of
+shape (1, N). Texts are a cell array; each different text is stored once and referred to.
+
+MATLAB takes ASCII names of letters, digits and underscores only. Columns get such a name, and ``recording_json``, a
+variable too, has the real one (`hil.recording.description`): ``info = jsondecode(recording_json)``.
+"""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from hil.recording.description import described_table, description_of, metadata_of
+from hil.recording.hdf5_file import reading, write_whole
+from hil.recording.kinds import Column, Kind, as_column, as_text
+from hil.recording.shared_length import columns_of_shared_length
+from hil.recording.table import Table
+
+File: TypeAlias = Any
+Dataset: TypeAlias = Any
+"""Those of h5py, which has no types."""
+
+TITLE = b"MATLAB 7.3 MAT-file"
+HEADER = (
+    (TITLE + b", Platform: hil, HDF5 schema 1.00 .").ljust(116) + bytes(8) + b"\x00\x02IM"
+)  # text, no subsystem data, version 2.0, little-endian
+
+DESCRIPTION = "recording_json"
+REFERENCES = "#refs#"
+LONGEST_NAME = 63
+"""Characters of a variable's name that MATLAB tells apart (``namelengthmax``)."""
+
+
+def read(path: Path) -> Table:
+    """Read a .mat recording of version 7.3.
+
+    Raises
+    ------
+    RecordingError
+        If the file is damaged, or holds no vector of numbers.
+    """
+    with reading(path, ".mat") as file:
+        return _own(path, file) if DESCRIPTION in file else _foreign(path, file)
+
+
+def read_metadata(path: Path) -> dict[str, str]:
+    """Read what a .mat recording of version 7.3 says of itself."""
+    with reading(path, ".mat") as file:
+        return metadata_of(path, _text(file[DESCRIPTION])) if DESCRIPTION in file else _foreign_metadata(file)
+
+
+def write(table: Table, path: Path) -> None:
+    """Write a table so that MATLAB loads it: a variable for each column, and ``recording_json``."""
+    stored_as = variable_names(table.columns)
+
+    def fill(file: File) -> None:
+        for name, column in table.columns.items():
+            if Kind.of(column) is Kind.TEXT:
+                _write_cells(file, stored_as[name], column.tolist())
+            else:
+                _write_numbers(file, stored_as[name], column)
+        _write_char(file, DESCRIPTION, description_of(table, stored_as))
+
+    write_whole(path, fill, HEADER)
+
+
+def variable_names(names: Iterable[str]) -> dict[str, str]:
+    """Give every column a name that MATLAB takes, none of them twice."""
+    given: dict[str, str] = {}
+    taken = {DESCRIPTION}
+    for name in names:
+        plain = re.sub(r"[^A-Za-z0-9_]", "_", name)
+        plain = (plain if plain[:1].isalpha() else f"x{plain}")[:LONGEST_NAME]
+        numbered = (f"{plain[: LONGEST_NAME - 10]}_{number}" for number in itertools.count(2))
+        given[name] = plain if plain not in taken else next(other for other in numbered if other not in taken)
+        taken.add(given[name])
+    return given
+
+
+def _write_numbers(file: File, name: str, column: Column) -> None:
+    matlab_class = {Kind.FLOAT: "double", Kind.INTEGER: "int64", Kind.BOOLEAN: "logical"}[Kind.of(column)]
+    cells = column.astype(np.uint8) if matlab_class == "logical" else column
+    dataset = file.create_dataset(name, data=cells[np.newaxis, :], compression="gzip", fletcher32=True)
+    _classify(dataset, matlab_class, 1 if matlab_class == "logical" else 0)
+
+
+def _write_cells(file: File, name: str, texts: list[str]) -> None:
+    import h5py
+
+    group = file.require_group(REFERENCES)
+    places: dict[str, Any] = {}
+    for text in dict.fromkeys(texts):
+        places[text] = _write_char(group, f"t{len(group)}", text).ref
+    references = np.empty((1, len(texts)), dtype=h5py.ref_dtype)
+    references[0, :] = [places[text] for text in texts]
+    _classify(file.create_dataset(name, data=references, dtype=h5py.ref_dtype), "cell")
+
+
+def _write_char(group: File, name: str, text: str) -> Dataset:
+    units = np.frombuffer(text.encode("utf-16-le"), dtype="<u2")
+    if units.size:
+        dataset = group.create_dataset(name, data=units[:, np.newaxis])
+    else:  # an empty array is its size, and an attribute that says so
+        dataset = group.create_dataset(name, data=np.zeros(2, dtype=np.uint64))
+        dataset.attrs["MATLAB_empty"] = np.uint8(1)
+    _classify(dataset, "char", 2)
+    return dataset
+
+
+def _classify(dataset: Dataset, matlab_class: str, decode: int = 0) -> None:
+    dataset.attrs["MATLAB_class"] = np.bytes_(matlab_class)
+    if decode:
+        dataset.attrs["MATLAB_int_decode"] = np.int32(decode)
+
+
+def _own(path: Path, file: File) -> Table:
+    def column(stored_as: str, kind: Kind) -> Column:
+        cells = _cells(file, file[stored_as])
+        return cells.astype(np.bool_) if kind is Kind.BOOLEAN else cells
+
+    return described_table(path, _text(file[DESCRIPTION]), column)
+
+
+def _foreign(path: Path, file: File) -> Table:
+    datasets = _datasets(file)
+    vectors = {n: _cells(file, d) for n, d in datasets.items() if _is_vector(d)}
+    chosen, remarks = columns_of_shared_length(vectors)
+    metadata = _foreign_metadata(file)
+    other = [
+        f"{name}: left out, it is no vector of numbers or texts"
+        for name in file
+        if name != REFERENCES and name not in vectors and name not in metadata
+    ]
+    return Table(path, chosen, metadata=metadata, remarks=(*remarks, *other))
+
+
+def _foreign_metadata(file: File) -> dict[str, str]:
+    datasets = _datasets(file)
+    scalars = {name: repr(d[()].item()) for name, d in datasets.items() if d.size == 1 and d.dtype.kind in "fiu"}
+    texts = {name: _text(d) for name, d in datasets.items() if _class_of(d) == "char" and 1 in (*d.shape, d.ndim)}
+    return {**scalars, **texts}
+
+
+def _datasets(file: File) -> dict[str, Dataset]:
+    return {name: entry for name, entry in file.items() if hasattr(entry, "dtype") and entry.dtype.names is None}
+
+
+def _is_vector(dataset: Dataset) -> bool:
+    is_cells = _class_of(dataset) == "cell" or (dataset.dtype.kind in "fiu" and _class_of(dataset) != "char")
+    return (
+        is_cells and dataset.size > 1 and max(dataset.shape) == dataset.size and not dataset.attrs.get("MATLAB_empty")
+    )
+
+
+def _cells(file: File, dataset: Dataset) -> Column:
+    content = dataset[()].ravel()
+    if _class_of(dataset) == "cell":
+        texts = {reference: _text(file[reference]) for reference in set(content.tolist())}
+        return as_text([texts[reference] for reference in content.tolist()])
+    return as_column(content.astype(np.bool_) if _class_of(dataset) == "logical" else content)
+
+
+def _text(dataset: Dataset) -> str:
+    if dataset.attrs.get("MATLAB_empty"):
+        return ""
+    if _class_of(dataset) != "char":
+        return str(dataset[()].ravel().tolist())
+    return bytes(dataset[()].astype("<u2").tobytes()).decode("utf-16-le", "replace")
+
+
+def _class_of(dataset: Dataset) -> str:
+    return bytes(dataset.attrs.get("MATLAB_class", b"")).decode("ascii", "replace")

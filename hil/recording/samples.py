@@ -1,0 +1,47 @@
+"""Samples of a rig as the columns of a recording."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from hil.recording import columns
+from hil.recording.table import Table
+from hil.rig.sample import Sample
+
+
+def cells_of(sample: Sample) -> tuple[float | int, ...]:
+    """Return one sample in the order of ``columns.UNITS``; the flags are an integer, all else is float."""
+    return (
+        float(sample.time_s),
+        float(sample.torque_ref_nm),
+        float(sample.torque_m1_nm),
+        float(sample.torque_m2_nm),
+        float(sample.speed_rad_s),
+        float(sample.prbs_nm),
+        int(sample.flags),
+        float(sample.torque_ref_m1_nm),
+        float(sample.torque_ref_m2_nm),
+        sample.age_ns / 1e9,
+    )
+
+
+def table_of(samples: Iterable[Sample], path: Path, metadata: Mapping[str, str]) -> Table:
+    """Make a table of samples; a row each.
+
+    Raises
+    ------
+    RecordingError
+        If there is none.
+    """
+    rows = [cells_of(sample) for sample in samples]
+    kinds = {name: np.int64 if name == columns.FLAGS else np.float64 for name in columns.UNITS}
+    cells = zip(*rows, strict=True) if rows else [() for _ in kinds]
+    return Table(
+        path,
+        {name: np.array(column, dtype=kind) for (name, kind), column in zip(kinds.items(), cells, strict=True)},
+        columns.UNITS,
+        metadata,
+    )

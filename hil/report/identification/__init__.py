@@ -1,0 +1,1 @@
+"""What was identified, as one self-contained page: ``hil identify`` and ``hil paper``."""

@@ -1,0 +1,95 @@
+"""What questioning an identification adds to its entry in ``identification.json``."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from estimator.identification.modes.propagate import Uncertain
+from estimator.identification.offline.free_run import FreeRun
+from estimator.identification.offline.validation import CorrelationTest
+from estimator.identification.study import Study
+from hil.report.numbers import json_number
+
+
+def studied(each: Study) -> dict[str, Any]:
+    """Return intervals, third order, validation, feedback, cancellations, physical parameters; JSON types only."""
+    return {
+        "resonance_interval": None
+        if each.resonance is None
+        else {
+            "frequency_hz": _uncertain(each.resonance.frequency_hz),
+            "damping": _uncertain(each.resonance.damping),
+        },
+        "third_order": {
+            "theta": each.third_order.model.theta.tolist(),
+            "nk": each.third_order.model.nk,
+            "poles": [[root.real, root.imag] for root in each.third_order.model.poles.tolist()],
+            "zeros": [[root.real, root.imag] for root in each.third_order.model.zeros.tolist()],
+            "largest_change": json_number(each.third_order.largest_error),
+        },
+        "validation": {
+            "statement": each.validation.statement,
+            "own": _free_run(each.validation.own),
+            "unseen": [_free_run(run) for run in each.validation.unseen],
+            "independence": _test(each.validation.independence),
+            "autocorrelation": _test(each.validation.autocorrelation),
+        },
+        "feedback": None
+        if each.feedback is None
+        else {
+            "detected": each.feedback.detected,
+            "p_value": json_number(each.feedback.p_value),
+            "statement": each.feedback.statement,
+        },
+        "cancellations": [
+            {
+                "pole": [one.pole.real, one.pole.imag],
+                "zero": [one.zero.real, one.zero.imag],
+                "p_value": json_number(one.p_value),
+            }
+            for one in each.roots.cancellations
+        ],
+        "physical": _physical(each),
+    }
+
+
+def _uncertain(estimate: Uncertain) -> dict[str, Any]:
+    """Return a value with its standard deviation and interval; null where not finite."""
+    return {
+        "value": json_number(estimate.value),
+        "std": json_number(estimate.std),
+        "ci95": [json_number(end) for end in estimate.ci95],
+    }
+
+
+def _free_run(run: FreeRun) -> dict[str, Any]:
+    return {
+        "name": run.name,
+        "rms": json_number(run.rms),
+        "fit_percent": json_number(run.fit_percent),
+        "one_step_fit_percent": json_number(run.one_step_fit_percent),
+    }
+
+
+def _test(test: CorrelationTest) -> dict[str, Any]:
+    return {
+        "lag": test.lag.tolist(),
+        "correlation": [json_number(value) for value in test.correlation.tolist()],
+        "bound": json_number(test.bound),
+        "p_value": json_number(test.p_value),
+    }
+
+
+def _physical(each: Study) -> dict[str, Any]:
+    if each.physical is None:
+        return {"parameters": {}, "sums": {}, "reason": each.not_physical}
+    groups = {"parameters": each.physical.parameters, "sums": each.physical.sums}
+    told: dict[str, Any] = {
+        group: {
+            name: _uncertain(one.estimate)
+            | {"unit": one.unit, "determined": one.is_determined, "statement": one.statement}
+            for name, one in members.items()
+        }
+        for group, members in groups.items()
+    }
+    return told | {"reason": ""}

@@ -1,0 +1,120 @@
+"""``report.html`` of ``hil identify``: what was identified, how sure it is, and what speaks for and against it.
+
+From the top: the result in a paragraph with its warnings, the numbers of every recording, the drive behind them, all
+recordings over one another, and for each its frequency response, poles and zeros, residual tests, free run and course.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+
+from estimator.identification.compare import Compared
+from estimator.identification.offline.orders import OrderChoice
+from estimator.identification.study import Study
+from hil.figures.local_model import LocalModel
+from hil.figures.palette import series_colour
+from hil.report import page as html
+from hil.report.identification.pole_map import PoleSet, known_sets, pole_figure
+from hil.report.identification.recording_section import recording_section
+from hil.report.identification.responses import responses_figure
+from hil.report.identification.tables import compared_table, numbers_table, orders_table, physical_tables
+from hil.report.identification.wording import headline, plus_minus, statement, warnings
+from hil.report.numbers import shown
+
+MOST_DRAWN = 12
+"""Recordings with a section of their own; the tables hold all."""
+
+FOOTER = (
+    "hil identify. High-passed and decimated; errors and fits are those of free-run simulations: measured torque in, "
+    "nothing fed back. Intervals hold the truth with 95 % probability."
+)
+
+
+def identification_page(
+    models: Sequence[LocalModel],
+    studies: Sequence[Study],
+    choice: OrderChoice | None = None,
+    compared: Sequence[Compared] = (),
+) -> str:
+    """Return the text of the page.
+
+    Parameters
+    ----------
+    models, studies
+        Every recording, identified and questioned, in one order.
+    choice
+        How order and delay were chosen, where they were.
+    compared
+        Other recursive estimators on the same data.
+    """
+    drawn = list(zip(models, studies, strict=True))[:MOST_DRAWN]
+    sections = [
+        _top(models, studies),
+        html.section("Resonance and damping", numbers_table(models, studies)),
+        _physical(studies),
+        *([html.section("Order and delay", orders_table(choice))] if choice is not None else []),
+        *([html.section("Recursive estimators compared", compared_table(compared))] if compared else []),
+        *([_together(models)] if len(models) > 1 else []),
+        *(recording_section(model, each, number) for number, (model, each) in enumerate(drawn)),
+    ]
+    if left := len(models) - len(drawn):
+        sections.append(
+            html.section("More recordings", html.paragraph(f"{left} more are in the tables alone.", "note"))
+        )
+    return html.page(f"Identification: {headline(studies)}", sections, FOOTER)
+
+
+def _top(models: Sequence[LocalModel], studies: Sequence[Study]) -> str:
+    notes = "".join(html.paragraph(f"Note: {text}", "warning") for text in warnings(studies))
+    return (
+        f'<header class="top">\n<h1>{escape(headline(studies))}</h1>\n'
+        + html.paragraph(statement(models, studies), "statement")
+        + notes
+        + html.tiles(_tiles(studies))
+        + "\n</header>"
+    )
+
+
+def _tiles(studies: Sequence[Study]) -> list[tuple[str, str, str]]:
+    first = studies[0]
+    tiles = []
+    if first.resonance is not None:
+        mode, online = first.resonance, first.found.online_resonance
+        told = ("none on line", "none on line")
+        if online is not None:
+            told = (f"on line {shown(online.frequency_hz, 'Hz')}", f"on line {shown(online.damping)}")
+        tiles += [
+            (f"frequency, {first.name}", plus_minus(mode.frequency_hz, "Hz"), told[0]),
+            (f"damping, {first.name}", plus_minus(mode.damping), told[1]),
+        ]
+    own = first.validation.own
+    tiles.append(("free-run fit", f"{own.fit_percent:.1f} %", f"one step ahead {own.one_step_fit_percent:.1f} %"))
+    tiles.append(("recordings", str(len(studies)), "each with models of its own"))
+    return tiles
+
+
+def _physical(studies: Sequence[Study]) -> str:
+    note = (
+        "The two-mass drive, at the motor shaft, whose response a third-order model at the recording's own period is. "
+        "Sums are often known where their parts are not."
+    )
+    return html.section("Physical parameters", html.paragraph(note, "note"), *physical_tables(studies))
+
+
+def _together(models: Sequence[LocalModel]) -> str:
+    sets = [
+        PoleSet(model.name, model.online.poles, model.online.zeros, series_colour(number))
+        for number, model in enumerate(models)
+    ]
+    note = (
+        "Lines: on-line models. Dots: spectral estimates. Click a name to take it away, double click to see it alone."
+    )
+    return html.section(
+        "All recordings",
+        html.paragraph(note, "note"),
+        "<h3>Frequency responses</h3>",
+        responses_figure("all-responses", models),
+        "<h3>Poles and zeros of the on-line models</h3>",
+        pole_figure("all-poles", [*sets, *known_sets(models)], models[0].online.sample_time_s),
+    )

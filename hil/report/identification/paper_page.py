@@ -1,0 +1,212 @@
+"""``report.html`` of ``hil paper``: the paper's figures, interactive, and the numbers behind them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+
+import numpy as np
+
+from hil.figures.local_model import LocalModel
+from hil.figures.numbers import Row
+from hil.figures.palette import series_colour
+from hil.figures.road.conditions import Conditions
+from hil.report import page as html
+from hil.report.figures import Line, Panel, Style, stretches_for, time_figure
+from hil.report.identification.pole_map import PoleSet, known_sets, pole_figure
+from hil.report.identification.responses import responses_figure
+from hil.report.numbers import shown
+
+SHOWN_SIGNALS = 3
+"""Recordings in Fig. 2, as in the paper."""
+
+SOURCE = (
+    "N. Nevaranta, J.-H. Montonen, T. Lindh: Online Estimation of a Mechanical Driveline Parameters of a Hybrid Bus, "
+    "EPE'18 ECCE Europe"
+)
+
+
+def paper_page(models: Sequence[LocalModel], rows: Sequence[Row], driven: Sequence[Conditions]) -> str:
+    """Return the text of the page.
+
+    Parameters
+    ----------
+    models, rows
+        Every experiment and its figures.
+    driven
+        Conditions they were driven under; empty where recordings were given.
+    """
+    sections = [
+        _top(models, rows, driven),
+        html.section("Resonance and damping", _numbers(rows)),
+        _signals(models),
+        _responses(models),
+        _poles(models),
+        *([html.section("What was driven", *_conditions(models, driven))] if driven else []),
+    ]
+    return html.page("The paper's figures", sections, f"hil paper. After {SOURCE}.")
+
+
+def _top(models: Sequence[LocalModel], rows: Sequence[Row], driven: Sequence[Conditions]) -> str:
+    count = f"{len(models)} experiment{'s' if len(models) > 1 else ''}"
+    first = models[0].found
+    orders, reference = first.online.orders, models[0].reference
+    how = (
+        f"{count} on the simulated rig over CANopen and Modbus, at near-constant speed, each with a payload, road, "
+        "wind and driver of its own."
+        if driven
+        else f"{count} as recorded."
+    )
+    settings = (
+        f"On line: OEFO with nA = {orders.na}, nB = {orders.nb}, total delay {orders.nk}, at "
+        f"{1e3 * first.online.sample_time_s:g} ms."
+    )
+    tiles = [("experiments", str(len(models)), "each a local model of its own")]
+    if reference is not None:
+        tiles += [
+            ("frequency, worst error", _worst(rows, "hz"), f"on line, to the {reference.name}"),
+            ("damping, worst error", _worst(rows, "damping"), f"on line, to the {reference.name}"),
+        ]
+    return (
+        f'<header class="top">\n<h1>The driveline of the paper, from {escape(count)}</h1>\n'
+        + html.paragraph(f"{how} {settings}", "statement")
+        + html.tiles(tiles)
+        + "\n</header>"
+    )
+
+
+def _worst(rows: Sequence[Row], what: str) -> str:
+    errors = np.array([row.error(what, "online") for row in rows])
+    missing = int(np.isnan(errors).sum())
+    text = f"{100.0 * float(np.nanmax(np.abs(errors))):.2g} %" if missing < errors.size else "–"
+    return f"{text}, {missing} without" if missing else text
+
+
+def _numbers(rows: Sequence[Row]) -> str:
+    headings = (
+        "experiment",
+        "on line [Hz]",
+        "off line [Hz]",
+        "reference [Hz]",
+        "error",
+        "damping on line",
+        "off line",
+        "reference",
+        "error",
+        "to off line [dB]",
+        "fit",
+        "status",
+    )
+    cells = [
+        (
+            row.name,
+            shown(row.online_hz),
+            shown(row.offline_hz),
+            shown(row.reference_hz),
+            _percent(row.error("hz", "online")),
+            shown(row.online_damping),
+            shown(row.offline_damping),
+            shown(row.reference_damping),
+            _percent(row.error("damping", "online")),
+            shown(row.offline_db),
+            shown(row.fit_percent, "%"),
+            row.status,
+        )
+        for row in rows
+    ]
+    note = (
+        "Error: of the on-line estimate to the reference. To off line: largest difference of the two models' frequency "
+        "responses in the unbroken band around the resonance where the coherence is above 0.9. Fit: free run of the "
+        "off-line model over the whole recording, after the high-pass."
+    )
+    return html.table(headings, cells, numbers=range(1, 11)) + html.paragraph(note, "note")
+
+
+def _percent(share: float) -> str:
+    return "–" if np.isnan(share) else f"{100.0 * share:+.2f} %"
+
+
+def _signals(models: Sequence[LocalModel]) -> str:
+    drawn = models[:SHOWN_SIGNALS]
+    stretches = stretches_for(4 * len(drawn))
+    pieces = []
+    for number, model in enumerate(drawn):
+        record = model.record
+        speed = np.where(record.okay, record.output, np.nan)
+        panels = (
+            Panel("T_tot [Nm]", (Line("total torque", record.total_torque_nm, Style.BEFORE),)),
+            Panel("ω_M [rad/s]", (Line("motor speed", speed, Style.AFTER),)),
+        )
+        pieces += [f"<h3>{escape(model.name)}</h3>", time_figure(f"signals-{number}", record.time_s, panels, stretches)]
+    text = f"As recorded, every {1e3 * drawn[0].record.sample_time_s:g} ms. Drag to zoom, double click to go back."
+    return html.section("Fig. 2: total torque and motor speed", html.paragraph(text, "note"), *pieces)
+
+
+def _responses(models: Sequence[LocalModel]) -> str:
+    text = (
+        "Lines: on-line models. Dots: spectral estimates of the same data. Click a name in the legend to take a line "
+        "away, double click to see it alone; the off-line models wait there."
+    )
+    return html.section(
+        "Fig. 4: on-line models against spectral estimates",
+        html.paragraph(text, "note"),
+        responses_figure("responses", models),
+    )
+
+
+def _poles(models: Sequence[LocalModel]) -> str:
+    whole = [_set(model, number) for number, model in enumerate(models)]
+    third = [
+        PoleSet(model.name, low.poles, low.zeros, series_colour(number))
+        for number, model in enumerate(models)
+        if (low := model.third_order) is not None
+    ]
+    known = known_sets(models)
+    period_s = models[0].online.sample_time_s
+    order = models[0].online.orders.na
+    return html.section(
+        "Fig. 5: poles and zeros",
+        html.paragraph(
+            "Crosses are poles, circles zeros, in the plane of z; what is known is black. Dotted: damping 0.1, 0.3, "
+            "0.6. A sampled model has its zeros where the continuous one's are only roughly.",
+            "note",
+        ),
+        f"<h3>As identified, nA = {order}</h3>",
+        pole_figure("poles", [*whole, *known], period_s),
+        "<h3>Their third-order equivalents</h3>",
+        pole_figure("poles-third", [*third, *known], period_s),
+    )
+
+
+def _set(model: LocalModel, number: int) -> PoleSet:
+    return PoleSet(model.name, model.online.poles, model.online.zeros, series_colour(number))
+
+
+def _conditions(models: Sequence[LocalModel], driven: Sequence[Conditions]) -> list[str]:
+    headings = (
+        "experiment",
+        "speed [rad/s]",
+        "payload [kg]",
+        "slope RMS [%]",
+        "head wind [m/s]",
+        "surface [Nm]",
+        "pedal [Nm]",
+    )
+    rows = [
+        (
+            model.name,
+            shown(each.speed_rad_s),
+            f"{each.payload_kg:+.0f}",
+            shown(100.0 * each.slope_rms),
+            f"{each.wind_m_s:.1f} ± {each.gust_m_s:.1f}",
+            shown(each.roughness_nm),
+            shown(each.pedal_nm),
+        )
+        for model, each in zip(models, driven, strict=True)
+    ]
+    note = (
+        "The paper gives no numbers for these; all are assumed. Payload: to the bus of the rig's model, which carries "
+        "some. Surface: RMS of what its unevenness adds to the load torque at the motor shaft; pedal: standard "
+        "deviation of the driver's corrections."
+    )
+    return [html.table(headings, rows, numbers=range(1, 7)), html.paragraph(note, "note")]

@@ -1,0 +1,117 @@
+"""Tables of an identification report."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from estimator.identification.compare import Compared
+from estimator.identification.offline.orders import OrderChoice
+from estimator.identification.study import Study
+from hil.figures.local_model import LocalModel
+from hil.report import page as html
+from hil.report.identification.wording import plus_minus
+from hil.report.numbers import shown, shown_interval
+
+MOST_CANDIDATES = 8
+"""Structures shown of an order selection."""
+
+
+def numbers_table(models: Sequence[LocalModel], studies: Sequence[Study]) -> str:
+    """Return resonance and damping on line and off line, and how well the models do, of every recording."""
+    headings = (
+        "recording",
+        "on line [Hz]",
+        "off line [Hz]",
+        "damping on line",
+        "off line",
+        "free-run fit",
+        "one step",
+        "unseen",
+        "status",
+    )
+    rows = [_numbers(each) for each in studies]
+    known = [model for model in models if model.reference_mode is not None]
+    if known and (mode := known[0].reference_mode) is not None and known[0].reference is not None:
+        rows.append((known[0].reference.name, "", shown(mode.frequency_hz), "", shown(mode.damping), "", "", "", ""))
+    note = (
+        "± is half the 95 % interval. Free-run fit: 100 % less the simulation error over the output's own variation; "
+        "one step ahead uses the measured output and is no measure of a model. Unseen: free run on the others."
+    )
+    return html.table(headings, rows, numbers=range(1, 8)) + html.paragraph(note, "note")
+
+
+def _numbers(each: Study) -> tuple[str, ...]:
+    online, offline, own = each.found.online_resonance, each.resonance, each.validation.own
+    unseen = [run.fit_percent for run in each.validation.unseen]
+    return (
+        each.name,
+        "–" if online is None else shown(online.frequency_hz),
+        "–" if offline is None else plus_minus(offline.frequency_hz),
+        "–" if online is None else shown(online.damping),
+        "–" if offline is None else plus_minus(offline.damping),
+        shown(own.fit_percent, "%"),
+        shown(own.one_step_fit_percent, "%"),
+        shown(sum(unseen) / len(unseen), "%") if unseen else "–",
+        each.found.estimate.status.value,
+    )
+
+
+def physical_tables(studies: Sequence[Study]) -> list[str]:
+    """Return the drive's parameters of every recording: one row each, then what is open and why."""
+    rows, told, is_open = [], [], []
+    for each in studies:
+        if each.physical is None:
+            told.append(html.paragraph(f"{each.name}: no two-mass drive. {each.not_physical}", "warning"))
+            continue
+        both = {**each.physical.parameters, **each.physical.sums}
+        rows += [
+            (
+                each.name,
+                name,
+                shown(one.estimate.value),
+                shown_interval(one.estimate.ci95),
+                one.unit,
+                "determined" if one.is_determined else "open",
+            )
+            for name, one in both.items()
+        ]
+        is_open += [
+            html.paragraph(f"{each.name}: {one.statement}", "note") for one in both.values() if not one.is_determined
+        ]
+    headings = ("recording", "parameter", "value", "95 % interval", "unit", "")
+    table = html.table(headings, rows, numbers=(2, 3)) if rows else ""
+    return [table, *told, html.details("What is open, and what would tell", *is_open) if is_open else ""]
+
+
+def orders_table(choice: OrderChoice) -> str:
+    """Return the best structures of an order selection, the chosen one first."""
+    rows = [
+        (
+            str(each.orders.na),
+            str(each.orders.nb),
+            str(each.orders.nk),
+            shown(each.criterion),
+            shown(each.rms),
+            shown(each.unseen_fit_percent, "%"),
+        )
+        for each in choice.candidates[:MOST_CANDIDATES]
+    ]
+    headings = ("nA", "nB", "delay", "BIC above the best", "RMS of the whitened error", "fit on unseen")
+    return html.paragraph(choice.statement) + html.table(headings, rows, numbers=range(6))
+
+
+def compared_table(compared: Sequence[Compared]) -> str:
+    """Return what several recursive estimators made of the same data."""
+    rows = [
+        (
+            each.recording,
+            each.estimator,
+            "–" if each.resonance is None else shown(each.resonance.frequency_hz),
+            "–" if each.resonance is None else shown(each.resonance.damping),
+            shown(each.fit_percent, "%"),
+            each.status.value,
+        )
+        for each in compared
+    ]
+    headings = ("recording", "estimator", "frequency [Hz]", "damping", "free-run fit", "status")
+    return html.table(headings, rows, numbers=(2, 3, 4))

@@ -1,0 +1,62 @@
+"""The table of ``hil identify`` for a terminal."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
+
+from estimator.identification.compare import Compared
+from estimator.identification.modes.modes import Mode
+from estimator.identification.online.recursive import Status
+from estimator.identification.study import Study
+from hil.report.identification.wording import plus_minus
+
+
+def summary(studies: Sequence[Study], nominal: Mode | None) -> Table:
+    """Return resonance and damping of each recording, on line and off line; it fits into 80 columns.
+
+    The status of the on-line estimates has a column where one of them is not as it should be.
+    """
+    wrong = any(each.found.estimate.status is not Status.ESTIMATED for each in studies)
+    table = Table(title="Resonance and damping", title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
+    for heading in ("recording", "on line", "", "off line", "", "fit"):
+        table.add_column(heading, no_wrap=True)
+    if wrong:
+        table.add_column("on-line status")
+    for each in studies:
+        fit = f"{each.found.batch.fit_percent:.1f} %"
+        status = [_status(each)] if wrong else []
+        table.add_row(each.name, *_shown(each.found.online_resonance), *_known(each), fit, *status)
+    if nominal is not None:
+        table.add_section()
+        table.add_row("model file", "", "", *_shown(nominal))
+    return table
+
+
+def compared_summary(compared: Iterable[Compared]) -> Table:
+    """Return what several recursive estimators made of the same data."""
+    table = Table(title="Recursive estimators", title_justify="left", box=SIMPLE_HEAD)
+    for heading in ("recording", "estimator", "frequency", "damping", "free-run fit", "status"):
+        table.add_column(heading)
+    for each in compared:
+        fit = f"{each.fit_percent:.1f} %" if math.isfinite(each.fit_percent) else "–"
+        table.add_row(each.recording, each.estimator, *_shown(each.resonance), fit, each.status.value)
+    return table
+
+
+def _shown(mode: Mode | None) -> tuple[str, str]:
+    return ("none", "") if mode is None else (f"{mode.frequency_hz:.2f} Hz", f"{mode.damping:.3f}")
+
+
+def _known(each: Study) -> tuple[str, str]:
+    mode = each.resonance
+    return ("none", "") if mode is None else (plus_minus(mode.frequency_hz, "Hz"), plus_minus(mode.damping))
+
+
+def _status(each: Study) -> str:
+    estimate = each.found.estimate
+    message = estimate.reason.message
+    return f"{estimate.status.value}: {message}" if message else estimate.status.value

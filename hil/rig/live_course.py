@@ -1,0 +1,133 @@
+"""The course of an on-line estimate, kept for a file: resonance at every kept sample, alarms, where it ended."""
+
+from __future__ import annotations
+
+import json
+import math
+from array import array
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:  # the estimator takes half a second to import, and a run without an estimate has no use for it
+    from estimator.identification.online.chain import OnlineChain
+    from estimator.identification.online.online_estimate import OnlineEstimate, OnlineTrajectory
+    from estimator.identification.tracking.alarm import Alarm
+
+SCHEMA = "hil.online/1"
+
+COLUMNS = ("time_s", "resonance_hz", "resonance_std_hz", "damping", "damping_std")
+"""What is kept of every estimate: 40 bytes, 7 MB for an hour at 20 ms."""
+
+
+def course_path(recording: Path) -> Path:
+    """Return where the course of a run stands: beside its recording."""
+    return recording.with_suffix(".online.json")
+
+
+class Course:
+    """What a chain said, sample by sample.
+
+    Parameters
+    ----------
+    chain
+        The chain; its settings stand in the file.
+    """
+
+    def __init__(self, chain: OnlineChain) -> None:
+        self.samples = 0
+        self.alarms: list[Alarm] = []
+        self._settings = chain.settings
+        self._columns = {name: array("d") for name in COLUMNS}
+        self._last: OnlineEstimate | None = None
+
+    def append(self, estimate: OnlineEstimate) -> None:
+        """Keep one estimate."""
+        mode = estimate.resonance
+        frequency_hz, damping = (math.nan, math.nan) if mode is None else (mode.frequency_hz, mode.damping)
+        row = (estimate.time_s, frequency_hz, estimate.frequency_std_hz, damping, estimate.damping_std)
+        for column, value in zip(self._columns.values(), row, strict=True):
+            column.append(value)
+        if estimate.alarm is not None:
+            self.alarms.append(estimate.alarm)
+        self._last = estimate
+
+    def extend(self, block: OnlineTrajectory) -> None:
+        """Keep the estimates of a block."""
+        rows = (block.time_s, block.frequency_hz, block.frequency_std_hz, block.damping, block.damping_std)
+        for column, values in zip(self._columns.values(), rows, strict=True):
+            column.frombytes(values.tobytes())
+        self.alarms.extend(block.alarms)
+        if len(block):
+            self._last = block[len(block) - 1]
+
+    def summary(self) -> dict[str, Any]:
+        """Return how it ended, and the alarms; JSON-able."""
+        settings = self._settings
+        return {
+            "schema": SCHEMA,
+            "settings": {
+                "na": settings.orders.na,
+                "nb": settings.orders.nb,
+                "nk": settings.orders.nk,
+                "sample_time_s": settings.sample_time_s,
+                "high_pass_hz": settings.high_pass_hz,
+                "band_hz": list(settings.band_hz),
+                "adaptation": repr(settings.adaptation),
+            },
+            "samples": self.samples,
+            "estimates": len(self._columns["time_s"]),
+            "final": None if self._last is None else _final(self._last),
+            "alarms": [alarm.as_json() for alarm in self.alarms],
+        }
+
+    def write(self, path: Path) -> None:
+        """Write it all; numbers with all their digits, so that a replay can be compared to the bit."""
+        columns = {name: [_number(value) for value in column] for name, column in self._columns.items()}
+        text = json.dumps(self.summary() | {"course": columns}, allow_nan=False)
+        path.write_text(text + "\n", encoding="utf-8")
+
+    @property
+    def statement(self) -> str:
+        """One line: resonance, damping and what is to be known about them."""
+        if self._last is None:
+            return "no estimate: the recording ended before the first one"
+        return statement(self._last)
+
+
+def statement(estimate: OnlineEstimate) -> str:
+    """Say one estimate in a line."""
+    mode = estimate.resonance
+    if mode is None:
+        return f"resonance: {estimate.estimate.reason.message or 'no lightly damped mode in the band'}"
+    return (
+        f"resonance {mode.frequency_hz:.3f} Hz{_plus_minus(estimate.frequency_std_hz, 3)}, "
+        f"damping {mode.damping:.4f}{_plus_minus(estimate.damping_std, 4)}"
+    )
+
+
+def _plus_minus(std: float, digits: int) -> str:
+    return f" ± {1.96 * std:.{digits}f}" if math.isfinite(std) else ""
+
+
+def _final(estimate: OnlineEstimate) -> dict[str, Any]:
+    mode = estimate.resonance
+    resonance = None
+    if mode is not None:
+        resonance = {
+            "frequency_hz": mode.frequency_hz,
+            "frequency_std_hz": _number(estimate.frequency_std_hz),
+            "damping": mode.damping,
+            "damping_std": _number(estimate.damping_std),
+        }
+    return {
+        "time_s": estimate.time_s,
+        "status": estimate.estimate.status.value,
+        "reason": estimate.estimate.reason.message,
+        "theta": estimate.estimate.theta.tolist(),
+        "resonance": resonance,
+    }
+
+
+def _number(value: float) -> float | None:
+    """Return a number as JSON has it: NaN is null."""
+    return value if math.isfinite(value) else None

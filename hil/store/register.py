@@ -1,0 +1,112 @@
+"""Enter a recording into the store of its folder: the one call a command makes when a run is over."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from hil.recording import columns
+from hil.recording.checksum import CHECKSUM, RIG_CHECKSUM, RIG_TEXT
+from hil.recording.formats import read_table
+from hil.recording.table import Table
+from hil.store.entry import COMPLETE, RunEntry
+from hil.store.run_store import RunStore
+
+EXPERIMENT, STARTED, VERSION = "experiment", "started_utc", "hil_version"
+OWN_KEYS = frozenset({RIG_TEXT, RIG_CHECKSUM, EXPERIMENT, STARTED, VERSION, CHECKSUM, "schema"})
+"""What has a place of its own in an entry; the rest is its settings."""
+
+
+def register_run(
+    recording: Path | str,
+    outcome: str = COMPLETE,
+    folder: Path | str | None = None,
+    results: Mapping[str, Path] | None = None,
+) -> int:
+    """Enter a recording that was just made.
+
+    Parameters
+    ----------
+    recording : Path or str
+        The recording; what is entered is what it says of itself.
+    outcome : str
+        `COMPLETE`, or what ended the run.
+    folder : Path or str, optional
+        Of the store; by default the recording's own.
+    results : mapping of kind to Path, optional
+        What came of it so far, to be attached.
+
+    Returns
+    -------
+    int
+        The run's number in the store.
+
+    Raises
+    ------
+    RecordingError
+        If the recording can't be read.
+    StoreError
+        If the store can't be written. The recording is whole: ``hil runs rebuild`` enters it later.
+    """
+    recording = Path(recording)
+    entry = entry_of(read_table(recording), outcome)
+    with RunStore(recording.parent if folder is None else folder) as store:
+        run_id = store.add_run(entry)
+        for kind, path in (results or {}).items():
+            store.attach(run_id, kind, path)
+        return run_id
+
+
+def entry_of(table: Table, outcome: str = COMPLETE) -> RunEntry:
+    """Make the entry of a recording from what it says of itself."""
+    said = table.metadata
+    rig_text = said.get(RIG_TEXT, "")
+    eds = {key[len("eds_") : -len("_sha256")]: value for key, value in said.items() if _is_eds(key)}
+    return RunEntry(
+        recording=table.path,
+        data_sha256=said.get(CHECKSUM, ""),
+        experiment=said.get(EXPERIMENT, ""),
+        started_utc=said.get(STARTED, ""),
+        duration_s=_duration_s(table),
+        samples=table.n_rows,
+        flagged=_flagged(table),
+        software_version=said.get(VERSION, ""),
+        rig_name=_rig_name(rig_text),
+        rig_text=rig_text,
+        eds_sha256=eds,
+        outcome=outcome,
+        settings={key: value for key, value in said.items() if key not in OWN_KEYS and not _is_eds(key)},
+    )
+
+
+def is_run(metadata: Mapping[str, str]) -> bool:
+    """Whether a recording is one of this rig: it says so of itself."""
+    return EXPERIMENT in metadata and RIG_TEXT in metadata
+
+
+def _is_eds(key: str) -> bool:
+    return key.startswith("eds_") and key.endswith("_sha256")
+
+
+def _rig_name(text: str) -> str:
+    try:
+        name = tomllib.loads(text).get("name", "")
+    except tomllib.TOMLDecodeError:  # a recording made before rig files were checked, or by another program
+        return ""
+    return name if isinstance(name, str) else ""
+
+
+def _duration_s(table: Table) -> float:
+    if columns.TIME not in table.columns or table.n_rows < 2:
+        return 0.0
+    time_s = table.numeric([columns.TIME])[columns.TIME]
+    return float((time_s[-1] - time_s[0]) * table.n_rows / (table.n_rows - 1))
+
+
+def _flagged(table: Table) -> int:
+    if columns.FLAGS not in table.columns:
+        return 0
+    return int(np.count_nonzero(table.numeric([columns.FLAGS])[columns.FLAGS]))

@@ -1,0 +1,114 @@
+"""The log of every command: what was asked for, with which version, what the libraries said, how it ended.
+
+One file that rotates, in the user's state folder, written by every ``hil`` there is: each line carries the process. It
+is for people who help; nothing of this program reads it but ``hil bugreport``.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import platform
+import shlex
+import sys
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from logging.handlers import RotatingFileHandler
+from typing import Final
+
+from hil import __version__
+from hil.errors import UsageError
+from hil.support.folders import log_file
+
+LEVELS: Final = ("debug", "info", "warning", "error", "off")
+"""From everything, each frame on the bus included, to nothing."""
+
+DEFAULT: Final = "info"
+VARIABLE: Final = "HIL_LOG"
+
+BYTES: Final = 1_000_000
+"""A log is rotated here; an ordinary command writes about 300 bytes."""
+
+KEPT: Final = 4
+"""Older logs beside the newest."""
+
+LOGGER: Final = logging.getLogger("hil")
+
+OURS: Final = ("hil", "drivers", "estimator")
+"""Loggers at the level asked for. Those of libraries, which tell every SDO at info, are at warning, but for debug."""
+
+OTHERS: Final = ("", "numba")
+
+
+def level_of(given: str | None) -> str:
+    """Return the level: what was given, else what the environment says, else the default.
+
+    Raises
+    ------
+    UsageError
+        If it is none of the levels.
+    """
+    source, level = ("--log-level", given) if given is not None else (VARIABLE, os.environ.get(VARIABLE) or DEFAULT)
+    if level.lower() not in LEVELS:
+        raise UsageError(f"{source}: expected one of {', '.join(LEVELS)}, came {level!r}")
+    return level.lower()
+
+
+@contextmanager
+def logged(command: str, arguments: Sequence[str], level: str) -> Iterator[None]:
+    """Keep the log while a command runs; whatever it raises is logged and goes on its way."""
+    handler = None if level == "off" else _opened(level)
+    if handler is None:
+        yield
+        return
+    before = {name: logging.getLogger(name).level for name in (*OURS, *OTHERS)}
+    logging.getLogger().addHandler(handler)
+    _set_levels({**dict.fromkeys(OURS, level.upper()), **_other_levels(level)})
+    started_s = time.monotonic()
+    try:
+        _begin(command, arguments)
+        yield
+    except KeyboardInterrupt:
+        LOGGER.info("interrupted after %.3f s", time.monotonic() - started_s)
+        raise
+    except BaseException as error:
+        LOGGER.error("ended by %s after %.3f s", type(error).__name__, time.monotonic() - started_s, exc_info=error)
+        raise
+    else:
+        LOGGER.info("ended after %.3f s", time.monotonic() - started_s)
+    finally:
+        _set_levels(before)
+        logging.getLogger().removeHandler(handler)
+        handler.close()
+
+
+def _set_levels(levels: Mapping[str, str | int]) -> None:
+    for name, level in levels.items():
+        logging.getLogger(name).setLevel(level)
+
+
+def _other_levels(level: str) -> dict[str, str]:
+    """Return the level of the root, which the libraries have, and of one that would tell every step it takes."""
+    return {"": "DEBUG" if level == "debug" else "ERROR" if level == "error" else "WARNING", "numba": "INFO"}
+
+
+def _begin(command: str, arguments: Sequence[str]) -> None:
+    LOGGER.info("hil %s", shlex.join((command, *arguments)))
+    LOGGER.info("version %s, Python %s, %s", __version__, platform.python_version(), platform.platform())
+
+
+def _opened(level: str) -> logging.Handler | None:
+    """Return the handler of the log; None, and a note, where none can be kept: no command fails for want of a log."""
+    path = log_file()
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handler = RotatingFileHandler(path, maxBytes=BYTES, backupCount=KEPT, encoding="utf-8")
+    except OSError as error:
+        sys.stderr.write(f"note: no log is kept, {path}: {error.strerror}. Set {VARIABLE}=off to go without.\n")
+        return None
+    handler.setLevel(level.upper())
+    form = logging.Formatter("%(asctime)s.%(msecs)03dZ %(process)d %(levelname)s %(name)s: %(message)s", "%FT%T")
+    form.converter = time.gmtime
+    handler.setFormatter(form)
+    return handler

@@ -1,0 +1,115 @@
+"""Takes out of a text what is nobody else's business: secrets, and where on a disk things are.
+
+Taken out are, in this order: PEM blocks; values of keys and options whose name says secret (password, token, key, ca,
+certificate, ...); user and password in a URL; the folders of absolute paths (the file's name stays, and so do paths
+inside this program); names of the user and of the machine. What it takes out it marks, so that a reader sees that
+something was there. Too much is better than too little: a value after ``key`` goes even where it was harmless.
+"""
+
+from __future__ import annotations
+
+import getpass
+import platform
+import re
+import sys
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+from hil.support.private_patterns import ASSIGNED, OPTION, PATH, PEM, QUOTED_PATH, SECRET_NAME, URL_USER
+
+REMOVED: Final = "[removed]"
+FOLDER: Final = "[folder]"
+
+PACKAGES: Final = Path(__file__).resolve().parents[2]
+"""Where the packages of this program are."""
+
+COMMON_NAMES: Final = frozenset({"root", "user", "users", "home", "admin", "localhost", "default", "hil", "test"})
+"""Names that tell nothing of anyone, and are words of other things."""
+
+
+@dataclass(slots=True)
+class Redaction:
+    """Takes out, and counts what it took out.
+
+    Attributes
+    ----------
+    places
+        Folder whose paths are kept, and what stands for it; the innermost first.
+    names
+        Names to take out, and what stands for each.
+    counts
+        How often each kind was taken out.
+    """
+
+    places: Mapping[str, str] = field(default_factory=lambda: dict(_places()))
+    names: Mapping[str, str] = field(default_factory=lambda: dict(_names()))
+    counts: Counter[str] = field(default_factory=Counter)
+
+    def text(self, text: str) -> str:
+        """Return a text without what is private."""
+        text = self._sub("PEM blocks", PEM, lambda _: REMOVED, text)
+        for pattern in (ASSIGNED, OPTION):
+            text = self._sub("secret values", pattern, lambda match: f'{match["name"]}"{REMOVED}"', text)
+        text = self._sub("users in URLs", URL_USER, lambda _: f"{REMOVED}@", text)
+        text = self._sub("folders", QUOTED_PATH, self._quoted, text)
+        text = self._sub("folders", PATH, lambda match: self._path(match[0]), text)
+        return self._without_names(text)
+
+    def document(self, value: Any, name: str = "") -> Any:
+        """Return a JSON document the same way: each of its texts, and whatever stands under a secret name."""
+        if isinstance(value, Mapping):
+            return {self.text(str(key)): self.document(part, str(key)) for key, part in value.items()}
+        if isinstance(value, (list, tuple)):
+            return [self.document(part, name) for part in value]
+        if SECRET_NAME.fullmatch(name):
+            self.counts["secret values"] += 1
+            return REMOVED
+        return self.text(value) if isinstance(value, str) else value
+
+    def _without_names(self, text: str) -> str:
+        for name, mark in self.names.items():
+            found = re.compile(rf"(?<!\w){re.escape(name)}(?!\w)")
+            self.counts["names"] += len(found.findall(text))
+            text = found.sub(mark, text)
+        return text
+
+    def _sub(self, kind: str, pattern: re.Pattern[str], by: Callable[[re.Match[str]], str], text: str) -> str:
+        def counted(match: re.Match[str]) -> str:
+            new = by(match)
+            self.counts[kind] += new != match[0]
+            return new
+
+        return pattern.sub(counted, text)
+
+    def _quoted(self, match: re.Match[str]) -> str:
+        return f"{match['quote']}{self._path(match['path'])}{match['quote']}"
+
+    def _path(self, path: str) -> str:
+        for place, mark in self.places.items():
+            if path == place or path.startswith((f"{place}/", f"{place}\\")):
+                return mark + path[len(place) :]
+        parts = path.replace("\\", "/").rstrip("/")
+        return f"{FOLDER}/{parts.rpartition('/')[2]}"
+
+
+def _places() -> Iterator[tuple[str, str]]:
+    found = {str(PACKAGES / name): f"<{name}>" for name in ("hil", "drivers", "estimator")}
+    found |= {str(Path(prefix)): "<python>" for prefix in (sys.prefix, sys.base_prefix) if len(Path(prefix).parts) > 1}
+    yield from sorted(found.items(), key=lambda item: -len(item[0]))
+
+
+def _names() -> Iterator[tuple[str, str]]:
+    for name, mark in ((_user(), "[user]"), (Path.home().name, "[user]"), (platform.node(), "[host]")):
+        if len(name) > 2 and name.lower() not in COMMON_NAMES:
+            yield name, mark
+
+
+def _user() -> str:
+    """Return the user's name; empty for a process that has none in the password file."""
+    try:
+        return getpass.getuser()
+    except (OSError, KeyError):
+        return ""

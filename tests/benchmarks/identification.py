@@ -1,0 +1,248 @@
+"""``python -m tests.benchmarks.identification``: how right the identified models are, over many simulated runs.
+
+``accuracy``  eight cruises, as many as the paper has: resonance and damping on line (N = 1024, Ts = 20 ms) and off line
+              against the truth; frequency responses against each other around the resonance
+``coverage``  how often the 95 % intervals of the off-line model hold the truth: resonance, damping, physical parameters
+``truth``     the same on the independent truth simulator: every run another bus, other inverters, another road
+
+Rates are told with their own 95 % confidence interval (E. B. Wilson, J. American Statistical Association 22, 1927).
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from scipy.stats import binomtest
+
+from estimator.identification.identify import identify
+from estimator.identification.linear_model import LinearModel, Orders
+from estimator.identification.modes.modes import Mode, two_mass_resonance
+from estimator.identification.modes.physical import physical_parameters
+from estimator.identification.modes.propagate import Uncertain
+from estimator.identification.modes.uncertainty import uncertain_resonance
+from estimator.identification.offline.box_jenkins import fit_box_jenkins
+from estimator.identification.spectral.estimate import SpectralEstimate
+from estimator.identification.spectral.local_polynomial import local_polynomial
+from estimator.signals.decimate import decimate
+from estimator.signals.record import Record
+from hil.proof.truth.bus import NOMINAL_ERROR
+from hil.proof.truth.case import record as drive
+from hil.proof.truth.specimen import draw_specimen
+from tests.benchmarks.ratios import table
+from tests.estimator.identification import driveline
+from tests.estimator.identification.driveline import cruise
+
+RUNS, EXPERIMENTS = 200, 8
+
+FIRST_SEED = 10_000
+"""Far from the seeds of the tests, on which settings were chosen."""
+
+RESONANCE_LIMIT, DAMPING_LIMIT, RESPONSE_LIMIT_DB = 0.02, 0.15, 1.0
+COVERAGE_LIMITS = (0.90, 0.98)
+
+TWO_MASS = Orders(3, 3, 1)
+
+AROUND = (0.75, 1.33)
+"""The band around the resonance, in parts of its frequency."""
+
+COHERENT = 0.9
+
+
+@dataclass(frozen=True, slots=True)
+class Truth:
+    """A recording and what it was made of; ``parameters`` holds J_M, J_L, k and c + b_M."""
+
+    record: Record
+    mode: Mode
+    parameters: Mapping[str, float]
+
+
+def _parameters(J_M: float, J_L: float, k: float, c: float, b_M: float) -> dict[str, float]:
+    return {"J_M": J_M, "J_L": J_L, "k": k, "c + b_M": c + b_M}
+
+
+def cruises(runs: int) -> Iterator[Truth]:
+    """Yield cruises of the tests' driveline, 22 s each."""
+    values = _parameters(driveline.J_M, driveline.J_L, driveline.K, driveline.C, driveline.B_M)
+    for seed in range(FIRST_SEED, FIRST_SEED + runs):
+        one = cruise(seed)
+        yield Truth(one.record, Mode(one.resonance_hz, one.damping), values)
+
+
+def buses(runs: int) -> Iterator[Truth]:
+    """Yield cruises of the truth simulator, 30 s each, nothing hidden; no two of one bus."""
+    for seed in range(FIRST_SEED, FIRST_SEED + runs):
+        specimen = draw_specimen("none", seed, NOMINAL_ERROR)
+        driven, bus = drive(specimen, 0), specimen.bus
+        mode = two_mass_resonance(bus.J_M, bus.J_L, bus.k, bus.c, bus.b_M, bus.b_L)
+        if mode is None:
+            raise ValueError(f"bus {seed} does not oscillate; expected one that does")
+        torque_nm = np.column_stack([driven.torque_m1_nm, driven.torque_m2_nm])
+        okay = np.isfinite(driven.speed_rad_s)
+        record = Record(f"bus_{seed}", 0.01, driven.time_s, torque_nm, driven.speed_rad_s, okay)
+        yield Truth(record, mode, _parameters(bus.J_M, bus.J_L, bus.k, bus.c, bus.b_M))
+
+
+def estimates(truth: Truth) -> dict[str, tuple[Uncertain, float]]:
+    """Return each estimate of the off-line model beside its true value, by name."""
+    fit = fit_box_jenkins(decimate(truth.record, 1), TWO_MASS)
+    mode = uncertain_resonance(fit.model, fit.covariance)
+    if mode is None:
+        nowhere = Uncertain(float("nan"), float("nan"))
+        return {"resonance": (nowhere, truth.mode.frequency_hz), "damping": (nowhere, truth.mode.damping)}
+    found = physical_parameters(fit.model, fit.covariance)
+    both = {**found.parameters, **found.sums}
+    return {
+        "resonance": (mode.frequency_hz, truth.mode.frequency_hz),
+        "damping": (mode.damping, truth.mode.damping),
+        **{name: (both[name].estimate, value) for name, value in truth.parameters.items()},
+    }
+
+
+@dataclass(frozen=True, slots=True)
+class Rate:
+    """How often something held, and how well that is known."""
+
+    held: int
+    runs: int
+
+    @property
+    def value(self) -> float:
+        """Share."""
+        return self.held / self.runs
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 % confidence, Wilson's."""
+        ends = binomtest(self.held, self.runs).proportion_ci(method="wilson")
+        return float(ends.low), float(ends.high)
+
+    @property
+    def text(self) -> str:
+        """As a table shows it."""
+        low, high = self.interval
+        return f"{100 * self.value:.1f} % ({100 * low:.1f} to {100 * high:.1f})"
+
+
+def coverage(truths: Iterator[Truth]) -> dict[str, tuple[Rate, float, float]]:
+    """Return for each estimate how often its interval held the truth, its RMS error and its median stated deviation."""
+    found = [estimates(truth) for truth in truths]
+    rates = {}
+    for name in found[0]:
+        pairs = [one[name] for one in found if name in one]
+        held = sum(estimate.covers(value) for estimate, value in pairs)
+        error = np.sqrt(np.nanmean([(estimate.value / value - 1.0) ** 2 for estimate, value in pairs]))
+        said = np.nanmedian([estimate.std / value for estimate, value in pairs])
+        rates[name] = (Rate(held, len(found)), float(error), float(said))
+    return rates
+
+
+def coverage_table(runs: int, source: Callable[[int], Iterator[Truth]]) -> str:
+    """Tell how often the intervals hold the truth."""
+    low, high = COVERAGE_LIMITS
+    rows = [
+        (name, rate.text, f"{100 * error:.3g} %", f"{100 * said:.3g} %")
+        for name, (rate, error, said) in coverage(source(runs)).items()
+    ]
+    columns = (f"of {runs} runs", f"held the truth, {low:.0%} to {high:.0%}", "RMS error", "stated std, median")
+    return table(columns, rows)
+
+
+def worst_db(model: LinearModel, other: SpectralEstimate, mode: Mode) -> float:
+    """Return the largest difference of magnitude [dB] around a resonance where the coherence is high."""
+    low, high = (part * mode.frequency_hz for part in AROUND)
+    band = (other.frequency_hz > low) & (other.frequency_hz < high) & (other.coherence > COHERENT)
+    ratio = np.abs(model.response(other.frequency_hz[band])) / np.abs(other.response[band])
+    return float(np.abs(20.0 * np.log10(ratio)).max()) if band.any() else float("nan")
+
+
+@dataclass(frozen=True, slots=True)
+class Experiment:
+    """Relative errors of one run, on line and off line, and the responses against each other [dB]."""
+
+    name: str
+    online: tuple[float, float]
+    offline: tuple[float, float]
+    response_db: float
+
+    @property
+    def is_good(self) -> bool:
+        """Tell whether the on-line estimate and the responses are within the limits."""
+        resonance, damping = (abs(error) for error in self.online)
+        return resonance < RESONANCE_LIMIT and damping < DAMPING_LIMIT and self.response_db < RESPONSE_LIMIT_DB
+
+
+def experiment(truth: Truth) -> Experiment:
+    """Identify one run as the paper does, and off line."""
+    result = identify(truth.record)
+    offline = fit_box_jenkins(decimate(truth.record, 1), TWO_MASS)
+    mode = uncertain_resonance(offline.model, offline.covariance)
+    return Experiment(
+        truth.record.name,
+        _errors(result.online_resonance, truth.mode),
+        _errors(None if mode is None else mode.mode, truth.mode),
+        worst_db(result.online, local_polynomial(result.data), truth.mode),
+    )
+
+
+def _errors(mode: Mode | None, truth: Mode) -> tuple[float, float]:
+    if mode is None:
+        return float("inf"), float("inf")
+    return mode.frequency_hz / truth.frequency_hz - 1.0, mode.damping / truth.damping - 1.0
+
+
+def accuracy(source: Callable[[int], Iterator[Truth]] = cruises) -> str:
+    """Tell the errors of eight experiments."""
+    rows = []
+    for truth in source(EXPERIMENTS):
+        one = experiment(truth)
+        errors = [f"{100 * error:+.2f} %" for error in (*one.online, *one.offline)]
+        rows.append(
+            (f"{truth.mode.frequency_hz:.2f} Hz", *errors, f"{one.response_db:.2f} dB", "yes" if one.is_good else "no")
+        )
+    columns = (
+        "truth",
+        f"on line: resonance, at most {RESONANCE_LIMIT:.0%}",
+        f"damping, at most {DAMPING_LIMIT:.0%}",
+        "off line: resonance",
+        "damping",
+        f"responses apart, at most {RESPONSE_LIMIT_DB:g} dB",
+        "kept",
+    )
+    return table(columns, rows)
+
+
+def truth_part(runs: int) -> str:
+    """Both comparisons on the truth simulator's buses."""
+    return f"{accuracy(buses)}\n{coverage_table(runs, buses)}"
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Simulate, identify and write the report; return the exit status."""
+    parts: dict[str, Callable[[int], str]] = {
+        "accuracy": lambda _: accuracy(),
+        "coverage": partial(coverage_table, source=cruises),
+        "truth": truth_part,
+    }
+    parser = argparse.ArgumentParser(
+        prog="python -m tests.benchmarks.identification", description="How right the identified models are."
+    )
+    parser.add_argument("parts", nargs="*", metavar="PART", help=f"{', '.join(parts)} (default: all)")
+    parser.add_argument("--runs", type=int, default=RUNS, help="runs of each rate (default: %(default)s)")
+    options = parser.parse_args(arguments)
+    unknown = [name for name in options.parts if name not in parts]
+    if unknown:
+        parser.error(f"expected {', '.join(parts)}, came {', '.join(unknown)}")
+    for name in options.parts or parts:
+        sys.stdout.write(f"\n### {name.capitalize()}\n\n{parts[name](options.runs)}")
+        sys.stdout.flush()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

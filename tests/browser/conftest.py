@@ -1,0 +1,69 @@
+"""Reports in a real browser: the system's chromium, headless, driven by playwright."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+CHROMIUM = next(
+    (path for name in ("chromium", "chromium-browser", "google-chrome") if (path := shutil.which(name))), ""
+)
+
+DRAWN = "[...document.querySelectorAll('.plotly-graph-div')].every((each) => each.querySelector('svg.main-svg'))"
+"""True once every figure is there."""
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Any]:
+    """Start the browser once; a machine without one can't judge pages."""
+    if not CHROMIUM:
+        pytest.skip("no chromium on this machine: pages can't be opened. Install one (Debian: apt install chromium).")
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        yield browser
+        browser.close()
+
+
+class Opened:
+    """A page that was opened, and everything it complained of or fetched."""
+
+    def __init__(self, page: Any) -> None:
+        self.page = page
+        self.complaints: list[str] = []
+        page.on("pageerror", lambda error: self.complaints.append(f"script: {error}"))
+        page.on("console", self._hear)
+        page.on("request", self._watch)
+
+    def _hear(self, message: Any) -> None:
+        if message.type in ("error", "warning"):
+            self.complaints.append(f"console: {message.text}")
+
+    def _watch(self, request: Any) -> None:
+        if not request.url.startswith(("file:", "data:", "blob:")):
+            self.complaints.append(f"fetched: {request.url}")
+
+    def wait_until_drawn(self) -> None:
+        self.page.wait_for_function(DRAWN, timeout=60_000)
+
+
+@pytest.fixture
+def opened(browser: Any) -> Iterator[Callable[..., Opened]]:
+    """Open a file at a width, without any network."""
+    contexts = []
+
+    def open_page(path: Path, width: int = 1600, height: int = 1000) -> Opened:
+        context = browser.new_context(viewport={"width": width, "height": height}, offline=True)
+        contexts.append(context)
+        opened = Opened(context.new_page())
+        opened.page.goto(path.resolve().as_uri())
+        return opened
+
+    yield open_page
+    for context in contexts:
+        context.close()

@@ -1,0 +1,172 @@
+"""Each report opens offline without a complaint, is readable at any width, by keys alone, and on paper."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from estimator.identification.compare import compare
+from estimator.identification.identify import Settings, identify
+from estimator.identification.online.registry import ESTIMATORS
+from estimator.identification.study import study
+from hil.figures.line import TwoMassLine
+from hil.figures.local_model import LocalModel, Reference
+from hil.figures.numbers import row_of
+from hil.figures.road.conditions import draw_conditions
+from hil.report.diagnosis_html import diagnosis_page
+from hil.report.identification.page import identification_page
+from hil.report.identification.paper_page import paper_page
+from tests.estimator.identification.driveline import B_L, B_M, J_L, J_M, C, K, cruise
+from tests.report.conftest import diagnosis as hand_made_diagnosis
+
+PHONE, DESK = 360, 1600
+A4_HEIGHT_PX = 96 * 297 / 25.4
+
+Open = Callable[..., Any]
+
+
+def identification() -> str:
+    settings, record = Settings(), cruise(1, name="run_1").record
+    found = identify(record, settings)
+    model = LocalModel(record, found, Reference("truth", TwoMassLine(J_M, J_L, K, C, B_M, B_L)))
+    compared = [compare(record, found, settings, "rls", ESTIMATORS["rls"])]
+    return identification_page([model], [study(record, found, settings)], None, compared)
+
+
+def paper() -> str:
+    line = TwoMassLine(J_M, J_L, K, C, B_M, B_L)
+    records = [cruise(seed, name=f"run_{seed}").record for seed in (1, 2)]
+    models = [LocalModel(record, identify(record), Reference("truth", line)) for record in records]
+    return paper_page(models, [row_of(model) for model in models], draw_conditions(1, len(models)))
+
+
+PAGES: dict[str, Callable[[], str]] = {
+    "identification": identification,
+    "paper": paper,
+    "diagnosis": lambda: diagnosis_page(hand_made_diagnosis.__wrapped__()),
+}
+
+
+@pytest.fixture(scope="module", params=PAGES)
+def report(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("pages") / f"{request.param}.html"
+    path.write_text(PAGES[request.param](), encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("width", [PHONE, DESK])
+def test_it_opens_offline_without_a_complaint_and_fits_its_width(opened: Open, report: Path, width: int) -> None:
+    opened = opened(report, width)
+    opened.wait_until_drawn()
+    assert opened.complaints == []
+    assert opened.page.evaluate("document.documentElement.scrollWidth") <= width
+    too_wide = opened.page.evaluate(
+        """() => [...document.querySelectorAll('.plotly-graph-div svg.main-svg, p, h1, h2, .tiles')]
+                 .filter((each) => each.getBoundingClientRect().right > innerWidth + 1)
+                 .map((each) => each.outerHTML.slice(0, 80))"""
+    )
+    assert too_wide == []
+
+
+def test_it_can_be_read_with_a_keyboard_alone(opened: Open, report: Path) -> None:
+    opened = opened(report, PHONE)
+    opened.wait_until_drawn()
+    page = opened.page
+    page.keyboard.press("Tab")
+    assert page.evaluate("document.activeElement.className") == "skip"
+    assert page.evaluate("document.activeElement.getBoundingClientRect().left") >= 0  # it shows where it has the focus
+    page.keyboard.press("Enter")
+    assert page.evaluate("document.activeElement.id") == "main"
+    seen = set()
+    for _ in range(400):
+        page.keyboard.press("Tab")
+        name = page.evaluate("document.activeElement.className.baseVal ?? document.activeElement.className")
+        kind = page.evaluate("document.activeElement.tagName")
+        if kind == "BODY":
+            break
+        seen.add(str(name).split(" ")[0])
+    else:
+        pytest.fail("the focus never left the page: it is trapped")
+    assert {"plotly-graph-div", "modebar-btn", "wide"} <= seen
+
+
+def test_the_sections_are_reached_by_their_links(opened: Open, report: Path) -> None:
+    page = opened(report).page
+    links = page.locator("nav a")
+    assert links.count() >= 3
+    last = links.nth(links.count() - 1)
+    target = last.get_attribute("href")
+    last.focus()
+    page.keyboard.press("Enter")
+    assert page.evaluate(f"document.querySelector('{target}').getBoundingClientRect().top") < 1000
+    addresses = page.eval_on_selector_all("[id]", "all => all.map((each) => each.id)")
+    assert len(addresses) == len(set(addresses))
+
+
+def test_a_figure_takes_keys(opened: Open, report: Path) -> None:
+    opened = opened(report)
+    opened.wait_until_drawn()
+    page = opened.page
+    first = page.locator(".plotly-graph-div").first
+    first.focus()
+    span = "() => { const d = document.activeElement; return d._fullLayout.xaxis.range.map(Number); }"
+    low, high = page.evaluate(span)
+    page.keyboard.press("+")
+    page.wait_for_function(f"({span})()[1] - ({span})()[0] < {0.9 * (high - low)}")
+    page.keyboard.press("0")
+    page.wait_for_function(f"({span})()[1] - ({span})()[0] > {0.9 * (high - low)}")
+    visible = "document.activeElement.data.filter((each) => each.visible !== 'legendonly').length"
+    before = page.evaluate(visible)
+    page.keyboard.press("1")
+    page.wait_for_function(f"{visible} !== {before}")
+    page.keyboard.press("1")
+    page.wait_for_function(f"{visible} === {before}")
+    assert opened.complaints == []
+
+
+def test_on_paper_nothing_is_cut_off_and_the_screen_comes_back(opened: Open, report: Path) -> None:
+    opened = opened(report)
+    opened.wait_until_drawn()
+    page = opened.page
+    widths = "[...document.querySelectorAll('.plotly-graph-div')].map((each) => each._fullLayout.width)"
+    before = page.evaluate(widths)
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    paper_width_px = 96 * (210 - 2 * 12) / 25.4  # A4 less the margins of the style sheet
+    page.wait_for_function(f"{widths}.every((each) => each <= {paper_width_px})")
+    page.evaluate("dispatchEvent(new Event('afterprint'))")
+    page.wait_for_function(f"JSON.stringify({widths}) === '{before}'.replaceAll(' ', '')")
+    printed = page.pdf(format="A4")
+    pages = max(int(count) for count in re.findall(rb"/Count (\d+)", printed))
+    height_px = page.evaluate("document.documentElement.scrollHeight")
+    assert 1 <= pages <= 2 + height_px / (0.5 * A4_HEIGHT_PX)  # pages are half full at least
+    assert opened.complaints == []
+
+
+def test_text_stands_out_from_its_ground(opened: Open, report: Path) -> None:
+    page = opened(report).page
+    weak = page.evaluate(
+        """() => {
+          const lum = (c) => c.map((v) => v / 255).map((v) => v <= 0.03928 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4)
+                              .reduce((sum, v, i) => sum + v * [0.2126, 0.7152, 0.0722][i], 0);
+          const rgb = (text) => text.match(/[\\d.]+/g).map(Number);
+          const ground = (node) => {
+            for (let at = node; at; at = at.parentElement) {
+              const c = rgb(getComputedStyle(at).backgroundColor);
+              if (c.length === 3 || c[3] > 0) return c.slice(0, 3);
+            }
+            return [255, 255, 255];
+          };
+          return [...document.querySelectorAll('main p, main td, main th, main h1, main h2, .badge, nav a, .tile span')]
+            .filter((node) => node.textContent.trim())
+            .map((node) => {
+              const [a, b] = [lum(rgb(getComputedStyle(node).color).slice(0, 3)), lum(ground(node))];
+              return [(Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05), node.textContent.slice(0, 40)];
+            })
+            .filter(([ratio]) => ratio < 4.5);
+        }"""
+    )
+    assert weak == []  # WCAG 2.1, success criterion 1.4.3

@@ -1,0 +1,172 @@
+"""``hil bugreport``: what is in it, and what must never be."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hil.cli.main import run
+from hil.store import RunEntry, RunStore
+from hil.support.redact import Redaction
+
+EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "rig.toml"
+
+SECRETS = {
+    'password = "hunter2"': "hunter2",
+    "passphrase='correct horse'": "correct horse",
+    'key = "/home/anna/keys/host.key"': "host.key",
+    'security = { ca = "/etc/plc/ca.pem", certificate = "anna.pem", key = "anna.key" }': "anna",
+    '"api_key": "abc123"': "abc123",
+    'token = """line one\nline two"""': "line two",
+    "-----BEGIN PRIVATE KEY-----\nMIIE\n-----END PRIVATE KEY-----": "MIIE",
+    "-----BEGIN CERTIFICATE-----\nMIIC": "MIIC",
+    'url = "wss://anna:hunter2@plc.example/"': "hunter2",
+    'url = "wss://anna:hun@ter2@plc.example/"': "ter2",
+    "ws://127.0.0.1:1/?token=abc123&x=1": "abc123",
+    "hil prove make proof --key-file /mnt/vault/proof.key": "vault",
+    "hil x --password hunter2": "hunter2",
+    "hil x --password=hunter2": "hunter2",
+    "hil run '/data/the customer/rig.toml' cruise": "customer",
+    "hil run /data/customer/rig.toml cruise": "customer",
+    "came: /home/anna/customer/cruise.csv: line 3": "customer",
+    r"C:\Users\anna\customer\rig.toml": "customer",
+    r'"C:\Users\the customer\rig.toml"': "customer",
+    "user anna on annas-laptop": "anna",
+}
+
+HARMLESS = (
+    "speed_rad_s = 60.0   # rad/s, Nm/rad, kg m^2/s",
+    'url = "ws://127.0.0.1:54701/"',
+    'url = "socketcan:can0"',
+    "object 0x1018:1 or 0x6076",
+    'mode = "cyclic_synchronous_torque"  # or "profile_torque"',
+    "keyboard = 3, monkeys = 4, cable = 5",
+    "see docs/formats.md",
+    "host = 192.168.0.10, port = 502",
+)
+
+
+def redaction() -> Redaction:
+    return Redaction(places={"/opt/hil": "<hil>"}, names={"anna": "[user]", "annas-laptop": "[host]"})
+
+
+@pytest.mark.parametrize(("text", "secret"), SECRETS.items())
+def test_what_is_private_is_taken_out_and_counted(text: str, secret: str) -> None:
+    found = redaction()
+    assert secret not in found.text(f"before\n{text}\nafter")
+    assert sum(found.counts.values()) >= 1
+
+
+@pytest.mark.parametrize("text", HARMLESS)
+def test_what_helps_stays(text: str) -> None:
+    found = redaction()
+    assert found.text(text) == text
+    assert sum(found.counts.values()) == 0
+
+
+def test_paths_of_the_program_stay_and_names_of_files() -> None:
+    found = redaction()
+    assert found.text('File "/opt/hil/cli/main.py", line 3') == 'File "<hil>/cli/main.py", line 3'
+    assert found.text("read /data/customer/rig.toml") == "read [folder]/rig.toml"
+    assert found.text("/opt/hillside/a.csv") == "[folder]/a.csv"
+
+
+def test_secrets_in_a_document_go_at_any_depth() -> None:
+    document = {
+        "plc": {"security": {"key": "k1", "roles": ["a"]}},
+        "rig_text": 'password = "p1"',
+        "n": 3,
+        "token": [1, 2],
+    }
+    text = json.dumps(redaction().document(document))
+    assert json.loads(text)["n"] == 3
+    assert not [secret for secret in ("k1", "p1") if secret in text]
+    assert json.loads(text)["token"] == ["[removed]", "[removed]"]
+
+
+PRINTABLE = st.text(st.characters(min_codepoint=33, max_codepoint=126, exclude_characters="\"'\\#"), min_size=6)
+
+
+@given(secret=PRINTABLE, before=PRINTABLE, name=st.sampled_from(["password", "key", "plc_token", "certificate", "ca"]))
+def test_a_secret_in_quotes_is_taken_out_whatever_it_is(secret: str, before: str, name: str) -> None:
+    text = redaction().text(f'{before}\n{name} = "{secret}" # comment\n')
+    assert secret not in text.removeprefix(before).replace("[removed]", "")
+
+
+def contents(path: Path) -> dict[str, str]:
+    with zipfile.ZipFile(path) as archive:
+        assert archive.testzip() is None
+        return {name: archive.read(name).decode() for name in archive.namelist()}
+
+
+@pytest.fixture
+def state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    monkeypatch.setenv("HIL_LOG", "info")
+    return tmp_path / "state"
+
+
+def test_everything_is_in_it_and_listed(state: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["effects", "backlash"], keep_log=True) == 0
+    rig = tmp_path / "customer" / "rig.toml"
+    rig.parent.mkdir()
+    text = EXAMPLE.read_text(encoding="utf-8").replace("# [plc.security]", '[plc.security]\nkey = "/home/anna/x.key"')
+    rig.write_text(text, encoding="utf-8")
+    capsys.readouterr()
+    assert run(["bugreport", str(tmp_path / "report.zip"), "--rig", str(rig), "--runs", str(tmp_path)]) == 0
+    printed = capsys.readouterr().out
+    found = contents(tmp_path / "report.zip")
+    assert set(found) == {"about.txt", "versions.json", "rig/rig.toml", "log/hil.log"}
+    assert all(name in printed for name in found)
+    assert "not in it: last run" in printed
+    assert "[experiments.cruise]" in found["rig/rig.toml"]
+    assert "x.key" not in found["rig/rig.toml"]
+    assert "hil effects backlash" in found["log/hil.log"]
+    versions = json.loads(found["versions.json"])
+    assert {"canopen", "numpy", "pymodbus"} <= set(versions["packages"])
+
+
+def test_the_last_run_is_told_without_notes_and_secrets(state: Path, tmp_path: Path) -> None:
+    for number, name in enumerate(("first", "last")):
+        recording = tmp_path / f"{name}.csv"
+        recording.write_text("time_s\n0.0\n", encoding="utf-8")
+        entry = RunEntry(
+            recording=recording,
+            experiment=name,
+            started_utc=f"2026-11-2{number}T08:00:00+00:00",
+            rig_text='name = "cell 2"\npassword = "hunter2"\n',
+        )
+        with RunStore(tmp_path) as store:
+            store.note(store.add_run(entry), "the driver was tired")
+    assert run(["bugreport", str(tmp_path / "report.zip"), "--runs", str(tmp_path)]) == 0
+    text = contents(tmp_path / "report.zip")["last_run.json"]
+    assert json.loads(text)["experiment"] == "last"
+    assert "cell 2" in text
+    assert not [private for private in ("hunter2", "tired", str(tmp_path)) if private in text]
+
+
+def test_a_rig_file_that_can_not_be_read_by_the_program_is_in_it(state: Path, tmp_path: Path) -> None:
+    rig = tmp_path / "rig.toml"
+    rig.write_bytes(b'schema = "hil.rig/1"\nname = broken \xff\npassword = "hunter2"\n')
+    assert run(["bugreport", str(tmp_path / "report.zip"), "--rig", str(rig)]) == 0
+    text = contents(tmp_path / "report.zip")["rig/rig.toml"]
+    assert "name = broken" in text
+    assert "hunter2" not in text
+
+
+def test_it_never_replaces_a_file_and_names_what_is_missing(
+    state: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "report.zip"
+    out.write_text("something else", encoding="utf-8")
+    assert run(["bugreport", str(out)]) == 2
+    assert "expected a new file" in capsys.readouterr().err
+    assert out.read_text(encoding="utf-8") == "something else"
+    assert run(["bugreport", str(tmp_path / "b.zip"), "--rig", str(tmp_path / "none.toml")]) == 2
+    assert "none.toml" in capsys.readouterr().err
+    assert not (tmp_path / "b.zip").exists()

@@ -1,0 +1,80 @@
+"""What every command has: --quiet, --log-level, the overview; before the command or after it."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+from hil.cli.call import SPEAKERS, Call
+from hil.cli.main import COMMANDS, run
+from hil.cli.overview import overview
+from hil.errors import UsageError
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "--quiet --log-level debug run rig.toml cruise",
+        "run --quiet rig.toml --log-level debug cruise",
+        "run rig.toml cruise --log-level=debug --quiet",
+    ],
+)
+def test_common_options_stand_anywhere(line: str) -> None:
+    assert Call.parse(line.split(), COMMANDS) == Call("run", ("rig.toml", "cruise"), True, "debug")
+
+
+def test_after_two_dashes_nothing_is_an_option() -> None:
+    assert Call.parse(["effects", "--", "--quiet"], COMMANDS) == Call("effects", ("--", "--quiet"))
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("--log-level", "requires an argument"),
+        ("effects --log-level", "requires an argument"),
+        ("effect", "Did you mean 'effects'"),
+        ("-q effects", "No such option: -q"),
+    ],
+)
+def test_wrong_use_is_refused(line: str, said: str) -> None:
+    with pytest.raises(UsageError, match=said):
+        Call.parse(line.split(), COMMANDS)
+
+
+def test_quiet_prints_nothing_but_what_json_prints(capsys: pytest.CaptureFixture[str], tmp_path: object) -> None:
+    assert run(["export", "st", "--adaptive", "--out", f"{tmp_path}/a.st", "--quiet"]) == 0
+    assert capsys.readouterr() == ("", "")
+    assert Call("diagnose", ("--json",), quiet=True).silent is False
+    assert Call("diagnose", (), quiet=True).silent is True
+
+
+def test_errors_are_told_all_the_same(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["--quiet", "identify", "nowhere.csv", "--out", "out"]) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert "nowhere.csv" in printed.err
+
+
+def test_what_a_command_is_called_for_is_not_silenced(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["--quiet", "effects"]) == 0
+    assert "backlash" in capsys.readouterr().out
+    assert set(COMMANDS) >= SPEAKERS
+
+
+@pytest.mark.parametrize("columns", [40, 80, 200])
+def test_the_overview_fits_the_terminal(columns: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", str(columns))
+    text = overview(COMMANDS)
+    assert max(map(len, text.splitlines())) <= columns
+    assert all(f"  {name} " in text for name in COMMANDS)
+
+
+def test_the_overview_imports_nothing_that_takes_time() -> None:
+    program = (
+        "import sys; from hil.cli.main import run; run(['--help']); "
+        "print(sorted({'typer', 'rich', 'numpy', 'pydantic', 'logging', 'can'} & set(sys.modules)), file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stderr.strip() == "[]"

@@ -1,0 +1,40 @@
+"""Every command, those of groups included, shows in its help an example that the program would take."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from hil.cli.main import run
+from tests.cli.command_lines import every_command, examples, parse
+
+EVERY = list(every_command())
+
+
+@pytest.mark.parametrize(("name", "command"), EVERY, ids=[name for name, _ in EVERY])
+def test_every_help_has_an_example_of_its_command_that_parses(name: str, command: Any) -> None:
+    lines = examples(command.epilog or "")
+    assert any(line.split()[1 : 1 + len(name.split())] == name.split() for line in lines)
+    for line in lines:
+        parse(line)
+
+
+@pytest.mark.parametrize(("name", "command"), EVERY, ids=[name for name, _ in EVERY])
+def test_every_help_prints_its_example(name: str, command: Any, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run([*name.split(), "--help"]) == 0
+    assert f"Example: hil {name}" in " ".join(capsys.readouterr().out.split())
+
+
+def test_several_examples_of_one_epilog_are_all_found() -> None:
+    assert examples("Example: hil a b.c --d 1.5. First look: hil a --dry; hil e") == [
+        "hil a b.c --d 1.5",
+        "hil a --dry",
+        "hil e",
+    ]
+
+
+@pytest.mark.parametrize("wrong", ["hil effects --colour", "hil export st", "hil rig paint", "hil nothing"])
+def test_a_wrong_example_would_be_noticed(wrong: str) -> None:
+    with pytest.raises(Exception, match=r"No such|Missing|unexpected|no such"):
+        parse(wrong)

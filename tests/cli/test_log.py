@@ -1,0 +1,92 @@
+"""The log that every command keeps: what a supporter reads in it, and that no command fails for it."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from hil.cli.main import run
+from hil.support import command_log
+from hil.support.folders import log_file
+
+
+@pytest.fixture(autouse=True)
+def state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A state folder of this test's own, and the log at its default level."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    monkeypatch.delenv("HIL_LOG")
+    return tmp_path / "state"
+
+
+def log() -> str:
+    return log_file().read_text(encoding="utf-8")
+
+
+def test_it_tells_command_version_and_end() -> None:
+    assert run(["effects", "backlash"], keep_log=True) == 0
+    lines = log().splitlines()
+    assert [line.split(" INFO hil: ")[1].split()[0] for line in lines] == ["hil", "version", "ended"]
+    assert "hil effects backlash" in lines[0]
+    assert all(re.match(rf"\d{{4}}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{{3}}Z {os.getpid()} ", line) for line in lines)
+
+
+def test_it_tells_the_error_with_its_place_in_the_program() -> None:
+    assert run(["identify", "nowhere.csv", "--out", "out"], keep_log=True) == 2
+    assert "ERROR hil: ended by RecordingError" in log()
+    assert "Traceback" in log()
+
+
+@pytest.mark.parametrize(("level", "told"), [("error", False), ("warning", False), ("info", True), ("debug", True)])
+def test_the_level_is_that_of_the_option(level: str, told: bool) -> None:
+    assert run(["--log-level", level, "effects"], keep_log=True) == 0
+    assert ("hil effects" in log()) is told
+
+
+def test_the_option_goes_before_the_variable(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("HIL_LOG", "error")
+    assert run(["effects", "--log-level", "info"], keep_log=True) == 0
+    assert "hil effects" in log()
+
+
+def test_off_keeps_none() -> None:
+    assert run(["effects", "--log-level", "off"], keep_log=True) == 0
+    assert not log_file().exists()
+
+
+@pytest.mark.parametrize("where", ["option", "variable"])
+def test_an_unknown_level_is_refused(
+    where: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    if where == "variable":
+        monkeypatch.setenv("HIL_LOG", "loud")
+    options = ["--log-level", "loud"] if where == "option" else []
+    assert run([*options, "effects"], keep_log=True) == 2
+    error = capsys.readouterr().err
+    assert "expected one of debug, info, warning, error, off, came 'loud'" in error
+    assert ("--log-level" if where == "option" else "HIL_LOG") in error
+
+
+def test_it_rotates_and_keeps_a_few(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(command_log, "BYTES", 500)
+    for _ in range(12):
+        assert run(["effects", "backlash"], keep_log=True) == 0
+    kept = sorted(log_file().parent.iterdir())
+    assert [path.name for path in kept] == ["hil.log", *(f"hil.log.{n}" for n in range(1, command_log.KEPT + 1))]
+    assert all(path.stat().st_size <= 500 for path in kept)
+
+
+def test_without_a_place_for_it_the_command_goes_on(state: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    state.write_text("a file where the folder should be", encoding="utf-8")
+    assert run(["effects", "backlash"], keep_log=True) == 0
+    assert "note: no log is kept" in capsys.readouterr().err
+
+
+def test_the_console_script_keeps_it() -> None:
+    done = subprocess.run([sys.executable, "-m", "hil", "effects", "backlash"], capture_output=True, check=True)
+    assert done.returncode == 0
+    assert "hil effects backlash" in log()

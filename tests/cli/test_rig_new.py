@@ -1,0 +1,213 @@
+"""``hil rig new``: by options, by a person at a real terminal, with wrong answers, never over a file."""
+
+from __future__ import annotations
+
+import os
+import pty
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hil.cli.main import run
+from hil.config.file_schema import FileKind
+from hil.config.new_rig.answers import answers
+from hil.config.new_rig.questions import QUESTIONS, Question
+from hil.config.new_rig.text import COMMENTS_AT, rig_text
+from hil.config.rig_file import read_rig
+from hil.config.schema import json_schema
+from hil.errors import UsageError
+from tests.cli.json_schema import Validator
+
+EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "rig.toml"
+
+VEHICLE = {
+    "plc": "192.168.0.10:502",
+    "vendor_id": "0x3E7",
+    "product_code": "1026",
+    "rated_torque_nm": "300",
+    "torque_limit_nm": "90",
+    "inertia_kg_m2": "80",
+    "speed_rad_s": "40",
+}
+
+
+def options(given: dict[str, str]) -> list[str]:
+    return [word for name, value in given.items() for word in ("--" + name.replace("_", "-"), value)]
+
+
+def test_the_simulated_rig_is_the_example(tmp_path: Path) -> None:
+    path = tmp_path / "rig.toml"
+    assert run(["rig", "new", str(path), "--simulated", "--yes"]) == 0
+    example = read_rig(EXAMPLE)
+    assert read_rig(path) == example.model_copy(update={"name": "simulated bus"})
+    assert (tmp_path / FileKind.RIG.value).is_file()
+    assert path.read_text(encoding="utf-8").startswith("#:schema ./rig.schema.json\n")
+
+
+def test_a_vehicle_by_options(tmp_path: Path) -> None:
+    path = tmp_path / "rig.toml"
+    assert run(["rig", "new", str(path), "--yes", *options(VEHICLE), "--name", 'a "bus" # 2']) == 0
+    rig = read_rig(path)
+    assert (rig.name, rig.plc.host, rig.plc.port) == ('a "bus" # 2', "192.168.0.10", 502)
+    assert rig.inverters.m1.product_code == rig.inverters.m2.product_code == 1026
+    assert rig.inverters.m1.torque_limit_nm == rig.inverters.m2.torque_limit_nm == 90.0
+    assert rig.simulation is None
+    assert Validator(json_schema(FileKind.RIG)).faults(tomllib.loads(path.read_text(encoding="utf-8"))) == []
+
+
+def test_comments_stand_in_one_column() -> None:
+    text = rig_text(answers({}, simulated=True), "rig.toml", simulated=True)
+    columns = [line.index("  # ") + 2 for line in text.splitlines() if "  # " in line and not line.startswith("# opt")]
+    assert len(columns) > 40
+    assert set(columns) == {COMMENTS_AT}
+
+
+@settings(max_examples=50, deadline=None)
+@given(
+    limit_nm=st.floats(1.0, 5000.0),
+    rated=st.floats(1.0, 10.0),
+    speed_rad_s=st.floats(0.1, 400.0),
+    name=st.text(min_size=1).filter(lambda text: text.strip() and text.isprintable()),
+)
+def test_whatever_the_limit_the_file_holds_together(
+    limit_nm: float, rated: float, speed_rad_s: float, name: str
+) -> None:
+    given = {"torque_limit_nm": repr(limit_nm), "rated_torque_nm": repr(limit_nm * rated)}
+    found = answers(VEHICLE | given | {"speed_rad_s": repr(speed_rad_s), "name": name}, simulated=False)
+    document = tomllib.loads(rig_text(found, "rig.toml", simulated=False))  # refused if a rule across keys is broken
+    assert document["name"] == name.strip()
+    assert document["inverters"]["m1"]["torque_limit_nm"] == limit_nm
+    assert document["guard"]["sum_limit_nm"] <= 2.0 * limit_nm
+
+
+def test_on_a_vehicle_nothing_that_limits_torque_has_a_default() -> None:
+    with pytest.raises(UsageError) as refused:
+        answers({}, simulated=False)
+    assert {"--rated-torque-nm", "--torque-limit-nm"} <= {line.split()[0] for line in str(refused.value).splitlines()}
+
+
+def test_all_wrong_options_are_named_at_once() -> None:
+    wrong = {
+        "name": " ",
+        "can": "can0",
+        "period_s": "0.0001",
+        "plc": "192.168.0.10",
+        "node_m1": "5",
+        "node_m2": "5",
+        "vendor_id": "0x1FFFFFFFF",
+        "mode": "speed",
+        "rated_torque_nm": "100",
+        "torque_limit_nm": "101",
+        "inertia_kg_m2": "nan",
+        "speed_rad_s": "-1",
+    }
+    with pytest.raises(UsageError) as refused:
+        answers(VEHICLE | wrong, simulated=False)
+    named = {line.split()[0].removeprefix("--").replace("-", "_") for line in str(refused.value).splitlines()}
+    assert named == set(wrong) - {"node_m1", "rated_torque_nm"}
+
+
+def test_a_wrong_answer_is_asked_again_with_what_would_fit() -> None:
+    said: list[str] = []
+    script = {"node_m2": iter(["1", "x", "2"]), "torque_limit_nm": iter(["", "700", "90"])}
+
+    def ask(question: Question, default: str, wrong: str) -> str:
+        said.append(wrong)
+        return next(script.get(question.name, iter([default or VEHICLE.get(question.name, "600")])))
+
+    found = answers({}, simulated=False, ask=ask)
+    assert (found["node_m2"], found["torque_limit_nm"]) == (2, 90.0)
+    complaints = [text for text in said if text]
+    assert len(complaints) == 4
+    assert "another node than m1 (1)" in complaints[0]
+    assert "there is no default" in complaints[2]
+    assert "at most the rated torque" in complaints[3]
+
+
+def test_what_is_given_is_not_asked() -> None:
+    def ask(question: Question, default: str, wrong: str) -> str:
+        assert question.name not in VEHICLE
+        return default
+
+    assert set(answers(VEHICLE, simulated=False, ask=ask)) == {question.name for question in QUESTIONS}
+
+
+def test_nobody_there_to_ask_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["rig", "new", str(tmp_path / "rig.toml")]) == 2
+    assert "--yes" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_that_is_there_stays(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "rig.toml"
+    path.write_text("mine", encoding="utf-8")
+    assert run(["rig", "new", str(path), "--simulated", "--yes"]) == 2
+    assert "expected a new file" in capsys.readouterr().err
+    assert path.read_text(encoding="utf-8") == "mine"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_folder_that_is_not_there_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["rig", "new", str(tmp_path / "no" / "rig.toml"), "--simulated", "--yes"]) == 2
+    assert "rig.toml: expected a place to write to" in capsys.readouterr().err
+
+
+@pytest.fixture
+def terminal(tmp_path: Path) -> Iterator[tuple[subprocess.Popen[bytes], int, Path]]:
+    """``hil rig new`` at a real terminal: the process, the other end of it, and the file it is to write."""
+    ours, theirs = pty.openpty()
+    path = tmp_path / "rig.toml"
+    process = subprocess.Popen(
+        [sys.executable, "-m", "hil", "rig", "new", str(path)], stdin=theirs, stdout=theirs, stderr=theirs
+    )
+    os.close(theirs)
+    yield process, ours, path
+    if process.poll() is None:
+        process.kill()
+        process.wait()
+    os.close(ours)
+
+
+def read_until(end: int, text: str) -> str:
+    """Read what the program prints until it has printed a text."""
+    seen = ""
+    while text not in seen:
+        seen += os.read(end, 1024).decode()
+    return seen
+
+
+def test_a_person_at_a_terminal(terminal: tuple[subprocess.Popen[bytes], int, Path]) -> None:
+    process, end, path = terminal
+    for question in QUESTIONS:
+        read_until(end, question.asks)
+        if question.name == "node_m1":
+            os.write(end, b"500\n")
+            assert "expected a whole number from 1 to 127" in read_until(end, question.asks)
+        os.write(end, f"{VEHICLE.get(question.name, '')}\n".encode())
+    assert "written" in read_until(end, "hil check")
+    assert process.wait(timeout=20) == 0
+    assert read_rig(path).inverters.m2.torque_limit_nm == 90.0
+
+
+def test_ctrl_c_writes_nothing(terminal: tuple[subprocess.Popen[bytes], int, Path]) -> None:
+    process, end, path = terminal
+    read_until(end, "Name of the rig")
+    os.write(end, b"\x03")
+    process.send_signal(2)
+    assert process.wait(timeout=20) == 130
+    assert list(path.parent.iterdir()) == []
+
+
+def test_the_end_of_the_input_writes_nothing(terminal: tuple[subprocess.Popen[bytes], int, Path]) -> None:
+    process, end, path = terminal
+    read_until(end, "Name of the rig")
+    os.write(end, b"\x04")
+    assert "the end of the input" in read_until(end, "end of the input")
+    assert process.wait(timeout=20) == 2
+    assert list(path.parent.iterdir()) == []

@@ -1,0 +1,151 @@
+"""What the steps compute, against signals whose answer is known."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from estimator.identification.modes.modes import Mode
+from estimator.identification.offline.output_error import fit_output_error
+from estimator.physics.stepper import Stepper
+from estimator.signals.decimate import decimate
+from estimator.signals.prbs import prbs_nm
+from estimator.signals.record import Record
+from hil.commission.analysis import amplitude
+from hil.commission.analysis.amplitude import Cap
+from hil.commission.analysis.comfort import vibration_m_s2
+from hil.commission.analysis.delay_selection import select_delay
+from hil.commission.analysis.measured import Measured, of_repeats
+from hil.commission.analysis.physical_fit import fit_two_mass
+from hil.commission.analysis.pulse_response import pulse_response, reading_lag
+from hil.commission.analysis.resonance_spread import ResonanceSpread, resonance_spread
+from hil.commission.analysis.response_ratio import response_ratio
+from hil.commission.predict import rigid_model
+from hil.config.rig_file import read_rig
+from hil.rig.experiments.pulses import LEAD_S, Pulses
+from hil.simulator.simulation_model import DEFAULT_BUS
+from tests.commission.rigs import EXAMPLE
+
+PERIOD_S = 0.01
+
+
+def simulated(torque_nm: np.ndarray, name: str = "run", noise: float = 0.05, gain: float = 1.0) -> Record:
+    """The default bus under a torque that reads so; ``gain`` of it acts."""
+    vehicle = Stepper(DEFAULT_BUS, PERIOD_S, speed_rad_s=10.0)
+    speed = np.empty(torque_nm.size)
+    for k, torque in enumerate(torque_nm):
+        speed[k] = vehicle.speed_rad_s
+        vehicle.step(gain * torque, 0.0)
+    speed += noise * np.random.default_rng(1).normal(size=speed.size)
+    time_s = PERIOD_S * np.arange(speed.size)
+    return Record(name, PERIOD_S, time_s, torque_nm[:, None], speed, np.ones(speed.size, dtype=bool))
+
+
+def excited(n: int = 2000, level_nm: float = 60.0, **arguments: float) -> Record:
+    return simulated(12.5 + prbs_nm(n, level_nm, clock_divider=2), **arguments)
+
+
+def test_interval_on_both_sides_of_a_limit_tells_nothing() -> None:
+    assert Measured(1.0, 0.1).is_within(0.5, 2.0) is True
+    assert Measured(3.0, 0.1).is_within(0.5, 2.0) is False
+    assert Measured(2.0, 0.1).is_within(0.5, 2.0) is None
+
+
+def test_interval_of_repeats_is_students() -> None:
+    # t(0.975, 2) = 4.303 (any table); values 1, 2, 3 have standard deviation 1
+    assert of_repeats(np.array([1.0, 2.0, 3.0])).ci95 == pytest.approx(4.303 / math.sqrt(3), rel=1e-3)
+    assert of_repeats(np.array([1.0])).ci95 == math.inf
+
+
+@pytest.mark.parametrize(("value", "text"), [(3.14159, "3.14 ± 0.25 %"), (100.0, "100.00 ± 0.25 %")])
+def test_value_has_as_many_places_as_its_interval(value: float, text: str) -> None:
+    assert Measured(value, 0.25).shown("%") == text
+
+
+@pytest.mark.parametrize("factor", [1.0, -1.0, 0.3])
+def test_pulses_tell_sign_and_size(factor: float) -> None:
+    course = Pulses(20.0, 1.0, 18.0)
+    reference = np.array([course.torque_nm(PERIOD_S * k) for k in range(1800)])
+    impulse = np.concatenate([[0.0], np.cumsum(reference)[:-1]]) * PERIOD_S
+    noise = 0.05 * np.random.default_rng(2).normal(size=impulse.size)
+    speed = factor * impulse / 100.0 + 0.02 * np.arange(impulse.size) * PERIOD_S + noise
+    found = pulse_response(reference, 0.99 * reference, speed, 100.0, PERIOD_S, 4, 400, round(LEAD_S / PERIOD_S))
+    assert found.speed.value == pytest.approx(factor, abs=0.15)
+    assert found.reading.value == pytest.approx(0.99, abs=1e-3)
+    assert found.speed.is_seen
+
+
+def test_lag_of_a_reading_is_counted() -> None:
+    reference = prbs_nm(500, 10.0)
+    assert reading_lag(np.roll(reference, 2), reference) == 2
+    assert reading_lag(-reference, reference) == 0
+
+
+def test_gain_and_delay_between_two_tests() -> None:
+    first, second = excited(), excited(gain=1.05)
+    found = response_ratio(first, second)
+    assert abs(found.gain.value - 1.05) < 2.0 * found.gain.ci95
+    assert abs(found.delay_s.value) < 2.0 * found.delay_s.ci95
+    later = Record("later", PERIOD_S, first.time_s, first.torque_nm, np.roll(second.output, 1), first.okay)
+    shifted = response_ratio(first, later)
+    assert shifted.delay_s.value == pytest.approx(PERIOD_S, abs=5e-4)
+
+
+def test_without_coherence_nothing_is_determined() -> None:
+    silent = simulated(np.full(2000, 12.5) + 0.001 * prbs_nm(2000, 1.0))
+    assert response_ratio(silent, silent).gain.ci95 == math.inf
+
+
+@pytest.mark.parametrize("extra", [0, 1, 3])
+def test_delay_of_whole_samples_is_found(extra: int) -> None:
+    record = excited()
+    late = Record("late", PERIOD_S, record.time_s, record.torque_nm, np.roll(record.output, extra), record.okay)
+    assert select_delay(late).extra_samples == extra
+
+
+def test_spread_of_the_resonance_is_that_of_repeats() -> None:
+    """The foretold standard deviation against the scatter of ten tests that differ in noise alone."""
+    base = simulated(12.5 + prbs_nm(2000, 60.0, clock_divider=2), noise=0.0)
+    foretold, found = [], []
+    for seed in range(10):
+        noise = 0.05 * np.random.default_rng(seed).normal(size=base.output.size)
+        record = Record("run", PERIOD_S, base.time_s, base.torque_nm, base.output + noise, base.okay)
+        spread = resonance_spread(fit_output_error(decimate(record, 1, 0.3)), (2.0, 25.0))
+        assert spread is not None
+        foretold.append(spread.frequency_std)
+        found.append(spread.mode.frequency_hz)
+    scatter = np.std(found, ddof=1) / np.mean(found)
+    assert 0.4 < np.mean(foretold) / scatter < 2.5  # ten tests: a scatter of 24 %; a decade off would fail
+
+
+def test_two_masses_are_found_from_rough_values() -> None:
+    fit = fit_two_mass([excited(), excited(level_nm=90.0)], 120.0, Mode(8.0, 0.05))
+    for name in ("J_M", "J_L", "k"):
+        truth = DEFAULT_BUS.parameters[name].value
+        assert abs(fit.parameters[name].value - truth) < max(3.0 * fit.parameters[name].ci95, 0.02 * truth)
+
+
+def test_vibration_of_a_rigid_vehicle() -> None:
+    """J dw/dt = T: a sine of 60 Nm on 100 kg m2 at 2 Hz is 0.6 / sqrt(2) rad/s2 RMS at the shaft."""
+    time_s = PERIOD_S * np.arange(4000)
+    omega = 2.0 * math.pi * 2.0
+    torque, speed = 60.0 * np.cos(omega * time_s), 60.0 / 100.0 / omega * np.sin(omega * time_s)
+    found = vibration_m_s2(torque, speed, rigid_model(read_rig(EXAMPLE)), PERIOD_S, 0.1)
+    assert found == pytest.approx(0.1 * 0.6 / math.sqrt(2.0), rel=0.03)
+
+
+def test_amplitude_serves_is_raised_or_is_held_down() -> None:
+    cap = (Cap(150.0, "a limit"), Cap(200.0, "another"))
+    assert amplitude.choose(120.0, 10.0, cap, 1.2).amplitude_nm == pytest.approx(120.0)
+    raised = amplitude.choose(2.0, 10.0, cap, 1.2)
+    assert (raised.amplitude_nm, raised.reason[:6]) == (pytest.approx(10.8), "raised")
+    held = amplitude.choose(180.0, 10.0, cap, 1.2)
+    assert (held.amplitude_nm, held.reason) == (pytest.approx(150.0), "held down by a limit")
+
+
+def test_needed_amplitude_is_inverse_to_the_spread() -> None:
+    spread = ResonanceSpread(Mode(8.0, 0.05), amplitude.FREQUENCY_STD, amplitude.DAMPING_STD / 2.0)
+    assert amplitude.needed_nm(spread, 60.0) == pytest.approx(amplitude.MARGIN * 60.0)
+    assert amplitude.needed_nm(spread.scaled(0.5), 60.0) == pytest.approx(amplitude.MARGIN * 30.0)

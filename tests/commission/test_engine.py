@@ -1,0 +1,201 @@
+"""The order of things: skip, repeat, resume, block, quit, a rig file that changed; with steps that do nothing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from hil.commission import announce, engine
+from hil.commission.engine import Asked, Commissioning
+from hil.commission.finding import Finding
+from hil.commission.order import RigSource
+from hil.commission.record import Status, StepRecord
+from hil.commission.state import State, load_state
+from hil.commission.step import Job, Outcome, Step
+from hil.commission.talk import Answer, Person, Script, Talk, What
+from hil.errors import RunAborted, UsageError
+from tests.commission.rigs import EXAMPLE
+
+NAMES = ("first", "second", "third")
+
+
+class World:
+    """Three steps of which each says what it did; the second commands torque, the third is computed from it."""
+
+    def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.folder = folder
+        self.done: list[str] = []
+        self.said: list[str] = []
+        self.fails: dict[str, BaseException] = {}
+        self.findings: dict[str, list[Finding]] = {}
+        self.text = EXAMPLE.read_text(encoding="utf-8")
+        needs: dict[str, tuple[str, ...]] = {"first": (), "second": ("first",), "third": ("second",)}
+        steps = tuple(Step(name, name, lambda job: "acts.", self._doer(name), needs=needs[name]) for name in NAMES)
+        for module in (engine, announce):
+            monkeypatch.setattr(module, "STEPS", steps)
+        run = announce.PlannedRun("run", 1.0, (0.0, 5.0), (0.0, 5.0), (0.0, 1.0))
+        monkeypatch.setattr(engine, "plan_of", lambda job, step: [run] if step.name == "second" else [])
+
+    def _doer(self, name: str):  # type: ignore[no-untyped-def]
+        def do(job: Job) -> Outcome:
+            self.done.append(name)
+            if name in self.fails:
+                raise self.fails.pop(name)
+            return Outcome(self.findings.pop(name, []), {"of": name})
+
+        return do
+
+    def state(self) -> State:
+        source = RigSource(EXAMPLE, self.text)
+        return load_state(self.folder, NAMES) or State(
+            self.folder, "rig", str(source.path), self.text, {name: StepRecord() for name in NAMES}
+        )
+
+    def call(self, talk: Talk | None = None, **asked: object) -> list[str]:
+        self.done.clear()
+        source = RigSource(EXAMPLE, self.text)
+        job = Job(source, source.rig(), self.state(), None, None, 0.1, True, self.said.append, lambda a, b: None)  # type: ignore[arg-type]
+        Commissioning(job, talk or Script(True), Asked(**asked), lambda step, findings: None).run()  # type: ignore[arg-type]
+        return list(self.done)
+
+
+@pytest.fixture
+def world(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> World:
+    return World(tmp_path, monkeypatch)
+
+
+def person(*answers: str) -> Person:
+    given = iter(answers)
+    return Person(lambda question: next(given))
+
+
+def test_every_step_once_and_then_none(world: World) -> None:
+    assert world.call() == list(NAMES)
+    assert world.call() == []
+
+
+def test_goes_on_at_the_step_that_was_interrupted(world: World) -> None:
+    world.fails["second"] = KeyboardInterrupt()
+    with pytest.raises(KeyboardInterrupt):
+        world.call()
+    assert [record.status for record in world.state().steps.values()] == [
+        Status.DONE,
+        Status.INTERRUPTED,
+        Status.PENDING,
+    ]
+    assert world.call() == ["second", "third"]
+    assert world.state().steps["second"].attempt == 2
+
+
+def test_program_that_was_killed_left_its_step_interrupted(world: World) -> None:
+    state = world.state()
+    state.steps["first"].begin("", keep_runs=False)
+    state.save()
+    assert world.state().steps["first"].status is Status.INTERRUPTED
+    assert "killed" in world.state().steps["first"].because
+
+
+def test_skipped_with_its_reason(world: World) -> None:
+    assert world.call(skip={"first": "done by hand"}) == ["second", "third"]
+    record = world.state().steps["first"]
+    assert (record.status, record.because) == (Status.SKIPPED, "done by hand")
+
+
+def test_repeated_and_what_is_computed_from_it(world: World) -> None:
+    world.call()
+    assert world.call(repeat=frozenset({"second"})) == ["second", "third"]
+    assert world.state().steps["second"].history[0]["status"] == "done"
+
+
+def test_repeating_what_another_with_torque_builds_on_says_so(world: World, monkeypatch: pytest.MonkeyPatch) -> None:
+    world.call()
+    orders = property(lambda step: lambda job: ["run"] if step.name == "second" else [])
+    monkeypatch.setattr(engine.Step, "orders", orders)
+    assert world.call(repeat=frozenset({"first"})) == ["first"]
+    assert any("driven before first was repeated; again by --repeat second" in line for line in world.said)
+
+
+def test_blocking_finding_ends_it_and_is_done_again(world: World) -> None:
+    world.findings["first"] = [Finding("sign", "forward", "backward", False, "Swap two phases", blocking=True)]
+    with pytest.raises(RunAborted, match=r"step first: sign: expected forward, came backward\. Swap two phases"):
+        world.call()
+    assert world.state().steps["first"].status is Status.BLOCKED
+    assert world.call() == list(NAMES)
+
+
+def test_without_yes_and_terminal_no_torque(world: World) -> None:
+    with pytest.raises(UsageError, match="step second commands torque: expected someone at a terminal"):
+        world.call(Script(False))
+    assert world.done == ["first"]
+
+
+def test_person_goes_on_skips_or_quits(world: World) -> None:
+    assert world.call(person("what?", "s", "", "no torque today")) == ["first", "third"]
+    assert world.state().steps["second"].because == "no torque today"
+    with pytest.raises(KeyboardInterrupt):
+        world.call(person("q"), repeat=frozenset({"second"}))
+
+
+def test_person_repeats_what_is_outside(world: World) -> None:
+    world.findings["second"] = [Finding("noise", "little", "much", False)]
+    assert world.call(person("y", "r", "y")) == ["first", "second", "second", "third"]
+
+
+def test_changed_rig_file_is_noticed_and_its_steps_are_done_again(world: World) -> None:
+    world.call()
+    world.text = world.text.replace("amplitude_nm = 120.0", "amplitude_nm = 60.0")
+    assert world.call() == list(NAMES)
+    assert "prbs.amplitude_nm: 120.0 → 60.0" in world.state().notes[0]["changes"]
+
+
+def test_comment_in_the_rig_file_is_no_change(world: World) -> None:
+    world.call()
+    world.text = "# looked at by two\n" + world.text
+    assert world.call() == []
+
+
+def test_results_are_kept_for_a_reason(world: World) -> None:
+    world.call()
+    world.text = world.text.replace("amplitude_nm = 120.0", "amplitude_nm = 60.0")
+    assert world.call(Script(True, keep="only the amplitude")) == []
+    assert world.state().notes[0]["steps"] == "kept: only the amplitude"
+    assert world.call() == []
+
+
+def test_changed_rig_file_and_a_person(world: World) -> None:
+    world.call()
+    world.text = world.text.replace("amplitude_nm = 120.0", "amplitude_nm = 60.0")
+    with pytest.raises(KeyboardInterrupt):
+        world.call(person("q"))
+    assert world.call(person("k", "only the amplitude")) == []
+
+
+@pytest.mark.parametrize("damage", ["", "{", '{"schema": "hil.other/1"}', '{"schema": "hil.commission/1"}', "[1]"])
+def test_damaged_state_is_refused_by_name(world: World, damage: str) -> None:
+    world.call()
+    world.state().path.write_text(damage, encoding="utf-8")
+    with pytest.raises(UsageError, match=r"commission\.json: expected the state of a commissioning"):
+        world.call()
+
+
+def test_state_is_whole_or_as_it_was(world: World, monkeypatch: pytest.MonkeyPatch) -> None:
+    world.call()
+    state = world.state()
+    before = state.path.read_bytes()
+    monkeypatch.setattr("hil.commission.state.os.fsync", _full_disk)
+    state.steps["first"].because = "changed"
+    with pytest.raises(OSError, match="No space left"):
+        state.save()
+    assert state.path.read_bytes() == before
+    assert [path.name for path in world.folder.iterdir()] == ["commission.json"]
+
+
+def _full_disk(descriptor: int) -> None:
+    raise OSError(28, "No space left on device")
+
+
+def test_answers_stand_for_what_they_say() -> None:
+    assert person("y").may_command("any", True) == Answer(What.GO)
+    assert person("").after("any", 1, True) == Answer(What.QUIT)
+    assert person().after("any", 0, False) == Answer(What.GO)

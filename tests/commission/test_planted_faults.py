@@ -1,0 +1,67 @@
+"""Each fault that is planted in a rig is found by the step it belongs to, and the sound rig passes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from hil.commission.record import Status
+from hil.errors import RunAborted
+from tests.commission.rigs import bench
+from tests.rig.observer import assert_disarmed
+
+
+def test_sound_rig_passes_the_first_steps(tmp_path: Path) -> None:
+    with bench(tmp_path) as rig:
+        state = rig.call("limits", "noise", "signs")
+        assert_disarmed(rig.server.bus_url, 1, 2)
+    assert all(finding.within is not False for finding in rig.shown)
+    assert state.steps["signs"].status is Status.DONE
+    assert rig.finding("m1: sign").measured == rig.finding("m2: sign").measured == "forward"
+
+
+def test_wrong_sign_of_one_inverter_blocks(tmp_path: Path) -> None:
+    with bench(tmp_path, miswired=True) as rig:
+        with pytest.raises(RunAborted, match=r"m2: sign.*came backward.*Swap two phases of m2"):
+            rig.call("signs")
+        assert_disarmed(rig.server.bus_url, 1, 2)
+        assert rig.job().state.steps["signs"].status is Status.BLOCKED
+    assert rig.finding("m1: sign").within is True
+    assert rig.finding("m2: sign").within is False
+
+
+def test_device_that_is_another_one_blocks(tmp_path: Path) -> None:
+    with bench(tmp_path, faults=["m2.wrong_identity"]) as rig, pytest.raises(RunAborted, match="m2 at node 2"):
+        rig.call("devices")
+    assert rig.finding("m1 at node 1").within is True
+
+
+def test_vehicle_held_by_friction_gets_more_torque_and_then_an_answer(tmp_path: Path) -> None:
+    with bench(tmp_path, effects=["coulomb_friction_motor:friction_nm=30"]) as rig:
+        rig.call("signs")
+    assert any("nothing seen to move with" in line for line in rig.said)
+    assert rig.finding("m1: sign").measured == "forward"
+
+
+def test_noise_is_measured(tmp_path: Path) -> None:
+    with bench(tmp_path, changes=[("speed_noise_rad_s = 0.05", "speed_noise_rad_s = 0.4")]) as rig:
+        state = rig.call("noise")
+    measured = state.steps["noise"].evidence["speed_std_rad_s"]
+    assert measured == pytest.approx(0.4, rel=0.1)  # 1000 samples: 2.2 % standard deviation
+    assert rig.finding("speed noise (RMS)").within is False
+
+
+def test_friction_and_inertia_are_measured(tmp_path: Path) -> None:
+    with bench(
+        tmp_path,
+        effects=["coulomb_friction_load:friction_nm=60"],
+        changes=[("inertia_kg_m2 = 100.0", "inertia_kg_m2 = 140.0")],
+    ) as rig:
+        state = rig.call("friction")
+    evidence = state.steps["friction"].evidence
+    inertia, spread = evidence["inertia_kg_m2"]
+    assert abs(inertia - 101.6) < max(2.0 * spread, 2.0)  # the elastic line is fitted as a rigid one: 2 %
+    dry, spread = evidence["dry_nm"]
+    assert abs(dry - 60.0) < max(2.0 * spread, 6.0)
+    assert "Set [vehicle] inertia_kg_m2 = 10" in rig.finding("total inertia at the motor shaft").advice

@@ -1,0 +1,83 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from estimator.errors import BadModel, BadShape
+from estimator.identification.identify import Identification
+from estimator.identification.linear_model import LinearModel
+from estimator.identification.modes.modes import resonance
+from estimator.identification.modes.reduced import reduce_order, third_order
+from tests.estimator.identification.driveline import Cruise
+
+T_S = 0.02
+FREQUENCY_HZ = np.linspace(0.01, 24.9, 400)
+
+
+def fourth_order(small: float) -> LinearModel:
+    """A third-order model and a fourth state of a given share, in parallel."""
+    pair = np.exp(T_S * 2 * np.pi * 8.2 * (-0.057 + 1j))
+    a3, b3 = np.real(np.poly([pair, pair.conj(), 0.98])), np.array([0.01, -0.015, 0.008])
+    a = np.polymul(a3, [1.0, 0.6])
+    b = np.polyadd(np.polymul(b3, [1.0, 0.6]), small * a3)
+    return LinearModel(tuple(a[1:].tolist()), tuple(b.tolist()), 1, T_S)
+
+
+@pytest.mark.parametrize("small", [1e-4, 1e-3])
+def test_the_response_changes_by_no_more_than_the_bound(small: float) -> None:
+    model = fourth_order(small)
+    reduced = third_order(model)
+    error = np.abs(reduced.model.response(FREQUENCY_HZ) - model.response(FREQUENCY_HZ))
+    assert error.max() <= reduced.largest_error * 1.0001
+    assert reduced.largest_error < 10 * small
+    assert len(reduced.model.a) == 3
+    assert reduced.model.is_stable
+
+
+def test_a_state_that_does_nothing_is_left_out_exactly() -> None:
+    model = fourth_order(0.0)
+    reduced = third_order(model)
+    np.testing.assert_allclose(reduced.model.response(FREQUENCY_HZ), model.response(FREQUENCY_HZ), rtol=1e-6)
+    assert reduced.hankel[3] < 1e-8 * reduced.hankel[0]
+
+
+@pytest.mark.parametrize("nk", [0, 1, 2])
+def test_what_is_of_third_order_or_less_stays_what_it_is(nk: int) -> None:
+    model = LinearModel((-1.6, 0.8), (0.1, 0.05), nk, T_S)
+    reduced = third_order(model)
+    np.testing.assert_allclose(reduced.model.response(FREQUENCY_HZ), model.response(FREQUENCY_HZ), rtol=1e-8)
+    assert reduced.largest_error == pytest.approx(0.0, abs=1e-9)
+
+
+def test_the_order_can_be_chosen() -> None:
+    assert len(reduce_order(fourth_order(1e-3), 2).model.a) == 2
+
+
+def test_the_covariance_goes_along() -> None:
+    model = fourth_order(1e-3)
+    S = 1e-5 * np.random.default_rng(0).normal(size=(8, 8))
+    reduced = third_order(model, S @ S.T)
+    thetas = np.random.default_rng(1).multivariate_normal(model.theta, S @ S.T, size=600)
+    scattered = [third_order(LinearModel.from_theta(theta, model.orders, T_S)).model.theta for theta in thetas]
+    assert reduced.covariance is not None
+    np.testing.assert_allclose(np.sqrt(np.diag(reduced.covariance)), np.std(scattered, axis=0), rtol=0.12)
+
+
+def test_the_papers_fourth_order_models_keep_their_resonance(
+    cruises: list[Cruise], identified: list[Identification]
+) -> None:
+    for drive, result in zip(cruises, identified, strict=True):
+        mode = resonance(third_order(result.batch.model, result.batch.covariance).model)
+        assert mode is not None
+        assert mode.frequency_hz == pytest.approx(drive.resonance_hz, rel=0.01)
+        assert mode.damping == pytest.approx(drive.damping, rel=0.15)
+
+
+def test_an_unstable_model_is_refused() -> None:
+    with pytest.raises(BadModel, match="expected all below 1"):
+        third_order(LinearModel((-1.1, 0.0), (1.0,), 1, T_S))
+
+
+def test_a_covariance_of_another_model_is_refused() -> None:
+    with pytest.raises(BadShape, match=r"expected \(8, 8\)"):
+        third_order(fourth_order(1e-3), np.eye(3))

@@ -1,0 +1,59 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from estimator.errors import BadSetting
+from estimator.identification.linear_model import Orders
+from estimator.identification.offline.orders import select_orders
+from estimator.signals.record import Record
+from tests.estimator.identification.closed_loop import controlled
+from tests.estimator.identification.driveline import cruise
+
+AMONG = [Orders(2, 2, 1), Orders(3, 3, 1), Orders(4, 4, 1), Orders(3, 3, 2)]
+
+
+def delayed(record: Record, samples: int) -> Record:
+    torque = np.roll(record.torque_nm, samples, axis=0)
+    okay = np.arange(record.okay.shape[0]) >= samples
+    return Record(record.name, record.sample_time_s, record.time_s, torque, record.output, record.okay & okay)
+
+
+def test_three_states_and_one_sample_of_delay_are_found() -> None:
+    """The truth wins in most runs and its criterion is never far from the best; too low an order always is."""
+    chosen = []
+    for seed in (400, 401, 403):
+        choice = select_orders(controlled(seed, 0.0)[0], AMONG)
+        by_orders = {candidate.orders: candidate.criterion for candidate in choice.candidates}
+        chosen.append(choice.chosen)
+        assert choice.chosen.nk == 1
+        assert by_orders[Orders(3, 3, 1)] < 20
+        assert by_orders[Orders(2, 2, 1)] > 50
+    assert chosen.count(Orders(3, 3, 1)) >= 2
+
+
+def test_a_load_that_swings_by_itself_costs_one_order_and_no_more() -> None:
+    """The tests' cruise has a sine in its load: a slow undamped pair with zeros on it may be taken to explain that."""
+    choice = select_orders(cruise(406, 40.0).record, AMONG[:3])
+    extra = choice.candidates[0].model
+    assert choice.chosen in AMONG[1:3]
+    slow = extra.poles[np.abs(np.log(extra.poles)) < 0.02]
+    assert all(np.abs(extra.zeros - pole).min() < 0.1 for pole in slow)
+
+
+def test_a_longer_delay_is_found() -> None:
+    late = delayed(cruise(400, 40.0).record, -1)  # torque written down one sample early
+    assert select_orders(late, AMONG).chosen.nk == 2
+
+
+def test_unseen_recordings_stand_beside() -> None:
+    choice = select_orders(cruise(400, 30.0).record, AMONG[:3], [cruise(401, 30.0).record])
+    assert all(80 < candidate.unseen_fit_percent < 100 for candidate in choice.candidates)
+    assert choice.candidates[0].criterion == 0.0
+    assert "Free-run fit on unseen recordings" in choice.statement
+    assert "unseen" not in select_orders(cruise(400, 30.0).record, AMONG[:2]).statement
+
+
+def test_no_candidate_is_refused() -> None:
+    with pytest.raises(BadSetting, match="0 candidates"):
+        select_orders(cruise(400, 30.0).record, [])

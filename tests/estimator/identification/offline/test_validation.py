@@ -1,0 +1,122 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from estimator.errors import BadModel
+from estimator.identification.linear_model import LinearModel, Orders
+from estimator.identification.offline.box_jenkins import fit_box_jenkins
+from estimator.identification.offline.feedback import judge_feedback
+from estimator.identification.offline.free_run import free_run
+from estimator.identification.offline.linear_fit import LinearFit
+from estimator.identification.offline.noise_model import fit_noise
+from estimator.identification.offline.validation import correlation_test, validate
+from estimator.signals.decimate import decimate
+from estimator.signals.record import Record
+from tests.estimator.identification.closed_loop import controlled
+from tests.estimator.identification.driveline import cruise
+
+THIRD = Orders(3, 3, 1)
+
+
+@pytest.fixture(scope="module")
+def records() -> list[Record]:
+    return [decimate(cruise(seed, 30.0, name=f"run_{seed}").record, 1) for seed in range(300, 306)]
+
+
+@pytest.fixture(scope="module")
+def fits(records: list[Record]) -> list[LinearFit]:
+    return [fit_box_jenkins(record, THIRD) for record in records]
+
+
+def test_the_right_model_passes_as_often_as_it_should(records: list[Record], fits: list[LinearFit]) -> None:
+    """At 95 % each, 3 or more of 6 fail with a probability of 0.2 %."""
+    results = [validate(fit, record) for fit, record in zip(fits, records, strict=True)]
+    assert sum(not result.independence.is_independent for result in results) <= 2
+    assert sum(judge_feedback(result).detected for result in results) <= 1
+
+
+def test_a_model_of_too_low_an_order_fails(records: list[Record]) -> None:
+    result = validate(fit_box_jenkins(records[0], Orders(2, 2, 1)), records[0])
+    assert result.independence.p_value < 1e-6
+    assert "correlated with the past input" in result.statement
+    assert "misses a part of the response" in result.statement
+
+
+def test_a_model_with_too_long_a_delay_fails(records: list[Record]) -> None:
+    assert not validate(fit_box_jenkins(records[0], Orders(3, 3, 3)), records[0]).independence.is_independent
+
+
+def test_whiteness_is_shown_and_is_no_judge(records: list[Record], fits: list[LinearFit]) -> None:
+    result = validate(fits[0], records[0])
+    assert not result.autocorrelation.is_independent  # the load's slow changes
+    assert "the model holds" in result.statement
+
+
+def test_free_run_is_told_first_and_one_step_as_what_it_is(records: list[Record], fits: list[LinearFit]) -> None:
+    result = validate(fits[0], records[0], records[1:3])
+    assert result.own.fit_percent == pytest.approx(fits[0].fit_percent, abs=0.1)
+    assert [run.name for run in result.unseen] == ["run_301", "run_302"]
+    assert all(75 < run.fit_percent < run.one_step_fit_percent for run in result.unseen)
+    assert result.statement.startswith("Free-run fit")
+    assert result.statement.index("unseen") < result.statement.index("one step ahead")
+
+
+def test_a_poor_model_with_a_fine_one_step_fit_is_seen_through(records: list[Record]) -> None:
+    """A model that does nothing; the last outputs alone tell the next."""
+    record = records[0]
+    run = free_run(LinearModel((), (1e-12,), 1, 0.01), record, fit_noise(record.output, record.okay, 20))
+    assert run.fit_percent < 1
+    assert run.one_step_fit_percent > 60
+
+
+def test_correlations_of_white_noise_keep_their_bound_and_p_is_uniform() -> None:
+    rng = np.random.default_rng(0)
+    lags, okay = np.arange(1, 26), np.ones(2000, dtype=bool)
+    tests = [correlation_test(rng.normal(size=2000), rng.normal(size=2000), okay, lags) for _ in range(400)]
+    beyond = np.mean([np.abs(test.correlation) > test.bound for test in tests])
+    assert beyond == pytest.approx(0.05, abs=0.01)
+    p = np.array([test.p_value for test in tests])
+    assert np.mean(p < 0.05) < 0.08
+    assert np.mean(p < 0.5) > 0.3  # not hopelessly cautious either
+
+
+@pytest.mark.parametrize("lag", [-3, 0, 7])
+def test_a_single_lag_is_found_where_it_is(lag: int) -> None:
+    rng = np.random.default_rng(1)
+    x = rng.normal(size=3000)
+    e = rng.normal(size=3000) + 0.2 * np.roll(x, lag)
+    test = correlation_test(e, x, np.ones(3000, dtype=bool), np.arange(-10, 11))
+    assert test.lag[np.argmax(np.abs(test.correlation))] == lag
+    assert test.p_value < 1e-6
+
+
+def test_no_residual_is_correlated_with_nothing() -> None:
+    assert correlation_test(np.zeros(50), np.ones(50), np.ones(50, dtype=bool), np.arange(5)).p_value == 1.0
+
+
+def test_a_controller_that_answers_the_speed_is_detected_and_its_effects_told() -> None:
+    for seed in (1, 2, 3):
+        record, _ = controlled(seed, gain=200.0)
+        found = judge_feedback(validate(fit_box_jenkins(record, THIRD), record))
+        assert found.detected
+        assert "The torque follows the speed" in found.statement
+        assert "fit_instrumental" in found.statement
+        assert set(found.consequences) >= {"arx", "output_error", "box_jenkins", "instrumental_variable", "spectral"}
+
+
+def test_in_open_loop_none_is_claimed(records: list[Record], fits: list[LinearFit]) -> None:
+    found = judge_feedback(validate(fits[2], records[2]))
+    assert not found.detected
+    assert not found.consequences
+
+
+def test_a_recording_at_another_period_is_refused(records: list[Record], fits: list[LinearFit]) -> None:
+    other = decimate(records[1], 2)
+    with pytest.raises(BadModel, match=r"sampled every 0\.02 s, the model every 0\.01 s"):
+        validate(fits[0], records[0], [other])
+
+
+def test_an_unstable_model_is_refused(records: list[Record], fits: list[LinearFit]) -> None:
+    with pytest.raises(BadModel, match="take a stable estimate"):
+        free_run(LinearModel((-1.2,), (1.0,), 1, 0.01), records[0], fits[0].noise)

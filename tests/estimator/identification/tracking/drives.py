@@ -1,0 +1,97 @@
+"""Drives whose physics changes on the way, many at once: exact discretisation by scipy, nothing of this project."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import expm
+from scipy.signal import max_len_seq
+
+from estimator.signals.record import FloatArray, Record
+
+SAMPLE_TIME_S = 0.01
+SPEED_RAD_S = 60.0
+PRBS_NM = 120.0
+CLOCK_DIVIDER = 2
+TORQUE_STEP_NM = 1.2
+"""0.1 % of 600 Nm, of two inverters."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """A two-mass driveline from a moment on."""
+
+    from_s: float = 0.0
+    k: float = 4200.0
+    J_L: float = 100.0
+    J_M: float = 1.6
+    c: float = 9.0
+    b_motor: float = 0.35
+    b_load: float = 0.9
+
+    @property
+    def matrix(self) -> FloatArray:
+        """A of dx/dt = A x + B [T, T_0], x = [w_M, w_L, phi_M - phi_L]."""
+        return np.array(
+            [
+                [-(self.c + self.b_motor) / self.J_M, self.c / self.J_M, -self.k / self.J_M],
+                [self.c / self.J_L, -(self.c + self.b_load) / self.J_L, self.k / self.J_L],
+                [1.0, -1.0, 0.0],
+            ]
+        )
+
+    @property
+    def resonance(self) -> tuple[float, float]:
+        """Natural frequency [Hz] and damping ratio of the oscillating pair."""
+        poles = np.linalg.eigvals(self.matrix)
+        pole = poles[np.argmax(poles.imag)]
+        return abs(pole) / (2 * np.pi), -pole.real / abs(pole)
+
+    def discrete(self) -> tuple[FloatArray, FloatArray]:
+        """Exact zero-order-hold discretisation."""
+        block = np.zeros((5, 5))
+        block[:3, :3] = self.matrix
+        block[:3, 3:] = [[1.0 / self.J_M, 0.0], [0.0, -1.0 / self.J_L], [0.0, 0.0]]
+        exponential = expm(block * SAMPLE_TIME_S)
+        return exponential[:3, :3], exponential[:3, 3:]
+
+
+def drives(
+    seed: int,
+    number: int,
+    duration_s: float,
+    lines: Sequence[Line] = (Line(),),
+    noise_rad_s: float = 0.05,
+    road_nm: float = 300.0,
+) -> list[Record]:
+    """Simulate drives at a held speed: PRBS, wandering load, rough road (white load torque), noisy resolver."""
+    rng = np.random.default_rng(seed)
+    n = round(duration_s / SAMPLE_TIME_S)
+    sequence = np.repeat(2.0 * max_len_seq(10)[0] - 1.0, CLOCK_DIVIDER)
+    starts = rng.integers(0, sequence.shape[0], number)
+    steps = {round(line.from_s / SAMPLE_TIME_S): line.discrete() for line in lines}
+    twist = 150.0 / lines[0].k
+    x = np.tile([SPEED_RAD_S, SPEED_RAD_S, twist], (number, 1))
+    base, wander = np.full(number, 204.0), np.zeros(number)
+    torque, speed = np.empty((number, n)), np.empty((number, n))
+    for t in range(n):
+        if t in steps:
+            Ad, Bd = (matrix.T for matrix in steps[t])
+        slow = SPEED_RAD_S - x[:, 1]
+        base += SAMPLE_TIME_S * 5.0 * slow
+        wander = 0.9998 * wander + rng.normal(0.0, 0.5, number)
+        load = 150.0 + wander + rng.normal(0.0, road_nm, number)
+        wanted = base + 40.0 * slow + PRBS_NM * sequence[(starts + t) % sequence.shape[0]]
+        torque[:, t] = np.round(wanted / TORQUE_STEP_NM) * TORQUE_STEP_NM
+        speed[:, t] = x[:, 0]
+        x = x @ Ad + np.column_stack([torque[:, t], load]) @ Bd
+    measured = torque + rng.normal(0.0, 0.4, torque.shape)
+    speed += rng.normal(0.0, noise_rad_s, speed.shape)
+    time_s = SAMPLE_TIME_S * np.arange(n)
+    okay = np.ones(n, dtype=np.bool_)
+    return [
+        Record(f"drive_{i}", SAMPLE_TIME_S, time_s, np.column_stack([u / 2, u / 2]), y, okay)
+        for i, (u, y) in enumerate(zip(measured, speed, strict=True))
+    ]

@@ -1,0 +1,36 @@
+"""The threshold against a trial of its rule, and what it refuses."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from estimator.errors import BadSetting
+from estimator.identification.tracking.threshold import false_pairs, threshold_for
+
+
+@pytest.mark.parametrize(("threshold", "n"), [(1.5, 21), (2.0, 10)])
+def test_probability_is_that_of_a_trial(threshold: float, n: int) -> None:
+    x = np.random.default_rng(5).normal(3.0, 2.0, (200_000, n + 2))
+    mean, std = x[:, :n].mean(axis=1, keepdims=True), x[:, :n].std(axis=1, ddof=1, keepdims=True)
+    tau = (x[:, n:] - mean) / (std * np.sqrt(1 + 1 / n))
+    pairs = (tau > threshold).all(axis=1) | (tau < -threshold).all(axis=1)
+    scatter = np.sqrt(pairs.mean() / pairs.size)
+    assert false_pairs(threshold, n) == pytest.approx(pairs.mean(), abs=4 * scatter)
+
+
+def test_threshold_gives_the_rate_it_was_asked_for() -> None:
+    threshold = threshold_for(0.1, 3600.0, 21)
+    assert 3600.0 * false_pairs(threshold, 21) == pytest.approx(0.1, rel=1e-3)
+    assert threshold_for(0.01, 3600.0, 21) > threshold > threshold_for(0.1, 3600.0, 100)
+
+
+@pytest.mark.parametrize("rate", [0.0, -1.0, 3600.0, float("nan")])
+def test_a_rate_no_threshold_has_is_refused(rate: float) -> None:
+    with pytest.raises(BadSetting, match="false_alarms_per_hour"):
+        threshold_for(rate, 3600.0, 21)
+
+
+def test_a_reference_too_short_for_the_rate_is_refused() -> None:
+    with pytest.raises(BadSetting, match="longer reference"):
+        threshold_for(1e-6, 3600.0, 3)

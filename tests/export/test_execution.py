@@ -1,0 +1,129 @@
+"""The exported text, executed, is the estimator of the host: every number, to the bit."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from estimator.identification.identify import Settings
+from estimator.identification.linear_model import Orders
+from estimator.identification.online.adaptation import Adaptation
+from estimator.identification.online.chain import OnlineChain
+from estimator.signals.record import FloatArray
+from hil.export.plc_estimator import PlcEstimator
+from hil.export.profiles import PROFILES, profile
+from hil.export.structured_text import Precision, structured_text
+from tests.export.drives import bad_drive, clean_drive, still_drive
+from tests.export.plc_runs import Cycles, assert_equal_bits, execute_oefo, on_host, on_plc, summed
+
+RESONANCE = np.poly([0.85 * np.exp(1.0j), 0.85 * np.exp(-1.0j)]).real
+"""A filter near the bus's own: 8 Hz at 20 ms is 1.0 rad per sample."""
+
+TRACE_REACHED = "decreasing_then_constant_trace:trace=1.0"
+"""The paper's profile with a trace that so short a drive comes down to."""
+
+
+@pytest.mark.parametrize("drive", [clean_drive(), bad_drive(), still_drive()], ids=["clean", "bad", "still"])
+@pytest.mark.parametrize("L", [RESONANCE, np.ones(1), None], ids=["fixed", "none", "adapted"])
+def test_every_number_is_the_hosts_to_the_bit(drive: Cycles, L: FloatArray | None, tmp_path: Path) -> None:
+    estimator = PlcEstimator(L=L)
+    assert_equal_bits(on_plc(estimator, drive, tmp_path), on_host(estimator, drive))
+
+
+@pytest.mark.parametrize(
+    ("orders", "cycle_s", "sample_time_s"),
+    [
+        (Orders(4, 4, 1), 0.02, 0.02),  # nothing to decimate: a low-pass of one tap
+        (Orders(2, 3, 0), 0.01, 0.02),
+        (Orders(3, 2, 5), 0.005, 0.02),
+        (Orders(0, 6, 1), 0.01, 0.01),  # no poles at all
+        (Orders(1, 1, 1), 0.01, 0.04),
+        (Orders(7, 5, 2), 0.01, 0.02),
+    ],
+    ids=str,
+)
+def test_orders_delay_and_periods_are_free(
+    orders: Orders, cycle_s: float, sample_time_s: float, tmp_path: Path
+) -> None:
+    estimator = PlcEstimator(Settings(orders=orders, sample_time_s=sample_time_s), cycle_s)
+    assert_equal_bits(on_plc(estimator, bad_drive(), tmp_path), on_host(estimator, bad_drive()))
+
+
+@pytest.mark.parametrize("name", PROFILES)
+def test_every_adaptation_profile(name: str, tmp_path: Path) -> None:
+    estimator = PlcEstimator(Settings(adaptation=profile(name)), L=RESONANCE)
+    assert_equal_bits(on_plc(estimator, bad_drive(), tmp_path), on_host(estimator, bad_drive()))
+
+
+def test_forgetting_without_excitation_ends_at_the_first_gain(tmp_path: Path) -> None:
+    adaptation: Adaptation = profile("constant_forgetting:lambda1=0.8")
+    estimator = PlcEstimator(Settings(adaptation=adaptation), L=RESONANCE)
+    assert_equal_bits(on_plc(estimator, still_drive(), tmp_path), on_host(estimator, still_drive()))
+
+
+def test_a_trace_that_is_reached_and_held(tmp_path: Path) -> None:
+    estimator = PlcEstimator(Settings(adaptation=profile(TRACE_REACHED)), L=RESONANCE)
+    host = estimator.oefo()
+    kept = estimator.decimator().run(*summed(bad_drive()))
+    host.run(kept.u, kept.y, kept.okay)
+    assert np.trace(host.F) == pytest.approx(1.0)
+    assert_equal_bits(on_plc(estimator, bad_drive(), tmp_path), on_host(estimator, bad_drive()))
+
+
+@pytest.mark.parametrize("L", [RESONANCE, None], ids=["fixed", "adapted"])
+def test_the_estimator_alone_without_the_decimator_to_hold_bad_values(L: FloatArray | None, tmp_path: Path) -> None:
+    estimator = PlcEstimator(Settings(adaptation=profile(TRACE_REACHED)), L=L)
+    u, y, okay = summed(bad_drive())
+    plc = execute_oefo(structured_text(estimator), u, y, okay, tmp_path)
+    assert_equal_bits(plc, estimator.oefo().run(u, y, okay))
+
+
+def test_it_does_what_the_chain_of_a_run_does(tmp_path: Path) -> None:
+    drive = bad_drive()
+    estimator = PlcEstimator(L=RESONANCE)
+    chain = OnlineChain(estimator.settings, estimator.cycle_s, estimator.L)
+    times = 0.01 * np.arange(drive.okay.shape[0])
+    estimates = chain.run_block(times, *summed(drive)).estimates
+    assert_equal_bits(on_plc(estimator, drive, tmp_path), estimates)
+
+
+def test_a_reset_forgets_everything(tmp_path: Path) -> None:
+    drive, at = bad_drive(), 1001  # in the middle of a sample of the model
+    estimator = PlcEstimator(L=None)
+    kept = on_plc(estimator, drive, tmp_path, reset_at=at)
+    rest = Cycles(*(array[at:] for array in vars(drive).values()))
+    before = (at + 1) // 2
+    after = replace(kept, **{name: values[before:] for name, values in vars(kept).items()})
+    assert_equal_bits(after, on_host(estimator, rest))
+
+
+def test_what_is_undetermined_is_named_as_on_the_host(tmp_path: Path) -> None:
+    for drive, expected in ((clean_drive(), False), (still_drive(), True)):
+        estimator = PlcEstimator(L=RESONANCE)
+        host = estimator.oefo()
+        kept = estimator.decimator().run(*summed(drive))
+        host.run(kept.u, kept.y, kept.okay)
+        weak = on_plc(estimator, drive, tmp_path).undetermined[-1]
+        names = np.array(estimator.settings.orders.names)[weak].tolist()
+        assert names == list(host.undetermined)
+        assert bool(names) is expected
+
+
+@pytest.mark.parametrize("L", [RESONANCE, None], ids=["fixed", "adapted"])
+def test_in_single_precision_no_number_is_lost_and_the_model_is_the_same(L: FloatArray | None, tmp_path: Path) -> None:
+    estimator, drive = PlcEstimator(L=L), bad_drive()
+    plc, host = on_plc(estimator, drive, tmp_path, Precision.SINGLE), on_host(estimator, drive)
+    assert np.isfinite(plc.theta).all()
+    assert np.isfinite(plc.errors).all()
+    assert np.array_equal(plc.used, host.used)
+    model = estimator.oefo().model(0.02)
+    frequency_hz = np.linspace(2.0, 25.0, 50)
+    single, double = (
+        type(model).from_theta(theta.astype(float), model.orders, 0.02).response(frequency_hz)
+        for theta in (plc.theta[-1], host.theta[-1])
+    )
+    # A hundredth of the 1 dB the two estimates of one drive may differ by: rounding must not count beside noise.
+    assert np.abs(20.0 * np.log10(np.abs(single / double))).max() < 0.01 * 1.0

@@ -1,0 +1,160 @@
+"""The rig's process: what it sends, what it keeps, and what it does when the view is gone."""
+
+from __future__ import annotations
+
+import multiprocessing
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from datetime import UTC, datetime
+from multiprocessing.connection import Connection
+from pathlib import Path
+
+from hil.config.rig_file import read_rig
+from hil.monitor.host import Job, SessionStop
+from hil.monitor.messages import Ended, Health, Kind, Notice, Over, Ready, Report, Reset, Samples, Start
+from hil.monitor.outbox import Outbox
+from hil.monitor.recorded_run import recording_path
+from hil.monitor.source import RigSource
+from hil.rig.addresses import with_addresses
+from hil.rig.experiments.base import Phase
+from tests.monitor.fake_source import sample
+from tests.rig.serving import served
+
+PATIENCE_S = 60.0
+
+
+@contextmanager
+def hosted(rig_path: Path, out: Path) -> Iterator[tuple[RigSource, list[Report]]]:
+    """Run the rig's process against a rig served here; reports gather in the list by `await_report`."""
+    with served(read_rig(rig_path), bus_url="ws://127.0.0.1:0/") as (server, rig):
+        job = Job(rig_path, with_addresses(rig, server.bus_url, str(server.modbus)), out)
+        with RigSource(job) as source:
+            yield source, []
+
+
+def await_report(source: RigSource, seen: list[Report], kind: type[Report]) -> Report:
+    until = time.monotonic() + PATIENCE_S
+    while time.monotonic() < until:
+        seen += source.poll()
+        found = [report for report in seen if isinstance(report, kind)]
+        if found:
+            return found[-1]
+        time.sleep(0.02)
+    raise AssertionError(f"no {kind} in {[type(report).__name__ for report in seen]}")
+
+
+def test_it_listens_tells_its_health_and_resets(rig_path: Path, tmp_path: Path) -> None:
+    with hosted(rig_path, tmp_path) as (source, seen):
+        health = await_report(source, seen, Health)
+        assert isinstance(health, Health)
+        assert health.m1.power == "switch on disabled"
+        samples = await_report(source, seen, Samples)
+        assert isinstance(samples, Samples)
+        assert {phase for _, phase in samples.rows} == {None}
+        seen.clear()
+        source.send(Reset())
+        assert await_report(source, seen, Ready) == Ready()
+        source.send(Start("no such experiment"))
+        over = await_report(source, seen, Over)
+        assert isinstance(over, Over)
+        assert "cruise, reversal, tip" in str(over.reason)
+    assert list(source.poll())[-1] == Ended()
+
+
+def test_a_store_that_can_not_be_used_costs_no_recording(rig_path: Path, tmp_path: Path) -> None:
+    out = tmp_path / "runs"
+    out.mkdir()
+    (out / "runs.sqlite").write_bytes(b"no database" * 1000)
+    with hosted(rig_path, out) as (source, seen):
+        await_report(source, seen, Ready)
+        source.send(Start("cruise"))
+        until = time.monotonic() + PATIENCE_S
+        while len(measured_samples(seen)) < 20:
+            assert time.monotonic() < until
+            seen += source.poll()
+            time.sleep(0.02)
+    seen += source.poll()
+    over = next(report for report in seen if isinstance(report, Over))
+    assert over.stopped
+    assert over.recording is not None
+    assert Path(over.recording).exists()
+    assert over.run_id is None
+    assert any(isinstance(report, Notice) and report.kind is Kind.FAULT for report in seen)
+
+
+def measured_samples(seen: list[Report]) -> list[object]:
+    rows = [row for report in seen if isinstance(report, Samples) for row in report.rows]
+    return [row for row, phase in rows if phase is Phase.MEASURE]
+
+
+def test_the_outbox_keeps_the_last_samples_and_says_how_many_are_lost() -> None:
+    near, far = multiprocessing.Pipe()
+    outbox = Outbox(far, kept_samples=10)
+    for k in range(25):
+        outbox.sample(sample(k), None)
+    outbox.tell(Ready())
+    with outbox:
+        sent = near.recv()
+        assert [row.cycle for row, _ in sent.rows] == list(range(15, 25))
+        assert sent.lost == 15
+        assert near.recv() == Ready()
+        outbox.sample(sample(25), None)
+        again = near.recv()
+        assert (len(again.rows), again.lost) == (1, 0)
+
+
+def test_a_view_that_is_gone_does_not_keep_the_cycle_waiting() -> None:
+    near, far = multiprocessing.Pipe()
+    near.close()
+    with Outbox(far) as outbox:
+        for k in range(1000):
+            outbox.sample(sample(k), None)
+    assert not any(thread.name == "to the view" for thread in threading.enumerate())
+
+
+def test_a_view_that_takes_nothing_does_not_keep_the_cycle_waiting() -> None:
+    near, far = multiprocessing.Pipe()
+    with Outbox(far, kept_samples=100) as outbox:
+        for _ in range(20):
+            for k in range(2000):
+                outbox.sample(sample(k), None)
+            time.sleep(0.06)  # the sender sends, until the pipe is full
+        drain(near)
+
+
+def drain(near: Connection) -> None:
+    """Take everything, so that the sender comes to its end."""
+
+    def take() -> None:
+        with suppress(EOFError, OSError):
+            while near.poll(1.0):
+                near.recv()
+
+    threading.Thread(target=take, daemon=True).start()
+
+
+def test_the_end_of_a_session_ends_its_run_and_those_that_would_begin() -> None:
+    session = SessionStop()
+    session.stop_run()  # nothing runs: nothing happens
+    with session.of_run() as stop:
+        assert not stop.requested
+        session.stop_run()
+        assert stop.requested
+    assert not session.requested
+    with session.of_run() as stop:
+        session.request()
+        assert stop.requested
+    with session.of_run() as stop:
+        assert stop.requested
+
+
+def test_recordings_never_share_a_name(tmp_path: Path) -> None:
+    now = datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
+    names = []
+    for _ in range(3):
+        path = recording_path(tmp_path, "cruise", now)
+        path.touch()
+        names.append(path.name)
+    assert names == [f"cruise-20260102-030405{suffix}.parquet" for suffix in ("", "-2", "-3")]

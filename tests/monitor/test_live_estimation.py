@@ -1,0 +1,100 @@
+"""The on-line chain behind the view: the same figures as the chain by itself, in whatever portions samples come."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from estimator.physics.twist import Shaft
+from hil.monitor.live_estimation import LiveEstimation
+from hil.rig.live import LiveEstimate, tracking_chain
+from hil.rig.sample import Sample, SampleFlag
+from hil.simulator.simulation_model import DEFAULT_BUS
+from tests.monitor.fake_source import sample
+from tests.monitor.two_mass import PERIOD_S, driven
+
+CYCLES = 2500
+RESONANCE_HZ, DAMPING = 8.22, 0.057
+"""Of the default bus (hil.simulator.simulation_model)."""
+
+
+@pytest.fixture(scope="module")
+def rows() -> list[Sample]:
+    """Samples of the default bus under a PRBS, with the bus's own noise."""
+    shaft = Shaft.of_model(DEFAULT_BUS, "test")
+    assert shaft is not None
+    drive = driven(shaft, CYCLES, seed=1, speed_std_rad_s=0.05)
+    pairs = zip(drive.torque_nm.tolist(), drive.speed_rad_s.tolist(), strict=True)
+    return [sample(k, torque, speed) for k, (torque, speed) in enumerate(pairs)]
+
+
+def fed(rows: list[Sample], portion: int) -> LiveEstimation:
+    live = LiveEstimation(PERIOD_S)
+    live.begin()
+    for at in range(0, len(rows), portion):
+        live.take(rows[at : at + portion])
+    return live
+
+
+def test_portions_do_not_matter_and_a_run_says_the_same(rows: list[Sample]) -> None:
+    alone = LiveEstimate(tracking_chain(PERIOD_S))
+    for row in rows:
+        alone(row)
+    assert alone.latest is not None
+    for portion in (7, 100, CYCLES):
+        seen = fed(rows, portion).look(rows[-1].t_ns)
+        assert alone.latest.resonance is not None
+        assert seen.resonance_hz == alone.latest.resonance.frequency_hz
+        assert seen.resonance_std_hz == alone.latest.frequency_std_hz
+        assert seen.damping == alone.latest.resonance.damping
+
+
+def test_the_resonance_is_that_of_the_line(rows: list[Sample]) -> None:
+    seen = fed(rows, 10).look(rows[-1].t_ns)
+    assert seen.status == "estimated"
+    assert seen.resonance_hz == pytest.approx(RESONANCE_HZ, rel=0.01)
+    assert seen.damping == pytest.approx(DAMPING, rel=0.15)
+    assert seen.model is not None
+    peak_hz = seen.model.frequency_hz[np.argmax(seen.model.gain)]
+    assert peak_hz == pytest.approx(RESONANCE_HZ, rel=0.03)
+    assert seen.history.time_s[-1] <= 0.0
+    assert len(seen.model.trail) >= 4
+
+
+def test_what_a_flagged_sample_says_does_not_matter(rows: list[Sample]) -> None:
+    def lost(torque_nm: float, speed_rad_s: float) -> float:
+        stale = SampleFlag.M1_STALE
+        changed = [sample(r.cycle, torque_nm, speed_rad_s, flags=stale) if r.cycle % 200 == 7 else r for r in rows]
+        return fed(changed, 10).look(0).resonance_hz
+
+    assert lost(9e3, 9e3) == lost(0.0, -1.0) == pytest.approx(RESONANCE_HZ, rel=0.02)
+
+
+def test_samples_wait_until_the_chain_is_compiled(rows: list[Sample]) -> None:
+    ready = False
+    live = LiveEstimation(PERIOD_S, is_ready=lambda: ready)
+    live.begin()
+    live.take(rows[:1000])
+    assert "being compiled" in live.look(0).status
+    ready = True
+    live.take(rows[1000:])
+    assert live.look(0).resonance_hz == fed(rows, 10).look(0).resonance_hz
+
+
+def test_the_history_outlives_a_run_and_the_trail_does_not(rows: list[Sample]) -> None:
+    live = fed(rows, 10)
+    points = len(live.look(0).history.time_s)
+    live.end()
+    live.begin()
+    seen = live.look(0)
+    assert len(seen.history.time_s) == points > 10
+    assert seen.model is None
+    assert seen.status == "waits for samples"
+
+
+def test_a_period_the_models_have_no_multiple_of_is_told() -> None:
+    live = LiveEstimation(0.003)
+    live.begin()
+    live.take([sample(0)])
+    assert "no estimate" in live.look(0).status
+    assert "0.003" in live.look(0).status

@@ -1,0 +1,89 @@
+"""Text plots: dots where the values are, axes that hold them, lines that fit."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hil.monitor.braille import Canvas, envelope
+from hil.monitor.plot import AXIS, Range, nice_range, number, strip, title
+from hil.monitor.ring import Ring
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "shown"),
+    [(0, 0, "⠁"), (1, 0, "⠈"), (0, 1, "⠂"), (0, 3, "⡀"), (1, 3, "⢀")],  # Unicode: dots 1, 4, 2, 7, 8
+)
+def test_each_dot_of_a_cell(x: int, y: int, shown: str) -> None:
+    canvas = Canvas(1, 1)
+    canvas.dot(x, y)
+    assert canvas.lines() == [shown]
+
+
+def test_outside_the_canvas_nothing_is_drawn() -> None:
+    canvas = Canvas(2, 1)
+    for x, y in ((-1, 0), (4, 0), (0, 4), (math.nan, 0), (0, math.inf)):
+        canvas.dot(x, y)
+    canvas.bar(9, 0, 3)
+    assert canvas.lines() == ["  "]
+
+
+def test_a_rising_line_rises() -> None:
+    x = np.linspace(0.0, 1.0, 50)
+    lines = strip(x, x, Range(0.0, 1.0), Range(0.0, 1.0), AXIS + 10, 5)
+    rows = [next(row for row, line in enumerate(lines) if line[AXIS + column] != " ") for column in range(10)]
+    assert rows == sorted(rows, reverse=True)
+    assert (rows[0], rows[-1]) == (4, 0)
+
+
+def test_an_envelope_shows_a_single_peak_among_many_samples() -> None:
+    y = np.zeros(10_000)
+    y[4321] = 7.0
+    found = envelope(np.linspace(0.0, 99.0, y.size), y, 100)
+    assert max(high for _, _, high in found) == 7.0
+    assert [column for column, _, _ in found] == list(range(100))
+
+
+def test_a_gap_stays_a_gap() -> None:
+    y = np.array([1.0, math.nan, math.nan, math.nan, 1.0])
+    assert [column for column, _, _ in envelope(np.arange(5.0), y, 5)] == [0, 4]
+
+
+@given(
+    st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=20),
+    st.floats(1e-3, 1e3),
+)
+def test_an_axis_holds_all_values_and_not_much_more(values: list[float], least: float) -> None:
+    y_range = nice_range(np.array(values), least)
+    span = max(max(values) - min(values), least)
+    slack = 1e-6 * max(1.0, *(abs(value) for value in values))
+    assert y_range.low <= min(values) + slack
+    assert y_range.high >= max(values) - slack
+    assert y_range.high - y_range.low <= 1.7 * span + slack  # two steps of at most 2.5 eighths each, at most
+
+
+def test_nothing_known_has_an_axis_all_the_same() -> None:
+    assert nice_range(np.array([math.nan]), 10.0) == Range(-6.0, 6.0)
+
+
+@given(st.floats(allow_nan=True, allow_infinity=True))
+def test_numbers_fit_the_axis(value: float) -> None:
+    assert len(number(value)) <= 7
+
+
+@given(st.text("ab ", max_size=100), st.text("0123", max_size=20), st.integers(0, 100))
+def test_a_title_has_the_width_it_is_given(text: str, value: str, width: int) -> None:
+    assert len(title(text, value, width)) == width
+
+
+@given(st.integers(1, 30), st.integers(0, 200))
+def test_a_ring_keeps_the_last_rows(length: int, rows: int) -> None:
+    ring = Ring(length, 2)
+    for k in range(rows):
+        ring.append((float(k), float(-k)))
+    kept = np.arange(max(0, rows - length), rows, dtype=float)
+    np.testing.assert_array_equal(ring.rows(), np.column_stack([kept, -kept]))

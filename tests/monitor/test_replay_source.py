@@ -1,0 +1,102 @@
+"""A recording or a bus trace in place of a rig."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hil.config.rig_file import read_rig
+from hil.errors import RecordingError, UsageError
+from hil.monitor.messages import Began, Over, Report, Samples
+from hil.monitor.opening import open_recording
+from hil.monitor.replay_source import ReplaySource, recorded_samples
+from hil.recording.writer import RecordingWriter
+from hil.rig.build import open_devices
+from hil.rig.experiments.base import Phase
+from hil.rig.sample import Sample, SampleFlag
+from hil.rig.trace import BusTrace
+from tests.monitor.fake_source import sample
+from tests.rig.serving import Samples as Recorded
+from tests.rig.serving import run, served
+
+SAMPLES = [sample(k, 0.5 * k, 0.1 * k, 120.0, SampleFlag(k % 7 == 3)) for k in range(100)]
+
+
+class Clock:
+    """A clock that is set by hand."""
+
+    def __init__(self) -> None:
+        self.now_ns = 5_000_000_000
+
+    def __call__(self) -> int:
+        return self.now_ns
+
+    def forward(self, seconds: float) -> None:
+        self.now_ns += round(seconds * 1e9)
+
+
+def samples_in(reports: list[Report]) -> list[Sample]:
+    return [row for report in reports if isinstance(report, Samples) for row, _ in report.rows]
+
+
+@pytest.mark.parametrize("speed", [1.0, 4.0])
+def test_samples_come_when_they_are_due(speed: float) -> None:
+    clock = Clock()
+    with ReplaySource("r", SAMPLES, speed, clock_ns=clock) as source:
+        first = list(source.poll())
+        assert first[0] == Began("", "r", SAMPLES[-1].time_s)
+        assert samples_in(first) == SAMPLES[:1]
+        clock.forward(0.2 / speed)
+        assert samples_in(list(source.poll())) == SAMPLES[1:21]
+        clock.forward(10.0)
+        last = list(source.poll())
+        assert samples_in(last) == SAMPLES[21:]
+        assert isinstance(last[-1], Over)
+        assert last[-1].flagged == sum(bool(row.flags) for row in SAMPLES)
+        assert list(source.poll()) == []
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+def test_a_recording_comes_back_as_the_samples_it_is_of(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"r{suffix}"
+    with RecordingWriter(path) as writer:
+        for row in SAMPLES:
+            writer.append(row)
+    assert recorded_samples(path) == SAMPLES
+
+
+def test_a_recording_of_the_four_columns_will_do(tmp_path: Path) -> None:
+    path = tmp_path / "r.csv"
+    path.write_text("time_s,torque_m1_nm,torque_m2_nm,speed_rad_s\n0,1,2,3\n0.01,1,2,nan\n", encoding="utf-8")
+    first, second = recorded_samples(path)
+    assert (first.torque_m1_nm, first.torque_m2_nm, first.speed_rad_s, first.prbs_nm) == (1.0, 2.0, 3.0, 0.0)
+    assert np.isnan(second.speed_rad_s)
+
+
+@pytest.mark.parametrize(
+    ("rows", "said"),
+    [("0,1,2,3\n0,1,2,3\n", "rise"), ("0,1,2,3\n", "came 1"), ("0,1,2,x\n", "column speed_rad_s")],
+)
+def test_a_recording_that_can_not_be_played_is_refused(tmp_path: Path, rows: str, said: str) -> None:
+    path = tmp_path / "r.csv"
+    path.write_text(f"time_s,torque_m1_nm,torque_m2_nm,speed_rad_s\n{rows}", encoding="utf-8")
+    with pytest.raises(RecordingError, match=said):
+        open_recording(path, None, 1.0, None)
+
+
+def test_a_bus_trace_is_played_with_its_rig_file_and_refused_without(rig_path: Path, tmp_path: Path) -> None:
+    trace, recorded = tmp_path / "run.blf", Recorded()
+    with served() as (_, rig), open_devices(rig) as devices, BusTrace(trace) as tap:
+        devices.link.trace_by(tap.take)
+        run(rig, devices, recorded)
+        devices.link.trace_by(None)
+    with pytest.raises(UsageError, match=r"run\.blf"):
+        open_recording(trace, None, 1.0, None)
+    opening = open_recording(trace, read_rig(rig_path), 1e6, None)
+    with opening.source:
+        reports = list(opening.source.poll())
+    rows = [row for report in reports if isinstance(report, Samples) for row in report.rows]
+    assert len(rows) > len(recorded.rows)  # what was before and after it, too
+    assert [row.torque_m1_nm for row, phase in rows if phase is Phase.MEASURE] == recorded.column("torque_m1_nm")

@@ -1,0 +1,83 @@
+"""What can't be watched is refused before the screen is taken, with its status and what to do."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from hil.cli.main import run
+from tests.monitor.terminal import LEAVE_SCREEN, Terminal
+
+NOWHERE = ("--bus", "ws://127.0.0.1:9/", "--modbus", "127.0.0.1:9")
+PICTURE = ("--snapshot", "picture.svg")
+
+pytestmark = pytest.mark.timeout(300)
+
+
+def test_without_a_terminal(rig_path: Path) -> None:
+    command = [sys.executable, "-m", "hil", "monitor", str(rig_path)]
+    ended = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True)
+    assert ended.returncode == 2
+    assert "expected a terminal" in ended.stderr
+    assert "ssh -t" in ended.stderr
+    assert ended.stdout == ""
+
+
+@pytest.mark.parametrize(("columns", "rows"), [(79, 24), (80, 23)])
+def test_a_terminal_that_is_too_small(rig_path: Path, columns: int, rows: int) -> None:
+    with Terminal("monitor", str(rig_path), columns=columns, rows=rows) as terminal:
+        assert terminal.await_end() == 2
+        assert f"at least 80 x 24, came {columns} x {rows}" in " ".join(terminal.text.split())
+        assert LEAVE_SCREEN not in terminal.output  # it was never taken
+
+
+def test_a_rig_that_is_not_there(rig_path: Path, tmp_path: Path) -> None:
+    with Terminal("monitor", str(rig_path), *NOWHERE, "--out", str(tmp_path / "runs")) as terminal:
+        assert terminal.await_end() == 3
+        assert LEAVE_SCREEN in terminal.output
+        assert terminal.settings == terminal.settings_before
+        assert "ws://127.0.0.1:9/" in terminal.text
+    assert not (tmp_path / "runs").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ((), "rig file to watch, or --replay"),
+        (("RIG", "--page", "poles"), "overview, model, resonance, bus, log"),
+        (("RIG", "--size", "80"), "COLSxROWS"),
+        (("RIG", "--replay", "r.csv", "--simulate"), "came both"),
+        (("RIG", "--replay", "r.csv"), "r.csv"),
+        (("RIG", "--model", "one_mass.toml"), "two_mass"),
+        (("RIG", "--out", "rig.toml"), "is a file"),
+        (("RIG", "--modbus", "nowhere"), "HOST:PORT"),
+        (("NO_SIMULATION", "--simulate"), "[simulation]"),
+    ],
+)
+def test_wrong_use(
+    rig_path: Path,
+    arguments: tuple[str, ...],
+    said: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(rig_path.parent)
+    text = rig_path.read_text(encoding="utf-8")
+    Path("real.toml").write_text(text[: text.index("\n[simulation]")], encoding="utf-8")
+    Path("one_mass.toml").write_text(
+        'schema = "hil.model/1"\nstructure = "one_mass"\n[parameters]\n'
+        "J_M = { value = 1.0, tolerance = 0.1 }\nb_M = { value = 0.1, tolerance = 0.1 }\n",
+        encoding="utf-8",
+    )
+    names = {"RIG": "rig.toml", "NO_SIMULATION": "real.toml"}
+    assert run(["monitor", *(names.get(word, word) for word in arguments), *PICTURE]) == 2
+    assert said in capsys.readouterr().err
+    assert not Path("picture.svg").exists()
+
+
+def test_a_picture_into_a_folder_that_is_not_there(rig_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["monitor", str(rig_path), "--snapshot", "no/such/folder.svg"]) == 2
+    assert "no/such" in capsys.readouterr().err

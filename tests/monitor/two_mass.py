@@ -1,0 +1,57 @@
+"""A two-mass driveline under a PRBS, discretised by scipy: the truth that the monitor's figures are held against."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import cont2discrete
+
+from estimator.physics.twist import Shaft
+from estimator.signals.prbs import Prbs
+
+FloatArray = NDArray[np.float64]
+
+PERIOD_S = 0.01
+
+
+@dataclass(frozen=True)
+class Drive:
+    """Torque, motor speed and twist of every cycle, shape (n,) each."""
+
+    torque_nm: FloatArray
+    speed_rad_s: FloatArray
+    twist_rad: FloatArray
+
+
+def driven(
+    shaft: Shaft,
+    n: int,
+    seed: int,
+    speed_std_rad_s: float = 0.0,
+    torque_std_nm: float = 0.0,
+    load_nm_per_sqrt_s: float = 0.0,
+) -> Drive:
+    """Drive the line at rest by a PRBS; what acts differs from the torque read by white noise, the load walks."""
+    s = shaft
+    A = np.array(
+        [
+            [-(s.c + s.b_M) / s.J_M, s.c / s.J_M, -s.k / s.J_M],
+            [s.c / s.J_L, -(s.c + s.b_L) / s.J_L, s.k / s.J_L],
+            [1.0, -1.0, 0.0],
+        ]
+    )
+    B = np.array([[1.0 / s.J_M, 0.0], [0.0, -1.0 / s.J_L], [0.0, 0.0]])
+    F, G, *_ = cont2discrete((A, B, np.eye(3), np.zeros((3, 2))), PERIOD_S)
+    rng = np.random.default_rng(seed)
+    prbs = Prbs(120.0, clock_divider=2)
+    torque_nm = np.array([prbs.next() for _ in range(n)])
+    acting = torque_nm + torque_std_nm * rng.standard_normal(n)
+    load = np.cumsum(load_nm_per_sqrt_s * np.sqrt(PERIOD_S) * rng.standard_normal(n))
+    x = np.zeros(3)
+    states = np.empty((n, 3))
+    for k in range(n):
+        states[k] = x
+        x = F @ x + G @ np.array([acting[k], load[k]])
+    return Drive(torque_nm, states[:, 0] + speed_std_rad_s * rng.standard_normal(n), states[:, 2])

@@ -1,0 +1,173 @@
+"""Damaged recordings of every format: refused by name with what was expected, or read as they were; never wrong."""
+
+from __future__ import annotations
+
+import random
+import resource
+import shutil
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from hil.errors import RecordingError
+from hil.recording import RecordingWriter, Table, read_table, write_table
+from hil.recording.checksum import CHECKSUM, data_sha256, text_sha256
+from hil.recording.differences import losses
+from hil.recording.formats import FORMATS, read_metadata
+from hil.recording.kinds import as_text
+from hil.recording.sidecar import sidecar_of
+
+WRITABLE = [suffix for suffix, form in FORMATS.items() if form.write]
+
+TRIALS = {".mf4": 3}
+"""A damaged MDF file is read by a process of its own, which takes a second; the others take milliseconds."""
+
+
+@pytest.fixture
+def told(own_table: Table) -> Table:
+    """A recording that says something of itself, with a text column: where MDF's own parser can be led astray."""
+    columns = {**own_table.columns, "gear": as_text([f"gear {k % 5}" for k in range(own_table.n_rows)])}
+    rig = 'name = "bench"\n' * 20
+    return Table(
+        own_table.path, columns, own_table.units, {"rig_file": rig, "rig_sha256": text_sha256(rig), "experiment": "tip"}
+    )
+
+
+def damaged(whole: bytes, dice: random.Random) -> bytes:
+    place = dice.randrange(len(whole))
+    return dice.choice(
+        [
+            whole[:place],
+            whole[:place] + bytes([whole[place] ^ 1 << dice.randrange(8)]) + whole[place + 1 :],
+            whole[:place] + dice.randbytes(32) + whole[place + 32 :],
+            whole[:place] + whole[place + 1 :],
+        ]
+    )
+
+
+@pytest.mark.parametrize("suffix", WRITABLE)
+def test_a_damaged_recording_is_refused_or_read_as_it_was(tmp_path: Path, told: Table, suffix: str) -> None:
+    path, dice = tmp_path / f"run{suffix}", random.Random(4)
+    write_table(told, path)
+    whole = path.read_bytes()
+    trials = TRIALS.get(suffix, 60)
+    read = []
+    for _ in range(trials):
+        path.write_bytes(damaged(whole, dice))
+        read.append(read_or_refusal(path))
+    refusals = [found for found in read if isinstance(found, str)]
+    assert all(str(path) in refusal for refusal in refusals)
+    assert len(refusals) > trials / 2
+    for table in read:
+        if not isinstance(table, str):
+            assert [loss for loss in losses(told, table) if loss.startswith("column")] == []
+            assert table.metadata.get("rig_file") == told.metadata["rig_file"]
+
+
+def read_or_refusal(path: Path) -> Table | str:
+    try:
+        return read_table(path)
+    except RecordingError as refusal:
+        return str(refusal)
+
+
+def test_a_csv_changed_by_hand_is_refused_with_both_checksums(tmp_path: Path, told: Table) -> None:
+    path = tmp_path / "run.csv"
+    write_table(told, path)
+    expected = read_metadata(path)[CHECKSUM]
+    table = read_table(path)
+    path.write_text(path.read_text(encoding="utf-8").replace("gear 3", "gear 9", 1), encoding="utf-8")
+    came = data_sha256({**table.columns, "gear": as_text([*table.columns["gear"].tolist()[:3], "gear 9"])})
+    with pytest.raises(RecordingError, match=rf"SHA-256 {expected[:12]}…, came (?!{came[:12]})\w+….*run\.csv\.json"):
+        read_table(path)
+    sidecar_of(path).unlink()  # the cure the message gives
+    assert read_table(path).columns["gear"][3] == "gear 9"
+
+
+def test_a_rig_file_that_was_changed_in_the_description_is_refused(tmp_path: Path, told: Table) -> None:
+    path = tmp_path / "run.csv"
+    write_table(told, path)
+    beside = sidecar_of(path)
+    beside.write_text(beside.read_text(encoding="utf-8").replace("bench", "bus 17", 1), encoding="utf-8")
+    with pytest.raises(RecordingError, match="expected the rig file it was recorded with, SHA-256"):
+        read_table(path)
+
+
+def test_the_checksum_knows_cells_names_and_kinds_and_nothing_else(told: Table) -> None:
+    columns = dict(told.columns)
+    checksum = data_sha256(columns)
+    assert data_sha256(dict(reversed(columns.items()))) == checksum
+    time_s = columns["time_s"]
+    others = (
+        columns | {"time_s": time_s + 1e-9},
+        columns | {"time_s": time_s[:-1]},
+        columns | {"flags": columns["flags"] == 1},
+        columns | {"flags": columns["flags"].astype(float)},
+        {("t" if name == "time_s" else name): column for name, column in columns.items()},
+        columns | {"gear": as_text(["gear", " 0", *columns["gear"].tolist()[2:]])},
+    )
+    assert len({checksum, *(data_sha256(other) for other in others)}) == len(others) + 1
+
+
+@pytest.mark.parametrize("suffix", WRITABLE)
+@pytest.mark.parametrize(
+    "content", [b"", b"PAR1", b"MDF     4.10", b"MATLAB 7.3 MAT-file", b"\x89HDF\r\n\x1a\n", b"\xff"]
+)
+def test_what_is_no_recording_is_refused_by_name(tmp_path: Path, suffix: str, content: bytes) -> None:
+    path = tmp_path / f"run{suffix}"
+    path.write_bytes(content)
+    with pytest.raises(RecordingError, match=rf"run{suffix}: .*expected"):
+        read_table(path)
+
+
+@contextmanager
+def largest_file(n_bytes: int) -> Iterator[None]:
+    """Let no file of this process grow beyond: what a full disk does, without one."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (n_bytes, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        signal.signal(signal.SIGXFSZ, handler)
+
+
+@pytest.mark.parametrize("suffix", WRITABLE)
+@pytest.mark.parametrize("existing", [False, True])
+def test_a_full_disk_leaves_what_was_there(tmp_path: Path, told: Table, suffix: str, existing: bool) -> None:
+    path = tmp_path / f"run{suffix}"
+    old = replace(told, metadata={"experiment": "old"})
+    if existing:
+        write_table(old, path)
+    before = {file.name: file.read_bytes() for file in tmp_path.iterdir()}
+    refusal = pytest.raises(RecordingError, match=rf"run{suffix}.*: expected room for the .*, came: .*File too large")
+    with refusal, largest_file(1000):
+        write_table(told, path, replace=True)
+    assert {file.name: file.read_bytes() for file in tmp_path.iterdir()} == before
+
+
+def test_a_full_disk_at_the_end_of_a_run_costs_the_description_and_no_sample(tmp_path: Path) -> None:
+    from tests.recording.test_writer import sample
+
+    def run() -> None:
+        with largest_file(50_000), RecordingWriter(tmp_path / "run.csv", {"note": "x" * 100_000}) as writer:
+            for k in range(20):
+                writer.append(sample(k))
+
+    with pytest.raises(RecordingError, match=r"run\.csv\.json: expected room for the description"):
+        run()
+    assert [path.name for path in tmp_path.iterdir()] == ["run.csv"]
+    assert read_table(tmp_path / "run.csv").n_rows == 20
+
+
+def test_a_folder_that_can_not_be_written_is_told(tmp_path: Path, told: Table) -> None:
+    (tmp_path / "taken.h5").mkdir()
+    with pytest.raises(RecordingError, match="came a folder"):
+        write_table(told, tmp_path / "taken.h5", replace=True)
+    shutil.rmtree(tmp_path / "taken.h5")
+    assert list(tmp_path.iterdir()) == []

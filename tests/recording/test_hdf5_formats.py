@@ -1,0 +1,155 @@
+"""HDF5 and MATLAB v7.3: what other programs find in a file of ours, and what is read of theirs."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from hil.errors import RecordingError
+from hil.recording import SignalsConfig, Table, read_record, read_table, write_table
+from hil.recording.formats import read_metadata
+from hil.recording.kinds import as_text
+from hil.recording.mat73_format import variable_names
+
+
+@pytest.fixture
+def mixed() -> Table:
+    return Table(
+        Path("run"),
+        {
+            "time_s": np.arange(4) * 0.01,
+            "Throttle [%]": np.arange(4),
+            "on": np.array([True, False, True, True]),
+            "gear": as_text(["", "ä", "second", "ä"]),
+        },
+        {"time_s": "s", "Throttle [%]": "%"},
+        {"experiment": "tip"},
+    )
+
+
+def test_hdf5_has_a_dataset_with_unit_for_each_column(tmp_path: Path, mixed: Table) -> None:
+    write_table(mixed, tmp_path / "run.h5")
+    with h5py.File(tmp_path / "run.h5") as file:
+        assert list(file["columns"]) == list(mixed.columns)
+        assert file["columns/time_s"][()].tolist() == mixed.columns["time_s"].tolist()
+        assert file["columns/Throttle [%]"].attrs["unit"] == "%"
+        assert file["columns/on"].dtype == np.bool_
+        assert [cell.decode() for cell in file["columns/gear"][()]] == ["", "ä", "second", "ä"]
+        assert json.loads(file["recording_json"][()])["metadata"]["experiment"] == "tip"
+
+
+def test_mat_v73_is_laid_out_as_matlab_writes_it(tmp_path: Path, mixed: Table) -> None:
+    """Header: 116 bytes of text, 8 of subsystem offset, version 0x0200 and endian indicator, then HDF5 at 512."""
+    write_table(mixed, tmp_path / "run.mat")
+    content = (tmp_path / "run.mat").read_bytes()
+    assert content[:19] == b"MATLAB 7.3 MAT-file"
+    assert content[116:128] == bytes(8) + b"\x00\x02IM"
+    assert content[512:520] == b"\x89HDF\r\n\x1a\n"
+    with h5py.File(tmp_path / "run.mat") as file:
+        classes = {name: file[name].attrs["MATLAB_class"] for name in file if name != "#refs#"}
+        assert classes == {
+            "time_s": b"double",
+            "Throttle____": b"int64",
+            "on": b"logical",
+            "gear": b"cell",
+            "recording_json": b"char",
+        }
+        assert file["time_s"].shape == (1, 4)  # a column of 4: MATLAB's order of dimensions is the other way round
+        assert (file["on"].dtype, file["on"].attrs["MATLAB_int_decode"]) == (np.uint8, 1)
+        empty, umlaut = (file[reference] for reference in file["gear"][0, :2])
+        assert (empty.attrs["MATLAB_empty"], empty[()].tolist()) == (1, [0, 0])
+        assert (umlaut.dtype, umlaut.shape, umlaut[0, 0]) == (np.uint16, (1, 1), ord("ä"))
+        assert len(file["#refs#"]) == 3  # each different text is stored once
+
+
+@pytest.mark.parametrize(
+    ("names", "variables"),
+    [
+        (["a b", "a_b", "a-b"], ["a_b", "a_b_2", "a_b_3"]),
+        (["1st", "_x", "ö"], ["x1st", "x_x", "x_"]),
+        (["recording_json"], ["recording_json_2"]),
+        (["x" * 70, "x" * 71], ["x" * 63, "x" * 53 + "_2"]),
+    ],
+)
+def test_variables_have_names_that_matlab_takes_and_tells_apart(names: list[str], variables: list[str]) -> None:
+    assert list(variable_names(names).values()) == variables
+
+
+def matlab_variable(file: h5py.File, name: str, values: np.ndarray, matlab_class: str) -> None:
+    file.create_dataset(name, data=values).attrs["MATLAB_class"] = np.bytes_(matlab_class)
+
+
+@pytest.fixture
+def theirs(tmp_path: Path) -> Path:
+    """As MATLAB's ``save -v7.3`` leaves it."""
+    path = tmp_path / "theirs.mat"
+    with h5py.File(path, "w", userblock_size=512) as file:
+        matlab_variable(file, "t", 0.01 * np.arange(30.0)[np.newaxis, :], "double")
+        matlab_variable(file, "vir", np.arange(30, dtype=np.float32)[:, np.newaxis], "single")
+        matlab_variable(file, "qm", np.arange(30.0)[np.newaxis, :], "double")
+        matlab_variable(file, "on", np.ones((1, 30), dtype=np.uint8), "logical")
+        matlab_variable(file, "other", np.arange(5.0)[np.newaxis, :], "double")
+        matlab_variable(file, "gain", np.array([[35.15]]), "double")
+        matlab_variable(file, "note", np.frombuffer("lap 2".encode("utf-16-le"), "<u2")[:, np.newaxis], "char")
+        matlab_variable(file, "matrix", np.eye(3), "double")
+    content = bytearray(path.read_bytes())
+    content[:128] = b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM"
+    path.write_bytes(content)
+    return path
+
+
+def test_a_v73_file_of_matlab_is_read(theirs: Path) -> None:
+    table = read_table(theirs)
+    assert sorted(table.columns) == ["on", "qm", "t", "vir"]
+    assert table.columns["on"].dtype == np.bool_
+    assert dict(table.metadata) == {"gain": "35.15", "note": "lap 2"} == dict(read_metadata(theirs))
+    assert sorted(remark.split(":")[0] for remark in table.remarks) == ["matrix", "other"]
+
+
+def test_a_v73_file_is_read_through_signals_of_a_model_file(theirs: Path) -> None:
+    signals = SignalsConfig.model_validate(
+        {"time": {"column": "t"}, "torque": [{"column": "vir", "scale": 35.15}], "position": {"column": "qm"}}
+    )
+    record = read_record(theirs, signals)
+    assert record.torque_nm[:, 0].tolist() == (35.15 * np.arange(30.0)).tolist()
+
+
+def test_an_hdf5_file_of_another_program_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "theirs.h5"
+    rows = np.array([(k * 0.1, k) for k in range(6)], dtype=[("time", "f8"), ("count", "u2")])
+    with h5py.File(path, "w") as file:
+        file.attrs["vehicle"] = "bus 17"
+        file["drive/speed"] = np.arange(6.0)
+        file["drive/speed"].attrs["units"] = "rad/s"
+        file["log"] = rows
+        file["words"] = np.array([b"a"] * 6)
+        file["short"] = np.arange(2.0)
+        file["picture"] = np.zeros((4, 4))
+    table = read_table(path)
+    assert sorted(table.columns) == ["drive/speed", "log/count", "log/time", "words"]
+    assert dict(table.units) == {"drive/speed": "rad/s"}
+    assert dict(table.metadata) == {"vehicle": "bus 17"}
+    assert sorted(remark.split(":")[0] for remark in table.remarks) == ["picture", "short"]
+
+
+@pytest.mark.parametrize("suffix", [".h5", ".mat"])
+def test_a_description_that_is_damaged_is_refused(tmp_path: Path, mixed: Table, suffix: str) -> None:
+    path = tmp_path / f"run{suffix}"
+    write_table(mixed, path)
+    with h5py.File(path, "r+") as file:
+        name = "columns/time_s" if suffix == ".h5" else "time_s"
+        file.move(name, f"{name}_gone")
+    with pytest.raises(RecordingError, match=r"column time_s: expected it under the name time_s, came none"):
+        read_table(path)
+    with h5py.File(path, "r+") as file:
+        if suffix == ".h5":
+            file["recording_json"][()] = b"{"
+        else:
+            file["recording_json"][0, 0] = ord("[")
+    for read in (read_table, read_metadata):
+        with pytest.raises(RecordingError, match=r"expected a description hil\.recording/1 inside, came a damaged one"):
+            read(path)

@@ -1,0 +1,158 @@
+"""MDF: what other tools find in a file of ours, and what is read of theirs."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from asammdf import MDF, Signal
+
+from hil.errors import RecordingError
+from hil.recording import SignalsConfig, Table, read_record, read_table, write_table
+from hil.recording.formats import read_metadata
+from hil.recording.mdf_seal import is_as_written, seal
+
+RIG = 'name = "bench"\n\n[guard]\n  indented = 1\n'
+
+
+@pytest.fixture
+def ours(tmp_path: Path, own_table: Table) -> Path:
+    said = {"experiment": "cruise", "started_utc": "2026-11-21T10:00:00+00:00", "rig_file": RIG, "pace": "fast"}
+    write_table(replace(own_table, metadata=said), tmp_path / "run.mf4")
+    return tmp_path / "run.mf4"
+
+
+def test_other_tools_find_one_timed_group_with_units_and_comments(ours: Path, own_table: Table) -> None:
+    with MDF(ours) as mdf:
+        assert mdf.version == "4.10"
+        assert len(mdf.groups) == 1
+        assert mdf.get_master(0).tolist() == own_table.columns["time_s"].tolist()
+        master = mdf.groups[0].channels[0]
+        assert (master.name, master.unit, master.channel_type, master.sync_type) == ("time_s", "s", 2, 1)
+        torque = mdf.get("torque_m1_nm")
+        assert (torque.unit, torque.comment) == ("Nm", "torque actual value of inverter m1 (0x6077)")
+        assert torque.samples.tolist() == own_table.columns["torque_m1_nm"].tolist()
+        assert mdf.header.start_time.isoformat() == "2026-11-21T10:00:00+00:00"
+        assert mdf.header._common_properties["experiment"] == "cruise"
+        assert mdf.header.subject == "cruise"
+        attached = {str(a.file_name): bytes(mdf.extract_attachment(k)[0]) for k, a in enumerate(mdf.attachments)}
+    assert attached["rig.toml"].decode() == RIG
+
+
+@pytest.mark.parametrize("times", [[0.0, 1.0, 1.0], [0.0, np.nan, 1.0], [2.0, 1.0, 0.0]])
+def test_a_time_that_does_not_increase_is_no_master(tmp_path: Path, times: list[float]) -> None:
+    write_table(Table(Path("a"), {"time_s": np.array(times), "x": np.arange(3.0)}), tmp_path / "a.mf4")
+    with MDF(tmp_path / "a.mf4") as mdf:
+        master = mdf.groups[0].channels[0]
+        assert (master.name, master.sync_type) == ("row", 4)
+    read = read_table(tmp_path / "a.mf4")
+    assert list(read.columns) == ["time_s", "x"]
+    np.testing.assert_array_equal(read.columns["time_s"], times)
+
+
+def test_a_recording_of_time_alone_is_kept(tmp_path: Path) -> None:
+    write_table(Table(Path("a"), {"time_s": np.arange(3.0)}), tmp_path / "a.mf4")
+    assert list(read_table(tmp_path / "a.mf4").columns) == ["time_s"]
+
+
+def test_the_checksum_of_the_file_holds_for_every_byte(ours: Path) -> None:
+    whole = ours.read_bytes()
+    assert is_as_written(whole)
+    for place in range(0, len(whole), 97):
+        assert not is_as_written(whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :])
+    assert not is_as_written(whole[:-1])
+    assert seal(b"no property in here") == b"no property in here"
+
+
+def foreign(path: Path) -> None:
+    """Two groups of one rate, one of another, an array, and samples their own file calls invalid."""
+    fast, slow = np.arange(20) * 0.01, np.arange(4) * 0.1
+    invalid = np.arange(20) % 5 == 1
+    with MDF(version="4.11") as mdf:
+        mdf.append([Signal(np.arange(4.0), slow, name="temperature", unit="°C")])
+        mdf.append(
+            [
+                Signal(np.arange(20.0), fast, name="Motor Torque", unit="Nm"),
+                Signal(np.arange(20, dtype=np.uint8), fast, name="gear"),
+                Signal(np.arange(20.0) / 3, fast, name="speed", unit="rad/s", invalidation_bits=invalid),
+            ]
+        )
+        mdf.append([Signal(np.arange(20) > 3, fast, name="clutch")])
+        mdf.append([Signal(np.arange(20.0), fast, name="gear")])
+        mdf.header.description = "second lap"
+        mdf.save(path)
+
+
+@pytest.fixture
+def theirs(tmp_path: Path) -> Path:
+    foreign(tmp_path / "theirs.mf4")
+    return tmp_path / "theirs.mf4"
+
+
+def test_of_other_programs_the_groups_of_one_time_are_the_recording(theirs: Path) -> None:
+    table = read_table(theirs)
+    assert list(table.columns) == ["time", "Motor Torque", "gear", "speed", "clutch"]
+    assert table.columns["gear"].dtype == np.int64
+    assert np.flatnonzero(np.isnan(table.columns["speed"])).tolist() == [1, 6, 11, 16]
+    assert table.units["Motor Torque"] == "Nm"
+    assert table.metadata["comment"] == "second lap"
+    assert [remark.split(":")[0] for remark in table.remarks] == ["gear", "temperature"]
+
+
+def test_a_foreign_file_is_read_through_signals_of_a_model_file(theirs: Path) -> None:
+    signals = SignalsConfig.model_validate(
+        {
+            "time": {"column": "time"},
+            "torque": [{"column": "Motor Torque", "scale": 2.0}],
+            "speed": {"column": "speed"},
+        }
+    )
+    record = read_record(theirs, signals)
+    assert record.torque_nm[:, 0].tolist() == (2.0 * np.arange(20)).tolist()
+    assert np.flatnonzero(~record.okay).tolist() == [1, 6, 11, 16]
+
+
+def test_a_file_its_writer_never_finished_is_finalised_in_a_copy(tmp_path: Path) -> None:
+    """What a logger leaves that lost its power: flags in the identification, no cycle count, no data length."""
+    path = tmp_path / "torn.mf4"
+    times = np.arange(50) * 0.01
+    with MDF(version="4.10") as mdf:
+        mdf.append([Signal(np.arange(50.0), times, name="speed", unit="rad/s")])
+        mdf.save(path)
+    with MDF(path) as mdf:
+        group, record_bytes = mdf.groups[0], 16
+        count_place = group.channel_group.address + 24 + 8 * group.channel_group.links_nr + 8
+        data_place = group.data_group.data_block_addr
+    content = bytearray(path.read_bytes())
+    assert struct.unpack_from("<Q", content, count_place) == (50,)
+    assert content[data_place : data_place + 4] == b"##DT"
+    struct.pack_into("<Q", content, count_place, 0)
+    struct.pack_into("<Q", content, data_place + 8, 24)
+    content[:8] = b"UnFinMF "
+    struct.pack_into("<H", content, 60, 0x01 | 0x04)
+    # The data block is the last of the file, as a logger has it, and its last record is torn.
+    end = data_place + 24 + 50 * record_bytes
+    data = bytes(content[data_place:end])
+    torn = bytes(content[:data_place]) + bytes(len(data)) + bytes(content[end:]) + data[:-3]
+    torn = torn.replace(struct.pack("<Q", data_place), struct.pack("<Q", len(torn) - len(data) + 3), 1)
+    path.write_bytes(torn)
+    table = read_table(path)
+    assert table.columns["speed"][:49].tolist() == np.arange(49.0).tolist()
+    assert any("never finished" in remark for remark in table.remarks)
+    assert path.read_bytes() == torn
+
+
+def test_a_file_that_can_not_be_finalised_is_refused(ours: Path) -> None:
+    content = bytearray(ours.read_bytes()[:400])
+    content[:8] = b"UnFinMF "
+    struct.pack_into("<H", content, 60, 0x01 | 0x04)
+    ours.write_bytes(content)
+    with pytest.raises(RecordingError, match=r"run\.mf4: expected "):
+        read_table(ours)
+
+
+def test_metadata_of_a_foreign_file_are_read(theirs: Path) -> None:
+    assert read_metadata(theirs)["comment"] == "second lap"

@@ -1,0 +1,103 @@
+"""Listening: live values from drives that stay disarmed, whoever is missing."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from drivers.errors import BusDown
+from hil.rig.build import open_devices
+from hil.rig.idle import Listening
+from hil.rig.sample import SampleFlag
+from hil.rig.timing import RunTiming
+from hil.simulator.inverter_settings import FaultAtStep, InverterFaults
+from hil.simulator.rig_server import RigFaults
+from tests.rig.observer import assert_disarmed
+from tests.rig.serving import fast, served
+
+
+def test_both_answer_and_stay_disarmed() -> None:
+    with served() as (server, rig), open_devices(rig) as devices:
+        listening = Listening(devices, fast(rig), RunTiming(10_000_000))
+        listening.begin()
+        samples = [listening.step() for _ in range(50)]
+        assert listening.troubles == (None, None)
+        assert server.torque_nm == (0.0, 0.0)
+        listening.plc.finish()
+        assert_disarmed(server.bus_url, 1, 2)
+    assert not any(sample.flags for sample in samples)
+    assert all(math.isfinite(sample.speed_rad_s) for sample in samples)
+    assert {sample.torque_ref_nm for sample in samples} == {0.0}
+    assert [sample.time_s for sample in samples[:3]] == [0.0, 0.01, 0.02]
+    assert listening.timing.cycles == 50
+    assert listening.timing.unanswered == 0
+
+
+def test_a_missing_drive_is_told_and_the_other_is_heard() -> None:
+    faults = RigFaults(m2=InverterFaults(absent=True))
+    with served(faults=faults) as (_, rig), open_devices(rig) as devices:
+        listening = Listening(devices, fast(rig, answer_timeout_s=0.05), RunTiming(10_000_000))
+        listening.begin()
+        sample = listening.step()
+        trouble_m1, trouble_m2 = listening.troubles
+        listening.plc.finish()
+    assert trouble_m1 is None
+    assert "m2" in str(trouble_m2)
+    assert sample.flags is SampleFlag.M2_STALE
+    assert math.isfinite(sample.torque_m1_nm)
+    assert math.isnan(sample.torque_m2_nm)
+
+
+def test_a_fault_is_reset_when_asked() -> None:
+    faults = RigFaults(m1=InverterFaults(fault=FaultAtStep(5, 0x3220)))
+    with served(faults=faults) as (_, rig), open_devices(rig) as devices:
+        listening = Listening(devices, fast(rig), RunTiming(10_000_000))
+        listening.begin()
+        for _ in range(10):
+            listening.step()
+        assert "0x3220" in str(devices.m1.fault())
+        assert listening.reset_faults() == ()
+        assert devices.m1.fault() is None
+        listening.plc.finish()
+
+
+def test_a_fault_that_stays_is_said() -> None:
+    faults = RigFaults(m2=InverterFaults(absent=True))
+    with served(faults=faults) as (_, rig), open_devices(rig) as devices:
+        listening = Listening(devices, fast(rig), RunTiming(10_000_000))
+        (failure,) = listening.reset_faults()
+    assert "m2" in failure
+
+
+def test_a_lost_bus_ends_it() -> None:
+    with served() as (_, rig), open_devices(rig) as devices:
+        listening = Listening(devices, fast(rig), RunTiming(10_000_000))
+        listening.begin()
+        listening.step()
+        listening.plc.finish()
+        devices.link.close()
+        with pytest.raises(BusDown):
+            listening.step()
+
+
+def test_a_plc_that_went_is_connected_again() -> None:
+    with served() as (_, rig), open_devices(rig) as devices:
+        listening = Listening(devices, fast(rig), RunTiming(10_000_000))
+        listening.begin()
+        devices.plc.close()
+        seen = []
+        for _ in range(3000):
+            sample = listening.step()
+            seen.append(listening.plc.trouble)
+            if seen[-1] is None and any(seen):
+                break
+            devices.plc_loop.call(_moment())
+        listening.plc.finish()
+        assert any(seen)
+        assert seen[-1] is None
+        assert sample.cycle < 3000
+
+
+async def _moment() -> None:
+    """Give the PLC's loop a turn."""

@@ -1,0 +1,138 @@
+"""What a run estimates while it drives is what its recording says afterwards; and it stays out of the cycle's way."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from estimator.errors import BadSetting
+from hil.recording import RecordingWriter, read_record
+from hil.rig.build import open_devices
+from hil.rig.experiments.base import Phase
+from hil.rig.live import LiveEstimate, tracking_chain, tracking_settings
+from hil.rig.live_replay import Pace, is_trace, play_record, play_samples
+from hil.rig.plan import plan_run
+from hil.rig.sample import Sample, SampleFlag
+from hil.rig.session import run_plan
+from hil.rig.stop import StopRequest
+from tests.estimator.identification.tracking.drives import drives
+from tests.rig.observer import assert_disarmed
+from tests.rig.serving import Samples, fast, served
+
+
+def driven(flagged: tuple[int, ...] = ()) -> list[Sample]:
+    """A drive as samples of a run; some flagged, their values beside the truth, as stand-ins have them."""
+    record = drives(21, 1, 16.0)[0]
+    samples = []
+    for k, (t, (m1, m2), speed) in enumerate(
+        zip(record.time_s.tolist(), record.torque_nm.tolist(), record.output.tolist(), strict=True)
+    ):
+        flags = SampleFlag.M1_STALE if k in flagged else SampleFlag.GOOD
+        torque_nm = math.nan if k in flagged and k < 3 else m1 + (99.0 if k in flagged else 0.0)
+        samples.append(Sample(k, k, t, 0.0, 0.0, 0.0, torque_nm, m2, speed, 0, flags))
+    return samples
+
+
+def run_observed(rig: object, observers: tuple[object, ...], samples: Samples) -> None:
+    with open_devices(rig) as devices:  # type: ignore[arg-type]
+        plan = plan_run(rig, "cruise")  # type: ignore[arg-type]
+        run_plan(
+            devices,
+            plan,
+            fast(rig),  # type: ignore[arg-type]
+            samples,
+            StopRequest(),
+            lambda phase, time_s: None,
+            observers=observers,  # type: ignore[arg-type]
+        )
+
+
+def test_observers_see_every_phase_and_what_is_recorded() -> None:
+    seen: list[tuple[Sample, Phase]] = []
+    samples = Samples()
+    with served() as (_, rig):
+        run_observed(rig, (lambda sample, phase: seen.append((sample, phase)),), samples)
+    assert [sample for sample, phase in seen if phase is Phase.MEASURE] == samples.rows
+    assert {phase for _, phase in seen} > {Phase.MEASURE}
+
+
+def test_an_observer_that_fails_ends_the_run_disarmed() -> None:
+    def fail(sample: Sample, phase: Phase) -> None:
+        if phase is Phase.MEASURE:
+            raise RuntimeError("observer at fault")
+
+    with served() as (server, rig):
+        with pytest.raises(RuntimeError, match="observer at fault"):
+            run_observed(rig, (fail,), Samples())
+        assert_disarmed(server.bus_url, 1, 2)
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+def test_live_is_replay_to_the_bit(tmp_path: Path, suffix: str) -> None:
+    samples = driven(flagged=(0, 1, 2, 500, 501, 900))
+    live = LiveEstimate(tracking_chain(0.01))
+    with RecordingWriter(tmp_path / f"run{suffix}") as recorder:
+        for sample in samples:
+            recorder.append(sample)
+            live(sample, Phase.MEASURE)
+    course = play_record(
+        read_record(tmp_path / f"run{suffix}"), tracking_settings(), Pace(), lambda course, time_s: None
+    )
+    live.course.write(tmp_path / "live.json")
+    course.write(tmp_path / "replay.json")
+    assert live.latest is not None
+    assert live.latest.resonance is not None
+    assert (tmp_path / "live.json").read_bytes() == (tmp_path / "replay.json").read_bytes()
+
+
+def test_other_phases_are_not_estimated_from() -> None:
+    live = LiveEstimate(tracking_chain(0.01))
+    for sample in driven()[:100]:
+        live(sample, Phase.APPROACH)
+    assert live.course.samples == 0
+    assert live.latest is None
+
+
+@pytest.mark.parametrize("speed", [2.0, 50.0])
+def test_speed_is_that_of_the_clock(speed: float) -> None:
+    now = [0.0]
+
+    def sleep(seconds: float) -> None:
+        now[0] += seconds
+
+    told: list[tuple[float, float]] = []
+    pace = Pace(speed, clock=lambda: now[0], sleep=sleep)
+    play_record(drives(22, 1, 8.0)[0], tracking_settings(), pace, lambda course, time_s: told.append((time_s, now[0])))
+    times = np.array(told)
+    assert times[:, 1] == pytest.approx(times[:, 0] / speed)
+    assert len(told) > 8.0 / speed * 9
+
+
+def test_samples_of_a_trace_may_be_played_at_a_speed_too() -> None:
+    slept: list[float] = []
+    pace = Pace(10.0, clock=lambda: 0.0, sleep=slept.append)
+    course = play_samples(driven()[:400], 0.01, tracking_settings(), pace, lambda course, time_s: None)
+    assert course.samples == 400
+    assert slept == pytest.approx([0.099, 0.199, 0.299, 0.399])
+
+
+def test_missing_speed_is_masked() -> None:
+    live = LiveEstimate(tracking_chain(0.01))
+    for k, sample in enumerate(driven()):
+        live(replace(sample, speed_rad_s=math.nan) if 900 <= k < 950 else sample)
+    assert live.latest is not None
+    assert live.latest.resonance is not None
+
+
+def test_period_that_does_not_fit_is_refused() -> None:
+    with pytest.raises(BadSetting, match=r"0\.003"):
+        tracking_chain(0.003)
+
+
+def test_traces_are_told_by_their_suffix() -> None:
+    assert is_trace(Path("a.BLF"))
+    assert not is_trace(Path("a.csv"))

@@ -1,0 +1,94 @@
+"""The store from the recordings alone: what is entered, what is found again, what is left out."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+from hil.recording import read_table, write_table
+from hil.store import RunStore, attach_to_runs, register_run, store_of
+from hil.store.rebuild import rebuild
+from hil.store.recording_state import VERIFIED, recording_state
+
+Record = Callable[..., Path]
+
+
+def test_runs_are_entered_and_everything_else_is_left_out(tmp_path: Path, record: Record) -> None:
+    record("a.csv")
+    record("sub/b.mf4")
+    write_table(read_table(tmp_path / "a.csv"), tmp_path / "copy_of_a.h5")
+    (tmp_path / "foreign.csv").write_text("t,v\n0,1\n", encoding="utf-8")
+    (tmp_path / "broken.parquet").write_bytes(b"PAR1")
+    (tmp_path / ".hidden.csv").write_text("x\n", encoding="utf-8")
+    result = rebuild(tmp_path)
+    assert (result.before, result.found, result.moved, result.copies, result.damaged) == (0, 2, 0, 1, None)
+    (problem,) = result.unreadable
+    assert "broken.parquet" in problem
+    again = rebuild(tmp_path)
+    assert (again.before, again.found, again.copies) == (2, 0, 1)
+
+
+def test_a_moved_recording_is_found_again_with_its_notes(tmp_path: Path, record: Record) -> None:
+    number = register_run(record("a.parquet"))
+    with RunStore(tmp_path) as store:
+        store.note(number, "wind")
+        (tmp_path / "a.parquet").rename(tmp_path / "renamed.parquet")
+        assert recording_state(store.get(number).entry).startswith("missing")
+    assert rebuild(tmp_path).moved == 1
+    with RunStore(tmp_path) as store:
+        (run,) = store.find()
+    assert (run.run_id, run.entry.recording.name, run.notes[0].text) == (number, "renamed.parquet", "wind")
+    assert recording_state(run.entry) == VERIFIED
+
+
+def test_results_in_the_folder_are_attached_once_to_the_runs_they_name(tmp_path: Path, record: Record) -> None:
+    for name in "abc":
+        record(f"{name}.csv")
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "diagnosis.json").write_text(
+        json.dumps({"verdict": "explained", "load_torque": {"a": {}}, "mismatch": {"time_s": {"b": []}}}), "utf-8"
+    )
+    (tmp_path / "out" / "identification.json").write_text(json.dumps({"recordings": [{"name": "c"}, 3]}), "utf-8")
+    (tmp_path / "a.online.json").write_text("{}", "utf-8")
+    (tmp_path / "diagnosis.json").write_text("[broken", "utf-8")
+    assert rebuild(tmp_path).attached == 4
+    assert rebuild(tmp_path).attached == 0
+    with RunStore(tmp_path) as store:
+        runs = store.find()
+    kinds = {run.entry.recording.stem: [entry.kind for entry in run.attachments] for run in runs}
+    assert kinds == {"a": ["online", "diagnosis"], "b": ["diagnosis"], "c": ["identification"]}
+    assert [run.verdict for run in runs] == ["explained", "explained", ""]
+
+
+def test_what_a_recording_became_is_told(tmp_path: Path, record: Record) -> None:
+    number = register_run(record("a.csv"))
+    with RunStore(tmp_path) as store:
+        entry = store.get(number).entry
+    path = entry.recording
+    assert recording_state(entry) == VERIFIED
+    whole = path.read_text(encoding="utf-8")
+    path.write_text(whole.replace("0.01,", "0.02,"), encoding="utf-8")
+    assert "damaged, or was changed" in recording_state(entry)
+    path.write_text(whole, encoding="utf-8")
+    for beside in ("", ".json"):
+        (tmp_path / f"a.csv{beside}").unlink()
+    other = record("b.csv")
+    other.rename(path)
+    (tmp_path / "b.csv.json").rename(tmp_path / "a.csv.json")
+    assert "another recording under the same name" in recording_state(entry)
+
+
+def test_results_are_attached_to_the_runs_they_are_of(tmp_path: Path, record: Record) -> None:
+    here, other = record("a.csv"), record("sub/b.csv")
+    register_run(here)
+    result = tmp_path / "diagnosis.json"
+    result.write_text('{"verdict": "unexplained"}', encoding="utf-8")
+    assert attach_to_runs([here, other, record("c.csv")], {"diagnosis": result}) == []
+    with RunStore(tmp_path) as store:
+        assert [run.verdict for run in store.find()] == ["unexplained"]
+    assert not store_of(other.parent).exists()  # a result makes no store
+    store_of(tmp_path).write_bytes(b"x" * 5000)
+    (complaint,) = attach_to_runs([here], {"diagnosis": result})
+    assert "damaged" in complaint
+    assert "The results are whole" in complaint
