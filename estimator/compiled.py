@@ -18,6 +18,9 @@ from numba.core import config as numba_config
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
+_UNCOUNTED: dict[str, Any] = {"_nrt": False}
+"""numba's option for a function without its run time; its types do not know it."""
+
 PACKAGES = ("signals", "identification", "physics", "diagnosis/line")
 """Packages that hold compiled code, or constants that it freezes."""
 
@@ -66,5 +69,5 @@ def borrowing(function: Function) -> Function:
     Nothing of it may make an array, or return one.
     """
     return cast(
-        Function, numba.njit(cache=True, nogil=True, error_model="numpy", forceinline=True, _nrt=False)(function)
+        Function, numba.njit(cache=True, nogil=True, error_model="numpy", forceinline=True, **_UNCOUNTED)(function)
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import os
+import re
 import signal
 import threading
 import time
@@ -30,6 +31,9 @@ from hil.rig.stop import STOP_SIGNALS
 
 DRAW_EVERY_S = 0.125
 """Eight pictures a second."""
+
+_NOT_OURS = re.compile(r"@font-face\s*\{[^}]*\}|<!--.*?-->", re.DOTALL)
+"""Fonts from the network, which a picture must do without, and a generator's name."""
 
 INTERRUPTED = 130
 """Exit status, as `hil.cli.main` has it; that module is not to be imported from below."""
@@ -171,7 +175,8 @@ class MonitorApp(App[None]):
         if self._picture is None:
             return
         path, _ = self._picture
-        path.write_text(self.export_screenshot(title="hil monitor"), encoding="utf-8")
+        drawn = self.export_screenshot(title="hil monitor")
+        path.write_text(_NOT_OURS.sub("", drawn), encoding="utf-8")
         self.action_leave()
 
     def action_page(self, name: str) -> None:

@@ -12,7 +12,7 @@ from hil.monitor.snapshot import Snapshot
 Draw = Callable[[Snapshot, int, int], list[str]]
 """``draw(snapshot, width, height)``: at most ``height`` lines of at most ``width`` characters."""
 
-STRONG = ("ALARM", "FAULT", "EMCY", "STALE", "TROUBLE", "LOST", "NO PERMIT", "WITHDRAWN", "ENDED EARLY")
+STRONG = ("ALARM", "FAULT", "EMCY 0x", "ACTIVE", "STALE", "TROUBLE", "LOST", "NO PERMIT", "WITHDRAWN", "ENDED EARLY")
 """Words that are set in bold: what they say is in the word, not in its look."""
 
 

@@ -174,4 +174,6 @@ def test_a_picture_is_drawn_and_the_view_ends(tmp_path: Path) -> None:
     picture = tmp_path / "view.svg"
     app = MonitorApp(source, LiveState("bus", PERIOD_S, None, False), picture=(picture, 0.3))
     app.run(headless=True, size=(80, 24))
-    assert "torque" in picture.read_text(encoding="utf-8")
+    drawn = picture.read_text(encoding="utf-8")
+    assert "torque" in drawn
+    assert "url(" not in drawn.replace("url(#", "")  # nothing from the network

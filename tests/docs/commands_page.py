@@ -1,0 +1,158 @@
+"""docs/reference-commands.md, written from the commands themselves.
+
+Run it to bring the page up to date: ``python -m tests.docs.commands_page``.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from hil.cli.main import COMMANDS, ExitStatus
+from hil.cli.overview import OPTIONS
+from tests.cli.command_lines import command, examples
+
+PAGE = Path(__file__).parents[2] / "docs" / "reference-commands.md"
+
+READ_MORE = {
+    "demo": "proof",
+    "prove": "proof",
+    "sim": "get-started",
+    "check": "first-time-on-a-vehicle",
+    "commission": "commissioning",
+    "run": "first-time-on-a-vehicle",
+    "monitor": "monitor",
+    "replay": "monitoring",
+    "convert": "formats",
+    "runs": "run-store",
+    "identify": "identification",
+    "paper": "paper",
+    "diagnose": "diagnosis",
+    "effects": "catalogue",
+    "rig": "support",
+    "model": "formats",
+    "completion": "support",
+    "bugreport": "support",
+    "export": "plc-export",
+}
+"""The page that tells the rest of a command."""
+
+STATUSES = {
+    ExitStatus.DONE: "done; a verdict is a result, whatever it says",
+    ExitStatus.BAD_INPUT: "wrong use or unreadable input; the message names file, line or key, what was expected, "
+    "what came",
+    ExitStatus.DEVICE_FAULT: "a device or the bus is at fault, or the vehicle is not fit for the run",
+    ExitStatus.REFUSED_BY_GUARD: "the torque guard refused a torque",
+    ExitStatus.INTERRUPTED: "interrupted",
+}
+
+TOP = """# Commands
+
+Written from the commands themselves by `python -m tests.docs.commands_page`; a test compares. `hil COMMAND --help` says
+the same at the terminal. In angle brackets stands what you put in, in square brackets what may be left out.
+"""
+
+
+def page() -> str:
+    """Return the page's text."""
+    parts = [TOP, *_map(), *_everywhere(), *_statuses()]
+    for name in COMMANDS:
+        parts += _section(name)
+    return "\n".join(parts).rstrip() + "\n"
+
+
+def _map() -> Iterator[str]:
+    yield from ("| command | does |", "| --- | --- |")
+    for name, line in COMMANDS.items():
+        more = f" ([more]({READ_MORE[name]}.md))" if name in READ_MORE else ""
+        yield f"| [`hil {name}`](#hil-{name}) | {_cell(line)}{more} |"
+    yield ""
+
+
+def _everywhere() -> Iterator[str]:
+    yield from ("## Options of every command", "", "| option | |", "| --- | --- |")
+    yield from (f"| `{option}` | {_cell(text)} |" for option, text in OPTIONS.items())
+    yield ""
+
+
+def _statuses() -> Iterator[str]:
+    yield from ("## Exit status", "", "| status | means |", "| --- | --- |")
+    yield from (f"| {status.value} | {STATUSES[status]} |" for status in ExitStatus)
+    yield from (
+        "",
+        "Torque is zero and the drives are disarmed on every way out; where a drive can't confirm it, that is said.",
+        "",
+    )
+
+
+def _section(name: str) -> Iterator[str]:
+    own = command(name)
+    inner = getattr(own, "commands", {})
+    yield from (f"## hil {name}", "")
+    yield from _told(f"hil {name}", own, bool(inner))
+    for each, part in inner.items():
+        yield from (f"### hil {name} {each}", "")
+        yield from _told(f"hil {name} {each}", part, False)
+
+
+def _told(name: str, given: Any, group: bool) -> Iterator[str]:
+    """Yield usage, text, arguments, options and examples of one command."""
+    arguments = [each for each in given.params if each.param_type_name == "argument"]
+    options = [each for each in given.params if each.param_type_name == "option"]
+    usage = [name, *(["[OPTIONS]"] if options else []), *map(_sign, arguments), *(["COMMAND"] if group else [])]
+    yield from ("```text", " ".join(usage), "```", "", _text(given.help), "")
+    if arguments or options:
+        yield from ("| | | default |", "| --- | --- | --- |")
+        yield from (f"| `{_sign(each)}` | {_cell(each.help or '')} | |" for each in arguments)
+        yield from (f"| {_names(each)} | {_cell(each.help or '')} | {_default(each)} |" for each in options)
+        yield ""
+    if shown := examples(given.epilog or ""):
+        yield from ("```sh", *(line.rstrip(".;") for line in shown), "```", "")
+
+
+def _sign(argument: Any) -> str:
+    metavar = argument.metavar or argument.name.upper()
+    if argument.nargs != 1 and not metavar.rstrip("]").endswith("..."):
+        metavar += "..."
+    return metavar if argument.required or metavar.startswith("[") else f"[{metavar}]"
+
+
+def _names(option: Any) -> str:
+    takes = "" if option.is_flag else f" {option.metavar or _kind(option)}"
+    names = ", ".join(f"`{name}{takes}`" for name in (*option.opts, *option.secondary_opts))
+    return names + (", again and again" if option.multiple else "") + (", needed" if option.required else "")
+
+
+def _kind(option: Any) -> str:
+    choices = getattr(option.type, "choices", None)
+    return "|".join(str(getattr(each, "value", each)) for each in choices) if choices else str(option.type.name).upper()
+
+
+def _default(option: Any) -> str:
+    value = option.default
+    if callable(value) or value in (None, False, ()) or value == [] or option.required:
+        return ""
+    return f"`{getattr(value, 'value', value)}`"
+
+
+def _text(words: str | None) -> str:
+    """Return a help text as paragraphs of one line each."""
+    parts = (words or "").replace("\b\n", "").strip().split("\n\n")
+    return "\n\n".join(_escaped(" ".join(part.split())) for part in parts)
+
+
+def _cell(text: str) -> str:
+    return _escaped(" ".join(text.split())).replace("|", "\\|")
+
+
+def _escaped(text: str) -> str:
+    for sign in "<>*_":
+        text = text.replace(sign, f"\\{sign}")
+    return text
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")
+    sys.stdout.write(f"{PAGE}: {len(COMMANDS)} commands\n")
