@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN    := .venv/bin
 READY  := .venv/.ready
 
-.PHONY: setup demo prove test campaign bench lint lock clean
+.PHONY: setup demo prove test campaign bench docs lint lock clean
 
 setup: $(READY)
 
@@ -33,6 +33,12 @@ bench: $(READY)
 	$(BIN)/python -m tests.benchmarks.fit
 	$(BIN)/python -m tests.benchmarks.diagnosis
 	$(BIN)/python -m tests.benchmarks.fieldbus
+	$(BIN)/python -m tests.benchmarks.recursive
+	$(BIN)/python -m tests.benchmarks.reports
+
+# The manual as pages: out/docs/index.html.
+docs: $(READY)
+	$(BIN)/sphinx-build -q -W -b html docs out/docs
 
 lint: $(READY)
 	$(BIN)/ruff check .

@@ -14,7 +14,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 project = "hil"
 author = "the hil developers"
-copyright = "the hil developers, Apache-2.0"  # noqa: A001 -- Sphinx's own name
+copyright = "the hil developers, Apache-2.0"
 release = version = version_of("hil-driveline")
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]

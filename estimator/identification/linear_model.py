@@ -65,7 +65,7 @@ class Orders:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Name of each entry of theta: ``a_1 .. a_na, b_1 .. b_nb``."""
+        """Name of each entry of theta, ``a_1 .. a_na, b_1 .. b_nb``."""
         a = [f"a_{i}" for i in range(1, self.na + 1)]
         return (*a, *(f"b_{j}" for j in range(1, self.nb + 1)))
 

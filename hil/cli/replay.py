@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from hil.cli.filter_option import FilterOf, FilterRun, with_filter
 from hil.errors import UsageError
 
 if TYPE_CHECKING:
     from estimator.identification.identify import Settings
+    from estimator.signals.record import FloatArray
     from hil.rig.live_course import Course
     from hil.rig.live_replay import Pace, Told
 
@@ -41,6 +43,8 @@ def replay(
     sample_time: Annotated[
         float, typer.Option(metavar="SECONDS", help="Sampling period of the models; a multiple of the recording's.")
     ] = 0.02,
+    filter_of: FilterOf = None,
+    filter_run: FilterRun = None,
     rig: Annotated[Path | None, typer.Option(metavar="RIG", help="Rig file of the run; for a bus trace.")] = None,
     out: Annotated[
         Path | None, typer.Option(metavar="REC", help="Recording to rebuild from a bus trace; a new file.")
@@ -62,13 +66,14 @@ def replay(
     if speed is not None and not speed > 0:
         raise UsageError(f"--speed: expected a multiple of real time above 0, came {speed:g}")
     settings, pace = tracking_settings(sample_time), Pace(speed)
+    settings, filter_l = with_filter(settings, filter_of, filter_run)
     begun_s = time.perf_counter()
     if is_trace(recording):
         _require(recording, "a bus trace", {"--rig": rig}, {"--model": model})
-        course, result = _play_trace(recording, rig or Path(), out, every, settings, pace)
+        course, result = _play_trace(recording, rig or Path(), out, every, settings, pace, filter_l)
     else:
         _require(recording, "a recording", {}, {"--rig": rig, "--out": out, "--all": every or None})
-        course, result = _play_recording(recording, model, settings, pace)
+        course, result = _play_recording(recording, model, settings, pace, filter_l)
     took_s = time.perf_counter() - begun_s
     if estimate is not None:
         publish(estimate.absolute().parent, {estimate.name: course.write})
@@ -93,20 +98,28 @@ def _require(path: Path, what: str, needed: dict[str, object], senseless: dict[s
             raise UsageError(f"{path}: expected no {option} with {what}, came one.{hint}")
 
 
-def _play_recording(path: Path, model: Path | None, settings: Settings, pace: Pace) -> tuple[Course, dict[str, Any]]:
+def _play_recording(
+    path: Path, model: Path | None, settings: Settings, pace: Pace, filter_l: FloatArray | None
+) -> tuple[Course, dict[str, Any]]:
     from hil.config.model_file import read_model_for_recordings
     from hil.recording import read_record
     from hil.rig.live_replay import play_record
 
     signals = None if model is None else read_model_for_recordings(model).signals
     record = read_record(path, signals)
-    course = play_record(record, settings, pace, _show(pace))
+    course = play_record(record, settings, pace, _show(pace), filter_l)
     flagged = int((~record.okay).sum())
     return course, {"recording": str(path), "recorded": course.samples, "flagged": flagged}
 
 
 def _play_trace(
-    path: Path, rig_path: Path, out: Path | None, every: bool, settings: Settings, pace: Pace
+    path: Path,
+    rig_path: Path,
+    out: Path | None,
+    every: bool,
+    settings: Settings,
+    pace: Pace,
+    filter_l: FloatArray | None,
 ) -> tuple[Course, dict[str, Any]]:
     from hil.config.rig_file import read_rig
     from hil.recording import RecordingWriter
@@ -116,7 +129,7 @@ def _play_trace(
 
     rig = read_rig(rig_path)
     samples = list(replayed(path, rig, whole=every))  # all of them before any is written
-    course = play_samples(samples, rig.period_s, settings, pace, _show(pace))
+    course = play_samples(samples, rig.period_s, settings, pace, _show(pace), filter_l)
     if out is not None:
         with RecordingWriter(out, replay_metadata(rig_path, path, samples[0].t_ns)) as recorder:
             for sample in samples:

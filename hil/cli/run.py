@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from drivers.canopen.can_link import CanLink
+from hil.cli.filter_option import FilterOf, FilterRun, with_filter
 from hil.cli.run_progress import RunProgress
 from hil.config.rig_file import Rig, read_rig
 from hil.errors import HilError, UsageError
@@ -73,6 +74,8 @@ def run(
     estimate: Annotated[
         bool, typer.Option(help="Estimate while driving; its course goes beside the recording: .online.json.")
     ] = True,
+    filter_of: FilterOf = None,
+    filter_run: FilterRun = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Run one experiment, record its measured part, and follow the resonance while driving.
@@ -87,23 +90,25 @@ def run(
     if out is None:
         raise UsageError("hil run: expected --out REC, a recording to write, or --dry-run; came neither.")
     metadata = {**run_metadata(rig, experiment), "pace": pace.value}
-    live = live_estimate(rig_file, out) if estimate else None
+    live = live_estimate(rig_file, out, filter_of, filter_run) if estimate else None
     job = _Job(rig_file, experiment, out, trace, pacer_for(rig_file, pace), metadata, live)
     with real_time() if pace is Pace.REAL else nullcontext(NOT_ASKED) as grants:
         summary = _record(job, grants)
     _report(job, summary, grants, as_json)
 
 
-def live_estimate(rig: Rig, recording: Path) -> LiveEstimate:
+def live_estimate(
+    rig: Rig, recording: Path, filter_of: Path | None = None, filter_run: str | None = None
+) -> LiveEstimate:
     """Make what estimates a run while it goes on.
 
     Raises
     ------
     UsageError
-        If its file is there already, or the rig's period does not divide that of the models.
+        If its file is there already, or the rig's period does not divide that of the models; see `with_filter` too.
     """
     from estimator.errors import BadSetting
-    from hil.rig.live import LiveEstimate, tracking_chain
+    from hil.rig.live import LiveEstimate, tracking_chain, tracking_settings
 
     if course_path(recording).exists():
         raise UsageError(
@@ -111,7 +116,7 @@ def live_estimate(rig: Rig, recording: Path) -> LiveEstimate:
             "another name with --out."
         )
     try:
-        return LiveEstimate(tracking_chain(rig.period_s))
+        return LiveEstimate(tracking_chain(rig.period_s, *with_filter(tracking_settings(), filter_of, filter_run)))
     except BadSetting as error:
         raise UsageError(f"{error} Or record without an estimate: --no-estimate.") from error
 

@@ -1,60 +1,12 @@
-"""Reads what an estimator on a PLC needs out of ``identification.json``, written by ``hil identify``."""
+"""The estimator of a PLC with what identified a recording."""
 
 from __future__ import annotations
 
-import json
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Literal
 
-import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
-
-from estimator.identification.identify import Settings
-from estimator.identification.linear_model import Orders
 from estimator.identification.online.adaptation import Adaptation
-from hil.config.problems import validate
-from hil.errors import FileProblem, UsageError
 from hil.export.plc_estimator import PlcEstimator
-
-
-class _Part(BaseModel):
-    """A part of the file; the file has more than is read here."""
-
-    model_config = ConfigDict(strict=True, frozen=True, extra="ignore")
-
-
-class _Settings(_Part):
-    na: int
-    nb: int
-    nk: int
-    sample_time_s: float
-    high_pass_hz: float
-
-
-class _Recording(_Part):
-    name: str
-    output: str
-    filter_L: list[float] = Field(min_length=1)  # noqa: N815 - the file's own key
-
-
-class IdentificationFile(_Part):
-    """The file: settings, and for each recording its observation filter."""
-
-    schema_name: Literal["hil.identification/1"] = Field(alias="schema")
-    settings: _Settings
-    recordings: list[_Recording] = Field(min_length=1)
-
-
-def read_identification(path: Path) -> IdentificationFile:
-    """Read one file.
-
-    Raises
-    ------
-    FileProblem
-        If it can't be read, is no JSON, or lacks something; with the line or the key.
-    """
-    return validate(IdentificationFile, _json(path), path, FileProblem)
+from hil.report.identification.read_back import identified
 
 
 def plc_estimator(
@@ -77,45 +29,8 @@ def plc_estimator(
 
     Raises
     ------
-    UsageError
-        If the recording is not in the file, or none is named and there are several.
-    FileProblem
-        If the file is wrong, or the recording's output is no speed.
+    UsageError, FileProblem
+        As `hil.report.identification.read_back.identified`.
     """
-    file = read_identification(path)
-    entry = _chosen(path, file.recordings, run)
-    if entry.output != "speed":
-        raise FileProblem(path, f"recordings.{entry.name}.output | expected 'speed' | came {entry.output!r}")
-    given = file.settings
-    settings = Settings(
-        orders=Orders(given.na, given.nb, given.nk),
-        sample_time_s=given.sample_time_s,
-        high_pass_hz=given.high_pass_hz,
-        adaptation=adaptation,
-    )
-    L = None if adaptive else np.array(entry.filter_L)  # noqa: N806 - the field's symbol
-    return PlcEstimator(settings, cycle_s, L, f"{path.name}, recording {entry.name}")
-
-
-def _chosen(path: Path, entries: Sequence[_Recording], run: str | None) -> _Recording:
-    names = ", ".join(entry.name for entry in entries)
-    if run is None and len(entries) > 1:
-        raise UsageError(f"{path}: it holds {len(entries)} recordings, expected one named by --run: {names}")
-    for entry in entries:
-        if run in (None, entry.name):
-            return entry
-    raise UsageError(f"--run {run}: expected a recording of {path}: {names}")
-
-
-def _json(path: Path) -> dict[str, Any]:
-    try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as cause:
-        raise FileProblem(path, f"the file | expected identification.json | came: {cause.strerror}") from cause
-    except UnicodeDecodeError as cause:
-        raise FileProblem(path, f"the file | expected UTF-8 text | came: {cause.reason}") from cause
-    except json.JSONDecodeError as cause:
-        raise FileProblem(path, f"line {cause.lineno} | expected JSON | came: {cause.msg}") from cause
-    if not isinstance(found, dict):
-        raise FileProblem(path, f"the file | expected a JSON object | came a {type(found).__name__}")
-    return found
+    found = identified(path, run, adaptation)
+    return PlcEstimator(found.settings, cycle_s, None if adaptive else found.L, f"{path.name}, recording {found.name}")

@@ -16,6 +16,7 @@ from estimator.identification.identify import Settings
 from estimator.identification.online.adaptation import ConstantForgetting
 from estimator.identification.online.chain import OnlineChain
 from estimator.identification.online.online_estimate import OnlineEstimate
+from estimator.signals.record import FloatArray
 from hil.rig.experiments.base import Phase
 from hil.rig.live_course import Course
 from hil.rig.pacing import NS_PER_S, period_ns
@@ -33,15 +34,17 @@ def tracking_settings(sample_time_s: float = Settings().sample_time_s) -> Settin
     return Settings(sample_time_s=sample_time_s, adaptation=ConstantForgetting(FORGETTING))
 
 
-def tracking_chain(period_s: float, settings: Settings | None = None) -> OnlineChain:
+def tracking_chain(period_s: float, settings: Settings | None = None, L: FloatArray | None = None) -> OnlineChain:
     """Make the chain for samples of a period [s]; counted in whole nanoseconds, as the pacers do.
+
+    With an observation filter L of an earlier run it is the paper's; without, the filter follows the estimate.
 
     Raises
     ------
     BadSetting
         If the models' period is no whole multiple of it.
     """
-    return OnlineChain(settings or tracking_settings(), period_ns(period_s) / NS_PER_S)
+    return OnlineChain(settings or tracking_settings(), period_ns(period_s) / NS_PER_S, L)
 
 
 @dataclass(slots=True)

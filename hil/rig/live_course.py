@@ -36,7 +36,7 @@ class Course:
     def __init__(self, chain: OnlineChain) -> None:
         self.samples = 0
         self.alarms: list[Alarm] = []
-        self._settings = chain.settings
+        self._settings, self._filter = chain.settings, chain.L
         self._columns = {name: array("d") for name in COLUMNS}
         self._last: OnlineEstimate | None = None
 
@@ -73,6 +73,7 @@ class Course:
                 "high_pass_hz": settings.high_pass_hz,
                 "band_hz": list(settings.band_hz),
                 "adaptation": repr(settings.adaptation),
+                "filter_L": None if self._filter is None else self._filter.tolist(),
             },
             "samples": self.samples,
             "estimates": len(self._columns["time_s"]),

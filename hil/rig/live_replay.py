@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from estimator.identification.identify import Settings
-from estimator.signals.record import Record
+from estimator.signals.record import FloatArray, Record
 from hil.rig.live import LiveEstimate, tracking_chain
 from hil.rig.live_course import Course
 from hil.rig.sample import Sample
@@ -62,7 +62,7 @@ class Pace:
         return wait
 
 
-def play_record(record: Record, settings: Settings, pace: Pace, told: Told) -> Course:
+def play_record(record: Record, settings: Settings, pace: Pace, told: Told, L: FloatArray | None = None) -> Course:
     """Play a recording in blocks; return what the chain said.
 
     Raises
@@ -70,7 +70,7 @@ def play_record(record: Record, settings: Settings, pace: Pace, told: Told) -> C
     BadSetting
         If the recording's period does not divide that of the models.
     """
-    chain = tracking_chain(record.sample_time_s, settings)
+    chain = tracking_chain(record.sample_time_s, settings, L)
     course, size, wait = Course(chain), pace.block_samples(record.sample_time_s), pace.waits()
     torque_nm = chain.torque_of(record)
     for first in range(0, record.time_s.shape[0], size):
@@ -83,7 +83,9 @@ def play_record(record: Record, settings: Settings, pace: Pace, told: Told) -> C
     return course
 
 
-def play_samples(samples: Iterable[Sample], period_s: float, settings: Settings, pace: Pace, told: Told) -> Course:
+def play_samples(
+    samples: Iterable[Sample], period_s: float, settings: Settings, pace: Pace, told: Told, L: FloatArray | None = None
+) -> Course:
     """Play samples as they come, such as those of a bus trace; return what the chain said.
 
     Raises
@@ -91,7 +93,7 @@ def play_samples(samples: Iterable[Sample], period_s: float, settings: Settings,
     BadSetting
         If the samples' period does not divide that of the models.
     """
-    live, every, wait = LiveEstimate(tracking_chain(period_s, settings)), pace.block_samples(period_s), pace.waits()
+    live, every, wait = LiveEstimate(tracking_chain(period_s, settings, L)), pace.block_samples(period_s), pace.waits()
     for sample in samples:
         live(sample)
         if live.course.samples % every == 0:

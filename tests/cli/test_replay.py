@@ -7,9 +7,14 @@ from pathlib import Path
 
 import pytest
 
+from estimator.identification.online.adaptation import ConstantForgetting
+from estimator.identification.online.chain import OnlineChain
 from hil.cli.main import run
 from hil.config.rig_file import read_rig
+from hil.recording import read_record
 from hil.recording.formats import read_table
+from hil.report.identification.read_back import identified
+from hil.rig.live import FORGETTING
 from hil.rig.trace import SUFFIXES
 from tests.estimator.identification.tracking.drives import Line, drives
 from tests.rig.serving import served
@@ -88,12 +93,37 @@ def test_replay_of_a_run_is_the_run_to_the_bit(
     assert from_bus.read_bytes() == course
 
 
-def test_replay_of_a_recording_tells_resonance_and_alarms(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    recording = tmp_path / "drive.csv"
-    drive = drives(4, 1, 75.0, (Line(), Line(45.0, k=3360.0)))[0]
+def written(recording: Path, duration_s: float, *lines: Line) -> Path:
+    """Write a drive with these lines, one after the other."""
+    drive = drives(4, 1, duration_s, lines)[0]
     columns = (drive.time_s, *drive.torque_nm.T, drive.output)
     rows = [",".join(map(repr, row)) for row in zip(*(column.tolist() for column in columns), strict=True)]
     recording.write_text("\n".join(["time_s,torque_m1_nm,torque_m2_nm,speed_rad_s", *rows]) + "\n", encoding="utf-8")
+    return recording
+
+
+def test_the_filter_of_an_earlier_run_is_the_papers(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The estimate is that of the chain with L of the file; and another than with a filter that follows."""
+    recording, out = written(tmp_path / "drive.csv", 30.0, Line()), tmp_path / "identified"
+    assert run(["identify", str(recording), "--out", str(out)]) == 0
+    with_l, without = tmp_path / "with.json", tmp_path / "without.json"
+    identified_in = out / "identification.json"
+    assert run(["replay", str(recording), "--estimate", str(with_l), "--filter", str(identified_in)]) == 0
+    assert run(["replay", str(recording), "--estimate", str(without)]) == 0
+    assert with_l.read_bytes() != without.read_bytes()
+    found = identified(identified_in, None, ConstantForgetting(FORGETTING))
+    chain = OnlineChain(found.settings, 0.01, found.L)
+    mode = chain.run(read_record(recording))[-1].resonance
+    assert mode is not None
+    assert json.loads(with_l.read_text())["course"]["resonance_hz"][-1] == mode.frequency_hz
+    capsys.readouterr()
+    options = ["replay", str(recording), "--filter", str(identified_in), "--filter-run", "other"]
+    assert run(options) == 2
+    assert "expected a recording of" in capsys.readouterr().err
+
+
+def test_replay_of_a_recording_tells_resonance_and_alarms(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    recording = written(tmp_path / "drive.csv", 75.0, Line(), Line(45.0, k=3360.0))
     assert run(["replay", str(recording), "--speed", "1000"]) == 0
     printed = capsys.readouterr()
     assert "resonance 7.3" in printed.out
@@ -108,6 +138,7 @@ def test_replay_of_a_recording_tells_resonance_and_alarms(tmp_path: Path, capsys
         (("r.csv", "--out", "again.csv"), "hil convert"),
         (("r.csv", "--all"), "expected no --all with a recording"),
         (("r.csv", "--speed", "0"), "above 0"),
+        (("r.csv", "--filter-run", "run_1"), "expected --filter FILE with it"),
     ],
 )
 def test_options_that_make_no_sense_are_refused(

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
+from enum import Enum
 from pathlib import Path
-from typing import Any
+from typing import Any, Final, get_args
 
 from hil.cli.main import COMMANDS, ExitStatus
 from hil.cli.overview import OPTIONS
@@ -48,10 +49,12 @@ STATUSES = {
     ExitStatus.INTERRUPTED: "interrupted",
 }
 
+KINDS: Final = {float: "NUMBER", int: "NUMBER", str: "TEXT", Path: "FILE"}
+
 TOP = """# Commands
 
-Written from the commands themselves by `python -m tests.docs.commands_page`; a test compares. `hil COMMAND --help` says
-the same at the terminal. In angle brackets stands what you put in, in square brackets what may be left out.
+Written from the commands themselves by `python -m tests.docs.commands_page`; a test compares. At the terminal
+`--help` after a command says the same. What stands in square brackets may be left out.
 """
 
 
@@ -104,7 +107,7 @@ def _told(name: str, given: Any, group: bool) -> Iterator[str]:
     usage = [name, *(["[OPTIONS]"] if options else []), *map(_sign, arguments), *(["COMMAND"] if group else [])]
     yield from ("```text", " ".join(usage), "```", "", _text(given.help), "")
     if arguments or options:
-        yield from ("| | | default |", "| --- | --- | --- |")
+        yield from ("| name | meaning | default |", "| --- | --- | --- |")
         yield from (f"| `{_sign(each)}` | {_cell(each.help or '')} | |" for each in arguments)
         yield from (f"| {_names(each)} | {_cell(each.help or '')} | {_default(each)} |" for each in options)
         yield ""
@@ -126,15 +129,17 @@ def _names(option: Any) -> str:
 
 
 def _kind(option: Any) -> str:
-    choices = getattr(option.type, "choices", None)
-    return "|".join(str(getattr(each, "value", each)) for each in choices) if choices else str(option.type.name).upper()
+    """Return what an option takes where it does not say so itself: its choices, or the kind of value."""
+    annotation = option.type_descriptor.annotation
+    kind = next(each for each in get_args(annotation) or (annotation,) if each is not type(None))
+    return "|".join(str(each.value) for each in kind) if issubclass(kind, Enum) else KINDS[kind]
 
 
 def _default(option: Any) -> str:
     value = option.default
-    if callable(value) or value in (None, False, ()) or value == [] or option.required:
+    if value in (None, False, ()) or value == [] or option.required:
         return ""
-    return f"`{getattr(value, 'value', value)}`"
+    return f"`{option.opts[0] if value is True else getattr(value, 'value', value)}`"
 
 
 def _text(words: str | None) -> str:

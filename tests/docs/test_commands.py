@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from hil.cli.main import COMMANDS
+from hil.cli.main import COMMANDS, ExitStatus
 from tests.cli.command_lines import command, parse
-from tests.docs.pages import DOCS, ROOT, command_lines, mentioned_commands, pages
+from tests.docs import commands_page
+from tests.docs.pages import ROOT, command_lines, mentioned_commands, pages
 
 SHOWN = sorted({line for page in pages() for line in command_lines(page)})
+CURE = "run: python -m tests.docs.commands_page"
 MENTIONED = sorted({line for page in pages() for line in mentioned_commands(page)})
 
 
@@ -47,9 +49,22 @@ def test_a_wrong_command_line_is_noticed(wrong: str, said: str) -> None:
         parse(wrong)
 
 
-def test_the_map_lists_every_command() -> None:
-    text = (DOCS / "index.md").read_text(encoding="utf-8")
-    assert [name for name in COMMANDS if f"| `hil {name}` |" not in text] == []
+def test_the_reference_is_what_the_commands_say() -> None:
+    assert commands_page.PAGE.read_text(encoding="utf-8") == commands_page.page(), CURE
+
+
+def test_a_stale_reference_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(commands_page.COMMANDS, "run", "Do something else.")
+    renewed = commands_page.page()
+    assert "Do something else." in renewed
+    assert renewed != commands_page.PAGE.read_text(encoding="utf-8")
+
+
+def test_the_reference_has_every_option() -> None:
+    text = commands_page.PAGE.read_text(encoding="utf-8")
+    declared = {option for name in COMMANDS for option in options(name) if option.startswith("--")}
+    assert {option for option in declared if f"`{option}" not in text} == set()
+    assert set(commands_page.STATUSES) == set(ExitStatus)
 
 
 def test_command_lines_are_found_at_all() -> None:

@@ -76,6 +76,7 @@ class OnlineChain:
         watch: WatchSettings | None = None,
     ) -> None:
         self.settings = settings
+        self.L = None if L is None else L.copy()
         factor = _factor(settings, sample_time_s)
         self._decimator = Decimator(sample_time_s, factor, settings.high_pass_hz)
         self._estimator = estimator(settings, L)

@@ -1,0 +1,67 @@
+"""Failures on the rig: a simulated device, the bus or the PLC goes wrong during a run, or is wrong before it."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+
+from hil.config.rig_file import read_rig
+from hil.simulator.fault_spec import rig_faults
+from hil.simulator.loopback import Address
+from hil.simulator.plant_factory import plant_for
+from hil.simulator.rig_server import RigServer
+from tests.docs.gallery.case import Failure, Told, said
+from tests.docs.gallery.draw import signals_of
+
+EXAMPLE = Path(__file__).resolve().parents[3] / "examples" / "rig.toml"
+AT_S = 4.0
+"""When a fault comes, in simulated time: the cruise is being recorded by then."""
+
+SHORTER = (
+    ("speed_rad_s = 60.0", "speed_rad_s = 10.0"),
+    ('kind = "cruise"\nduration_s = 30.0', 'kind = "cruise"\nduration_s = 3.0'),
+    ("inertia_kg_m2 = 100.0 ", "inertia_kg_m2 = 101.6 "),  # the simulated bus: both masses
+)
+
+
+def write_rig(changes: tuple[tuple[str, str], ...] = SHORTER) -> Path:
+    """Write the example's rig file, changed, as ``rig.toml`` here."""
+    text = EXAMPLE.read_text(encoding="utf-8")
+    for before, after in changes:
+        if text.count(before) != 1:
+            raise LookupError(f"{EXAMPLE} holds {before!r} {text.count(before)} times, expected once")
+        text = text.replace(before, after)
+    path = Path("rig.toml")
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def on_rig(command: str, fault: str, draws: bool = False) -> Told:
+    """Carry out a command on the simulated rig of ``rig.toml`` with a fault."""
+    rig = read_rig(write_rig())
+    faults = rig_faults([fault] if fault else [], rig.period_s)
+    with RigServer(plant_for(rig, []), rig, "virtual:gallery", Address("127.0.0.1", 0), faults) as server:
+        where = ("--bus", server.bus_url, "--modbus", str(server.modbus))
+        fast = ("--pace", "fast") if command.startswith("hil run") else ()
+        text, status = said(command, *where, *fast)
+    text = text.replace(str(server.modbus), str(Address(rig.plc.host, rig.plc.port))).replace(server.bus_url, rig.can.url)
+    shown = f"hil sim rig.toml --fault {fault}\n{command}" if fault else command
+    return Told(shown, text, status, signals_of(Path("cruise.csv")) if draws else None)
+
+
+_run = partial(on_rig, "hil run rig.toml cruise --out cruise.csv", draws=True)
+_refused_run = partial(on_rig, "hil run rig.toml cruise --out cruise.csv")
+_check = partial(on_rig, "hil check rig.toml")
+
+RIG = (
+    Failure("stale_pdo", partial(_run, f"m1.stale_pdo@{AT_S}")),
+    Failure("lost_frames", partial(_run, "bus.lose=0.03:0x181")),
+    Failure("bus_off", partial(_run, f"bus.off@{AT_S}")),
+    Failure("drive_fault", partial(_run, f"m1.fault@{AT_S}")),
+    Failure("permissive_lost", partial(_run, f"plc.permissive_withdrawn@{AT_S}")),
+    Failure("clutch_closes", partial(_run, f"plc.clutch_closes@{AT_S}")),
+    Failure("mode_refused", partial(_refused_run, "m2.refuse_mode")),
+    Failure("missing_object", partial(_check, "m1.lacks=0x60B2")),
+    Failure("wrong_drive", partial(_check, "m2.wrong_identity")),
+    Failure("drive_absent", partial(_check, "m2.absent")),
+)
