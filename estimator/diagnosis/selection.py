@@ -373,11 +373,16 @@ class Selector:
         return self.examiner.compare(before, effects_of(before), trial.result, trial.effects)
 
     def _holds_out(self, trial: Trial, before: FitResult) -> bool:
-        """Tell whether a fair part of the gain on the fitted samples shows on unseen ones, as far as these can tell."""
+        """Tell whether a fair part of the gain on the fitted samples shows on unseen ones, as far as these can tell.
+
+        Where the unseen ones are at the noise already there is nothing to gain: an effect may not show in them.
+        """
         held = self._examine(trial, before)
         seen = 1.0 - (trial.result.rms / before.rms) ** 2
         unseen = 1.0 - (held.after / held.before) ** 2
-        return unseen + Z95 * held.spread >= PART_UNSEEN * seen
+        level = self._level(trial.result)
+        possible = 1.0 - (level / held.before) ** 2 if held.before > VISIBLE * level else 0.0
+        return unseen + Z95 * held.spread >= PART_UNSEEN * min(seen, possible)
 
     def _examined(self, trial: Trial, before: FitResult) -> Trial:
         return replace(trial, holdout=self._examine(trial, before), failed=None)

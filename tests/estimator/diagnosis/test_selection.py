@@ -10,7 +10,7 @@ import pytest
 from scipy.signal import lfilter
 
 from estimator.diagnosis.evidence import VERY_STRONG, gain
-from estimator.diagnosis.holdout import Examiner
+from estimator.diagnosis.holdout import Examiner, HoldOut
 from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects, everything, open_hypotheses
 from estimator.diagnosis.intervals import covariance, interval
 from estimator.diagnosis.noise import noise_floor
@@ -310,6 +310,24 @@ class TestRules:
         assert p_value > SIGNIFICANT
         failed = select._statistics_fail(COULOMB, result, strong, p_value)
         assert failed == "could be chance (p = 0.09 after 18 hypotheses)"
+
+    @pytest.mark.parametrize(
+        ("held", "holds"),
+        [
+            (HoldOut(1.0, 0.7), True),  # half of the power, three quarters of it where it was fitted
+            (HoldOut(1.0, 0.95), False),  # a tenth
+            (HoldOut(1.0, 0.95, spread=0.1), True),  # but unseen samples are too few to tell
+            (HoldOut(0.101, 0.101), True),  # there was nothing to gain: the error was the noise already
+            (HoldOut(0.101, 0.12), False),  # and it got worse
+        ],
+    )
+    def test_a_gain_has_to_show_where_it_was_not_fitted(
+        self, monkeypatch: pytest.MonkeyPatch, held: HoldOut, holds: bool
+    ) -> None:
+        monkeypatch.setattr(Selector, "_examine", lambda *_: held)
+        select = selector(quiet(values=ONE_MASS, samples=600), floor=0.1)
+        before, trial = of_rms(1.0, 2), self.trial(COULOMB, 0.5)
+        assert select._holds_out(trial, before) is holds
 
     @pytest.mark.parametrize(("after", "weighty"), [(0.95, True), (0.98, False), (0.1, True)])
     def test_a_share_of_the_first_mismatch_has_weight(self, select: Selector, after: float, weighty: bool) -> None:
