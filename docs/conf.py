@@ -20,6 +20,9 @@ release = version = version_of("hil-driveline")
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 exclude_patterns: list[str] = []
 
+smartquotes = False
+"""Options are shown as they are typed: ``--json``, not with a dash."""
+
 myst_heading_anchors = 4
 """Headings are reached by the fragments that Git hosts give them, as tests/docs/test_links.py reckons them."""
 
@@ -31,5 +34,7 @@ napoleon_use_rtype = False
 
 html_theme = "furo"
 html_title = "hil"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
 html_copy_source = False
 html_show_sphinx = False

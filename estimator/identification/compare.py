@@ -32,6 +32,8 @@ class Compared:
         Free-run fit of that model over the whole recording, high-passed, at the model's period; NaN where unstable.
     status : Status
         Of its last estimate.
+    reason : str
+        Why it has that status and what to do; empty where nothing is wrong.
     """
 
     recording: str
@@ -39,6 +41,7 @@ class Compared:
     resonance: Mode | None
     fit_percent: float
     status: Status
+    reason: str = ""
 
 
 def compare(
@@ -83,4 +86,4 @@ def compare(
     judged = decimate(record, 1, settings.high_pass_hz) if raw else found.data
     fit = free_run(model, judged, white(judged.output, judged.okay)).fit_percent if model.is_stable else float(np.nan)
     last = trajectory[len(trajectory) - 1]
-    return Compared(found.name, name, resonance(model, settings.band_hz), fit, last.status)
+    return Compared(found.name, name, resonance(model, settings.band_hz), fit, last.status, last.reason.message)

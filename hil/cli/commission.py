@@ -67,7 +67,7 @@ def commission(
     ] = None,
     travel: Annotated[
         float | None,
-        typer.Option(metavar="M_PER_RAD", min=1e-6, help="Way of the vehicle per radian of the motor shaft [m]."),
+        typer.Option(metavar="M_PER_RAD", min=1e-6, help="Way of the vehicle in metres per radian of the motor shaft."),
     ] = None,
     pace: Annotated[Pace, typer.Option(help="By the wall clock, or as fast as a simulated rig answers.")] = Pace.REAL,
     bus: Annotated[str | None, typer.Option(metavar="URL", help="CAN bus in place of the rig file's.")] = None,
@@ -84,8 +84,10 @@ def commission(
     """
     from rich.console import Console
 
+    from hil.commission.lock import sole_use
     from hil.commission.order import RigSource
     from hil.config.rig_file import read_rig
+    from hil.errors import UsageError
     from hil.report.outputs import require_folder
 
     asked = _asked(skip or (), because or (), repeat or ())
@@ -97,10 +99,17 @@ def commission(
         return
     require_folder(out)
     out.mkdir(parents=True, exist_ok=True)
-    job = _job(source, out, model, travel, pace, console)
-    try:
-        _commission(job, _talk(console, yes, keep_results), asked, console)
-    finally:
+    with sole_use(out):
+        job = _job(source, out, model, travel, pace, console)
+        try:
+            _commission(job, _talk(console, yes, keep_results), asked, console)
+        except BaseException as error:
+            try:
+                _write_report(job.state)
+            except UsageError as trouble:  # what ended the job is what has to be told first
+                error.add_note(f"Its report is missing: {trouble}")
+            _print_result(job.state, console, as_json)
+            raise
         _write_report(job.state)
         _print_result(job.state, console, as_json)
 

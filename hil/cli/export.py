@@ -30,9 +30,10 @@ def st(
     profile: str = typer.Option(
         "decreasing_then_constant_trace",
         "--profile",
-        metavar="NAME[:k=v,...]",
-        help="Adaptation gain: decreasing_then_constant_trace (the paper's), decreasing_gain, constant_forgetting, "
-        "variable_forgetting, variable_forgetting_then_constant_trace, constant_trace, constant_gain.",
+        metavar="PROFILE",
+        help="Adaptation gain, NAME or NAME:k=v,...: decreasing_then_constant_trace (the paper's), decreasing_gain, "
+        "constant_forgetting, variable_forgetting, variable_forgetting_then_constant_trace, constant_trace, "
+        "constant_gain.",
     ),
     single: bool = typer.Option(False, "--single", help="32-bit REAL instead of 64-bit LREAL."),
 ) -> None:

@@ -24,7 +24,7 @@ app = typer.Typer(add_completion=False)
 
 @app.command(epilog="Example: hil identify run_1.csv run_2.csv --out identified --model bus.toml")
 def identify(
-    recordings: list[Path] = typer.Argument(..., metavar="REC...", help="Recordings to identify from."),
+    recordings: list[Path] = typer.Argument(..., metavar="REC", help="Recordings to identify from."),
     out: Path = typer.Option(..., "--out", metavar="DIR", help="Folder for the results; made where missing."),
     model: Path | None = typer.Option(
         None,

@@ -107,7 +107,10 @@ def _run(call: Call, keep_log: bool) -> int:
 
 def _called(call: Call) -> int:
     """Import the command that is called, it alone, and carry it out."""
+    from hil.cli.flowing import flow
+
     app = importlib.import_module(f"hil.cli.{call.command}").app
+    flow(app)
     result = app(list(call.arguments), prog_name=f"hil {call.command}", standalone_mode=False)
     if result == ExitStatus.INTERRUPTED:  # what typer makes of Ctrl-C
         raise KeyboardInterrupt

@@ -31,7 +31,7 @@ def monitor(
     bus: Annotated[str | None, typer.Option(metavar="URL", help="CAN bus in place of the rig file's.")] = None,
     modbus: Annotated[str | None, typer.Option(metavar="HOST:PORT", help="PLC in place of the rig file's.")] = None,
     simulate: Annotated[
-        bool, typer.Option("--simulate", help="Simulate the rig, with nothing connected; needs [simulation].")
+        bool, typer.Option("--simulate", help=r"Simulate the rig, with nothing connected; needs \[simulation].")
     ] = False,
     replay: Annotated[
         Path | None,

@@ -35,9 +35,7 @@ app = typer.Typer(add_completion=False)
 def paper(
     recordings: Annotated[
         list[Path] | None,
-        typer.Argument(
-            metavar="[REC...]", help="Recordings to take; without any, eight are driven on a simulated rig."
-        ),
+        typer.Argument(metavar="REC", help="Recordings to take; without any, eight are driven on a simulated rig."),
     ] = None,
     out: Annotated[
         Path, typer.Option("--out", metavar="DIR", help="Folder for figures, report, numbers and recordings.")

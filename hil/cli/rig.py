@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -14,7 +14,9 @@ if TYPE_CHECKING:
 
 app = typer.Typer(add_completion=False, no_args_is_help=True)
 
-Text = Annotated[str | None, typer.Option(metavar="VALUE")]
+
+def _answer(about: str) -> Any:
+    return typer.Option(metavar="VALUE", help=about)
 
 
 @app.callback(epilog="Example: hil rig new rig.toml --simulated --yes")
@@ -32,19 +34,19 @@ def new(
         bool, typer.Option("--simulated", help="For the simulated rig of hil sim: every answer has a default.")
     ] = False,
     yes: Annotated[bool, typer.Option("--yes", help="Ask nothing: defaults stand for what is not given.")] = False,
-    name: Text = None,
-    can: Text = None,
-    period_s: Text = None,
-    plc: Text = None,
-    node_m1: Text = None,
-    node_m2: Text = None,
-    vendor_id: Text = None,
-    product_code: Text = None,
-    mode: Text = None,
-    rated_torque_nm: Text = None,
-    torque_limit_nm: Text = None,
-    inertia_kg_m2: Text = None,
-    speed_rad_s: Text = None,
+    name: Annotated[str | None, _answer("Name of the rig, for people.")] = None,
+    can: Annotated[str | None, _answer("CAN bus, INTERFACE:CHANNEL.")] = None,
+    period_s: Annotated[str | None, _answer("SYNC period in seconds.")] = None,
+    plc: Annotated[str | None, _answer("PLC, HOST:PORT.")] = None,
+    node_m1: Annotated[str | None, _answer("CANopen node of inverter m1.")] = None,
+    node_m2: Annotated[str | None, _answer("CANopen node of inverter m2.")] = None,
+    vendor_id: Annotated[str | None, _answer("Vendor ID of both inverters, object 0x1018:1.")] = None,
+    product_code: Annotated[str | None, _answer("Product code of both inverters, object 0x1018:2.")] = None,
+    mode: Annotated[str | None, _answer("Mode of operation: cyclic_synchronous_torque or profile_torque.")] = None,
+    rated_torque_nm: Annotated[str | None, _answer("Rated torque of one inverter, object 0x6076.")] = None,
+    torque_limit_nm: Annotated[str | None, _answer("Most torque one inverter may ever give here.")] = None,
+    inertia_kg_m2: Annotated[str | None, _answer("Inertia of vehicle and driveline at the motor shaft.")] = None,
+    speed_rad_s: Annotated[str | None, _answer("Motor speed of the cruise.")] = None,
 ) -> None:
     """Ask what is connected, and write a rig file with a comment on every key; never over one that is there.
 

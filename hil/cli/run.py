@@ -163,16 +163,23 @@ def _record(job: _Job, grants: RealTimeGrants) -> RunSummary:
         raise
     finally:
         if job.live is not None and recorder.kept is not None:
-            beside = course_path(job.out)
-            publish(beside.parent, {beside.name: job.live.course.write})
+            _keep_course(job.live, course_path(job.out))
         _register(job, recorder, ended_by)
+
+
+def _keep_course(live: LiveEstimate, path: Path) -> None:
+    """Write the course of the estimate; where that can't be done, what ended the run is still told."""
+    try:
+        publish(path.parent, {path.name: live.course.write})
+    except UsageError as error:
+        typer.echo(f"{path} is missing: {error}", err=True)
 
 
 def _register(job: _Job, recorder: RecordingWriter, ended_by: str) -> None:
     """Enter the run into the store beside its recording, which stays whole where that can't be done."""
     if recorder.kept != job.out:
         return
-    results = {} if job.live is None else {ONLINE: course_path(job.out)}
+    results = {ONLINE: course_path(job.out)} if course_path(job.out).exists() else {}
     try:
         register_run(job.out, ended_by, results=results)
     except HilError as error:

@@ -17,7 +17,7 @@ from hil.commission.registry import STEPS
 from hil.commission.rig_change import changed_keys, rig_digest
 from hil.commission.step import Job, Outcome, Step
 from hil.commission.talk import Answer, Talk, What
-from hil.errors import RunAborted
+from hil.errors import RunAborted, UsageError
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,7 +154,10 @@ class Commissioning:
             outcome = step.do(self.job)
         except BaseException as error:
             record.end(Status.INTERRUPTED, _told(error))
-            self.job.state.save()
+            try:
+                self.job.state.save()
+            except UsageError as trouble:  # what ended the step is what has to be told first
+                error.add_note(str(trouble))
             raise
         record.findings, record.evidence = list(outcome.findings), json_safe(outcome.evidence)
         blocked = any(finding.stops for finding in record.findings)

@@ -69,7 +69,7 @@ class State:
 
         Raises
         ------
-        OSError
+        UsageError
             If the disk does not take it; the file before it is still there.
         """
         text = json.dumps(self.document(), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
@@ -80,6 +80,11 @@ class State:
                 file.flush()
                 os.fsync(file.fileno())
             part.replace(self.path)
+        except OSError as error:
+            raise UsageError(
+                f"{self.path}: expected room for the state, came: {error.strerror or error}. The one before it is "
+                "kept; make room and call again."
+            ) from error
         finally:
             part.unlink(missing_ok=True)
 

@@ -140,10 +140,12 @@ class Person:
 
     def _answer(self, question: str, words: dict[str, What]) -> Answer:
         """Ask until one of the words comes; `SKIP` asks for a reason until there is one."""
+        expected = " or ".join(word for word in words if word)
         while (word := self.ask(question).strip().lower()) not in words:
-            pass
+            question = f"  expected {expected}, came {word or 'nothing'}\n{question.splitlines()[-1]}"
         if words[word] is not What.SKIP:
             return Answer(words[word])
-        while not (reason := self.ask("  Because: ").strip()):
-            pass
+        question = "  Because: "
+        while not (reason := self.ask(question).strip()):
+            question = "  A reason is needed, it is recorded. Because: "
         return Answer(What.SKIP, reason)

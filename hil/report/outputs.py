@@ -50,12 +50,18 @@ def publish(folder: Path, files: Mapping[str, Callable[[Path], object]]) -> None
 
 
 def _publish(folder: Path, files: Mapping[str, Callable[[Path], object]]) -> None:
+    is_new = not folder.exists()
     folder.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=folder, prefix=".unfinished-") as workshop:
-        for name, write in files.items():
-            write(Path(workshop) / name)
-        for name in files:
-            (Path(workshop) / name).replace(folder / name)
+    try:
+        with tempfile.TemporaryDirectory(dir=folder, prefix=".unfinished-") as workshop:
+            for name, write in files.items():
+                write(Path(workshop) / name)
+            for name in files:
+                (Path(workshop) / name).replace(folder / name)
+    except BaseException:
+        if is_new and not any(folder.iterdir()):
+            folder.rmdir()
+        raise
 
 
 def _unwritable(folder: Path, error: OSError) -> UsageError:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import re
+from itertools import pairwise
 from typing import Any
 
 import pytest
 
+from hil.cli.flowing import flowing
 from hil.cli.main import run
 from tests.cli.command_lines import every_command, examples, parse
 
@@ -38,3 +41,28 @@ def test_several_examples_of_one_epilog_are_all_found() -> None:
 def test_a_wrong_example_would_be_noticed(wrong: str) -> None:
     with pytest.raises(Exception, match=r"No such|Missing|unexpected|no such"):
         parse(wrong)
+
+
+@pytest.mark.parametrize(("name", "command"), EVERY, ids=[name for name, _ in EVERY])
+def test_every_help_flows(name: str, command: Any, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run([*name.split(), "--help"]) == 0
+    above_boxes = re.split(r"^╭", capsys.readouterr().out, maxsplit=1, flags=re.MULTILINE)[0]
+    for line, following in pairwise(line.strip() for line in above_boxes.splitlines()):
+        if line and following:  # a line is broken only where the next word has no room
+            assert len(line) + 1 + len(following.split()[0]) > 78
+    assert "…" not in above_boxes
+
+
+@pytest.mark.parametrize(("name", "command"), EVERY, ids=[name for name, _ in EVERY])
+def test_no_word_of_a_help_is_taken_for_markup(
+    name: str, command: Any, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "2000")  # so that every text is on one line
+    assert run([*name.split(), "--help"]) == 0
+    printed = capsys.readouterr().out
+    for parameter in command.params:
+        assert (parameter.help or "").replace(r"\[", "[") in printed, f"{parameter.name}: a bracket is written \\["
+
+
+def test_a_list_in_a_help_stays_a_list() -> None:
+    assert flowing("First\nof it.\n\nThen\nthis:\n\n  one\n  two\n") == "First of it.\n\nThen this:\n\n  one\n  two"

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 
 import numpy as np
 import pytest
+from rich.console import Console
 
+from estimator.identification.compare import Compared
 from estimator.identification.identify import identify
 from estimator.identification.linear_model import LinearModel
+from estimator.identification.online.recursive import Status
 from hil.cli.main import run
 from hil.recording import read_record
+from hil.report.identification.terminal import compared_summary
 from tests.estimator.identification.driveline import cruise, true_resonance
 
 MODEL = """schema = "hil.model/1"
@@ -170,6 +175,22 @@ def test_the_report_says_what_was_identified(recordings: list[Path], tmp_path: P
     assert [(each["recording"], each["estimator"]) for each in compared] == [
         (name, estimator) for name in ("run_1", "run_2") for estimator in ("rls", "ekf")
     ]
+    assert all((each["status"] == "estimated") == (not each["reason"]) for each in compared)
+
+
+def test_the_terminal_says_why_a_compared_estimate_is_invalid(capsys: pytest.CaptureFixture[str]) -> None:
+    cases = (
+        Compared("run_1", "riv", None, 85.0, Status.ESTIMATED),
+        *(
+            Compared("run_1", name, None, math.nan, Status.INVALID, "a pole on the unit circle")
+            for name in ("rls", "oeepm")
+        ),
+    )
+    Console(width=80).print(compared_summary(cases))
+    printed = capsys.readouterr().out
+    assert "run_1, rls: a pole on the unit circle" in printed
+    assert "run_1, oeepm: a pole on the unit circle" in printed
+    assert "run_1, riv:" not in printed
 
 
 def test_order_and_delay_are_chosen_where_they_are_left_open(

@@ -13,6 +13,7 @@ import pytest
 
 from hil.cli.main import run
 from hil.config.rig_file import read_rig
+from hil.errors import UsageError
 from hil.recording.formats import read_table
 from tests.cli.conftest import await_rows
 from tests.rig.observer import assert_disarmed
@@ -166,3 +167,19 @@ def test_course_is_never_overwritten(short_rig: Path, tmp_path: Path, capsys: py
     assert run(["run", str(short_rig), "cruise", "--out", str(tmp_path / "r.csv"), *NOWHERE]) == 2
     assert "r.online.json" in capsys.readouterr().err
     assert kept.read_text(encoding="utf-8") == "mine"
+
+
+def test_course_that_can_not_be_kept_is_said_and_the_run_is_entered_all_the_same(
+    short_rig: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(folder: Path, files: object) -> None:
+        raise UsageError(f"{folder}: no room")
+
+    monkeypatch.setattr("hil.cli.run.publish", full)
+    out = tmp_path / "run.csv"
+    with served(read_rig(short_rig)) as (server, _):
+        addresses = ("--bus", server.bus_url, "--modbus", str(server.modbus))
+        assert run(["run", str(short_rig), "reversal", "--out", str(out), "--pace", "fast", *addresses]) == 0
+    assert f"{tmp_path / 'run.online.json'} is missing: {tmp_path}: no room" in capsys.readouterr().err
+    assert run(["runs", "--store", str(tmp_path)]) == 0
+    assert "reversal" in capsys.readouterr().out

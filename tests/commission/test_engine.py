@@ -185,14 +185,46 @@ def test_state_is_whole_or_as_it_was(world: World, monkeypatch: pytest.MonkeyPat
     before = state.path.read_bytes()
     monkeypatch.setattr("hil.commission.state.os.fsync", _full_disk)
     state.steps["first"].because = "changed"
-    with pytest.raises(OSError, match="No space left"):
+    with pytest.raises(UsageError, match=r"commission\.json: expected room .* No space left"):
         state.save()
     assert state.path.read_bytes() == before
     assert [path.name for path in world.folder.iterdir()] == ["commission.json"]
 
 
+def test_what_ended_a_step_is_told_where_the_state_can_not_be_kept(
+    world: World, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    save = State.save
+
+    def save_while_there_is_room(state: State) -> None:
+        if any(record.status is Status.INTERRUPTED for record in state.steps.values()):
+            raise UsageError("no room")
+        save(state)
+
+    monkeypatch.setattr(State, "save", save_while_there_is_room)
+    world.fails["second"] = RunAborted("the bus is gone")
+    with pytest.raises(RunAborted, match="the bus is gone") as ended:
+        world.call()
+    assert ended.value.__notes__ == ["no room"]
+
+
 def _full_disk(descriptor: int) -> None:
     raise OSError(28, "No space left on device")
+
+
+def test_answer_that_is_none_is_told_what_would_be() -> None:
+    asked: list[str] = []
+    answers = iter(["what?", "", "s", "", "no torque today"])
+
+    def ask(question: str) -> str:
+        asked.append(question)
+        return next(answers)
+
+    assert Person(ask).may_command("any", True) == Answer(What.SKIP, "no torque today")
+    go = "  Go? [y]es, [s]kip, [q]uit: "
+    assert asked[0].endswith(go)
+    assert asked[1:3] == [f"  expected y or yes or s or q, came {came}\n{go}" for came in ("what?", "nothing")]
+    assert asked[3:] == ["  Because: ", "  A reason is needed, it is recorded. Because: "]
 
 
 def test_answers_stand_for_what_they_say() -> None:

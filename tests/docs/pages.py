@@ -49,9 +49,10 @@ def command_lines(page: Path) -> Iterator[str]:
     """Yield every command line ``hil ...`` of a page's blocks."""
     for block in blocks(page):
         if block.language in ("", "console", "sh"):
+            prompt = "$ " if block.language == "console" else ""  # what has none there is output
             for line in block.text.splitlines():
-                bare = line.removeprefix("$ ")
-                if bare.startswith("hil "):
+                bare = line.removeprefix(prompt)
+                if line.startswith(prompt) and bare.startswith("hil "):
                     yield bare.removesuffix("&").strip()
 
 

@@ -34,6 +34,8 @@ def test_a_mentioned_command_and_its_options_exist(line: str) -> None:
         return
     assert name in COMMANDS
     assert {word for word in words if word.startswith("--")} <= options(name)
+    inner = getattr(command(name), "commands", {})
+    assert not (inner and words) or words[0] in inner or words[0].startswith("-"), f"no such command: {line}"
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ from drivers.plc.map_needs import USED
 from estimator.diagnosis import evidence, holdout, judgement, noise, selection
 from estimator.diagnosis.where import locate
 from estimator.physics import own_law
+from hil.cli.main import ExitStatus
 from hil.config.experiment_tables import AnyExperiment
 from hil.config.model_file import read_model
 from hil.config.rig_file import Rig
@@ -22,6 +23,7 @@ from hil.proof.wire.challenge import CONCEALED
 from hil.recording.columns import UNITS
 from hil.recording.formats import FORMATS
 from hil.rig.sample import SampleFlag
+from tests.cli import bench
 from tests.docs.pages import DOCS, ROOT, blocks, pages
 
 
@@ -156,3 +158,20 @@ def test_the_shown_check_of_a_seal_runs(
     monkeypatch.chdir(tmp_path)
     exec(compile(script, "proof.md", "exec"), {})
     assert capsys.readouterr().out.startswith("backlash {")
+
+
+def test_the_verdict_from_python_is_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (script,) = (block.text for block in blocks(DOCS / "reference-api.md") if block.language == "python")
+    for seed, name in enumerate(("cruise", "reversal", "tip")):
+        bench.record(tmp_path / f"{name}.csv", seed, noise=0.02, n=600)
+    bench.model(tmp_path / "model.toml")
+    monkeypatch.chdir(tmp_path)
+    exec(compile(script, "reference-api.md", "exec"), {})
+    assert "Nothing is missing" in capsys.readouterr().out
+
+
+def test_every_exit_status_is_explained() -> None:
+    listed = re.findall(r"^\| (\d+) \|", text("reference-commands.md"), re.M)
+    assert [int(status) for status in listed] == [status.value for status in ExitStatus]

@@ -155,6 +155,12 @@ def test_a_result_that_fails_leaves_the_older_ones(tmp_path: Path) -> None:
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"a.txt": "old"}
 
 
+def test_a_folder_made_for_a_result_that_fails_is_not_left_behind(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="Is a directory"):
+        publish(tmp_path / "new", {"a.txt": lambda path: tmp_path.read_bytes()})
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize("name", ["file", "file/deeper"])
 def test_a_file_is_no_folder_for_results(tmp_path: Path, name: str) -> None:
     (tmp_path / "file").touch()

@@ -150,4 +150,5 @@ def _compared(each: Compared) -> dict[str, Any]:
         "resonance": _mode(each.resonance),
         "fit_percent": json_number(each.fit_percent),
         "status": each.status.value,
+        "reason": each.reason,
     }

@@ -109,7 +109,7 @@ def compared_table(compared: Sequence[Compared]) -> str:
             "–" if each.resonance is None else shown(each.resonance.frequency_hz),
             "–" if each.resonance is None else shown(each.resonance.damping),
             shown(each.fit_percent, "%"),
-            each.status.value,
+            f"{each.status.value}: {each.reason}" if each.reason else each.status.value,
         )
         for each in compared
     ]

@@ -41,9 +41,12 @@ def compared_summary(compared: Iterable[Compared]) -> Table:
     table = Table(title="Recursive estimators", title_justify="left", box=SIMPLE_HEAD)
     for heading in ("recording", "estimator", "frequency", "damping", "free-run fit", "status"):
         table.add_column(heading)
-    for each in compared:
+    told = list(compared)
+    for each in told:
         fit = f"{each.fit_percent:.1f} %" if math.isfinite(each.fit_percent) else "–"
         table.add_row(each.recording, each.estimator, *_shown(each.resonance), fit, each.status.value)
+    table.caption = "\n".join(f"{each.recording}, {each.estimator}: {each.reason}" for each in told if each.reason)
+    table.caption_justify = "left"
     return table
 
 

@@ -8,7 +8,8 @@ import os
 import re
 import shlex
 import tempfile
-from collections.abc import Callable, Iterator
+import textwrap
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -36,12 +37,18 @@ class Failure:
     quick: bool = False
 
 
+WIDTH = 84
+"""Characters of a line in a block of the built page."""
+
+_PARAGRAPH = re.compile(r"[a-z' ]+: ")
+"""How a line begins that is a statement of its own: ``note: ...``, ``can't tell: ...``."""
+
 _NUMBER = re.compile(r"\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 
 
 def skeleton(text: str) -> str:
-    """Return a text without its numbers: how many samples there were depends on the machine, what is said does not."""
-    return _NUMBER.sub("#", text)
+    """Return a text without its numbers and spacing: those depend on the machine, what is said does not."""
+    return re.sub(r"\s+", " ", _NUMBER.sub("#", text))
 
 
 def tell(failure: Failure) -> Told:
@@ -50,7 +57,7 @@ def tell(failure: Failure) -> Told:
         return failure.provoke()
 
 
-def said(command: str, *also: str, keep: Callable[[str], bool] = lambda line: True) -> tuple[str, int]:
+def said(command: str, *also: str, only: tuple[str, ...] = (), without: str = "") -> tuple[str, int]:
     """Carry out a command line as a user types it; return what it printed and its exit status.
 
     Parameters
@@ -58,31 +65,42 @@ def said(command: str, *also: str, keep: Callable[[str], bool] = lambda line: Tr
     command
         ``hil ...``.
     also
-        Further words that are not shown, such as addresses.
-    keep
-        Which of the printed lines are shown; the others are left out, and that is marked.
+        Further words that are not shown.
+    only
+        How the paragraphs begin that are shown, such as ``note:``; without it all are. What is left out is marked.
+    without
+        Pattern of what is taken out wherever it stands, unmarked: a name drawn at random.
     """
     printed = io.StringIO()
     with _wide(), contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed):
         status = run([*shlex.split(command)[1:], *also])
-    return "\n".join(_kept(printed.getvalue().rstrip().splitlines(), keep)), status
+    lines = re.sub(without, "", printed.getvalue()).rstrip().splitlines()
+    return "\n".join(_wrapped(_chosen(lines, only) if only else lines)), status
 
 
-def _kept(lines: list[str], keep: Callable[[str], bool]) -> Iterator[str]:
-    left_out = False
+def _chosen(lines: list[str], only: tuple[str, ...]) -> Iterator[str]:
+    """Yield the paragraphs that begin so, with ``...`` in the place of others; the terminal has wrapped them."""
+    shown = left_out = False
     for line in lines:
-        if keep(line):
-            if left_out:
-                yield "..."
-            yield line.rstrip()
-        left_out = not keep(line)
+        if _PARAGRAPH.match(line):
+            shown = line.startswith(only)
+        if shown and left_out:
+            yield "..."
+        left_out = not shown
+        if shown:
+            yield line
+
+
+def _wrapped(lines: Iterable[str]) -> Iterator[str]:
+    for line in lines:
+        yield from textwrap.wrap(line, WIDTH) if len(line) > WIDTH else [line.rstrip()]
 
 
 @contextlib.contextmanager
 def _wide() -> Iterator[None]:
     """Let what is printed be as wide as the page allows, whatever the terminal is."""
     before = os.environ.get("COLUMNS")
-    os.environ["COLUMNS"] = "110"
+    os.environ["COLUMNS"] = str(WIDTH)
     try:
         yield
     finally:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+from collections.abc import Mapping
 from pathlib import Path
 
 import matplotlib as mpl
@@ -12,6 +13,7 @@ from matplotlib.figure import Figure
 
 from estimator.signals.record import FloatArray
 from hil.recording import read_table
+from hil.recording.table import Column
 from tests.docs.gallery.case import Draw
 from tests.docs.signature_pictures import REST, STYLE, WITH, WITHOUT
 
@@ -20,7 +22,7 @@ FOLDER = Path(__file__).parents[3] / "docs" / "images" / "gallery"
 _TOO_FINE = re.compile(r"(?<=[ L])(\d+\.\d)\d+(?=[ \n])")
 
 
-def signals_of(path: Path, other: Path | None = None) -> Draw:
+def signals_of(path: Path, other: Path | None = None, until_s: float | None = None) -> Draw:
     """Return what draws a recording, beside the same one without the fault where there is one; read at once."""
     columns = read_table(path).columns
     beside = None if other is None else read_table(other).columns
@@ -33,7 +35,11 @@ def signals_of(path: Path, other: Path | None = None) -> Draw:
         if beside is not None:
             for panel, values in ((torque, _torque(beside)), (speed, np.asarray(beside["speed_rad_s"], dtype=float))):
                 panel.plot(np.asarray(beside["time_s"], dtype=float), values, color=WITHOUT, label="as it should be")
-        torque.plot(time_s, _torque(columns), color=WITH, label="recorded")
+        if beside is None:
+            torque.plot(time_s, columns["torque_m1_nm"], color=WITH, label="m1")
+            torque.plot(time_s, columns["torque_m2_nm"], color=WITHOUT, ls="--", label="m2")
+        else:
+            torque.plot(time_s, _torque(columns), color=WITH, label="recorded")
         speed.plot(time_s, np.asarray(columns["speed_rad_s"], dtype=float), color=WITH)
         for panel in (torque, speed):
             for at in time_s[flags]:
@@ -41,17 +47,17 @@ def signals_of(path: Path, other: Path | None = None) -> Draw:
         torque.set_ylabel("torque [Nm]")
         speed.set_ylabel("speed [rad/s]")
         speed.set_xlabel("time [s]")
-        if beside is not None or flags.any():
-            torque.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0, ncols=3)
+        torque.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0, ncols=3)
+        if until_s is not None:
+            speed.set_xlim(time_s[0], until_s)
         figure.align_ylabels([torque, speed])
         _save(figure, target)
 
     return draw
 
 
-def _torque(columns: object) -> FloatArray:
-    total = np.asarray(columns["torque_m1_nm"], dtype=float) + np.asarray(columns["torque_m2_nm"], dtype=float)  # type: ignore[index]
-    return np.asarray(total)
+def _torque(columns: Mapping[str, Column]) -> FloatArray:
+    return np.asarray(columns["torque_m1_nm"], dtype=float) + np.asarray(columns["torque_m2_nm"], dtype=float)
 
 
 def _save(figure: Figure, path: Path) -> None:

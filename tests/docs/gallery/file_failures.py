@@ -1,0 +1,74 @@
+"""Failures that files show before anything moves: rig file, data sheet, limits, recordings that are damaged."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+
+from tests.cli import bench
+from tests.docs.gallery.case import Failure, Told, said
+from tests.docs.gallery.recordings import cruise
+from tests.docs.gallery.rig_failures import EXAMPLE, write_rig
+
+EDS = EXAMPLE.parents[1] / "eds" / "inverter.eds"
+
+
+def told_of(command: str) -> Told:
+    """Carry out a command, show all of it."""
+    text, status = said(command)
+    return Told(command, text, status)
+
+
+def rig_file() -> Told:
+    """Check a rig file with three faults."""
+    write_rig(
+        (
+            ("period_s = 0.01 ", 'period_s = "10ms" '),
+            ("[inverters.m2]\nnode_id = 2", "[inverters.m2]\nnode_id = 200"),
+            ("sum_limit_nm = 700.0", "sum_limit = 700.0"),
+        )
+    )
+    return told_of("hil check rig.toml")
+
+
+def data_sheet(before: str, after: str) -> Told:
+    """Check an EDS that lacks what the tool needs."""
+    text = EDS.read_text(encoding="utf-8")
+    if text.count(before) != 1:
+        raise LookupError(f"{EDS} holds {before!r} {text.count(before)} times, expected once")
+    Path("drive.eds").write_text(text.replace(before, after), encoding="utf-8")
+    return told_of("hil check --eds drive.eds")
+
+
+def limits_refused() -> Told:
+    """Plan a run whose PRBS is above what its limits allow."""
+    write_rig((("amplitude_nm = 120.0", "amplitude_nm = 300.0"),))
+    return told_of("hil run rig.toml cruise --dry-run")
+
+
+def time_backwards() -> Told:
+    """Diagnose a recording whose time runs backwards in one row."""
+    bench.record(Path("run_1.csv"), 1, noise=0.02)
+    bench.model(Path("model.toml"))
+    rows = Path("run_1.csv").read_text(encoding="utf-8").splitlines(keepends=True)
+    rows[700], rows[701] = rows[701], rows[700]
+    Path("run_1.csv").write_text("".join(rows), encoding="utf-8")
+    return told_of("hil diagnose run_1.csv --model model.toml --out result")
+
+
+def cut_short() -> Told:
+    """Identify a recording of which a copy was not finished."""
+    path = cruise(Path("run_1.parquet"), 120.0, duration_s=3.0)
+    whole = path.read_bytes()
+    path.write_bytes(whole[: len(whole) // 2])
+    return told_of("hil identify run_1.parquet --out identified")
+
+
+FILES = (
+    Failure("rig_file", rig_file, quick=True),
+    Failure("missing_eds_object", partial(data_sheet, "\n[60B2]\n", "\n[60B3]\n"), quick=True),
+    Failure("wrong_pdo_map", partial(data_sheet, "DefaultValue=0x60B20010", "DefaultValue=0x60FF0020"), quick=True),
+    Failure("limits_refused", limits_refused, quick=True),
+    Failure("time_backwards", time_backwards, quick=True),
+    Failure("cut_recording", cut_short, quick=True),
+)
