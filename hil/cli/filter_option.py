@@ -46,5 +46,5 @@ def with_filter(settings: Settings, path: Path | None, run: str | None) -> tuple
         return settings, None
     from hil.report.identification.read_back import identified
 
-    found = identified(path, run, settings.adaptation)
+    found = identified(path, run, settings.adaptation, "--filter-run")
     return replace(found.settings, band_hz=settings.band_hz), found.L

@@ -56,7 +56,7 @@ def test_a_simulation_has_no_place_either(refused: Refused, drive: Path) -> None
 @pytest.mark.parametrize(
     ("name", "said"),
     [
-        ("run.mat", "expected a name that ends in one of .csv, .parquet"),
+        ("run.xlsx", "expected a name that ends in one of .csv, .parquet"),
         ("rig.toml/run.csv", "expected an existing folder"),
         ("none/run.csv", "expected an existing folder"),
     ],

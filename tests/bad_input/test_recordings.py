@@ -73,8 +73,8 @@ def test_refused_by_line_and_nothing_is_written(refused: Refused, drive: Path, f
         ("run.parquet", b"time_s,speed_rad_s\n", "a damaged or truncated one"),
         ("run.parquet", b"", "a damaged or truncated one"),
         ("run.mat", b"time_s,speed_rad_s\n", "a damaged or truncated one"),
-        ("run.xlsx", b"PK", "expected a recording (.csv, .parquet, .mat), came '.xlsx'"),
-        ("run", b"", "expected a recording (.csv, .parquet, .mat), came ''"),
+        ("run.xlsx", b"PK", "expected a recording (.csv, .parquet, .mf4, .mdf, .h5, .hdf5, .mat), came '.xlsx'"),
+        ("run", b"", "expected a recording (.csv, .parquet, .mf4, .mdf, .h5, .hdf5, .mat), came ''"),
     ],
 )
 def test_what_is_no_recording_is_refused(

@@ -18,6 +18,8 @@ from hil.config.model_file import read_model
 from hil.recording import read_records
 from tests.real.conftest import real_recording
 
+pytestmark = pytest.mark.campaign  # a diagnosis of a whole trip takes a minute
+
 MODEL = Path(__file__).parents[2] / "examples" / "electric_car.toml"
 TRIPS = ("A01", "A02", "A05", "A10", "A12", "A19", "A20", "A23")
 

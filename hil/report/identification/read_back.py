@@ -77,7 +77,7 @@ class Identified:
     L: FloatArray
 
 
-def identified(path: Path, run: str | None, adaptation: Adaptation) -> Identified:
+def identified(path: Path, run: str | None, adaptation: Adaptation, option: str = "--run") -> Identified:
     """Return the settings that identified a recording, and its observation filter L, as the paper reuses them.
 
     Parameters
@@ -88,6 +88,8 @@ def identified(path: Path, run: str | None, adaptation: Adaptation) -> Identifie
         Name of the recording; None where the file has one alone.
     adaptation : Adaptation
         Adaptation-gain profile to run with.
+    option : str
+        The option that names the recording, for messages.
 
     Raises
     ------
@@ -97,7 +99,7 @@ def identified(path: Path, run: str | None, adaptation: Adaptation) -> Identifie
         If the file is wrong, or the recording's output is no speed.
     """
     file = read_identification(path)
-    entry = _chosen(path, file.recordings, run)
+    entry = _chosen(path, file.recordings, run, option)
     if entry.output != "speed":
         raise FileProblem(path, f"recordings.{entry.name}.output | expected 'speed' | came {entry.output!r}")
     given = file.settings
@@ -110,14 +112,14 @@ def identified(path: Path, run: str | None, adaptation: Adaptation) -> Identifie
     return Identified(entry.name, settings, np.array(entry.filter_L))
 
 
-def _chosen(path: Path, entries: Sequence[_Recording], run: str | None) -> _Recording:
+def _chosen(path: Path, entries: Sequence[_Recording], run: str | None, option: str) -> _Recording:
     names = ", ".join(entry.name for entry in entries)
     if run is None and len(entries) > 1:
-        raise UsageError(f"{path}: it holds {len(entries)} recordings, expected one named: {names}")
+        raise UsageError(f"{path}: it holds {len(entries)} recordings, expected one named by {option}: {names}")
     for entry in entries:
         if run in (None, entry.name):
             return entry
-    raise UsageError(f"{run!r}: expected a recording of {path}: {names}")
+    raise UsageError(f"{option} {run}: expected a recording of {path}: {names}")
 
 
 def _json(path: Path) -> dict[str, Any]:
