@@ -75,9 +75,7 @@ class Stepper:
         self._torque[:-1] = self._torque[1:]
         self._torque[-1] = shaft_torque(np.array([torque_nm]), now, self._p)[0]
         self._angle[-1] = self._state[state_vector.ANGLE]
-        self._angle[-2] = (
-            self._angle[-1] - self._state[state_vector.SPEED] * self._period_s
-        )  # it goes straight on
+        self._angle[-2] = self._angle[-1] - self._state[state_vector.SPEED] * self._period_s  # it goes straight on
         last = self._torque.size - 1
         integration.integrate_period(
             self._masses,
