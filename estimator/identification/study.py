@@ -3,8 +3,9 @@
 What :func:`estimator.identification.identify.identify` found is taken as it is; here it is questioned. Each part has
 its derivation in its own module.
 
-A second off-line model, of third order and at the recording's own period, stands beside: there the torque was held from
-one sample to the next, which it is no more after the low-pass of the decimation. It is the one physical parameters are
+A second off-line model, by Box and Jenkins, of third order and at the recording's own period, stands beside: there the
+torque was held from one sample to the next, which it is no more after the low-pass of the decimation, and its noise
+model takes what the road does, which would bias an output-error fit's uncertain parameters. It is the one physical parameters are
 taken from, and the one that can tell feedback: the low-pass looks ahead, and so would a decimated residual.
 """
 
@@ -25,7 +26,7 @@ from estimator.identification.modes.uncertainty import (
 )
 from estimator.identification.offline.feedback import Feedback, judge_feedback
 from estimator.identification.offline.linear_fit import LinearFit
-from estimator.identification.offline.output_error import fit_output_error
+from estimator.identification.offline.box_jenkins import fit_box_jenkins
 from estimator.identification.offline.validation import Validation, validate
 from estimator.identification.online.chain import OnlineChain
 from estimator.identification.online.online_estimate import OnlineTrajectory
@@ -122,7 +123,7 @@ def _native(record: Record, settings: Settings) -> tuple[NativeModel | None, str
     """Fit a two-mass drive's structure at the recording's own period; or say why that can't be done."""
     data = decimate(record, 1, settings.high_pass_hz)
     try:
-        fit = fit_output_error(data, RESPONDING)
+        fit = fit_box_jenkins(data, RESPONDING)
     except NotExciting as error:
         return None, str(error)
     return NativeModel(fit, validate(fit, data)), ""

@@ -111,6 +111,11 @@ def in_any_recording(_model: DrivelineModel, _records: Sequence[Record]) -> Unte
     return None
 
 
+def as_given(values: Mapping[str, float]) -> Mapping[str, float]:
+    """Leave values as they were given."""
+    return values
+
+
 def told_one_way(_values: Mapping[str, float]) -> float:
     """Know no other way to tell the same motion."""
     return 1.0
@@ -218,6 +223,8 @@ class Effect:
     rescaled : callable
         Parameter values to the factor that every torque of the line takes in the other way to tell the same motion; 1
         where there is none.
+    completed : callable
+        Values that were given to those a simulation should have: where leaving one out is simpler than any real part.
     recognised : bool
         True where it is recognised in the raw data before any fit (repeated, lost, quantised samples).
     """
@@ -246,6 +253,7 @@ class Effect:
     implausible: Callable[[DrivelineModel, Sequence[Record], Mapping[str, float]], str] = always_plausible
     unresolved: Callable[[DrivelineModel, Sequence[Record], Mapping[str, float]], str] = always_plausible
     rescaled: Callable[[Mapping[str, float]], float] = told_one_way
+    completed: Callable[[Mapping[str, float]], Mapping[str, float]] = as_given
     recognised: bool = False
 
     @property

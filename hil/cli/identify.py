@@ -123,6 +123,7 @@ def _publish(
     from hil.report.identification.document import FILE_NAME, identification_text
     from hil.report.identification.page import identification_page
     from hil.report.identification.terminal import compared_summary, summary
+    from hil.report.identification.wording import warnings
     from hil.report.outputs import publish
 
     models = [beside(record, each.found, model) for record, each in zip(records, studies, strict=True)]
@@ -143,4 +144,6 @@ def _publish(
     console.print(summary(studies, nominal))
     if compared:
         console.print(compared_summary(compared))
+    for text in warnings(studies):
+        console.print(f"note: {text}", highlight=False, markup=False)
     typer.echo(f"all of it: {out / FILE_NAME}    report: {out / PAGE}")

@@ -56,7 +56,9 @@ def plant_for(rig: Rig, effects: Sequence[EffectSpec] = ()) -> Plant:
 
 
 def _values(effect: EffectSpec) -> dict[str, EffectValue]:
-    return {key: EffectValue(value) for key, value in effect.parameters.items()}
+    entry = EFFECTS.get(effect.name)
+    parameters = effect.parameters if entry is None else entry.completed(effect.parameters)
+    return {key: EffectValue(value) for key, value in parameters.items()}
 
 
 def _require_parameters(effect: EffectSpec) -> None:

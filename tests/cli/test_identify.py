@@ -193,6 +193,16 @@ def test_the_terminal_says_why_a_compared_estimate_is_invalid(capsys: pytest.Cap
     assert "run_1, riv:" not in printed
 
 
+def test_a_torque_that_moves_the_speed_next_to_nothing_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    weak = write(tmp_path / "weak.csv", 1, prbs_nm=2.0)
+    assert run(arguments([weak], tmp_path / "out")) == 0
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "most of the speed comes from elsewhere than from the torque" in printed
+    assert "Raise the PRBS" in printed
+
+
 def test_order_and_delay_are_chosen_where_they_are_left_open(
     recordings: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

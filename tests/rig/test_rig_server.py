@@ -144,6 +144,19 @@ def test_an_optional_parameter_may_be_at_its_null() -> None:
     plant_for(small_rig(), [EffectSpec("backlash", {"gap_rad": 0.02, "contact_rad": 0.0})])
 
 
+def test_a_gap_that_is_given_alone_has_a_depth_of_contact() -> None:
+    """A twentieth of it; damping that acts all at once would be a law of its own."""
+    alone, deep, sudden = (
+        plant_for(small_rig(), [EffectSpec("backlash", {"gap_rad": 0.02, **more})])
+        for more in ({}, {"contact_rad": 0.001}, {"contact_rad": 0.0})
+    )
+    for step in range(60):
+        torque_nm = 40.0 if step % 20 < 10 else -40.0
+        for plant in (alone, deep, sudden):
+            plant.advance((torque_nm, torque_nm), 0.01)
+    assert alone.speed_rad_s == deep.speed_rad_s != sudden.speed_rad_s
+
+
 def test_bounds_without_any_experiment_to_go_by() -> None:
     rig = small_rig().model_copy(update={"experiments": {}})
     with pytest.raises(UsageError, match="gap_rad is 3, expected 0 to"):

@@ -39,6 +39,15 @@ def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
     return [(0.1, contact), (0.4, contact), (1.2, contact)]
 
 
+CONTACT_PER_GAP = 0.05
+"""Depth of contact of a simulated joint that was given none: faces of steel are rounded by far less than their gap."""
+
+
+def completed(values: Mapping[str, float]) -> Mapping[str, float]:
+    """Give a gap without a depth of contact one: damping all at once would kick the motor at every touch."""
+    return {"contact_rad": CONTACT_PER_GAP * values.get("gap_rad", 0.0), **values}
+
+
 def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
     """Need torque of both signs, so that the gap is crossed."""
     if any(torque_reverses(record) for record in records):
@@ -76,4 +85,5 @@ EFFECT = Effect(
     starts=starts,
     testable=testable,
     sentence=sentence,
+    completed=completed,
 )

@@ -19,6 +19,10 @@ FAR_APART = 0.03
 """On-line and off-line frequency further apart than this share are worth a warning: docs/identification.md."""
 
 
+LITTLE_PERCENT = 50.0
+"""Free-run fit below which most of the output comes from elsewhere than from the torque."""
+
+
 def headline(studies: Sequence[Study]) -> str:
     """Return the result in a line."""
     modes = [each.resonance for each in studies if each.resonance is not None]
@@ -62,6 +66,12 @@ def warnings(studies: Sequence[Study]) -> list[str]:
         estimate = each.found.estimate
         if estimate.status is not Status.ESTIMATED:
             told.append(f"{each.name}: the on-line estimate is {estimate.status.value}: {estimate.reason.message}.")
+        if each.found.batch.fit_percent < LITTLE_PERCENT:
+            told.append(
+                f"{each.name}: the off-line model reproduces {each.found.batch.fit_percent:.0f} % of its recording: most "
+                "of the speed comes from elsewhere than from the torque, and a resonance of such a model is none to "
+                "believe. Raise the PRBS or record longer."
+            )
         if each.feedback is not None and each.feedback.detected:
             told.append(f"{each.name}: {each.feedback.statement}")
         if apart := _apart(each.found.online_resonance, each.found.batch_resonance):
