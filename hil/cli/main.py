@@ -6,6 +6,7 @@ other, with its exit status and without a traceback.
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import sys
 from collections.abc import Sequence
@@ -136,7 +137,9 @@ def _see_help(error: BaseException) -> str:
 
 
 def _complain(text: str) -> None:
-    print(text, file=sys.stderr)  # noqa: T201 - the one place that speaks of errors
+    """Say what went wrong; where the terminal is gone nobody can be told, and the exit status says it alone."""
+    with contextlib.suppress(OSError):
+        print(text, file=sys.stderr, flush=True)  # noqa: T201 - the one place that speaks of errors
 
 
 def main() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -96,14 +97,18 @@ def _view(opening: Opening, out: Path, page: str, picture: tuple[Path, float] | 
 
 
 def _close(opening: Opening, view: MonitorApp) -> None:
-    """Say how every run went, then end as the view ended."""
+    """Say how every run went, then end as the view ended.
+
+    Where the terminal has gone, which is told as an interruption, nobody can be told.
+    """
     from hil.monitor.state import outcome
 
     for report in opening.source.poll():  # what the rig said while it was being closed
         opening.state.take(report)
     if opening.source.can_drive:
-        for run in opening.state.runs:
-            typer.echo(outcome(run))
+        with suppress(OSError) if view.interrupted else nullcontext():
+            for run in opening.state.runs:
+                typer.echo(outcome(run))
     if opening.state.ended is not None and opening.state.ended.error is not None:
         raise RunAborted(opening.state.ended.error)
     if view.return_code:

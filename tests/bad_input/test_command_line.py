@@ -22,7 +22,7 @@ from tests.bad_input.conftest import Refused
         ("sim", "Missing argument 'RIG'. See: hil sim --help"),
         ("check --colour", "No such option: --colour"),
         ("run rig.toml", "Missing argument 'EXPERIMENT'. See: hil run --help"),
-        ("identify", "Missing argument 'REC...'. See: hil identify --help"),
+        ("identify", "Missing argument 'REC'. See: hil identify --help"),
         ("diagnose run.csv --out out", "Missing option '--model'. See: hil diagnose --help"),
         ("simulate", "Missing option '--model'. See: hil simulate --help"),
         ("compare", "Missing argument 'MODEL'. See: hil compare --help"),

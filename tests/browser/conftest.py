@@ -17,9 +17,13 @@ DRAWN = "[...document.querySelectorAll('.plotly-graph-div')].every((each) => eac
 """True once every figure is there."""
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
-    """Start the browser once; a machine without one can't judge pages."""
+    """Start the browser; a machine without one can't judge pages.
+
+    Not for the whole session: while it is there playwright keeps an event loop running in this thread, and no other
+    test could have one.
+    """
     if not CHROMIUM:
         pytest.skip("no chromium on this machine: pages can't be opened. Install one (Debian: apt install chromium).")
     from playwright.sync_api import sync_playwright

@@ -23,6 +23,9 @@ from tests.export.iec.tree import REALS
 
 L = np.array([1.0, -0.9, 0.72])
 
+SLOW = pytest.mark.campaign
+"""The other parser takes seconds for a program: one of the four is read at every change."""
+
 
 @pytest.mark.parametrize("precision", Precision)
 def test_it_is_plain_and_narrow(precision: Precision) -> None:
@@ -51,8 +54,14 @@ def test_every_input_and_output_has_a_comment(name: str) -> None:
     assert [line for line in lines if "(*" not in line] == []
 
 
-@pytest.mark.parametrize("precision", Precision)
-@pytest.mark.parametrize("filter_L", [L, None], ids=["fixed", "adapted"])
+@pytest.mark.parametrize(
+    ("precision", "filter_L"),
+    [
+        pytest.param(precision, filter_L, marks=() if filter_L is L and precision is Precision.DOUBLE else SLOW)
+        for precision in Precision
+        for filter_L in (L, None)
+    ],
+)
 def test_an_independent_parser_reads_the_same_program(precision: Precision, filter_L: FloatArray | None) -> None:
     if find_spec("blark") is None:
         pytest.skip("blark, a parser of IEC 61131-3, is not installed: pip install blark==0.8.3")

@@ -91,7 +91,11 @@ def test_a_day_at_the_rig(rig_path: Path, tmp_path: Path) -> None:
         assert run.entry.outcome == "stopped by the operator"
 
 
-@pytest.mark.parametrize("how", ["q", "\x03", "SIGTERM", "SIGHUP"])
+LONGER = pytest.mark.campaign
+"""Each of these starts two programs: one way out is tried at every change, the others by ``make campaign``."""
+
+
+@pytest.mark.parametrize("how", ["\x03", *(pytest.param(how, marks=LONGER) for how in ("q", "SIGTERM", "SIGHUP"))])
 def test_every_way_out_disarms(rig_path: Path, tmp_path: Path, how: str) -> None:
     with watched(rig_path, tmp_path / "runs") as (terminal, server):
         start(terminal)
@@ -106,6 +110,7 @@ def test_every_way_out_disarms(rig_path: Path, tmp_path: Path, how: str) -> None
     assert len(list((tmp_path / "runs").glob("cruise-*.parquet"))) == 1
 
 
+@LONGER
 def test_a_killed_view_leaves_nothing_armed(rig_path: Path, tmp_path: Path) -> None:
     with watched(rig_path, tmp_path / "runs") as (terminal, server):
         start(terminal)
@@ -127,6 +132,7 @@ def test_a_terminal_that_goes_away_leaves_nothing_armed(rig_path: Path, tmp_path
     assert len(list((tmp_path / "runs").glob("cruise-*.parquet"))) == 1
 
 
+@LONGER
 def test_a_killed_rig_process_is_told(rig_path: Path, tmp_path: Path) -> None:
     with watched(rig_path, tmp_path / "runs") as (terminal, _):
         for child in children(terminal.pid):

@@ -117,6 +117,7 @@ def test_wrong_use_is_refused_before_anything_is_made(tmp_path, capsys, wrong, s
 
 
 @pytest.mark.timeout(300)
+@pytest.mark.campaign
 def test_the_public_command_is_scored_by_the_verdict_it_wrote(tmp_path):
     """Three times the bound, recordings of 15 s: whether it is found is the tool's affair, not this test's."""
     wanted = ["--effects", "coulomb_friction_motor", "--seeds", "1", "--multiples", "3", "--duration-s", "15"]
