@@ -6,7 +6,7 @@ import math
 
 from hil.monitor.messages import Health, NodeHealth, PlcHealth
 from hil.monitor.plot import title
-from hil.monitor.snapshot import Snapshot
+from hil.monitor.snapshot import Activity, Snapshot
 
 NO_BUS = "a recording is played: no bus"
 
@@ -20,6 +20,8 @@ PLC_STALE_S = 1.0
 def brief(snapshot: Snapshot, width: int, height: int) -> list[str]:
     """Health in a few lines."""
     health = snapshot.health
+    if snapshot.headline.activity is Activity.LOST:
+        return [title("bus", "LOST", width), "no word of any device"[:width]]
     head = title("bus", "" if health is None else verdict(health), width)
     if health is None:
         return [head, NO_BUS[:width] if not snapshot.can_drive else "no word of the bus yet"]
@@ -39,7 +41,7 @@ def brief(snapshot: Snapshot, width: int, height: int) -> list[str]:
 def full(snapshot: Snapshot, width: int, height: int) -> list[str]:
     """Everything that is known of the bus, as a page."""
     health = snapshot.health
-    if health is None:
+    if health is None or snapshot.headline.activity is Activity.LOST:
         return brief(snapshot, width, height)
     timing = health.timing
     lines = [

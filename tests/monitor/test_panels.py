@@ -13,7 +13,7 @@ from estimator.identification.tracking.alarm import Alarm, Level
 from hil.monitor import bus_panels, head_panels, model_panels, signal_panels
 from hil.monitor.messages import Began, Kind, NodeHealth, Notice, PlcHealth, Ready, Samples
 from hil.monitor.panel import Draw
-from hil.monitor.snapshot import History, Model, Snapshot
+from hil.monitor.snapshot import Activity, History, Model, Snapshot
 from hil.monitor.state import LiveState
 from hil.rig.experiments.base import Phase
 from tests.monitor.fake_source import PERIOD_S, health, node, sample
@@ -150,6 +150,16 @@ def test_a_healthy_bus_is_called_so() -> None:
         lines = draw(snapshot(), 80, 30)
         assert lines[0].endswith("OK")
         assert not any("STALE" in line for line in lines)
+
+
+def test_of_a_bus_that_is_lost_nothing_old_is_shown() -> None:
+    healthy = snapshot()
+    lost = replace(healthy, headline=replace(healthy.headline, activity=Activity.LOST))
+    for draw in (bus_panels.brief, bus_panels.full):
+        text = "\n".join(draw(lost, 80, 30))
+        assert "LOST" in text
+        assert "OK" not in text
+        assert "operation enabled" not in text
 
 
 def test_a_permit_that_is_withdrawn_is_said_so() -> None:
