@@ -5,8 +5,8 @@ its derivation in its own module.
 
 A second off-line model, by Box and Jenkins, of third order and at the recording's own period, stands beside: there the
 torque was held from one sample to the next, which it is no more after the low-pass of the decimation, and its noise
-model takes what the road does, which would bias an output-error fit's uncertain parameters. It is the one physical parameters are
-taken from, and the one that can tell feedback: the low-pass looks ahead, and so would a decimated residual.
+model takes what the road does, which an output-error fit would take for parameters. It is the one physical parameters
+are taken from, and the one that can tell feedback: the low-pass looks ahead, and so would a decimated residual.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from estimator.identification.modes.uncertainty import (
     pole_zero_map,
     uncertain_resonance,
 )
+from estimator.identification.offline.box_jenkins import fit_box_jenkins
 from estimator.identification.offline.feedback import Feedback, judge_feedback
 from estimator.identification.offline.linear_fit import LinearFit
-from estimator.identification.offline.box_jenkins import fit_box_jenkins
 from estimator.identification.offline.validation import Validation, validate
 from estimator.identification.online.chain import OnlineChain
 from estimator.identification.online.online_estimate import OnlineTrajectory

@@ -66,11 +66,11 @@ def warnings(studies: Sequence[Study]) -> list[str]:
         estimate = each.found.estimate
         if estimate.status is not Status.ESTIMATED:
             told.append(f"{each.name}: the on-line estimate is {estimate.status.value}: {estimate.reason.message}.")
-        if each.found.batch.fit_percent < LITTLE_PERCENT:
+        if (fit := each.found.batch.fit_percent) < LITTLE_PERCENT:
             told.append(
-                f"{each.name}: the off-line model reproduces {each.found.batch.fit_percent:.0f} % of its recording: most "
-                "of the speed comes from elsewhere than from the torque, and a resonance of such a model is none to "
-                "believe. Raise the PRBS or record longer."
+                f"{each.name}: the off-line model reproduces {fit:.0f} % of its recording: most of the speed comes "
+                "from elsewhere than from the torque, and a resonance of such a model is none to believe. Raise the PRBS or "
+                "record longer."
             )
         if each.feedback is not None and each.feedback.detected:
             told.append(f"{each.name}: {each.feedback.statement}")
