@@ -69,8 +69,8 @@ def warnings(studies: Sequence[Study]) -> list[str]:
         if (fit := each.found.batch.fit_percent) < LITTLE_PERCENT:
             told.append(
                 f"{each.name}: the off-line model reproduces {fit:.0f} % of its recording: most of the speed comes "
-                "from elsewhere than from the torque, and a resonance of such a model is none to believe. Raise the PRBS or "
-                "record longer."
+                "from elsewhere than from the torque, and a resonance of such a model is none to believe. Raise the "
+                "PRBS or record longer."
             )
         if each.feedback is not None and each.feedback.detected:
             told.append(f"{each.name}: {each.feedback.statement}")
