@@ -29,7 +29,8 @@ class Terminal:
         self._command = [sys.executable, "-m", "hil", *arguments]
         self._screen = pyte.Screen(columns, rows)
         self._stream = pyte.ByteStream(self._screen)
-        self._environment = {**os.environ, "TERM": "xterm-256color", **({"NO_COLOR": "1"} if no_color else {})}
+        given = {name: value for name, value in os.environ.items() if name not in ("COLUMNS", "LINES")}
+        self._environment = {**given, "TERM": "xterm-256color", **({"NO_COLOR": "1"} if no_color else {})}
         self.output = bytearray()
         self._closed = False
         self._gone = False
