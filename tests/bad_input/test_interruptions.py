@@ -33,7 +33,10 @@ def opened_by(process: subprocess.Popen[str], pipe: Path) -> int:
 
 
 @pytest.mark.parametrize("number", SIGNALS)
-@pytest.mark.parametrize("command", ["identify PIPE --out OUT", "diagnose PIPE --model MODEL --out OUT"])
+@pytest.mark.parametrize(
+    "command",
+    ["identify PIPE --out OUT", pytest.param("diagnose PIPE --model MODEL --out OUT", marks=pytest.mark.campaign)],
+)
 def test_while_it_reads(spawn: Spawn, drive: Path, command: str, number: signal.Signals) -> None:
     """The recording is a named pipe with nothing in it: the command is at it, and stays there."""
     pipe, out = drive / "pipe.csv", drive / "out"
