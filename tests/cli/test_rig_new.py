@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
+import fcntl
 import os
 import pty
 import subprocess
 import sys
+import termios
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -164,7 +167,11 @@ def terminal(tmp_path: Path) -> Iterator[tuple[subprocess.Popen[bytes], int, Pat
     ours, theirs = pty.openpty()
     path = tmp_path / "rig.toml"
     process = subprocess.Popen(
-        [sys.executable, "-m", "hil", "rig", "new", str(path)], stdin=theirs, stdout=theirs, stderr=theirs
+        [sys.executable, "-m", "hil", "rig", "new", str(path)],
+        stdin=theirs,
+        stdout=theirs,
+        stderr=theirs,
+        preexec_fn=lambda: (os.setsid(), fcntl.ioctl(0, termios.TIOCSCTTY, 0)),  # Ctrl-C is then a key of it
     )
     os.close(theirs)
     yield process, ours, path
@@ -180,6 +187,15 @@ def read_until(end: int, text: str) -> str:
     while text not in seen:
         seen += os.read(end, 1024).decode()
     return seen
+
+
+def ended_by_ctrl_c(process: subprocess.Popen[bytes], end: int) -> int:
+    """Press Ctrl-C as a person does, once more where it came between the prompt and the wait for the line."""
+    for _ in range(20):
+        os.write(end, b"\x03")
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            return process.wait(timeout=2)
+    raise AssertionError("still there after twenty times Ctrl-C")
 
 
 def test_a_person_at_a_terminal(terminal: tuple[subprocess.Popen[bytes], int, Path]) -> None:
@@ -198,9 +214,7 @@ def test_a_person_at_a_terminal(terminal: tuple[subprocess.Popen[bytes], int, Pa
 def test_ctrl_c_writes_nothing(terminal: tuple[subprocess.Popen[bytes], int, Path]) -> None:
     process, end, path = terminal
     read_until(end, "Name of the rig")
-    os.write(end, b"\x03")
-    process.send_signal(2)
-    assert process.wait(timeout=20) == 130
+    assert ended_by_ctrl_c(process, end) == 130
     assert list(path.parent.iterdir()) == []
 
 
