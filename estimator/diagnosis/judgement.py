@@ -10,8 +10,9 @@ from estimator.diagnosis.convergence import unconverged
 from estimator.diagnosis.evidence import VERY_STRONG, gain, residuals_by_record
 from estimator.diagnosis.noise import unpredictable
 from estimator.diagnosis.result import Verdict
-from estimator.diagnosis.selection import VISIBLE, Selection
+from estimator.diagnosis.selection import Selection
 from estimator.diagnosis.unnamed import UnnamedLaw
+from estimator.diagnosis.weight import VISIBLE
 from estimator.physics.catalogue import EFFECTS
 from estimator.signals.record import OutputKind
 

@@ -9,7 +9,8 @@ from estimator.diagnosis.chain import Chain
 from estimator.diagnosis.holdout import Examiner
 from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects, Progress, everything, open_hypotheses
 from estimator.diagnosis.noise import noise_floor
-from estimator.diagnosis.selection import VISIBLE, Selection, Selector
+from estimator.diagnosis.selection import Selection, Selector
+from estimator.diagnosis.weight import VISIBLE, Weight
 from estimator.physics.effect import Untestable
 from estimator.physics.model import DrivelineModel
 from estimator.signals.record import Record
@@ -52,6 +53,6 @@ def _searched(chain: Chain, model: DrivelineModel, unseen: Sequence[Record], pro
     examiner = Examiner(model, chain.records, unseen)
     floor = noise_floor(chain.records)
     names, untestable = open_hypotheses(model, chain.records)
-    least_ratio = VISIBLE if chain.torque_is_unknown else 1.0
-    selection = Selector(bench, examiner, names, floor, progress, least_ratio).run()
+    weight = Weight(floor, least_ratio=VISIBLE if chain.torque_is_unknown else 1.0)
+    selection = Selector(bench, examiner, names, weight, progress).run()
     return Search(chain, bench, examiner, floor, selection, untestable)

@@ -15,15 +15,15 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from estimator.diagnosis.evidence import VERY_STRONG, Gain, gain, information, residuals_by_record
+from estimator.diagnosis.evidence import VERY_STRONG, Gain, gain, information
 from estimator.diagnosis.holdout import Examiner, HoldOut
 from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects, Progress, effects_of, with_effect
 from estimator.diagnosis.intervals import Z95, chance_of_coherent, reported_covariance
 from estimator.diagnosis.lookalikes import lookalikes
-from estimator.diagnosis.noise import unpredictable
 from estimator.diagnosis.screening import Look, Screen, promising
 from estimator.diagnosis.trial import Trial, has_edge, healed_in, null_inside, ranks, scan_choices, values_of
 from estimator.diagnosis.unnamed import UnnamedLaw, best_unnamed
+from estimator.diagnosis.weight import VISIBLE, Weight, earns_detail
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult
 from estimator.physics.parallel import concurrently
@@ -42,18 +42,8 @@ MOST_FITS = 10
 WORTH_FINISHING = 0.5
 """Share of the best rough fit's gain below which a rival's fit is not finished."""
 
-PART_OF_MISMATCH = 0.05
-"""Share of the first mismatch's power that a further effect must remove, or else
-``VISIBLE`` of the RMS and half of what stands."""
-
-PART_FOR_DETAIL = 0.01
-"""Share of what a special case removes that its generalisation must remove on top: the same friction written as
-bristles or as a rounded sign differs by less."""
-
 PART_UNSEEN = 0.25
 """Share of the relative gain on fitted samples that must show on unseen ones; an effect may act mostly elsewhere."""
-
-VISIBLE = 1.05
 
 NEAR_NOISE = 1.5
 """Error over the noise floor above which a choice is compared with what can be found behind a slow load."""
@@ -107,20 +97,17 @@ class Selector:
 
     Attributes
     ----------
-    floor : float
-        Noise floor of the output.
     names : sequence of str
         Effects that the recordings can tell.
-    least_ratio : float
-        By which an effect must lower the RMS at least: above 1 where part of the input is itself an estimate.
+    weight : Weight
+        What counts in these recordings.
     """
 
     bench: Bench
     examiner: Examiner
     names: Sequence[str]
-    floor: float
+    weight: Weight
     progress: Progress
-    least_ratio: float = 1.0
     _rounds: int = 0
     _trials: dict[str, Trial] = field(default_factory=dict)
     _dismissed: dict[str, float] = field(default_factory=dict)
@@ -133,7 +120,7 @@ class Selector:
         """
         retuned = self.bench.fit(NOTHING)
         path = self._grown(_Path(NOTHING, retuned, {}), retuned)
-        if not path.chosen or path.current.rms > NEAR_NOISE * self._level(path.current):
+        if not path.chosen or path.current.rms > NEAR_NOISE * self.weight.level(path.current):
             path = self._better(path, self._behind_profile(retuned), retuned)
         chosen, current = path.chosen, path.current
         if any(EFFECTS[name].event for name in chosen):
@@ -198,11 +185,7 @@ class Selector:
 
     def _is_noise(self, result: FitResult) -> bool:
         """Tell whether what a fit leaves is next to the noise, and no law without a name finds anything in it."""
-        return result.rms < VISIBLE * self._level(result) and self._law(result) is None
-
-    def _level(self, result: FitResult) -> float:
-        """Return the noise: of the reading, or of a fit's error if that is less."""
-        return min(self.floor, unpredictable(residuals_by_record(result)))
+        return result.rms < VISIBLE * self.weight.level(result) and self._law(result) is None
 
     def _behind_profile(self, retuned: FitResult) -> Trial | None:
         """Look for an effect behind a slow load that by itself hides it, where something stands.
@@ -294,16 +277,21 @@ class Selector:
         return entry.implausible(*given) or entry.unresolved(*given) or None
 
     def _best(self, trials: Mapping[str, Trial], current: FitResult, retuned: FitResult) -> Trial | None:
-        """Return the trial that gains most and passes every test, the simpler of two nested ones where they tie."""
+        """Return the trial that gains most and passes every test, the simpler of two nested ones where they tie.
+
+        What an effect explains that was too light to count is no evidence for another that explains less of it.
+        """
         passing = [trial for trial in trials.values() if trial.failed is None]
         rank = ranks(passing, current)
         most = self._most_unresolved(trials, current)
+        least_rank = -math.inf
         for trial in sorted(passing, key=lambda t: -rank[t.name]):
-            if trial.result.squares > most:
+            if trial.result.squares > most or rank[trial.name] < least_rank:
                 return None
             simpler = self._simpler(trial, trials, current)
-            weighty = self._weighty(simpler.name, simpler.effects, simpler.result, current, retuned)
-            if weighty and self._beyond_rest(simpler, current) and self._holds_out(simpler, current):
+            if not self.weight.counts(simpler.name, simpler.effects, simpler.result, current, retuned):
+                least_rank = max(least_rank, rank[trial.name] - VERY_STRONG)
+            elif self._beyond_rest(simpler, current) and self._holds_out(simpler, current):
                 return self._examined(simpler, current)
         return None
 
@@ -336,38 +324,9 @@ class Selector:
             special = trials.get(name)
             if special is not None and special.failed is None:
                 more = gain(special.result, trial.result)
-                if more.delta_bic < VERY_STRONG or not self._earns_detail(special, trial, current):
+                if more.delta_bic < VERY_STRONG or not earns_detail(special.result, trial.result, current):
                     return special
         return trial
-
-    @staticmethod
-    def _earns_detail(special: Trial, general: Trial, current: FitResult) -> bool:
-        """Tell whether the general law removes clearly more of the mismatch than its special case."""
-        removed = special.result.rms**2 - general.result.rms**2
-        return removed >= PART_FOR_DETAIL * (current.rms**2 - special.result.rms**2)
-
-    def _visible(self, before: FitResult, after: FitResult) -> bool:
-        standing = max(before.rms**2 - self._level(before) ** 2, 0.0)
-        removed = before.rms**2 - after.rms**2
-        return before.rms >= VISIBLE * after.rms and removed >= 0.5 * standing
-
-    def _weighty(self, name: str, effects: Effects, after: FitResult, before: FitResult, retuned: FitResult) -> bool:
-        """Tell whether an effect removes enough to count.
-
-        At an element of its own it may be small, if it can be seen. Beside another effect of the same element it must
-        be a real part of the mismatch: a law written another way leaves just such a small remainder. So must a profile,
-        which can take up any slow rest, and a wave beside another wave: no machine's is a pure sine.
-        """
-        if before.rms < self.least_ratio * after.rms:
-            return False
-        mismatch = max(retuned.rms**2 - self.floor**2, retuned.rms**2 - after.rms**2)
-        removed = before.rms**2 - after.rms**2
-        if removed >= PART_OF_MISMATCH * mismatch:
-            return True
-        neighbours = {EFFECTS[other].element for other in effects if other != name}
-        overtone = bool(EFFECTS[name].phases) and any(EFFECTS[other].phases for other in effects - {name})
-        alike = EFFECTS[name].element in neighbours or EFFECTS[name].profile or overtone
-        return not alike and self._visible(before, after)
 
     def _examine(self, trial: Trial, before: FitResult) -> HoldOut:
         return self.examiner.compare(before, effects_of(before), trial.result, trial.effects)
@@ -380,7 +339,7 @@ class Selector:
         held = self._examine(trial, before)
         seen = 1.0 - (trial.result.rms / before.rms) ** 2
         unseen = 1.0 - (held.after / held.before) ** 2
-        level = self._level(trial.result)
+        level = self.weight.level(trial.result)
         possible = 1.0 - (level / held.before) ** 2 if held.before > VISIBLE * level else 0.0
         return unseen + Z95 * held.spread >= PART_UNSEEN * min(seen, possible)
 
@@ -391,7 +350,7 @@ class Selector:
         for name in sorted(chosen) if len(chosen) > 1 else ():
             without = self.bench.fit(chosen - {name}, current)
             gained = gain(without, current)
-            if gained.delta_bic < VERY_STRONG or not self._weighty(name, chosen, current, without, retuned):
+            if gained.delta_bic < VERY_STRONG or not self.weight.counts(name, chosen, current, without, retuned):
                 return self._drop_superfluous(chosen - {name}, without, retuned)
         return chosen, current
 

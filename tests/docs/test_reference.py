@@ -11,7 +11,7 @@ from pydantic import BaseModel
 
 from drivers.inverter.drive_settings import OPTION_CODES
 from drivers.plc.map_needs import USED
-from estimator.diagnosis import evidence, holdout, judgement, noise, selection
+from estimator.diagnosis import evidence, holdout, judgement, noise, selection, weight
 from estimator.diagnosis.where import locate
 from estimator.physics import own_law
 from hil.cli.main import ExitStatus
@@ -91,9 +91,9 @@ def test_the_thresholds_of_a_verdict_are_those_of_the_code() -> None:
     for said in (
         f"ΔBIC of at least {evidence.VERY_STRONG:.0f}",
         f"p ≤ {selection.SIGNIFICANT:g} after",
-        f"removes {selection.PART_OF_MISMATCH:.0%}".replace("%", " %") + " of the first mismatch's power",
-        f"{selection.VISIBLE - 1:.0%}".replace("%", " %") + " of the RMS and half of what stands",
-        f"removes {selection.PART_FOR_DETAIL:.0%}".replace("%", " %") + " more",
+        f"removes {weight.PART_OF_MISMATCH:.0%}".replace("%", " %") + " of the first mismatch's power",
+        f"{weight.VISIBLE - 1:.0%}".replace("%", " %") + " of the RMS and half of what stands",
+        f"removes {weight.PART_FOR_DETAIL:.0%}".replace("%", " %") + " more",
         f"{judgement.ABOVE_FLOOR:g} times the floor",
         f"the last {noise.PREDICTOR_ORDER} outputs",
         f"blocks of {holdout.BLOCK_S:g} s every {holdout.EVERY_S:g} s",

@@ -13,8 +13,9 @@ from estimator.diagnosis.evidence import VERY_STRONG
 from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects, everything
 from estimator.diagnosis.judgement import ABOVE_FLOOR, MOST, MOST_VISIBLE, NEAR_FLOOR, NEAR_FLOOR_PROFILE, judge
 from estimator.diagnosis.result import Verdict
-from estimator.diagnosis.selection import VISIBLE, Selection, counting_law
+from estimator.diagnosis.selection import Selection, counting_law
 from estimator.diagnosis.unnamed import best_unnamed
+from estimator.diagnosis.weight import VISIBLE
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
 from estimator.physics.model import DrivelineModel

@@ -18,15 +18,13 @@ from estimator.diagnosis.screening import Screen
 from estimator.diagnosis.selection import (
     MOST_EFFECTS,
     MOST_FITS,
-    PART_FOR_DETAIL,
-    PART_OF_MISMATCH,
     SIGNIFICANT,
-    VISIBLE,
     WORTH_FITTING,
     Selection,
     Selector,
 )
 from estimator.diagnosis.trial import Trial, has_edge, healed_in, null_inside, scan_choices
+from estimator.diagnosis.weight import Weight
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult
 from estimator.physics.own_scan import MOST_CELLS
@@ -48,7 +46,7 @@ def selector(records: Sequence[Record], names: Sequence[str] | None = None, floo
     found, _ = open_hypotheses(LINE, records)
     bench = Bench(LINE, records, everything(records))
     level = noise_floor(records) if floor is None else floor
-    return Selector(bench, Examiner(LINE, records, ()), found if names is None else names, level, silent)
+    return Selector(bench, Examiner(LINE, records, ()), found if names is None else names, Weight(level), silent)
 
 
 def coulomb(speed: float) -> float:
@@ -329,45 +327,6 @@ class TestRules:
         before, trial = of_rms(1.0, 2), self.trial(COULOMB, 0.5)
         assert select._holds_out(trial, before) is holds
 
-    @pytest.mark.parametrize(("after", "weighty"), [(0.95, True), (0.98, False), (0.1, True)])
-    def test_a_share_of_the_first_mismatch_has_weight(self, select: Selector, after: float, weighty: bool) -> None:
-        """1 - 0.95^2 = 9.8 % of the power, 1 - 0.98^2 = 4.0 %; the floor holds 1 %."""
-        assert PART_OF_MISMATCH == 0.05
-        alone = frozenset({COULOMB})
-        assert select._weighty(COULOMB, alone, of_rms(after, 3), self.RETUNED, self.RETUNED) is weighty
-
-    @pytest.mark.parametrize(
-        ("before", "after", "visible"),
-        [
-            (0.12, 0.101, True),  # most of the rest that stands above the floor, 19 % of the RMS
-            (0.12, 0.117, False),  # 2.6 % of the RMS
-            (0.5, 0.47, False),  # 6 % of the RMS but a small part of what stands
-        ],
-    )
-    def test_a_small_rest_counts_where_it_is_most_of_what_stands(
-        self, select: Selector, before: float, after: float, visible: bool
-    ) -> None:
-        assert VISIBLE == 1.05
-        assert select._visible(of_rms(before, 3), of_rms(after, 4)) is visible
-        elsewhere = frozenset({COULOMB, "road_grade"})
-        assert select._weighty(COULOMB, elsewhere, of_rms(after, 4), of_rms(before, 3), self.RETUNED) is visible
-
-    def test_a_small_rest_beside_an_effect_of_the_same_element_is_its_law_written_another_way(
-        self, select: Selector
-    ) -> None:
-        same = frozenset({"backlash", "stiffness_nonlinearity"})
-        after, before = of_rms(0.101, 4), of_rms(0.12, 3)
-        assert not select._weighty("stiffness_nonlinearity", same, after, before, self.RETUNED)
-        assert select._weighty("stiffness_nonlinearity", same, of_rms(0.101, 4), of_rms(0.5, 3), self.RETUNED)
-
-    def test_a_small_wave_beside_a_wave_is_its_overtone(self, select: Selector) -> None:
-        """Motor and load are two elements; alone beside friction the same rest would count."""
-        after, before = of_rms(0.101, 4), of_rms(0.12, 3)
-        assert not select._weighty(
-            "load_imbalance", frozenset({"torque_ripple", "load_imbalance"}), after, before, self.RETUNED
-        )
-        assert select._weighty("load_imbalance", frozenset({COULOMB, "load_imbalance"}), after, before, self.RETUNED)
-
     @pytest.mark.parametrize(("lag_rms", "named"), [(0.15, False), (0.3, True)])
     def test_nothing_is_named_in_place_of_what_is_too_small_to_tell(
         self, select: Selector, monkeypatch: pytest.MonkeyPatch, lag_rms: float, named: bool
@@ -382,13 +341,21 @@ class TestRules:
         best = select._best(trials, self.RETUNED, self.RETUNED)
         assert (best is not None) is named
 
-    def test_where_the_torque_is_an_estimate_a_gain_must_be_seen(self, select: Selector) -> None:
-        """1 - 0.97^2 = 6 % of the mismatch is weight enough, but not where part of it was put in by a repair."""
-        guessed = replace(select, least_ratio=VISIBLE)
-        alone = frozenset({COULOMB})
-        assert select._weighty(COULOMB, alone, of_rms(0.97, 3), self.RETUNED, self.RETUNED)
-        assert not guessed._weighty(COULOMB, alone, of_rms(0.97, 3), self.RETUNED, self.RETUNED)
-        assert guessed._weighty(COULOMB, alone, of_rms(0.94, 3), self.RETUNED, self.RETUNED)
+    @pytest.mark.parametrize(("lighter_rms", "named"), [(0.15, False), (0.1, True)])
+    def test_what_was_too_light_to_count_is_no_evidence_for_another(
+        self, select: Selector, monkeypatch: pytest.MonkeyPatch, lighter_rms: float, named: bool
+    ) -> None:
+        """A small rest that a second law of the shaft explains best is not told as friction that explains less."""
+        monkeypatch.setattr(Selector, "_beyond_rest", lambda *_: True)
+        monkeypatch.setattr(Selector, "_holds_out", lambda *_: True)
+        monkeypatch.setattr(Selector, "_examined", lambda _, trial, __: trial)
+        before = of_rms(0.2, 3)
+        trials = {
+            name: replace(self.trial(name, rms, 4), effects=frozenset({"backlash", name}))
+            for name, rms in (("stiffness_nonlinearity", 0.1), (COULOMB, lighter_rms))
+        }
+        best = select._best(trials, before, self.RETUNED)
+        assert (None if best is None else best.name) == (COULOMB if named else None)
 
     def test_the_special_case_is_taken_where_the_general_one_adds_little(self, select: Selector) -> None:
         special = self.trial(COULOMB, 0.2)
@@ -400,13 +367,6 @@ class TestRules:
         special = replace(self.trial(COULOMB, 0.2), failed="could be chance")
         general = self.trial(STRIBECK, 0.199, 5)
         assert select._simpler(general, {COULOMB: special, STRIBECK: general}, self.RETUNED) is general
-
-    def test_detail_must_remove_a_share_of_what_the_special_case_removed(self, select: Selector) -> None:
-        special = self.trial(COULOMB, 0.2)
-        removed = 1.0 - 0.2**2
-        edge = np.sqrt(0.2**2 - PART_FOR_DETAIL * removed)
-        assert select._earns_detail(special, self.trial(STRIBECK, 0.99 * edge, 5), self.RETUNED)
-        assert not select._earns_detail(special, self.trial(STRIBECK, 1.01 * edge, 5), self.RETUNED)
 
 
 class TestNull:

@@ -1,0 +1,76 @@
+"""Whether an effect removes enough of a mismatch to count: what beats chance may still be too little to name."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from estimator.diagnosis.evidence import residuals_by_record
+from estimator.diagnosis.hypotheses import Effects
+from estimator.diagnosis.noise import unpredictable
+from estimator.physics.catalogue import EFFECTS
+from estimator.physics.fit import FitResult
+
+PART_OF_MISMATCH = 0.05
+"""Share of the first mismatch's power that a further effect must remove, or else
+``VISIBLE`` of the RMS and half of what stands."""
+
+PART_FOR_DETAIL = 0.01
+"""Share of what a special case removes that its generalisation must remove on top: the same friction written as
+bristles or as a rounded sign differs by less."""
+
+VISIBLE = 1.05
+
+
+@dataclass(frozen=True, slots=True)
+class Weight:
+    """What counts in recordings of one noise.
+
+    Attributes
+    ----------
+    floor : float
+        Noise floor of the output.
+    least_ratio : float
+        By which an effect must lower the RMS at least: above 1 where part of the input is itself an estimate.
+    """
+
+    floor: float
+    least_ratio: float = 1.0
+
+    def level(self, result: FitResult) -> float:
+        """Return the noise: of the reading, or of a fit's error if that is less."""
+        return min(self.floor, unpredictable(residuals_by_record(result)))
+
+    def visible(self, before: FitResult, after: FitResult) -> bool:
+        """Tell whether the error falls by what can be seen in a plot, and by half of what stands over the noise."""
+        standing = max(before.rms**2 - self.level(before) ** 2, 0.0)
+        removed = before.rms**2 - after.rms**2
+        return before.rms >= VISIBLE * after.rms and removed >= 0.5 * standing
+
+    def counts(self, name: str, effects: Effects, after: FitResult, before: FitResult, retuned: FitResult) -> bool:
+        """Tell whether an effect removes enough to count.
+
+        At an element of its own it may be small, if it can be seen. Beside another effect of the same element it must
+        be a real part of the mismatch: a law written another way leaves just such a small remainder. A profile is no
+        law, its knots follow whatever is slow; what it leaves at the load is another's. But it could take up any slow
+        rest itself, and so must be a real part; and a wave beside another wave: no machine's is a pure sine.
+        """
+        if before.rms < self.least_ratio * after.rms:
+            return False
+        mismatch = max(retuned.rms**2 - self.floor**2, retuned.rms**2 - after.rms**2)
+        if before.rms**2 - after.rms**2 >= PART_OF_MISMATCH * mismatch:
+            return True
+        return not _echoes(name, effects - {name}) and self.visible(before, after)
+
+
+def _echoes(name: str, others: Effects) -> bool:
+    """Tell whether a small effect could be what other laws leave because nature's are written another way."""
+    entry = EFFECTS[name]
+    neighbours = {EFFECTS[other].element for other in others if not EFFECTS[other].profile}
+    overtone = bool(entry.phases) and any(EFFECTS[other].phases for other in others)
+    return entry.element in neighbours or entry.profile or overtone
+
+
+def earns_detail(special: FitResult, general: FitResult, before: FitResult) -> bool:
+    """Tell whether the general law removes clearly more of the mismatch than its special case."""
+    removed = special.rms**2 - general.rms**2
+    return removed >= PART_FOR_DETAIL * (before.rms**2 - special.rms**2)
