@@ -9,6 +9,7 @@ from estimator.diagnosis.acquisition import Finding
 from estimator.diagnosis.convergence import unconverged
 from estimator.diagnosis.evidence import VERY_STRONG, gain, residuals_by_record
 from estimator.diagnosis.noise import unpredictable
+from estimator.diagnosis.phrases import PLACE_NAMES, kind_in_words
 from estimator.diagnosis.result import Verdict
 from estimator.diagnosis.selection import Selection
 from estimator.diagnosis.unnamed import UnnamedLaw
@@ -124,11 +125,13 @@ def _objection(selection: Selection, floor: float, unnamed: UnnamedLaw | None, r
     if leaves := _leaves_too_much(selection, floor, alone):
         return f"{named} would leave {leaves}"
     if alone and remaining is not None and not _leaves_a_detail(selection, floor):  # an edge in what should be smooth
-        return f"{named} would leave {remaining.terms[0][0]} at the {remaining.element.value} unexplained"
+        law = kind_in_words(remaining.terms[0][0])
+        return f"{named} would leave {law} at the {PLACE_NAMES[remaining.element]} unexplained"
     if unnamed is None or not _reads_speed(selection):  # a free-running position drifts as any flexible law does
         return ""
     elements = {EFFECTS[name].element for name in selection.chosen}
     rival_is_simpler = unnamed.gain.delta_bic > gain(selection.retuned, selection.result).delta_bic + VERY_STRONG
     if rival_is_simpler and (profiles or unnamed.element not in elements):
-        return f"a law of {unnamed.terms[0][0]} at the {unnamed.element.value} explains it with less than {named}"
+        law = kind_in_words(unnamed.terms[0][0])
+        return f"{law} at the {PLACE_NAMES[unnamed.element]} would explain it with less than {named}"
     return ""

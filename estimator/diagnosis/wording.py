@@ -2,24 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from estimator.diagnosis.judgement import Judgement
+from estimator.diagnosis.phrases import PLACE_NAMES, law_in_words
 from estimator.diagnosis.result import Fit, FoundEffect, UntestableEffect, Verdict
 from estimator.diagnosis.selection import Selection
 from estimator.diagnosis.trial import Trial
-from estimator.diagnosis.unnamed import UnnamedLaw
 from estimator.physics.catalogue import EFFECTS
-from estimator.physics.effect import Element
-
-PLACES: Mapping[Element, str] = {
-    Element.TORQUE_PATH: "torque path",
-    Element.MOTOR: "motor side",
-    Element.SHAFT: "shaft",
-    Element.LOAD: "load side",
-    Element.SPEED_SENSOR: "speed reading",
-    Element.ACQUISITION: "acquisition",
-}
 
 
 def statement(
@@ -29,8 +19,8 @@ def statement(
     parts = [_HEADLINES[judgement.verdict](judgement, effects, fit), *judgement.unconverged]
     if judgement.remaining is not None and judgement.verdict is Verdict.EXPLAINED:
         parts.append(
-            f"A smaller remainder still follows {_law(judgement.remaining)} at the "
-            f"{PLACES[judgement.remaining.element]}: the law found is an approximation there."
+            f"A smaller remainder still follows {law_in_words(judgement.remaining.terms)} at the "
+            f"{PLACE_NAMES[judgement.remaining.element]}: the law found is an approximation there."
         )
     twins = sorted({twin for effect in effects for twin in effect.indistinguishable_from})
     if twins:
@@ -60,7 +50,7 @@ def _explained(judgement: Judgement, effects: Sequence[FoundEffect], fit: Fit) -
 
 def _unexplained(judgement: Judgement, effects: Sequence[FoundEffect], fit: Fit) -> str:
     where = (
-        f" It looks most like {_law(judgement.unnamed)} at the {PLACES[judgement.unnamed.element]}."
+        f" It looks most like {law_in_words(judgement.unnamed.terms)} at the {PLACE_NAMES[judgement.unnamed.element]}."
         if judgement.unnamed is not None
         else ""
     )
@@ -76,10 +66,6 @@ _HEADLINES = {
     Verdict.EXPLAINED: _explained,
     Verdict.UNEXPLAINED: _unexplained,
 }
-
-
-def _law(law: UnnamedLaw) -> str:
-    return " + ".join(f"{coefficient:.3g} {name}" for name, coefficient in law.terms[:3])
 
 
 def rejection(trial: Trial, selection: Selection) -> str:

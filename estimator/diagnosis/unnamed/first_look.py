@@ -89,5 +89,5 @@ def _without_strays(hunt: Hunt) -> Hunt:
     if count == 0 or law.information(before, after, n) <= max(0.0, known):
         return hunt
     size = rms([error[each] for each, error in zip(off, errors, strict=True)])
-    law = replace(law, terms=(("single readings that are off", size),))
+    law = replace(law, terms=(("the single readings that are off", size),))
     return replace(hunt, law=law, mean_square=after / rows, errors=rest, stuck=True)

@@ -87,11 +87,11 @@ def _shares(element: Element, motions: Sequence[Motion]) -> list[Form]:
     inputs = min(m.inputs.shape[1] for m in motions)
     if element is not Element.TORQUE_PATH or inputs == 1:
         return []
-    found = [Form(f"T_{j + 1} alone", _single(partial(_input, j))) for j in range(inputs - 1)]
+    found = [Form(f"T_{j + 1}", _single(partial(_input, j))) for j in range(inputs - 1)]
     for j in range(inputs):
         top = top_of(np.concatenate([_input(j, m) for m in motions]))
         found += [
-            Form(f"T_{j + 1} beyond {share:g} of its range", _single(partial(_input_beyond, j, share * top)))
+            Form(f"a part of T_{j + 1} beyond {share:g} of its range", _single(partial(_input_beyond, j, share * top)))
             for share in (0.5, 0.65, 0.8, 0.9)
         ]
     return found
@@ -110,11 +110,11 @@ def _input_beyond(index: int, limit: float, motion: Motion) -> FloatArray:
 def _periodic(view: Scene, element: Element, motions: Sequence[Motion]) -> list[Form]:
     """Return waves over the motor's angle that the input at the element's place shows, each recording its phase."""
     found = []
-    for prefix, modulation in MODULATIONS[element].items():
+    for of, modulation in MODULATIONS[element].items():
         inputs = view.explanations[PLACES[element]].inputs
         weighted = [each.value * modulation(m) for each, m in zip(inputs, motions, strict=True)]
         found += [
-            Form(f"{prefix}wave {order:.3g} times per motor turn", partial(_waves, order, modulation))
+            Form(f"a wave{of} {order:.3g} times per motor turn", partial(_waves, order, modulation))
             for order in dict.fromkeys([*USUAL_ORDERS, *peaks(weighted, [m.angle for m in motions])])
         ]
     return found
@@ -150,7 +150,7 @@ def _steps(result: FitResult, element: Element, motions: Sequence[Motion]) -> li
         return []
     names = _names(result)
     return [
-        Form(f"load step at {moment:.1f} s in {names[i]}", partial(_from_moment, i, one, moment))
+        Form(f"a load step at {moment:.1f} s in {names[i]}", partial(_from_moment, i, one, moment))
         for i, motion in enumerate(motions)
         for moment in moments(motion, STEP_EVERY_S, len(motions))
     ] + [Form(f"a slow course of the load in {name}", partial(_course, i)) for i, name in enumerate(names)]

@@ -1,4 +1,8 @@
-"""The laws that are tried, element by element, as functions of the motion at their place."""
+"""The laws that are tried, element by element, as functions of the motion at their place.
+
+A name is a formula, which takes a coefficient, or a phrase, which begins with an article
+(`estimator.diagnosis.phrases`).
+"""
 
 from __future__ import annotations
 
@@ -79,7 +83,7 @@ def _drag_laws(name: str, speed: Law) -> dict[str, Law]:
 MOTOR_LAWS: Mapping[str, Law] = _drag_laws("w_M", lambda m: m.speed)
 
 LOAD_LAWS: Mapping[str, Law] = _drag_laws("w_L", lambda m: m.load_speed) | {
-    f"shaft torque behind by {time_s:g} s": _with(behind, lambda m: m.twist, time_s) for time_s in (0.01, 0.03, 0.1)
+    f"the shaft torque behind by {time_s:g} s": _with(behind, lambda m: m.twist, time_s) for time_s in (0.01, 0.03, 0.1)
 }
 
 
@@ -99,11 +103,11 @@ def _shaft_laws() -> dict[str, Law]:
         "twist t": lambda m: m.twist * since_start(m),
     }
     for share in (0.03, 0.1, 0.3):
-        laws[f"twist held inside {share:g} of its range"] = _of(inside, _twist, share)
-        laws[f"slider that yields at {share:g} of the twist"] = _of(slide, _twist, share)
+        laws[f"the twist held inside {share:g} of its range"] = _of(inside, _twist, share)
+        laws[f"a slider that yields at {share:g} of the twist"] = _of(slide, _twist, share)
         laws[f"twist / (1 + (w_M / {share:g} top)^2)"] = _with(at_low_speed, _twist, share)
     for time_s in (0.005, 0.01, 0.02, 0.04, 0.1, 0.3):
-        laws[f"relaxation of the twist in {time_s:g} s"] = _with(behind, _twist, time_s)
+        laws[f"a relaxation of the twist in {time_s:g} s"] = _with(behind, _twist, time_s)
     return laws
 
 
@@ -118,16 +122,16 @@ def _torque_laws() -> dict[str, Law]:
         "T^3": lambda m: m.torque**3,
         "sign(T)": lambda m: sign(m.torque),
         "T t": lambda m: m.torque * since_start(m),
-        "one period late": lambda m: np.append(m.torque[:1], m.torque[:-1]) - m.torque,
-        "two periods late": lambda m: np.append(m.torque[[0, 0]], m.torque[:-2]) - m.torque,
+        "a torque one period late": lambda m: np.append(m.torque[:1], m.torque[:-1]) - m.torque,
+        "a torque two periods late": lambda m: np.append(m.torque[[0, 0]], m.torque[:-2]) - m.torque,
         "T |w_M|": lambda m: m.torque * np.abs(m.speed),
     }
     for share in (0.03, 0.1):
-        laws[f"T held inside {share:g} of its range"] = _of(inside, _torque, share)
+        laws[f"the torque held inside {share:g} of its range"] = _of(inside, _torque, share)
     for share in (0.5, 0.65, 0.8, 0.9):
-        laws[f"T beyond {share:g} of its range"] = _of(beyond, _torque, share)
+        laws[f"the torque beyond {share:g} of its range"] = _of(beyond, _torque, share)
     for time_s in (0.005, 0.02, 0.06, 0.2):
-        laws[f"T behind by {time_s:g} s"] = _with(behind, _torque, time_s)
+        laws[f"the torque behind by {time_s:g} s"] = _with(behind, _torque, time_s)
     for time_s in (3.0, 10.0, 30.0):
         laws[f"T (1 - exp(-t / {time_s:g} s))"] = _with(rising, _torque, time_s)
     return laws
@@ -147,7 +151,7 @@ def _reading_laws() -> dict[str, Law]:
         "T": lambda m: m.torque,
     }
     for time_s in (0.005, 0.02, 0.06, 0.2):
-        laws[f"w behind by {time_s:g} s"] = _with(behind, _speed, time_s)
+        laws[f"the speed reading behind by {time_s:g} s"] = _with(behind, _speed, time_s)
     return laws
 
 
@@ -183,11 +187,11 @@ CHANGING: Mapping[Element, Mapping[str, Law]] = {
 """Laws that may set in at a moment of one recording."""
 
 MODULATIONS: Mapping[Element, Mapping[str, Law]] = {
-    Element.TORQUE_PATH: {"": one, "T ": _torque},
+    Element.TORQUE_PATH: {"": one, " of T": _torque},
     Element.MOTOR: {},  # what depends on the motor's angle is the torque path's there
     Element.SHAFT: {"": one},
     Element.LOAD: {"": one},
-    Element.SPEED_SENSOR: {"w ": _speed},
+    Element.SPEED_SENSOR: {" of w": _speed},
     Element.ACQUISITION: {},
 }
-"""What a wave over the angle is multiplied by."""
+"""What a wave over the angle is multiplied by, as its name goes on."""

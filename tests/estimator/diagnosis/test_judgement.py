@@ -12,6 +12,7 @@ from estimator.diagnosis.acquisition import Finding
 from estimator.diagnosis.evidence import VERY_STRONG
 from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects, everything
 from estimator.diagnosis.judgement import ABOVE_FLOOR, MOST, MOST_VISIBLE, NEAR_FLOOR, NEAR_FLOOR_PROFILE, judge
+from estimator.diagnosis.phrases import kind_in_words
 from estimator.diagnosis.result import Verdict
 from estimator.diagnosis.selection import Selection, counting_law
 from estimator.diagnosis.unnamed import best_unnamed
@@ -176,7 +177,7 @@ class TestChosen:
         assert judged.remaining is not None
         assert judged.remaining.element is Element.MOTOR
         law = judged.remaining.terms[0][0]
-        assert judged.objection == f"road grade would leave {law} at the motor unexplained"
+        assert judged.objection == f"road grade would leave {kind_in_words(law)} at the motor side unexplained"
 
     @staticmethod
     def nearly(found: Selection) -> Selection:
@@ -189,7 +190,7 @@ class TestChosen:
         judged = judge(self.nearly(selection(sensor_error(0.05), CUBIC, model(TWO_MASS, TIGHT))), SIGMA)
         assert judged.verdict is Verdict.UNEXPLAINED
         assert judged.objection == (
-            "a law of |w| at the speed_sensor explains it with less than hardening or softening shaft"
+            "a law of |w| at the speed reading would explain it with less than hardening or softening shaft"
         )
 
     def test_the_same_at_the_laws_own_element_is_believed(self) -> None:

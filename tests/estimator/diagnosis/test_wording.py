@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import pytest
-
 from estimator.diagnosis.evidence import Gain
 from estimator.diagnosis.judgement import Judgement
 from estimator.diagnosis.result import Evidence, Fit, FoundEffect, UntestableEffect, Verdict
 from estimator.diagnosis.selection import Selection
 from estimator.diagnosis.trial import Trial
 from estimator.diagnosis.unnamed import UnnamedLaw
-from estimator.diagnosis.wording import PLACES, rejection, statement
+from estimator.diagnosis.wording import rejection, statement
 from estimator.physics.effect import Element
 from tests.estimator.diagnosis.outcome import outcome
 from tests.estimator.diagnosis.regression import of_rms
@@ -49,7 +47,7 @@ def test_two_effects_are_these() -> None:
 
 def test_a_remainder_is_given_as_a_law_at_its_place() -> None:
     said = statement(Judgement(Verdict.EXPLAINED, None, LAW), [effect("a", "one")], FIT, ())
-    assert "remainder still follows 3.46 sign(w_M) + -0.0123 w_M |w_M| at the motor side" in said
+    assert "remainder still follows 3.46 sign(w_M) - 0.0123 w_M |w_M| at the motor side" in said
 
 
 def test_twins_are_named() -> None:
@@ -86,11 +84,6 @@ def test_what_can_not_be_told_names_the_test_that_would() -> None:
     )
     said = statement(Judgement(Verdict.NO_MISMATCH, None, None), (), FIT, blind)
     assert "can't tell coulomb_friction_motor, road_grade, stribeck_friction; a cruise or reversal test would." in said
-
-
-@pytest.mark.parametrize("element", Element)
-def test_every_element_has_a_place(element: Element) -> None:
-    assert PLACES[element]
 
 
 class TestRejection:

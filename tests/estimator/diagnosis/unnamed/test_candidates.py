@@ -111,14 +111,14 @@ def test_a_delay_of_one_period_is_the_difference_to_the_torque_before(pool: list
     torque = drive_torque(1)
     late = np.concatenate([[torque[0]], torque[:-1]])
     expected = response(late - torque, np.zeros_like(torque))
-    answer = first(pick(pool, Element.TORQUE_PATH, "one period late"))
+    answer = first(pick(pool, Element.TORQUE_PATH, "a torque one period late"))
     assert np.max(np.abs(answer - expected)) < 1e-3 * np.ptp(expected)
 
 
 def test_the_answer_to_an_error_of_the_reading_is_the_error(pool: list[Candidate]) -> None:
     """Waves are in the phase of each recording: cosine and sine of the first, then of the second."""
     states = exact_states(TWO_MASS, drive_torque(1), START)
-    turns = [c for c in pool if c.element is Element.SPEED_SENSOR and c.law == "w wave 1 times per motor turn"]
+    turns = [c for c in pool if c.element is Element.SPEED_SENSOR and c.law == "a wave of w 1 times per motor turn"]
     expected = states[:, SPEED] * np.sin(states[:, ANGLE] - states[0, ANGLE])
     assert turns[0].answers.shape == (3000, 4)
     np.testing.assert_allclose(turns[0].answers[:1500, 1], expected, atol=5e-3 * np.ptp(expected))
@@ -127,7 +127,7 @@ def test_the_answer_to_an_error_of_the_reading_is_the_error(pool: list[Candidate
 
 
 def test_load_steps_are_on_a_grid_each_in_one_recording(result: FitResult, pool: list[Candidate]) -> None:
-    steps = [c for c in pool if c.law.startswith("load step")]
+    steps = [c for c in pool if c.law.startswith("a load step")]
     per_recording = int(14.99 / STEP_EVERY_S) - 1
     assert len(steps) == 2 * per_recording
     assert len({c.law for c in steps}) == len(steps)
@@ -155,9 +155,9 @@ def test_every_input_but_the_last_may_count_more_than_its_reading() -> None:
     shares = np.column_stack([0.3 * drive_torque(1), 0.7 * drive_torque(1) + 20.0, np.full(1500, -20.0)])
     rec = replace(linear_record(TWO_MASS, drive_torque(1), START), torque_nm=shares)
     pool = candidates(scene(fit(make_problem(model(TWO_MASS), [rec], ())), SIGMA), Element.TORQUE_PATH)
-    assert [c.law for c in pool if c.law.endswith("alone")] == ["T_1 alone", "T_2 alone"]
+    assert [c.law for c in pool if c.law in ("T_1", "T_2", "T_3")] == ["T_1", "T_2"]
     expected = response(shares[:, 1], np.zeros(1500))
-    answer = first(pick(pool, Element.TORQUE_PATH, "T_2 alone"))
+    answer = first(pick(pool, Element.TORQUE_PATH, "T_2"))
     assert np.max(np.abs(answer - expected)) < 1e-3 * np.ptp(expected)
 
 
@@ -170,7 +170,7 @@ def test_one_mass_has_no_shaft_and_its_load_acts_at_the_motor() -> None:
         Element.SPEED_SENSOR,
         Element.ACQUISITION,
     )
-    assert {c.element for c in everywhere(view) if c.law.startswith("load step")} == {Element.MOTOR}
+    assert {c.element for c in everywhere(view) if c.law.startswith("a load step")} == {Element.MOTOR}
 
 
 def test_a_position_has_no_error_of_the_speed_reading() -> None:
@@ -198,6 +198,6 @@ def test_a_profile_of_the_fit_goes_on_in_the_answers() -> None:
     assert followed.rms < 0.02 * nominal_fit(hill).rms
     moved = motion_of(followed, 0)
     assert np.max(np.abs(moved.speed - hill[0].output)) < 0.01 * np.ptp(hill[0].output)
-    step = pick(candidates(scene(followed, SIGMA), Element.LOAD), Element.LOAD, "load step at 5.0 s in run_1")
+    step = pick(candidates(scene(followed, SIGMA), Element.LOAD), Element.LOAD, "a load step at 5.0 s in run_1")
     expected = response(np.zeros(1500), np.where(np.arange(1500) >= 500, 1.0, 0.0))
     assert np.max(np.abs(first(step) - expected)) < 1e-2 * np.ptp(expected)

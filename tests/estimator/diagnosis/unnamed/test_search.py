@@ -15,7 +15,7 @@ from tests.estimator.physics.bench import TWO_MASS, linear_record
 
 # Element, name of the law, the law, coefficient: 5 to 10 % of the torque or 1 % of the speed in use.
 PLANTED: list[tuple[Element, str, Law, float]] = [
-    (Element.TORQUE_PATH, "one period late", lambda m: -np.diff(m.torque, prepend=m.torque[0]), 0.05),
+    (Element.TORQUE_PATH, "a torque one period late", lambda m: -np.diff(m.torque, prepend=m.torque[0]), 0.05),
     (Element.TORQUE_PATH, "T |T|", lambda m: m.torque * np.abs(m.torque), 3e-4),
     (Element.TORQUE_PATH, "T t", lambda m: m.torque * m.time_s, -4e-3),
     (Element.MOTOR, "sign(w_M)", lambda m: np.tanh(m.speed / 0.1), 3.0),
@@ -57,7 +57,7 @@ def test_a_wave_over_the_angle_is_found_in_the_reading(order: float) -> None:
     found = best_unnamed(nominal_fit(planted))
     assert found is not None
     assert found.element is Element.SPEED_SENSOR
-    assert found.terms[0][0] == f"w wave {order:.3g} times per motor turn"
+    assert found.terms[0][0] == f"a wave of w {order:.3g} times per motor turn"
 
 
 def test_a_step_of_the_load_is_found_in_its_recording_at_its_moment() -> None:
@@ -70,7 +70,7 @@ def test_a_step_of_the_load_is_found_in_its_recording_at_its_moment() -> None:
     found = best_unnamed(nominal_fit(records))
     assert found is not None
     assert found.element is Element.LOAD
-    assert found.terms[0][0] == "load step at 6.0 s in run_2"
+    assert found.terms[0][0] == "a load step at 6.0 s in run_2"
     assert found.terms[0][1] == pytest.approx(8.0, rel=0.1)
 
 
@@ -92,7 +92,7 @@ def test_steps_in_both_recordings_take_several_terms_and_leave_the_noise() -> No
     found = best_unnamed(nominal_fit(records))
     assert found is not None
     assert found.element is Element.LOAD
-    assert dict(found.terms)["load step at 9.0 s in run_2"] == pytest.approx(-12.0, rel=0.1)
+    assert dict(found.terms)["a load step at 9.0 s in run_2"] == pytest.approx(-12.0, rel=0.1)
     assert found.rms == pytest.approx(SIGMA, rel=0.1)
 
 
@@ -130,5 +130,5 @@ def test_single_readings_that_are_off_are_the_acquisitions() -> None:
     found = best_unnamed(nominal_fit(spoilt))
     assert found is not None
     assert found.element is Element.ACQUISITION
-    assert found.terms[0] == ("single readings that are off", pytest.approx(1.0, rel=0.05))
+    assert found.terms[0] == ("the single readings that are off", pytest.approx(1.0, rel=0.05))
     assert found.rms == pytest.approx(SIGMA, rel=0.1)
