@@ -53,7 +53,7 @@ class Tool:
 
 
 @pytest.fixture
-def tool(monkeypatch, tmp_path):
+def tool(monkeypatch, tmp_path, brief):
     tool = Tool(tmp_path)
     for module in (campaign_case, fresh):
         monkeypatch.setattr(module, "run_hil", tool)
@@ -74,7 +74,7 @@ def test_the_tool_sees_recordings_and_nominal_model_and_nothing_of_the_truth(too
     assert not list(tmp_path.rglob("out/fresh_?.csv"))
 
 
-def test_a_command_that_fails_ends_its_case_and_no_other(monkeypatch, tmp_path):
+def test_a_command_that_fails_ends_its_case_and_no_other(monkeypatch, tmp_path, brief):
     def broken(arguments, folder, limit_s):
         raise CommandFailed("hil diagnose: ended with status 3: no bus")
 

@@ -41,7 +41,7 @@ class Tool:
 
 
 @pytest.fixture
-def tool(monkeypatch):
+def tool(monkeypatch, brief):
     tool = Tool()
     monkeypatch.setattr(campaign_case, "run_hil", tool)
     return tool

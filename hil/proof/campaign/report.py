@@ -10,6 +10,7 @@ from hil.proof.campaign.kinds import Group
 from hil.proof.campaign.statistics import (
     Rate,
     Row,
+    banded,
     by_kind,
     columns,
     confusion,
@@ -43,6 +44,11 @@ FRESH_NOTE = (
     "is in the reading itself: there it can't reach 1."
 )
 
+BAND_NOTE = (
+    "*band*: of the frequency bands told, those right: at least half of the true mismatch's power is inside, and both "
+    "bands share at least half of the wider."
+)
+
 
 def summary(rows: Sequence[Row]) -> dict[str, Any]:
     """Return what the rows of a campaign add up to; JSON types only."""
@@ -50,6 +56,7 @@ def summary(rows: Sequence[Row]) -> dict[str, Any]:
     return {
         "schema": SCHEMA,
         "cases": len(rows),
+        "band": _band_figures(rows),
         "groups": {group.value: _figures(members) for group, members in groups.items() if members},
         "kinds": {name: _figures(members) for name, members in by_kind(rows).items()},
         "confusion": {planted: dict(counts) for planted, counts in confusion(rows).items()},
@@ -67,10 +74,20 @@ def _figures(rows: Sequence[Row]) -> dict[str, Any]:
         "outcomes": outcomes(rows),
         "element": share(located).as_json(),
         "event_iou_median": quantiles(ious, (0.5,))[0],
+        "band": _band_figures(rows),
         "fresh_over_floor": dict(
             zip(("median", "p90"), quantiles((v for r in rows for v in r["fresh_over_floor"]), (0.5, 0.9)), strict=True)
         ),
         "diagnose_s_median": quantiles((row["diagnose_s"] for row in rows), (0.5,))[0],
+    }
+
+
+def _band_figures(rows: Sequence[Row]) -> dict[str, Any]:
+    scores = banded(rows)
+    return {
+        "right": share(score["right"] for score in scores).as_json(),
+        "power_share_median": quantiles((score["power_share"] for score in scores), (0.5,))[0],
+        "width_ratio_median": quantiles((score["width_ratio"] for score in scores), (0.5,))[0],
     }
 
 
@@ -106,6 +123,7 @@ def markdown(rows: Sequence[Row]) -> str:
                     "interval",
                     "element",
                     "event IoU",
+                    "band",
                     "fresh / noise",
                     "time s",
                     "outcomes",
@@ -116,6 +134,7 @@ def markdown(rows: Sequence[Row]) -> str:
                         *_rate_cells(figures),
                         _percent(figures["element"]["rate"]),
                         _number(figures["event_iou_median"]),
+                        _percent(figures["band"]["right"]["rate"]),
                         _number(figures["fresh_over_floor"]["median"]),
                         _number(figures["diagnose_s_median"]),
                         _counts(figures["outcomes"]),
@@ -125,6 +144,8 @@ def markdown(rows: Sequence[Row]) -> str:
             ),
             "",
             FRESH_NOTE,
+            "",
+            BAND_NOTE,
             "",
             "## What was named",
             "",

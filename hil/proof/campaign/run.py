@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from hil.errors import RecordingError, UsageError
+from hil.proof.campaign.band import score_band
 from hil.proof.campaign.case import run_case
 from hil.proof.campaign.kinds import ALL, Group, Kind, kind, parse_kinds, parse_seeds
 from hil.proof.campaign.matrix import confusion_svg
@@ -86,7 +87,8 @@ def run_campaign(jobs: Sequence[Job], out: Path, workers: int, limit_s: float) -
 
 def _scored(planted: Kind, seed: int, out: Path, limit_s: float) -> dict[str, Any]:
     truth, answer = run_case(planted, seed, out / "cases" / planted.name / str(seed), limit_s)
-    return score(planted, seed, truth, answer)
+    row = score(planted, seed, truth, answer)
+    return {**row, "band": score_band(planted, seed, truth, answer.diagnosis)}
 
 
 def write_summary(rows: Sequence[Row], out: Path) -> None:

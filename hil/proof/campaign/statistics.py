@@ -83,6 +83,12 @@ def coverage(rows: Sequence[Row]) -> dict[str, Rate]:
     return {what: share(flags) for what, flags in sorted(inside.items())}
 
 
+def banded(rows: Sequence[Row]) -> list[Mapping[str, Any]]:
+    """Return the scores of the bands that have one (`hil.proof.campaign.band`)."""
+    scores = [row.get("band") for row in rows]
+    return [score for score in scores if score is not None and "right" in score]
+
+
 def quantiles(values: Iterable[float | None], at: Sequence[float] = (0.5, 0.9, 1.0)) -> list[float | None]:
     """Return quantiles of finite values; None each without any."""
     known = [value for value in values if value is not None and math.isfinite(value)]

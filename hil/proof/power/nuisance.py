@@ -2,33 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
-from hil.proof.power.drive import Drive, drive
+from hil.proof.mismatch.line import PARAMETERS, line_of, scaled
+from hil.proof.power.drive import drive
+from hil.proof.truth.bus import Bus
 from hil.proof.truth.case import TESTS
-from hil.proof.truth.physics import FloatArray, Physics
+from hil.proof.truth.physics import FloatArray
 from hil.proof.truth.specimen import draw_specimen
 from hil.proof.truth.state import State
 
-PARAMETERS = ("J_M", "J_L", "k", "c", "b_M", "b_L")
-"""Nuisance parameters that all recordings share."""
-
 STEP = 1e-3
 """Step of the finite differences, over the parameter's value."""
-
-START_STEPS = ((State.SPEED_M, 1e-2), (State.SPEED_L, 1e-2), (State.ANGLE_M, 1e-4))
-"""Initial state: speeds [rad/s] and twist [rad], and the steps of their differences; the line is linear in them."""
-
-LOAD_STEP_NM = 0.1
 
 COLLINEAR = 1e-8
 """Singular value, over the largest, below which a combination of nuisance parameters moves nothing."""
 
 BUSES_KEPT = 8
 """All effects of one seed share a bus."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Run:
+    """A test of a bus with nothing hidden: torque of both inverters [Nm], shape (N,), and initial state, shape (3,)."""
+
+    torque_nm: FloatArray
+    start: FloatArray
 
 
 @lru_cache(maxsize=BUSES_KEPT)
@@ -45,8 +48,8 @@ def sensitivities(seed: int, samples: int) -> FloatArray:
     samples
         Length N of each recording.
     """
-    specimen = draw_specimen("none", seed)
-    return _columns([drive(specimen, test, samples) for test in range(len(TESTS))])
+    bus = draw_specimen("none", seed).bus
+    return _columns(bus, [_run(seed, test, samples) for test in range(len(TESTS))])
 
 
 def without(basis: FloatArray, moved: FloatArray) -> FloatArray:
@@ -63,37 +66,31 @@ def orthonormal(columns: FloatArray) -> FloatArray:
     return spanning
 
 
-def _columns(drives: Sequence[Drive]) -> FloatArray:
-    ends = np.cumsum([0, *(each.m1_nm.size for each in drives)])
-    shared = [np.concatenate([_by_parameter(each, name) for each in drives]) for name in PARAMETERS]
+def _run(seed: int, test: int, samples: int) -> _Run:
+    still = drive(draw_specimen("none", seed), test, samples)
+    twist = still.state[State.ANGLE_M] - still.state[State.ANGLE_L]
+    start = np.array([twist, still.state[State.SPEED_M], still.state[State.SPEED_L]])
+    return _Run(still.m1_nm + still.m2_nm, start)
+
+
+def _columns(bus: Bus, runs: Sequence[_Run]) -> FloatArray:
+    ends = np.cumsum([0, *(run.torque_nm.size for run in runs)])
+    shared = [_by_parameter(bus, name, runs) for name in PARAMETERS]
     own = []
-    for each, first, last in zip(drives, ends[:-1], ends[1:], strict=True):
-        for moved in (_by_load(each), *(_by_start(each, place, step) for place, step in START_STEPS)):
+    for run, first, last in zip(runs, ends[:-1], ends[1:], strict=True):
+        for moved in line_of(bus).of_load_and_start(run.torque_nm.size):
             column = np.zeros(ends[-1])
             column[first:last] = moved
             own.append(column)
     return np.column_stack([*shared, *own])
 
 
-def _by_parameter(each: Drive, name: str) -> FloatArray:
-    value = getattr(each.physics, name)
-    return _across(each, lambda sign: each.physics._replace(**{name: value * (1.0 + sign * STEP)}))
-
-
-def _by_load(each: Drive) -> FloatArray:
-    value = each.physics.load_torque_nm
-    return _across(each, lambda sign: each.physics._replace(load_torque_nm=value + sign * LOAD_STEP_NM))
-
-
-def _across(each: Drive, physics: Callable[[float], Physics]) -> FloatArray:
-    up, down = (Drive(physics(sign), each.state, each.m1_nm, each.m2_nm) for sign in (1.0, -1.0))
-    return up.speed_rad_s() - down.speed_rad_s()
-
-
-def _by_start(each: Drive, place: State, step: float) -> FloatArray:
-    moved = []
-    for sign in (1.0, -1.0):
-        state = each.state.copy()
-        state[place] += sign * step
-        moved.append(Drive(each.physics, state, each.m1_nm, each.m2_nm).speed_rad_s())
-    return moved[0] - moved[1]
+def _by_parameter(bus: Bus, name: str, runs: Sequence[_Run]) -> FloatArray:
+    up, down = (line_of(scaled(bus, {name: 1.0 + sign * STEP})) for sign in (1.0, -1.0))
+    load_nm = bus.load_torque_nm
+    return np.concatenate(
+        [
+            up.speed_rad_s(run.torque_nm, load_nm, run.start) - down.speed_rad_s(run.torque_nm, load_nm, run.start)
+            for run in runs
+        ]
+    )

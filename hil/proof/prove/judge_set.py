@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from hil.errors import UsageError
+from hil.proof.campaign.band import score_band
 from hil.proof.campaign.case import Answer
 from hil.proof.campaign.kinds import kind
 from hil.proof.campaign.score import score
@@ -81,7 +82,9 @@ def _judge_one(folder: Path, key: bytes, name: str, shown: Shown, answered: Mapp
     if not isinstance(case, dict) or not isinstance(fresh, dict):
         raise SealBroken(f"{folder / SEALED / name}: expected a truth with case and fresh recordings")
     answer = _answer(folder / VERDICTS / name, fresh, float(answered["diagnose_s"]))
-    return {"case": name, **score(planted, int(str(truth["seed"])), case, answer)}
+    seed = int(str(truth["seed"]))
+    band = score_band(planted, seed, case, answer.diagnosis)
+    return {"case": name, **score(planted, seed, case, answer), "band": band}
 
 
 def _answer(verdict: Path, fresh: Mapping[str, str], took_s: float) -> Answer:

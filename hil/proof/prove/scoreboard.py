@@ -13,8 +13,8 @@ from hil.proof.campaign.kinds import Group, kind
 from hil.proof.campaign.matrix import confusion_svg
 from hil.proof.campaign.report import TITLES, WANTED, summary
 from hil.proof.campaign.score import right_columns
-from hil.proof.campaign.statistics import Rate, Row, confusion, coverage, quantiles, share
-from hil.proof.prove.manifest import VERDICTS
+from hil.proof.campaign.statistics import Rate, Row, banded, confusion, coverage, quantiles, share
+from hil.proof.prove.scoreboard_cases import cases_table
 from hil.proof.prove.scoreboard_real import real_section
 from hil.proof.prove.scoreboard_wire import wire_section
 from hil.report import page as html
@@ -83,11 +83,11 @@ def scoreboard_page(board: Board) -> str:
     sections = [
         f'<header class="top">\n<h1>{escape(title)}</h1>\n{html.tiles(_tiles(rows))}\n</header>',
         html.section("By what was hidden", _groups(rows)),
-        html.section("Misses", _cases(misses) if misses else html.paragraph("None.")),
+        html.section("Misses", cases_table(misses) if misses else html.paragraph("None.")),
         *([wire_section(board.wire, WIRE)] if board.wire else []),
         *([real_section(board.real, REAL)] if board.real else []),
         html.section("What was named", f'<div class="wide">{_matrix(rows)}</div>'),
-        html.section("Every case", _cases(rows)),
+        html.section("Every case", cases_table(rows)),
     ]
     return html.page("Scoreboard", sections, FOOTER, plots=False)
 
@@ -97,6 +97,7 @@ def _tiles(rows: Sequence[Row]) -> list[tuple[str, str, str]]:
     held = Rate(sum(rate.hits for rate in sizes), sum(rate.trials for rate in sizes))
     fresh = quantiles((value for row in rows for value in row["fresh_over_floor"]), (0.5,))[0]
     located = share(row["element_right"] for row in rows if row.get("element_right") is not None)
+    banded_right = share(band["right"] for band in banded(rows))
     return [
         (
             "as it should be",
@@ -109,6 +110,7 @@ def _tiles(rows: Sequence[Row]) -> list[tuple[str, str, str]]:
             _interval(_rate(rows, FALSE_CLAIMS)),
         ),
         ("right element", _percent(located), _interval(located)),
+        ("right frequency band", _percent(banded_right), _interval(banded_right)),
         ("95 % intervals that hold the truth", _percent(held), f"of {held.trials}"),
         ("error on fresh recordings", "–" if fresh is None else f"{fresh:.3g} ×", "the sensor's noise, median"),
     ]
@@ -131,31 +133,6 @@ def _matrix(rows: Sequence[Row]) -> str:
     return confusion_svg(matrix, {planted: right_columns(kind(planted)) for planted in matrix})
 
 
-def _cases(rows: Sequence[Row]) -> str:
-    headings = ("case", "hidden", "found", "outcome", "error before", "after", "noise", "fresh / noise", "report")
-    return html.html_table(headings, [_case(row) for row in rows], numbers=(4, 5, 6, 7))
-
-
-def _case(row: Row) -> list[str]:
-    fit: Mapping[str, Any] = row.get("fit", {})
-    errors = [_number(fit.get(name)) for name in ("retuned", "augmented", "noise_floor")]
-    fresh = quantiles(row["fresh_over_floor"], (0.5,))[0]
-    report = f'<a href="{VERDICTS}/{escape(row["case"])}/report.html">report</a>'
-    mark = "✓" if row["success"] else "✗"
-    return [
-        *(escape(text) for text in (row["case"], row["kind"], _found(row), f"{mark} {row['outcome']}")),
-        *errors,
-        _number(fresh),
-        report if "verdict" in row else escape(row["fault"] or ""),
-    ]
-
-
-def _found(row: Row) -> str:
-    if "verdict" not in row:
-        return "nothing: the command failed"
-    return ", ".join(row["named"]) or str(row["verdict"]).replace("_", " ")
-
-
 def _rate(rows: Sequence[Row], outcomes: Sequence[str]) -> Rate:
     return share(row["outcome"] in outcomes for row in rows)
 
@@ -167,7 +144,3 @@ def _percent(rate: Rate) -> str:
 def _interval(rate: Rate) -> str:
     low, high = rate.interval
     return f"{100.0 * low:.0f} to {100.0 * high:.0f} %"
-
-
-def _number(value: float | None) -> str:
-    return "–" if value is None else f"{value:.3g}"

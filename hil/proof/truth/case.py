@@ -18,7 +18,7 @@ from hil.proof.truth.laws_in_time import brake_torque
 from hil.proof.truth.physics import FloatArray, Physics
 from hil.proof.truth.readings import sampling_instants_s, speed_as_read
 from hil.proof.truth.rows import IntArray, Rows, as_recorded
-from hil.proof.truth.sensors import torque_reading
+from hil.proof.truth.sensors import USUAL, Noise, torque_reading
 from hil.proof.truth.specimen import Specimen, Stream, draw_specimen, stream
 from hil.proof.truth.state import State
 
@@ -99,14 +99,17 @@ def make_case(effect: str, seed: int, nominal_error: float = NOMINAL_ERROR) -> C
     return Case(specimen, recordings[: len(TESTS)], recordings[len(TESTS) :])
 
 
-def record(specimen: Specimen, number: int) -> TruthRecording:
-    """Draw and drive the specimen's recording of a number from 0; the kinds of `TESTS` take turns."""
+def record(specimen: Specimen, number: int, noise: Noise = USUAL) -> TruthRecording:
+    """Draw and drive the specimen's recording of a number from 0; the kinds of `TESTS` take turns.
+
+    With other noise the same is driven, and the same goes wrong in the same samples.
+    """
     rng = stream(specimen.seed, Stream.RECORDING, number)
     test = number % len(TESTS)
     plan = draw_plan(TESTS[test], rng)
     rng_sensors, rng_effect, rng_acquisition = rng.spawn(3)
     physics = specimen.physics(rng_effect, test)
-    recording = _drive(physics, plan, specimen.acquisition(test), rng_sensors, rng_acquisition)
+    recording = _drive(physics, plan, specimen.acquisition(test), noise, rng_sensors, rng_acquisition)
     return replace(recording, events=specimen.events(physics, test))
 
 
@@ -114,6 +117,7 @@ def _drive(
     physics: Physics,
     plan: Plan,
     acquisition: Acquisition,
+    noise: Noise,
     rng_sensors: np.random.Generator,
     rng_acquisition: np.random.Generator,
 ) -> TruthRecording:
@@ -123,8 +127,8 @@ def _drive(
     time_s = sample_times_s()
     instants_s = sampling_instants_s(time_s, acquisition, rng_acquisition)
     speed, disturbance = _sample(rolling.driveline, m1, m2, instants_s)
-    m1_read, m2_read = torque_reading(m1, rng_sensors), torque_reading(m2, rng_sensors)
-    read = Rows(m1_read, m2_read, speed_as_read(speed, acquisition, rng_sensors))
+    m1_read, m2_read = (torque_reading(each, rng_sensors, noise) for each in (m1, m2))
+    read = Rows(m1_read, m2_read, speed_as_read(speed, acquisition, rng_sensors, noise))
     rows = as_recorded(read, acquisition, rng_acquisition)
     return TruthRecording(
         time_s=instants_s if acquisition.stamps_told else time_s,

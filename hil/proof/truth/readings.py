@@ -9,7 +9,7 @@ import numpy as np
 
 from hil.proof.truth.acquisition import Acquisition
 from hil.proof.truth.physics import FloatArray
-from hil.proof.truth.sensors import speed_reading
+from hil.proof.truth.sensors import USUAL, Noise, speed_reading
 
 CURVATURE_SPEED_RAD_S = 100.0
 """Speed at which the curvature's share of the reading is missing."""
@@ -23,11 +23,13 @@ def sampling_instants_s(time_s: FloatArray, acquisition: Acquisition, rng: np.ra
     return np.maximum(instants, 0.0)
 
 
-def speed_as_read(speed_rad_s: FloatArray, acquisition: Acquisition, rng: np.random.Generator) -> FloatArray:
+def speed_as_read(
+    speed_rad_s: FloatArray, acquisition: Acquisition, rng: np.random.Generator, noise: Noise = USUAL
+) -> FloatArray:
     """Return what the sensor gives for a true speed [rad/s], shape (N,)."""
     a = acquisition
     reading = speed_rad_s * (1.0 - a.curvature * np.abs(speed_rad_s) / CURVATURE_SPEED_RAD_S)
-    reading = speed_reading(reading, rng)
+    reading = speed_reading(reading, rng, noise)
     if a.sign_blind:
         reading = np.abs(reading)
     if a.grid_rad_s > 0.0:

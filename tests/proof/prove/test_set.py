@@ -22,6 +22,7 @@ from hil.proof.prove.manifest import CASES, COMMITMENTS, SEALED, VERDICTS, VERDI
 from hil.proof.prove.scoreboard import Board, scoreboard_files
 from hil.proof.prove.vault import new_key, parse_key
 from hil.proof.seal import SealBroken
+from tests.proof.conftest import recordings_of
 
 SEED, COUNT = 5, 2
 KEY = parse_key(new_key())
@@ -72,7 +73,8 @@ def tool(monkeypatch: pytest.MonkeyPatch) -> Tool:
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("prove") / "set"
-    make(folder, COUNT, SEED, KEY, 2, silent)
+    with recordings_of(300):
+        make(folder, COUNT, SEED, KEY, 2, silent)
     return folder
 
 
@@ -101,6 +103,7 @@ def test_what_is_shown_and_what_is_sealed_tells_nothing(made: Path) -> None:
         assert str(each.seed).encode() not in readable
 
 
+@pytest.mark.usefixtures("brief")
 def test_the_same_seed_makes_the_same_recordings(made: Path, tmp_path: Path) -> None:
     make(tmp_path / "again", 1, SEED, KEY, 1, silent)
     for name in ("model.toml", "run_1.csv"):
@@ -115,6 +118,7 @@ def test_a_folder_with_something_in_it_is_left_alone(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
 
 
+@pytest.mark.usefixtures("brief")
 def test_an_interrupted_making_leaves_nothing(tmp_path: Path) -> None:
     def interrupt(what: str, done: int, total: int) -> None:
         raise KeyboardInterrupt

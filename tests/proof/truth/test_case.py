@@ -33,7 +33,7 @@ def test_the_same_seed_gives_the_same_case(nothing):
         np.testing.assert_array_equal(one.torque_m1_nm, other.torque_m1_nm)
 
 
-def test_another_seed_gives_another_bus(nothing):
+def test_another_seed_gives_another_bus(nothing, brief):
     assert make_case("none", SEED + 1).specimen.bus != nothing.specimen.bus
 
 
@@ -105,6 +105,7 @@ def test_two_effects_of_one_place_are_refused_with_what_both_set():
 EVENTS = [name for name, effect in EFFECTS.items() if effect.when is not None]
 
 
+@pytest.mark.usefixtures("brief")  # the times are drawn, not recorded
 @pytest.mark.parametrize("name", EVENTS)
 def test_the_truth_has_the_times_of_an_event_in_each_recording(name):
     case = make_case(name, SEED)
@@ -134,7 +135,7 @@ def test_a_recording_without_its_event_is_one_of_a_faultless_bus(nothing):
     np.testing.assert_array_equal(with_it.speed_rad_s, without.speed_rad_s)
 
 
-def test_what_is_not_an_event_has_no_times(nothing):
+def test_what_is_not_an_event_has_no_times(nothing, brief):
     assert nothing.truth()["events"] == {}
     assert make_case("backlash", SEED).truth()["events"] == {}
 

@@ -1,0 +1,25 @@
+"""Recordings that are short, for tests of what is done with a recording and not of what is in it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import pytest
+
+from hil.proof.truth import experiments
+
+
+@contextmanager
+def recordings_of(samples: int) -> Iterator[None]:
+    """Let what is recorded meanwhile have so many samples, of 10 ms each, instead of 3000."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(experiments, "SAMPLES", samples)
+        yield
+
+
+@pytest.fixture
+def brief() -> Iterator[None]:
+    """Three seconds: a case is made in a tenth of the time."""
+    with recordings_of(300):
+        yield
