@@ -18,9 +18,6 @@ from numba.core import config as numba_config
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
-_UNCOUNTED: dict[str, Any] = {"_nrt": False}
-"""numba's option for a function without its run time; its types do not know it."""
-
 PACKAGES = ("signals", "identification", "physics", "diagnosis/line")
 """Packages that hold compiled code, or constants that it freezes."""
 
@@ -48,7 +45,12 @@ def compiled(function: Function) -> Function:
 
 
 def inlined(function: Function) -> Function:
-    """Compile a function into whatever calls it: what is constant there is worked out once, and no call is left."""
+    """Compile a function into whatever calls it: what is constant there is worked out once, and no call is left.
+
+    Of an array that is handed over, references are still counted, two atomic operations per array and call. A loop that
+    is done in 100 ns hands over a record instead, and parts of a record, which own nothing
+    (``estimator.identification.online.memory``).
+    """
     return cast(Function, numba.njit(cache=True, nogil=True, error_model="numpy", forceinline=True)(function))
 
 
@@ -59,15 +61,3 @@ def brief(function: Function) -> Function:
     woken, find it taken, and begin to wait anew (CPython's ``take_gil``). A heartbeat came 0.4 s late by that.
     """
     return cast(Function, numba.njit(cache=True, error_model="numpy")(function))
-
-
-def borrowing(function: Function) -> Function:
-    """Compile a function into whatever calls it, for functions that only read and write arrays they are given.
-
-    It counts no references to them. In a loop over views of one vector that counting, two atomic operations per array
-    and call, took six times as long as the arithmetic (a recursive estimator of eight parameters: 0.7 us and 0.12 us).
-    Nothing of it may make an array, or return one.
-    """
-    return cast(
-        Function, numba.njit(cache=True, nogil=True, error_model="numpy", forceinline=True, **_UNCOUNTED)(function)
-    )

@@ -69,7 +69,8 @@ def minimise(
             if -step @ (2.0 * gradient + curvature @ step) < enough:
                 return Solution(x, errors, derivative, True)
             tried = residual(x + step)
-            moved = float(tried @ tried) < square
+            with np.errstate(over="ignore"):  # a simulation that ran away: an infinite error is no improvement
+                moved = float(tried @ tried) < square
             damping = max(damping * (EASE if moved else STIFFEN), LEAST_DAMPING)
         if not moved:
             return Solution(x, errors, derivative, True)

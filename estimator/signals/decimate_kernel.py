@@ -46,7 +46,8 @@ def _remove_mean(good: bool, share: float, level: FloatArray, window: FloatArray
     for row in (U, Y):
         held = level[HELD_U + row]
         level[row] += share * (held - level[row])
-        window[row, 1:] = window[row, :-1].copy()
+        for i in range(window.shape[1] - 1, 0, -1):
+            window[row, i] = window[row, i - 1]
         window[row, 0] = held - level[row]
     level[CONTAMINATION] += share * ((0.0 if good else 1.0) - level[CONTAMINATION])
 
@@ -92,11 +93,11 @@ def decimate_block(
             counters[SPOILT] = taps.shape[0]
         if counters[PHASE] == 0:
             counters[PHASE] = factor
-            for row in (U, Y):
-                total = 0.0
-                for i in range(taps.shape[0]):
-                    total += taps[i] * window[row, i]
-                out[row, produced] = total
+            filtered_u, filtered_y = 0.0, 0.0
+            for i in range(taps.shape[0]):
+                filtered_u += taps[i] * window[U, i]
+                filtered_y += taps[i] * window[Y, i]
+            out[U, produced], out[Y, produced] = filtered_u, filtered_y
             out_okay[produced] = counters[SPOILT] == 0 and counters[STARTED] == 1
             produced += 1
         counters[PHASE] -= 1

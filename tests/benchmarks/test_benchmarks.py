@@ -14,7 +14,7 @@ from tests.benchmarks.memory import read_case, write_case
 from tests.benchmarks.ratios import Comparison, Taken
 from tests.benchmarks.scipy_fit import ScipyFit, fit_by_scipy
 
-SHORT_S = 3.0
+SHORT_S = 2.0
 
 
 @pytest.fixture(scope="module")

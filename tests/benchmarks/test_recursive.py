@@ -48,7 +48,7 @@ def test_least_squares_has_the_rows_that_padasip_is_given() -> None:
 
 
 def test_every_estimator_is_timed() -> None:
-    lines = recursive.single(pairs=1, n=2000)
+    lines = recursive.single(pairs=1, n=recursive.BLOCK)
     assert [line[0] for line in lines] == list(ESTIMATORS)
     assert all(cell.endswith(" us") and float(cell.split()[0]) > 0 for line in lines for cell in line[1:])
 

@@ -32,7 +32,7 @@ from estimator.identification.online import ekf_kernel as kernel
 from estimator.identification.online.ekf_noise import EkfNoise
 from estimator.identification.online.kernel_estimator import KernelEstimator
 from estimator.identification.online.memory import Memory
-from estimator.identification.online.regression_kernel import LEARNT, N_LIVE
+from estimator.identification.online.regression_kernel import LEARNT
 from estimator.identification.online.two_mass import ESTIMATED, TwoMass
 from estimator.signals.record import FloatArray
 from estimator.signals.settings import Requirement, is_positive, require
@@ -69,23 +69,21 @@ class Ekf(KernelEstimator):
         noise = EkfNoise() if noise is None else noise
         orders = Orders(3, 3, nk)
         n = kernel.N_STATES
-        shapes = {"live": N_LIVE, "theta": orders.n_parameters, "physical": 6, "past": nk, "work": kernel.N_WORK}
-        parts = {name: (n, n) if name == "U" else (shapes.get(name, n),) for name in kernel.PARTS}
         law = noise.law(start, sample_time_s)
-        memory = Memory(parts)
+        structure = np.array([orders.na, orders.nb, nk], dtype=np.float64)
+        memory = Memory(kernel.kept(orders), {"structure": structure, "law": law}, kernel.room())
         memory["x"][:] = law[kernel.ORIGIN :]
         memory["U"][...] = np.eye(n)
         memory["D"][:] = memory["diagonal"][:] = law[kernel.START : kernel.ORIGIN]
         memory["physical"][:] = [start.J_M, start.J_L, start.k, start.c, start.b_M, start.b_L]
-        structure = np.array([3, 3, nk, 0, 0, n, nk])
-        super().__init__("ekf", kernel.block, orders, structure, law, memory, ESTIMATED)
+        super().__init__("ekf", kernel.block, orders, memory, ESTIMATED)
 
     @property
     def undetermined(self) -> tuple[str, ...]:
         """Names of the physical parameters the samples so far do not determine."""
         if self._stands_still:
             return ESTIMATED
-        now, start = self._memory["diagonal"][kernel.FIRST_LOG :], self._law[kernel.START : kernel.ORIGIN]
+        now, start = self._memory["diagonal"][kernel.FIRST_LOG :], self._memory["law"][kernel.START : kernel.ORIGIN]
         still = now >= LEARNT * start[kernel.FIRST_LOG :]
         return tuple(name for name, is_open in zip(ESTIMATED, still, strict=True) if is_open)
 

@@ -10,7 +10,8 @@ over whole rows of fixed length, which a compiler turns into vector instructions
 
 from __future__ import annotations
 
-from estimator.compiled import borrowing
+from estimator.compiled import inlined
+from estimator.identification.online.memory import Parts
 from estimator.signals.record import FloatArray
 
 # Places in `law`, see GainLaw.as_array.
@@ -23,7 +24,7 @@ HOLDS_TRACE = 1  # 1 while tr F is held
 INFORMATION_GAIN = 1000.0  # start of the gain that tells what the samples determine, where F itself can't
 
 
-@borrowing
+@inlined
 def dot(a: FloatArray, b: FloatArray) -> float:
     """Return a^T b; a plain loop, since calling a library takes longer than eight products."""
     total = 0.0
@@ -32,7 +33,7 @@ def dot(a: FloatArray, b: FloatArray) -> float:
     return total
 
 
-@borrowing
+@inlined
 def project(Phi: FloatArray, U: FloatArray, f: FloatArray) -> None:
     """Set f = U^T Phi."""
     for j in range(Phi.shape[0]):
@@ -42,7 +43,7 @@ def project(Phi: FloatArray, U: FloatArray, f: FloatArray) -> None:
         f[j] = total
 
 
-@borrowing
+@inlined
 def gain(Phi: FloatArray, U: FloatArray, D: FloatArray, g: FloatArray, f: FloatArray) -> float:
     """Set g = F Phi and return Phi^T F Phi."""
     n = Phi.shape[0]
@@ -58,7 +59,7 @@ def gain(Phi: FloatArray, U: FloatArray, D: FloatArray, g: FloatArray, f: FloatA
     return s
 
 
-@borrowing
+@inlined
 def absorb(Phi: FloatArray, ratio: float, U: FloatArray, D: FloatArray, g: FloatArray, f: FloatArray) -> float:
     """Take Phi into the factors, F - F Phi Phi^T F / (ratio + Phi^T F Phi); g and the result as of :func:`gain`."""
     n = Phi.shape[0]
@@ -83,7 +84,7 @@ def absorb(Phi: FloatArray, ratio: float, U: FloatArray, D: FloatArray, g: Float
     return s
 
 
-@borrowing
+@inlined
 def diagonal(U: FloatArray, D: FloatArray, diag: FloatArray) -> float:
     """Set diag = diag F and return tr F."""
     n = D.shape[0]
@@ -98,71 +99,49 @@ def diagonal(U: FloatArray, D: FloatArray, diag: FloatArray) -> float:
     return trace
 
 
-@borrowing
-def scale_of(trace: float, law: FloatArray, live: FloatArray, n: int) -> float:
+@inlined
+def scale_of(trace: float, m: Parts) -> float:
     """Return what F is multiplied by after a sample was absorbed: 1 / lambda_1, as the profile has it."""
-    if live[HOLDS_TRACE] == 1.0:
-        return float(law[TRACE] / trace)
-    if trace <= live[LAMBDA1_NOW] * law[INITIAL_GAIN] * n:
-        return float(1.0 / live[LAMBDA1_NOW])
+    if m.live[HOLDS_TRACE] == 1.0:
+        return float(m.law[TRACE] / trace)
+    if trace <= m.live[LAMBDA1_NOW] * m.law[INITIAL_GAIN] * m.D.shape[0]:
+        return float(1.0 / m.live[LAMBDA1_NOW])
     return 1.0  # without excitation nothing is forgotten: F would grow beyond every bound
 
 
-@borrowing
-def learn(
-    Phi: FloatArray,
-    law: FloatArray,
-    live: FloatArray,
-    U: FloatArray,
-    D: FloatArray,
-    diag: FloatArray,
-    g: FloatArray,
-    f: FloatArray,
-) -> float:
+@inlined
+def learn(Phi: FloatArray, m: Parts) -> float:
     """Update F by equation (5) with the lambdas of the profile; g = F Phi and Phi^T F Phi are of the F before."""
-    n = D.shape[0]
-    s = absorb(Phi, law[ALPHA] if live[HOLDS_TRACE] == 1.0 else live[LAMBDA1_NOW], U, D, g, f)
-    trace = diagonal(U, D, diag)
-    scale = scale_of(trace, law, live, n)
-    for i in range(n):
-        D[i] *= scale
-        diag[i] *= scale
+    live, law = m.live, m.law
+    s = absorb(Phi, law[ALPHA] if live[HOLDS_TRACE] == 1.0 else live[LAMBDA1_NOW], m.U, m.D, m.g, m.f)
+    trace = diagonal(m.U, m.D, m.diagonal)
+    scale = scale_of(trace, m)
+    for i in range(m.D.shape[0]):
+        m.D[i] *= scale
+        m.diagonal[i] *= scale
     live[LAMBDA1_NOW] = law[LAMBDA0] * live[LAMBDA1_NOW] + 1.0 - law[LAMBDA0]
     if trace * scale <= law[TRACE]:
         live[HOLDS_TRACE] = 1.0
     return s
 
 
-@borrowing
+@inlined
 def informs_by_itself(law: FloatArray) -> bool:
     """Tell whether diag F falls as the samples determine more; a constant gain and a constant trace do not."""
     return bool(law[LAMBDA2] != 0.0 and law[HOLDS_AT_ONCE] == 0.0)
 
 
-@borrowing
-def adapt(
-    Phi: FloatArray,
-    law: FloatArray,
-    live: FloatArray,
-    U: FloatArray,
-    D: FloatArray,
-    known_U: FloatArray,
-    known_D: FloatArray,
-    diag: FloatArray,
-    g: FloatArray,
-    f: FloatArray,
-) -> float:
+@inlined
+def adapt(Phi: FloatArray, m: Parts) -> float:
     """Update whatever the profile has; g = F Phi and Phi^T F Phi are of the F before.
 
-    ``diag`` then tells what the samples determine: it is that of F, or, where F does not fall with them, that of
+    ``m.diagonal`` then tells what the samples determine: it is that of F, or, where F does not fall with them, that of
     the decreasing gain ``known_U``, ``known_D`` that runs beside it for this alone.
     """
-    if informs_by_itself(law):
-        return learn(Phi, law, live, U, D, diag, g, f)
-    absorb(Phi, 1.0, known_U, known_D, g, f)
-    if law[LAMBDA2] == 0.0:
-        s = gain(Phi, U, D, g, f)
-    else:
-        s = learn(Phi, law, live, U, D, diag, g, f)
-    diagonal(known_U, known_D, diag)
+    by_itself = informs_by_itself(m.law)
+    if not by_itself:
+        absorb(Phi, 1.0, m.known_U, m.known_D, m.g, m.f)
+    s = gain(Phi, m.U, m.D, m.g, m.f) if m.law[LAMBDA2] == 0.0 else learn(Phi, m)
+    if not by_itself:
+        diagonal(m.known_U, m.known_D, m.diagonal)
     return s

@@ -10,20 +10,28 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from estimator.errors import BadShape
 from estimator.identification.linear_model import LinearModel, Orders
 from estimator.identification.online import state as states
 from estimator.identification.online.memory import Memory
 from estimator.identification.online.recursive import Estimate, Reason, Trajectory, statement
-from estimator.identification.online.regression_kernel import N_OUT, OUTPUT_MOVES, TORQUE_MOVES
-from estimator.signals.record import BoolArray, FloatArray, IntArray
+from estimator.identification.online.regression_kernel import OUTPUT_MOVES, TORQUE_MOVES
+from estimator.signals.record import BoolArray, FloatArray
 
 _REASONS = tuple(Reason)
 
 
 Block = Callable[..., None]
-"""A compiled loop: ``block(u, y, okay, structure, law, memory, at, out)``, one row of ``out`` for each sample."""
+"""A compiled loop: ``block(u, y, okay, memory, out)``, one row of ``out`` (:func:`row_type`) for each sample."""
+
+
+def row_type(n_parameters: int, n_extra: int) -> np.dtype[np.void]:
+    """Return the type of a row of results: :class:`Estimate` as the compiled loops write it."""
+    numbers = [(name, np.float64) for name in ("y_hat", "e_prior", "e_post")]
+    vectors = [("theta", np.float64, (n_parameters,)), ("extra", np.float64, (n_extra,))]
+    return np.dtype([*vectors, *numbers, ("used", np.bool_), ("reason", np.int8)], align=True)
 
 
 class KernelEstimator:
@@ -37,10 +45,6 @@ class KernelEstimator:
         Its compiled loop.
     orders : Orders
         Structure of the model it gives.
-    structure : ndarray of int
-        Whole numbers the loops need.
-    law : ndarray
-        The other settings the loops need.
     memory : Memory
         With its start values.
     extra_names : tuple of str
@@ -52,17 +56,14 @@ class KernelEstimator:
         name: str,
         block: Block,
         orders: Orders,
-        structure: IntArray,
-        law: FloatArray,
         memory: Memory,
         extra_names: tuple[str, ...] = (),
     ) -> None:
         self._name, self._block, self._orders = name, block, orders
-        self._structure, self._law, self._memory = structure, law, memory
-        self._extra_names = extra_names
-        self._row = np.zeros((1, orders.n_parameters + len(extra_names) + N_OUT))
-        self._row_theta = self._row[0, : orders.n_parameters]
-        self._row_rest = self._row[0, -N_OUT:]
+        self._memory, self._extra_names = memory, extra_names
+        self._row = np.zeros(1, row_type(orders.n_parameters, len(extra_names)))
+        self._row_theta = self._row["theta"][0]
+        self._row_rest = self._row[["reason", "used", "y_hat", "e_prior", "e_post"]]
         self._u, self._y, self._okay = np.zeros(1), np.zeros(1), np.ones(1, dtype=np.bool_)
         # An empty block compiles the loop now, so that the first cycle on the rig does not wait for it.
         self.run(np.empty(0), np.empty(0), np.empty(0, dtype=np.bool_))
@@ -124,8 +125,8 @@ class KernelEstimator:
         """
         self._u[0], self._y[0], self._okay[0] = u, y, okay
         self._advance(self._u, self._y, self._okay, self._row)
-        y_hat, e_prior, e_post, used, reason = self._row_rest.tolist()
-        return Estimate(self._row_theta.copy(), _REASONS[int(reason)], used == 1.0, y_hat, e_prior, e_post)
+        reason, *rest = self._row_rest.item()
+        return Estimate(self._row_theta.copy(), _REASONS[reason], *rest)
 
     def run(self, u: FloatArray, y: FloatArray, okay: BoolArray) -> Trajectory:
         """Take a block of samples, with the same bits as one by one.
@@ -150,21 +151,17 @@ class KernelEstimator:
                 f"{self._name}: u, y and okay have the shapes {u.shape}, {y.shape}, {okay.shape}, expected one shape "
                 "(N,). Give every signal one value per sample."
             )
-        out = np.empty((u.shape[0], self._row.shape[1]))
+        out = np.empty(u.shape[0], self._row.dtype)
         self._advance(
             np.ascontiguousarray(u, dtype=np.float64),
             np.ascontiguousarray(y, dtype=np.float64),
             np.ascontiguousarray(okay, dtype=np.bool_),
             out,
         )
-        n, rest = self._orders.n_parameters, out.shape[1] - N_OUT
-        y_hat, e_prior, e_post, used, reason = (out[:, rest + column] for column in range(N_OUT))
-        return Trajectory(
-            out[:, :n], y_hat, e_prior, e_post, used == 1.0, reason.astype(np.int8), out[:, n:rest], self._extra_names
-        )
+        return Trajectory(**{name: out[name] for name in self._row.dtype.names or ()}, extra_names=self._extra_names)
 
-    def _advance(self, u: FloatArray, y: FloatArray, okay: BoolArray, out: FloatArray) -> None:
-        self._block(u, y, okay, self._structure, self._law, self._memory.vector, self._memory.at, out)
+    def _advance(self, u: FloatArray, y: FloatArray, okay: BoolArray, out: NDArray[np.void]) -> None:
+        self._block(u, y, okay, self._memory.record, out)
 
     @property
     def _stands_still(self) -> bool:
@@ -174,7 +171,7 @@ class KernelEstimator:
 
     def state(self) -> states.State:
         """Return everything it remembers, as plain arrays; see :mod:`estimator.identification.online.state`."""
-        return states.saved(self._name, self._settings, self._memory)
+        return states.saved(self._name, self._memory)
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Take up a saved state: what follows has the bits it would have had without the break.
@@ -184,8 +181,4 @@ class KernelEstimator:
         BadSetting
             If the state is not that of an estimator of this kind and these settings.
         """
-        states.restored(state, self._name, self._settings, self._memory)
-
-    @property
-    def _settings(self) -> dict[str, np.ndarray]:
-        return {"structure": self._structure, "law": self._law}
+        states.restored(state, self._name, self._memory)

@@ -43,7 +43,7 @@ class OeEpm(RegressionEstimator):
         super().__init__(
             "oeepm",
             kernel.block,
-            kernel.N_ROWS,
+            kernel.past(orders),
             orders,
             adaptation,
             theta=theta,

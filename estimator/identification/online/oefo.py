@@ -93,15 +93,16 @@ class Oefo(RegressionEstimator):
         start_up_samples: int = 0,
         theta: FloatArray | None = None,
     ) -> None:
-        orders = Orders() if orders is None else orders
+        orders, adapted = Orders() if orders is None else orders, filtering is Filtering.ADAPTED
+        L = _of_length(L, orders.na + 1) if adapted else L
         super().__init__(
             "oefo",
             kernel.block,
-            kernel.N_ROWS,
+            kernel.past(orders, np.size(L)),
             orders,
             adaptation,
-            L=_of_length(L, orders.na + 1) if filtering is Filtering.ADAPTED else L,
-            adapts_filter=filtering is Filtering.ADAPTED,
+            L=L,
+            adapts_filter=adapted,
             start_up_samples=start_up_samples,
             theta=theta,
         )

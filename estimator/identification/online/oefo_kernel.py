@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from estimator.compiled import borrowing, compiled, inlined
+from estimator.compiled import compiled, inlined
+from estimator.identification.linear_model import Orders
 from estimator.identification.online.gain_kernel import dot
+from estimator.identification.online.memory import Parts, Shapes
 from estimator.identification.online.regression_kernel import (
     ADAPT_FILTER,
-    NA,
     START_UP,
     USED,
     correct,
@@ -16,120 +18,55 @@ from estimator.identification.online.regression_kernel import (
     is_stable,
     is_usable,
     kept_in_bounds,
-    opened,
-    past,
+    orders,
     push,
     regressor,
     taken_input,
     tell,
-    verdict,
 )
 from estimator.signals.record import BoolArray, FloatArray
 
-N_ROWS = 4
-"""Rows of past values: predicted outputs, torques, and both filtered by 1 / L."""
+
+def past(of: Orders, n_L: int) -> Shapes:
+    """Return its past values: predicted outputs, torques, and both filtered by the n_L coefficients of 1 / L."""
+    return {
+        "outputs": (of.na,),
+        "inputs": (of.nk + of.nb,),
+        "outputs_f": (max(of.na, n_L - 1),),
+        "inputs_f": (max(of.nk + of.nb, n_L - 1),),
+    }
 
 
 @inlined
-def opened_rows(memory: FloatArray, at: np.ndarray, structure: np.ndarray) -> tuple[FloatArray, ...]:
-    """Return L and the rows of past values."""
-    return (
-        memory[at[8] : at[9]],
-        past(memory, at, structure, 0),
-        past(memory, at, structure, 1),
-        past(memory, at, structure, 2),
-        past(memory, at, structure, 3),
-    )
-
-
-@borrowing
-def step(
-    u: float,
-    y: float,
-    okay: bool,
-    structure: np.ndarray,
-    law: FloatArray,
-    live: FloatArray,
-    theta: FloatArray,
-    U: FloatArray,
-    D: FloatArray,
-    known_U: FloatArray,
-    known_D: FloatArray,
-    diag: FloatArray,
-    phi: FloatArray,
-    Phi: FloatArray,
-    g: FloatArray,
-    f: FloatArray,
-    L: FloatArray,
-    outputs: FloatArray,
-    outputs_f: FloatArray,
-    inputs: FloatArray,
-    inputs_f: FloatArray,
-    t: int,
-    out: FloatArray,
-) -> None:
+def step(u: float, y: float, okay: bool, m: Parts, row: Parts) -> None:
     """Run one sample through equations (1) to (7)."""
-    u = taken_input(u, structure, live, inputs)
-    push(inputs_f, filtered(u, L, inputs_f))
-    regressor(structure, outputs, inputs, phi)
-    if live[USED] < structure[START_UP]:
-        regressor(structure, outputs, inputs, Phi)
+    u = taken_input(u, m)
+    push(m.inputs_f, filtered(u, m.L, m.inputs_f))
+    of = orders(m, row)
+    regressor(of, m.outputs, m.inputs, m.phi)
+    if m.live[USED] < m.structure[START_UP]:
+        regressor(of, m.outputs, m.inputs, m.Phi)
     else:
-        regressor(structure, outputs_f, inputs_f, Phi)
-    y_hat = dot(theta, phi)
-    used = is_usable(y, okay, live)
+        regressor(of, m.outputs_f, m.inputs_f, m.Phi)
+    y_hat = dot(m.theta, m.phi)
+    used = is_usable(y, okay, m.live)
     e_prior, e_post = 0.0, 0.0
     if used:
         e_prior = y - y_hat
-        e_post = correct(e_prior, y, Phi, law, live, theta, U, D, known_U, known_D, diag, g, f)
-        y_hat = dot(theta, phi)
-    y_hat = kept_in_bounds(y_hat, y, used, live)
-    stable = is_stable(theta, structure[NA], f)
-    if stable and structure[ADAPT_FILTER] == 1:
-        for i in range(structure[NA]):
-            L[1 + i] = theta[i]
-    push(outputs, y_hat)
-    push(outputs_f, filtered(y_hat, L, outputs_f))
-    tell(theta, y_hat, e_prior, e_post, used, verdict(structure, law, live, diag, stable), t, out)
+        e_post = correct(e_prior, y, m.Phi, m)
+        y_hat = dot(m.theta, m.phi)
+    y_hat = kept_in_bounds(y_hat, y, used, m.live)
+    stable = is_stable(m.theta, of[0], m.f)
+    if stable and m.structure[ADAPT_FILTER] == 1.0:
+        for i in range(of[0]):
+            m.L[1 + i] = m.theta[i]
+    push(m.outputs, y_hat)
+    push(m.outputs_f, filtered(y_hat, m.L, m.outputs_f))
+    tell(y_hat, e_prior, e_post, used, stable, m, row)
 
 
 @compiled
-def block(
-    u: FloatArray,
-    y: FloatArray,
-    okay: BoolArray,
-    structure: np.ndarray,
-    law: FloatArray,
-    memory: FloatArray,
-    at: np.ndarray,
-    out: FloatArray,
-) -> None:
+def block(u: FloatArray, y: FloatArray, okay: BoolArray, memory: NDArray[np.void], out: NDArray[np.void]) -> None:
     """Run the samples of a block through, each into its row of ``out``."""
-    live, theta, U, D, known_U, known_D, diag, phi, Phi, g, f = opened(memory, at, structure)
-    L, outputs, outputs_f, inputs, inputs_f = opened_rows(memory, at, structure)
     for t in range(u.shape[0]):
-        step(
-            u[t],
-            y[t],
-            okay[t],
-            structure,
-            law,
-            live,
-            theta,
-            U,
-            D,
-            known_U,
-            known_D,
-            diag,
-            phi,
-            Phi,
-            g,
-            f,
-            L,
-            outputs,
-            outputs_f,
-            inputs,
-            inputs_f,
-            t,
-            out,
-        )
+        step(u[t], y[t], okay[t], memory[0], out[t])

@@ -9,7 +9,7 @@ from estimator.identification.linear_model import Orders
 from estimator.identification.online import gain_kernel, regression_kernel
 from estimator.identification.online.adaptation import Adaptation, DecreasingThenConstantTrace, GainLaw
 from estimator.identification.online.kernel_estimator import Block, KernelEstimator
-from estimator.identification.online.memory import Memory
+from estimator.identification.online.memory import Memory, Shapes
 from estimator.signals.record import FloatArray
 from estimator.signals.settings import Requirement, require
 
@@ -21,10 +21,10 @@ class RegressionEstimator(KernelEstimator):
     ----------
     name, block
         As for every compiled estimator.
-    rows : int
-        Rows of past values its step keeps.
-    orders : Orders, optional
-        The paper's by default.
+    past : mapping
+        Shapes of the past values its step keeps, by name.
+    orders : Orders
+        Structure of the model.
     adaptation : Adaptation, optional
         Adaptation-gain profile; the paper's by default.
     L : ndarray, shape (m,)
@@ -37,8 +37,6 @@ class RegressionEstimator(KernelEstimator):
         Start values; zero by default. Choose a small initial gain with them.
     extra_names : tuple of str
         Parameters beside those of the transfer function, estimated along.
-    keeps_theta : bool
-        Whether one of the rows of past values holds parameters.
 
     Raises
     ------
@@ -54,8 +52,8 @@ class RegressionEstimator(KernelEstimator):
         self,
         name: str,
         block: Block,
-        rows: int,
-        orders: Orders | None,
+        past: Shapes,
+        orders: Orders,
         adaptation: Adaptation | None,
         *,
         L: FloatArray | None = None,
@@ -63,26 +61,25 @@ class RegressionEstimator(KernelEstimator):
         start_up_samples: int = 0,
         theta: FloatArray | None = None,
         extra_names: tuple[str, ...] = (),
-        keeps_theta: bool = False,
     ) -> None:
         require(name, (Requirement("start_up_samples", start_up_samples, start_up_samples >= 0, "0 or more"),))
-        orders = Orders() if orders is None else orders
         law = (DecreasingThenConstantTrace() if adaptation is None else adaptation).law
         n = orders.n_parameters + len(extra_names)
         own_L = np.ones(1) if L is None else checked_filter(name, L)
-        depth = max(orders.na, len(extra_names), orders.nk + orders.nb, own_L.shape[0], n if keeps_theta else 0)
-        structure = np.array([orders.na, orders.nb, orders.nk, adapts_filter, start_up_samples, n, depth])
-        memory = _memory(n, own_L, (rows, depth), law)
+        structure = np.array([orders.na, orders.nb, orders.nk, adapts_filter, start_up_samples], dtype=np.float64)
+        shapes = {**regression_kernel.kept(n), "L": own_L.shape, **past}
+        memory = Memory(shapes, {"structure": structure, "law": law.as_array(n)}, regression_kernel.room(n))
+        _begin(memory, own_L, law)
         if theta is not None:
             memory["theta"][: orders.n_parameters] = _start_values(name, theta, orders)
-        super().__init__(name, block, orders, structure.astype(np.int64), law.as_array(n), memory, extra_names)
+        super().__init__(name, block, orders, memory, extra_names)
 
     @property
     def undetermined(self) -> tuple[str, ...]:
         """Names of the parameters the samples so far do not determine."""
         if self._stands_still:
             return self._orders.names
-        start = gain_kernel.INFORMATION_GAIN if self._judged_apart else self._law[gain_kernel.INITIAL_GAIN]
+        start = gain_kernel.INFORMATION_GAIN if self._judged_apart else self._memory["law"][gain_kernel.INITIAL_GAIN]
         still = self._memory["diagonal"] >= regression_kernel.LEARNT * start
         return tuple(name for name, is_open in zip(self._orders.names, still, strict=False) if is_open)
 
@@ -95,11 +92,12 @@ class RegressionEstimator(KernelEstimator):
     @property
     def L(self) -> FloatArray:
         """Denominator of the observation filter in use, leading 1; a copy."""
-        return self._memory["filter"].copy()
+        return self._memory["L"].copy()
 
     @property
     def _judged_apart(self) -> bool:
-        return bool(self._law[gain_kernel.LAMBDA2] == 0.0 or self._law[gain_kernel.HOLDS_AT_ONCE] == 1.0)
+        law = self._memory["law"]
+        return bool(law[gain_kernel.LAMBDA2] == 0.0 or law[gain_kernel.HOLDS_AT_ONCE] == 1.0)
 
 
 def checked_filter(name: str, L: FloatArray) -> FloatArray:
@@ -122,18 +120,13 @@ def checked_filter(name: str, L: FloatArray) -> FloatArray:
     return own
 
 
-def _memory(n: int, L: FloatArray, past: tuple[int, int], law: GainLaw) -> Memory:
-    vector, matrix = (n,), (n, n)
-    shapes = {"live": (regression_kernel.N_LIVE,), "U": matrix, "known_U": matrix, "work": (4, n), "past": past}
-    shapes["filter"] = L.shape
-    memory = Memory({name: shapes.get(name, vector) for name in regression_kernel.PARTS})
-    memory["U"][...], memory["known_U"][...] = np.eye(n), np.eye(n)
+def _begin(memory: Memory, L: FloatArray, law: GainLaw) -> None:
+    memory["U"][...] = memory["known_U"][...] = np.eye(memory["theta"].shape[0])
     memory["D"][:], memory["known_D"][:] = law.initial_gain, gain_kernel.INFORMATION_GAIN
     memory["diagonal"][:] = law.initial_gain if law.informs_by_itself else gain_kernel.INFORMATION_GAIN
     memory["live"][:2] = law.lambda1, law.holds_at_once
     memory["live"][regression_kernel.IS_STABLE] = 1.0  # theta(0) = 0
-    memory["filter"][:] = L
-    return memory
+    memory["L"][:] = L
 
 
 def _start_values(name: str, theta: FloatArray, orders: Orders) -> FloatArray:

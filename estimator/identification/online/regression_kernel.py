@@ -1,22 +1,20 @@
 """Compiled: what the estimators of a transfer function share: their memory, their signals, their corrections.
 
-All state lives in one vector (:mod:`estimator.identification.online.memory`); :func:`opened` gives the parts of it
-in the order of ``PARTS``. A step takes one sample, and the same step serves a block and the rig's single sample.
+All state lives in one record ``m`` (:mod:`estimator.identification.online.memory`) with the parts of :func:`kept`,
+:func:`room` and each estimator's own. A step takes one sample and fills a row of results
+(:func:`estimator.identification.online.kernel_estimator.row_type`); the same step serves a block and the rig's single
+sample.
 """
 
 from __future__ import annotations
 
-import numpy as np
-
-from estimator.compiled import borrowing, inlined
+from estimator.compiled import inlined
 from estimator.identification.online.gain_kernel import INFORMATION_GAIN, INITIAL_GAIN, adapt, informs_by_itself
+from estimator.identification.online.memory import Parts, Shapes
 from estimator.signals.record import FloatArray
 
-PARTS = ("live", "theta", "U", "D", "known_U", "known_D", "diagonal", "work", "filter", "past")
-"""Parts of the memory, in the order in which :func:`opened` gives them."""
-
-# Places in `structure`.
-NA, NB, NK, ADAPT_FILTER, START_UP, N, DEPTH = range(7)
+# Places in `structure` after the orders, which the shapes tell already.
+NA, NB, NK, ADAPT_FILTER, START_UP = range(5)
 
 # Places in `live` after those of the gain.
 USED = 2  # samples that corrected theta
@@ -30,8 +28,6 @@ OUTPUT_MOVES = 9  # 1 once the output has
 LAST_OUTPUT = 10
 N_LIVE = 11
 
-N_OUT = 5  # columns of `out` after the parameters, see :func:`tell`
-
 # Reasons, as in estimator.identification.online.recursive.Reason.
 NONE, TOO_FEW_SAMPLES, NOT_EXCITED, UNSTABLE, CONSTANT_OUTPUT = range(5)
 
@@ -41,49 +37,43 @@ LARGEST = 1e30  # beyond it a value is no measurement; below it nothing here can
 RUNAWAY = 1e3  # times the largest output, beyond which a predicted output is given up
 
 
-@inlined
-def opened(memory: FloatArray, at: np.ndarray, structure: np.ndarray) -> tuple[FloatArray, ...]:
-    """Return the parts of a memory that every estimator has; vectors of length n, but U and known_U (n, n)."""
-    n = structure[N]
-    return (
-        memory[at[0] : at[1]],
-        memory[at[1] : at[2]],
-        memory[at[2] : at[3]].reshape((n, n)),
-        memory[at[3] : at[4]],
-        memory[at[4] : at[5]].reshape((n, n)),
-        memory[at[5] : at[6]],
-        memory[at[6] : at[7]],
-        memory[at[7] : at[7] + n],
-        memory[at[7] + n : at[7] + 2 * n],
-        memory[at[7] + 2 * n : at[7] + 3 * n],
-        memory[at[7] + 3 * n : at[8]],
-    )
+def kept(n: int) -> Shapes:
+    """Return the parts that every estimator of n parameters keeps, beside its past values and L."""
+    vectors = dict.fromkeys(("theta", "D", "known_D", "diagonal"), (n,))
+    return {"live": (N_LIVE,), **vectors, "U": (n, n), "known_U": (n, n)}
+
+
+def room(n: int) -> Shapes:
+    """Return the parts that an estimator of n parameters works in: both regressors, F Phi and U^T Phi."""
+    return dict.fromkeys(("phi", "Phi", "g", "f"), (n,))
 
 
 @inlined
-def past(memory: FloatArray, at: np.ndarray, structure: np.ndarray, row: int) -> FloatArray:
-    """Return a row of past values, newest first."""
-    start = at[9] + row * structure[DEPTH]
-    return memory[start : start + structure[DEPTH]]
+def orders(m: Parts, row: Parts) -> tuple[int, int, int]:
+    """Return na, nb and nk, as the shapes tell them: constants to the compiler."""
+    na = m.outputs.shape[0]
+    nb = row.theta.shape[0] - na
+    return na, nb, m.inputs.shape[0] - nb
 
 
-@borrowing
-def push(row: FloatArray, value: float) -> None:
-    """Put a value in front; the oldest drops out."""
-    for i in range(row.shape[0] - 1, 0, -1):
-        row[i] = row[i - 1]
-    row[0] = value
+@inlined
+def push(past: FloatArray, value: float) -> None:
+    """Put a value in front of past ones, newest first; the oldest drops out."""
+    if past.shape[0] > 0:
+        for i in range(past.shape[0] - 1, 0, -1):
+            past[i] = past[i - 1]
+        past[0] = value
 
 
-@borrowing
-def filtered(value: float, L: FloatArray, row: FloatArray) -> float:
+@inlined
+def filtered(value: float, L: FloatArray, past: FloatArray) -> float:
     """Return the next output of 1 / L, equation (7), given its last ones."""
     for i in range(1, L.shape[0]):
-        value -= L[i] * row[i - 1]
+        value -= L[i] * past[i - 1]
     return value
 
 
-@borrowing
+@inlined
 def is_stable(a: FloatArray, n: int, work: FloatArray) -> bool:
     """Tell whether 1 + a_1 q^-1 + .. + a_n q^-n has all roots inside the unit circle (step-down, Schur and Cohn)."""
     for i in range(n):
@@ -100,17 +90,17 @@ def is_stable(a: FloatArray, n: int, work: FloatArray) -> bool:
     return True
 
 
-@borrowing
-def regressor(structure: np.ndarray, outputs: FloatArray, inputs: FloatArray, phi: FloatArray) -> None:
+@inlined
+def regressor(of: tuple[int, int, int], outputs: FloatArray, inputs: FloatArray, phi: FloatArray) -> None:
     """Fill phi, equation (3), with outputs and inputs of whatever kind (measured, predicted, filtered)."""
-    na, nk = structure[NA], structure[NK]
+    na, nb, nk = of
     for i in range(na):
         phi[i] = -outputs[i]
-    for j in range(structure[NB]):
+    for j in range(nb):
         phi[na + j] = inputs[nk + j]
 
 
-@borrowing
+@inlined
 def note_torque(u: float, before: float, live: FloatArray) -> None:
     """Remember whether the torque ever changes."""
     if live[BEGUN] == 1.0 and u != before:
@@ -118,7 +108,7 @@ def note_torque(u: float, before: float, live: FloatArray) -> None:
     live[BEGUN] = 1.0
 
 
-@borrowing
+@inlined
 def note_output(y: float, live: FloatArray) -> None:
     """Count an output that was used, and remember whether it ever changes."""
     if live[USED] > 0.0 and y != live[LAST_OUTPUT]:
@@ -127,7 +117,7 @@ def note_output(y: float, live: FloatArray) -> None:
     live[USED] += 1.0
 
 
-@borrowing
+@inlined
 def constant_signal(live: FloatArray) -> int:
     """Return the reason that a signal which never changes gives, or none."""
     if live[TORQUE_MOVES] == 0.0:
@@ -135,26 +125,27 @@ def constant_signal(live: FloatArray) -> int:
     return NONE if live[OUTPUT_MOVES] == 1.0 else CONSTANT_OUTPUT
 
 
-@borrowing
-def taken_input(u: float, structure: np.ndarray, live: FloatArray, inputs: FloatArray) -> float:
+@inlined
+def taken_input(u: float, m: Parts) -> float:
     """Push the input and return it; the last one is held in place of one that can't be used."""
+    live, inputs = m.live, m.inputs
     if abs(u) <= LARGEST:
         note_torque(u, inputs[0], live)
         live[HELD_SAMPLES] = max(live[HELD_SAMPLES] - 1.0, 0.0)
     else:
         u = inputs[0]
-        live[HELD_SAMPLES] = structure[NK] + structure[NB]
+        live[HELD_SAMPLES] = inputs.shape[0]
     push(inputs, u)
     return u
 
 
-@borrowing
+@inlined
 def is_usable(y: float, okay: bool, live: FloatArray) -> bool:
     """Tell whether theta may be corrected by this output."""
     return okay and abs(y) <= LARGEST and live[HELD_SAMPLES] == 0.0
 
 
-@borrowing
+@inlined
 def kept_in_bounds(y_hat: float, y: float, used: bool, live: FloatArray) -> float:
     """Return the prediction, or the measured output (without one: 0) in place of one that has run away."""
     if abs(y_hat) <= RUNAWAY * live[PEAK]:
@@ -162,57 +153,43 @@ def kept_in_bounds(y_hat: float, y: float, used: bool, live: FloatArray) -> floa
     return y if used else 0.0
 
 
-@borrowing
-def correct(
-    error: float,
-    y: float,
-    Phi: FloatArray,
-    law: FloatArray,
-    live: FloatArray,
-    theta: FloatArray,
-    U: FloatArray,
-    D: FloatArray,
-    known_U: FloatArray,
-    known_D: FloatArray,
-    diag: FloatArray,
-    g: FloatArray,
-    f: FloatArray,
-) -> float:
+@inlined
+def correct(error: float, y: float, Phi: FloatArray, m: Parts) -> float:
     """Correct theta and F by an a-priori error, equations (4) to (6); return the a-posteriori error."""
-    s = adapt(Phi, law, live, U, D, known_U, known_D, diag, g, f)
+    s = adapt(Phi, m)
     e_post = error / (1.0 + s)  # equation (6)
-    for i in range(theta.shape[0]):
-        theta[i] += g[i] * e_post  # equation (4)
-    note_output(y, live)
-    live[PEAK] = max(live[PEAK], abs(y))
+    for i in range(m.theta.shape[0]):
+        m.theta[i] += m.g[i] * e_post  # equation (4)
+    note_output(y, m.live)
+    m.live[PEAK] = max(m.live[PEAK], abs(y))
     return e_post
 
 
-@borrowing
-def verdict(structure: np.ndarray, law: FloatArray, live: FloatArray, diag: FloatArray, stable: bool) -> int:
+@inlined
+def verdict(stable: bool, m: Parts, row: Parts) -> int:
     """Return the reason of the estimate's status; only the parameters of the transfer function are judged."""
-    if live[USED] < SETTLING * structure[N]:
+    if m.live[USED] < SETTLING * m.theta.shape[0]:
         return TOO_FEW_SAMPLES
-    constant = constant_signal(live)
+    constant = constant_signal(m.live)
     if constant != NONE:
         return constant
-    start = law[INITIAL_GAIN] if informs_by_itself(law) else INFORMATION_GAIN
-    for i in range(structure[NA] + structure[NB]):
-        if not diag[i] < LEARNT * start:
+    start = m.law[INITIAL_GAIN] if informs_by_itself(m.law) else INFORMATION_GAIN
+    for i in range(row.theta.shape[0]):
+        if not m.diagonal[i] < LEARNT * start:
             return NOT_EXCITED
     return NONE if stable else UNSTABLE
 
 
-@borrowing
-def tell(
-    theta: FloatArray, y_hat: float, e_prior: float, e_post: float, used: bool, reason: float, t: int, out: FloatArray
-) -> None:
-    """Fill the row of results of sample t."""
-    n = theta.shape[0]
+@inlined
+def tell(y_hat: float, e_prior: float, e_post: float, used: bool, stable: bool, m: Parts, row: Parts) -> None:
+    """Fill the row of results of a sample."""
+    n = row.theta.shape[0]
     for i in range(n):
-        out[t, i] = theta[i]
-    out[t, n] = y_hat
-    out[t, n + 1] = e_prior
-    out[t, n + 2] = e_post
-    out[t, n + 3] = 1.0 if used else 0.0
-    out[t, n + 4] = reason
+        row.theta[i] = m.theta[i]
+    for i in range(row.extra.shape[0]):
+        row.extra[i] = m.theta[n + i]
+    row.y_hat = y_hat
+    row.e_prior = e_prior
+    row.e_post = e_post
+    row.used = used
+    row.reason = verdict(stable, m, row)

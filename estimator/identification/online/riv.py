@@ -21,6 +21,8 @@ In place of a missing output its simulated one stands in phi, which at the true 
 
 from __future__ import annotations
 
+import numpy as np
+
 from estimator.identification.linear_model import Orders
 from estimator.identification.online import riv_kernel as kernel
 from estimator.identification.online.adaptation import Adaptation
@@ -60,14 +62,14 @@ class Riv(RegressionEstimator):
         start_up_samples: int = 0,
         theta: FloatArray | None = None,
     ) -> None:
+        orders = Orders() if orders is None else orders
         super().__init__(
             "riv",
             kernel.block,
-            kernel.N_ROWS,
+            kernel.past(orders, np.size(L)),
             orders,
             adaptation,
             L=L,
             start_up_samples=start_up_samples,
             theta=theta,
-            keeps_theta=True,
         )

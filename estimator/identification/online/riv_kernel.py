@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from estimator.compiled import borrowing, compiled, inlined
+from estimator.compiled import compiled, inlined
+from estimator.identification.linear_model import Orders
 from estimator.identification.online.gain_kernel import dot
+from estimator.identification.online.memory import Parts, Shapes
 from estimator.identification.online.regression_kernel import (
     IS_STABLE,
     LARGEST,
-    NA,
     START_UP,
     USED,
     correct,
@@ -17,129 +19,58 @@ from estimator.identification.online.regression_kernel import (
     is_stable,
     is_usable,
     kept_in_bounds,
-    opened,
-    past,
+    orders,
     push,
     regressor,
     taken_input,
     tell,
-    verdict,
 )
 from estimator.signals.record import BoolArray, FloatArray
 
-N_ROWS = 6
-"""Rows of past values: outputs of the auxiliary model, measured outputs, torques (all by 1 / L);
-outputs and torques as they came; parameters of the auxiliary model."""
+
+def past(of: Orders, n_L: int) -> Shapes:
+    """Return its past values.
+
+    Outputs of the auxiliary model and torques; those two and the measured outputs, filtered by the n_L coefficients of
+    1 / L; parameters of the auxiliary model.
+    """
+    outputs_f, inputs_f = (max(of.na, n_L - 1),), (max(of.nk + of.nb, n_L - 1),)
+    filtered_rows = {"auxiliary_f": outputs_f, "outputs_f": outputs_f, "inputs_f": inputs_f}
+    return {"outputs": (of.na,), "inputs": (of.nk + of.nb,), **filtered_rows, "auxiliary": (of.n_parameters,)}
 
 
 @inlined
-def opened_rows(memory: FloatArray, at: np.ndarray, structure: np.ndarray) -> tuple[FloatArray, ...]:
-    """Return L and the rows of past values."""
-    return (
-        memory[at[8] : at[9]],
-        past(memory, at, structure, 0),
-        past(memory, at, structure, 1),
-        past(memory, at, structure, 2),
-        past(memory, at, structure, 3),
-        past(memory, at, structure, 4),
-        past(memory, at, structure, 5),
-    )
-
-
-@borrowing
-def step(
-    u: float,
-    y: float,
-    okay: bool,
-    structure: np.ndarray,
-    law: FloatArray,
-    live: FloatArray,
-    theta: FloatArray,
-    U: FloatArray,
-    D: FloatArray,
-    known_U: FloatArray,
-    known_D: FloatArray,
-    diag: FloatArray,
-    phi: FloatArray,
-    Phi: FloatArray,
-    g: FloatArray,
-    f: FloatArray,
-    L: FloatArray,
-    aux_f: FloatArray,
-    outputs_f: FloatArray,
-    inputs_f: FloatArray,
-    aux: FloatArray,
-    inputs: FloatArray,
-    kept: FloatArray,
-    t: int,
-    out: FloatArray,
-) -> None:
+def step(u: float, y: float, okay: bool, m: Parts, row: Parts) -> None:
     """Run one sample through the equations of the instrumental variable."""
-    u = taken_input(u, structure, live, inputs)
-    push(inputs_f, filtered(u, L, inputs_f))
-    regressor(structure, aux, inputs, phi)
-    simulated = kept_in_bounds(dot(kept, phi), y, False, live)
-    push(aux, simulated)
-    regressor(structure, outputs_f, inputs_f, phi)
-    if live[USED] < structure[START_UP] or live[IS_STABLE] == 0.0:
-        regressor(structure, outputs_f, inputs_f, Phi)
+    u = taken_input(u, m)
+    push(m.inputs_f, filtered(u, m.L, m.inputs_f))
+    of = orders(m, row)
+    regressor(of, m.outputs, m.inputs, m.phi)
+    simulated = kept_in_bounds(dot(m.auxiliary, m.phi), y, False, m.live)
+    push(m.outputs, simulated)
+    regressor(of, m.outputs_f, m.inputs_f, m.phi)
+    if m.live[USED] < m.structure[START_UP] or m.live[IS_STABLE] == 0.0:
+        regressor(of, m.outputs_f, m.inputs_f, m.Phi)
     else:
-        regressor(structure, aux_f, inputs_f, Phi)
-    used = is_usable(y, okay, live)
-    y_f = filtered(y if okay and abs(y) <= LARGEST else simulated, L, outputs_f)
+        regressor(of, m.auxiliary_f, m.inputs_f, m.Phi)
+    used = is_usable(y, okay, m.live)
+    y_f = filtered(y if okay and abs(y) <= LARGEST else simulated, m.L, m.outputs_f)
     e_prior, e_post = 0.0, 0.0
     if used:
-        e_prior = y_f - dot(theta, phi)
-        e_post = correct(e_prior, y, Phi, law, live, theta, U, D, known_U, known_D, diag, g, f)
-    push(outputs_f, y_f)
-    push(aux_f, filtered(simulated, L, aux_f))
-    stable = is_stable(theta, structure[NA], f)
-    live[IS_STABLE] = 1.0 if stable else 0.0
+        e_prior = y_f - dot(m.theta, m.phi)
+        e_post = correct(e_prior, y, m.Phi, m)
+    push(m.outputs_f, y_f)
+    push(m.auxiliary_f, filtered(simulated, m.L, m.auxiliary_f))
+    stable = is_stable(m.theta, of[0], m.f)
+    m.live[IS_STABLE] = 1.0 if stable else 0.0
     if stable:
-        for i in range(theta.shape[0]):
-            kept[i] = theta[i]
-    tell(theta, simulated, e_prior, e_post, used, verdict(structure, law, live, diag, stable), t, out)
+        for i in range(m.theta.shape[0]):
+            m.auxiliary[i] = m.theta[i]
+    tell(simulated, e_prior, e_post, used, stable, m, row)
 
 
 @compiled
-def block(
-    u: FloatArray,
-    y: FloatArray,
-    okay: BoolArray,
-    structure: np.ndarray,
-    law: FloatArray,
-    memory: FloatArray,
-    at: np.ndarray,
-    out: FloatArray,
-) -> None:
+def block(u: FloatArray, y: FloatArray, okay: BoolArray, memory: NDArray[np.void], out: NDArray[np.void]) -> None:
     """Run the samples of a block through, each into its row of ``out``."""
-    live, theta, U, D, known_U, known_D, diag, phi, Phi, g, f = opened(memory, at, structure)
-    L, aux_f, outputs_f, inputs_f, aux, inputs, kept = opened_rows(memory, at, structure)
     for t in range(u.shape[0]):
-        step(
-            u[t],
-            y[t],
-            okay[t],
-            structure,
-            law,
-            live,
-            theta,
-            U,
-            D,
-            known_U,
-            known_D,
-            diag,
-            phi,
-            Phi,
-            g,
-            f,
-            L,
-            aux_f,
-            outputs_f,
-            inputs_f,
-            aux,
-            inputs,
-            kept,
-            t,
-            out,
-        )
+        step(u[t], y[t], okay[t], memory[0], out[t])

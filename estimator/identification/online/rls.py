@@ -39,4 +39,5 @@ class Rls(RegressionEstimator):
     def __init__(
         self, orders: Orders | None = None, adaptation: Adaptation | None = None, theta: FloatArray | None = None
     ) -> None:
-        super().__init__("rls", kernel.block, kernel.N_ROWS, orders, adaptation, theta=theta)
+        orders = Orders() if orders is None else orders
+        super().__init__("rls", kernel.block, kernel.past(orders), orders, adaptation, theta=theta)

@@ -3,115 +3,55 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from estimator.compiled import borrowing, compiled, inlined
+from estimator.compiled import compiled, inlined
+from estimator.identification.linear_model import Orders
 from estimator.identification.online.gain_kernel import dot
+from estimator.identification.online.memory import Parts, Shapes
 from estimator.identification.online.regression_kernel import (
     HELD_OUTPUTS,
     LARGEST,
-    NA,
     correct,
     is_stable,
     is_usable,
     kept_in_bounds,
-    opened,
-    past,
+    orders,
     push,
     regressor,
     taken_input,
     tell,
-    verdict,
 )
 from estimator.signals.record import BoolArray, FloatArray
 
-N_ROWS = 2
-"""Rows of past values: measured outputs, torques."""
+
+def past(of: Orders) -> Shapes:
+    """Return its past values: measured outputs, torques."""
+    return {"outputs": (of.na,), "inputs": (of.nk + of.nb,)}
 
 
 @inlined
-def opened_rows(memory: FloatArray, at: np.ndarray, structure: np.ndarray) -> tuple[FloatArray, ...]:
-    """Return the rows of past values."""
-    return (
-        past(memory, at, structure, 0),
-        past(memory, at, structure, 1),
-    )
-
-
-@borrowing
-def step(
-    u: float,
-    y: float,
-    okay: bool,
-    structure: np.ndarray,
-    law: FloatArray,
-    live: FloatArray,
-    theta: FloatArray,
-    U: FloatArray,
-    D: FloatArray,
-    known_U: FloatArray,
-    known_D: FloatArray,
-    diag: FloatArray,
-    phi: FloatArray,
-    Phi: FloatArray,
-    g: FloatArray,
-    f: FloatArray,
-    outputs: FloatArray,
-    inputs: FloatArray,
-    t: int,
-    out: FloatArray,
-) -> None:
+def step(u: float, y: float, okay: bool, m: Parts, row: Parts) -> None:
     """Run one sample through the equations of recursive least squares."""
-    taken_input(u, structure, live, inputs)
-    regressor(structure, outputs, inputs, phi)
-    y_hat = dot(theta, phi)
+    taken_input(u, m)
+    of = orders(m, row)
+    regressor(of, m.outputs, m.inputs, m.phi)
+    y_hat = dot(m.theta, m.phi)
     measured = okay and abs(y) <= LARGEST
-    used = is_usable(y, okay, live) and live[HELD_OUTPUTS] == 0.0
+    used = is_usable(y, okay, m.live) and m.live[HELD_OUTPUTS] == 0.0
     e_prior, e_post = 0.0, 0.0
     if used:
         e_prior = y - y_hat
-        e_post = correct(e_prior, y, phi, law, live, theta, U, D, known_U, known_D, diag, g, f)
-        y_hat = dot(theta, phi)
-    y_hat = kept_in_bounds(y_hat, y, used, live)
-    live[HELD_OUTPUTS] = max(live[HELD_OUTPUTS] - 1.0, 0.0) if measured else float(structure[NA])
-    push(outputs, y if measured else y_hat)
-    stable = is_stable(theta, structure[NA], f)
-    tell(theta, y_hat, e_prior, e_post, used, verdict(structure, law, live, diag, stable), t, out)
+        e_post = correct(e_prior, y, m.phi, m)
+        y_hat = dot(m.theta, m.phi)
+    y_hat = kept_in_bounds(y_hat, y, used, m.live)
+    m.live[HELD_OUTPUTS] = max(m.live[HELD_OUTPUTS] - 1.0, 0.0) if measured else float(of[0])
+    push(m.outputs, y if measured else y_hat)
+    tell(y_hat, e_prior, e_post, used, is_stable(m.theta, of[0], m.f), m, row)
 
 
 @compiled
-def block(
-    u: FloatArray,
-    y: FloatArray,
-    okay: BoolArray,
-    structure: np.ndarray,
-    law: FloatArray,
-    memory: FloatArray,
-    at: np.ndarray,
-    out: FloatArray,
-) -> None:
+def block(u: FloatArray, y: FloatArray, okay: BoolArray, memory: NDArray[np.void], out: NDArray[np.void]) -> None:
     """Run the samples of a block through, each into its row of ``out``."""
-    live, theta, U, D, known_U, known_D, diag, phi, Phi, g, f = opened(memory, at, structure)
-    outputs, inputs = opened_rows(memory, at, structure)
     for t in range(u.shape[0]):
-        step(
-            u[t],
-            y[t],
-            okay[t],
-            structure,
-            law,
-            live,
-            theta,
-            U,
-            D,
-            known_U,
-            known_D,
-            diag,
-            phi,
-            Phi,
-            g,
-            f,
-            outputs,
-            inputs,
-            t,
-            out,
-        )
+        step(u[t], y[t], okay[t], memory[0], out[t])

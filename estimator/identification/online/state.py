@@ -14,32 +14,18 @@ import numpy as np
 from estimator.errors import BadSetting
 from estimator.identification.online.memory import Memory
 
-VERSION = 1
+VERSION = 2
 """Goes up when a part changes its meaning; states of another version are refused."""
-
-SCRATCH = "work"
-"""The part that no sample leaves anything in for the next."""
 
 State = dict[str, Any]
 
 
-def saved(estimator: str, settings: Mapping[str, np.ndarray], memory: Memory) -> State:
-    """Return the state of an estimator.
-
-    Parameters
-    ----------
-    estimator
-        Its name.
-    settings
-        What its memory is worth nothing without: structure and adaptation gain.
-    memory
-        What it has learnt.
-    """
-    kept = {name: values.copy() for name, values in settings.items()}
-    return {"estimator": estimator, "version": VERSION, **kept, **memory.copies(without=[SCRATCH])}
+def saved(estimator: str, memory: Memory) -> State:
+    """Return the state of an estimator: its name, what it was set up with, and what it has learnt."""
+    return {"estimator": estimator, "version": VERSION, **memory.settings, **memory.kept}
 
 
-def restored(state: Mapping[str, Any], estimator: str, settings: Mapping[str, np.ndarray], memory: Memory) -> None:
+def restored(state: Mapping[str, Any], estimator: str, memory: Memory) -> None:
     """Write a state into the memory of an estimator of the same kind and settings.
 
     Raises
@@ -50,11 +36,11 @@ def restored(state: Mapping[str, Any], estimator: str, settings: Mapping[str, np
     """
     for name, expected in (("estimator", estimator), ("version", VERSION)):
         _require(str(np.asarray(_part(state, name))) == str(expected), name, state[name], repr(expected))
-    for name, setting in settings.items():
+    for name, setting in memory.settings.items():
         _require(
             np.array_equal(_numbers(state, name), setting), name, state[name], f"{setting.tolist()}, as set up here"
         )
-    new = {name: _numbers(state, name) for name in memory.copies(without=[SCRATCH])}
+    new = {name: _numbers(state, name) for name in memory.kept}
     for name, values in new.items():
         _require(values.shape == memory[name].shape, name, f"of shape {values.shape}", f"shape {memory[name].shape}")
         _require(bool(np.isfinite(values).all()), name, "not finite", "finite numbers only")

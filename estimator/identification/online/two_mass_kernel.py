@@ -13,7 +13,7 @@ obey the same equations and are summed beside it.
 
 from __future__ import annotations
 
-from estimator.compiled import borrowing
+from estimator.compiled import inlined
 from estimator.signals.record import FloatArray
 
 # Columns that are propagated: the motion, then its derivatives.
@@ -28,7 +28,7 @@ TERMS = 16  # 1 / 16! = 5e-14 of a part of the period whose largest rate times l
 MOST_PARTS = 128
 
 
-@borrowing
+@inlined
 def rate(x: FloatArray, column: int, forced: float, load: float, p: FloatArray, out: FloatArray) -> None:
     """Set a column of ``out`` to the time derivative of one of ``x`` under a torque and a load; p as in the filter."""
     J_M, J_L, k, c, b_M, b_L = p[0], p[1], p[2], p[3], p[4], p[5]
@@ -39,7 +39,7 @@ def rate(x: FloatArray, column: int, forced: float, load: float, p: FloatArray, 
     out[2, column] = slip
 
 
-@borrowing
+@inlined
 def rates(x: FloatArray, torque: float, load: float, unit: float, p: FloatArray, out: FloatArray) -> None:
     """Differentiate all columns; ``unit`` is 1 where the inputs act (first derivative) and 0 above it."""
     rate(x, MOTION, torque * unit, load * unit, p, out)
@@ -58,14 +58,14 @@ def rates(x: FloatArray, torque: float, load: float, unit: float, p: FloatArray,
     out[1, BY_LOG + 3] += damper / p[1]
 
 
-@borrowing
+@inlined
 def parts_of(period_s: float, p: FloatArray) -> int:
     """Return how many parts to cut a period into, so that the series of each converges at once."""
     fastest = (p[2] * (1.0 / p[0] + 1.0 / p[1])) ** 0.5 + (p[3] + p[4]) / p[0] + (p[3] + p[5]) / p[1]
     return int(min(1.0 + period_s * fastest, float(MOST_PARTS)))
 
 
-@borrowing
+@inlined
 def propagate(
     x: FloatArray,
     torque: float,
@@ -97,7 +97,7 @@ def propagate(
                     x[row, column] += term[row, column]
 
 
-@borrowing
+@inlined
 def transfer_function(x: FloatArray, theta: FloatArray) -> None:
     """Set theta = a_1 .. a_3, b_1 .. b_3 of speed over torque from the propagated columns (Leverrier, Markov)."""
     a00, a01, a02 = x[0, 1], x[0, 2], x[0, 3]

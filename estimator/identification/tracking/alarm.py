@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -29,6 +30,12 @@ class Level:
     def as_json(self) -> dict[str, Any]:
         """Return the level as it stands in a file."""
         return {"value": self.value, "ci95": list(self.ci95)}
+
+    @classmethod
+    def from_json(cls, document: Mapping[str, Any]) -> Level:
+        """Read what `as_json` gave."""
+        low, high = document["ci95"]
+        return cls(document["value"], (low, high))
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,3 +96,23 @@ class Alarm:
                 "false_alarms_per_hour": self.false_alarms_per_hour,
             },
         }
+
+    @classmethod
+    def from_json(cls, document: Mapping[str, Any]) -> Alarm:
+        """Read what `as_json` gave.
+
+        Raises
+        ------
+        KeyError, TypeError, ValueError
+            If it is something else.
+        """
+        begin_s, end_s = document["changed_between_s"]
+        return cls(
+            time_s=document["time_s"],
+            changed_between_s=(begin_s, end_s),
+            quantity=document["quantity"],
+            before=Level.from_json(document["before"]),
+            after=Level.from_json(document["after"]),
+            settled=document["settled"],
+            **document["evidence"],
+        )

@@ -94,9 +94,9 @@ class Follower:
         live, out = self._live, np.empty((len(estimates), 5))
         follow_block(
             u,
-            np.ascontiguousarray(estimates.theta),
-            np.ascontiguousarray(estimates.y_hat),
-            np.ascontiguousarray(estimates.e_prior),
+            estimates.theta,
+            estimates.y_hat,
+            estimates.e_prior,
             estimates.used,
             estimates.reason,
             self._structure,

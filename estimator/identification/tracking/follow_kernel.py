@@ -6,7 +6,14 @@ import numpy as np
 
 from estimator.compiled import compiled
 from estimator.identification.linear_model import ComplexArray
-from estimator.identification.tracking.pole_kernel import DAMPING, FREQUENCY_HZ, HEIGHT, dominant, mode_gradient
+from estimator.identification.tracking.pole_kernel import (
+    DAMPING,
+    FREQUENCY_HZ,
+    HEIGHT,
+    dominant,
+    mode_gradient,
+    squared,
+)
 from estimator.signals.record import BoolArray, FloatArray, IntArray
 
 # Rows of `past`: newest value first.
@@ -55,15 +62,15 @@ def through_pair(value: float, pair: FloatArray, row: FloatArray) -> float:
 def take_pair(roots: ComplexArray, found: int, pair: FloatArray) -> None:
     """Take the resonance's poles into the gradient's filter; an unstable pair leaves the last one in place."""
     pole = roots[found]
-    magnitude = abs(pole)
+    magnitude = np.sqrt(squared(pole))
     if not magnitude < 1.0:
         return
     pair[L_1], pair[L_2] = -2.0 * pole.real, magnitude * magnitude
     others = 1.0 + 0.0j
     for i in range(roots.shape[0]):
-        if i != found and abs(roots[i] - pole.conjugate()) > 1e-9:
-            others *= 1.0 - roots[i] * pole.conjugate() / magnitude
-    pair[OTHERS] = 1.0 / max(abs(others), LEAST_DISTANCE)
+        if i != found and squared(roots[i] - pole.conjugate()) > 1e-18:
+            others *= 1.0 - roots[i] * (pole.conjugate() * (1.0 / magnitude))
+    pair[OTHERS] = 1.0 / max(np.sqrt(squared(others)), LEAST_DISTANCE)
 
 
 @compiled

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from estimator.compiled import compiled
+from estimator.compiled import compiled, inlined
 from estimator.identification.linear_model import ComplexArray
 from estimator.signals.record import FloatArray
 
@@ -35,15 +35,21 @@ START = 0.4 + 0.9j  # no root of unity, and neither real nor imaginary: Durand's
 FREQUENCY_HZ, DAMPING, HEIGHT = 0, 1, 2
 
 
-@compiled
+@inlined
+def squared(z: complex) -> float:
+    """Return |z|^2, without the care that ``abs`` takes of numbers near the ends of the range."""
+    return z.real * z.real + z.imag * z.imag
+
+
+@inlined
 def ratio(x: complex, y: complex) -> complex:
     """Return x / y; no number where y is 0, while the compiled division of complex numbers would raise."""
-    squared = y.real * y.real + y.imag * y.imag
+    size = squared(y)
     real, imag = x.real * y.real + x.imag * y.imag, x.imag * y.real - x.real * y.imag
-    return complex(real / squared, imag / squared)
+    return complex(real / size, imag / size)
 
 
-@compiled
+@inlined
 def go_round(a: FloatArray, z: ComplexArray) -> float:
     """Do one round; return the largest change of a pole."""
     n = a.shape[0]
@@ -86,7 +92,13 @@ def find_poles(a: FloatArray, z: ComplexArray) -> bool:
     return change < COINCIDING
 
 
-@compiled
+@inlined
+def continuous(z: complex, sample_time_s: float) -> complex:
+    """Return the pole ln(z) / T of continuous time [1/s]."""
+    return complex(0.5 * np.log(squared(z)), np.arctan2(z.imag, z.real)) * (1.0 / sample_time_s)
+
+
+@inlined
 def height(b: FloatArray, nk: int, z: ComplexArray, i: int) -> float:
     """Return |residue of B / A at pole i| / distance of the pole from the unit circle."""
     q = ratio(1.0 + 0.0j, z[i])
@@ -98,7 +110,7 @@ def height(b: FloatArray, nk: int, z: ComplexArray, i: int) -> float:
     for j in range(z.shape[0]):
         if j != i:
             numerator = ratio(numerator, 1.0 - z[j] * q)
-    return float(abs(numerator) / max(1.0 - abs(z[i]), 1e-12))
+    return float(np.sqrt(squared(numerator)) / max(1.0 - np.sqrt(squared(z[i])), 1e-12))
 
 
 @compiled
@@ -127,11 +139,12 @@ def dominant(
     if not find_poles(theta[:na], z):
         return best
     for i in range(na):
-        if z[i].imag <= 1e-9 * abs(z[i]):  # a real pole does not oscillate, at whatever sampled frequency
+        if z[i].imag <= 1e-9 * np.sqrt(squared(z[i])):  # a real pole does not oscillate, at whatever sampled frequency
             continue
-        s = np.log(z[i]) * (1.0 / sample_time_s)
-        frequency_hz = abs(s) / (2.0 * np.pi)
-        damping = -s.real / abs(s)
+        s = continuous(z[i], sample_time_s)
+        magnitude = np.sqrt(squared(s))
+        frequency_hz = magnitude / (2.0 * np.pi)
+        damping = -s.real / magnitude
         if not (band_hz[0] <= frequency_hz <= band_hz[1] and abs(damping) < band_hz[2]):
             continue
         tall = height(theta[na:], nk, z, i)
@@ -152,8 +165,8 @@ def mode_gradient(z: ComplexArray, i: int, sample_time_s: float, frequency: Floa
     for j in range(n):
         if j != i:
             slope *= z[i] - z[j]
-    s = np.log(z[i]) * (1.0 / sample_time_s)
-    magnitude = abs(s)
+    s = continuous(z[i], sample_time_s)
+    magnitude = np.sqrt(squared(s))
     power = 1.0 + 0.0j
     for k in range(n - 1, -1, -1):
         ds = -ratio(power, slope * z[i] * sample_time_s)

@@ -15,12 +15,14 @@ on the bulk of the distribution, two standard deviations and a half out, and not
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 from scipy.optimize import brentq
-from scipy.special import roots_hermitenorm
-from scipy.stats import chi2, norm
+from scipy.special import gammaincinv, ndtr, roots_hermitenorm
 
 from estimator.errors import BadSetting
+from estimator.signals.record import FloatArray
 
 HIGHEST = 40.0
 """No threshold is sought above."""
@@ -29,16 +31,23 @@ QUANTILES = 4000
 """Points at which the distribution of s is taken."""
 
 
+@cache
+def _reference(n_reference: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return how the reference is distributed: s at its quantiles, and the nodes of m with their weights."""
+    nodes, weights = roots_hermitenorm(60)
+    probability, freedom = (np.arange(QUANTILES) + 0.5) / QUANTILES, n_reference - 1
+    s = np.sqrt(2.0 * gammaincinv(freedom / 2, probability) / freedom)  # chi^2 is twice a gamma variable
+    return s, nodes / np.sqrt(n_reference), weights / weights.sum()
+
+
 def false_pairs(threshold: float, n_reference: int) -> float:
     """Return the probability that two statistics in a row are beyond a threshold, on the same side."""
-    nodes, weights = roots_hermitenorm(60)
-    weights = weights / weights.sum()
-    probability = (np.arange(QUANTILES) + 0.5) / QUANTILES
-    s = np.sqrt(chi2.ppf(probability, n_reference - 1) / (n_reference - 1))
-    limit = threshold * np.sqrt(1.0 + 1.0 / n_reference) * s[:, np.newaxis] + nodes / np.sqrt(n_reference)
-    return float(2.0 * (norm.sf(limit) ** 2 @ weights).mean())
+    s, m, weights = _reference(n_reference)
+    limit = threshold * np.sqrt(1.0 + 1.0 / n_reference) * s[:, np.newaxis] + m
+    return float(2.0 * (ndtr(-limit) ** 2 @ weights).mean())
 
 
+@cache
 def threshold_for(false_alarms_per_hour: float, statistics_per_hour: float, n_reference: int) -> float:
     """Return the threshold that has at most so many false alarms an hour.
 

@@ -261,7 +261,7 @@ def test_a_restored_state_goes_on_to_the_bit(case: Case, carried: type) -> None:
     ("key", "value", "named"),
     [
         ("estimator", "other", "estimator is other, expected"),
-        ("version", 99, "version is 99, expected 1"),
+        ("version", 99, "version is 99, expected 2"),
         ("structure", np.zeros(7), "structure is"),
         ("law", np.ones(3), "law is"),
         ("theta", np.ones(99), r"theta is of shape \(99,\), expected shape"),
