@@ -30,6 +30,7 @@ from estimator.diagnosis.result import (
     Discrepancy,
     Fit,
     FoundEffect,
+    Interval,
     Mismatch,
     RejectedEffect,
     Trace,
@@ -98,7 +99,7 @@ def _diagnose(
     line = mechanical(model)
     chain, unseen = read_through(records), read_through(holdout)
     found = search(chain, line, unseen.records, progress)
-    bench, examiner, selection, floor = found.bench, found.examiner, found.selection, found.floor
+    examiner, selection, floor = found.examiner, found.selection, found.floor
     progress("weighing the verdict", 0.9)
     chain = found.chain.with_jitter_in(selection.result)
     judgement = judge(selection, floor, chain.findings)
@@ -108,8 +109,9 @@ def _diagnose(
     if judgement.verdict is not Verdict.NO_MISMATCH:
         seen = discrepancy(selection.retuned, final, _floor(selection, floor), line.motion)
         judgement = _located(judgement, seen)
-    before = _raw_fit(chain, line, bench, final)
-    figures = _fit_figures(chain, before, selection, examiner, line, floor, believed)
+    before = _raw_fit(chain, line, final)
+    retuned = _raw_fit(chain, line, selection.retuned)
+    figures = _fit_figures(chain, retuned, selection, examiner, line, floor, believed)
     acquired = acquired_effects(chain, residuals_by_record(before), chain.errors(final.outputs))
     effects = (*(found_effects(selection, line, examiner) if believed else ()), *acquired)
     blind = tuple(UntestableEffect(n, u.reason, u.suggested_test) for n, u in found.untestable.items())
@@ -117,7 +119,7 @@ def _diagnose(
     return Diagnosis(
         verdict=judgement.verdict,
         statement=statement(judgement, effects, figures, blind),
-        mismatch=_mismatch(selection, judgement, floor, effects),
+        mismatch=_mismatch(selection, judgement, floor, effects, None if chain.findings else final, retuned),
         effects=effects,
         rejected=_rejected(selection, believed, judgement),
         untestable=blind,
@@ -142,16 +144,16 @@ def _located(judgement: Judgement, seen: Discrepancy) -> Judgement:
     return replace(judgement, unnamed=law)
 
 
-def _raw_fit(chain: Chain, model: DrivelineModel, bench: Bench, final: FitResult) -> FitResult:
-    """Return the fit of the final hypothesis to the recordings as they were read, faults of the acquisition and all."""
+def _raw_fit(chain: Chain, model: DrivelineModel, result: FitResult) -> FitResult:
+    """Return the fit of a hypothesis to the recordings as they were read, faults of the acquisition and all."""
     if not chain.findings:
-        return final
-    return Bench(model, chain.raw, everything(chain.raw)).fit(effects_of(final), final)
+        return result
+    return Bench(model, chain.raw, everything(chain.raw)).fit(effects_of(result), result)
 
 
 def _fit_figures(
     chain: Chain,
-    before: FitResult,
+    retuned: FitResult,
     selection: Selection,
     examiner: Examiner,
     model: DrivelineModel,
@@ -164,9 +166,6 @@ def _fit_figures(
     chosen = selection.chosen if believed else NOTHING
     final = selection.result if believed else selection.retuned
     held = examiner.compare(selection.retuned, NOTHING, final, chosen)
-    retuned = selection.retuned
-    if chain.findings:
-        retuned = Bench(model, chain.raw, everything(chain.raw)).fit(NOTHING) if chosen else before
     return Fit(
         unit=unit(dimension, model.motion),
         nominal=nominal.rms,
@@ -183,7 +182,19 @@ def _floor(selection: Selection, floor: float) -> float:
     return min(floor, unpredictable(residuals_by_record(selection.result)))
 
 
-def _mismatch(selection: Selection, judgement: Judgement, floor: float, effects: Sequence[FoundEffect]) -> Mismatch:
+def _mismatch(
+    selection: Selection,
+    judgement: Judgement,
+    floor: float,
+    effects: Sequence[FoundEffect],
+    explained: FitResult | None,
+    retuned: FitResult,
+) -> Mismatch:
+    """Return what is missing where.
+
+    ``explained`` is the fit that is believed, None where the acquisition's own faults are part of what it explains;
+    ``retuned`` that of the nominal model to the recordings as they were read.
+    """
     floor = _floor(selection, floor)
     if judgement.verdict is Verdict.NO_MISMATCH:
         return Mismatch(False, None, {}, None, None, 1.0)
@@ -196,10 +207,22 @@ def _mismatch(selection: Selection, judgement: Judgement, floor: float, effects:
         detected=True,
         element=element,
         time_s=locate.intervals(selection.retuned, floor),
-        band_hz=locate.band_hz(selection.retuned, floor),
+        band_hz=_band(judgement, explained, retuned, floor),
         region=None if element is None else locate.region(selection.retuned, element, floor),
         p_value=p_value,
     )
+
+
+def _band(judgement: Judgement, explained: FitResult | None, retuned: FitResult, floor: float) -> Interval | None:
+    """Return the band of what the explanation moves, which no noise blurs; else that of the error above the noise."""
+    records = retuned.problem.records
+    moved = explained.outputs if judgement.verdict is Verdict.EXPLAINED and explained is not None else None
+    other = [record.output for record in records] if moved is None else moved
+    mismatch = [
+        np.where(record.okay, output - mine, 0.0)
+        for record, output, mine in zip(records, retuned.outputs, other, strict=True)
+    ]
+    return locate.band_hz(mismatch, [record.sample_time_s for record in records], floor if moved is None else 0.0)
 
 
 def _element(selection: Selection, judgement: Judgement, effects: Sequence[FoundEffect]) -> Element | None:

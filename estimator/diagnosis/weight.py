@@ -14,6 +14,10 @@ PART_OF_MISMATCH = 0.05
 """Share of the first mismatch's power that a further effect must remove, or else
 ``VISIBLE`` of the RMS and half of what stands."""
 
+PART_BESIDE = 0.001
+"""Share of the first mismatch's power that even a visible effect must remove: no law is nature's to better than three
+per cent of what it moves, and some law elsewhere follows what is left."""
+
 PART_FOR_DETAIL = 0.01
 """Share of what a special case removes that its generalisation must remove on top: the same friction written as
 bristles or as a rounded sign differs by less."""
@@ -52,22 +56,24 @@ class Weight:
         At an element of its own it may be small, if it can be seen. Beside another effect of the same element it must
         be a real part of the mismatch: a law written another way leaves just such a small remainder. A profile is no
         law, its knots follow whatever is slow; what it leaves at the load is another's. But it could take up any slow
-        rest itself, and so must be a real part; and a wave beside another wave: no machine's is a pure sine.
+        rest itself, and so must be a real part. A wave is an echo of another wave alone: no machine's is a pure sine,
+        and no law of twist or speed leaves one that is in step with the motor's angle.
         """
         if before.rms < self.least_ratio * after.rms:
             return False
         mismatch = max(retuned.rms**2 - self.floor**2, retuned.rms**2 - after.rms**2)
-        if before.rms**2 - after.rms**2 >= PART_OF_MISMATCH * mismatch:
+        share = (before.rms**2 - after.rms**2) / mismatch
+        if share >= PART_OF_MISMATCH:
             return True
-        return not _echoes(name, effects - {name}) and self.visible(before, after)
+        return share >= PART_BESIDE and not _echoes(name, effects - {name}) and self.visible(before, after)
 
 
 def _echoes(name: str, others: Effects) -> bool:
     """Tell whether a small effect could be what other laws leave because nature's are written another way."""
     entry = EFFECTS[name]
-    neighbours = {EFFECTS[other].element for other in others if not EFFECTS[other].profile}
-    overtone = bool(entry.phases) and any(EFFECTS[other].phases for other in others)
-    return entry.element in neighbours or entry.profile or overtone
+    if entry.phases:
+        return any(EFFECTS[other].phases for other in others)
+    return entry.profile or entry.element in {EFFECTS[other].element for other in others if not EFFECTS[other].profile}
 
 
 def earns_detail(special: FitResult, general: FitResult, before: FitResult) -> bool:

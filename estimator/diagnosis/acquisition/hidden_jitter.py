@@ -29,6 +29,11 @@ PAST = 8
 AROUND = 3
 """Slopes before and after that may explain it: a delay, a lag or a wrong inertia show as a mix of them."""
 
+BLOCK = 250
+"""Rows within which these explain by coefficients of their own, to tell whether there is jitter at all: a simulated
+angle that drifts off the true one moves what depends on it as a delay does that comes and goes. Its size is told from
+all rows: so many coefficients follow a part of the jitter too."""
+
 LEAST_GAIN = 0.05
 """Share of the error's variance that jitter must account for, on average: less changes no fit."""
 
@@ -40,8 +45,8 @@ OF_THE_MANY = 0.4
 """Jitter seen in the median must be this share of that seen in the mean. Between Gaussian and uniform jitter it is 1 to
 1.6; a few wild rows (stale samples, a clunk) leave nothing in the median."""
 
-NEIGHBOURS = 0.25
-"""Correlation of neighbouring errors, weighed by slope, up to which they count as independent."""
+NEIGHBOURS = 0.5
+"""Share of the jitter that neighbouring rows may have in common: 0 if drawn anew for each, 1 if it delays both."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,16 +80,15 @@ def hidden_jitter(
     Finding or None
         ``sample_jitter`` with its standard deviation; None where the errors don't show any.
     """
-    rests = [rest for data in zip(errors, slopes, okay, strict=True) if (rest := _rest(*data)) is not None]
-    if not rests:
+    rest = _rests(errors, slopes, okay)
+    within = _rests(errors, slopes, okay, BLOCK)
+    if rest is None or within is None or _likeliest(within.error, within.slope) is None:
         return None
-    fields = ("error", "slope", "next_error", "next_slope")
-    rest = _Rest(*(np.concatenate([getattr(one, name) for one in rests]) for name in fields))
     p_value = _score_p_value(rest.error, rest.slope)
     if p_value > LEVEL:
         return None
     found = _likeliest(rest.error, rest.slope)
-    if found is None or not (_of_the_many(rest, found) and _independent(rest)):
+    if found is None or not (_of_the_many(rest, found) and _independent(rest, found)):
         return None
     whole = np.concatenate([error[good] - error[good].mean() for error, good in zip(errors, okay, strict=True)])
     if found.jitter_s**2 * np.mean(rest.slope**2) < MOST_OF_IT * (np.mean(whole**2) - found.noise**2):
@@ -107,8 +111,21 @@ def _outputs(records: Sequence[Record], okay: Sequence[BoolArray]) -> Mapping[st
     return cells
 
 
-def _rest(error: FloatArray, slope: FloatArray, okay: BoolArray) -> _Rest | None:
-    """Take off what past errors and the slopes around explain; rows whose surroundings are not okay are left out."""
+def _rests(
+    errors: Sequence[FloatArray], slopes: Sequence[FloatArray], okay: Sequence[BoolArray], block: int | None = None
+) -> _Rest | None:
+    """Return the rests of all recordings in a row; None where no recording is long enough."""
+    found = [_rest(*data, block) for data in zip(errors, slopes, okay, strict=True)]
+    rests = [rest for rest in found if rest is not None]
+    fields = ("error", "slope", "next_error", "next_slope")
+    return _Rest(*(np.concatenate([getattr(one, name) for one in rests]) for name in fields)) if rests else None
+
+
+def _rest(error: FloatArray, slope: FloatArray, okay: BoolArray, block: int | None) -> _Rest | None:
+    """Take off what past errors and the slopes around explain, all along or in blocks of so many rows.
+
+    Rows whose surroundings are not okay are left out.
+    """
     filled = np.where(okay, error, 0.0)
     width = 2 * AROUND + 1
     first, last = PAST, error.size - AROUND
@@ -116,13 +133,17 @@ def _rest(error: FloatArray, slope: FloatArray, okay: BoolArray) -> _Rest | None
         return None
     past = sliding_window_view(filled, PAST)[: last - first]
     around = sliding_window_view(slope, width)[first - AROUND : last - AROUND]
-    usable = sliding_window_view(okay, PAST + 1)[: last - first].all(axis=1)
+    usable: BoolArray = np.all(sliding_window_view(okay, PAST + 1)[: last - first], axis=1)
     if usable.sum() < 5 * (PAST + width):
         return None
-    regressors = np.column_stack([past, around, np.ones(last - first)])[usable]
-    now = filled[first:last][usable]
+    regressors = np.column_stack([past, around, np.ones(last - first)])
     left = np.full(last - first, np.nan)
-    left[usable] = now - regressors @ np.linalg.lstsq(regressors, now, rcond=None)[0]
+    blocks = 1 if block is None else max(1, (last - first) // block)
+    for stretch in np.array_split(np.arange(last - first), blocks):
+        rows = stretch[usable[stretch]]
+        if rows.size >= 5 * (PAST + width):
+            a, now = regressors[rows], filled[first:last][rows]
+            left[rows] = now - a @ np.linalg.lstsq(a, now, rcond=None)[0]
     pairs = np.isfinite(left[:-1]) & np.isfinite(left[1:])
     inner = slope[first:last]
     return _Rest(left[:-1][pairs], inner[:-1][pairs], left[1:][pairs], inner[1:][pairs])
@@ -191,8 +212,7 @@ def _of_the_many(rest: _Rest, found: _Jitter) -> bool:
     return bool(typical - found.noise**2 > OF_THE_MANY * (expected - found.noise**2))
 
 
-def _independent(rest: _Rest) -> bool:
-    """Tell whether errors in a row, weighed by slope, are independent: those of a clunk or a lag are not."""
-    now, after = rest.error * rest.slope, rest.next_error * rest.next_slope
-    scale = float(np.sqrt((now**2).sum() * (after**2).sum()))
-    return scale > 0.0 and abs(float(now @ after)) < NEIGHBOURS * scale
+def _independent(rest: _Rest, found: _Jitter) -> bool:
+    """Tell whether rows in a row are off their time independently of each other: those of a clunk or a lag are not."""
+    in_common = float((rest.error * rest.slope) @ (rest.next_error * rest.next_slope))
+    return abs(in_common) < NEIGHBOURS * found.jitter_s**2 * float(rest.slope**2 @ rest.next_slope**2)

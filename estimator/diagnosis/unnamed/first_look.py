@@ -17,7 +17,7 @@ from estimator.diagnosis.unnamed.hunt import NO_LAW, RIDGE, Found, Hunt, cost, r
 from estimator.diagnosis.unnamed.laws import Law
 from estimator.diagnosis.unnamed.pursuit import pursue
 from estimator.diagnosis.unnamed.scene import Scene
-from estimator.diagnosis.unnamed.strays import strays
+from estimator.diagnosis.unnamed.strays import apart_from_neighbours, strays
 from estimator.physics.effect import Element
 
 KEPT = 40
@@ -76,18 +76,23 @@ def _from(view: Scene, element: Element, ground: Ground) -> Hunt:
 
 
 def _without_strays(hunt: Hunt) -> Hunt:
-    """Take single readings that are off for the law, where that is worth a coefficient each."""
+    """Take single readings that are off for the law, where that is worth a coefficient each.
+
+    They have pulled the fit away from the others: a slow error that is no reason to doubt them. What of the rest stands
+    apart from its neighbours tells how many samples are independent.
+    """
     errors = hunt.ground.split(hunt.ground.error)
     off = strays(errors)
     count = sum(int(each.sum()) for each in off)
     rest = [np.where(each, 0.0, error) for each, error in zip(off, errors, strict=True)]
     rows = hunt.ground.error.size
     before, after = hunt.path.squares[0], sum(float(each @ each) for each in rest)
-    n = effective_samples(rest)
+    aside = [apart_from_neighbours(each) for each in rest]
+    n = effective_samples(aside)
     law = Found((), count, count * math.log(rows))
     known = hunt.law.information(before, hunt.mean_square * rows, n)
     if count == 0 or law.information(before, after, n) <= max(0.0, known):
         return hunt
     size = rms([error[each] for each, error in zip(off, errors, strict=True)])
     law = replace(law, terms=(("the single readings that are off", size),))
-    return replace(hunt, law=law, mean_square=after / rows, errors=rest, stuck=True)
+    return replace(hunt, law=law, mean_square=after / rows, errors=aside, stuck=True)

@@ -22,14 +22,14 @@ WITHIN = 0.9
 
 def strays(errors: Sequence[FloatArray]) -> list[BoolArray]:
     """Tell which values of an error stand out of their neighbours, per recording; shapes (B_i,)."""
-    apart = [_apart(error) for error in errors]
+    apart = [apart_from_neighbours(error) for error in errors]
     every = np.concatenate(apart)
     sigma = float(np.quantile(np.abs(every), WITHIN)) / float(stats.norm.isf(0.5 * (1.0 - WITHIN)))
     limit = float(stats.norm.isf(0.5 * FALSE_ALARM / every.size)) * sigma
     return [np.abs(each) > limit for each in apart]
 
 
-def _apart(error: FloatArray) -> FloatArray:
+def apart_from_neighbours(error: FloatArray) -> FloatArray:
     """Return how far each value is from its neighbours' median; 0 at the ends, with neighbours on one side only."""
     apart: FloatArray = error - median_filter(error, NEIGHBOURS, mode="nearest")
     ends = NEIGHBOURS // 2

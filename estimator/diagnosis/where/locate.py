@@ -84,20 +84,31 @@ def _merged(spans: Sequence[Interval]) -> list[Interval]:
     return joined
 
 
-def band_hz(result: FitResult, floor: float) -> Interval | None:
-    """Return the band that holds the central part of the error's power above the floor [Hz]."""
-    totals = []
-    for i, record in enumerate(result.problem.records):
-        errors = _errors(result, i)
-        frequency, density = signal.welch(errors, 1.0 / record.sample_time_s, nperseg=min(LONGEST_SEGMENT, errors.size))
-        white = 2.0 * floor**2 * record.sample_time_s
-        totals.append((frequency, np.maximum(density - white, 0.0)))
-    frequency = totals[0][0]
-    excess_density = sum(np.interp(frequency, f, d) for f, d in totals)
-    if not np.any(excess_density > 0):
-        return None
-    low, high = _central(frequency, np.asarray(excess_density))
-    return (low, high)
+def band_hz(mismatch: Sequence[FloatArray], sample_times_s: Sequence[float], noise: float) -> Interval | None:
+    """Return the band that holds the central part of a mismatch's power [Hz]; None where noise could be all.
+
+    Parameters
+    ----------
+    mismatch : sequence of ndarray, shape (N_i,)
+        Per recording, 0 where a sample is missing.
+    sample_times_s : sequence of float
+        Their sampling periods.
+    noise : float
+        RMS of the white noise in them; only frequencies that stand above it count. 0 where simulations are compared.
+    """
+    frequency: FloatArray = np.fft.rfftfreq(min(LONGEST_SEGMENT, mismatch[0].size), sample_times_s[0]).astype(float)
+    density: FloatArray = np.zeros(frequency.size)
+    white, averages = 0.0, 0.0
+    for errors, sample_time_s in zip(mismatch, sample_times_s, strict=True):
+        length = min(LONGEST_SEGMENT, errors.size)
+        segments = max(2.0 * errors.size / length - 1.0, 1.0)
+        density += segments * np.interp(frequency, *signal.welch(errors, 1.0 / sample_time_s, nperseg=length))
+        white += segments * 2.0 * noise**2 * sample_time_s
+        averages += segments
+    degrees = 2.0 * averages / (1.0 + 2.0 / 36.0)  # neighbours share half their samples (Welch)
+    stands = density > white * stats.chi2.isf(FALSE_ALARM / frequency.size, degrees) / degrees
+    weight = np.where(stands, density - white, 0.0)
+    return _central(frequency, weight) if weight.any() else None
 
 
 def region(result: FitResult, element: Element, floor: float = 0.0) -> Region:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.weight import PART_FOR_DETAIL, PART_OF_MISMATCH, VISIBLE, Weight, earns_detail
+from estimator.diagnosis.weight import PART_BESIDE, PART_FOR_DETAIL, PART_OF_MISMATCH, VISIBLE, Weight, earns_detail
 from tests.estimator.diagnosis.regression import of_rms
 
 COULOMB = "coulomb_friction_motor"
@@ -74,3 +74,19 @@ def test_a_small_rest_behind_a_profile_is_not_the_profile_written_another_way() 
     after, before = of_rms(0.101, 4), of_rms(0.12, 3)
     assert WEIGHT.counts("tyre_slip", frozenset({"road_grade", "tyre_slip"}), after, before, RETUNED)
     assert not WEIGHT.counts("road_grade", frozenset({"road_grade", "tyre_slip"}), after, before, RETUNED)
+
+
+def test_a_small_wave_beside_a_law_of_its_element_is_no_echo_of_it() -> None:
+    """No law of the twist leaves what is in step with the motor's angle; another law of the twist does."""
+    after, before = of_rms(0.101, 4), of_rms(0.12, 3)
+    for name, counts in (("cardan_second_order", True), ("stiffness_nonlinearity", False)):
+        assert WEIGHT.counts(name, frozenset({"backlash", name}), after, before, RETUNED) is counts
+
+
+def test_what_is_next_to_nothing_of_the_mismatch_is_not_told_from_the_law_that_explains_it() -> None:
+    """All that stands above the noise, and visible; but of the first mismatch more or less than one in a thousand."""
+    after, before = of_rms(0.101, 4), of_rms(0.12, 3)
+    removed = 0.12**2 - 0.101**2
+    for share, counts in ((1.1 * PART_BESIDE, True), (0.9 * PART_BESIDE, False)):
+        retuned = of_rms(float(np.sqrt(removed / share + WEIGHT.floor**2)), 2)
+        assert WEIGHT.counts(COULOMB, frozenset({"backlash", COULOMB}), after, before, retuned) is counts

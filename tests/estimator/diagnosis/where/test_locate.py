@@ -75,16 +75,22 @@ class TestTime:
         assert found == {"run": ((0.0, time_s[-1]),)}
 
 
+def band_of(*records: Record, noise: float = SIGMA) -> tuple[float, float] | None:
+    result = fitted(*records)
+    errors = [np.where(r.okay, output - r.output, 0.0) for r, output in zip(records, result.outputs, strict=True)]
+    return band_hz(errors, [r.sample_time_s for r in records], noise)
+
+
 class TestBand:
     @pytest.mark.parametrize("hz", [3.0, 8.0, 20.0])
     def test_the_band_holds_the_frequency_and_little_else(self, hz: float) -> None:
-        band = band_hz(fitted(drive(burst(0.0, 20.0, hz))), SIGMA)
+        band = band_of(drive(burst(0.0, 20.0, hz)))
         assert band is not None
         assert band[0] <= hz <= band[1]
         assert band[1] - band[0] < 1.0
 
     def test_two_tones_span_a_band(self) -> None:
-        band = band_hz(fitted(drive(burst(0.0, 20.0, 5.0) + burst(0.0, 20.0, 15.0))), SIGMA)
+        band = band_of(drive(burst(0.0, 20.0, 5.0) + burst(0.0, 20.0, 15.0)))
         assert band == pytest.approx((5.0, 15.0), abs=0.4)
 
     def test_recordings_of_different_length_are_added_at_their_frequencies(self) -> None:
@@ -98,11 +104,21 @@ class TestBand:
             okay=long.okay[:300],
         )
         for records in ((long, short), (short, long)):
-            band = band_hz(fitted(*records), SIGMA)
+            band = band_of(*records)
             assert band == pytest.approx((8.0, 8.0), abs=0.7)
 
     def test_without_power_above_the_floor_there_is_none(self) -> None:
-        assert band_hz(fitted(drive(np.zeros(2000))), 10 * SIGMA) is None
+        assert band_of(drive(np.zeros(2000)), noise=10 * SIGMA) is None
+
+    @pytest.mark.parametrize("seed", range(5))
+    def test_noise_does_not_widen_the_band(self, seed: int) -> None:
+        """A slow mismatch of the noise's own size: nothing but it stands out at any of 257 frequencies."""
+        band = band_of(drive(SIGMA * np.sqrt(2.0) * np.sin(2 * np.pi * 0.5 * TIME_S), seed=seed))
+        assert band == pytest.approx((0.5, 0.5), abs=0.4)
+
+    def test_a_difference_of_simulations_has_no_noise(self) -> None:
+        tone = 1e-6 * np.sin(2 * np.pi * 8.0 * TIME_S)
+        assert band_hz([tone], [0.01], 0.0) == pytest.approx((8.0, 8.0), abs=0.4)
 
 
 class TestRegion:
