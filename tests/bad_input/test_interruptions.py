@@ -6,6 +6,7 @@ import importlib
 import os
 import signal
 import subprocess
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NoReturn
@@ -27,8 +28,8 @@ def opened_by(process: subprocess.Popen[str], pipe: Path) -> int:
     while process.poll() is None:
         try:
             return os.open(pipe, os.O_WRONLY | os.O_NONBLOCK)
-        except OSError:  # nobody reads yet
-            continue
+        except OSError:  # nobody reads yet, and shall have the processor to come to it
+            time.sleep(0.01)
     raise AssertionError(process.communicate())
 
 
@@ -86,6 +87,7 @@ def test_a_host_that_is_killed_leaves_no_drive_enabled_and_the_rig_up(
     process.wait()
     while any(power_state(simulation.bus, node_id) is PowerState.OPERATION_ENABLED for node_id in (1, 2)):
         assert simulation.process.poll() is None
+        time.sleep(0.01)
     simulation.process.send_signal(signal.SIGTERM)
     assert simulation.process.communicate(timeout=20) == ("", "")
     assert simulation.process.returncode == 0

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -56,18 +57,11 @@ class Opened:
         self.page.wait_for_function(DRAWN, timeout=60_000)
 
 
-@pytest.fixture
-def opened(browser: Any) -> Iterator[Callable[..., Opened]]:
-    """Open a file at a width, without any network."""
-    contexts = []
-
-    def open_page(path: Path, width: int = 1600, height: int = 1000) -> Opened:
-        context = browser.new_context(viewport={"width": width, "height": height}, offline=True)
-        contexts.append(context)
+@contextmanager
+def opened(browser: Any, path: Path, width: int, height: int = 1000) -> Iterator[Opened]:
+    """Open a file at a width, without any network, and wait until its figures are drawn."""
+    with browser.new_context(viewport={"width": width, "height": height}, offline=True) as context:
         opened = Opened(context.new_page())
         opened.page.goto(path.resolve().as_uri())
-        return opened
-
-    yield open_page
-    for context in contexts:
-        context.close()
+        opened.wait_until_drawn()
+        yield opened

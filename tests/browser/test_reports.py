@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -20,13 +20,12 @@ from hil.figures.road.conditions import draw_conditions
 from hil.report.diagnosis_html import diagnosis_page
 from hil.report.identification.page import identification_page
 from hil.report.identification.paper_page import paper_page
+from tests.browser.conftest import Opened, opened
 from tests.estimator.identification.driveline import B_L, B_M, J_L, J_M, C, K, cruise
 from tests.report.conftest import diagnosis as hand_made_diagnosis
 
 PHONE, DESK = 360, 1600
 A4_HEIGHT_PX = 96 * 297 / 25.4
-
-Open = Callable[..., Any]
 
 
 def identification() -> str:
@@ -58,13 +57,30 @@ def report(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFact
     return path
 
 
-@pytest.mark.parametrize("width", [PHONE, DESK])
-def test_it_opens_offline_without_a_complaint_and_fits_its_width(opened: Open, report: Path, width: int) -> None:
-    opened = opened(report, width)
-    opened.wait_until_drawn()
-    assert opened.complaints == []
-    assert opened.page.evaluate("document.documentElement.scrollWidth") <= width
-    too_wide = opened.page.evaluate(
+@pytest.fixture(scope="module")
+def on_a_phone(browser: Any, report: Path) -> Iterator[Opened]:
+    """Open a report once for all tests: to draw its figures takes longer than what a test does with them."""
+    with opened(browser, report, PHONE) as shown:
+        yield shown
+
+
+@pytest.fixture(scope="module")
+def on_a_desk(browser: Any, report: Path) -> Iterator[Opened]:
+    """Open it as wide as a desk's screen; each test leaves it as it was."""
+    with opened(browser, report, DESK) as shown:
+        yield shown
+
+
+@pytest.mark.usefixtures("report")  # of which there are several; the screens are asked for by name
+@pytest.mark.parametrize(("screen", "width"), [("on_a_phone", PHONE), ("on_a_desk", DESK)])
+def test_it_opens_offline_without_a_complaint_and_fits_its_width(
+    request: pytest.FixtureRequest, screen: str, width: int
+) -> None:
+    shown = request.getfixturevalue(screen)
+    assert shown.complaints == []
+    assert shown.page.evaluate("innerWidth") == width
+    assert shown.page.evaluate("document.documentElement.scrollWidth") <= width
+    too_wide = shown.page.evaluate(
         """() => [...document.querySelectorAll('.plotly-graph-div svg.main-svg, p, h1, h2, .tiles')]
                  .filter((each) => each.getBoundingClientRect().right > innerWidth + 1)
                  .map((each) => each.outerHTML.slice(0, 80))"""
@@ -72,10 +88,8 @@ def test_it_opens_offline_without_a_complaint_and_fits_its_width(opened: Open, r
     assert too_wide == []
 
 
-def test_it_can_be_read_with_a_keyboard_alone(opened: Open, report: Path) -> None:
-    opened = opened(report, PHONE)
-    opened.wait_until_drawn()
-    page = opened.page
+def test_it_can_be_read_with_a_keyboard_alone(on_a_phone: Opened) -> None:
+    page = on_a_phone.page
     page.keyboard.press("Tab")
     assert page.evaluate("document.activeElement.className") == "skip"
     assert page.evaluate("document.activeElement.getBoundingClientRect().left") >= 0  # it shows where it has the focus
@@ -94,8 +108,8 @@ def test_it_can_be_read_with_a_keyboard_alone(opened: Open, report: Path) -> Non
     assert {"plotly-graph-div", "modebar-btn", "wide"} <= seen
 
 
-def test_the_sections_are_reached_by_their_links(opened: Open, report: Path) -> None:
-    page = opened(report).page
+def test_the_sections_are_reached_by_their_links(on_a_desk: Opened) -> None:
+    page = on_a_desk.page
     links = page.locator("nav a")
     assert links.count() >= 3
     last = links.nth(links.count() - 1)
@@ -107,10 +121,8 @@ def test_the_sections_are_reached_by_their_links(opened: Open, report: Path) -> 
     assert len(addresses) == len(set(addresses))
 
 
-def test_a_figure_takes_keys(opened: Open, report: Path) -> None:
-    opened = opened(report)
-    opened.wait_until_drawn()
-    page = opened.page
+def test_a_figure_takes_keys(on_a_desk: Opened) -> None:
+    page = on_a_desk.page
     first = page.locator(".plotly-graph-div").first
     first.focus()
     span = "() => { const d = document.activeElement; return d._fullLayout.xaxis.range.map(Number); }"
@@ -125,13 +137,11 @@ def test_a_figure_takes_keys(opened: Open, report: Path) -> None:
     page.wait_for_function(f"{visible} !== {before}")
     page.keyboard.press("1")
     page.wait_for_function(f"{visible} === {before}")
-    assert opened.complaints == []
+    assert on_a_desk.complaints == []
 
 
-def test_on_paper_nothing_is_cut_off_and_the_screen_comes_back(opened: Open, report: Path) -> None:
-    opened = opened(report)
-    opened.wait_until_drawn()
-    page = opened.page
+def test_on_paper_nothing_is_cut_off_and_the_screen_comes_back(on_a_desk: Opened) -> None:
+    page = on_a_desk.page
     widths = "[...document.querySelectorAll('.plotly-graph-div')].map((each) => each._fullLayout.width)"
     before = page.evaluate(widths)
     page.evaluate("dispatchEvent(new Event('beforeprint'))")
@@ -143,12 +153,11 @@ def test_on_paper_nothing_is_cut_off_and_the_screen_comes_back(opened: Open, rep
     pages = max(int(count) for count in re.findall(rb"/Count (\d+)", printed))
     height_px = page.evaluate("document.documentElement.scrollHeight")
     assert 1 <= pages <= 2 + height_px / (0.5 * A4_HEIGHT_PX)  # pages are half full at least
-    assert opened.complaints == []
+    assert on_a_desk.complaints == []
 
 
-def test_text_stands_out_from_its_ground(opened: Open, report: Path) -> None:
-    page = opened(report).page
-    weak = page.evaluate(
+def test_text_stands_out_from_its_ground(on_a_desk: Opened) -> None:
+    weak = on_a_desk.page.evaluate(
         """() => {
           const lum = (c) => c.map((v) => v / 255).map((v) => v <= 0.03928 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4)
                               .reduce((sum, v, i) => sum + v * [0.2126, 0.7152, 0.0722][i], 0);

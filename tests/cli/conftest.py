@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -86,4 +87,5 @@ def await_rows(part: Path, process: subprocess.Popen[str]) -> None:
     while process.poll() is None:
         if part.exists() and part.read_text(encoding="utf-8").count("\n") > 10:
             return
+        time.sleep(0.01)  # the processor is for those who write
     raise AssertionError(process.communicate())

@@ -6,6 +6,7 @@ Run it by ``python -m tests.docs.monitor_pictures``.
 from __future__ import annotations
 
 import uuid
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from estimator.physics.twist import Shaft
 from hil.config.rig_file import Rig, read_rig
 from hil.monitor.app import MonitorApp
 from hil.monitor.health import HealthWatch, plc_health
-from hil.monitor.messages import Began, Ended, Health, Order, Ready, Samples
+from hil.monitor.messages import Began, Ended, Health, Order, Ready, Report, Samples
 from hil.monitor.state import LiveState
 from hil.rig.addresses import with_addresses
 from hil.rig.build import open_devices
@@ -44,7 +45,14 @@ SHOWN_S = 24.0
 
 
 class Played(FakeSource):
-    """Ends when it is told to."""
+    """Says the bus's health again and again, as a rig does that goes on; ends when it is told to."""
+
+    _last: Sequence[Report] = ()
+
+    def poll(self) -> Sequence[Report]:
+        reports = super().poll()
+        self._last = reports[-1:] or self._last
+        return reports or self._last
 
     def send(self, order: Order) -> None:
         self.coming = [Ended()]
