@@ -94,7 +94,7 @@ class BoundedRemoteBus(RemoteBus):  # type: ignore[misc]  # the library has no t
         except BaseException:
             self.socket.close()
             raise
-        self.channel_info = self.remote_protocol.channel_info
+        self.channel_info = url  # as the rig file has it; the server's own name of its bus is of no use to a person
         self.channel = url
         can.BusABC.__init__(self, url)
 

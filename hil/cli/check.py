@@ -4,20 +4,16 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.markup import escape
-from rich.table import Table
 
-from drivers.datasheet.check import EdsReport, check_eds
-from drivers.errors import ConfigMismatch
-from hil.config.rig_file import Rig, read_rig
 from hil.errors import InputError, UsageError
-from hil.report.eds_findings import eds_lines, eds_section, verdict
-from hil.rig.addresses import with_addresses
-from hil.rig.check import Finding, Verdict, check_rig
+
+if TYPE_CHECKING:
+    from drivers.datasheet.check import EdsReport
+    from hil.config.rig_file import Rig
+    from hil.rig.check import Finding
 
 app = typer.Typer(add_completion=False)
 
@@ -48,6 +44,11 @@ def check(
     With --eds, check such a file line by line against CiA 306 and against what this program needs of a drive:
     exit status 2 if it can't be used. Without RIG no device is looked for.
     """
+    from drivers.datasheet.check import check_eds
+    from hil.config.rig_file import read_rig
+    from hil.rig.addresses import with_addresses
+    from hil.rig.check import check_rig
+
     if rig is None and not eds:
         raise UsageError("expected a rig file, an EDS with --eds, or both, came neither. See: hil check --help")
     if rig is None and (bus or modbus or prove_stop):
@@ -65,6 +66,10 @@ def check(
 
 
 def _refuse(reports: tuple[EdsReport, ...], rig: Rig | None, findings: tuple[Finding, ...]) -> None:
+    from drivers.errors import ConfigMismatch
+    from hil.report.eds_findings import verdict
+    from hil.rig.check import Verdict
+
     if unusable := [each for each in reports if not each.usable]:
         raise InputError(
             f"{'; '.join(f'EDS {each.path} is {verdict(each)}' for each in unusable)}: see above. "
@@ -79,12 +84,18 @@ def _refuse(reports: tuple[EdsReport, ...], rig: Rig | None, findings: tuple[Fin
 
 
 def _print_eds(reports: tuple[EdsReport, ...]) -> None:
+    from hil.report.eds_findings import eds_lines
+
     for report in reports:
         for line in eds_lines(report):
             typer.echo(line)
 
 
 def _print(name: str, findings: tuple[Finding, ...]) -> None:
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table
+
     table = Table(title=name, title_justify="left")
     for column in ("device", "address", "result", "what", "expected", "found"):
         table.add_column(column, overflow="fold")
@@ -100,6 +111,8 @@ def _print(name: str, findings: tuple[Finding, ...]) -> None:
 
 
 def _document(rig: Rig | None, findings: tuple[Finding, ...], reports: tuple[EdsReport, ...]) -> dict[str, Any]:
+    from hil.report.eds_findings import eds_section
+
     files = [eds_section(report) for report in reports]
     if rig is None or not findings:
         return {"schema": "hil.eds_check/1", "files": files}

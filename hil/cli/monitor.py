@@ -101,7 +101,7 @@ def _close(opening: Opening, view: MonitorApp) -> None:
 
     Where the terminal has gone, which is told as an interruption, nobody can be told.
     """
-    from hil.monitor.state import outcome
+    from hil.monitor.outcome import outcome
 
     for report in opening.source.poll():  # what the rig said while it was being closed
         opening.state.take(report)

@@ -31,11 +31,11 @@ class RunProgress:
     def __init__(self, plan: Plan) -> None:
         console = Console(stderr=True)
         self._bar = Progress(
-            TextColumn("{task.description}"),
+            TextColumn("{task.description}", markup=False),
             BarColumn(),
             TextColumn("{task.completed:.1f} of {task.total:.1f} s"),
             TimeElapsedColumn(),
-            TextColumn("{task.fields[estimate]}"),
+            TextColumn("{task.fields[estimate]}", markup=False),
             console=console,
             disable=not console.is_terminal,
         )

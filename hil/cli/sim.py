@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.markup import escape
 
-from hil.config.rig_file import Rig, read_rig
 from hil.rig.stop import StopRequest, stop_on_signals
-from hil.simulator.fault_spec import known_faults, rig_faults
-from hil.simulator.loopback import Address, modbus_address
-from hil.simulator.plant_factory import plant_for
-from hil.simulator.rig_server import RigServer
-from hil.simulator.simulation_model import EffectSpec
+from hil.simulator.fault_spec import known_faults
+
+if TYPE_CHECKING:
+    from hil.config.rig_file import Rig
+    from hil.simulator.loopback import Address
+    from hil.simulator.rig_server import RigServer
 
 LOOK_EVERY_S = 0.1
 """How soon a signal is answered [s]."""
@@ -65,6 +65,12 @@ def sim(
 
     Prints one line, `ready bus=... modbus=...`, and runs until SIGINT or SIGTERM. Port 0 takes a free one.
     """
+    from hil.config.rig_file import read_rig
+    from hil.simulator.fault_spec import rig_faults
+    from hil.simulator.plant_factory import plant_for
+    from hil.simulator.rig_server import RigServer
+    from hil.simulator.simulation_model import EffectSpec
+
     rig_file = read_rig(rig)
     effects = [EffectSpec.parse(text) for text in effect or ()]
     server = RigServer(
@@ -80,6 +86,8 @@ def sim(
 
 
 def _modbus(rig: Rig, given: str | None) -> Address:
+    from hil.simulator.loopback import Address, modbus_address
+
     return modbus_address(str(Address(rig.plc.host, rig.plc.port)) if given is None else given)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Annotated
 
@@ -15,6 +16,7 @@ def simulate(
     model: Annotated[Path, typer.Option(metavar="MODEL", help="Model file, nominal or augmented.")],
     recording: Annotated[Path, typer.Option("--input", metavar="REC", help="Recording with the torques.")],
     out: Annotated[Path, typer.Option(metavar="CSV", help="Simulated output, one row per sample of REC.")],
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Simulate the output from the measured torques, nothing fed back.
 
@@ -26,7 +28,7 @@ def simulate(
     from hil.config.model_file import read_model_for_recordings
     from hil.errors import UsageError
     from hil.recording import Table, csv_format, read_record
-    from hil.report.numbers import shown
+    from hil.report.numbers import json_number, shown
     from hil.report.outputs import publish, require_folder
     from hil.report.wording import output_unit, simulated_column
 
@@ -41,6 +43,17 @@ def simulate(
     column = simulated_column(record.kind, file.model.motion)
     table = Table(out, {"time_s": record.time_s, column: run.output})
     publish(out.parent, {out.name: lambda path: csv_format.write(table, path)})
-    error = shown(run.rms, output_unit(record.kind, file.model.motion))
-    load = shown(run.start.load_torque_nm, unit("torque", file.model.motion))
+    error_unit, load_unit = output_unit(record.kind, file.model.motion), unit("torque", file.model.motion)
+    if as_json:
+        document = {
+            "schema": "hil.simulate/1",
+            "recording": record.name,
+            "out": str(out),
+            "samples": record.time_s.size,
+            "rms": {"value": json_number(run.rms), "unit": error_unit},
+            "constant_load": {"value": json_number(run.start.load_torque_nm), "unit": load_unit},
+        }
+        typer.echo(json.dumps(document))
+        return
+    error, load = shown(run.rms, error_unit), shown(run.start.load_torque_nm, load_unit)
     typer.echo(f"{record.name}: {record.time_s.size} samples, RMS error {error}, constant load {load}; in {out}")

@@ -21,7 +21,9 @@ from textual.widgets import Static
 
 from hil.monitor import head_panels
 from hil.monitor.dialogs import Choice, HelpDialog, MarkDialog, StartDialog
+from hil.monitor.keys import HELP, key_line
 from hil.monitor.layout import CSS, LEAST_COLUMNS, LEAST_ROWS, PAGES, WIDE_COLUMNS, WIDE_ROWS, pages
+from hil.monitor.log_panel import LogPanel
 from hil.monitor.messages import Kind, Mark, Notice, Quit, Reset, Start, Stop
 from hil.monitor.panel import Panel
 from hil.monitor.snapshot import Activity
@@ -40,24 +42,6 @@ INTERRUPTED = 130
 
 GRACE_S = LONGEST_END_S + 5.0
 """Time from a stop signal to an end without ceremony [s]."""
-
-KEYS = "e start  SPACE stop  m mark  r reset  1-5/TAB page  +/- time  ? help  q quit"
-
-REPLAY_KEYS = "1-5/TAB page  +/- time  ? help  q quit   (a recording: nothing to drive)"
-
-HELP = """\
-e         choose an experiment of the rig file and start it; asks first
-SPACE, x  stop at once: zero torque, drives disarmed
-m         mark this moment; the mark goes into the recording
-r         reset the drives' faults, configure them again; at rest only
-1 to 5    overview, model, resonance, bus, log; TAB the next
-+ -       signals over a shorter or a longer time
-q         quit; a run ends at zero torque first; Ctrl-C does the same
-
-STALE: older than it should be. LATE: the cycle began late.
-Twist: estimated from torque and speed with a two-mass model, ± two
-standard deviations as the filter reckons them; a backlash's free play
-is not in it."""
 
 
 class MonitorApp(App[None]):
@@ -91,6 +75,10 @@ class MonitorApp(App[None]):
         Binding("question_mark", "help", "Help"),
         Binding("plus,equals_sign", "zoom(-1)", "Shorter window"),
         Binding("minus", "zoom(1)", "Longer window"),
+        Binding("down", "scroll(1)", "Down the log"),
+        Binding("up", "scroll(-1)", "Up the log"),
+        Binding("pagedown", "scroll(1, True)", "Page down the log"),
+        Binding("pageup", "scroll(-1, True)", "Page up the log"),
         Binding("tab", "turn(1)", "Next page", priority=True),
         Binding("shift+tab", "turn(-1)", "Page before", priority=True),
         *(Binding(str(number + 1), f"page('{name}')", name) for number, name in enumerate(PAGES)),
@@ -113,6 +101,7 @@ class MonitorApp(App[None]):
         self._picture = picture
         self._page = page
         self._leaving = False
+        self._heard_s = time.monotonic()
         self._handlers: dict[int, Any] = {}
         self.interrupted = False
 
@@ -122,7 +111,7 @@ class MonitorApp(App[None]):
         yield from pages()
         yield Static("", id="too-small")
         yield Panel(head_panels.message, "message")
-        yield Static(KEYS if self._source.can_drive else REPLAY_KEYS, classes="keys")
+        yield Static("", id="keys", classes="keys", markup=False)
 
     def on_mount(self) -> None:
         """Begin to draw."""
@@ -162,12 +151,13 @@ class MonitorApp(App[None]):
     def _tick(self) -> None:
         for report in self._source.poll():
             self._state.take(report)
+            self._heard_s = time.monotonic()
         self._draw()
         if self._state.ended is not None and (self._leaving or self._state.ended.error is not None):
             self.exit()
 
     def _draw(self) -> None:
-        snapshot = self._state.snapshot()
+        snapshot = self._state.snapshot(time.monotonic() - self._heard_s)
         for panel in self.screen_stack[0].query(Panel):
             panel.show(snapshot)
 
@@ -184,7 +174,14 @@ class MonitorApp(App[None]):
         self._page = name
         for container in self.screen_stack[0].query(".page").results(Container):
             container.set_class(container.id == name, "shown")
+        self.screen_stack[0].query_one("#keys", Static).update(key_line(self._page, self._source.can_drive))
         self.call_after_refresh(self._draw)
+
+    def action_scroll(self, by: int, pages: bool = False) -> None:
+        """Go down the log, or up, by a line or a page."""
+        if self._page == "log" and len(self.screen_stack) == 1:
+            log = self.screen_stack[0].query_one(LogPanel)
+            log.scroll_lines(by * (log.page_lines if pages else 1))
 
     def action_turn(self, by: int) -> None:
         """Show the next page, or the one before; in a dialog the key is the dialog's."""
@@ -253,7 +250,9 @@ class MonitorApp(App[None]):
     def _refuse(self, allowed: bool, why_not: str) -> bool:
         """Tell why a key does nothing now; True where it does nothing."""
         allowed = allowed and self._source.can_drive
-        if not allowed:
+        if allowed:
+            self._state.say("")  # what was refused before is no news any more
+        else:
             self._state.say(why_not if self._source.can_drive else "a recording is played: there is no rig to drive")
         return not allowed
 

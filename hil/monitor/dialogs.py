@@ -13,6 +13,8 @@ from textual.screen import ModalScreen
 from textual.widgets import Input, OptionList, Static
 from textual.widgets.option_list import Option
 
+from hil.monitor.panel import printable
+
 
 @dataclass(frozen=True, slots=True)
 class Choice:
@@ -32,7 +34,8 @@ class StartDialog(ModalScreen[str | None]):
 
     def __init__(self, choices: Sequence[Choice], out: str) -> None:
         super().__init__()
-        self._choices = {choice.name: choice for choice in choices}
+        self._names = [choice.name for choice in choices]
+        self._summaries = ["\n".join(map(printable, choice.summary.splitlines())) for choice in choices]
         self._out = out
         self._chosen: str | None = None
 
@@ -40,25 +43,26 @@ class StartDialog(ModalScreen[str | None]):
         """Offer the experiments."""
         with Vertical(classes="dialog"):
             yield Static("Start an experiment: arrows and Enter choose, Esc goes back", classes="lead")
-            yield OptionList(*(Option(f"  {name}", id=name) for name in self._choices))
-            yield Static("", id="summary")
-            yield Static("", id="question")
+            yield OptionList(
+                *(Option(_offer(" ", name), id=str(number)) for number, name in enumerate(self._names)), markup=False
+            )
+            yield Static("", id="summary", markup=False)
+            yield Static("", id="question", markup=False)
 
     def on_option_list_option_highlighted(self, event: OptionList.OptionHighlighted) -> None:
         """Tell what the experiment under the bar would command."""
-        name = str(event.option.id)
         self._chosen = None
-        for option in event.option_list.options:
-            pointer = ">" if option.id == name else " "
-            event.option_list.replace_option_prompt(str(option.id), f"{pointer} {option.id}")
-        self.query_one("#summary", Static).update(self._choices[name].summary)
+        for number, name in enumerate(self._names):
+            pointer = ">" if number == event.option_index else " "
+            event.option_list.replace_option_prompt_at_index(number, _offer(pointer, name))
+        self.query_one("#summary", Static).update(self._summaries[event.option_index])
         self.query_one("#question", Static).update("")
 
     def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
         """Ask once more."""
-        self._chosen = str(event.option.id)
+        self._chosen = self._names[event.option_index]
         question = f"Arm both drives and run {self._chosen}, recorded in {self._out}? Press y for yes, Esc for no."
-        self.query_one("#question", Static).update(question)
+        self.query_one("#question", Static).update(printable(question))
 
     def action_confirm(self) -> None:
         """Start what was chosen; without a choice the key does nothing."""
@@ -68,6 +72,10 @@ class StartDialog(ModalScreen[str | None]):
     def action_back(self) -> None:
         """Start nothing."""
         self.dismiss(None)
+
+
+def _offer(pointer: str, name: str) -> str:
+    return f"{pointer} {printable(name)}"
 
 
 class MarkDialog(ModalScreen[str | None]):
@@ -106,7 +114,7 @@ class HelpDialog(ModalScreen[None]):
     def compose(self) -> ComposeResult:
         """Show them."""
         with Vertical(classes="dialog"):
-            yield Static(self._text)
+            yield Static(self._text, markup=False)
 
     def action_back(self) -> None:
         """Go back."""

@@ -1,19 +1,22 @@
-"""The lines above and below: what is going on, the last message; and the log."""
+"""The lines above and below: what is going on, the last message."""
 
 from __future__ import annotations
 
 import math
 
-from hil.monitor.plot import title
-from hil.monitor.snapshot import Activity, Headline, Snapshot
+from hil.monitor.snapshot import SILENT_AFTER_S, Activity, Headline, Snapshot
 
-NS_PER_S = 1_000_000_000
+MORE = "… (5: log)"
+
+QUIET = (Activity.CONNECTING, Activity.STARTING, Activity.LOST, Activity.PLAYED, Activity.ENDED)
+"""When it is no news that nothing comes."""
 
 
 def headline(snapshot: Snapshot, width: int, height: int) -> list[str]:
     """One line: activity, run, phase and time on the left, the rig's name on the right."""
     head = snapshot.headline
-    left = doing(head)
+    silent = head.silent_s > SILENT_AFTER_S and head.activity not in QUIET
+    left = doing(head) + (f", NO NEWS for {head.silent_s:.0f} s" if silent else "")
     room = width - len(left) - 2
     name = head.rig if len(head.rig) <= room else head.rig[: max(0, room - 1)] + "…"
     return [f"{left}{name:>{max(0, width - len(left))}}"[:width]]
@@ -30,20 +33,6 @@ def doing(head: Headline) -> str:
 
 
 def message(snapshot: Snapshot, width: int, height: int) -> list[str]:
-    """Give the last thing the operator has to know."""
-    return [snapshot.headline.message[:width]]
-
-
-def log(snapshot: Snapshot, width: int, height: int) -> list[str]:
-    """List what happened, the latest first, with the seconds since."""
-    lines = [title("log, latest first", f"{snapshot.runs} runs", width)]
-    for notice in reversed(snapshot.log):
-        ago_s = (snapshot.now_ns - notice.t_ns) / NS_PER_S
-        text = " ".join(notice.text.split())
-        first = f"{ago_s:7.0f} s ago {notice.kind.value:5} "
-        room = max(1, width - len(first))
-        pieces = [text[at : at + room] for at in range(0, len(text), room)] or [""]
-        lines += [first + pieces[0], *(" " * len(first) + piece for piece in pieces[1:3])]
-        if len(lines) >= height:
-            break
-    return [line[:width] for line in lines][:height]
+    """Give the last thing the operator has to know; what has no room is on the log page."""
+    text = " ".join(snapshot.headline.message.split())
+    return [text if len(text) <= width else (text[: max(0, width - len(MORE))] + MORE)[:width]]

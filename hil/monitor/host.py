@@ -28,6 +28,7 @@ from hil.monitor.health import HealthWatch, plc_health
 from hil.monitor.messages import Ended, Kind, Lost, Mark, Notice, Order, Quit, Ready, Reset, Start, Stop
 from hil.monitor.outbox import Outbox
 from hil.monitor.recorded_run import RecordedRun
+from hil.monitor.warm_up import run_once
 from hil.rig.addresses import with_addresses
 from hil.rig.build import Devices, open_devices
 from hil.rig.idle import Listening
@@ -128,6 +129,7 @@ class _Host:
 
     def serve(self) -> None:
         threading.Thread(target=self._take_orders, name="from the view", daemon=True).start()
+        run_once(self._job.rig.period_s)  # compiled before there is a cycle that it could keep waiting
         with real_time() as grants, _rig(self._job) as rig:
             self._grants = grants
             while not self._stop.requested:

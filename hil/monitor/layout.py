@@ -6,7 +6,8 @@ from textual.app import ComposeResult
 from textual.containers import Container, Horizontal, Vertical
 from textual.widget import Widget
 
-from hil.monitor import bus_panels, head_panels, model_panels, signal_panels
+from hil.monitor import bus_panels, model_panels, signal_panels
+from hil.monitor.log_panel import LogPanel
 from hil.monitor.panel import Panel
 
 LEAST_COLUMNS, LEAST_ROWS = 80, 24
@@ -21,6 +22,7 @@ Screen { layers: base; background: ansi_default; color: ansi_default; }
 .panel { width: 1fr; height: 1fr; background: ansi_default; color: ansi_default; }
 .headline { height: 1; text-style: bold; }
 .message { height: 1; }
+.standing { height: 2; }
 .keys { height: 1; text-style: reverse; }
 .page { height: 1fr; display: none; }
 .page.shown { display: block; }
@@ -39,6 +41,7 @@ Screen.wide .brief { height: 9; }
           background: ansi_default; color: ansi_default; }
 StartDialog, HelpDialog { align: center middle; background: ansi_default; }
 MarkDialog { align: center bottom; background: transparent; }
+MarkDialog > .dialog { width: 100%; }
 .lead { text-style: bold; margin-bottom: 1; }
 OptionList { height: auto; max-height: 8; border: none; background: ansi_default; color: ansi_default; }
 OptionList > .option-list--option-highlighted { background: ansi_default; color: ansi_default; text-style: bold; }
@@ -83,7 +86,12 @@ def pages() -> ComposeResult:
         ),
     )
     yield page(
-        "model", Vertical(Panel(model_panels.response, "response-page"), Panel(model_panels.poles, "poles-page"))
+        "model",
+        Vertical(
+            Panel(model_panels.response, "response-page"),
+            Panel(model_panels.poles, "poles-page"),
+            Panel(model_panels.standing, "standing"),
+        ),
     )
     yield page(
         "resonance",
@@ -91,7 +99,8 @@ def pages() -> ComposeResult:
             Panel(model_panels.resonance, "resonance-history"),
             Panel(model_panels.damping, "damping-history"),
             Panel(model_panels.alarms, "alarms"),
+            Panel(model_panels.standing, "standing"),
         ),
     )
     yield page("bus", Panel(bus_panels.full, "bus-page"))
-    yield page("log", Panel(head_panels.log, "log-page"))
+    yield page("log", LogPanel())

@@ -142,6 +142,8 @@ class Over:
         What ended it before its time; None where it ran to its end or was stopped.
     run_id
         Its number in the run store; None where it is not in there.
+    alarms
+        Changes of the driveline that the on-line estimate found.
     """
 
     experiment: str
@@ -151,6 +153,7 @@ class Over:
     stopped: bool
     reason: str | None
     run_id: int | None = None
+    alarms: int = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,11 +8,26 @@ import textwrap
 import numpy as np
 
 from hil.monitor.braille import Canvas
+from hil.monitor.estimate_words import (
+    LIVE,
+    WIDEST_BAND,
+    alarm_line,
+    condition,
+    course,
+    nothing_yet,
+    resonance_in_words,
+    with_interval,
+)
 from hil.monitor.plot import AXIS, Range, height_of, nice_range, strip, time_axis, title, with_axis, wrapped
-from hil.monitor.snapshot import Estimation, Snapshot
+from hil.monitor.snapshot import Snapshot
 
 LARGEST_REACH = 2.0
 """Real part up to which poles and zeros are in the picture; a spare zero may be anywhere."""
+
+RESPONSE = "response w/T [dB]"
+
+ROOM_OF_TITLE = 6
+"""Characters of a title beside its text and its value, a short rule included."""
 
 HISTORY_S = 120.0
 """What the histories reach back [s]."""
@@ -21,8 +36,11 @@ HISTORY_S = 120.0
 def response(snapshot: Snapshot, width: int, height: int) -> list[str]:
     """Magnitude of the frequency response of the on-line model, both axes logarithmic."""
     estimation = snapshot.estimation
-    head = title("response |w/T| [dB]", _resonance(estimation), width)
     model = estimation.model
+    value = "--" if model is None else resonance_in_words(estimation)
+    if len(RESPONSE) + len(value) + ROOM_OF_TITLE > width:
+        value = f"{estimation.resonance_hz:.2f} Hz"  # how sure it is stands among the figures
+    head = title(RESPONSE, value, width)
     if model is None:
         return wrapped(head, nothing_yet(snapshot), width, height)
     decibel = 20.0 * np.log10(np.maximum(model.gain, 1e-12))
@@ -60,7 +78,9 @@ def poles(snapshot: Snapshot, width: int, height: int) -> list[str]:
 def resonance(snapshot: Snapshot, width: int, height: int) -> list[str]:
     """Resonance over time, with its band of two standard deviations."""
     history = snapshot.estimation.history
-    head = title("resonance [Hz]", _resonance(snapshot.estimation), width)
+    head = title("resonance [Hz]", resonance_in_words(snapshot.estimation), width)
+    if not history.time_s.size:
+        return wrapped(head, nothing_yet(snapshot), width, height)
     return _history(head, history.time_s, history.frequency_hz, history.frequency_std_hz, 0.5, width, height)
 
 
@@ -69,6 +89,8 @@ def damping(snapshot: Snapshot, width: int, height: int) -> list[str]:
     estimation = snapshot.estimation
     head = title("damping ratio", with_interval(estimation.damping, estimation.damping_std, "", 4), width)
     history = estimation.history
+    if not history.time_s.size:
+        return wrapped(head, nothing_yet(snapshot), width, height)
     return _history(head, history.time_s, history.damping, history.damping_std, 0.02, width, height)
 
 
@@ -76,14 +98,25 @@ def figures(snapshot: Snapshot, width: int, height: int) -> list[str]:
     """Resonance, damping, the estimator's own word and the last alarm, in words."""
     estimation = snapshot.estimation
     alarms = estimation.alarms
-    lines = [
-        title("estimate", "live" if estimation.live else "of the last run" if estimation.model else "", width),
-        f"resonance {_resonance(estimation)}",
-        f"damping   {with_interval(estimation.damping, estimation.damping_std, '', 4)}",
-        f"status    {estimation.status}",
-        f"alarms    {len(alarms)}" + (f", last: {alarm_line(snapshot)}" if alarms else ""),
-    ]
+    values, label = [], ""  # while there are none, the reason takes their room
+    if math.isfinite(estimation.resonance_hz):
+        values = [
+            f"resonance {resonance_in_words(estimation)}",
+            f"damping   {with_interval(estimation.damping, estimation.damping_std, '', 4)}",
+        ]
+        label = f"{'status':10}"
+    last = f"ALARM {len(alarms)}: {alarm_line(alarms[-1])}" if alarms else "alarms    none"
+    status = textwrap.wrap(f"{label}{condition(snapshot)}", max(width, 8))
+    room = max(1, height - 2 - len(values))
+    lines = [title("estimate", course(snapshot), width), *values, *status[:room], last]
     return [line[:width] for line in lines][:height]
+
+
+def standing(snapshot: Snapshot, width: int, height: int) -> list[str]:
+    """Say whether the estimate goes on, and why not, for the pages that have only plots."""
+    why = snapshot.quality.reasons
+    parts = (course(snapshot), condition(snapshot) + (f" ({why})" if course(snapshot) == LIVE and why else ""))
+    return textwrap.wrap(f"estimate: {', '.join(part for part in parts if part)}", max(width, 8))[:height]
 
 
 def alarms(snapshot: Snapshot, width: int, height: int) -> list[str]:
@@ -96,41 +129,14 @@ def alarms(snapshot: Snapshot, width: int, height: int) -> list[str]:
     return [line[:width] for line in lines][:height]
 
 
-def alarm_line(snapshot: Snapshot) -> str:
-    """Tell the last alarm in a few words; empty where there is none."""
-    found = snapshot.estimation.alarms
-    if not found:
-        return ""
-    last = found[-1]
-    still = "" if last.settled else ", goes on"
-    return f"{last.quantity} {last.before.value:.4g} -> {last.after.value:.4g}{still}"
-
-
-def nothing_yet(snapshot: Snapshot) -> str:
-    """Say why there is no model."""
-    hint = ": start an experiment (e)" if snapshot.can_drive and not snapshot.estimation.live else ""
-    return f"no on-line model yet{hint}"
-
-
-def with_interval(value: float, std: float, unit: str, digits: int) -> str:
-    """Write a value with two standard deviations, as far as they are known."""
-    if not math.isfinite(value):
-        return "--"
-    interval = f" ±{2.0 * std:.{digits}f}" if math.isfinite(std) else ""
-    return f"{value:.{digits}f}{interval} {unit}".rstrip()
-
-
-def _resonance(estimation: Estimation) -> str:
-    return with_interval(estimation.resonance_hz, estimation.resonance_std_hz, "Hz", 2)
-
-
 def _history(
     head: str, time_s: np.ndarray, values: np.ndarray, std: np.ndarray, least: float, width: int, height: int
 ) -> list[str]:
-    """Plot points over the last two minutes, each with its band."""
+    """Plot points over the last two minutes, each with its band, cut at `WIDEST_BAND`."""
     rows = height - 2
     recent = time_s >= -HISTORY_S
-    time_s, values, std = time_s[recent], values[recent], np.nan_to_num(2.0 * std[recent])
+    time_s, values = time_s[recent], values[recent]
+    std = np.minimum(np.nan_to_num(2.0 * std[recent]), WIDEST_BAND * np.abs(values))
     y_range = nice_range(np.r_[values - std, values + std], least)
     canvas = Canvas(width - AXIS, rows)
     x = (time_s / HISTORY_S + 1.0) * (canvas.width - 1)

@@ -12,8 +12,16 @@ from hil.monitor.snapshot import Snapshot
 Draw = Callable[[Snapshot, int, int], list[str]]
 """``draw(snapshot, width, height)``: at most ``height`` lines of at most ``width`` characters."""
 
-STRONG = ("ALARM", "FAULT", "EMCY 0x", "ACTIVE", "STALE", "TROUBLE", "LOST", "NO PERMIT", "WITHDRAWN", "ENDED EARLY")
+STRONG = (
+    *("ALARM", "FAULT", "EMCY 0x", "ACTIVE", "STALE", "TROUBLE", "LOST", "NO PERMIT", "WITHDRAWN", "ENDED EARLY"),
+    *("STANDS STILL", "NO VALUE", "NO NEWS", "FLAGGED", "UNSURE"),
+)
 """Words that are set in bold: what they say is in the word, not in its look."""
+
+
+def printable(text: str) -> str:
+    """Put a dot in place of each character that would steer a terminal instead of being seen on it."""
+    return "".join(letter if letter.isprintable() else "·" for letter in text)
 
 
 class Panel(Widget):
@@ -43,6 +51,7 @@ class Panel(Widget):
         width, height = self.size
         if self._snapshot is None or width <= 0 or height <= 0:
             return Text("")
-        text = Text("\n".join(self._draw(self._snapshot, width, height)), no_wrap=True, end="")
+        lines = map(printable, self._draw(self._snapshot, width, height))
+        text = Text("\n".join(lines), no_wrap=True, end="")  # never markup: names and texts are other people's
         text.highlight_words(STRONG, "bold")
         return text

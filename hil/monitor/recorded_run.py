@@ -9,13 +9,17 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from drivers.errors import DriverError
+from estimator.errors import EstimatorError
 from hil.config.rig_file import Rig
-from hil.errors import HilError
+from hil.errors import HilError, UsageError
 from hil.monitor.messages import Began, Kind, Mark, Notice, Over
 from hil.monitor.outbox import Outbox
 from hil.recording.writer import RecordingWriter
+from hil.report.outputs import publish
 from hil.rig.build import Devices
 from hil.rig.experiments.base import Phase
+from hil.rig.live import LiveEstimate, tracking_chain
+from hil.rig.live_course import course_path
 from hil.rig.metadata import run_metadata
 from hil.rig.pacing import NS_PER_S, RealTimePacer, period_ns
 from hil.rig.plan import Plan, plan_run
@@ -24,6 +28,8 @@ from hil.rig.session import run_plan
 from hil.rig.stop import StopRequest
 from hil.rig.timing import RunTiming
 from hil.store import register_run
+from hil.store.alarms import found_changes
+from hil.store.entry import COMPLETE, ONLINE
 
 SUFFIX = ".parquet"
 """A format that carries units and metadata in the file itself."""
@@ -58,6 +64,7 @@ class RecordedRun:
         self._events: list[dict[str, float | str | None]] = []
         self._now: tuple[Sample, Phase] | None = None
         self._flagged = 0
+        self._live: LiveEstimate | None = None
 
     def mark(self, mark: Mark) -> None:
         """Put a mark at its time into the recording; from any thread."""
@@ -90,6 +97,7 @@ class RecordedRun:
             What else the recording shall say of itself.
         """
         recorder = RecordingWriter(self._path, {**run_metadata(self._rig_path, self._name), **metadata})
+        self._live = self._estimate()
         reason, stopped = None, False
         try:
             plan = plan_run(self._rig, self._name)
@@ -123,7 +131,15 @@ class RecordedRun:
             watch(sample.t_ns)
 
         pacer = RealTimePacer(period_ns(self._rig.period_s))
-        run_plan(devices, plan, pacer, recorder, stop, lambda phase, time_s: None, timing, (observe,))
+        observers = (observe,) if self._live is None else (observe, self._live)
+        run_plan(devices, plan, pacer, recorder, stop, lambda phase, time_s: None, timing, observers)
+
+    def _estimate(self) -> LiveEstimate | None:
+        """Make the estimate that is kept beside the recording, as `hil run` does; None where there can be none."""
+        try:
+            return LiveEstimate(tracking_chain(self._rig.period_s))
+        except EstimatorError:  # the view, which has the same chain, says why there is no estimate
+            return None
 
     def _place(self, t_ns: int) -> tuple[float | None, str]:
         """Tell where in the run a moment of the monotonic clock is: time in the recording [s], and phase."""
@@ -135,17 +151,36 @@ class RecordedRun:
 
     def _tell_end(self, recorder: RecordingWriter, timing: RunTiming, stopped: bool, reason: str | None) -> None:
         kept = recorder.kept
-        run_id = None if kept is None else self._registered(kept, STOPPED if stopped else reason)
+        run_id = None if kept is None else self._registered(kept, STOPPED if stopped else reason or COMPLETE)
+        n_alarms = 0 if self._live is None else len(found_changes(self._live.course.summary()))
         recording = None if kept is None else str(kept)
-        self._outbox.tell(Over(self._name, recording, recorder.n_samples, self._flagged, stopped, reason, run_id))
+        self._outbox.tell(
+            Over(self._name, recording, recorder.n_samples, self._flagged, stopped, reason, run_id, n_alarms)
+        )
 
-    def _registered(self, recording: Path, ended_by: str | None) -> int | None:
+    def _registered(self, recording: Path, outcome: str) -> int | None:
         """Enter the recording into the run store of its folder; it stays whole where that can't be done."""
+        course = self._kept_course()
         try:
-            return register_run(recording) if ended_by is None else register_run(recording, ended_by)
+            return register_run(recording, outcome, results={} if course is None else {ONLINE: course})
         except (HilError, OSError) as error:
-            self._outbox.tell(Notice(time.monotonic_ns(), Kind.FAULT, f"run store: {error}"))
+            self._complain(f"run store: {error}")
             return None
+
+    def _kept_course(self) -> Path | None:
+        """Write resonance and alarms beside the recording; None where there are none or the disk does not take them."""
+        if self._live is None:
+            return None
+        path = course_path(self._path)
+        try:
+            publish(path.parent, {path.name: self._live.course.write})
+        except UsageError as error:
+            self._complain(f"{path} is missing, 'hil replay' makes it again: {error}")
+            return None
+        return path
+
+    def _complain(self, text: str) -> None:
+        self._outbox.tell(Notice(time.monotonic_ns(), Kind.FAULT, text))
 
 
 def recording_path(folder: Path, name: str, now: datetime) -> Path:

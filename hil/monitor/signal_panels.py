@@ -47,13 +47,14 @@ def torque(snapshot: Snapshot, width: int, height: int) -> list[str]:
     total_nm, reference_nm = _latest(s.torque_nm), _latest(s.reference_nm)
     parts = f"m1 {s.torque_m1_nm:.1f} m2 {s.torque_m2_nm:.1f} " if width >= ROOM_FOR_PARTS else ""
     now = f"{total_nm:.1f} ({parts}ref {reference_nm:.1f})"
-    return _draw(s, Trace("torque [Nm]", "Nm", s.torque_nm, 10.0, now), width, height)
+    return _draw(s, Trace("torque [Nm]", "Nm", s.torque_nm, 10.0, _or_why_not(snapshot, now)), width, height)
 
 
 def speed(snapshot: Snapshot, width: int, height: int) -> list[str]:
     """Draw the motor speed."""
     s = snapshot.signals
-    return _draw(s, Trace("speed [rad/s]", "rad/s", s.speed_rad_s, 1.0, f"{_latest(s.speed_rad_s):.2f}"), width, height)
+    now = _or_why_not(snapshot, f"{_latest(s.speed_rad_s):.2f}")
+    return _draw(s, Trace("speed [rad/s]", "rad/s", s.speed_rad_s, 1.0, now), width, height)
 
 
 def prbs(snapshot: Snapshot, width: int, height: int) -> list[str]:
@@ -67,6 +68,7 @@ def twist(snapshot: Snapshot, width: int, height: int) -> list[str]:
     s = snapshot.signals
     mrad = 1e3 * s.twist_rad
     now = f"{_latest(mrad):.1f} ±{2e3 * s.twist_std_rad:.1f}" if math.isfinite(s.twist_std_rad) else "--"
+    now = _or_why_not(snapshot, now)  # without readings it is the model's word alone
     lines = _draw(s, Trace(f"twist [mrad], {s.twist_of}", "mrad", mrad, 2.0, now), width, height - 1)
     return [*lines, time_axis(s.window_s, width)]
 
@@ -77,5 +79,13 @@ def _draw(signals: Signals, trace: Trace, width: int, height: int) -> list[str]:
     return [title(trace.name, trace.now.replace("nan", "--"), width), *plot]
 
 
+def _or_why_not(snapshot: Snapshot, now: str) -> str:
+    """Say in place of a present value why there is none."""
+    quality = snapshot.quality
+    return f"NO VALUE: {quality.why}" if quality.stands_still else now
+
+
 def _latest(values: FloatArray) -> float:
-    return float(values[-1]) if values.size else math.nan
+    """Give the last value there is; a gap of a few samples does not make the number flicker."""
+    known = values[np.isfinite(values)]
+    return float(known[-1]) if known.size else math.nan

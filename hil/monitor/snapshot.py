@@ -10,9 +10,14 @@ from numpy.typing import NDArray
 
 from estimator.identification.tracking.alarm import Alarm
 from hil.monitor.messages import Health, Notice
+from hil.monitor.quality import Quality
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
+
+
+SILENT_AFTER_S = 2.0
+"""Without a word from the source for so long [s] the screen says how old it is."""
 
 
 class Activity(Enum):
@@ -43,6 +48,8 @@ class Headline:
         Of the run under way; empty, NaN while there is none. ``duration_s`` is that of the measured part.
     message
         The last thing the operator has to know; it stays until another comes.
+    silent_s
+        Time since the source last said anything [s]: so old is what is shown.
     """
 
     rig: str
@@ -53,6 +60,7 @@ class Headline:
     duration_s: float
     recording: str
     message: str
+    silent_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -158,3 +166,4 @@ class Snapshot:
     now_ns: int
     runs: int
     can_drive: bool
+    quality: Quality

@@ -12,6 +12,8 @@ import numpy as np
 from estimator.physics.twist import Shaft, TwistFilter
 from hil.monitor.live_estimation import LiveEstimation
 from hil.monitor.messages import Began, Ended, Health, Kind, Lost, Notice, Over, Ready, Report, Samples
+from hil.monitor.outcome import as_known, outcome
+from hil.monitor.quality import QualityWatch
 from hil.monitor.ring import Ring
 from hil.monitor.snapshot import Activity, Headline, Signals, Snapshot
 from hil.rig.experiments.base import Phase
@@ -63,6 +65,7 @@ class LiveState:
         self._twist = None if shaft is None else TwistFilter(shaft, period_s)
         self._tuned_hz = math.nan
         self._estimation = LiveEstimation(period_s, is_ready)
+        self._quality = QualityWatch(period_s)
         self._health: Health | None = None
         self._log: deque[Notice] = deque(maxlen=KEPT_NOTICES)
         self._now_ns = 0
@@ -117,10 +120,10 @@ class LiveState:
             case Ready() | Lost() | Ended():
                 self._turn(report)
 
-    def snapshot(self) -> Snapshot:
-        """Give the picture of now."""
+    def snapshot(self, silent_s: float = 0.0) -> Snapshot:
+        """Give the picture of now; nothing has come for ``silent_s`` [s]."""
         return Snapshot(
-            headline=self._headline,
+            headline=replace(self._headline, silent_s=silent_s),
             signals=self._signals(),
             estimation=self._estimation.look(self._now_ns),
             health=self._health,
@@ -128,6 +131,7 @@ class LiveState:
             now_ns=self._now_ns,
             runs=len(self.runs),
             can_drive=self._can_drive,
+            quality=self._quality.look(self._now_ns),
         )
 
     def _take_samples(self, report: Samples) -> None:
@@ -147,13 +151,11 @@ class LiveState:
             self._headline = replace(self._headline, phase_s=sample.time_s)
 
     def _keep(self, sample: Sample) -> None:
-        torque_nm = sample.torque_m1_nm + sample.torque_m2_nm
-        okay = not sample.flags and math.isfinite(torque_nm) and math.isfinite(sample.speed_rad_s)
-        twist_rad = math.nan if self._twist is None else self._twist.step(torque_nm, sample.speed_rad_s, okay)
+        torque_nm, speed_rad_s = sample.torque_m1_nm + sample.torque_m2_nm, sample.speed_rad_s
+        okay = self._quality.take(sample) == 0
+        twist_rad = math.nan if self._twist is None else self._twist.step(torque_nm, speed_rad_s, okay)
         if not okay:
             torque_nm, speed_rad_s = math.nan, math.nan
-        else:
-            speed_rad_s = sample.speed_rad_s
         self._now_ns = sample.t_ns
         self._ring.append(
             (sample.t_ns / NS_PER_S, torque_nm, sample.torque_ref_nm, sample.prbs_nm, speed_rad_s, twist_rad)
@@ -187,6 +189,7 @@ class LiveState:
 
     def _begin(self, report: Began) -> None:
         self._estimation.begin()
+        self._quality.begin()
         self._headline = replace(
             self._headline,
             activity=Activity.RUNNING if self._can_drive else Activity.REPLAYING,
@@ -198,10 +201,11 @@ class LiveState:
             message="",
         )
         if self._can_drive:
-            self._tell(Kind.RUN, f"{report.experiment} begins, recorded as {report.recording}")
+            self._tell(Kind.RUN, f"{report.experiment} begins, recorded as {as_known(report.recording)}")
 
     def _end(self, report: Over) -> None:
         self._estimation.end()
+        self._quality.begin()
         self.runs.append(report)
         activity = Activity.LISTENING if self._can_drive else Activity.PLAYED
         self._headline = replace(
@@ -219,6 +223,7 @@ class LiveState:
             case Ready():
                 if self.activity is Activity.LOST:
                     self._tell(Kind.INFO, "the bus is there again")
+                self._quality.begin()
                 self._headline = replace(self._headline, activity=Activity.LISTENING)
             case Lost():
                 if self.activity is not Activity.LOST:
@@ -235,16 +240,3 @@ class LiveState:
 
     def _tell(self, kind: Kind, text: str) -> None:
         self._log.append(Notice(self._now_ns, kind, text))
-
-
-def outcome(over: Over) -> str:
-    """Tell in one line how a run went."""
-    kept = "nothing recorded"
-    if over.recording is not None:
-        number = "" if over.run_id is None else f", run {over.run_id}"
-        kept = f"{over.samples} samples in {over.recording}{number}"
-        if over.flagged:
-            kept += f", {over.flagged} flagged"
-    if over.reason is not None:
-        return f"{over.experiment} ENDED EARLY: {over.reason} ({kept})"
-    return f"{over.experiment} {'stopped by the operator' if over.stopped else 'done'}: {kept}"

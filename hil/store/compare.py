@@ -9,7 +9,7 @@ from typing import Any
 from hil.store.entry import Run
 from hil.store.facts import facts_of, results_of
 
-_APART = frozenset({"notes", "attachments", "settings", "eds_sha256", "id"})
+_APART = frozenset({"notes", "attachments", "settings", "eds_sha256", "id", "alarms"})
 
 
 @dataclass(frozen=True, slots=True)

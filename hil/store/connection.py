@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from hil.errors import StoreError
-from hil.store.schema import MIGRATIONS, ForeignDatabase, NewerStore, bring_up_to_date
+from hil.store.schema import MIGRATIONS, ForeignDatabase, NewerStore, bring_up_to_date, roll_back
 
 BUSY_S = 20.0
 """How long a writer waits for another; the longest there is writes one run and its documents, some milliseconds."""
@@ -76,8 +76,7 @@ def transaction(path: Path, connection: sqlite3.Connection) -> Iterator[None]:
             yield
             connection.execute("COMMIT")
         except BaseException:
-            if connection.in_transaction:  # a full disk has ended it already
-                connection.execute("ROLLBACK")
+            roll_back(connection)
             raise
 
 
@@ -114,7 +113,11 @@ def _in_words(path: Path, error: sqlite3.Error) -> StoreError:
             path, f"expected room for the entry, came: {error}. Nothing of it was entered; make room and try again."
         )
     if code in _UNWRITABLE:
-        return StoreError(path, f"expected a folder and a file that can be written, came: {error}.")
+        return StoreError(
+            path,
+            f"expected a folder and a file that can be written, came: {error}. Mend their permissions, or copy the "
+            "folder to where they can.",
+        )
     if code in _BUSY:
         return StoreError(path, f"expected the store within {BUSY_S:g} s, came: {error}. Another program holds it.")
     if code in _DAMAGED:

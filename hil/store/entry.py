@@ -118,6 +118,8 @@ class Run:
         Of the last diagnosis; empty where there is none.
     notes, attachments : tuple
         In a list of runs (`RunStore.find`) the attachments come without their documents.
+    alarms : int
+        Changes of the driveline that its last on-line estimate found.
     """
 
     run_id: int
@@ -125,6 +127,7 @@ class Run:
     verdict: str = ""
     notes: tuple[Note, ...] = ()
     attachments: tuple[Attachment, ...] = ()
+    alarms: int = 0
 
     def latest(self, kind: str) -> Attachment | None:
         """Return the last attachment of a kind."""

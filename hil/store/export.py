@@ -25,6 +25,7 @@ _COLUMNS = (
     "flagged",
     "outcome",
     "verdict",
+    "alarms",
     "software_version",
     "recording",
     "data_sha256",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from hil.store.alarms import statements
 from hil.store.entry import DIAGNOSIS, IDENTIFICATION, ONLINE, Run
 
 SCHEMA = "hil.runs/1"
@@ -24,6 +25,7 @@ def facts_of(run: Run) -> dict[str, Any]:
         "flagged": entry.flagged,
         "outcome": entry.outcome,
         "verdict": run.verdict,
+        "alarms": run.alarms,
         "rig": entry.rig_name,
         "rig_sha256": entry.rig_sha256,
         "eds_sha256": dict(entry.eds_sha256),
@@ -58,7 +60,12 @@ def _online(run: Run) -> dict[str, Any]:
     document = _content(run, ONLINE)
     mode = _table(_table(document.get("final")).get("resonance"))
     found = {f"{what} while driving": mode[name] for name, what in _MODE if name in mode}
-    return found | ({"alarms while driving": len(_list(document.get("alarms")))} if document else {})
+    return found | ({"alarms while driving": run.alarms} if document else {})
+
+
+def alarms_of(run: Run) -> list[str]:
+    """Return a line for each change of the driveline that the run's last on-line estimate found."""
+    return statements(_content(run, ONLINE))
 
 
 _MODE = (("frequency_hz", "resonance [Hz]"), ("damping", "damping"))

@@ -10,13 +10,14 @@ import numpy as np
 
 from hil.recording import columns
 from hil.recording.checksum import CHECKSUM, RIG_CHECKSUM, RIG_TEXT
+from hil.recording.description import OUTCOME
 from hil.recording.formats import read_table
 from hil.recording.table import Table
 from hil.store.entry import COMPLETE, RunEntry
 from hil.store.run_store import RunStore
 
 EXPERIMENT, STARTED, VERSION = "experiment", "started_utc", "hil_version"
-OWN_KEYS = frozenset({RIG_TEXT, RIG_CHECKSUM, EXPERIMENT, STARTED, VERSION, CHECKSUM, "schema"})
+OWN_KEYS = frozenset({RIG_TEXT, RIG_CHECKSUM, EXPERIMENT, STARTED, VERSION, CHECKSUM, OUTCOME, "schema"})
 """What has a place of its own in an entry; the rest is its settings."""
 
 
@@ -61,7 +62,7 @@ def register_run(
 
 
 def entry_of(table: Table, outcome: str = COMPLETE) -> RunEntry:
-    """Make the entry of a recording from what it says of itself."""
+    """Make the entry of a recording from what it says of itself; what ended it early, too, if nobody else knows."""
     said = table.metadata
     rig_text = said.get(RIG_TEXT, "")
     eds = {key[len("eds_") : -len("_sha256")]: value for key, value in said.items() if _is_eds(key)}
@@ -77,7 +78,7 @@ def entry_of(table: Table, outcome: str = COMPLETE) -> RunEntry:
         rig_name=_rig_name(rig_text),
         rig_text=rig_text,
         eds_sha256=eds,
-        outcome=outcome,
+        outcome=said.get(OUTCOME, COMPLETE) if outcome == COMPLETE else outcome,
         settings={key: value for key, value in said.items() if key not in OWN_KEYS and not _is_eds(key)},
     )
 

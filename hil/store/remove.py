@@ -6,10 +6,11 @@ from pathlib import Path
 
 from hil.errors import UsageError
 from hil.recording.formats import FORMATS
+from hil.store.results import ONLINE_SUFFIX
 
 
 def remove_files(recording: Path) -> list[Path]:
-    """Delete a recording and the file beside it, where there is one.
+    """Delete a recording and what was made with it: its sidecar and the course of its on-line estimate.
 
     Returns
     -------
@@ -24,7 +25,8 @@ def remove_files(recording: Path) -> list[Path]:
     known = FORMATS.get(recording.suffix.lower())
     beside = [] if known is None or known.beside is None else [known.beside(recording)]
     removed = []
-    for path in (*beside, recording):
+    course = recording.with_name(f"{recording.stem}{ONLINE_SUFFIX}")
+    for path in (*beside, course, recording):
         try:
             path.unlink()
         except FileNotFoundError:

@@ -8,12 +8,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from hil.store.alarms import COUNT
 from hil.store.entry import Attachment, Note, Run, RunEntry
 from hil.store.filters import VERDICT
 
 _RUNS = (
     "SELECT runs.*, coalesce(rig_files.name, '') AS rig_name, coalesce(rig_files.text, '') AS rig_text, "
-    f"coalesce({VERDICT}, '') AS verdict "
+    f"coalesce({VERDICT}, '') AS verdict, coalesce({COUNT}, 0) AS alarms "
     "FROM runs LEFT JOIN rig_files ON rig_files.sha256 = runs.rig_sha256 "
 )
 
@@ -92,4 +93,5 @@ def _run(database: sqlite3.Connection, folder: Path, row: sqlite3.Row, document:
             Attachment(kind, added_utc, None if path is None else folder / path, text)
             for kind, added_utc, path, text in attached
         ),
+        int(row["alarms"]),
     )

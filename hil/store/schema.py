@@ -87,8 +87,14 @@ def bring_up_to_date(connection: sqlite3.Connection) -> None:
         connection.execute(f"PRAGMA user_version = {len(MIGRATIONS)}")
         connection.execute("COMMIT")
     except BaseException:
-        connection.execute("ROLLBACK")
+        roll_back(connection)
         raise
+
+
+def roll_back(connection: sqlite3.Connection) -> None:
+    """Undo the transaction that is open; a full disk has ended it already."""
+    if connection.in_transaction:
+        connection.execute("ROLLBACK")
 
 
 def _require_ours(connection: sqlite3.Connection) -> None:

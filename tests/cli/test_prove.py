@@ -67,6 +67,7 @@ def test_a_rig_whose_clutch_is_closed_is_not_driven(tmp_path: Path, capsys: pyte
 
 
 @pytest.mark.campaign
+@pytest.mark.timeout(1800)  # eight rigs, each driven and diagnosed
 def test_what_is_concealed_in_the_rigs_is_found_over_the_wire(tmp_path: Path) -> None:
     assert run(["prove", "wire", str(tmp_path)]) == 0
     rigs = json.loads((tmp_path / "wire" / "wire.json").read_text())["rigs"]

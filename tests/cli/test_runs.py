@@ -88,6 +88,17 @@ def test_filters(folder: Path, capsys: Capture, options: list[str], ids: list[in
     assert [run["id"] for run in documents(capsys, *options)["runs"]] == ids
 
 
+def test_the_list_says_what_ended_a_run_and_show_what_to_do_then(folder: Path, capsys: Capture) -> None:
+    write_table(Table(folder / "d.csv", {"time_s": np.arange(5) * 0.1, "speed_rad_s": np.ones(5)}), folder / "d.csv")
+    register_run(folder / "d.csv", "PLC: clutch is closed. Mend the cause, run again.")
+    assert hil(["runs"]) == 0
+    said = capsys.readouterr().out
+    assert "PLC: clutch is closed" in said
+    assert "Mend" not in said
+    assert hil(["runs", "show", "4"]) == 0
+    assert "PLC: clutch is closed. Mend the cause, run again." in capsys.readouterr().out
+
+
 def test_an_empty_answer_is_an_answer(folder: Path, capsys: Capture) -> None:
     assert hil(["runs", "--experiment", "none"]) == 0
     assert capsys.readouterr().out == "no such run\n"
@@ -104,6 +115,31 @@ def test_one_run_is_shown_with_the_state_of_its_recording(folder: Path, capsys: 
     assert document["eds_sha256"] == {"m1": "ab" * 32}
     (folder / "a.csv").write_text("time_s,speed_rad_s\n0.0,1.0\n", encoding="utf-8")
     assert "damaged, or was changed" in documents(capsys, "show", "1")["recording_state"]
+
+
+def test_alarms_are_listed_and_shown(folder: Path, capsys: Capture) -> None:
+    level = {"value": 8.2, "ci95": [8.1, 8.3]}
+    alarm = {
+        "time_s": 60.0,
+        "changed_between_s": [50.0, 55.0],
+        "quantity": "resonance_hz",
+        "before": level,
+        "after": {"value": 7.6, "ci95": [7.5, 7.7]},
+        "settled": True,
+        "evidence": {"statistic": 31.0, "threshold": 12.0, "false_alarms_per_hour": 0.01},
+    }
+    with RunStore(folder) as store:
+        store.attach(2, "online", {"alarms": [alarm]})
+    assert hil(["runs", "--store", str(folder)]) == 0
+    head, _, second, _ = capsys.readouterr().out.splitlines()
+    assert "alarms" in head
+    assert second[head.index("alarms") :].split()[0] == "1"
+    assert hil(["runs", "show", "2", "--store", str(folder)]) == 0
+    shown = capsys.readouterr().out
+    assert "ALARM                           resonance_hz changed from 8.2 (8.1 to 8.3) to 7.6 (7.5 to 7.7)" in shown
+    assert hil(["runs", "show", "2", "--store", str(folder), "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["alarms"] == len(document["alarm_statements"]) == 1
 
 
 def test_two_runs_are_compared_down_to_their_rig_files(folder: Path, capsys: Capture) -> None:

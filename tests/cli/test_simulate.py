@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 
@@ -46,6 +47,17 @@ def test_the_simulation_is_the_motion_in_closed_form(
     load = re.search(r"constant load ([\d.]+) Nm", out)
     assert load is not None
     assert float(load[1]) == pytest.approx(bench.LOAD, abs=0.02)
+
+
+def test_a_script_gets_json(arguments: dict[str, Path], capsys: pytest.CaptureFixture[str]) -> None:
+    words = [str(word) for pair in arguments.items() for word in pair]
+    assert run(["simulate", *words, "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert (document["schema"], document["recording"], document["samples"]) == ("hil.simulate/1", "run_1", 1500)
+    assert document["constant_load"]["unit"] == "Nm"
+    assert document["constant_load"]["value"] == pytest.approx(bench.LOAD, abs=0.02)
+    assert document["rms"]["unit"] == "rad/s"
+    assert 0.0 <= document["rms"]["value"] < 0.01
 
 
 def test_missing_samples_have_their_row_too(arguments: dict[str, Path]) -> None:

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import multiprocessing
+import re
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from datetime import UTC, datetime
 from multiprocessing.connection import Connection
 from pathlib import Path
 
 from hil.config.rig_file import read_rig
 from hil.monitor.host import Job, SessionStop
-from hil.monitor.messages import Ended, Health, Kind, Notice, Over, Ready, Report, Reset, Samples, Start
+from hil.monitor.messages import Ended, Health, Kind, Lost, Notice, Over, Ready, Report, Reset, Samples, Start
 from hil.monitor.outbox import Outbox
 from hil.monitor.recorded_run import recording_path
 from hil.monitor.source import RigSource
@@ -82,6 +83,19 @@ def test_a_store_that_can_not_be_used_costs_no_recording(rig_path: Path, tmp_pat
     assert Path(over.recording).exists()
     assert over.run_id is None
     assert any(isinstance(report, Notice) and report.kind is Kind.FAULT for report in seen)
+
+
+def test_a_bus_that_is_lost_is_named_as_a_person_knows_it(rig_path: Path, tmp_path: Path) -> None:
+    seen: list[Report] = []
+    with ExitStack() as stack:
+        with served(read_rig(rig_path), bus_url="ws://127.0.0.1:0/") as (server, rig):
+            job = Job(rig_path, with_addresses(rig, server.bus_url, str(server.modbus)), tmp_path)
+            source = stack.enter_context(RigSource(job))
+            await_report(source, seen, Samples)
+        lost = await_report(source, seen, Lost)
+    assert isinstance(lost, Lost)
+    assert server.bus_url in lost.reason
+    assert not re.search(r"[0-9a-f]{8}-[0-9a-f]{4}", lost.reason)  # the server's own name of it, another one each time
 
 
 def measured_samples(seen: list[Report]) -> list[object]:

@@ -10,12 +10,13 @@ import pytest
 
 from drivers.plc.types import ClutchState, DriveMode, PlcStatus, PlcWatchdog, PrbsSettings, PrbsSource
 from estimator.identification.tracking.alarm import Alarm, Level
-from hil.monitor import bus_panels, head_panels, model_panels, signal_panels
+from hil.monitor import bus_panels, head_panels, log_panel, model_panels, signal_panels
 from hil.monitor.messages import Began, Kind, NodeHealth, Notice, PlcHealth, Ready, Samples
 from hil.monitor.panel import Draw
 from hil.monitor.snapshot import Activity, History, Model, Snapshot
 from hil.monitor.state import LiveState
 from hil.rig.experiments.base import Phase
+from hil.rig.sample import SampleFlag
 from tests.monitor.fake_source import PERIOD_S, health, node, sample
 
 DRAWN: tuple[Draw, ...] = (
@@ -33,7 +34,8 @@ DRAWN: tuple[Draw, ...] = (
     bus_panels.full,
     head_panels.headline,
     head_panels.message,
-    head_panels.log,
+    log_panel.log,
+    model_panels.standing,
 )
 
 STATUS = PlcStatus(
@@ -121,7 +123,7 @@ def test_poles_and_zeros_are_letters_in_the_plane() -> None:
 def test_an_alarm_says_what_changed_and_on_what_evidence() -> None:
     text = " ".join(" ".join(model_panels.alarms(snapshot(), 80, 6)).split())
     assert f"ALARM {ALARM.statement}, evidence 31 above 12" in text
-    assert "alarms    1, last: resonance_hz 8.21 -> 7.6" in model_panels.figures(snapshot(), 60, 5)
+    assert "ALARM 1: 8.21 -> 7.6 Hz" in model_panels.figures(snapshot(), 60, 5)
 
 
 @pytest.mark.parametrize(
@@ -170,3 +172,109 @@ def test_a_permit_that_is_withdrawn_is_said_so() -> None:
 
 def test_the_headline_says_what_is_driven() -> None:
     assert head_panels.headline(snapshot(), 80, 1)[0].startswith("RUNNING cruise measure 7.0 s of 30 s")
+
+
+def interrupted(n_stale: int) -> Snapshot:
+    """A run whose first inverter falls silent for so many cycles."""
+    live = LiveState("bus", PERIOD_S, None, can_drive=True)
+    live.take(Ready())
+    live.take(Began("cruise", "runs/cruise.parquet", 30.0))
+    flags = [SampleFlag.GOOD] * 500 + [SampleFlag.M1_STALE] * n_stale
+    live.take(Samples(tuple((sample(k, 20.0, 0.1, 120.0, flag), Phase.MEASURE) for k, flag in enumerate(flags))))
+    live.take(health())
+    return live.snapshot()
+
+
+def test_an_estimate_that_stands_still_says_so_and_why() -> None:
+    shown = interrupted(210)
+    for width in (31, 80):
+        lines = model_panels.figures(shown, width, 5)
+        assert lines[0].endswith("STANDS STILL 2.1 s")
+        assert lines[1] == "m1 silent"
+    assert model_panels.standing(shown, 80, 1) == ["estimate: STANDS STILL 2.1 s, m1 silent"]
+    for draw in (signal_panels.torque, signal_panels.speed, signal_panels.twist):
+        assert draw(shown, 47, 5)[0].endswith("NO VALUE: m1 silent")
+
+
+def test_lost_samples_are_counted_and_do_not_hide_the_present_value() -> None:
+    shown = interrupted(10)
+    assert "2 % masked" in " ".join(model_panels.figures(shown, 80, 5))
+    assert "(m1 silent 10x)" in " ".join(model_panels.standing(shown, 80, 2))
+    assert "20.0 (" in signal_panels.torque(shown, 47, 5)[0]
+    assert "samples 98 % good in 10 s" in bus_panels.brief(shown, 31, 7)
+    assert "m1 silent 10x" in bus_panels.full(shown, 80, 22)
+
+
+def test_many_lost_samples_are_trouble() -> None:
+    text = "\n".join(bus_panels.brief(interrupted(100), 31, 7))
+    assert "TROUBLE" in text
+    assert "samples 17 % FLAGGED: m1 silent" in text
+
+
+def test_what_has_no_room_is_counted() -> None:
+    shown = snapshot(node(emergency="EMCY 0x8130 life guard", heartbeat_age_s=0.9, tpdo_age_s=3.0, trouble="no SDO"))
+    lines = bus_panels.brief(shown, 31, 7)
+    assert lines[-1] == "+3 more lines: 4"  # of five lines, the first two have room
+    assert "HEARTBEAT LOST" in "\n".join(bus_panels.full(shown, 80, 22))
+
+
+def test_a_table_is_whole_or_not_there() -> None:
+    for height in range(10, 30):
+        text = "\n".join(bus_panels.full(snapshot(), 80, height))
+        assert ("[ms]" in text) == ("reply age" in text)
+
+
+def test_while_the_drives_are_armed_nothing_old_is_shown() -> None:
+    live = LiveState("bus", PERIOD_S, None, can_drive=True)
+    for report in (Ready(), health(node(n_emergencies=7))):
+        live.take(report)
+    live.starting("cruise")
+    live.take(health(node(n_emergencies=7)))  # was on its way
+    for draw in (bus_panels.brief, bus_panels.full):
+        text = "\n".join(draw(live.snapshot(), 80, 22))
+        assert "arming" in text
+        assert "OK" not in text
+        assert "answers" not in text
+
+
+@pytest.mark.parametrize(("silent_s", "told"), [(0.5, False), (3.2, True)])
+def test_a_source_that_says_nothing_is_told(silent_s: float, told: bool) -> None:
+    live = LiveState("bus", PERIOD_S, None, can_drive=True)
+    live.take(Ready())
+    live.take(health())
+    shown = live.snapshot(silent_s)
+    assert ("NO NEWS for 3 s" in head_panels.headline(shown, 80, 1)[0]) == told
+    assert bus_panels.full(shown, 80, 22)[0].endswith("NO NEWS 3 s" if told else "OK")
+
+
+def test_a_long_message_says_where_the_rest_is() -> None:
+    long = replace(snapshot(), headline=replace(snapshot().headline, message="word " * 40))
+    (line,) = head_panels.message(long, 80, 1)
+    assert line.endswith("… (5: log)")
+    assert len(line) == 80
+
+
+def test_a_value_that_is_hardly_known_is_called_unsure() -> None:
+    shown = snapshot()
+    wild = replace(shown, estimation=replace(shown.estimation, resonance_std_hz=15.0, damping_std=1.7))
+    assert model_panels.resonance(wild, 80, 8)[0].endswith("8.00 ±30 Hz UNSURE")
+    assert model_panels.damping(wild, 80, 8)[0].endswith("0.0500 ±3.4 UNSURE")
+    history = replace(shown.estimation.history, frequency_std_hz=np.full(50, 15.0))
+    wide = replace(shown, estimation=replace(shown.estimation, history=history))
+    labels = [float(line.split("┤")[0]) for line in model_panels.resonance(wide, 80, 8) if "┤" in line]
+    assert min(labels) >= 0.0
+
+
+def test_an_estimate_before_the_measured_part_waits() -> None:
+    live = LiveState("bus", PERIOD_S, None, can_drive=True)
+    live.take(Began("cruise", "runs/cruise.parquet", 30.0))
+    live.take(Samples(((sample(0), Phase.APPROACH),)))
+    assert model_panels.figures(live.snapshot(), 31, 5)[0].endswith("not measuring yet")
+
+
+def test_why_there_is_no_estimate_can_be_read_in_full() -> None:
+    shown = interrupted(0)
+    reason = shown.estimation.status
+    assert len(reason) > 40
+    for draw, width, height in ((model_panels.figures, 32, 5), (model_panels.standing, 80, 2)):
+        assert reason in " ".join(" ".join(draw(shown, width, height)).split())

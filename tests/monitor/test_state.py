@@ -9,8 +9,9 @@ import pytest
 
 from estimator.physics.twist import Shaft
 from hil.monitor.messages import Began, Ended, Kind, Lost, Notice, Over, Ready, Samples
+from hil.monitor.outcome import outcome
 from hil.monitor.snapshot import Activity
-from hil.monitor.state import WINDOWS_S, LiveState, outcome
+from hil.monitor.state import WINDOWS_S, LiveState
 from hil.rig.experiments.base import Phase
 from hil.rig.sample import SampleFlag
 from hil.simulator.simulation_model import DEFAULT_BUS
@@ -38,7 +39,7 @@ def test_a_run_from_order_to_end() -> None:
     live.take(DONE)
     assert live.activity is Activity.LISTENING
     assert live.runs == [DONE]
-    assert "3000 samples in runs/cruise.parquet, run 7, 2 flagged" in live.snapshot().headline.message
+    assert "3000 samples, 2 flagged, run 7, runs/cruise.parquet" in live.snapshot().headline.message
 
 
 def test_a_run_that_failed_says_why() -> None:

@@ -6,10 +6,17 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 
-from hil.recording import read_table, write_table
+import pytest
+
+from hil.errors import RunAborted
+from hil.recording import RecordingWriter, read_table, write_table
+from hil.recording.checksum import text_sha256
 from hil.store import RunStore, attach_to_runs, register_run, store_of
+from hil.store.entry import COMPLETE
 from hil.store.rebuild import rebuild
 from hil.store.recording_state import VERIFIED, recording_state
+from tests.recording.test_writer import sample
+from tests.store.conftest import RIG
 
 Record = Callable[..., Path]
 
@@ -40,6 +47,25 @@ def test_a_moved_recording_is_found_again_with_its_notes(tmp_path: Path, record:
         (run,) = store.find()
     assert (run.run_id, run.entry.recording.name, run.notes[0].text) == (number, "renamed.parquet", "wind")
     assert recording_state(run.entry) == VERIFIED
+
+
+def test_what_ended_a_run_is_told_by_the_recording_itself(tmp_path: Path) -> None:
+    said = {"experiment": "cruise", "rig_file": RIG, "rig_sha256": text_sha256(RIG)}
+
+    def run(name: str, samples: int, ended_by: Exception | None = None) -> None:
+        with RecordingWriter(tmp_path / name, said) as writer:
+            for k in range(samples):
+                writer.append(sample(k))
+            if ended_by is not None:
+                raise ended_by
+
+    run("whole.parquet", 9)
+    with pytest.raises(RunAborted):
+        run("cut.parquet", 3, RunAborted("PLC: clutch is closed"))
+    rebuild(tmp_path)
+    with RunStore(tmp_path) as store:
+        outcomes = {run.entry.recording.name: run.entry.outcome for run in store.find()}
+    assert outcomes == {"cut.parquet": "PLC: clutch is closed", "whole.parquet": COMPLETE}
 
 
 def test_results_in_the_folder_are_attached_once_to_the_runs_they_name(tmp_path: Path, record: Record) -> None:

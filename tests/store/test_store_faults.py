@@ -150,6 +150,14 @@ def test_a_full_disk_costs_only_what_was_being_entered(filled: Path) -> None:
         assert [attachment.kind for attachment in store.get(1).attachments] == ["diagnosis"]
 
 
+@pytest.mark.parametrize("pages", [0, 4, 8, 12])
+def test_a_full_disk_leaves_no_room_for_a_new_store_and_is_told(tmp_path: Path, pages: int) -> None:
+    """From 8 pages on there is room for the index of the WAL, and SQLite rolls back by itself."""
+    with largest_file(pages * PAGE_BYTES), pytest.raises(StoreError, match=r"expected room for the entry.*make room"):
+        names(tmp_path)
+    assert names(tmp_path) == {}
+
+
 def test_a_store_held_by_another_program_is_told(filled: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(connection, "BUSY_S", 0.05)
     other = sqlite3.connect(store_of(filled), isolation_level=None)

@@ -1,0 +1,54 @@
+"""The plan before, the result after, and the report: as lines, as JSON, as a page."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+import typer
+
+from hil.commission.announce import plan_document
+from hil.commission.registry import STEPS
+from hil.commission.state import State
+from hil.commission.step import Job
+from hil.report.commission_text import plan_lines, result_document, result_lines
+from hil.report.outputs import publish
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+REPORT = "commissioning.html"
+
+
+def write_report(state: State) -> None:
+    """Write the commissioning report into the folder of the job.
+
+    Raises
+    ------
+    UsageError
+        If it can't be written.
+    """
+    from hil.report.commission_html import commission_page  # brings the plotting library along
+
+    page = commission_page(state.document(), {step.name: step.title for step in STEPS})
+    publish(state.folder, {REPORT: lambda path: path.write_text(page, encoding="utf-8")})
+
+
+def print_plan(job: Job, console: Console, as_json: bool) -> None:
+    """Print what the job would do."""
+    document = plan_document(job)
+    if as_json:
+        typer.echo(json.dumps(document))
+        return
+    for line in plan_lines(document):
+        console.print(line, markup=False, soft_wrap=not console.is_terminal)
+
+
+def print_result(state: State, console: Console, as_json: bool, reported: bool) -> None:
+    """Print what has come of the job so far; ``reported`` tells whether its report could be written."""
+    document = result_document(state.document(), str(state.folder), REPORT if reported else None)
+    if as_json:
+        typer.echo(json.dumps(document))
+        return
+    for line in result_lines(document):
+        console.print(line, markup=False, soft_wrap=True)

@@ -1,0 +1,67 @@
+"""The command ``hil run``: what is asked for, and who does it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from hil.cli.filter_option import FilterOf, FilterRun
+from hil.cli.pace import Pace, PaceOption
+from hil.errors import UsageError
+
+
+def run(
+    rig: Annotated[Path, typer.Argument(metavar="RIG", help="Rig file.")],
+    experiment: Annotated[str, typer.Argument(metavar="EXPERIMENT", help="Name of an experiment of the rig file.")],
+    out: Annotated[
+        Path | None, typer.Option(metavar="REC", help="Recording to write, .csv or .parquet; a new file.")
+    ] = None,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Predict torque and speed; opens no bus, writes nothing.")
+    ] = False,
+    pace: PaceOption = Pace.REAL,
+    bus: Annotated[str | None, typer.Option(metavar="URL", help="CAN bus in place of the rig file's.")] = None,
+    modbus: Annotated[str | None, typer.Option(metavar="HOST:PORT", help="PLC in place of the rig file's.")] = None,
+    trace: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Bus trace beside it: every frame; .blf, .log (candump) or .asc; a new file."
+        ),
+    ] = None,
+    estimate: Annotated[
+        bool, typer.Option(help="Estimate while driving; its course goes beside the recording: .online.json.")
+    ] = True,
+    filter_of: FilterOf = None,
+    filter_run: FilterRun = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+) -> None:
+    """Run one experiment, record its measured part, and follow the resonance while driving.
+
+    The drives are at zero torque and disarmed on every way out, Ctrl-C included; the recording then holds
+    everything up to there.
+    """
+    from hil.config.rig_file import read_rig
+    from hil.rig.addresses import with_addresses
+
+    rig_file = with_addresses(read_rig(rig), bus, modbus)
+    if dry_run:
+        from hil.cli.run.prediction import predict
+
+        predict(rig_file, experiment, as_json)
+        return
+    if out is None:
+        raise UsageError("hil run: expected --out REC, a recording to write, or --dry-run; came neither.")
+    from hil.cli.pace import pacer_for, scheduling
+    from hil.cli.run.job import Job, record
+    from hil.cli.run.live import live_estimate
+    from hil.cli.run.result import print_result
+    from hil.rig.metadata import run_metadata
+
+    metadata = {**run_metadata(rig, experiment), "pace": pace.value}
+    live = live_estimate(rig_file, out, filter_of, filter_run) if estimate else None
+    job = Job(rig_file, experiment, out, trace, pacer_for(rig_file, pace), metadata, live)
+    with scheduling(pace) as grants:
+        summary = record(job, grants)
+    print_result(job, summary, grants, as_json)

@@ -1,0 +1,82 @@
+"""Texts of devices, files and operators are shown as they are: no markup, no control of the terminal."""
+
+from __future__ import annotations
+
+import asyncio
+import html
+import re
+
+import pytest
+
+from hil.monitor.app import MonitorApp
+from hil.monitor.dialogs import Choice
+from hil.monitor.messages import Began, Kind, Mark, Notice, Ready
+from hil.monitor.panel import printable
+from hil.monitor.state import LiveState
+from tests.monitor.fake_source import PERIOD_S, FakeSource, health, node
+
+TEXT = "[bold]x[/]"
+WRONG = "[/red] [[x]"
+"""What a reader of markup refuses: the end of something that has not begun."""
+
+
+def shown(*keys: str, text: str = TEXT, coming: tuple[object, ...] = ()) -> str:
+    """What the screen shows after keys, line by line."""
+    source = FakeSource(coming=[Ready(), *coming])  # type: ignore[list-item]
+    app = MonitorApp(source, LiveState(text, PERIOD_S, None, True), (Choice(text, f"sum {text}"),), f"out {text}")
+    drawn: list[str] = []
+
+    async def go() -> None:
+        async with app.run_test(size=(80, 24)) as pilot:
+            await pilot.pause(0.3)
+            for key in keys:
+                await pilot.press(key)
+            await pilot.pause(0.3)
+            drawn.append(app.export_screenshot())
+
+    asyncio.run(go())
+    return html.unescape(re.sub(r"<[^>]*>", "", drawn[0])).replace("\xa0", " ")
+
+
+@pytest.mark.parametrize("text", [TEXT, WRONG])
+def test_names_of_the_rig_file_and_the_folder(text: str) -> None:
+    asked = shown("e", "enter", text=text)
+    assert f"> {text}" in asked
+    assert f"sum {text}" in asked
+    assert f"run {text}, recorded in out {text}?" in asked
+    assert text in shown(text=text)
+
+
+@pytest.mark.parametrize("text", [TEXT, WRONG])
+def test_an_emcy_and_a_mark(text: str) -> None:
+    coming = (
+        health(node(emergency=f"EMCY 0x3220 {text}")),
+        Notice(0, Kind.EMCY, f"m1: EMCY 0x3220 {text}"),
+        Notice(0, Kind.MARK, f"{text} (at 1.00 s of the recording)"),
+    )
+    log = shown("5", coming=coming)
+    assert f"EMCY 0x3220 {text}" in log
+    assert f"{text} (at 1.00 s" in log
+    assert f"mark: {text} (at 1.00 s" in log  # the line of the last message
+    assert f"EMCY 0x3220 {text}" in shown("4", coming=coming)
+
+
+def test_a_mark_is_sent_as_it_was_typed() -> None:
+    source = FakeSource(coming=[Ready(), Began("cruise", "c.parquet", 30.0)])
+    app = MonitorApp(source, LiveState("bus", PERIOD_S, None, True))
+
+    async def go() -> None:
+        async with app.run_test(size=(80, 24)) as pilot:
+            await pilot.pause(0.3)
+            await pilot.press("m", *TEXT, "enter")
+
+    asyncio.run(go())
+    (mark,) = source.sent
+    assert isinstance(mark, Mark)
+    assert mark.text == TEXT
+
+
+def test_what_would_steer_the_terminal_is_a_dot() -> None:
+    assert printable("a\x1b[2J\x07\tb ü ±") == "a·[2J··b ü ±"
+    assert "\x1b" not in shown(coming=(Notice(0, Kind.EMCY, "a\x1b[2Jb"),))
+    assert "a·[2Jb" in shown(coming=(Notice(0, Kind.EMCY, "a\x1b[2Jb"),))

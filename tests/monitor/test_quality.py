@@ -1,0 +1,75 @@
+"""Quality of the samples: what is counted, since when, in what words."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from hil.monitor.quality import NO_VALUE, STANDS_STILL_S, WINDOW_S, Quality, QualityWatch, words
+from hil.rig.sample import SampleFlag
+from tests.monitor.fake_source import PERIOD_S, sample
+
+GOOD, M1, M2, LATE = SampleFlag.GOOD, SampleFlag.M1_STALE, SampleFlag.M2_STALE, SampleFlag.LATE
+
+
+def seen(*flags: SampleFlag) -> Quality:
+    """Quality after samples with these flags, at the time of the last."""
+    watch = QualityWatch(PERIOD_S)
+    for cycle, flag in enumerate(flags):
+        watch.take(sample(cycle, flags=flag))
+    return watch.look(sample(len(flags) - 1).t_ns)
+
+
+def test_reasons_are_counted_the_most_frequent_first() -> None:
+    quality = seen(GOOD, LATE, M1, M1 | M2, GOOD)
+    assert (quality.samples, quality.good) == (5, 2)
+    assert quality.reasons == "m1 silent 2x, m2 silent 1x, cycle late 1x"
+    assert quality.bad_share == pytest.approx(0.6)
+
+
+def test_cycles_before_the_first_answer_are_no_fault() -> None:
+    quality = seen(M1 | M2, M1 | M2, M2, GOOD, GOOD)
+    assert (quality.samples, quality.good, quality.against) == (2, 2, ())
+
+
+def test_a_new_stretch_begins_with_nothing() -> None:
+    watch = QualityWatch(PERIOD_S)
+    for cycle, flag in enumerate((GOOD, M1)):
+        watch.take(sample(cycle, flags=flag))
+    watch.begin()
+    assert watch.look(sample(1).t_ns) == Quality()
+
+
+def test_what_is_over_goes_away() -> None:
+    n = round(WINDOW_S / PERIOD_S)
+    assert seen(GOOD, M1, *[GOOD] * n).good == seen(GOOD, M1, *[GOOD] * n).samples == n
+    assert seen(GOOD, M1, *[GOOD] * (n - 2)).reasons == "m1 silent 1x"
+
+
+def test_the_time_without_a_good_sample_counts_until_the_next() -> None:
+    n = round(STANDS_STILL_S / PERIOD_S)
+    short, long = seen(GOOD, *[M1] * (n - 1)), seen(GOOD, *[M1] * n)
+    assert not short.stands_still
+    assert long.stands_still
+    assert long.standing_s == pytest.approx(STANDS_STILL_S)
+    assert long.why == "m1 silent"
+    assert seen(GOOD, *[M1] * n, GOOD).standing_s == 0.0
+
+
+def test_a_drive_that_never_answers_stands_still_too() -> None:
+    quality = seen(*[M2] * 100)
+    assert quality.samples == 0
+    assert quality.standing_s == pytest.approx(0.99)
+
+
+def test_a_number_that_is_missing_without_a_flag_counts_too() -> None:
+    watch = QualityWatch(PERIOD_S)
+    assert watch.take(sample(0)) == 0
+    assert watch.take(sample(1, speed_rad_s=math.nan)) == NO_VALUE
+    assert watch.look(sample(1).t_ns).reasons == "no value 1x"
+
+
+def test_every_flag_has_words() -> None:
+    assert words(M1 | M2 | LATE | SampleFlag.PLC_STALE) == "m1, m2 silent; cycle late; PLC silent"
+    assert all(words(flag) for flag in SampleFlag if flag)
