@@ -18,6 +18,7 @@ from hil.commission.rig_change import changed_keys, rig_digest
 from hil.commission.step import Job, Outcome, Step
 from hil.commission.talk import Answer, Talk, What
 from hil.errors import RunAborted, UsageError
+from hil.report.numbers import moment
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,7 +119,7 @@ class Commissioning:
     def _say_settled(self, step: Step) -> None:
         record = step.record(self.job)
         because = f", because: {record.because}" if record.status is Status.SKIPPED else ""
-        self.job.say(f"{step.title}: {record.status.value} {record.ended_utc}{because}")
+        self.job.say(f"{step.title}: {record.status.value} {moment(record.ended_utc)}{because}")
         if rebuilt := sorted(self._redone.intersection(step.needs)):
             self.job.say(f"  it was driven before {', '.join(rebuilt)} was repeated; again by --repeat {step.name}")
 
@@ -157,7 +158,8 @@ class Commissioning:
             try:
                 self.job.state.save()
             except UsageError as trouble:  # what ended the step is what has to be told first
-                error.add_note(str(trouble))
+                if str(trouble) != str(error):
+                    error.add_note(str(trouble))
             raise
         record.findings, record.evidence = list(outcome.findings), json_safe(outcome.evidence)
         blocked = any(finding.stops for finding in record.findings)

@@ -22,6 +22,9 @@ from hil.recording.table import Table
 
 SCHEMA = "hil.recording/1"
 
+OUTCOME = "outcome"
+"""Key of the metadata of a run that did not come to its end: what ended it."""
+
 
 def description_of(table: Table, stored_as: Mapping[str, str]) -> str:
     """Describe a table whose columns are stored under other names."""

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from hil.errors import RecordingError
+from hil.recording.damaged import damaged
 
 DAMAGED = (OSError, KeyError, ValueError, TypeError, RuntimeError, IndexError, AttributeError)
 """What h5py raises on a file that is cut or damaged."""
@@ -40,9 +40,7 @@ def reading(path: Path, what: str) -> Iterator[Any]:
         with h5py.File(path, "r") as file:
             yield file
     except DAMAGED as error:
-        raise RecordingError(
-            path, f"expected a whole {what} file, came a damaged or truncated one ({error})"
-        ) from error
+        raise damaged(path, f"a whole {what} file", error) from error
 
 
 def write_whole(path: Path, fill: Callable[[Any], None], header: bytes = b"") -> None:

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from hil.errors import RecordingError
 from hil.recording import mat73_format
+from hil.recording.damaged import damaged
 from hil.recording.format_hints import FormatHints
 from hil.recording.kinds import as_column
 from hil.recording.shared_length import columns_of_shared_length
@@ -39,7 +39,7 @@ def read(path: Path, hints: FormatHints) -> Table:
     try:
         variables = scipy.io.loadmat(path)
     except (*DAMAGED, MatReadError) as error:
-        raise RecordingError(path, f"expected a whole .mat file, came a damaged or truncated one ({error})") from error
+        raise damaged(path, "a whole .mat file", error) from error
     arrays = {name: value for name, value in variables.items() if isinstance(value, np.ndarray)}
     numeric = {name: value for name, value in arrays.items() if value.dtype.kind in "fiub"}
     vectors = {name: v.ravel() for name, v in numeric.items() if v.size > 1 and max(v.shape) == v.size}

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hil.errors import RecordingError
+from hil.recording.damaged import damaged
 
 if TYPE_CHECKING:
     from asammdf import MDF
@@ -84,9 +85,7 @@ def opened(path: Path) -> Iterator[MDF]:
             yield mdf
     except (*DAMAGED, MdfException) as error:
         what = "one that can be finalised: its writer never finished it" if is_unfinished(path) else "a whole MDF file"
-        raise RecordingError(
-            path, f"expected {what}, came a damaged or truncated one ({error or type(error).__name__})"
-        ) from error
+        raise damaged(path, what, error) from error
 
 
 def channels_of(mdf: MDF, group: int) -> list[Any]:

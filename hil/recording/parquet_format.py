@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet
 
-from hil.errors import RecordingError
+from hil.recording.damaged import damaged
 from hil.recording.format_hints import FormatHints
 from hil.recording.kinds import Column, as_column, as_text
 from hil.recording.table import Table
@@ -32,9 +32,7 @@ def read(path: Path, hints: FormatHints) -> Table:
         with pa.parquet.ParquetFile(path, page_checksum_verification=True) as file:
             content = file.read()
     except (pa.ArrowException, OSError) as error:
-        raise RecordingError(
-            path, f"expected a whole Parquet file, came a damaged or truncated one ({error})"
-        ) from error
+        raise damaged(path, "a whole Parquet file", error) from error
     units = {
         f.name: f.metadata[UNIT_KEY].decode("utf-8", "replace")
         for f in content.schema
@@ -55,9 +53,7 @@ def read_metadata(path: Path) -> dict[str, str]:
     try:
         schema = pa.parquet.read_schema(path)
     except (pa.ArrowException, OSError) as error:
-        raise RecordingError(
-            path, f"expected a whole Parquet file, came a damaged or truncated one ({error})"
-        ) from error
+        raise damaged(path, "a whole Parquet file", error) from error
     return _metadata(schema.metadata or {})
 
 

@@ -68,7 +68,8 @@ def write_table(
         ) from error
     finally:
         for file in (part, *([] if form.beside is None else [form.beside(part)])):
-            file.unlink(missing_ok=True)
+            if file.is_file():  # on a disk that can't be written even removing nothing is refused
+                file.unlink()
 
 
 def _write(

@@ -22,6 +22,7 @@ from hil.errors import RecordingError
 from hil.recording import columns
 from hil.recording.checksum import sealed
 from hil.recording.csv_format import description_of
+from hil.recording.description import OUTCOME
 from hil.recording.formats import read_table, writer_for
 from hil.recording.publish import write_table
 from hil.recording.samples import cells_of
@@ -71,7 +72,10 @@ class RecordingWriter:
                 "It is a recording up to that moment: rename it to keep it, or remove it.",
             ) from error
         except OSError as error:
-            raise RecordingError(self.path, f"expected a place to write, came: {error.strerror}") from error
+            raise RecordingError(
+                self.path,
+                f"expected a place to write, came: {error.strerror}. Choose another folder, or mend this one.",
+            ) from error
         self._file.write(",".join(columns.UNITS) + "\n")
         return self
 
@@ -111,6 +115,10 @@ class RecordingWriter:
         """Make the recording of what has been appended, however the run ended."""
         if self._file is None:
             return
+        if error is not None:
+            self.describe(
+                OUTCOME, "interrupted" if isinstance(error, KeyboardInterrupt) else str(error) or type(error).__name__
+            )
         self._close(self._file)
         self._file = None
         if self.n_samples == 0:
@@ -146,12 +154,10 @@ class RecordingWriter:
             return
         try:
             write_table(table, self.path)
-        except OSError as error:
-            raise RecordingError(
-                self.path,
-                f"expected room for the recording, came: {error.strerror or error}. Its samples are in "
-                f"{self.part_path}, a recording itself: rename it to keep it, or remove it.",
-            ) from error
+        except RecordingError as error:
+            kept = f"Its samples are in {self.part_path}, a recording itself: rename it to keep it, or remove it."
+            *others, last = error.problems
+            raise RecordingError(self.path, *others, f"{last} {kept}") from error
         self.part_path.unlink()
 
 

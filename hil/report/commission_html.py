@@ -12,7 +12,7 @@ from typing import Any
 
 from hil.report import page as html
 from hil.report.commission_step import STATUSES, STYLE, badge, card_row, card_table, step_section
-from hil.report.numbers import shown
+from hil.report.numbers import moment, shown
 
 State = Mapping[str, Any]
 
@@ -40,7 +40,8 @@ def commission_page(state: State, titles: Mapping[str, str]) -> str:
     return html.page(
         f"Commissioning of {state['rig_name']}",
         (piece for piece in body if piece),
-        f"hil commission {state['hil_version']}, begun {state['started_utc']}, as of {state['updated_utc']}. "
+        f"hil commission {state['hil_version']}, begun {moment(state['started_utc'])}, as of "
+        f"{moment(state['updated_utc'])}. "
         "Intervals are of 95 % confidence; foretold values are from the driveline as it was known before each run.",
     )
 
@@ -50,7 +51,7 @@ def _top(state: State) -> str:
     outside = sum(finding["within"] is False for record in records for finding in record["findings"])
     to_do = [name for name, record in state["steps"].items() if record["status"] not in ("done", "skipped")]
     if to_do:
-        kind, words = "unexplained", f"not complete: {len(to_do)} steps to do, next is {to_do[0]}"
+        kind, words = "unexplained", f"not complete: {len(to_do)} to do, next is {to_do[0]}"
     elif outside:
         kind, words = "explained", f"complete, {outside} outside their limits"
     else:
@@ -130,7 +131,7 @@ def _link(record: Mapping[str, Any]) -> str:
 def _decisions(state: State) -> str:
     if not state["notes"]:
         return ""
-    rows = [(note["at_utc"], note["what"], note["changes"], note["steps"]) for note in state["notes"]]
+    rows = [(moment(note["at_utc"]), note["what"], note["changes"], note["steps"]) for note in state["notes"]]
     return html.section("Decisions on the way", html.table(("at", "what", "changes", "steps done before"), rows))
 
 

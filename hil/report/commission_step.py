@@ -9,6 +9,7 @@ from typing import Any
 
 from hil.report import page as html
 from hil.report.commission_figures import step_figures
+from hil.report.numbers import moment
 
 MARKS = MappingProxyType({True: ("no_mismatch", "✓ within"), False: ("unexplained", "✗ outside"), None: ("", "–")})
 """CSS class and words for within, outside, and no limit: the words tell, not the colour alone."""
@@ -75,7 +76,7 @@ def badge(kind: str, words: str) -> str:
 def _status(record: Mapping[str, Any]) -> str:
     kind, words = STATUSES[record["status"]]
     because = f" because: {record['because']}" if record["because"] else ""
-    when = f" {record['ended_utc']}" if record["ended_utc"] else ""
+    when = f" {moment(record['ended_utc'])}" if record["ended_utc"] else ""
     attempt = f", attempt {record['attempt']}" if record["attempt"] > 1 else ""
     return f"<p>{badge(kind, words)} {escape(when + attempt + because)}</p>"
 
@@ -126,7 +127,7 @@ def _runs(runs: Sequence[Mapping[str, Any]]) -> str:
 
 def _both(run: Mapping[str, Any], key: str, digits: int) -> Iterator[str]:
     for ranges in (run["measured"], run["predicted"]):
-        yield f"{ranges[key][0]:.{digits}f} … {ranges[key][1]:.{digits}f}" if key in ranges else "–"
+        yield f"{ranges[key][0]:z.{digits}f} … {ranges[key][1]:z.{digits}f}" if key in ranges else "–"
 
 
 def _history(history: Sequence[Mapping[str, Any]]) -> str:
@@ -134,7 +135,7 @@ def _history(history: Sequence[Mapping[str, Any]]) -> str:
         (
             str(each["attempt"]),
             each["status"],
-            each["ended_utc"],
+            moment(each["ended_utc"]) if each["ended_utc"] else "",
             each["because"],
             str(sum(finding["within"] is False for finding in each["findings"])),
             ", ".join(each["recordings"]),

@@ -54,8 +54,8 @@ def plan_lines(document: Mapping[str, Any]) -> Iterator[str]:
     )
 
 
-def result_document(state: Mapping[str, Any], folder: str, report: str) -> dict[str, Any]:
-    """Return the result for scripts (schema ``hil.commission_result/1``)."""
+def result_document(state: Mapping[str, Any], folder: str, report: str | None) -> dict[str, Any]:
+    """Return the result for scripts (schema ``hil.commission_result/1``); ``report`` None where it is not written."""
     steps = state["steps"]
     settled = [record["status"] in ("done", "skipped") for record in steps.values()]
     findings = [finding for record in steps.values() for finding in record["findings"]]
@@ -66,7 +66,7 @@ def result_document(state: Mapping[str, Any], folder: str, report: str) -> dict[
         "complete": all(settled),
         "outside": sum(finding["within"] is False for finding in findings),
         "driven_s": round(sum(run["seconds"] for record in steps.values() for run in record["runs"]), 1),
-        "report": str(Path(folder) / report),
+        "report": None if report is None else str(Path(folder) / report),
         "model": str(model) if model.exists() else None,
         "steps": {
             name: {key: record[key] for key in ("status", "because", "attempt", "findings")}
@@ -81,12 +81,16 @@ def result_lines(document: Mapping[str, Any]) -> Iterator[str]:
     skipped = [name for name, step in document["steps"].items() if step["status"] == "skipped"]
     yield ""
     if open_steps:
-        yield f"not complete: it goes on with {open_steps[0]} at the next call, {len(open_steps)} steps to go"
+        to_go = "1 step" if len(open_steps) == 1 else f"{len(open_steps)} steps"
+        yield f"not complete: it goes on with {open_steps[0]} at the next call, {to_go} to go"
     else:
-        driven = f"{document['driven_s'] / 60.0:.1f} min driven"
-        yield f"complete: {document['outside']} findings outside their limits, {driven}"
+        yield f"complete: {_outside(document['outside'])}, {document['driven_s'] / 60.0:.1f} min driven"
     if skipped:
         yield f"skipped: {', '.join(skipped)}"
-    yield f"report: {document['report']}"
+    yield f"report: {document['report'] or 'not written'}"
     if document["model"]:
         yield f"model:  {document['model']}"
+
+
+def _outside(count: int) -> str:
+    return "1 finding outside its limits" if count == 1 else f"{count or 'no'} findings outside their limits"

@@ -1,9 +1,10 @@
-"""How numbers are shown to people and written for programs."""
+"""How numbers and moments are shown to people and written for programs."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from datetime import UTC, datetime
 
 JSON_DIGITS = 10
 """Significant digits in JSON: more than any estimate here carries, without the noise of the last bits."""
@@ -65,3 +66,8 @@ def shown_ratio(value: float, reference: float) -> str:
 def shown_times(intervals: Iterable[tuple[float, float]]) -> str:
     """Format time intervals [s]."""
     return ", ".join(f"{low:.4g} to {high:.4g} s" for low, high in intervals)
+
+
+def moment(utc: str) -> str:
+    """Write a moment in ISO 8601 as a person reads it: ``2026-11-21 10:03 UTC``."""
+    return f"{datetime.fromisoformat(utc).astimezone(UTC):%Y-%m-%d %H:%M} UTC"

@@ -16,6 +16,9 @@ from hil.report.figures import plotly_script
 FEWEST_LISTED = 3
 """Sections from which on a page begins with a list of them."""
 
+LONGEST_WORDS = 30
+"""Characters of a cell that fit a line of a narrow screen; longer ones are sentences and get room for some words."""
+
 KEYS = (
     "A figure that has the focus takes keys: + and - zoom, the arrows move, 1 to 9 show or hide a line, 0 shows all "
     "again."
@@ -81,16 +84,24 @@ def table(headings: Sequence[str], rows: Iterable[Sequence[str]], numbers: Seque
 
 
 def html_table(headings: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequence[int] = ()) -> str:
-    """Make a table of cells that are HTML already."""
+    """Make a table of cells that are HTML already; a column with sentences in it is marked as prose."""
+    rows = list(rows)
+    kinds = dict.fromkeys(_prose(rows), "prose") | dict.fromkeys(numbers, "number")
 
     def cell(tag: str, column: int, content: str) -> str:
-        kind = ' class="number"' if column in numbers else ""
+        kind = f' class="{kinds[column]}"' if column in kinds else ""
         return f"<{tag}{kind}>{content}</{tag}>"
 
     titles = "".join(cell("th", i, escape(text)) for i, text in enumerate(headings))
     head = f"<thead><tr>{titles}</tr></thead>\n" if any(headings) else ""
     lines = ["<tr>" + "".join(cell("td", i, text) for i, text in enumerate(row)) + "</tr>" for row in rows]
     return f'<div class="wide"><table>\n{head}<tbody>\n' + "\n".join(lines) + "\n</tbody></table></div>"
+
+
+def _prose(rows: Sequence[Sequence[str]]) -> set[int]:
+    """Return the columns, but the first, with cells too long for one line of a narrow screen."""
+    cells = ((i, re.sub(r"<[^>]*>", "", text)) for row in rows for i, text in enumerate(row))
+    return {i for i, text in cells if i and len(text) > LONGEST_WORDS}
 
 
 def tiles(entries: Iterable[tuple[str, str, str]]) -> str:

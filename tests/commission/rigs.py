@@ -113,5 +113,5 @@ def bench(
     faulty = rig_faults(faults, rig.period_s)
     with RigServer(plant, rig, f"virtual:{uuid.uuid4()}", Address("127.0.0.1", 0), faulty) as server:
         out = folder / "out"
-        out.mkdir()
+        out.mkdir(exist_ok=True)
         yield Bench(server, RigSource(path, text, server.bus_url, str(server.modbus)), out)

@@ -64,6 +64,22 @@ def test_value_has_as_many_places_as_its_interval(value: float, text: str) -> No
     assert Measured(value, 0.25).shown("%") == text
 
 
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (-0.115e-3, "0.115 ± 0.090 ms earlier"),
+        (0.115e-3, "0.115 ± 0.090 ms later"),
+        (-1e-9, "0.000 ± 0.090 ms earlier"),
+    ],
+)
+def test_a_word_stands_for_the_sign(value: float, text: str) -> None:
+    assert Measured(value, 0.09e-3).shown_as("later", "earlier", "ms", 1e3) == text
+
+
+def test_what_rounds_to_nothing_has_no_sign() -> None:
+    assert Measured(-0.001, 0.2).shown("Nm") == "0.00 ± 0.20 Nm"
+
+
 @pytest.mark.parametrize("factor", [1.0, -1.0, 0.3])
 def test_pulses_tell_sign_and_size(factor: float) -> None:
     course = Pulses(20.0, 1.0, 18.0)

@@ -48,7 +48,7 @@ def state(tmp_path: Path) -> dict[str, Any]:
 def test_page_says_everything_and_fetches_nothing(state: dict[str, Any]) -> None:
     page = commission_page(state, TITLES)
     for text in (
-        "not complete: 8 steps to do, next is limits",
+        "not complete: 8 to do, next is limits",
         "gain &lt;m2&gt;",
         "3.1 ± 0.4 %",
         "→ Calibrate one",
@@ -76,6 +76,13 @@ def test_result_tells_where_it_goes_on(state: dict[str, Any], tmp_path: Path) ->
     assert (result["complete"], result["outside"], result["driven_s"], result["model"]) == (False, 1, 3.5, None)
     assert "not complete: it goes on with limits at the next call, 8 steps to go" in list(result_lines(result))
     assert "skipped: devices" in list(result_lines(result))
+    assert f"report: {tmp_path / 'commissioning.html'}" in list(result_lines(result))
+
+
+def test_a_report_that_is_not_written_is_not_named(state: dict[str, Any], tmp_path: Path) -> None:
+    result = result_document(state, str(tmp_path), None)
+    assert result["report"] is None
+    assert "report: not written" in list(result_lines(result))
 
 
 def test_findings_on_a_terminal_are_told_in_words() -> None:

@@ -165,6 +165,13 @@ def test_a_full_disk_at_the_end_of_a_run_costs_the_description_and_no_sample(tmp
     assert read_table(tmp_path / "run.csv").n_rows == 20
 
 
+@pytest.mark.parametrize("suffix", WRITABLE)
+def test_a_place_that_takes_no_file_is_told(told: Table, suffix: str) -> None:
+    path = Path(f"/proc/run{suffix}")
+    with pytest.raises(RecordingError, match=rf"/proc/run{suffix}: expected room for the recording, came: "):
+        write_table(told, path)
+
+
 def test_a_folder_that_can_not_be_written_is_told(tmp_path: Path, told: Table) -> None:
     (tmp_path / "taken.h5").mkdir()
     with pytest.raises(RecordingError, match="came a folder"):

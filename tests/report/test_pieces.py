@@ -23,6 +23,7 @@ from hil.report.diagnosis_text import diagnosis_summary
 from hil.report.figures import LONGEST_STRETCHES, input_lines, stretches_for
 from hil.report.numbers import p_statement, shown, shown_interval, shown_p, shown_ratio
 from hil.report.outputs import publish, require_folder
+from hil.report.page import table
 from hil.report.wording import listed, simulated_column
 
 NAN = float("nan")
@@ -178,3 +179,9 @@ def test_a_read_only_folder_is_refused() -> None:
 )
 def test_a_probability_is_stated_as_far_as_it_means_something(value: float, expected: str) -> None:
     assert p_statement(value) == expected
+
+
+def test_a_column_of_sentences_is_prose_and_one_of_words_is_not() -> None:
+    long = "explains 74 % of what backlash explains"
+    assert f'<td class="prose">{long}</td>' in table(("effect", "why not"), [("stiffness_nonlinearity", long)])
+    assert 'class="prose"' not in table(("recording", "parameter", "value"), [("cruise", "J_M", long)], numbers=[2])

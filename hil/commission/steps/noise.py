@@ -75,7 +75,7 @@ def _torque_finding(job: Job, name: str, reading: np.ndarray) -> Finding:
     return Finding(
         f"torque reading of {name}",
         f"mean within ±{TORQUE_PERMILLE:g} ‰ of rated, noise at most {TORQUE_PERMILLE:g} ‰",
-        f"mean {mean:.2f} ‰, noise {std:.2f} ‰",
+        f"mean {mean:z.2f} ‰, noise {std:.2f} ‰",
         abs(mean) <= TORQUE_PERMILLE and std <= TORQUE_PERMILLE,
         f"Calibrate the current sensors of {name}, or look for a torque it gives by itself",
     )

@@ -156,7 +156,7 @@ def _own_findings(name: str, test: _Test) -> list[Finding]:
         Finding(
             f"{name}: delay from torque reading to speed",
             "the one sample that sampling makes",
-            f"{extra + NATURAL_DELAY} samples" + (f", {extra} more ({extra * period_ms:g} ms)" if extra else ""),
+            f"{extra + NATURAL_DELAY} samples, {extra} more ({extra * period_ms:g} ms)" if extra else "that one",
             extra == 0,
             "Look for a filter or dead time in drive, bus or resolver; the diagnosis takes it into account",
         ),
@@ -171,9 +171,7 @@ def _mutual_findings(ratio: ResponseRatio, period_s: float) -> list[Finding]:
         Finding(
             "m2 against m1: gain, for the same reading",
             f"equal within ±{100.0 * (GAIN[1] - 1.0):g} %",
-            f"m2 gives {difference.shown('%', 100.0)} more"
-            if gain.value >= 1.0
-            else f"m2 gives {type(gain)(-difference.value, gain.ci95).shown('%', 100.0)} less",
+            f"m2 gives {difference.shown_as('more', 'less', '%', 100.0)}",
             gain.is_within(*GAIN),
             "Calibrate one against a torque transducer or a known inertia: no test here tells which is right",
             blocking=gain.value < 0.0,
@@ -181,7 +179,7 @@ def _mutual_findings(ratio: ResponseRatio, period_s: float) -> list[Finding]:
         Finding(
             "m2 against m1: delay",
             f"equal within ±{limit_ms:g} ms",
-            f"m2 acts {delay.shown('ms', 1e3)} later",
+            f"m2 acts {delay.shown_as('later', 'earlier', 'ms', 1e3)}",
             delay.is_within(-1e-3 * limit_ms, 1e-3 * limit_ms),
             "Compare cycle times, torque filters and transmission types of both drives",
         ),

@@ -13,14 +13,12 @@ from hil.proof.truth.driveline import TruthDriveline
 from hil.proof.truth.driver import bring_to_speed
 from hil.proof.truth.experiments import PERIOD_S, Plan, Test, draw_plan, sample_times_s
 from hil.proof.truth.hidden import Interval
-from hil.proof.truth.laws_in_angle import gravity_torque
-from hil.proof.truth.laws_in_time import brake_torque
+from hil.proof.truth.observed import observed
 from hil.proof.truth.physics import FloatArray, Physics
 from hil.proof.truth.readings import sampling_instants_s, speed_as_read
 from hil.proof.truth.rows import IntArray, Rows, as_recorded
 from hil.proof.truth.sensors import USUAL, Noise, torque_reading
 from hil.proof.truth.specimen import Specimen, Stream, draw_specimen, stream
-from hil.proof.truth.state import State
 
 TESTS = tuple(Test)
 
@@ -149,21 +147,8 @@ def _sample(
 
     The last torque stays on: a clock may ask for a speed after the last period.
     """
-    speed, disturbance = np.empty(instants_s.size), np.empty(instants_s.size)
-    now_s, held = 0.0, 0
-    for row, instant_s in enumerate(instants_s):
-        while held + 1 < m1_nm.size and (held + 1) * PERIOD_S <= instant_s:
-            bus.advance((m1_nm[held], m2_nm[held]), (held + 1) * PERIOD_S - now_s)
-            held += 1
-            now_s = held * PERIOD_S
-        if instant_s > now_s:
-            bus.advance((m1_nm[held], m2_nm[held]), instant_s - now_s)
-            now_s = instant_s
-        speed[row] = bus.speed_rad_s
-        disturbance[row] = _disturbance_nm(bus.physics, bus.state)
-    return speed, disturbance
-
-
-def _disturbance_nm(physics: Physics, state: FloatArray) -> float:
-    """Torque against the load beyond the constant one: hill and brake."""
-    return float(gravity_torque(physics, state[State.ANGLE_L]) + brake_torque(physics, state[State.TIME_S]))
+    switches_s = PERIOD_S * np.arange(1, m1_nm.size)
+    moments_s = np.unique(np.concatenate([switches_s, instants_s, [0.0]]))
+    held = np.searchsorted(switches_s, moments_s[:-1], side="right")
+    states = np.vstack([bus.state, bus.course(m1_nm[held], m2_nm[held], np.diff(moments_s))])
+    return observed(bus.physics, states[np.searchsorted(moments_s, instants_s)])

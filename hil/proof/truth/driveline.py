@@ -6,8 +6,8 @@ import numpy as np
 
 from hil.proof.truth import kernel
 from hil.proof.truth.delay_line import DelayLine
-from hil.proof.truth.inverters import true_torque
-from hil.proof.truth.laws_in_angle import resolver_speed
+from hil.proof.truth.inverters import true_torque, true_torques
+from hil.proof.truth.observed import speed_as_sensed
 from hil.proof.truth.physics import FloatArray, Physics
 from hil.proof.truth.state import SPEEDS, STATES, State
 
@@ -35,6 +35,21 @@ class TruthDriveline:
         for piece in self._delay.push(total_nm, duration_s):
             kernel.advance(self._state, self._physics, piece.torque_nm, piece.duration_s)
 
+    def course(self, m1_nm: FloatArray, m2_nm: FloatArray, durations_s: FloatArray) -> FloatArray:
+        """Hold torques for their times, shapes (N,), one after the other; return the states after each, (N, STATES)."""
+        begins_s = self._state[State.TIME_S] + np.cumsum(durations_s) - durations_s
+        pieces = [
+            self._delay.push(total_nm, duration_s)
+            for total_nm, duration_s in zip(
+                true_torques(self._physics, m1_nm, m2_nm, begins_s).tolist(), durations_s.tolist(), strict=True
+            )
+        ]
+        ends = np.cumsum([len(each) for each in pieces]) - 1
+        commands_nm = np.array([piece.torque_nm for each in pieces for piece in each])
+        held_s = np.array([piece.duration_s for each in pieces for piece in each])
+        states: FloatArray = kernel.course(self._state, self._physics, commands_nm, held_s)[ends]
+        return states
+
     def go_on_with(self, physics: Physics) -> None:
         """Change the physics under way: motion and twist go on, clock and distance start again at zero."""
         self._physics = physics
@@ -58,7 +73,4 @@ class TruthDriveline:
     @property
     def speed_rad_s(self) -> float:
         """Motor speed as the resolver gives it, behind its filter where it has one [rad/s]."""
-        p = self._physics
-        if p.filter_time_s > 0.0 or p.filter_rad_s > 0.0:
-            return float(self._state[State.FILTERED])
-        return float(resolver_speed(p, self._state[State.ANGLE_M], self._state[State.SPEED_M]))
+        return float(speed_as_sensed(self._physics, self._state))

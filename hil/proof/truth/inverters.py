@@ -7,10 +7,23 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from hil.proof.truth import laws_in_time
-from hil.proof.truth.physics import Physics
+from hil.proof.truth.compiled import compiled
+from hil.proof.truth.physics import FloatArray, Physics
 
 
+@compiled
+def true_torques(p: Physics, m1_nm: FloatArray, m2_nm: FloatArray, times_s: FloatArray) -> FloatArray:
+    """Return `true_torque` for readings and times of shape (N,)."""
+    total_nm = np.empty(times_s.size)
+    for i in range(times_s.size):
+        total_nm[i] = true_torque(p, (m1_nm[i], m2_nm[i]), times_s[i])
+    return total_nm
+
+
+@compiled
 def true_torque(p: Physics, reading_nm: tuple[float, float], time_s: float) -> float:
     """Return the torque of both inverters together for their readings at a time [Nm]."""
     left = laws_in_time.torque_left(p, time_s)
@@ -20,10 +33,12 @@ def true_torque(p: Physics, reading_nm: tuple[float, float], time_s: float) -> f
     return _limited(both, p.limit_total_nm, p.limit_knee)
 
 
+@compiled
 def _beyond(torque_nm: float, deadband_nm: float) -> float:
     return math.copysign(max(0.0, abs(torque_nm) - deadband_nm), torque_nm)
 
 
+@compiled
 def _limited(torque_nm: float, limit_nm: float, knee: float) -> float:
     """Return a torque below its limit, which is approached in a knee and not at an edge."""
     if limit_nm <= 0.0:

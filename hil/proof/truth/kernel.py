@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from hil.proof.truth import iwan, laws, laws_in_angle, laws_in_time, tyre
 from hil.proof.truth.compiled import compiled
 from hil.proof.truth.line import accelerations, breakaway_limit, disturbance, shaft_ends, shaft_twist, speeds_of
@@ -133,3 +135,13 @@ def advance(state: FloatArray, p: Physics, command_nm: float, duration_s: float)
             _couple_generator(state, p, h)
         if p.filter_time_s > 0.0 or p.filter_rad_s > 0.0:
             _filter_speed(state, p, h)
+
+
+@compiled
+def course(state: FloatArray, p: Physics, commands_nm: FloatArray, durations_s: FloatArray) -> FloatArray:
+    """Move the state on by one command after the other, shapes (N,); return it after each, shape (N, STATES)."""
+    after = np.empty((durations_s.size, state.size))
+    for i in range(durations_s.size):
+        advance(state, p, commands_nm[i], durations_s[i])
+        after[i] = state
+    return after
