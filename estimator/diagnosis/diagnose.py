@@ -114,7 +114,7 @@ def _diagnose(
     figures = _fit_figures(chain, retuned, selection, examiner, line, floor, believed)
     acquired = acquired_effects(chain, residuals_by_record(before), chain.errors(final.outputs))
     effects = (*(found_effects(selection, line, examiner) if believed else ()), *acquired)
-    blind = tuple(UntestableEffect(n, u.reason, u.suggested_test) for n, u in found.untestable.items())
+    blind = tuple(UntestableEffect(n, u.reason, u.suggested_test, u.needs) for n, u in found.untestable.items())
     progress("done", 1.0)
     return Diagnosis(
         verdict=judgement.verdict,

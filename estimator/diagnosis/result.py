@@ -107,11 +107,17 @@ class RejectedEffect:
 
 @dataclass(frozen=True, slots=True)
 class UntestableEffect:
-    """An effect these recordings can't tell, and the test that could."""
+    """An effect these recordings can't tell, and the test that could; ``needs`` is what must be given beside it."""
 
     name: str
     reason: str
     suggested_test: str
+    needs: str = ""
+
+    @property
+    def cure(self) -> str:
+        """What to do, in a few words."""
+        return f"give {self.needs}" if self.needs else f"drive a {self.suggested_test} test"
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,10 +25,11 @@ def statement(
     twins = sorted({twin for effect in effects for twin in effect.indistinguishable_from})
     if twins:
         parts.append(f"From torque and speed alone this can't be told from {' or '.join(twins)}.")
-    if untestable:
-        tests = " or ".join(sorted({entry.suggested_test for entry in untestable}))
-        names = ", ".join(entry.name for entry in untestable)
+    if testable := [entry for entry in untestable if not entry.needs]:
+        tests = " or ".join(sorted({entry.suggested_test for entry in testable}))
+        names = ", ".join(entry.name for entry in testable)
         parts.append(f"These recordings can't tell {names}; a {tests} test would.")
+    parts += [f"Without {entry.needs}, {entry.name} can't be told." for entry in untestable if entry.needs]
     return " ".join(parts)
 
 

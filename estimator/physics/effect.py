@@ -84,10 +84,14 @@ class Held:
 
 @dataclass(frozen=True, slots=True)
 class Untestable:
-    """Why a set of recordings can't tell whether an effect is there, and which test would."""
+    """Why a set of recordings can't tell whether an effect is there, and which test would.
+
+    ``needs`` is what must be given beside any test; without it no recording can tell.
+    """
 
     reason: str
     suggested_test: str
+    needs: str = ""
 
 
 Scales = Callable[[DrivelineModel, Sequence[Record]], tuple[float, ...]]

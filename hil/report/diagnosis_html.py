@@ -272,9 +272,9 @@ def _rivals(diagnosis: Diagnosis) -> str:
 def _untestable(diagnosis: Diagnosis) -> str:
     if not diagnosis.untestable:
         return ""
-    rows = [(entry.name, entry.reason, entry.suggested_test) for entry in diagnosis.untestable]
+    rows = [(entry.name, entry.reason, entry.cure) for entry in diagnosis.untestable]
     return html.section(
-        "What these recordings can't tell", html.table(("effect", "why", "a test that would tell"), rows)
+        "What these recordings can't tell", html.table(("effect", "why", "what would tell"), rows)
     )
 
 

@@ -49,6 +49,7 @@ def diagnosis_json(diagnosis: Diagnosis) -> Json:
         "rejected": [_rejected(rival) for rival in diagnosis.rejected],
         "untestable": [
             {"name": entry.name, "reason": entry.reason, "suggested_test": entry.suggested_test}
+            | ({"needs": entry.needs} if entry.needs else {})
             for entry in diagnosis.untestable
         ],
         "unnamed": None if diagnosis.unnamed is None else _unnamed(diagnosis.unnamed),

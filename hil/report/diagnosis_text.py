@@ -34,10 +34,7 @@ def diagnosis_summary(diagnosis: Diagnosis) -> RenderableType:
     pieces += [Text(f"rejected: {rival.name}: {rival.reason}") for rival in diagnosis.rejected[:MOST_RIVALS]]
     if len(diagnosis.rejected) > MOST_RIVALS:
         pieces.append(Text(f"rejected: {len(diagnosis.rejected) - MOST_RIVALS} more, with reasons in the report"))
-    pieces += [
-        Text(f"can't tell: {entry.name}: {entry.reason}; test: {entry.suggested_test}")
-        for entry in diagnosis.untestable
-    ]
+    pieces += [Text(f"can't tell: {entry.name}: {entry.reason}; {entry.cure}") for entry in diagnosis.untestable]
     pieces += [Text(f"note: {warning}") for warning in diagnosis.warnings]
     return Group(*pieces)
 

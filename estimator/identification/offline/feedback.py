@@ -64,7 +64,7 @@ def judge_feedback(validation: Validation) -> Feedback:
         return Feedback(False, p_value, MappingProxyType({}), statement)
     statement = (
         f"The torque follows the speed (p = {p_value:.2g}): a driver or controller closes the loop. The output-error, "
-        "recursive and spectral estimates are biased by what noise it feeds back. Use fit_box_jenkins, or "
-        "fit_instrumental with the PRBS as instrument; or record with the torque held but for the PRBS."
+        "recursive and spectral estimates are biased by what noise it feeds back. Believe the Box-Jenkins model, or "
+        "the instrumental variable with the PRBS as instrument; or record with the torque held but for the PRBS."
     )
     return Feedback(True, p_value, CONSEQUENCES, statement)

@@ -23,7 +23,8 @@ def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
 def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
     """Need the gear ratio, and motion."""
     if model.gear_ratio is None:
-        return Untestable("the model file has no [geometry] gear_ratio: the wheel's angle is unknown", "reversal")
+        reason = "the model file has no [geometry] gear_ratio: the wheel's angle is unknown"
+        return Untestable(reason, "reversal", needs="gear_ratio in the model file's [geometry]")
     return None
 
 

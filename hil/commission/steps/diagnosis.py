@@ -105,7 +105,7 @@ def _findings(result: Diagnosis) -> list[Finding]:
     ]
     findings += [stated(f"found: {effect.name}", effect.statement) for effect in result.effects]
     findings += [
-        Finding(f"can't tell: {each.name}", "–", each.reason, None, f"Test that would: {each.suggested_test}")
+        Finding(f"can't tell: {each.name}", "–", each.reason, None, f"What would: {each.cure}")
         for each in result.untestable
     ]
     return findings

@@ -86,6 +86,13 @@ def test_what_can_not_be_told_names_the_test_that_would() -> None:
     assert "can't tell coulomb_friction_motor, road_grade, stribeck_friction; a cruise or reversal test would." in said
 
 
+def test_what_no_test_would_tell_names_what_is_to_be_given() -> None:
+    needy = UntestableEffect("load_imbalance", "no gear ratio", "reversal", needs="gear_ratio in [geometry]")
+    said = statement(Judgement(Verdict.NO_MISMATCH, None, None), (), FIT, (needy,))
+    assert said.endswith("Without gear_ratio in [geometry], load_imbalance can't be told.")
+    assert "test would" not in said
+
+
 class TestRejection:
     RETUNED, BEST = of_rms(1.0, 2), of_rms(0.1, 3)
 
