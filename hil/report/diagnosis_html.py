@@ -273,9 +273,7 @@ def _untestable(diagnosis: Diagnosis) -> str:
     if not diagnosis.untestable:
         return ""
     rows = [(entry.name, entry.reason, entry.cure) for entry in diagnosis.untestable]
-    return html.section(
-        "What these recordings can't tell", html.table(("effect", "why", "what would tell"), rows)
-    )
+    return html.section("What these recordings can't tell", html.table(("effect", "why", "what would tell"), rows))
 
 
 def _parameters(diagnosis: Diagnosis) -> str:
