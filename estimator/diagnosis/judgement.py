@@ -129,7 +129,8 @@ def _objection(selection: Selection, floor: float, unnamed: UnnamedLaw | None, r
         return f"{named} would leave {law} at the {PLACE_NAMES[remaining.element]} unexplained"
     if unnamed is None or not _reads_speed(selection):  # a free-running position drifts as any flexible law does
         return ""
-    elements = {EFFECTS[name].element for name in selection.chosen}
+    named_or_alike = {*selection.chosen, *(twin for twins in selection.lookalikes.values() for twin in twins)}
+    elements = {EFFECTS[name].element for name in named_or_alike}
     rival_is_simpler = unnamed.gain.delta_bic > gain(selection.retuned, selection.result).delta_bic + VERY_STRONG
     if rival_is_simpler and (profiles or unnamed.element not in elements):
         law = kind_in_words(unnamed.terms[0][0])

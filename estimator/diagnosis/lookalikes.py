@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from estimator.diagnosis.evidence import VERY_STRONG, gain, information
 from estimator.diagnosis.hypotheses import Bench, Effects, with_effect
 from estimator.diagnosis.screening import Screen, promising
+from estimator.diagnosis.weight import PART_BESIDE
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult
 
@@ -18,7 +19,11 @@ NEARLY = 1.5
 
 
 def lookalikes(name: str, chosen: Effects, current: FitResult, bench: Bench, names: Sequence[str]) -> tuple[str, ...]:
-    """Return the effects that explain as much in an effect's place, as far as these recordings can tell."""
+    """Return the effects that explain as much in an effect's place, as far as these recordings can tell.
+
+    A rival that is beyond chance worse, but by less than any law is known to, is alike as well: a filter of second
+    order is nearer to a delay than to the catalogue's filter of first order.
+    """
     entry = EFFECTS[name]
     others = chosen - {name}
     kin = {*entry.resembles, *entry.equivalent} | {
@@ -29,6 +34,7 @@ def lookalikes(name: str, chosen: Effects, current: FitResult, bench: Bench, nam
     without = bench.fit(others, current)
     screen = Screen(without, bench.model)
     explained = min(without.squares - current.squares, screen.looks(name)[0].promise)  # a strong law bends
+    known = PART_BESIDE * (without.squares - current.squares)
     n = gain(without, current).n_effective
     for rival in rivals:
         looks = screen.looks(rival)
@@ -38,6 +44,6 @@ def lookalikes(name: str, chosen: Effects, current: FitResult, bench: Bench, nam
         if result.squares > NEARLY * current.squares:
             continue
         result = bench.fit(with_effect(others, rival), without)
-        if information(result, current, n) < VERY_STRONG:
+        if information(result, current, n) < VERY_STRONG or result.squares - current.squares < known:
             alike.add(rival)
     return tuple(sorted(alike))

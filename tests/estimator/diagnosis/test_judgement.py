@@ -193,6 +193,12 @@ class TestChosen:
             "a law of |w| at the speed reading would explain it with less than hardening or softening shaft"
         )
 
+    def test_one_whose_look_alike_is_where_the_simple_law_is_is_believed(self) -> None:
+        """From torque and speed alone the two are one; the law is at the other's element."""
+        found = self.nearly(selection(sensor_error(0.05), CUBIC, model(TWO_MASS, TIGHT)))
+        judged = judge(replace(found, lookalikes=dict.fromkeys(found.chosen, ("resolver_error",))), SIGMA)
+        assert judged.objection == ""
+
     def test_the_same_at_the_laws_own_element_is_believed(self) -> None:
         records = recordings(Element.SHAFT, lambda moved: moved.twist**3, 4e4)
         judged = judge(self.nearly(selection(records, CUBIC, model(TWO_MASS, TIGHT))), SIGMA)

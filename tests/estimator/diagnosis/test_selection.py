@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from estimator.diagnosis.evidence import VERY_STRONG, gain
+from estimator.diagnosis.evidence import VERY_STRONG, gain, information
 from estimator.diagnosis.holdout import Examiner, HoldOut
 from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects, everything, open_hypotheses
 from estimator.diagnosis.intervals import covariance, interval
@@ -76,6 +76,20 @@ def lagged(time_constant_s: float) -> list[Record]:
         behind = lfilter([0.0, 1.0 - decay], [1.0, -decay], read - read[0]) + read[0]
         true = read + (behind - read) * time_constant_s / 0.01 * (1.0 - decay)
         rec = linear_record(ONE_MASS, true, Start(5.0, 0.0, 2.0), sigma=SIGMA, seed=seed, name=f"run_{seed}")
+        found.append(replace(rec, torque_nm=read[:, None]))
+    return found
+
+
+def twice_lagged(time_constant_s: float, sigma: float, parts: int = 10) -> list[Record]:
+    """Torque behind two lags in a row, followed in parts of a period, on a mass that adds up what it gets."""
+    decay, found = np.exp(-0.01 / parts / time_constant_s), []
+    for seed in (1, 2):
+        read = drive_torque(seed, 1200)
+        behind = np.repeat(read - read[0], parts)
+        for _ in range(2):
+            behind = lfilter([1.0 - decay], [1.0, -decay], behind)
+        true = behind.reshape(-1, parts).mean(axis=1) + read[0]
+        rec = linear_record(ONE_MASS, true, Start(5.0, 0.0, 2.0), sigma=sigma, seed=seed, name=f"run_{seed}")
         found.append(replace(rec, torque_nm=read[:, None]))
     return found
 
@@ -247,6 +261,16 @@ class TestLookalikes:
     def test_a_relative_that_explains_less_is_not(self, with_coulomb: Selection) -> None:
         """Quadratic friction resembles it, and Stribeck's law contains it."""
         assert with_coulomb.lookalikes == {COULOMB: ()}
+
+    def test_what_is_worse_by_next_to_nothing_is(self) -> None:
+        """Two lags of 3 ms in a row are told from a delay beyond chance, and by next to nothing."""
+        late = {"actuator_lag", "speed_filter", "transport_delay"}
+        selection = selector(twice_lagged(0.003, sigma=0.1 * SIGMA), [*sorted(late), COULOMB]).run()
+        (chosen,) = selection.chosen
+        (rival,) = late - {chosen, "speed_filter"}
+        n = gain(selection.retuned, selection.result).n_effective
+        assert information(selection.trials[rival].result, selection.result, n) > VERY_STRONG
+        assert {chosen, *selection.lookalikes[chosen]} == late
 
     def test_what_is_the_same_by_its_equation_always_is(self) -> None:
         """Here it was no hypothesis at all."""
