@@ -21,7 +21,16 @@ from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects, Progress, ef
 from estimator.diagnosis.intervals import Z95, chance_of_coherent, reported_covariance
 from estimator.diagnosis.lookalikes import lookalikes
 from estimator.diagnosis.screening import Look, Screen, promising
-from estimator.diagnosis.trial import Trial, has_edge, healed_in, null_inside, ranks, scan_choices, values_of
+from estimator.diagnosis.trial import (
+    Trial,
+    has_edge,
+    healed_in,
+    null_inside,
+    pressed_parameters,
+    ranks,
+    scan_choices,
+    values_of,
+)
 from estimator.diagnosis.unnamed import UnnamedLaw, best_unnamed
 from estimator.diagnosis.weight import VISIBLE, Weight, earns_detail
 from estimator.physics.catalogue import EFFECTS
@@ -231,18 +240,22 @@ class Selector:
         return trials
 
     def _looks(self, names: Sequence[str], chosen: Effects, current: FitResult) -> dict[str, list[Look]]:
-        """Return the looks worth a fit: what promises a fair part of the best, or contains a chosen effect."""
+        """Return the looks worth a fit: what promises a fair part of the best, or contains a chosen effect.
+
+        And what would let a parameter go that is pressed against its bound.
+        """
         self._report("looking at every effect", 0.0)
         screen = Screen(current, self.bench.model)
         looks = dict(zip(names, concurrently(screen.looks, names), strict=True))
         promises = {name: found[0].promise for name, found in looks.items()}
         most = max((promise for promise in promises.values() if math.isfinite(promise)), default=0.0)
         least = current.squares * -math.expm1(-VERY_STRONG / current.residual.size)
-        worth: list[str] = []
+        pressed = pressed_parameters(current)
+        worth = [name for name in names if EFFECTS[name].loosens & pressed]
         for name in sorted(names, key=lambda name: -promises[name]):
             special = set(EFFECTS[name].contains)
             related = bool(special & chosen) or bool(special & set(worth))
-            if related or promises[name] >= max(WORTH_FITTING * most, least):
+            if name not in worth and (related or promises[name] >= max(WORTH_FITTING * most, least)):
                 worth.append(name)
         if not chosen:
             self._dismissed = {

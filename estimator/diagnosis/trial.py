@@ -47,6 +47,15 @@ def values_of(name: str, result: FitResult) -> dict[str, float]:
     }
 
 
+def pressed_parameters(result: FitResult) -> frozenset[str]:
+    """Return the nominal parameters that a fit has moved to a bound of what they are trusted to."""
+    return frozenset(
+        shared.name
+        for shared, pinned in zip(result.problem.shared, result.pinned, strict=False)
+        if pinned and not shared.effect and shared.low < shared.high
+    )
+
+
 def ranks(passing: Sequence[Trial], before: FitResult) -> dict[str, float]:
     """Return what trials gain over one fit, with one number of independent samples, that of the least error.
 

@@ -219,6 +219,9 @@ class Effect:
     decisive : tuple[str, ...]
         Parameters of which at least one must differ from its null; by default the amplitudes of a periodic effect, the
         first parameter that is fitted of another.
+    loosens : frozenset[str]
+        Nominal parameters that it moves beyond what they are trusted to. Where one of them is at its bound the effect
+        is fitted whatever a first look along its size promises: the look does not move them with it.
     implausible : callable
         Model, records and parameter values to the reason why such values are no case of this effect, or "".
     unresolved : callable
@@ -254,6 +257,7 @@ class Effect:
     step: Step | None = None
     phases: Mapping[str, str] = field(default_factory=dict)
     decisive: tuple[str, ...] = ()
+    loosens: frozenset[str] = frozenset()
     implausible: Callable[[DrivelineModel, Sequence[Record], Mapping[str, float]], str] = always_plausible
     unresolved: Callable[[DrivelineModel, Sequence[Record], Mapping[str, float]], str] = always_plausible
     rescaled: Callable[[Mapping[str, float]], float] = told_one_way

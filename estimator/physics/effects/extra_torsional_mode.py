@@ -22,9 +22,12 @@ def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...
 
 
 def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
-    """Return modes below, around and above the first resonance, as close as they are narrow; heavy ones far above."""
-    near = [(0.2, float(ratio), 1.0, 1.0) for ratio in np.geomspace(0.3, 5.0, 24)]
-    return [*near, *((1.5, ratio, 1.0, 0.95) for ratio in (3.0, 4.0, 5.0, 6.0))]
+    """Return heavy modes far above the first resonance, and light ones below, around and above it, as close as narrow.
+
+    The heavy ones come first: where only what their spring does to the line shows, nothing else tells them apart.
+    """
+    heavy = [(1.5, ratio, 1.0, 0.95) for ratio in (3.0, 4.0, 5.0, 6.0)]
+    return [*heavy, *((0.2, float(ratio), 1.0, 1.0) for ratio in np.geomspace(0.3, 5.0, 24))]
 
 
 def sentence(values: Mapping[str, float], motion: Motion) -> str:
@@ -64,5 +67,6 @@ EFFECT = Effect(
     starts=starts,
     sentence=sentence,
     decisive=("inertia_kg_m2", "line_share"),
+    loosens=frozenset({"k", "c"}),  # a spring in the line softens it by s and lowers its damping by s^2
     implausible=implausible,
 )

@@ -14,7 +14,7 @@ from estimator.diagnosis.holdout import Examiner, HoldOut
 from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects, everything, open_hypotheses
 from estimator.diagnosis.intervals import covariance, interval
 from estimator.diagnosis.noise import noise_floor
-from estimator.diagnosis.screening import Screen
+from estimator.diagnosis.screening import Look, Screen
 from estimator.diagnosis.selection import (
     MOST_EFFECTS,
     MOST_FITS,
@@ -29,6 +29,7 @@ from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult
 from estimator.physics.own_scan import MOST_CELLS
 from estimator.physics.simulate import Start
+from estimator.physics.unknowns import Release
 from estimator.signals.record import Record
 from tests.estimator.diagnosis.planted import SIGMA, Friction, drive_torque, quiet, rubbing, rubbing_speed
 from tests.estimator.diagnosis.regression import of_rms
@@ -313,6 +314,16 @@ class TestEvents:
         assert choices >= scan_choices("brake_drag", braked.result)
         assert trial.gain.delta_bic == pytest.approx(plain.delta_bic - 2.0 * choices)
         assert trial.p_value == pytest.approx(min(1.0, plain.p_value * 3 * np.exp(choices)))
+
+
+def test_what_lets_a_pressed_parameter_go_is_fitted_whatever_a_look_promises(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A spring in the line takes its damping below what it is trusted to; a look along its size shows nothing of it."""
+    select = selector(quiet(values=ONE_MASS, samples=600), [COULOMB, "extra_torsional_mode"], floor=0.1)
+    monkeypatch.setattr(Screen, "looks", lambda *_: [Look(Release((), ()), 0.0)])
+    current = select.bench.fit(NOTHING)
+    for pressed, looked_at in ((frozenset(), set()), (frozenset({"c"}), {"extra_torsional_mode"})):
+        monkeypatch.setattr("estimator.diagnosis.selection.pressed_parameters", lambda _, found=pressed: found)
+        assert set(select._looks(select.names, NOTHING, current)) == looked_at
 
 
 class TestRules:

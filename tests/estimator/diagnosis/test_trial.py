@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis.evidence import gain, information
-from estimator.diagnosis.trial import Trial, ranks
+from estimator.diagnosis.hypotheses import NOTHING, Bench, everything
+from estimator.diagnosis.trial import Trial, pressed_parameters, ranks
+from estimator.physics.simulate import Start
 from tests.estimator.diagnosis.regression import of_rms
+from tests.estimator.physics.bench import TWO_MASS, linear_record, model, random_steps
 
 LAG, FILTER, DELAY = "actuator_lag", "speed_filter", "transport_delay"
 RETUNED = of_rms(1.0, 2)
@@ -53,3 +56,13 @@ def test_how_correlated_an_error_is_does_not_decide() -> None:
     assert trials[1].gain.delta_bic > trials[0].gain.delta_bic
     found = ranks(trials, RETUNED)
     assert found[LAG] > found[DELAY]
+
+
+@pytest.mark.parametrize(("factor", "pressed"), [(1.1, frozenset()), (1.5, frozenset({"k"}))])
+def test_a_parameter_that_should_go_further_than_it_is_trusted_to_is_pressed(
+    factor: float, pressed: frozenset[str]
+) -> None:
+    """A shaft 10 % softer than the nominal one is re-tuned, one a third softer ends at the bound of 20 %."""
+    record = linear_record(TWO_MASS, random_steps(1500, 3), Start(5.0, 0.0, 2.0), sigma=0.02)
+    nominal = model(TWO_MASS | {"k": factor * TWO_MASS["k"]})
+    assert pressed_parameters(Bench(nominal, [record], everything([record])).fit(NOTHING)) & {"k"} == pressed
