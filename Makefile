@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN    := .venv/bin
 READY  := .venv/.ready
 
-.PHONY: setup demo prove test campaign bench docs lint lock clean
+.PHONY: setup demo prove test kernels campaign bench docs lint lock clean
 
 setup: $(READY)
 
@@ -21,8 +21,13 @@ demo: $(READY)
 prove: $(READY)
 	$(BIN)/hil prove --out out/proof
 
-test: lint
+test: $(READY)
+	$(MAKE) --jobs 2 --output-sync lint kernels
 	$(BIN)/python -m pytest -n 2 -m "not campaign"
+
+# Compiled once, while lint has the other core; else both of pytest's workers would.
+kernels: $(READY)
+	$(BIN)/python -m tests.kernels
 
 # What takes too long for every change.
 campaign: $(READY)

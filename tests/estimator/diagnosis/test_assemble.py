@@ -22,6 +22,7 @@ from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects, everything
 from estimator.diagnosis.noise import effective_samples
 from estimator.diagnosis.result import FoundEffect
 from estimator.diagnosis.selection import Selection, Selector
+from estimator.diagnosis.weight import Weight
 from estimator.physics.catalogue import effect_problems
 from estimator.physics.effect import Element
 from estimator.physics.free_run import free_run
@@ -68,7 +69,7 @@ def assembled(records: list[Record], *names: str) -> tuple[Selection, Examiner]:
     result = retuned
     for count in range(1, len(names) + 1):
         result = bench.fit(frozenset(names[:count]), result)
-    select = Selector(bench, examiner, names, SIGMA, lambda message, share: None)
+    select = Selector(bench, examiner, names, Weight(SIGMA), lambda message, share: None)
     trials = {}
     for name in names:
         without = bench.fit(chosen - {name}, result)
@@ -201,7 +202,7 @@ def brake() -> FoundEffect:
         )
         records.append(replace(rec, time_s=rec.time_s + 100.0))
     bench, examiner = Bench(LINE, records, everything(records)), Examiner(LINE, records, ())
-    selection = Selector(bench, examiner, ["brake_drag"], SIGMA, lambda message, share: None).run()
+    selection = Selector(bench, examiner, ["brake_drag"], Weight(SIGMA), lambda message, share: None).run()
     (found,) = found_effects(selection, LINE, examiner)
     return found
 

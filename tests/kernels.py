@@ -1,0 +1,30 @@
+"""``python -m tests.kernels``: compile what most tests need, once and on one core, while lint has the other.
+
+In a fresh clone two workers would compile the same kernels at the same time.
+"""
+
+from __future__ import annotations
+
+from contextlib import suppress
+
+from estimator.diagnosis.diagnose import diagnose
+from estimator.errors import EstimatorError
+from estimator.identification.identify import Settings
+from hil.rig.live import tracking_settings
+from hil.rig.live_replay import Pace, play_record
+from tests.benchmarks.cases import make
+
+SHORT_S = 4.0
+
+
+def main() -> None:
+    """Run the truth, the diagnosis and both on-line chains over a few seconds."""
+    case = make("backlash", 1, SHORT_S)
+    with suppress(EstimatorError):  # so short they need not tell anything: all there is to compile has been by then
+        diagnose(case.records, case.model)
+    for settings in (Settings(), tracking_settings()):
+        play_record(case.records[0], settings, Pace(), lambda course, now_s: None, None)
+
+
+if __name__ == "__main__":
+    main()
