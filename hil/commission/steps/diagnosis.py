@@ -105,7 +105,7 @@ def _findings(result: Diagnosis) -> list[Finding]:
     ]
     findings += [stated(f"found: {effect.name}", effect.statement) for effect in result.effects]
     findings += [
-        Finding(f"can't tell: {each.name}", "–", each.reason, None, f"What would: {each.cure}")
+        Finding(f"can't tell: {each.name}", "–", each.reason, None, f"{each.cure[0].upper()}{each.cure[1:]}.")
         for each in result.untestable
     ]
     return findings
