@@ -132,3 +132,17 @@ def test_single_readings_that_are_off_are_the_acquisitions() -> None:
     assert found.element is Element.ACQUISITION
     assert found.terms[0] == ("the single readings that are off", pytest.approx(1.0, rel=0.05))
     assert found.rms == pytest.approx(SIGMA, rel=0.1)
+
+
+def test_strays_that_pulled_the_fit_away_are_seen_all_the_same() -> None:
+    """One in sixty, of 150 times the noise: the rest is off slowly by then, and few samples of it are independent."""
+    rng = np.random.default_rng(8)
+    spoilt = []
+    for rec in quiet():
+        output, count = rec.output.copy(), rec.output.size // 60
+        output[rng.choice(output.size, count, replace=False)] += 150.0 * SIGMA * rng.choice([-1.0, 1.0], count)
+        spoilt.append(replace(rec, output=output))
+    found = best_unnamed(nominal_fit(spoilt))
+    assert found is not None
+    assert found.element is Element.ACQUISITION
+    assert found.terms[0] == ("the single readings that are off", pytest.approx(150.0 * SIGMA, rel=0.05))
