@@ -8,8 +8,10 @@ from dataclasses import dataclass
 from estimator.diagnosis.chain import Chain
 from estimator.diagnosis.holdout import Examiner
 from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects, Progress, everything, open_hypotheses
+from estimator.diagnosis.judgement import judge
 from estimator.diagnosis.noise import noise_floor
-from estimator.diagnosis.selection import Selection, Selector
+from estimator.diagnosis.result import Verdict
+from estimator.diagnosis.selection import Jury, Selection, Selector
 from estimator.diagnosis.weight import VISIBLE, Weight
 from estimator.physics.effect import Untestable
 from estimator.physics.model import DrivelineModel
@@ -54,5 +56,8 @@ def _searched(chain: Chain, model: DrivelineModel, unseen: Sequence[Record], pro
     floor = noise_floor(chain.records)
     names, untestable = open_hypotheses(model, chain.records)
     weight = Weight(floor, least_ratio=VISIBLE if chain.torque_is_unknown else 1.0)
-    selection = Selector(bench, examiner, names, weight, progress).run()
+    selector = Selector(Jury(bench, examiner, names, weight), progress)
+    selection = selector.run()
+    if judge(selection, floor, chain.findings).verdict is Verdict.UNEXPLAINED:
+        selection = selector.by_other_ways(selection)
     return Search(chain, bench, examiner, floor, selection, untestable)

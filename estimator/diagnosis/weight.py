@@ -61,11 +61,19 @@ class Weight:
         """
         if before.rms < self.least_ratio * after.rms:
             return False
-        mismatch = max(retuned.rms**2 - self.floor**2, retuned.rms**2 - after.rms**2)
+        mismatch = self._mismatch(after, retuned)
         share = (before.rms**2 - after.rms**2) / mismatch
         if share >= PART_OF_MISMATCH:
             return True
         return share >= PART_BESIDE and not _echoes(name, effects - {name}) and self.visible(before, after)
+
+    def leaves_room(self, current: FitResult, retuned: FitResult) -> bool:
+        """Tell whether a fit leaves as much above the noise as a further effect must remove to count."""
+        standing = current.rms**2 - self.level(current) ** 2
+        return standing >= PART_BESIDE * self._mismatch(current, retuned)
+
+    def _mismatch(self, after: FitResult, retuned: FitResult) -> float:
+        return max(retuned.rms**2 - self.floor**2, retuned.rms**2 - after.rms**2)
 
 
 def _echoes(name: str, others: Effects) -> bool:

@@ -32,7 +32,7 @@ CLOSE = 1.1
 """Squared error, over the best start's, up to which a start goes on."""
 
 BAD = 1e3
-"""A simulation that runs away counts as this many times the output's range wrong."""
+"""A simulation that runs away counts as this many times the largest output."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,10 +208,10 @@ def simulated_each(problem: Problem, points: Sequence[tuple[FloatArray, FloatArr
     record, basis = problem.records[index], problem.local[index]
     cases = [Case(basis.parameters(p, local), basis.start(local), basis.extra_load(local)) for p, local in points]
     out = simulate_each(problem.grid, record, cases)
-    if np.isfinite(out).all():
+    worst = BAD * (float(np.abs(record.output[record.okay]).max()) or 1.0)
+    if np.abs(out).max() <= worst:  # False where it is no number
         return out
-    worst = BAD * float(np.ptp(record.output[record.okay]))
-    return np.nan_to_num(out, nan=worst, posinf=worst, neginf=-worst)
+    return np.clip(np.nan_to_num(out, nan=worst), -worst, worst)
 
 
 def _stack(problem: Problem, arrays: Sequence[FloatArray]) -> FloatArray:

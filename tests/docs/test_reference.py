@@ -11,7 +11,8 @@ from pydantic import BaseModel
 
 from drivers.inverter.drive_settings import OPTION_CODES
 from drivers.plc.map_needs import USED
-from estimator.diagnosis import evidence, holdout, judgement, noise, selection, weight
+from estimator.diagnosis import evidence, holdout, judgement, noise, weight
+from estimator.diagnosis.selection import jury, rounds, selector
 from estimator.diagnosis.where import locate
 from estimator.physics import own_law
 from hil.cli.main import ExitStatus
@@ -90,7 +91,7 @@ def test_the_thresholds_of_a_verdict_are_those_of_the_code() -> None:
     page = re.sub(r"\s+", " ", text("diagnosis.md"))
     for said in (
         f"ΔBIC of at least {evidence.VERY_STRONG:.0f}",
-        f"p ≤ {selection.SIGNIFICANT:g} after",
+        f"p ≤ {jury.SIGNIFICANT:g} after",
         f"removes {weight.PART_OF_MISMATCH:.0%}".replace("%", " %") + " of the first mismatch's power",
         f"{weight.VISIBLE - 1:.0%}".replace("%", " %") + " of the RMS, half of what stands",
         f"{weight.PART_BESIDE:.1%}".replace("%", " %") + " of the first mismatch's power",
@@ -102,15 +103,18 @@ def test_the_thresholds_of_a_verdict_are_those_of_the_code() -> None:
         f"central {locate.CENTRAL:.0%}".replace("%", " %"),
     ):
         assert said in page
-    assert selection.PART_UNSEEN == 0.25
+    assert jury.PART_UNSEEN == 0.25
     assert "at least a quarter" in page
-    assert selection.MOST_EFFECTS == 4
+    assert selector.MOST_EFFECTS == 4
     assert "up to four effects" in page
     assert judgement.MOST == 0.8
     assert "a fifth or more of the mismatch's power" in page
     assert f"{judgement.NEAR_FLOOR:g} times the noise" in page
     assert f"{judgement.NEAR_FLOOR_PROFILE:g} times for a load profile alone" in page
-    assert selection.WORTH_FITTING == 0.2
+    assert selector.OTHER_WAYS == 3
+    assert "each of the three that leave least begins a way" in page
+    assert f"ends within {selector.NEAR_NOISE:g} times the noise" in page
+    assert rounds.WORTH_FITTING == 0.2
     assert "less than a fifth of the best one's part" in page
 
 

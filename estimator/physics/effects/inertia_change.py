@@ -32,7 +32,7 @@ EFFECT = Effect(
     source="the vehicle's mass at the wheel, m r^2: Gillespie, Fundamentals of Vehicle Dynamics, SAE 1992",
     excited_by="acceleration before and after the change",
     parameters=(
-        EffectParameter("change_kg_m2", "inertia", 0.0, -9.0, 40.0, "change of the inertia: delta"),
+        EffectParameter("change_kg_m2", "inertia", 0.0, -7.0, 40.0, "change of the inertia: delta"),
         *MOMENTS,
     ),
     structures=EVERY_LINE,

@@ -21,7 +21,7 @@ from estimator.diagnosis.holdout import Examiner
 from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects, everything
 from estimator.diagnosis.noise import effective_samples
 from estimator.diagnosis.result import FoundEffect
-from estimator.diagnosis.selection import Selection, Selector
+from estimator.diagnosis.selection import Jury, Selection, Selector
 from estimator.diagnosis.weight import Weight
 from estimator.physics.catalogue import effect_problems
 from estimator.physics.effect import Element
@@ -69,11 +69,11 @@ def assembled(records: list[Record], *names: str) -> tuple[Selection, Examiner]:
     result = retuned
     for count in range(1, len(names) + 1):
         result = bench.fit(frozenset(names[:count]), result)
-    select = Selector(bench, examiner, names, Weight(SIGMA), lambda message, share: None)
+    jury = Jury(bench, examiner, names, Weight(SIGMA))
     trials = {}
     for name in names:
         without = bench.fit(chosen - {name}, result)
-        trials[name] = select._examined(select._trial(name, chosen, without, result), without)
+        trials[name] = jury.examined(jury.trial(name, chosen, without, result), without)
     return outcome(retuned, chosen, result, trials=trials), examiner
 
 
@@ -202,7 +202,7 @@ def brake() -> FoundEffect:
         )
         records.append(replace(rec, time_s=rec.time_s + 100.0))
     bench, examiner = Bench(LINE, records, everything(records)), Examiner(LINE, records, ())
-    selection = Selector(bench, examiner, ["brake_drag"], Weight(SIGMA), lambda message, share: None).run()
+    selection = Selector(Jury(bench, examiner, ["brake_drag"], Weight(SIGMA)), lambda message, share: None).run()
     (found,) = found_effects(selection, LINE, examiner)
     return found
 

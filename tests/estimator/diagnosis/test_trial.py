@@ -1,4 +1,4 @@
-"""Ranks of rivals, with one number of independent samples for all."""
+"""One trial: ranks of rivals with one number of independent samples for all, and nulls."""
 
 from __future__ import annotations
 
@@ -7,11 +7,15 @@ import pytest
 
 from estimator.diagnosis.evidence import gain, information
 from estimator.diagnosis.hypotheses import NOTHING, Bench, everything
-from estimator.diagnosis.trial import Trial, pressed_parameters, ranks
+from estimator.diagnosis.intervals import covariance, interval
+from estimator.diagnosis.trial import Trial, null_inside, pressed_parameters, ranks
+from estimator.physics.fit import FitResult
 from estimator.physics.simulate import Start
+from tests.estimator.diagnosis.planted import Friction, rubbing
 from tests.estimator.diagnosis.regression import of_rms
-from tests.estimator.physics.bench import TWO_MASS, linear_record, model, random_steps
+from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, linear_record, model, random_steps
 
+ONE, COULOMB = model(ONE_MASS), "coulomb_friction_motor"
 LAG, FILTER, DELAY = "actuator_lag", "speed_filter", "transport_delay"
 RETUNED = of_rms(1.0, 2)
 
@@ -66,3 +70,23 @@ def test_a_parameter_that_should_go_further_than_it_is_trusted_to_is_pressed(
     record = linear_record(TWO_MASS, random_steps(1500, 3), Start(5.0, 0.0, 2.0), sigma=0.02)
     nominal = model(TWO_MASS | {"k": factor * TWO_MASS["k"]})
     assert pressed_parameters(Bench(nominal, [record], everything([record])).fit(NOTHING)) & {"k"} == pressed
+
+
+class TestNull:
+    def fitted(self, friction: Friction) -> FitResult:
+        records = rubbing(friction)
+        bench = Bench(ONE, records, everything(records))
+        return bench.fit(frozenset({COULOMB}), bench.fit(NOTHING))
+
+    def test_an_interval_that_excludes_the_null_tells(self) -> None:
+        assert not null_inside(COULOMB, self.fitted(lambda speed: 12.0))
+
+    def test_an_effect_that_is_not_there_includes_it(self) -> None:
+        result = self.fitted(lambda speed: 0.0)
+        index = [(s.effect, s.name) for s in result.problem.shared].index((COULOMB, "friction_nm"))
+        low, high = interval(result, covariance(result), index)
+        assert null_inside(COULOMB, result)
+        assert low <= 0.0 <= high
+
+    def test_a_profile_has_no_single_null(self) -> None:
+        assert not null_inside("road_grade", self.fitted(lambda speed: 12.0))

@@ -1,0 +1,55 @@
+"""What a selection comes to."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from estimator.diagnosis.evidence import VERY_STRONG
+from estimator.diagnosis.hypotheses import Effects
+from estimator.diagnosis.selection.jury import SIGNIFICANT
+from estimator.diagnosis.trial import Trial
+from estimator.diagnosis.unnamed import UnnamedLaw, best_unnamed
+from estimator.diagnosis.weight import VISIBLE
+from estimator.physics.fit import FitResult
+
+
+@dataclass(frozen=True, slots=True)
+class Selection:
+    """The outcome of a selection.
+
+    Attributes
+    ----------
+    chosen : frozenset of str
+        The effects that earned their place; ``result`` is their fit, ``retuned`` the one without any.
+    accepted : mapping of str to Trial
+        Each chosen effect's last trial.
+    trials : mapping of str to Trial
+        The first trial of every effect that was fitted.
+    dismissed : mapping of str to float
+        Effects not worth a fit: the share of the squared error that a first look found them to explain.
+    lookalikes : mapping of str to tuple of str
+        Per chosen effect, those that explain the same as well: the recordings can't tell them apart.
+    unnamed : UnnamedLaw or None
+        The best law without a name for what the re-tuned nominal leaves, where it counts.
+    remaining : UnnamedLaw or None
+        The best one for what the chosen effects leave, where it counts.
+    """
+
+    retuned: FitResult
+    chosen: Effects
+    result: FitResult
+    accepted: Mapping[str, Trial]
+    trials: Mapping[str, Trial]
+    dismissed: Mapping[str, float]
+    lookalikes: Mapping[str, tuple[str, ...]]
+    unnamed: UnnamedLaw | None
+    remaining: UnnamedLaw | None
+
+
+def counting_law(result: FitResult) -> UnnamedLaw | None:
+    """Return the law without a name that best explains what a fit leaves, if it is beyond chance and visible."""
+    law = best_unnamed(result)
+    if law is None or law.gain.delta_bic < VERY_STRONG or law.gain.p_value > SIGNIFICANT:
+        return None
+    return law if result.rms >= VISIBLE * law.rms else None

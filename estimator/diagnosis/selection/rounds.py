@@ -1,0 +1,124 @@
+"""A round: every effect looked at on top of those chosen, and what could matter fitted."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+from estimator.diagnosis.evidence import VERY_STRONG
+from estimator.diagnosis.hypotheses import NOTHING, Effects, Progress, effects_of, with_effect
+from estimator.diagnosis.screening import Look, Screen, promising
+from estimator.diagnosis.selection.jury import Jury
+from estimator.diagnosis.trial import Trial, pressed_parameters
+from estimator.physics.catalogue import EFFECTS
+from estimator.physics.fit import FitResult
+from estimator.physics.parallel import concurrently
+
+WORTH_FITTING = 0.2
+"""Share of the best first look's promise below which an effect is not fitted."""
+
+MOST_FITS = 10
+"""Effects that are fitted in a round, the most promising ones."""
+
+WORTH_FINISHING = 0.5
+"""Share of the best rough fit's gain below which a rival's fit is not finished."""
+
+
+@dataclass
+class Rounds:
+    """Tries effects, and remembers the first trial of each.
+
+    Attributes
+    ----------
+    trials : mapping of str to Trial
+        The first trial of every effect that was fitted.
+    dismissed : mapping of str to float
+        Effects not worth a fit in the first round, with the share of the squared error they promise to explain.
+    """
+
+    jury: Jury
+    progress: Progress
+    trials: dict[str, Trial] = field(default_factory=dict)
+    dismissed: dict[str, float] = field(default_factory=dict)
+    _count: int = 0
+
+    def try_all(
+        self, chosen: Effects, current: FitResult, without: Effects = NOTHING, least: float = 0.0
+    ) -> dict[str, Trial]:
+        """Look at every effect but some, fit what could matter a few steps, and to the end what comes near the best.
+
+        ``least`` is the fall of the squared error that an effect must promise to be fitted.
+        """
+        superseded = {name for have in chosen for name in EFFECTS[have].contains}
+        names = [name for name in self.jury.names if name not in chosen | superseded | without]
+        looks = self._looks(names, chosen, current, least)
+        titles = ", ".join(EFFECTS[name].title for name in looks)
+        self._report(f"testing {titles}", 0.3)
+        fits = concurrently(
+            lambda name: self.jury.bench.rough_fit(
+                with_effect(chosen, name), current, [look.release for look in looks[name]]
+            ),
+            list(looks),
+        )
+        rough = dict(zip(looks, fits, strict=True))
+        most = max((current.squares - result.squares for result in rough.values()), default=0.0)
+        self._report("finishing the best of them", 0.7)
+
+        def finished(name: str) -> Trial:
+            effects = with_effect(chosen, name)
+            near = current.squares - rough[name].squares >= WORTH_FINISHING * most
+            result = self.jury.bench.fit(effects, current) if near else rough[name]
+            return self.jury.trial(name, effects, current, result)
+
+        trials = dict(zip(rough, concurrently(finished, list(rough)), strict=True))
+        self._count += 1
+        self.trials = trials | self.trials
+        return trials
+
+    def _looks(
+        self, names: Sequence[str], chosen: Effects, current: FitResult, least: float = 0.0
+    ) -> dict[str, list[Look]]:
+        """Return the looks worth a fit: what promises a fair part of the best, or contains a chosen effect.
+
+        And what would let a parameter go that is pressed against its bound.
+        """
+        self._report("looking at every effect", 0.0)
+        screen = Screen(current, self.jury.bench.model)
+        looks = dict(zip(names, concurrently(screen.looks, names), strict=True))
+        promises = {name: found[0].promise for name, found in looks.items()}
+        most = max((promise for promise in promises.values() if math.isfinite(promise)), default=0.0)
+        least = max(least, WORTH_FITTING * most, current.squares * -math.expm1(-VERY_STRONG / current.residual.size))
+        pressed = pressed_parameters(current)
+        worth = [name for name in names if EFFECTS[name].loosens & pressed]
+        for name in sorted(names, key=lambda name: -promises[name]):
+            special = set(EFFECTS[name].contains)
+            related = bool(special & chosen) or bool(special & set(worth))
+            if name not in worth and (related or promises[name] >= least):
+                worth.append(name)
+        if not chosen:
+            self.dismissed = {
+                name: max(promises[name], 0.0) / current.squares for name in names if name not in worth[:MOST_FITS]
+            }
+        return {name: promising(looks[name]) for name in worth[:MOST_FITS]}
+
+    def _report(self, what: str, part: float) -> None:
+        share = 0.9 * (1.0 - 0.5**self._count * (1.0 - 0.5 * part))  # a round is half of the rest
+        self.progress(what, share)
+
+    def finished_first(self, retuned: FitResult) -> list[Trial]:
+        """Return the effects of the first round, each fitted to its end, the one that leaves least first."""
+        alone = [trial for trial in self.trials.values() if len(trial.effects) == 1]
+
+        def finished(trial: Trial) -> Trial:
+            return self.jury.trial(trial.name, trial.effects, retuned, self.jury.bench.fit(trial.effects, retuned))
+
+        self._report("finishing all of them", 0.0)
+        trials = concurrently(finished, alone)
+        self.trials |= {trial.name: trial for trial in trials}
+        return sorted(trials, key=lambda trial: trial.result.squares)
+
+    def let_go(self, kept: FitResult) -> None:
+        """Let the derivatives of what lost a round go."""
+        self.jury.bench.let_go(effects_of(kept))
+        self.trials = {name: replace(trial, result=trial.result.light()) for name, trial in self.trials.items()}

@@ -1,0 +1,174 @@
+"""Effects added one by one: the way that gains most first, and others where that one ends in doubt."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from estimator.diagnosis.evidence import VERY_STRONG, gain, information
+from estimator.diagnosis.hypotheses import NOTHING, Effects, Progress
+from estimator.diagnosis.lookalikes import lookalikes
+from estimator.diagnosis.selection.jury import Jury
+from estimator.diagnosis.selection.outcome import Selection, counting_law
+from estimator.diagnosis.selection.rounds import Rounds
+from estimator.diagnosis.trial import Trial
+from estimator.diagnosis.unnamed import UnnamedLaw
+from estimator.diagnosis.weight import VISIBLE
+from estimator.physics.catalogue import EFFECTS
+from estimator.physics.fit import FitResult
+
+MOST_EFFECTS = 4
+
+NEAR_NOISE = 1.5
+"""Error over the noise that an explanation may leave: another way to write the same law leaves that much."""
+
+OTHER_WAYS = 3
+"""Effects that another way begins with, those that by themselves leave least."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Path:
+    """Effects chosen so far, their fit, and the trial of each."""
+
+    chosen: Effects
+    current: FitResult
+    accepted: Mapping[str, Trial]
+
+
+class Selector:
+    """Runs the selection before one jury."""
+
+    def __init__(self, jury: Jury, progress: Progress) -> None:
+        self.jury = jury
+        self._progress = progress
+        self._rounds = Rounds(jury, progress)
+        self._laws: dict[int, tuple[FitResult, UnnamedLaw | None]] = {}
+
+    def run(self) -> Selection:
+        """Add effects while one earns its place; then drop those that the others made superfluous."""
+        retuned = self.jury.bench.fit(NOTHING)
+        return self._concluded(self._grown(_Path(NOTHING, retuned, {}), retuned), retuned)
+
+    def by_other_ways(self, selection: Selection) -> Selection:
+        """Return the best of a selection that is in doubt and of those that begin with other effects.
+
+        Of two effects that hide each other none passes alone: each moves the free run by more than what the other
+        leaves, and pays for itself out of an error that stays correlated. And a load profile bends to imitate two at
+        once: where it seems to have done so, it is left out.
+        """
+        retuned = selection.retuned
+        old = path = _Path(selection.chosen, selection.result, selection.accepted)
+        without = _profiles(path.chosen) if self._is_near(path.current) else NOTHING
+        for first in self._firsts(retuned, without):
+            path = self._better(path, self._completed(first, retuned, without), retuned)
+            if path is not old and self._is_near(path.current):
+                break
+        return selection if path is old else self._concluded(self._grown(path, retuned), retuned)
+
+    def _firsts(self, retuned: FitResult, without: Effects) -> list[Trial]:
+        """Return the trials that other ways begin with; a general law comes after its special case, where it pays."""
+        alone = self._rounds.finished_first(retuned)
+        names = {trial.name for trial in alone}
+        firsts = [t for t in alone if t.name not in without and not names & set(EFFECTS[t.name].contains)]
+        return firsts[:OTHER_WAYS]
+
+    def _completed(self, first: Trial, retuned: FitResult, without: Effects) -> _Path:
+        """Return the way that begins with an effect, and ends there or with one that completes the explanation."""
+        way = self._with(_Path(NOTHING, retuned, {}), first, retuned)
+        standing = way.current.squares - self.jury.weight.level(way.current) ** 2 * way.current.residual.size
+        if self._is_near(way.current):
+            return way
+        trials = self._rounds.try_all(way.chosen, way.current, without, 0.5 * standing)
+        best = self.jury.best(trials, way.current, retuned)
+        return way if best is None else self._with(way, best, retuned)
+
+    def _concluded(self, path: _Path, retuned: FitResult) -> Selection:
+        chosen, current = path.chosen, path.current
+        if any(EFFECTS[name].event for name in chosen):
+            current = self.jury.bench.settle(chosen)
+        accepted = {
+            name: self.jury.final(name, chosen, current, trial)
+            for name, trial in path.accepted.items()
+            if name in chosen
+        }
+        alike = {name: lookalikes(name, chosen, current, self.jury.bench, self.jury.names) for name in chosen}
+        self._progress("looking for laws without a name", 0.9)
+        return Selection(
+            retuned,
+            chosen,
+            current,
+            accepted,
+            self._rounds.trials,
+            self._rounds.dismissed,
+            alike,
+            unnamed=self._law(retuned),
+            remaining=self._law(current) if chosen else None,
+        )
+
+    def _grown(self, path: _Path, retuned: FitResult, rounds: int = MOST_EFFECTS, without: Effects = NOTHING) -> _Path:
+        """Add effects to a path while one earns its place.
+
+        A further round of fits is only made where some law, named or not, still has something to explain.
+        """
+        for _ in range(MOST_EFFECTS - len(path.chosen)):
+            if path.chosen and not self._has_rest(path.current, retuned):
+                break
+            trials = self._rounds.try_all(path.chosen, path.current)
+            best = self.jury.best(trials, path.current, retuned)
+            self._rounds.let_go(path.current if best is None else best.result)
+            if best is None:
+                break
+            path = self._with(path, best, retuned)
+        return path
+
+    def _with(self, path: _Path, best: Trial, retuned: FitResult) -> _Path:
+        """Return a path with the effects of a trial, less those it made superfluous."""
+        accepted = {name: path.accepted.get(name, best) for name in best.effects} | {best.name: best}
+        whole = self.jury.bench.fit(best.effects, best.result)
+        return _Path(*self._drop_superfluous(best.effects, whole, retuned), accepted)
+
+    def _better(self, path: _Path, other: _Path, retuned: FitResult) -> _Path:
+        """Return the better of two paths; where nothing was found, another way must end near the noise."""
+        if not self._stands(other) or not (path.chosen or self._is_near(other.current)):
+            return path
+        n = gain(retuned, other.current).n_effective
+        return other if information(path.current, other.current, n) > 0.0 else path
+
+    def _stands(self, path: _Path) -> bool:
+        """Tell whether every effect of a path passes beside the others."""
+        for name in path.chosen:
+            without = self.jury.bench.fit(path.chosen - {name}, path.current)
+            if self.jury.trial(name, path.chosen, without, path.current).failed is not None:
+                return False
+        return True
+
+    def _drop_superfluous(self, chosen: Effects, current: FitResult, retuned: FitResult) -> tuple[Effects, FitResult]:
+        for name in sorted(chosen) if len(chosen) > 1 else ():
+            without = self.jury.bench.fit(chosen - {name}, current)
+            gained = gain(without, current)
+            if gained.delta_bic < VERY_STRONG or not self.jury.weight.counts(name, chosen, current, without, retuned):
+                return self._drop_superfluous(chosen - {name}, without, retuned)
+        return chosen, current
+
+    def _law(self, result: FitResult) -> UnnamedLaw | None:
+        """Return the law without a name that counts for what a fit leaves; each fit is searched once."""
+        known = self._laws.get(id(result))
+        if known is None:
+            known = self._laws[id(result)] = (result, counting_law(result))
+        return known[1]
+
+    def _is_near(self, result: FitResult) -> bool:
+        return result.rms <= NEAR_NOISE * self.jury.weight.level(result)
+
+    def _has_rest(self, current: FitResult, retuned: FitResult) -> bool:
+        """Tell whether what a fit leaves could make another effect count, and is no noise.
+
+        Next to the noise some law without a name must find something in it.
+        """
+        if not self.jury.weight.leaves_room(current, retuned):
+            return False
+        return current.rms >= VISIBLE * self.jury.weight.level(current) or self._law(current) is not None
+
+
+def _profiles(names: Effects) -> Effects:
+    return frozenset(name for name in names if EFFECTS[name].profile)

@@ -1,0 +1,75 @@
+"""Where a selection is in doubt, others that begin with other effects are looked at."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from estimator.diagnosis.chain import read_through
+from estimator.diagnosis.hypotheses import NOTHING
+from estimator.diagnosis.search import search
+from estimator.diagnosis.selection import Selection, Selector
+from tests.estimator.diagnosis.planted import quiet, rubbing
+from tests.estimator.diagnosis.selection.mass import COULOMB, LINE, coulomb, late, selector, silent
+from tests.estimator.physics.bench import ONE_MASS
+
+BOTH = {COULOMB, "transport_delay"}
+
+
+def nothing_of(selection: Selection) -> Selection:
+    """As if no effect had passed alone."""
+    return replace(selection, chosen=NOTHING, result=selection.retuned, accepted={})
+
+
+@pytest.fixture(scope="module")
+def select() -> Selector:
+    return selector(late(rubbing(coulomb), 3))
+
+
+@pytest.fixture(scope="module")
+def found(select: Selector) -> Selection:
+    return select.run()
+
+
+def test_two_of_which_none_passed_alone_are_found_together(select: Selector, found: Selection) -> None:
+    other = select.by_other_ways(nothing_of(found))
+    assert other.chosen == BOTH
+    assert other.result.rms == pytest.approx(found.result.rms, rel=1e-3)
+    assert set(other.accepted) == BOTH
+
+
+def test_a_profile_that_imitated_them_is_left_out(select: Selector, found: Selection) -> None:
+    """It leaves as little, and takes all its knots for that."""
+    assert found.accepted
+    bent = select.jury.bench.fit(frozenset({"road_grade"}), found.retuned)
+    alike = replace(bent, residual=found.result.residual)
+    imitated = replace(found, chosen=frozenset({"road_grade"}), result=alike, accepted={})
+    assert select.by_other_ways(imitated).chosen == BOTH
+
+
+def test_what_is_better_stays(select: Selector, found: Selection) -> None:
+    assert select.by_other_ways(found) is found
+
+
+def test_a_way_from_nothing_must_end_near_the_noise() -> None:
+    """Friction alone explains a part; without the delay among the hypotheses it is no explanation."""
+    select = selector(late(rubbing(coulomb), 12), [COULOMB, "quadratic_friction"])
+    found = select.run()
+    other = select.by_other_ways(nothing_of(found))
+    assert other.chosen == NOTHING
+
+
+def test_doubt_is_what_another_way_is_looked_for_in(monkeypatch: pytest.MonkeyPatch) -> None:
+    run = Selector.run
+    monkeypatch.setattr(Selector, "run", lambda self: nothing_of(run(self)))
+    assert search(read_through(late(rubbing(coulomb), 3)), LINE, (), silent).selection.chosen == BOTH
+
+
+def test_where_nothing_stands_it_is_not() -> None:
+    """Nothing chosen is no doubt where no law finds anything."""
+    monkey = pytest.MonkeyPatch()
+    with monkey.context() as patched:
+        patched.setattr(Selector, "by_other_ways", lambda *_: pytest.fail("looked for another way"))
+        found = search(read_through(quiet(values=ONE_MASS, samples=1200)), LINE, (), silent)
+    assert found.selection.chosen == NOTHING
