@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -66,6 +66,28 @@ class Bench:
             told = from_their_moment(result, self.model)
             self._fits[effects] = _without_much(result if told is result else polished(told))
         return self._fits[effects]
+
+    def fit_again(self, effects: Effects, name: str) -> FitResult:
+        """Look for the rest of an effect once what it loosens is loose, and return the better of both fits.
+
+        A first look around a fit that its bounds hold sees nothing of what stands behind them.
+        """
+        had = self._fits[effects]
+        releases = [look.release for look in promising(Screen(had, self.model).looks(name, EFFECTS[name].loosened_by))]
+        again = self._fit(effects, _forgetting(had, name), releases)
+        if again.squares < had.squares:
+            self._fits[effects] = _without_much(again)
+        return self._fits[effects]
+
+    def fit_less(self, effects: Effects, larger: FitResult) -> FitResult:
+        """Fit fewer effects from where a fit with more ended, too, and return the better of both.
+
+        What was found beside another effect may be out of reach from where these began by themselves.
+        """
+        less, known = self._fit(effects, larger, ()), self._fits.get(effects)
+        if known is None or less.squares < known.squares:
+            self._fits[effects] = _without_much(less)
+        return self.fit(effects)
 
     def fit_by_steps(self, effects: Effects) -> FitResult:
         """Fit a set of effects of which none has been fitted here, one after the other along the chain."""
@@ -133,6 +155,14 @@ class Bench:
         """Return the nominal parameters, and what the model's own effects leave to every recording."""
         own = tuple(own_unknowns(self.model.effects, record) for record in self.records)
         return Release(nominal_unknowns(self.model), own)
+
+
+def _forgetting(result: FitResult, name: str) -> FitResult:
+    """Return a fit as if an effect without parameters of a recording's own had not been released in it."""
+    keep = [shared.effect != name for shared in result.problem.shared]
+    shared = tuple(each for each, kept in zip(result.problem.shared, keep, strict=True) if kept)
+    rest = [True] * (result.x.size - len(keep))
+    return replace(result, problem=replace(result.problem, shared=shared), x=result.x[[*keep, *rest]])
 
 
 def _without_much(result: FitResult) -> FitResult:

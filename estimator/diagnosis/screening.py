@@ -74,14 +74,26 @@ class Screen:
         self._projector = Projector(result)
         self._rows = np.cumsum([0, *(int(use.sum()) for use in result.problem.use)])
 
-    def looks(self, name: str) -> list[Look]:
-        """Return a look at each start of an effect, the most promising first."""
+    def looks(self, name: str, kept: str = "") -> list[Look]:
+        """Return a look at each start of an effect, the most promising first.
+
+        ``kept`` is a parameter that keeps the value of the fit that is looked around, in every start.
+        """
         entry = EFFECTS[name]
         releases = effect_unknowns(name, self._model, self._result.problem.records)
+        if kept:
+            releases = [self._keeping(kept, release) for release in releases]
         if entry.profile:
             return [Look(release, np.inf) for release in releases]
         looker = self._periodic if entry.phases else self._event if entry.event else self._plain
         return sorted((looker(entry, release) for release in releases), key=lambda look: -look.promise)
+
+    def _keeping(self, kept: str, release: Release) -> Release:
+        p = self._result.p
+        return replace(
+            release,
+            shared=tuple(replace(u, start=p[u.slot] / u.scale) if u.name == kept else u for u in release.shared),
+        )
 
     def _plain(self, entry: Effect, release: Release) -> Look:
         first = next(shared for shared in release.shared if shared.low < shared.high)

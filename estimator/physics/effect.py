@@ -222,6 +222,8 @@ class Effect:
     loosens : frozenset[str]
         Nominal parameters that it moves beyond what they are trusted to. Where one of them is at its bound the effect
         is fitted whatever a first look along its size promises: the look does not move them with it.
+    loosened_by : str
+        The parameter of its own that moves them. Once it is fitted, the rest of the effect is looked for again.
     implausible : callable
         Model, records and parameter values to the reason why such values are no case of this effect, or "".
     unresolved : callable
@@ -258,6 +260,7 @@ class Effect:
     phases: Mapping[str, str] = field(default_factory=dict)
     decisive: tuple[str, ...] = ()
     loosens: frozenset[str] = frozenset()
+    loosened_by: str = ""
     implausible: Callable[[DrivelineModel, Sequence[Record], Mapping[str, float]], str] = always_plausible
     unresolved: Callable[[DrivelineModel, Sequence[Record], Mapping[str, float]], str] = always_plausible
     rescaled: Callable[[Mapping[str, float]], float] = told_one_way

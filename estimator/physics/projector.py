@@ -24,7 +24,8 @@ class Projector:
         jacobian = result.jacobian
         self._free = np.linalg.qr(jacobian[:, ~result.pinned])[0]
         self._all, self._triangle = np.linalg.qr(jacobian[:, movable])
-        self._room = (low - result.x)[movable], (high - result.x)[movable]
+        x = result.x[movable]
+        self._room = low[movable] - x, high[movable] - x
         self._residual = result.residual
         self.error = self.rest(result.residual)
 

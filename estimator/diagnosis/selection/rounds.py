@@ -63,12 +63,15 @@ class Rounds:
         )
         rough = dict(zip(looks, fits, strict=True))
         most = max((current.squares - result.squares for result in rough.values()), default=0.0)
+        pressed = pressed_parameters(current)
         self._report("finishing the best of them", 0.7)
 
         def finished(name: str) -> Trial:
             effects = with_effect(chosen, name)
             near = current.squares - rough[name].squares >= WORTH_FINISHING * most
             result = self.jury.bench.fit(effects, current) if near else rough[name]
+            if near and EFFECTS[name].loosens & pressed:
+                result = self.jury.bench.fit_again(effects, name)
             return self.jury.trial(name, effects, current, result)
 
         trials = dict(zip(rough, concurrently(finished, list(rough)), strict=True))

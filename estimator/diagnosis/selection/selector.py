@@ -22,6 +22,9 @@ MOST_EFFECTS = 4
 NEAR_NOISE = 1.5
 """Error over the noise that an explanation may leave: another way to write the same law leaves that much."""
 
+PATIENCE = 4
+"""How many times its iterations a fit may take on which a verdict is built."""
+
 OTHER_WAYS = 3
 """Effects that another way begins with, those that by themselves leave least."""
 
@@ -46,7 +49,7 @@ class Selector:
 
     def run(self) -> Selection:
         """Add effects while one earns its place; then drop those that the others made superfluous."""
-        retuned = self.jury.bench.fit(NOTHING)
+        retuned = self._to_its_end(NOTHING)
         return self._concluded(self._grown(_Path(NOTHING, retuned, {}), retuned), retuned)
 
     def by_other_ways(self, selection: Selection) -> Selection:
@@ -124,8 +127,17 @@ class Selector:
     def _with(self, path: _Path, best: Trial, retuned: FitResult) -> _Path:
         """Return a path with the effects of a trial, less those it made superfluous."""
         accepted = {name: path.accepted.get(name, best) for name in best.effects} | {best.name: best}
-        whole = self.jury.bench.fit(best.effects, best.result)
+        whole = self._to_its_end(best.effects, best.result)
         return _Path(*self._drop_superfluous(best.effects, whole, retuned), accepted)
+
+    def _to_its_end(self, effects: Effects, warm: FitResult | None = None) -> FitResult:
+        """Return the fit on which a verdict is built: it may take its iterations several times."""
+        result = self.jury.bench.fit(effects, warm)
+        for _ in range(PATIENCE - 1):
+            if result.converged:
+                break
+            result = self.jury.bench.fit(effects, result)
+        return result
 
     def _better(self, path: _Path, other: _Path, retuned: FitResult) -> _Path:
         """Return the better of two paths; where nothing was found, another way must end near the noise."""
@@ -144,7 +156,7 @@ class Selector:
 
     def _drop_superfluous(self, chosen: Effects, current: FitResult, retuned: FitResult) -> tuple[Effects, FitResult]:
         for name in sorted(chosen) if len(chosen) > 1 else ():
-            without = self.jury.bench.fit(chosen - {name}, current)
+            without = self.jury.bench.fit_less(chosen - {name}, current)
             gained = gain(without, current)
             if gained.delta_bic < VERY_STRONG or not self.jury.weight.counts(name, chosen, current, without, retuned):
                 return self._drop_superfluous(chosen - {name}, without, retuned)

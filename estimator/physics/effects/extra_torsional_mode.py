@@ -12,7 +12,10 @@ from estimator.physics.model import DrivelineModel, Motion, natural_frequencies_
 from estimator.signals.record import Record
 
 MOST_DAMPING = 0.15
-"""Steel shafts and their rubber couplings stay below this damping ratio."""
+"""Steel shafts and their rubber couplings stay below this damping ratio of their own."""
+
+LEAST_AMPLIFIED = 2.0
+"""By which a resonance amplifies at least, ``1 / (2 zeta)``, whatever damps it."""
 
 
 def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
@@ -39,8 +42,13 @@ def sentence(values: Mapping[str, float], motion: Motion) -> str:
 
 
 def implausible(model: DrivelineModel, records: Sequence[Record], values: Mapping[str, float]) -> str:
-    """Object to a branch that is damped so much that it has no resonance of its own to speak of."""
-    if values["damping_ratio"] <= MOST_DAMPING:
+    """Object to a branch that is damped so much that it has no resonance of its own to speak of.
+
+    An inertia within the line is damped by the shaft beside it, too: ``c / (2 J_X w)`` comes on top of its own.
+    """
+    impedance = 4.0 * math.pi * values["inertia_kg_m2"] * values["frequency_hz"]
+    most = min(MOST_DAMPING + model.parameters["c"].value / impedance, 0.5 / LEAST_AMPLIFIED)
+    if values["damping_ratio"] <= most:
         return ""
     return f"a branch with damping ratio {values['damping_ratio']:.2g} is no mode"
 
@@ -56,7 +64,7 @@ EFFECT = Effect(
     parameters=(
         EffectParameter("inertia_kg_m2", "inertia", 0.0, 0.0, 50.0, "inertia J_X"),
         EffectParameter("frequency_hz", "Hz", 1.0, 0.05, 8.0, "its frequency with the motor held: f"),
-        EffectParameter("damping_ratio", "", 0.05, 0.02, 4.0, "its damping ratio: c_X / (2 sqrt(k_X J_X))"),
+        EffectParameter("damping_ratio", "", 0.05, 0.02, 8.0, "its damping ratio: c_X / (2 sqrt(k_X J_X))"),
         EffectParameter("line_share", "", 1.0, 0.4, 1.0, "share of the twist that the main shaft has: s", True),
     ),
     structures=WITH_SHAFT,
@@ -68,5 +76,6 @@ EFFECT = Effect(
     sentence=sentence,
     decisive=("inertia_kg_m2", "line_share"),
     loosens=frozenset({"k", "c"}),  # a spring in the line softens it by s and lowers its damping by s^2
+    loosened_by="line_share",
     implausible=implausible,
 )

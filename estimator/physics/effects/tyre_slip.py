@@ -70,15 +70,24 @@ def carcass(
     return damping * slide / (1.0 + (vehicle / creep_speed) ** 2)
 
 
+@compiled
+def gripped(traction: float, grip: float) -> float:
+    """Return the torque that a tyre passes on [Nm], of what it would without an end to its grip."""
+    if math.isinf(grip):
+        return traction
+    return grip * math.tanh(traction / grip)
+
+
 def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
-    """Return a per cent of slip at the torque in use, 1, a tenth of the top speed, a radian, and 10 ms."""
-    return (0.01 / torque_scale(records), 1.0, 0.1 * speed_scale(records), 1.0, 0.01)
+    """Return a per cent of slip at the torque in use, 1, a tenth of the top speed, a radian, 10 ms, and the torque."""
+    torque = torque_scale(records)
+    return (0.01 / torque, 1.0, 0.1 * speed_scale(records), 1.0, 0.01, torque)
 
 
 def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
-    """Return creep from small to large, at once or after rolling, for a light and a heavy wheel."""
+    """Return creep from small to large, at once or after rolling, for a light and a heavy wheel, far from its grip."""
     return [
-        (slip, wheel, creep, relaxation, damping)
+        (slip, wheel, creep, relaxation, damping, 4.0)
         for slip in (0.3, 1.5)
         for wheel in (0.05, 0.15)
         for creep, relaxation, damping in ((1.0, 0.5, 0.5), (0.5, 3.0, 0.5))
@@ -116,8 +125,8 @@ EFFECT = Effect(
     title="slip of the tyre",
     law="J_W dw_W/dt = T_S - T_x, J_V dw_V/dt = T_x - b_L w_V - T_load, "
     "T_x = (w_W - w_V) / (s (|w_V| + w_0)); or T_x = T_l + t_c (w_W - w_V) / (s l (1 + (w_V/w_0)^2)), "
-    "l dT_l/dt + |w_V| T_l = (w_W - w_V) / s",
-    source="linear slip, relaxation, standstill: Pacejka, Tire and Vehicle Dynamics, 3rd ed., 2012, ch. 4, 7, 8.6",
+    "l dT_l/dt + |w_V| T_l = (w_W - w_V) / s; of either the tyre passes on G tanh(T_x / G)",
+    source="slip, grip, relaxation, standstill: Pacejka, Tire and Vehicle Dynamics, 3rd ed., 2012, ch. 4, 7, 8.6",
     excited_by="large torque changes: tip-in, tip-out, PRBS",
     parameters=(
         EffectParameter("slip_per_nm", "per_torque", 0.0, 0.0, 100.0, "slip per torque: s"),
@@ -125,6 +134,7 @@ EFFECT = Effect(
         EffectParameter("creep_rad_s", "speed", 1.0, 0.1, 100.0, "speed below which slip is a slide: w_0", True),
         EffectParameter("relaxation_rad", "angle", 0.0, 0.05, 100.0, "angle over which traction builds up: l", True),
         EffectParameter("carcass_s", "s", 0.0, 0.0, 20.0, "damping of the carcass at standstill: t_c", True),
+        EffectParameter("grip_nm", "torque", math.inf, 0.6, 20.0, "torque at which the tyre slides: G", True),
     ),
     structures=WITH_SHAFT,
     resembles=("extra_torsional_mode",),

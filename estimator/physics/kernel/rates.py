@@ -127,6 +127,7 @@ def load_rates(pull: float, now: Conditions, x: State, p: FloatArray) -> tuple[f
         steepest = now.fastest * now.inertia_load
         slope, share = tyre_slip.coupling(vehicle, slip, creep, share, steepest)
         traction = slope * (wheel - vehicle)
+    traction = tyre_slip.gripped(traction, p[slots.GRIP])
     dry = dry_friction(wheel, now.dry_load, now.width_load)
     drag = load_drag(wheel, vehicle, now, p) - dry
     wheel_rate = (pull - dry - traction) / (share * now.inertia_load)

@@ -11,6 +11,7 @@ from typing import Any
 
 from hil.proof.judge import Comparison
 from hil.proof.truth.iwan import ELEMENTS
+from hil.proof.truth.tyre import SHAPE
 
 Json = Mapping[str, Any]
 
@@ -64,6 +65,11 @@ def _wheel_share(sizes: Json, bus: Json) -> float:
 
 def _relaxation_rad(sizes: Json, bus: Json) -> float:
     return float(sizes["relaxation_m"] * bus["gear_ratio"] / bus["wheel_radius_m"])
+
+
+def _grip_nm(sizes: Json, bus: Json) -> float:
+    """Grip of the ``G tanh(x / G)`` that bends off as ``D sin(C atan(x / (C D)))`` does: their terms in x^3 agree."""
+    return float(sizes["grip_nm"]) / math.sqrt(0.5 + SHAPE**-2)
 
 
 def _payload(sizes: Json, bus: Json) -> float:
@@ -121,6 +127,7 @@ COUNTERPARTS: Mapping[str, Mapping[str, Convert]] = {
         "slip_per_nm": _slip_per_nm,
         "wheel_share": _wheel_share,
         "relaxation_rad": _relaxation_rad,
+        "grip_nm": _grip_nm,
     },
     "load_imbalance": {"amplitude_nm": _same("imbalance_nm")},
     "inertia_change": {"change_kg_m2": _payload},

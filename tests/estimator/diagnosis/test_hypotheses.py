@@ -12,12 +12,13 @@ from estimator.diagnosis.hypotheses import NOTHING, Bench, effects_of, everythin
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
+from estimator.physics.layout import flat_values
 from estimator.physics.model import Motion, Structure
-from estimator.physics.simulate import Start
+from estimator.physics.simulate import Start, grid_for, simulate
 from estimator.physics.unknowns import effect_unknowns
 from estimator.signals.record import OutputKind
 from tests.estimator.diagnosis.planted import SIGMA, quiet, rubbing
-from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, linear_record, model, random_steps
+from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, linear_record, model, random_steps, record
 
 COULOMB = frozenset({"coulomb_friction_motor"})
 FRICTION_NM = 12.0
@@ -173,3 +174,57 @@ class TestOpenHypotheses:
         sliding = model(ONE_MASS, motion=Motion.TRANSLATION)
         testable, untestable = open_hypotheses(sliding, [self.REVERSAL])
         assert not [name for name in {*testable, *untestable} if EFFECTS[name].phases]
+
+
+class TestLocalMinima:
+    """What a fit missed from where it began is found from where another ended."""
+
+    MODE = frozenset({"extra_torsional_mode"})
+
+    def with_mode(self, inertia: float, frequency_hz: float, line_share: float) -> Bench:
+        """A line with one more spring in it, so soft that the shaft's stiffness ends at its tolerance of 20 %."""
+        values = {
+            "inertia_kg_m2": inertia,
+            "frequency_hz": frequency_hz,
+            "damping_ratio": 0.045,
+            "line_share": line_share,
+        }
+        nominal, records = model(TWO_MASS), []
+        for seed in (3, 4):
+            silent = record(random_steps(1500, seed, hold=3), np.zeros(1500), name=f"run_{seed}")
+            flat = flat_values(TWO_MASS, {"extra_torsional_mode": values})
+            output = simulate(grid_for(nominal, [silent]), silent, flat, Start(5.0, 0.0, 2.0))
+            noise = SIGMA * np.random.default_rng(seed).standard_normal(output.size)
+            records.append(replace(silent, output=output + noise))
+        return Bench(nominal, records, everything(records))
+
+    @pytest.mark.parametrize(("inertia", "frequency_hz", "line_share"), [(0.1, 11.0, 0.72), (0.1, 20.0, 0.76)])
+    def test_the_rest_of_an_effect_shows_once_its_spring_is_fitted(
+        self, inertia: float, frequency_hz: float, line_share: float
+    ) -> None:
+        bench = self.with_mode(inertia, frequency_hz, line_share)
+        first = bench.fit(self.MODE, bench.fit(NOTHING))
+        again = bench.fit_again(self.MODE, "extra_torsional_mode")
+        assert first.rms > 3.0 * SIGMA
+        assert again.rms == pytest.approx(SIGMA, rel=0.05)
+        assert again is bench.fit(self.MODE)
+        assert again.value("extra_torsional_mode", "frequency_hz") == pytest.approx(frequency_hz, rel=0.02)
+
+    def test_a_better_fit_stays(self) -> None:
+        bench = self.with_mode(0.2, 13.0, 0.76)
+        first = bench.fit(self.MODE, bench.fit(NOTHING))
+        assert first.rms == pytest.approx(SIGMA, rel=0.05)
+        assert bench.fit_again(self.MODE, "extra_torsional_mode").squares <= first.squares
+
+    def test_fewer_effects_start_from_where_more_ended_too(self) -> None:
+        records = rubbing(lambda speed: FRICTION_NM)
+        bench = Bench(model(ONE_MASS), records, everything(records))
+        right = bench.fit(COULOMB, bench.fit(NOTHING))
+        larger = bench.fit(COULOMB | {"actuator_lag"}, right)
+        bench._fits[COULOMB] = replace(right, residual=5.0 * right.residual)  # as if it had ended elsewhere
+        assert bench.fit_less(COULOMB, larger).squares == pytest.approx(right.squares, rel=1e-4)
+
+    def test_what_fewer_effects_had_found_better_stays(self, bench: Bench) -> None:
+        right = bench.fit(COULOMB, bench.fit(NOTHING))
+        larger = bench.fit(COULOMB | {"actuator_lag"}, right)
+        assert bench.fit_less(COULOMB, larger).squares <= right.squares

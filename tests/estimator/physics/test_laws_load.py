@@ -112,14 +112,17 @@ def test_a_slipping_tyre_couples_wheel_and_vehicle_by_creep(slip: float, share: 
     assert_law({"tyre_slip": values}, expected)
 
 
-@pytest.mark.parametrize(("slip", "roll"), [(2e-3, 0.5), (5e-4, 3.0)])
-def test_the_traction_of_a_tyre_may_build_up_as_it_rolls(slip: float, roll: float) -> None:
+@pytest.mark.parametrize(("slip", "roll", "grip"), [(2e-3, 0.5, np.inf), (5e-4, 3.0, np.inf), (5e-4, 3.0, 90.0)])
+def test_the_traction_of_a_tyre_may_build_up_as_it_rolls_and_ends_where_it_slides(
+    slip: float, roll: float, grip: float
+) -> None:
     v, share, creep, carcass_s = TWO_MASS, 0.15, 2.0, 0.01
 
     def rhs(t: float, x: FloatArray, torque: float) -> FloatArray:
         _, w_M, twist, w_W, w_V, T_l = x
         T_S = v["k"] * twist + v["c"] * (w_M - w_W)
         T_x = T_l + carcass_s / (slip * roll) / (1.0 + (w_V / creep) ** 2) * (w_W - w_V)
+        T_x = grip * np.tanh(T_x / grip) if np.isfinite(grip) else T_x
         drag = v["b_L"] * w_V + START.load_torque_nm
         return np.array(
             [
@@ -135,7 +138,7 @@ def test_the_traction_of_a_tyre_may_build_up_as_it_rolls(slip: float, roll: floa
     start = np.array([*start_vector(), START.load_speed_rad_s, START.load_torque_nm])  # it carries the constant load
     expected = reference.solve(rhs, start, Held.of(TORQUE, SAMPLE_TIME_S), TIME_S)[:, reference.SPEED]
     values = {"slip_per_nm": slip, "wheel_share": share, "creep_rad_s": creep, "relaxation_rad": roll}
-    values["carcass_s"] = carcass_s
+    values |= {"carcass_s": carcass_s, "grip_nm": grip}
     assert_law({"tyre_slip": values}, expected)
 
 

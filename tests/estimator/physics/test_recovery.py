@@ -78,7 +78,14 @@ PLANTS = {
     "aerodynamic_drag": Plant({"drag_nm_s2": 0.5}),
     "brake_drag": Plant({"brake_nm": 20.0}, EVENTS),
     "tyre_slip": Plant(
-        {"slip_per_nm": 5e-4, "wheel_share": 0.1, "creep_rad_s": 3.0, "relaxation_rad": 2.0, "carcass_s": 0.01}
+        {
+            "slip_per_nm": 5e-4,
+            "wheel_share": 0.1,
+            "creep_rad_s": 3.0,
+            "relaxation_rad": 2.0,
+            "carcass_s": 0.01,
+            "grip_nm": 450.0,
+        }
     ),
     "load_imbalance": Plant({"amplitude_nm": 40.0, "motor_turns_per_turn": 3.0}, PHASES),
     "inertia_change": Plant({"change_kg_m2": 6.0}, EVENTS),

@@ -46,6 +46,24 @@ def test_a_carcass_that_damps_at_every_speed_is_no_tyre() -> None:
     assert implausible(LINE, driven, {"wheel_share": 0.1, "relaxation_rad": 0.0, "creep_rad_s": 500.0}) == ""
 
 
+@pytest.mark.parametrize(
+    ("inertia", "frequency_hz", "most"),
+    [
+        (10.0, 30.0, 0.152),  # so heavy that the shaft beside it takes next to nothing: 9 / (4 pi 10 30) = 0.002
+        (0.5, 16.0, 0.2395),  # 9 / (4 pi 0.5 16) = 0.0895 on top of 0.15
+        (0.01, 16.0, 0.25),  # what amplifies less than twice is no resonance
+    ],
+)
+def test_a_mode_may_be_damped_by_itself_and_by_the_shaft_beside_it(
+    inertia: float, frequency_hz: float, most: float
+) -> None:
+    assert LINE.parameters["c"].value == 9.0
+    implausible = EFFECTS["extra_torsional_mode"].implausible
+    branch = {"inertia_kg_m2": inertia, "frequency_hz": frequency_hz}
+    assert implausible(LINE, RECORDS, {**branch, "damping_ratio": most - 0.002}) == ""
+    assert "is no mode" in implausible(LINE, RECORDS, {**branch, "damping_ratio": most + 0.002})
+
+
 def test_a_loss_that_is_complete_at_once_is_not_from_warming() -> None:
     implausible = EFFECTS["torque_derating"].implausible
     assert implausible(LINE, RECORDS, {"depth": 0.2, "time_constant_s": 3.0}) == ""
