@@ -10,7 +10,7 @@ import numpy as np
 from estimator.diagnosis.chain import Chain
 from estimator.diagnosis.evidence import gain_from_squares
 from estimator.diagnosis.holdout import Examiner
-from estimator.diagnosis.intervals import Z95, interval, reported_covariance, rescaled, told_both_ways
+from estimator.diagnosis.intervals import Z95, interval, interval_both_ways, reported_covariance, trusted
 from estimator.diagnosis.result import Estimated, Evidence, FoundEffect, Interval, Profile, Retuned
 from estimator.diagnosis.selection import Selection
 from estimator.diagnosis.trial import Trial
@@ -113,10 +113,10 @@ def rms_of(errors: Sequence[FloatArray]) -> float:
 
 def _parameters(name: str, result: FitResult, cov: FloatArray, model: DrivelineModel) -> dict[str, Estimated]:
     """Return what was fitted, and what was held; a held value at its null only where a model file needs it."""
-    entry, factor = EFFECTS[name], rescaled(result)
+    entry = EFFECTS[name]
     units = {parameter.name: parameter.unit(model.motion) for parameter in entry.parameters}
-    factors = {
-        parameter.name: factor
+    torques = {
+        parameter.name
         for parameter in entry.parameters
         if parameter.dimension in IN_PROPORTION and entry.element is not Element.TORQUE_PATH
     }
@@ -124,7 +124,7 @@ def _parameters(name: str, result: FitResult, cov: FloatArray, model: DrivelineM
     return {
         shared.name: Estimated(
             float(result.x[i]) * shared.scale,
-            told_both_ways(interval(result, cov, i), factors.get(shared.name, 1.0)),
+            (interval_both_ways if shared.name in torques else interval)(result, cov, i),
             units[shared.name],
         )
         for i, shared in enumerate(result.problem.shared)
@@ -165,11 +165,18 @@ def _profile_size(result: FitResult, cov: FloatArray, model: DrivelineModel) -> 
     return {name: Estimated(size, (max(size - spread, 0.0), size + spread), unit("torque", model.motion))}
 
 
-def retuned_parameters(result: FitResult, model: DrivelineModel) -> dict[str, Retuned]:
-    """Return every nominal parameter before and after; one trusted exactly stays what it was."""
-    cov, factor = reported_covariance(result), rescaled(result)
+def retuned_parameters(result: FitResult, model: DrivelineModel, whole: bool) -> dict[str, Retuned]:
+    """Return every nominal parameter before and after; one trusted exactly stays what it was.
+
+    Without the ``whole`` physics in the fit its intervals are what the nominal values are trusted to: how far a
+    parameter bends to follow what is left out, no covariance of the errors tells.
+    """
+    cov = reported_covariance(result)
     fitted = {
-        shared.name: (float(result.x[i]) * shared.scale, told_both_ways(interval(result, cov, i), factor))
+        shared.name: (
+            float(result.x[i]) * shared.scale,
+            interval_both_ways(result, cov, i) if whole else trusted(result, i),
+        )
         for i, shared in enumerate(result.problem.shared)
         if not shared.effect
     }

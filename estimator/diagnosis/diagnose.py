@@ -125,7 +125,7 @@ def _diagnose(
         untestable=blind,
         unnamed=_unnamed(selection, judgement),
         fit=figures,
-        parameters=retuned_parameters(final, line),
+        parameters=retuned_parameters(final, line, judgement.verdict is not Verdict.UNEXPLAINED),
         load_torque=load_torques(final, line),
         timing_s={"total": time.perf_counter() - began},
         augmented=augmented_model(final, model, effects),

@@ -8,7 +8,7 @@ from scipy import stats
 from estimator.diagnosis.evidence import residuals_by_record
 from estimator.diagnosis.noise import correlation_length, unpredictable
 from estimator.physics.catalogue import EFFECTS
-from estimator.physics.fit import FitResult
+from estimator.physics.fit import STEP, FitResult
 from estimator.signals.record import BoolArray, FloatArray
 
 Z95 = 1.959963984540054
@@ -116,17 +116,37 @@ def interval(result: FitResult, cov: FloatArray, index: int) -> tuple[float, flo
     return (shared.scale * max(x - spread, shared.low), shared.scale * min(x + spread, shared.high))
 
 
-def rescaled(result: FitResult) -> float:
+def trusted(result: FitResult, index: int) -> tuple[float, float]:
+    """Return what a nominal parameter is trusted to, in its unit: a fit that leaves physics out can't narrow it."""
+    shared = result.problem.shared[index]
+    return (shared.scale * shared.low, shared.scale * shared.high)
+
+
+def interval_both_ways(result: FitResult, cov: FloatArray, index: int) -> tuple[float, float]:
+    """Return the 95 % interval of a torque, or of what is in proportion to one, that holds it told either way.
+
+    In the other way every torque is multiplied by a factor, itself estimated: ``d(x f) = f dx + x df``.
+    """
+    low, high = interval(result, cov, index)
+    factor, slope = _rescaled(result, result.x), np.zeros_like(result.x)
+    if factor == 1.0:
+        return low, high
+    for i, shared in enumerate(result.problem.shared):
+        if shared.effect and shared.low < shared.high:
+            moved = result.x.copy()
+            moved[i] += STEP
+            slope[i] = result.x[index] * (_rescaled(result, moved) - factor) / STEP
+    slope[index] += factor
+    scale = result.problem.shared[index].scale
+    other, spread = scale * factor * float(result.x[index]), scale * Z95 * float(np.sqrt(slope @ cov @ slope))
+    return (min(low, other - spread), max(high, other + spread))
+
+
+def _rescaled(result: FitResult, x: FloatArray) -> float:
     """Return the factor on every torque of the line in the other way to tell the same motion; 1 where there is none."""
     factor = 1.0
     for name, entry in EFFECTS.items():
-        values = {s.name: float(result.x[i]) * s.scale for i, s in enumerate(result.problem.shared) if s.effect == name}
+        values = {s.name: float(x[i]) * s.scale for i, s in enumerate(result.problem.shared) if s.effect == name}
         if values:
             factor *= entry.rescaled(values)
     return factor
-
-
-def told_both_ways(ci95: tuple[float, float], factor: float) -> tuple[float, float]:
-    """Return the interval that holds a torque, or what is in proportion to one, in both ways to tell the motion."""
-    low, high = ci95
-    return (min(low, low * factor), max(high, high * factor))

@@ -19,6 +19,7 @@ from estimator.diagnosis.assemble import (
 from estimator.diagnosis.chain import Chain
 from estimator.diagnosis.holdout import Examiner
 from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects, everything
+from estimator.diagnosis.intervals import Z95, interval, interval_both_ways, reported_covariance
 from estimator.diagnosis.noise import effective_samples
 from estimator.diagnosis.result import FoundEffect
 from estimator.diagnosis.selection import Jury, Selection, Selector
@@ -110,10 +111,34 @@ def test_whichever_inverter_is_wrong_the_intervals_hold_the_line(wrong: str) -> 
     (told,) = found.parameters
     other_way = 1.0 / found.parameters[told].value
     assert (found.parameters[told].value if told == wrong else other_way) == pytest.approx(gain, rel=0.01)
-    for name, parameter in retuned_parameters(selection.result, LINE).items():
+    for name, parameter in retuned_parameters(selection.result, LINE, whole=True).items():
         low, high = parameter.ci95
         assert low <= ONE_MASS[name] <= high
         assert high / low >= 1.0 / gain - 0.01
+
+
+def test_the_other_way_is_as_uncertain_as_the_factor_between_both() -> None:
+    """The factor is the gain's: its own relative variance comes on top, and their covariance twice."""
+    records = []
+    for seed, share in ((1, 0.5), (2, 0.65)):
+        torque, other = drive_torque(seed, 1200), random_steps(1200, seed + 20, size_nm=20.0, hold=7)
+        read = np.column_stack([share * torque + other, (1.0 - share) * torque - other])
+        record = linear_record(ONE_MASS, read @ [1.0, 0.9], Start(5.0, 0.0, 2.0), sigma=SIGMA, seed=seed)
+        records.append(replace(record, torque_nm=read, name=f"run_{seed}"))
+    result = assembled(records, "inverter_gain_mismatch")[0].result
+    names = [(shared.effect, shared.name) for shared in result.problem.shared]
+    (gain,) = (i for i, s in enumerate(result.problem.shared) if s.effect and s.low < s.high)
+    inertia, cov = names.index(("", "J_M")), reported_covariance(result)
+    other = np.zeros(result.x.size)
+    other[inertia], other[gain] = 1.0 / result.x[inertia], -1.0 / result.x[gain]  # of ln(J / g)
+    relative = float(np.sqrt(other @ cov @ other))
+    scale = result.problem.shared[inertia].scale
+    told = scale * result.x[inertia] / result.x[gain] * np.array([1.0 - Z95 * relative, 1.0 + Z95 * relative])
+    low, high = interval_both_ways(result, cov, inertia)
+    assert (low, high) == pytest.approx(
+        (min(interval(result, cov, inertia)[0], told[0]), max(interval(result, cov, inertia)[1], told[1])), rel=1e-6
+    )
+    assert np.ptp(told) > 1.2 * np.ptp(interval(result, cov, inertia)) / result.x[gain]
 
 
 class TestAnEffect:
@@ -261,18 +286,28 @@ class TestAcquired:
 
 class TestParameters:
     def test_before_and_after_with_interval_and_unit(self, rubbed: tuple[Selection, Examiner]) -> None:
-        parameters = retuned_parameters(rubbed[0].result, LINE)
+        parameters = retuned_parameters(rubbed[0].result, LINE, whole=True)
         assert list(parameters) == ["J_M", "b_M"]
         inertia = parameters["J_M"]
         assert (inertia.nominal, inertia.unit) == (NOMINAL["J_M"], "kg m^2")
         assert inertia.value == pytest.approx(ONE_MASS["J_M"], rel=0.01)
         assert inertia.ci95[0] < inertia.value < inertia.ci95[1]
 
+    def test_without_the_whole_physics_no_interval_is_narrower_than_the_trust(
+        self, rubbed: tuple[Selection, Examiner]
+    ) -> None:
+        retuned = rubbed[0].retuned
+        told = {whole: retuned_parameters(retuned, LINE, whole)["J_M"] for whole in (True, False)}
+        assert told[False].value == told[True].value
+        tolerance = LINE.parameters["J_M"].tolerance
+        edges = (NOMINAL["J_M"] * (1.0 - tolerance), NOMINAL["J_M"] * (1.0 + tolerance))
+        assert told[False].ci95 == pytest.approx(edges)
+
     def test_one_that_is_trusted_exactly_stays(self) -> None:
         records = rubbing(lambda speed: 0.0)
         exact = model(ONE_MASS, tolerance=0.0)
         result = Bench(exact, records, everything(records)).fit(NOTHING)
-        for name, parameter in retuned_parameters(result, exact).items():
+        for name, parameter in retuned_parameters(result, exact, whole=True).items():
             assert parameter.value == parameter.nominal == ONE_MASS[name]
             assert parameter.ci95 == (ONE_MASS[name], ONE_MASS[name])
 
