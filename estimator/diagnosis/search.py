@@ -58,6 +58,7 @@ def _searched(chain: Chain, model: DrivelineModel, unseen: Sequence[Record], pro
     weight = Weight(floor, least_ratio=VISIBLE if chain.torque_is_unknown else 1.0)
     selector = Selector(Jury(bench, examiner, names, weight), progress)
     selection = selector.run()
-    if judge(selection, floor, chain.findings).verdict is Verdict.UNEXPLAINED:
+    doubted = judge(selection, floor, chain.findings).verdict is Verdict.UNEXPLAINED
+    if doubted or selector.may_imitate(selection):
         selection = selector.by_other_ways(selection)
     return Search(chain, bench, examiner, floor, selection, untestable)

@@ -52,19 +52,24 @@ class Selector:
         retuned = self._to_its_end(NOTHING)
         return self._concluded(self._grown(_Path(NOTHING, retuned, {}), retuned), retuned)
 
+    def may_imitate(self, selection: Selection) -> bool:
+        """Tell whether a choice came near the noise by bending: some law still finds something in what it leaves."""
+        bends = bool(_flexible(selection.chosen)) and self._is_near(selection.result)
+        return bends and selection.remaining is not None
+
     def by_other_ways(self, selection: Selection) -> Selection:
         """Return the best of a selection that is in doubt and of those that begin with other effects.
 
         Of two effects that hide each other none passes alone: each moves the free run by more than what the other
-        leaves, and pays for itself out of an error that stays correlated. And a load profile bends to imitate two at
-        once: where it seems to have done so, it is left out.
+        leaves, and pays for itself out of an error that stays correlated. And a load profile, or an event whose
+        moments are sought, bends to imitate two at once: where it came near the noise, the ways go without it.
         """
         retuned = selection.retuned
         old = path = _Path(selection.chosen, selection.result, selection.accepted)
-        without = _profiles(path.chosen) if self._is_near(path.current) else NOTHING
+        without = _flexible(path.chosen) if self._is_near(path.current) else NOTHING
         for first in self._firsts(retuned, without):
             path = self._better(path, self._completed(first, retuned, without), retuned)
-            if path is not old and self._is_near(path.current):
+            if path is not old and self._is_near(path.current) and not _flexible(path.chosen):
                 break
         return selection if path is old else self._concluded(self._grown(path, retuned), retuned)
 
@@ -182,5 +187,6 @@ class Selector:
         return current.rms >= VISIBLE * self.jury.weight.level(current) or self._law(current) is not None
 
 
-def _profiles(names: Effects) -> Effects:
-    return frozenset(name for name in names if EFFECTS[name].profile)
+def _flexible(names: Effects) -> Effects:
+    """Return the effects whose course or moments every recording has of its own."""
+    return frozenset(name for name in names if EFFECTS[name].profile or EFFECTS[name].event)

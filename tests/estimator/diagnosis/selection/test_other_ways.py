@@ -73,3 +73,12 @@ def test_where_nothing_stands_it_is_not() -> None:
         patched.setattr(Selector, "by_other_ways", lambda *_: pytest.fail("looked for another way"))
         found = search(read_through(quiet(values=ONE_MASS, samples=1200)), LINE, (), silent)
     assert found.selection.chosen == NOTHING
+
+
+def test_what_bends_and_leaves_a_law_may_imitate(select: Selector, found: Selection) -> None:
+    """Near the noise, by an event or a profile, and some law finds something there: all three."""
+    braked, far = frozenset({"brake_drag"}), found.retuned
+    assert select.may_imitate(replace(found, chosen=braked, remaining=found.unnamed))
+    assert not select.may_imitate(replace(found, chosen=braked, remaining=None))
+    assert not select.may_imitate(replace(found, chosen=braked, remaining=found.unnamed, result=far))
+    assert not select.may_imitate(replace(found, remaining=found.unnamed))
