@@ -77,7 +77,7 @@ class Jury:
             simpler = self._simpler(trial, trials, current)
             if not self.weight.counts(simpler.name, simpler.effects, simpler.result, current, retuned):
                 least_rank = max(least_rank, rank[trial.name] - VERY_STRONG)
-            elif self._beyond_rest(simpler, current) and self._holds_out(simpler, current):
+            elif self._beyond_rest(simpler, current) and self.holds_out(simpler, current):
                 return self.examined(simpler, current)
         return None
 
@@ -117,7 +117,7 @@ class Jury:
     def _examine(self, trial: Trial, before: FitResult) -> HoldOut:
         return self.examiner.compare(before, effects_of(before), trial.result, trial.effects)
 
-    def _holds_out(self, trial: Trial, before: FitResult) -> bool:
+    def holds_out(self, trial: Trial, before: FitResult) -> bool:
         """Tell whether a fair part of the gain on the fitted samples shows on unseen ones, as far as these can tell.
 
         Where the unseen ones are at the noise already there is nothing to gain: an effect may not show in them.

@@ -113,7 +113,7 @@ class Selector:
             remaining=self._law(current) if chosen else None,
         )
 
-    def _grown(self, path: _Path, retuned: FitResult, rounds: int = MOST_EFFECTS, without: Effects = NOTHING) -> _Path:
+    def _grown(self, path: _Path, retuned: FitResult) -> _Path:
         """Add effects to a path while one earns its place.
 
         A further round of fits is only made where some law, named or not, still has something to explain.
@@ -152,10 +152,11 @@ class Selector:
         return other if information(path.current, other.current, n) > 0.0 else path
 
     def _stands(self, path: _Path) -> bool:
-        """Tell whether every effect of a path passes beside the others."""
+        """Tell whether every effect of a path passes beside the others, on unseen data too."""
         for name in path.chosen:
             without = self.jury.bench.fit(path.chosen - {name}, path.current)
-            if self.jury.trial(name, path.chosen, without, path.current).failed is not None:
+            trial = self.jury.trial(name, path.chosen, without, path.current)
+            if trial.failed is not None or not self.jury.holds_out(trial, without):
                 return False
         return True
 

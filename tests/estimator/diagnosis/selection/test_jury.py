@@ -57,7 +57,7 @@ class TestRules:
         monkeypatch.setattr(Jury, "_examine", lambda *_: held)
         judging = jury(quiet(values=ONE_MASS, samples=600), floor=0.1)
         before, trial = of_rms(1.0, 2), self.trial(COULOMB, 0.5)
-        assert judging._holds_out(trial, before) is holds
+        assert judging.holds_out(trial, before) is holds
 
     @pytest.mark.parametrize(("lag_rms", "named"), [(0.15, False), (0.3, True)])
     def test_nothing_is_named_in_place_of_what_is_too_small_to_tell(
@@ -67,7 +67,7 @@ class TestRules:
         lag = replace(self.trial("actuator_lag", lag_rms), failed="less than a tenth of the sampling period")
         values = {"actuator_lag": {"time_constant_s": 0.0}, COULOMB: {"friction_nm": 1.0}}
         monkeypatch.setattr(Trial, "values", property(lambda trial: values[trial.name]))
-        monkeypatch.setattr(Jury, "_holds_out", lambda *_: True)
+        monkeypatch.setattr(Jury, "holds_out", lambda *_: True)
         monkeypatch.setattr(Jury, "examined", lambda _, trial, __: trial)
         trials = {"actuator_lag": lag, COULOMB: self.trial(COULOMB, 0.2)}
         best = judging.best(trials, self.RETUNED, self.RETUNED)
@@ -79,7 +79,7 @@ class TestRules:
     ) -> None:
         """A small rest that a second law of the shaft explains best is not told as friction that explains less."""
         monkeypatch.setattr(Jury, "_beyond_rest", lambda *_: True)
-        monkeypatch.setattr(Jury, "_holds_out", lambda *_: True)
+        monkeypatch.setattr(Jury, "holds_out", lambda *_: True)
         monkeypatch.setattr(Jury, "examined", lambda _, trial, __: trial)
         before = of_rms(0.2, 3)
         trials = {
