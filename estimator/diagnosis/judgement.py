@@ -36,6 +36,14 @@ DETAIL = 0.005
 """Share of the mismatch's power that a profile may leave above the noise beyond that: next to a mismatch of many times
 the noise it is a detail of the road or the line, whatever it is."""
 
+HARMONICS = 0.05
+"""Share of the mismatch's power that a wave over an angle may leave, however far above the noise: no machine's is a
+pure sine, and a harmonic of a fifth of the amplitude has a twenty-fifth of the power."""
+
+FAR_BETTER = 0.5
+"""Share of what an explanation leaves above the noise that a simpler law at the same place leaves at most, where that
+law is another."""
+
 ABOVE_FLOOR = 1.25
 """A re-tuned nominal model whose error is above the floor by this factor does not explain a speed recording: the
 torque reading's own noise adds a few per cent, the estimate of the floor errs upward."""
@@ -99,6 +107,8 @@ def _leaves_too_much(selection: Selection, floor: float, profile_alone: bool) ->
     share = (before**2 - after**2) / (before**2 - min(level, after) ** 2)
     if not _reads_speed(selection):
         return f"{1.0 - share:.0%} of the mismatch" if share < MOST_OF_POSITION else ""
+    if all(EFFECTS[name].phases for name in selection.chosen) and share >= 1.0 - HARMONICS:
+        return ""
     most = NEAR_FLOOR_PROFILE if profile_alone and not _leaves_a_detail(selection, floor) else NEAR_FLOOR
     seen = after > NEAR_FLOOR_PROFILE * level
     if share < (MOST_VISIBLE if seen else MOST) or after > most * level:
@@ -110,6 +120,16 @@ def _leaves_a_detail(selection: Selection, floor: float) -> bool:
     """Tell whether what an explanation leaves above the noise is next to nothing of the mismatch."""
     before, after = selection.retuned.rms, selection.result.rms
     return after**2 - min(floor, after) ** 2 <= DETAIL * (before**2 - min(floor, before) ** 2)
+
+
+def _is_another_law(selection: Selection, floor: float, unnamed: UnnamedLaw) -> bool:
+    """Tell whether a law at the same place leaves so much less that it can't be the named one in other words."""
+    if any(EFFECTS[name].phases for name in selection.chosen):  # a wave and its harmonics are sought one by one
+        return False
+    after = selection.result.rms
+    level = min(floor, unpredictable(residuals_by_record(selection.result)))
+    left = max(unnamed.rms**2 - level**2, 0.0)
+    return after > NEAR_FLOOR_PROFILE * level and left < FAR_BETTER * (after**2 - level**2)
 
 
 def _reads_speed(selection: Selection) -> bool:
@@ -132,7 +152,8 @@ def _objection(selection: Selection, floor: float, unnamed: UnnamedLaw | None, r
     named_or_alike = {*selection.chosen, *(twin for twins in selection.lookalikes.values() for twin in twins)}
     elements = {EFFECTS[name].element for name in named_or_alike}
     rival_is_simpler = unnamed.gain.delta_bic > gain(selection.retuned, selection.result).delta_bic + VERY_STRONG
-    if rival_is_simpler and (profiles or unnamed.element not in elements):
+    elsewhere = bool(profiles) or unnamed.element not in elements
+    if rival_is_simpler and (elsewhere or _is_another_law(selection, floor, unnamed)):
         law = kind_in_words(unnamed.terms[0][0])
         return f"{law} at the {PLACE_NAMES[unnamed.element]} would explain it with less than {named}"
     return ""

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis.acquisition import Finding
-from estimator.diagnosis.evidence import VERY_STRONG
+from estimator.diagnosis.evidence import VERY_STRONG, residuals_by_record
 from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects, everything
 from estimator.diagnosis.judgement import ABOVE_FLOOR, MOST, MOST_VISIBLE, NEAR_FLOOR, NEAR_FLOOR_PROFILE, judge
+from estimator.diagnosis.noise import unpredictable
 from estimator.diagnosis.phrases import kind_in_words
 from estimator.diagnosis.result import Verdict
 from estimator.diagnosis.selection import Selection, counting_law
@@ -144,6 +145,18 @@ class TestHowMuchMayBeLeft:
         assert (self.objection(before, after, ROAD) == "") is believed
         assert (self.objection(before, after, ROAD | COULOMB) == "") is (after < 0.15)
 
+    @pytest.mark.parametrize(
+        ("after", "believed"),
+        [
+            (0.24, True),  # 2.4 times the noise, and (0.24^2 - 0.1^2) / (1 - 0.1^2) = 4.8 % of the mismatch
+            (0.25, False),  # 5.3 %
+        ],
+    )
+    def test_a_wave_may_leave_its_harmonics(self, after: float, believed: bool) -> None:
+        ripple: Effects = frozenset({"torque_ripple"})
+        assert (self.objection(1.0, after, ripple) == "") is believed
+        assert self.objection(1.0, after, ripple | COULOMB) != ""
+
     @pytest.mark.parametrize(("share", "left"), [(0.6, ""), (0.8, "64% of the mismatch")])
     def test_of_a_position_half(self, share: float, left: str) -> None:
         """0.6^2 = 36 % and 0.8^2 = 64 % are left; how near to the noise is not asked."""
@@ -180,10 +193,10 @@ class TestChosen:
         assert judged.objection == f"road grade would leave {kind_in_words(law)} at the motor side unexplained"
 
     @staticmethod
-    def nearly(found: Selection) -> Selection:
-        """The same with white errors of 1.14 times the noise left."""
+    def nearly(found: Selection, noises: float = 1.14) -> Selection:
+        """The same with white errors of so many times the noise left."""
         errors = np.random.default_rng(5).standard_normal(found.retuned.residual.size)
-        return replace(found, result=replace(found.result, residual=1.14 * SIGMA * errors))
+        return replace(found, result=replace(found.result, residual=noises * SIGMA * errors))
 
     def test_one_elsewhere_that_a_simple_law_beats_does_not(self) -> None:
         """An error of the sensor, nearly explained by the shaft, and to the noise by |w| at the sensor."""
@@ -205,6 +218,21 @@ class TestChosen:
         assert judged.unnamed is not None
         assert judged.unnamed.element is Element.SHAFT
         assert judged.verdict is Verdict.EXPLAINED
+
+    @pytest.mark.parametrize(("law", "verdict"), [(1.25, Verdict.EXPLAINED), (1.1, Verdict.UNEXPLAINED)])
+    def test_a_simple_law_at_its_own_place_that_leaves_less_than_half_is_another(
+        self, law: float, verdict: Verdict
+    ) -> None:
+        """Of 1.4^2 - 1 = 0.96 above the noise 1.25 leaves 0.56 and 1.1 leaves 0.21."""
+        records = recordings(Element.SHAFT, lambda moved: moved.twist**3, 4e4)
+        found = self.nearly(selection(records, CUBIC, model(TWO_MASS, TIGHT)), 1.4)
+        assert found.unnamed is not None
+        level = unpredictable(residuals_by_record(found.result)) / 1.4
+        rival = replace(found.unnamed, rms=law * level, gain=replace(found.unnamed.gain, delta_bic=1e9))
+        judged = judge(replace(found, unnamed=rival), level)
+        assert judged.verdict is verdict
+        wave = replace(found, unnamed=rival, chosen=frozenset({"cardan_second_order"}))
+        assert judge(wave, level).verdict is Verdict.EXPLAINED
 
     def test_what_it_leaves_is_told(self) -> None:
         """Friction of a motor that also misreads: named, and the rest is given as a law."""
