@@ -79,6 +79,18 @@ class Bench:
             self._fits[effects] = _without_much(again)
         return self._fits[effects]
 
+    def fit_widely(self, effects: Effects, name: str) -> FitResult:
+        """Fit an effect from every start it has, promising or not, and return the better of this and what is known.
+
+        What one effect leaves in a poorer minimum, another would be named for.
+        """
+        had, before = self._fits[effects], self.fit(effects - {name})
+        releases = [look.release for look in Screen(before, self.model).looks(name)]
+        again = self._fit(effects, before, releases) if len(releases) > 1 else had
+        if again.squares < had.squares:
+            self._fits[effects] = _without_much(again)
+        return self._fits[effects]
+
     def fit_less(self, effects: Effects, larger: FitResult) -> FitResult:
         """Fit fewer effects from where a fit with more ended, too, and return the better of both.
 

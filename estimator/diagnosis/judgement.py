@@ -29,12 +29,15 @@ MOST_OF_POSITION = 0.5
 NEAR_FLOOR = 1.5
 """Error over the noise floor that an explanation may leave: another way to write the same law leaves that much."""
 
+NEAR_FLOOR_DETAIL = 2.5
+"""The same where that is next to nothing of the mismatch."""
+
 NEAR_FLOOR_PROFILE = 1.15
 """The same for a profile over time, which follows whatever is slow: what it leaves is something else."""
 
 DETAIL = 0.005
-"""Share of the mismatch's power that a profile may leave above the noise beyond that: next to a mismatch of many times
-the noise it is a detail of the road or the line, whatever it is."""
+"""Share of the mismatch's power that an explanation may leave above the noise beyond that: next to a mismatch of many
+times the noise it is a detail of the road or the line, or of how a law is written, whatever it is."""
 
 HARMONICS = 0.05
 """Share of the mismatch's power that a wave over an angle may leave, however far above the noise: no machine's is a
@@ -109,7 +112,11 @@ def _leaves_too_much(selection: Selection, floor: float, profile_alone: bool) ->
         return f"{1.0 - share:.0%} of the mismatch" if share < MOST_OF_POSITION else ""
     if all(EFFECTS[name].phases for name in selection.chosen) and share >= 1.0 - HARMONICS:
         return ""
-    most = NEAR_FLOOR_PROFILE if profile_alone and not _leaves_a_detail(selection, floor) else NEAR_FLOOR
+    if _leaves_a_detail(selection, floor):
+        bends = any(EFFECTS[name].profile for name in selection.chosen)
+        most = NEAR_FLOOR if bends else NEAR_FLOOR_DETAIL
+    else:
+        most = NEAR_FLOOR_PROFILE if profile_alone else NEAR_FLOOR
     seen = after > NEAR_FLOOR_PROFILE * level
     if share < (MOST_VISIBLE if seen else MOST) or after > most * level:
         return f"{1.0 - share:.0%} of the mismatch, {after / level:.2g} times the noise"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from estimator.diagnosis.evidence import VERY_STRONG, gain, information
 from estimator.diagnosis.hypotheses import NOTHING, Effects, Progress
@@ -127,6 +127,9 @@ class Selector:
             if best is None:
                 break
             path = self._with(path, best, retuned)
+            if len(path.chosen) == 1 and self._has_rest(path.current, retuned):  # before another is named for the rest
+                (alone,) = path.chosen
+                path = replace(path, current=self.jury.bench.fit_widely(path.chosen, alone))
         return path
 
     def _with(self, path: _Path, best: Trial, retuned: FitResult) -> _Path:

@@ -216,6 +216,12 @@ class TestLocalMinima:
         assert first.rms == pytest.approx(SIGMA, rel=0.05)
         assert bench.fit_again(self.MODE, "extra_torsional_mode").squares <= first.squares
 
+    def test_before_another_is_named_every_start_is_tried(self) -> None:
+        bench = self.with_mode(0.2, 13.0, 0.76)
+        right = bench.fit(self.MODE, bench.fit(NOTHING))
+        bench._fits[self.MODE] = replace(right, residual=5.0 * right.residual)  # as if it had ended elsewhere
+        assert bench.fit_widely(self.MODE, "extra_torsional_mode").squares == pytest.approx(right.squares, rel=1e-4)
+
     def test_fewer_effects_start_from_where_more_ended_too(self) -> None:
         records = rubbing(lambda speed: FRICTION_NM)
         bench = Bench(model(ONE_MASS), records, everything(records))

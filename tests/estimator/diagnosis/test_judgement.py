@@ -123,6 +123,8 @@ class TestHowMuchMayBeLeft:
             (0.16, 0.113, ""),  # 18 %, hardly seen
             (0.2, 0.13, "23% of the mismatch, 1.3 times the noise"),
             (1.0, 0.5, "24% of the mismatch, 5 times the noise"),
+            (9.0, 0.24, ""),  # 0.06 % of the mismatch: a detail of how the law is written
+            (9.0, 0.26, "0% of the mismatch, 2.6 times the noise"),
         ],
     )
     def test_a_fifth_of_the_mismatch_and_half_again_the_noise(self, before: float, after: float, left: str) -> None:
