@@ -134,8 +134,8 @@ class Jury:
         return replace(trial, holdout=self._examine(trial, before), failed=None)
 
     def final(self, name: str, chosen: Effects, current: FitResult, trial: Trial) -> Trial:
-        """Judge an accepted effect once more, against the final set without it."""
-        if chosen == trial.effects and trial.name == name:
+        """Judge an accepted effect once more, against the final set without it; or alone, where its fit got better."""
+        if chosen == trial.effects and trial.name == name and trial.result.squares <= current.squares:
             return trial
         without = self.bench.fit(chosen - {name}, current)
         final = self.trial(name, chosen, without, current)

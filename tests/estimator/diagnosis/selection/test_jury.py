@@ -14,7 +14,7 @@ from estimator.diagnosis.selection.jury import SIGNIFICANT
 from estimator.diagnosis.trial import Trial
 from tests.estimator.diagnosis.planted import quiet, rubbing
 from tests.estimator.diagnosis.regression import of_rms
-from tests.estimator.diagnosis.selection.mass import COULOMB, STRIBECK, jury
+from tests.estimator.diagnosis.selection.mass import COULOMB, STRIBECK, coulomb, jury
 from tests.estimator.physics.bench import ONE_MASS
 
 
@@ -107,3 +107,14 @@ class TestRules:
         strong = replace(gain(of_rms(1.0, 2), of_rms(0.5, 3)), delta_bic=50.0, p_value=1e-9)
         failed = judging._statistics_fail(COULOMB, result, strong, 1e-8)
         assert failed == "its interval includes the value at which it does nothing"
+
+    def test_an_effect_whose_fit_got_better_is_judged_anew(self) -> None:
+        """A fit from more starts is not told with the evidence of the poorer one."""
+        judging = jury(rubbing(coulomb))
+        alone = frozenset({COULOMB})
+        retuned = judging.bench.fit(NOTHING)
+        right = judging.bench.fit(alone, retuned)
+        poorer = judging.trial(COULOMB, alone, retuned, replace(right, residual=1.5 * right.residual))
+        assert judging.final(COULOMB, alone, right, poorer).gain == gain(retuned, right)
+        same = judging.trial(COULOMB, alone, retuned, right)
+        assert judging.final(COULOMB, alone, right, same) is same

@@ -66,12 +66,10 @@ def test_doubt_is_what_another_way_is_looked_for_in(monkeypatch: pytest.MonkeyPa
     assert search(read_through(late(rubbing(coulomb), 3)), LINE, (), silent).selection.chosen == BOTH
 
 
-def test_where_nothing_stands_it_is_not() -> None:
+def test_where_nothing_stands_it_is_not(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nothing chosen is no doubt where no law finds anything."""
-    monkey = pytest.MonkeyPatch()
-    with monkey.context() as patched:
-        patched.setattr(Selector, "by_other_ways", lambda *_: pytest.fail("looked for another way"))
-        found = search(read_through(quiet(values=ONE_MASS, samples=1200)), LINE, (), silent)
+    monkeypatch.setattr(Selector, "by_other_ways", lambda *_: pytest.fail("looked for another way"))
+    found = search(read_through(quiet(values=ONE_MASS, samples=1200)), LINE, (), silent)
     assert found.selection.chosen == NOTHING
 
 
