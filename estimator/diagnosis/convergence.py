@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from estimator.diagnosis.selection import Selection
-from estimator.diagnosis.selection.selector import PATIENCE
 from estimator.physics.catalogue import EFFECTS
-from estimator.physics.fit import ITERATIONS
 
 
 def unconverged(selection: Selection) -> tuple[str, ...]:
@@ -21,6 +19,6 @@ def unconverged(selection: Selection) -> tuple[str, ...]:
 
 def _sentence(what: str, so: str) -> str:
     return (
-        f"The fit of {what} did not converge in {PATIENCE * ITERATIONS} steps: {so}, and no explanation is built on "
+        f"The fit of {what} did not converge: {so}, and no explanation is built on "
         "it. Check that the nominal values are near the line's, narrow the tolerances, or record what excites more."
     )

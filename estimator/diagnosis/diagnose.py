@@ -19,11 +19,10 @@ from estimator.diagnosis.assemble import (
     rms_of,
 )
 from estimator.diagnosis.chain import Chain, mechanical, read_through
-from estimator.diagnosis.evidence import Gain, gain, information, residuals_by_record
+from estimator.diagnosis.evidence import Gain, gain, information, noise_level, residuals_by_record
 from estimator.diagnosis.holdout import Examiner, foreign_outputs
 from estimator.diagnosis.hypotheses import NOTHING, Bench, Progress, effects_of, everything
 from estimator.diagnosis.judgement import Judgement, judge
-from estimator.diagnosis.noise import unpredictable
 from estimator.diagnosis.preconditions import prepare
 from estimator.diagnosis.result import (
     Diagnosis,
@@ -107,7 +106,7 @@ def _diagnose(
     final = selection.result if believed else selection.retuned
     seen = None
     if judgement.verdict is not Verdict.NO_MISMATCH:
-        seen = discrepancy(selection.retuned, final, _floor(selection, floor), line.motion)
+        seen = discrepancy(selection.retuned, final, noise_level(selection.result, floor), line.motion)
         judgement = _located(judgement, seen)
     before = _raw_fit(chain, line, final)
     retuned = _raw_fit(chain, line, selection.retuned)
@@ -173,13 +172,8 @@ def _fit_figures(
         augmented=rms_of(chain.errors(final.outputs)),
         holdout_retuned=held.before,
         holdout_augmented=held.after,
-        noise_floor=_floor(selection, floor),
+        noise_floor=noise_level(selection.result, floor),
     )
-
-
-def _floor(selection: Selection, floor: float) -> float:
-    """Return the lower of the two estimates of the noise: of the reading, and of the best explanation's error."""
-    return min(floor, unpredictable(residuals_by_record(selection.result)))
 
 
 def _mismatch(
@@ -195,7 +189,7 @@ def _mismatch(
     ``explained`` is the fit that is believed, None where the acquisition's own faults are part of what it explains;
     ``retuned`` that of the nominal model to the recordings as they were read.
     """
-    floor = _floor(selection, floor)
+    floor = noise_level(selection.result, floor)
     if judgement.verdict is Verdict.NO_MISMATCH:
         return Mismatch(False, None, {}, None, None, 1.0)
     element = _element(selection, judgement, effects)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
-from estimator.diagnosis.noise import effective_samples
+from estimator.diagnosis.noise import effective_samples, unpredictable
 from estimator.physics.fit import FitResult
 from estimator.signals.record import FloatArray
 
@@ -42,6 +42,11 @@ def residuals_by_record(result: FitResult) -> list[FloatArray]:
     """Split a fit's stacked residual into one array per recording."""
     sizes = np.cumsum([int(use.sum()) for use in result.problem.use])[:-1]
     return list(np.split(result.residual, sizes))
+
+
+def noise_level(result: FitResult, floor: float) -> float:
+    """Return the lower of two estimates of the noise: of the reading, and of what no past predicts of a fit's error."""
+    return min(floor, unpredictable(residuals_by_record(result)))
 
 
 def gain(smaller: FitResult, larger: FitResult) -> Gain:

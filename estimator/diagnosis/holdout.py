@@ -9,12 +9,12 @@ moments) is estimated on the rest.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from estimator.diagnosis.hypotheses import Bench, Effects
-from estimator.physics.fit import FitResult
+from estimator.diagnosis.hypotheses import Effects
+from estimator.physics.fit import FitResult, fit
 from estimator.physics.free_run import simulate_foreign
 from estimator.physics.model import DrivelineModel
 from estimator.signals.record import BoolArray, FloatArray, Record
@@ -48,7 +48,7 @@ def blocks(record: Record) -> BoolArray:
 
 @dataclass
 class Examiner:
-    """Judges sets of effects on samples kept out of their fits; each fit is made once.
+    """Judges sets of effects on samples kept out of their fits; each fit is made once, from where the full one ended.
 
     Attributes
     ----------
@@ -59,9 +59,7 @@ class Examiner:
     model: DrivelineModel
     records: Sequence[Record]
     holdout: Sequence[Record]
-
-    def __post_init__(self) -> None:
-        self._between = Bench(self.model, self.records, [r.okay & ~blocks(r) for r in self.records])
+    _between: dict[tuple[Effects, bytes], tuple[FloatArray, ...]] = field(default_factory=dict)
 
     def compare(self, before: FitResult, smaller: Effects, after: FitResult, larger: Effects) -> HoldOut:
         """Compare two hypotheses on unseen samples; ``before`` and ``after`` are their fits of everything."""
@@ -82,7 +80,7 @@ class Examiner:
             use = [record.okay & ~blocks(record) for record in self.holdout]
             outputs = foreign_outputs(full, self.model, self.holdout, use, effects)
         else:
-            outputs = self._between.fit(effects, full).outputs
+            outputs = self._from_between(full, effects)
         return np.array(
             [
                 np.sum((output - record.output)[block] ** 2)
@@ -90,6 +88,14 @@ class Examiner:
                 for block in _single_blocks(record)
             ]
         )
+
+    def _from_between(self, full: FitResult, effects: Effects) -> tuple[FloatArray, ...]:
+        """Return the outputs of a fit of what is between the blocks alone, begun where the full one ended."""
+        end = (effects, full.x.tobytes())
+        if end not in self._between:
+            use = tuple(record.okay & ~blocks(record) for record in self.records)
+            self._between[end] = fit(replace(full.problem, use=use), full.x).outputs
+        return self._between[end]
 
 
 def _single_blocks(record: Record) -> list[BoolArray]:

@@ -10,7 +10,7 @@ import numpy as np
 from estimator.diagnosis.screening import Screen, promising
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Untestable
-from estimator.physics.fit import HEAT, ITERATIONS, FitResult, Problem, best_fit, converge, make_problem
+from estimator.physics.fit import HEAT, ITERATIONS, FitResult, Problem, best_fit, converge, fit, make_problem
 from estimator.physics.model import DrivelineModel, Motion
 from estimator.physics.moments import polished, without_idle
 from estimator.physics.simulate import grid_for
@@ -20,6 +20,9 @@ from estimator.signals.record import BoolArray, Record
 
 Effects = frozenset[str]
 NOTHING: Effects = frozenset()
+
+FURTHER = 8
+"""Jacobians that a rough fit gets before it is compared once more."""
 
 MUCH_BYTES = 2**24
 """Room of a derivative that is rather found again than kept: a round of the search has a dozen of them."""
@@ -117,6 +120,15 @@ class Bench:
             self._rough[effects] = _without_much(self._fit(effects, warm, releases, HEAT))
         return self._rough[effects]
 
+    def go_on(self, effects: Effects) -> FitResult:
+        """Take a rough fit some steps further; ``fit`` goes on from there."""
+        if effects in self._fits:
+            return self._fits[effects]
+        rough = self._rough[effects]
+        if not rough.converged:
+            self._rough[effects] = _without_much(fit(rough.problem, rough.x, FURTHER))
+        return self._rough[effects]
+
     def let_go(self, keep: Effects) -> None:
         """Take the derivatives out of all fits but one: what lost is rarely looked at again."""
         for fits in (self._fits, self._rough):
@@ -150,7 +162,8 @@ class Bench:
             for release in (releases or [Release((), ((),) * len(self.records))])
         ]
         result = best_fit(problems, warm, iterations)
-        return polished(result, iterations) if any(EFFECTS[name].event for name in effects) else result
+        sought = effects if iterations == ITERATIONS else effects - had  # in a few steps, moments of the new one only
+        return polished(result, iterations) if any(EFFECTS[name].event for name in sought) else result
 
     def _problem(self, effects: Effects, release: Release) -> Problem:
         return make_problem(

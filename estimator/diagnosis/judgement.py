@@ -7,24 +7,16 @@ from dataclasses import dataclass
 
 from estimator.diagnosis.acquisition import Finding
 from estimator.diagnosis.convergence import unconverged
-from estimator.diagnosis.evidence import VERY_STRONG, gain, residuals_by_record
-from estimator.diagnosis.noise import unpredictable
+from estimator.diagnosis.evidence import VERY_STRONG, gain, noise_level
 from estimator.diagnosis.phrases import PLACE_NAMES, kind_in_words
 from estimator.diagnosis.result import Verdict
 from estimator.diagnosis.selection import Selection
 from estimator.diagnosis.unnamed import UnnamedLaw
-from estimator.diagnosis.weight import VISIBLE
+from estimator.diagnosis.weight import VISIBLE, least_share, reads_speed, share_removed
 from estimator.physics.catalogue import EFFECTS
-from estimator.signals.record import OutputKind
-
-MOST = 0.8
-"""Share of the mismatch's power, above the noise floor, that an explanation must take away."""
 
 MOST_VISIBLE = 0.9
-"""The same where what it leaves is seen above the noise."""
-
-MOST_OF_POSITION = 0.5
-"""The same where a position is read, whose error has no floor to speak of."""
+"""Share of the mismatch's power that an explanation must take away where what it leaves is seen above the noise."""
 
 NEAR_FLOOR = 1.5
 """Error over the noise floor that an explanation may leave: another way to write the same law leaves that much."""
@@ -93,7 +85,7 @@ def judge(selection: Selection, floor: float, findings: Sequence[Finding] = ()) 
 
 
 def _above_floor(selection: Selection, floor: float) -> bool:
-    return _reads_speed(selection) and selection.retuned.rms > ABOVE_FLOOR * floor
+    return reads_speed(selection.retuned) and selection.retuned.rms > ABOVE_FLOOR * floor
 
 
 def _leaves_too_much(selection: Selection, floor: float, profile_alone: bool) -> str:
@@ -101,15 +93,14 @@ def _leaves_too_much(selection: Selection, floor: float, profile_alone: bool) ->
 
     Near to the noise is asked of a speed only: a free-running position drifts away from any model.
     """
-    before, after = selection.retuned.rms, selection.result.rms
-    level = floor
+    after, level = selection.result.rms, floor
     if all(record.torque_trusted.all() for record in selection.result.problem.records):
-        level = min(floor, unpredictable(residuals_by_record(selection.result)))
+        level = noise_level(selection.result, floor)
     if after < VISIBLE * level and selection.remaining is None:
         return ""  # what is left is the noise of the reading and of the torque's
-    share = (before**2 - after**2) / (before**2 - min(level, after) ** 2)
-    if not _reads_speed(selection):
-        return f"{1.0 - share:.0%} of the mismatch" if share < MOST_OF_POSITION else ""
+    share, least = share_removed(selection.retuned, selection.result, level), least_share(selection.result)
+    if not reads_speed(selection.result):
+        return f"{1.0 - share:.0%} of the mismatch" if share < least else ""
     if all(EFFECTS[name].phases for name in selection.chosen) and share >= 1.0 - HARMONICS:
         return ""
     if _leaves_a_detail(selection, floor):
@@ -118,7 +109,7 @@ def _leaves_too_much(selection: Selection, floor: float, profile_alone: bool) ->
     else:
         most = NEAR_FLOOR_PROFILE if profile_alone else NEAR_FLOOR
     seen = after > NEAR_FLOOR_PROFILE * level
-    if share < (MOST_VISIBLE if seen else MOST) or after > most * level:
+    if share < (MOST_VISIBLE if seen else least) or after > most * level:
         return f"{1.0 - share:.0%} of the mismatch, {after / level:.2g} times the noise"
     return ""
 
@@ -134,13 +125,9 @@ def _is_another_law(selection: Selection, floor: float, unnamed: UnnamedLaw) -> 
     if any(EFFECTS[name].phases for name in selection.chosen):  # a wave and its harmonics are sought one by one
         return False
     after = selection.result.rms
-    level = min(floor, unpredictable(residuals_by_record(selection.result)))
+    level = noise_level(selection.result, floor)
     left = max(unnamed.rms**2 - level**2, 0.0)
     return after > NEAR_FLOOR_PROFILE * level and left < FAR_BETTER * (after**2 - level**2)
-
-
-def _reads_speed(selection: Selection) -> bool:
-    return all(record.kind is OutputKind.SPEED for record in selection.retuned.problem.records)
 
 
 def _objection(selection: Selection, floor: float, unnamed: UnnamedLaw | None, remaining: UnnamedLaw | None) -> str:
@@ -154,7 +141,7 @@ def _objection(selection: Selection, floor: float, unnamed: UnnamedLaw | None, r
     if alone and remaining is not None and not _leaves_a_detail(selection, floor):  # an edge in what should be smooth
         law = kind_in_words(remaining.terms[0][0])
         return f"{named} would leave {law} at the {PLACE_NAMES[remaining.element]} unexplained"
-    if unnamed is None or not _reads_speed(selection):  # a free-running position drifts as any flexible law does
+    if unnamed is None or not reads_speed(selection.result):  # a free-running position drifts as any flexible law does
         return ""
     named_or_alike = {*selection.chosen, *(twin for twins in selection.lookalikes.values() for twin in twins)}
     elements = {EFFECTS[name].element for name in named_or_alike}

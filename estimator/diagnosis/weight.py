@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from estimator.diagnosis.evidence import residuals_by_record
+from estimator.diagnosis.evidence import noise_level
 from estimator.diagnosis.hypotheses import Effects
-from estimator.diagnosis.noise import unpredictable
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult
+from estimator.signals.record import OutputKind
 
 PART_OF_MISMATCH = 0.05
 """Share of the first mismatch's power that a further effect must remove, or else
@@ -21,6 +21,12 @@ per cent of what it moves, and some law elsewhere follows what is left."""
 PART_FOR_DETAIL = 0.01
 """Share of what a special case removes that its generalisation must remove on top: the same friction written as
 bristles or as a rounded sign differs by less."""
+
+MOST = 0.8
+"""Share of the mismatch's power, above the noise floor, that an explanation must take away to be believed."""
+
+MOST_OF_POSITION = 0.5
+"""The same where a position is read, whose error has no floor to speak of."""
 
 VISIBLE = 1.05
 
@@ -42,7 +48,11 @@ class Weight:
 
     def level(self, result: FitResult) -> float:
         """Return the noise: of the reading, or of a fit's error if that is less."""
-        return min(self.floor, unpredictable(residuals_by_record(result)))
+        return noise_level(result, self.floor)
+
+    def may_stand(self, result: FitResult, retuned: FitResult) -> bool:
+        """Tell whether a fit takes so much of the mismatch away that an explanation could rest on it."""
+        return share_removed(retuned, result, self.level(result)) >= least_share(result)
 
     def visible(self, before: FitResult, after: FitResult) -> bool:
         """Tell whether the error falls by what can be seen in a plot, and by half of what stands over the noise."""
@@ -74,6 +84,21 @@ class Weight:
 
     def _mismatch(self, after: FitResult, retuned: FitResult) -> float:
         return max(retuned.rms**2 - self.floor**2, retuned.rms**2 - after.rms**2)
+
+
+def share_removed(before: FitResult, after: FitResult, level: float) -> float:
+    """Return the share of the mismatch's power, above the noise, that a fit takes away."""
+    return (before.rms**2 - after.rms**2) / (before.rms**2 - min(level, after.rms) ** 2)
+
+
+def reads_speed(result: FitResult) -> bool:
+    """Tell whether a fit is of speeds alone."""
+    return all(record.kind is OutputKind.SPEED for record in result.problem.records)
+
+
+def least_share(result: FitResult) -> float:
+    """Return the share of the mismatch's power that an explanation must take away."""
+    return MOST if reads_speed(result) else MOST_OF_POSITION
 
 
 def _echoes(name: str, others: Effects) -> bool:

@@ -107,14 +107,14 @@ def test_the_thresholds_of_a_verdict_are_those_of_the_code() -> None:
     assert "at least a quarter" in page
     assert selector.MOST_EFFECTS == 4
     assert "up to four effects" in page
-    assert judgement.MOST == 0.8
+    assert weight.MOST == 0.8
     assert "a fifth or more of the mismatch's power" in page
     assert f"{judgement.NEAR_FLOOR:g} times the noise" in page
     assert f"{judgement.NEAR_FLOOR_PROFILE:g} times for a load profile alone" in page
     assert selector.OTHER_WAYS == 3
     assert "each of the three that leave least begins a way" in page
     assert f"ends within {selector.NEAR_NOISE:g} times the noise" in page
-    assert rounds.WORTH_FITTING == 0.2
+    assert (rounds.WORTH_FITTING, rounds.WORTH_GOING_ON, rounds.WORTH_FINISHING) == (0.2, 0.5, 0.8)
     assert "less than a fifth of the best one's part" in page
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from estimator.diagnosis.evidence import VERY_STRONG
@@ -21,8 +21,8 @@ WORTH_FITTING = 0.2
 MOST_FITS = 10
 """Effects that are fitted in a round, the most promising ones."""
 
-WORTH_FINISHING = 0.5
-"""Share of the best rough fit's gain below which a rival's fit is not finished."""
+WORTH_GOING_ON, WORTH_FINISHING = 0.5, 0.8
+"""Share of the best fit's gain below which a rival's fit stays as it is, after the first few steps and a few more."""
 
 
 @dataclass
@@ -46,7 +46,7 @@ class Rounds:
     def try_all(
         self, chosen: Effects, current: FitResult, without: Effects = NOTHING, least: float = 0.0
     ) -> dict[str, Trial]:
-        """Look at every effect but some, fit what could matter a few steps, and to the end what comes near the best.
+        """Look at every effect but some, fit what could matter a few steps, and to the end what stays near the best.
 
         ``least`` is the fall of the squared error that an effect must promise to be fitted.
         """
@@ -62,15 +62,18 @@ class Rounds:
             list(looks),
         )
         rough = dict(zip(looks, fits, strict=True))
-        most = max((current.squares - result.squares for result in rough.values()), default=0.0)
-        pressed = pressed_parameters(current)
         self._report("finishing the best of them", 0.7)
+        further = _near_the_best(rough, current, WORTH_GOING_ON)
+        if len(further) > 1:
+            fits = concurrently(lambda name: self.jury.bench.go_on(with_effect(chosen, name)), further)
+            rough |= dict(zip(further, fits, strict=True))
+            further = _near_the_best(rough, current, WORTH_FINISHING)
+        pressed = pressed_parameters(current)
 
         def finished(name: str) -> Trial:
             effects = with_effect(chosen, name)
-            near = current.squares - rough[name].squares >= WORTH_FINISHING * most
-            result = self.jury.bench.fit(effects, current) if near else rough[name]
-            if near and EFFECTS[name].loosens & pressed:
+            result = self.jury.bench.fit(effects, current) if name in further else rough[name]
+            if name in further and EFFECTS[name].loosens & pressed:
                 result = self.jury.bench.fit_again(effects, name)
             return self.jury.trial(name, effects, current, result)
 
@@ -125,3 +128,10 @@ class Rounds:
         """Let the derivatives of what lost a round go."""
         self.jury.bench.let_go(effects_of(kept))
         self.trials = {name: replace(trial, result=trial.result.light()) for name, trial in self.trials.items()}
+
+
+def _near_the_best(fits: Mapping[str, FitResult], current: FitResult, share: float) -> list[str]:
+    """Return the effects whose fits gain at least a share of what the best one does."""
+    gains = {name: current.squares - result.squares for name, result in fits.items()}
+    most = max(gains.values(), default=0.0)
+    return [name for name, gained in gains.items() if gained >= share * most]

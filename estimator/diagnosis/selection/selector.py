@@ -135,14 +135,16 @@ class Selector:
     def _with(self, path: _Path, best: Trial, retuned: FitResult) -> _Path:
         """Return a path with the effects of a trial, less those it made superfluous."""
         accepted = {name: path.accepted.get(name, best) for name in best.effects} | {best.name: best}
-        whole = self._to_its_end(best.effects, best.result)
+        whole = self._to_its_end(best.effects, best.result, retuned)
         return _Path(*self._drop_superfluous(best.effects, whole, retuned), accepted)
 
-    def _to_its_end(self, effects: Effects, warm: FitResult | None = None) -> FitResult:
-        """Return the fit on which a verdict is built: it may take its iterations several times."""
+    def _to_its_end(
+        self, effects: Effects, warm: FitResult | None = None, retuned: FitResult | None = None
+    ) -> FitResult:
+        """Return a fit that may take its iterations several times, unless it leaves too much for a verdict anyway."""
         result = self.jury.bench.fit(effects, warm)
         for _ in range(PATIENCE - 1):
-            if result.converged:
+            if result.converged or (retuned is not None and not self.jury.weight.may_stand(result, retuned)):
                 break
             result = self.jury.bench.fit(effects, result)
         return result

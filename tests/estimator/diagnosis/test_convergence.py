@@ -48,8 +48,8 @@ def test_which_fit_it_was_is_said(dry: Selection) -> None:
     result = replace(dry.result, converged=False)
     restless = replace(dry, retuned=replace(dry.retuned, converged=False), result=result)
     first, second = unconverged(restless)
-    assert first.startswith("The fit of the re-tuned nominal model did not converge in 200 steps: its error is an")
-    assert second.startswith("The fit of the model with dry friction at the motor did not converge in 200 steps")
+    assert first.startswith("The fit of the re-tuned nominal model did not converge: its error is an")
+    assert second.startswith("The fit of the model with dry friction at the motor did not converge: its")
     said = statement(judge(restless, SIGMA), (), FIGURES, ())
     assert first in said
     assert second in said

@@ -10,8 +10,9 @@ import pytest
 from estimator.diagnosis.holdout import BLOCK_S, EVERY_S, Examiner, blocks, foreign_outputs
 from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects, everything
 from estimator.physics.effects.road_grade import KNOT_SPACING_S
-from estimator.physics.fit import FitResult
+from estimator.physics.fit import FitResult, fit
 from estimator.physics.simulate import Start
+from estimator.physics.unknowns import Shared
 from estimator.signals.record import Record
 from tests.estimator.diagnosis.planted import SIGMA, drive_torque, quiet, rubbing
 from tests.estimator.physics.bench import ONE_MASS, linear_record, model, random_steps, record
@@ -60,6 +61,14 @@ def braked(seeds: tuple[int, ...] = (1, 2), lasts_s: tuple[float, float] = BRAKE
     ]
 
 
+def _at_most(unknown: Shared, value: float) -> Shared:
+    """Hold the size of an effect low; nominal unknowns stay as they are."""
+    if not unknown.effect:
+        return unknown
+    high = value / unknown.scale
+    return replace(unknown, high=high, start=min(unknown.start, high))
+
+
 def fits(records: list[Record], effects: Effects) -> tuple[FitResult, FitResult]:
     bench = Bench(LINE, records, everything(records))
     return bench.fit(NOTHING), bench.fit(effects, bench.fit(NOTHING))
@@ -95,6 +104,17 @@ class TestWithoutHoldOutRecordings:
         assert after.value("coulomb_friction_motor", "friction_nm") != pytest.approx(12.0, rel=0.02)
         held = Examiner(LINE, spoilt, ()).compare(before, NOTHING, after, COULOMB)
         assert held.after == pytest.approx(np.hypot(1.0, SIGMA), rel=0.01)
+
+    def test_a_fit_that_got_better_is_judged_by_itself(self) -> None:
+        """Unseen samples are told from where the full fit ended: a poorer one seen before does not stay."""
+        records = with_friction()
+        before, after = fits(records, COULOMB)
+        held_low = replace(after.problem, shared=tuple(_at_most(u, 3.0) for u in after.problem.shared))
+        poorer = fit(held_low)
+        examiner = Examiner(LINE, records, ())
+        held = [examiner.compare(before, NOTHING, each, COULOMB).after for each in (poorer, after)]
+        assert held[0] > 2.0 * SIGMA
+        assert held[1] == pytest.approx(SIGMA, rel=0.15)
 
     def test_a_road_is_judged_on_blocks_that_its_neighbours_predict(self) -> None:
         records = hilly()

@@ -111,6 +111,20 @@ def test_a_rough_fit_is_gone_on_with() -> None:
     assert finished.squares < rough.squares < nominal.squares
 
 
+def test_a_rough_fit_that_stays_near_the_best_is_taken_further() -> None:
+    records = rubbing(lambda speed: float(8.0 + 14.0 * np.exp(-((speed / 0.8) ** 2))))
+    fresh, stribeck = Bench(model(ONE_MASS), records, everything(records)), frozenset({"stribeck_friction"})
+    nominal = fresh.fit(NOTHING)
+    start = effect_unknowns("stribeck_friction", fresh.model, records)[0]
+    small = replace(start, shared=tuple(replace(unknown, start=0.1 * unknown.start) for unknown in start.shared))
+    rough = fresh.rough_fit(stribeck, nominal, [small])
+    further = fresh.go_on(stribeck)
+    assert further.squares < rough.squares
+    finished = fresh.fit(stribeck)
+    assert finished.squares <= further.squares
+    assert fresh.go_on(stribeck) is finished
+
+
 def test_fits_but_one_let_their_derivatives_go() -> None:
     records = rubbing(lambda speed: FRICTION_NM)
     bench = Bench(model(ONE_MASS), records, everything(records))

@@ -11,13 +11,13 @@ import pytest
 from estimator.diagnosis.acquisition import Finding
 from estimator.diagnosis.evidence import VERY_STRONG, residuals_by_record
 from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects, everything
-from estimator.diagnosis.judgement import ABOVE_FLOOR, MOST, MOST_VISIBLE, NEAR_FLOOR, NEAR_FLOOR_PROFILE, judge
+from estimator.diagnosis.judgement import ABOVE_FLOOR, MOST_VISIBLE, NEAR_FLOOR, NEAR_FLOOR_PROFILE, judge
 from estimator.diagnosis.noise import unpredictable
 from estimator.diagnosis.phrases import kind_in_words
 from estimator.diagnosis.result import Verdict
 from estimator.diagnosis.selection import Selection, counting_law
 from estimator.diagnosis.unnamed import best_unnamed
-from estimator.diagnosis.weight import VISIBLE
+from estimator.diagnosis.weight import MOST, VISIBLE
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
 from estimator.physics.model import DrivelineModel

@@ -7,7 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.weight import PART_BESIDE, PART_FOR_DETAIL, PART_OF_MISMATCH, VISIBLE, Weight, earns_detail
+from estimator.diagnosis.weight import (
+    MOST,
+    PART_BESIDE,
+    PART_FOR_DETAIL,
+    PART_OF_MISMATCH,
+    VISIBLE,
+    Weight,
+    earns_detail,
+)
 from tests.estimator.diagnosis.regression import of_rms
 
 COULOMB = "coulomb_friction_motor"
@@ -50,6 +58,13 @@ def test_a_small_wave_beside_a_wave_is_its_overtone() -> None:
     after, before = of_rms(0.101, 4), of_rms(0.12, 3)
     assert not WEIGHT.counts("load_imbalance", frozenset({"torque_ripple", "load_imbalance"}), after, before, RETUNED)
     assert WEIGHT.counts("load_imbalance", frozenset({COULOMB, "load_imbalance"}), after, before, RETUNED)
+
+
+@pytest.mark.parametrize(("after", "may_stand"), [(0.43, True), (0.47, False), (0.1, True)])
+def test_an_explanation_may_stand_that_takes_four_fifths_away(after: float, may_stand: bool) -> None:
+    """1 - 0.43^2 = 81.5 % of the power, 1 - 0.47^2 = 77.9 %; the floor holds 1 %."""
+    assert MOST == 0.8
+    assert WEIGHT.may_stand(of_rms(after, 3), RETUNED) is may_stand
 
 
 def test_where_the_torque_is_an_estimate_a_gain_must_be_seen() -> None:

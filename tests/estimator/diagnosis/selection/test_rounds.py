@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
-from estimator.diagnosis.hypotheses import NOTHING
+from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects
 from estimator.diagnosis.screening import Look, Screen
+from estimator.diagnosis.selection.rounds import WORTH_FINISHING, WORTH_GOING_ON
+from estimator.physics.fit import FitResult
 from estimator.physics.unknowns import Release
-from tests.estimator.diagnosis.planted import quiet
-from tests.estimator.diagnosis.selection.mass import COULOMB, rounds
+from tests.estimator.diagnosis.planted import quiet, rubbing
+from tests.estimator.diagnosis.selection.mass import COULOMB, STRIBECK, rounds
 from tests.estimator.physics.bench import ONE_MASS
 
 
@@ -20,3 +23,31 @@ def test_what_lets_a_pressed_parameter_go_is_fitted_whatever_a_look_promises(mon
     for pressed, looked_at in ((frozenset(), set()), (frozenset({"c"}), {"extra_torsional_mode"})):
         monkeypatch.setattr("estimator.diagnosis.selection.rounds.pressed_parameters", lambda _, found=pressed: found)
         assert set(tried._looks(tried.jury.names, NOTHING, current)) == looked_at
+
+
+def test_only_what_stays_near_the_best_is_finished(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Friction that falls with speed: after a few more steps its dry part alone is left behind."""
+    records = rubbing(lambda speed: float(2.0 + 30.0 * np.exp(-((speed / 2.0) ** 2))))
+    tried = rounds(records, [COULOMB, STRIBECK])
+    bench, ended = tried.jury.bench, {"rough_fit": {}, "go_on": {}}
+    current = bench.fit(NOTHING)
+    for step, found in ended.items():
+        _spy(monkeypatch, step, found)
+    trials = tried.try_all(NOTHING, current)
+    gains = [{name: current.squares - r.squares for name, r in found.items()} for found in ended.values()]
+    rough, further = gains
+    assert set(further) == {name for name in rough if rough[name] >= WORTH_GOING_ON * max(rough.values())}
+    finished = {name for name in further if further[name] >= WORTH_FINISHING * max(further.values())}
+    assert STRIBECK in finished
+    assert {name for name in trials if frozenset({name}) in bench._fits} == finished < set(further)
+
+
+def _spy(monkeypatch: pytest.MonkeyPatch, step: str, found: dict[str, FitResult]) -> None:
+    real = getattr(Bench, step)
+
+    def noted(bench: Bench, effects: Effects, *given: object) -> FitResult:
+        (name,) = effects
+        found[name] = real(bench, effects, *given)
+        return found[name]
+
+    monkeypatch.setattr(Bench, step, noted)
