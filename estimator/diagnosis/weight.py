@@ -87,8 +87,9 @@ class Weight:
 
 
 def share_removed(before: FitResult, after: FitResult, level: float) -> float:
-    """Return the share of the mismatch's power, above the noise, that a fit takes away."""
-    return (before.rms**2 - after.rms**2) / (before.rms**2 - min(level, after.rms) ** 2)
+    """Return the share of the mismatch's power, above the noise, that a fit takes away; 1 where none stands."""
+    standing = before.rms**2 - min(level, after.rms) ** 2
+    return (before.rms**2 - after.rms**2) / standing if standing > 0.0 else 1.0
 
 
 def reads_speed(result: FitResult) -> bool:

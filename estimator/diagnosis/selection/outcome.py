@@ -29,7 +29,8 @@ class Selection:
     dismissed : mapping of str to float
         Effects not worth a fit: the share of the squared error that a first look found them to explain.
     lookalikes : mapping of str to tuple of str
-        Per chosen effect, those that explain the same as well: the recordings can't tell them apart.
+        Per chosen effect, those that explain the same as well: the recordings can't tell them apart. Empty where the
+        chosen ones leave too much to be named.
     unnamed : UnnamedLaw or None
         The best law without a name for what the re-tuned nominal leaves, where it counts.
     remaining : UnnamedLaw or None

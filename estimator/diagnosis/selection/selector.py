@@ -83,10 +83,9 @@ class Selector:
     def _completed(self, first: Trial, retuned: FitResult, without: Effects) -> _Path:
         """Return the way that begins with an effect, and ends there or with one that completes the explanation."""
         way = self._with(_Path(NOTHING, retuned, {}), first, retuned)
-        standing = way.current.squares - self.jury.weight.level(way.current) ** 2 * way.current.residual.size
         if self._is_near(way.current):
             return way
-        trials = self._rounds.try_all(way.chosen, way.current, without, 0.5 * standing)
+        trials = self._rounds.try_all(way.chosen, way.current, without, self._half_of_rest(way.current))
         best = self.jury.best(trials, way.current, retuned)
         return way if best is None else self._with(way, best, retuned)
 
@@ -99,7 +98,8 @@ class Selector:
             for name, trial in path.accepted.items()
             if name in chosen
         }
-        alike = {name: lookalikes(name, chosen, current, self.jury.bench, self.jury.names) for name in chosen}
+        named = chosen if self.jury.weight.may_stand(current, retuned) else NOTHING
+        alike = {name: lookalikes(name, chosen, current, self.jury.bench, self.jury.names) for name in named}
         self._progress("looking for laws without a name", 0.9)
         return Selection(
             retuned,
@@ -116,12 +116,15 @@ class Selector:
     def _grown(self, path: _Path, retuned: FitResult) -> _Path:
         """Add effects to a path while one earns its place.
 
-        A further round of fits is only made where some law, named or not, still has something to explain.
+        A further round of fits is only made where some law, named or not, still has something to explain. Where two
+        leave too much to stand, a third must promise to complete them: what imitates takes a little each time.
         """
         for _ in range(MOST_EFFECTS - len(path.chosen)):
             if path.chosen and not self._has_rest(path.current, retuned):
                 break
-            trials = self._rounds.try_all(path.chosen, path.current)
+            hopeless = len(path.chosen) > 1 and not self.jury.weight.may_stand(path.current, retuned)
+            least = self._half_of_rest(path.current) if hopeless else 0.0
+            trials = self._rounds.try_all(path.chosen, path.current, least=least)
             best = self.jury.best(trials, path.current, retuned)
             self._rounds.let_go(path.current if best is None else best.result)
             if best is None:
@@ -182,6 +185,10 @@ class Selector:
 
     def _is_near(self, result: FitResult) -> bool:
         return result.rms <= NEAR_NOISE * self.jury.weight.level(result)
+
+    def _half_of_rest(self, result: FitResult) -> float:
+        """Return half of the squared error that a fit leaves above the noise."""
+        return 0.5 * max(result.squares - self.jury.weight.level(result) ** 2 * result.residual.size, 0.0)
 
     def _has_rest(self, current: FitResult, retuned: FitResult) -> bool:
         """Tell whether what a fit leaves could make another effect count, and is no noise.

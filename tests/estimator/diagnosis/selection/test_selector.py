@@ -12,9 +12,12 @@ from estimator.diagnosis.hypotheses import NOTHING, Effects, open_hypotheses
 from estimator.diagnosis.screening import Screen
 from estimator.diagnosis.selection import Selection, Selector
 from estimator.diagnosis.selection.rounds import MOST_FITS, WORTH_FITTING
-from estimator.diagnosis.selection.selector import MOST_EFFECTS
+from estimator.diagnosis.selection.selector import MOST_EFFECTS, _Path
+from estimator.diagnosis.trial import Trial
 from estimator.physics.catalogue import EFFECTS
+from estimator.physics.fit import FitResult
 from tests.estimator.diagnosis.planted import SIGMA, quiet, rubbing
+from tests.estimator.diagnosis.regression import of_rms
 from tests.estimator.diagnosis.selection.mass import (
     COULOMB,
     LINE,
@@ -114,6 +117,23 @@ class TestSeveralEffects:
         assert kept == {COULOMB}
         assert result is select.jury.bench.fit(frozenset({COULOMB}))
 
+    @pytest.mark.parametrize(("left", "least"), [(0.5, 0.5 * 2000 * (0.5**2 - 0.1**2)), (0.3, 0.0)])
+    def test_a_third_must_promise_to_complete_two_that_leave_too_much(
+        self, monkeypatch: pytest.MonkeyPatch, left: float, least: float
+    ) -> None:
+        """Of a mismatch of 1 they leave 25 % of the power or 9 %; the noise holds 1 %."""
+        select, asked = Selector(jury(quiet(values=ONE_MASS, samples=600), floor=0.1), silent), []
+
+        def nothing_fitted(chosen: Effects, current: FitResult, *, least: float) -> dict[str, Trial]:
+            asked.append(least)
+            return {}
+
+        monkeypatch.setattr(select._rounds, "try_all", nothing_fitted)
+        monkeypatch.setattr(select, "_has_rest", lambda *_: True)
+        two = _Path(frozenset({COULOMB, "actuator_lag"}), of_rms(left, 4), {})
+        assert select._grown(two, of_rms(1.0, 2)) is two
+        assert asked == pytest.approx([least])
+
     def test_there_is_an_end(self) -> None:
         assert 1 <= MOST_EFFECTS <= 6
 
@@ -152,6 +172,14 @@ class TestLookalikes:
         (chosen,) = dragging.chosen
         (other,) = {"quadratic_friction", "aerodynamic_drag"} - {chosen}
         assert dragging.lookalikes == {chosen: (other,)}
+
+    def test_of_what_leaves_too_much_to_be_named_none_is_sought(self) -> None:
+        """Drag that grows with the square of the speed leaves a fifth of what dry friction does."""
+        select = selector(rubbing(coulomb), ["quadratic_friction", "aerodynamic_drag"])
+        retuned, drag = select.jury.bench.fit(NOTHING), frozenset({"quadratic_friction"})
+        path = _Path(drag, select.jury.bench.fit(drag, retuned), {})
+        assert not select.jury.weight.may_stand(path.current, retuned)
+        assert select._concluded(path, retuned).lookalikes == {}
 
     def test_a_relative_that_explains_less_is_not(self, with_coulomb: Selection) -> None:
         """Quadratic friction resembles it, and Stribeck's law contains it."""
