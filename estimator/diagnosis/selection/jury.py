@@ -109,8 +109,7 @@ class Jury:
         for name in EFFECTS[trial.name].contains:
             special = trials.get(name)
             if special is not None and special.failed is None:
-                more = gain(special.result, trial.result)
-                if more.delta_bic < VERY_STRONG or not earns_detail(special.result, trial.result, current):
+                if not generalises(special.result, trial.result, current):
                     return special
         return trial
 
@@ -140,3 +139,8 @@ class Jury:
         without = self.bench.fit(chosen - {name}, current)
         final = self.trial(name, chosen, without, current)
         return self.examined(final, without)
+
+
+def generalises(special: FitResult, general: FitResult, before: FitResult) -> bool:
+    """Tell whether a general law earns its place over its special case, ``before`` being the fit with neither."""
+    return gain(special, general).delta_bic >= VERY_STRONG and earns_detail(special, general, before)

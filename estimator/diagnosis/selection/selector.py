@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from estimator.diagnosis.evidence import VERY_STRONG, gain, information
 from estimator.diagnosis.hypotheses import NOTHING, Effects, Progress
 from estimator.diagnosis.lookalikes import lookalikes
-from estimator.diagnosis.selection.jury import Jury
+from estimator.diagnosis.selection.jury import Jury, generalises
 from estimator.diagnosis.selection.outcome import Selection, counting_law
 from estimator.diagnosis.selection.rounds import Rounds
 from estimator.diagnosis.trial import Trial
@@ -136,10 +136,11 @@ class Selector:
         return path
 
     def _with(self, path: _Path, best: Trial, retuned: FitResult) -> _Path:
-        """Return a path with the effects of a trial, less those it made superfluous."""
-        accepted = {name: path.accepted.get(name, best) for name in best.effects} | {best.name: best}
+        """Return a path with the effects of a trial, less those it made superfluous, and these as simple as will do."""
         whole = self._to_its_end(best.effects, best.result, retuned)
-        return _Path(*self._drop_superfluous(best.effects, whole, retuned), accepted)
+        chosen, current = self._simplified(*self._drop_superfluous(best.effects, whole, retuned))
+        trials = {**path.accepted, best.name: best}
+        return _Path(chosen, current, {name: trials.get(name, best) for name in chosen})
 
     def _to_its_end(
         self, effects: Effects, warm: FitResult | None = None, retuned: FitResult | None = None
@@ -174,6 +175,16 @@ class Selector:
             gained = gain(without, current)
             if gained.delta_bic < VERY_STRONG or not self.jury.weight.counts(name, chosen, current, without, retuned):
                 return self._drop_superfluous(chosen - {name}, without, retuned)
+        return chosen, current
+
+    def _simplified(self, chosen: Effects, current: FitResult) -> tuple[Effects, FitResult]:
+        """Return effects with a general law's special case in its place, where that does beside the others."""
+        for name in sorted(chosen) if len(chosen) > 1 else ():
+            for special in set(EFFECTS[name].contains) & set(self.jury.names):
+                without = self.jury.bench.fit(chosen - {name}, current)
+                simpler = self.jury.bench.fit(chosen - {name} | {special}, without)
+                if not generalises(simpler, current, without):
+                    return chosen - {name} | {special}, simpler
         return chosen, current
 
     def _law(self, result: FitResult) -> UnnamedLaw | None:

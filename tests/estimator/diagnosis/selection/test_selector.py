@@ -117,6 +117,19 @@ class TestSeveralEffects:
         assert kept == {COULOMB}
         assert result is select.jury.bench.fit(frozenset({COULOMB}))
 
+    def test_a_general_law_that_came_to_its_special_case_is_told_as_that(self) -> None:
+        """Dry friction without a breakaway, named with one before the delay of the torque was known."""
+        select = selector(late(rubbing(coulomb), 3))
+        bench = select.jury.bench
+        retuned, general = bench.fit(NOTHING), frozenset({STRIBECK})
+        friction = bench.fit(general, retuned)
+        path = _Path(general, friction, {STRIBECK: select.jury.trial(STRIBECK, general, retuned, friction)})
+        whole = bench.fit(general | {"transport_delay"}, friction)
+        best = select.jury.trial("transport_delay", general | {"transport_delay"}, friction, whole)
+        simple = select._with(path, best, retuned)
+        assert simple.chosen == set(simple.accepted) == {COULOMB, "transport_delay"}
+        assert simple.current.rms == pytest.approx(SIGMA, rel=0.1)
+
     @pytest.mark.parametrize(("left", "least"), [(0.5, 0.5 * 2000 * (0.5**2 - 0.1**2)), (0.3, 0.0)])
     def test_a_third_must_promise_to_complete_two_that_leave_too_much(
         self, monkeypatch: pytest.MonkeyPatch, left: float, least: float
