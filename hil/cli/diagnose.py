@@ -75,21 +75,24 @@ def diagnose(
     with progress_bar() as progress:
         diagnosis = diagnose_records(training, file.model, kept_back, progress)
     text = diagnosis_text(diagnosis)
-    publish(
-        out,
-        {
-            "diagnosis.json": lambda path: path.write_text(text, encoding="utf-8"),
-            "augmented.toml": lambda path: write_model(path, diagnosis.augmented, file.signals, file.laws),
-            "report.html": lambda path: path.write_text(diagnosis_page(diagnosis), encoding="utf-8"),
-        },
-    )
+    try:
+        publish(
+            out,
+            {
+                "diagnosis.json": lambda path: path.write_text(text, encoding="utf-8"),
+                "augmented.toml": lambda path: write_model(path, diagnosis.augmented, file.signals, file.laws),
+                "report.html": lambda path: path.write_text(diagnosis_page(diagnosis), encoding="utf-8"),
+            },
+        )
+    finally:  # told even where the disk does not take it
+        if as_json:
+            typer.echo(text, nl=False)
+        else:
+            Console().print(diagnosis_summary(diagnosis))
     results = {DIAGNOSIS: out / "diagnosis.json", MODEL: out / "augmented.toml"}
     for complaint in attach_to_runs([*recordings, *(holdout or ())], results):
         typer.echo(complaint, err=True)
-    if as_json:
-        typer.echo(text, nl=False)
-    else:
-        Console().print(diagnosis_summary(diagnosis))
+    if not as_json:
         typer.echo(f"report: {out / 'report.html'}")
 
 

@@ -72,6 +72,22 @@ def test_json_goes_to_standard_output_alone(
     assert captured.err == ""
 
 
+def test_a_full_disk_takes_the_files_but_not_the_verdict(
+    bench_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("hil.report.diagnosis_html.diagnosis_page", full)
+    out = tmp_path / "result"
+    arguments = [str(bench_folder / "run_1.csv"), "--model", str(bench_folder / "drive.toml"), "--json"]
+    assert run(["diagnose", *arguments, "--out", str(out)]) == 2
+    told = capsys.readouterr()
+    assert json.loads(told.out)["effects"][0]["name"] == "coulomb_friction_motor"
+    assert "No space left on device. Make room there" in told.err
+    assert not out.exists()
+
+
 def test_no_progress_is_shown_where_nobody_looks(capsys: pytest.CaptureFixture[str]) -> None:
     with progress_bar() as progress:
         progress("fitting", 0.5)
