@@ -84,7 +84,7 @@ def replay(
     if out is not None:
         typer.echo(f"{out}: {result['recorded']} samples, {result['flagged']} flagged")
     typer.echo(f"{recording}: {course.samples} samples in {took_s:.2f} s; {course.statement}")
-    for alarm in course.alarms:
+    for alarm in course.changes:
         typer.echo(f"  alarm: {alarm.statement}")
 
 

@@ -31,7 +31,7 @@ def print_result(job: Job, summary: RunSummary, grants: RealTimeGrants, as_json:
         typer.echo(f"{job.trace}: every frame of the bus")
     if job.live is not None and summary.recorded:
         typer.echo(f"{course_path(job.out)}: {job.live.course.statement}")
-        for alarm in job.live.course.alarms:
+        for alarm in job.live.course.changes:
             typer.echo(f"  alarm: {alarm.statement}")
 
 
