@@ -36,6 +36,11 @@ def with_effect(effects: Effects, name: str) -> Effects:
     return (effects - set(EFFECTS[name].contains)) | {name}
 
 
+def flexible(names: Effects) -> Effects:
+    """Return the effects whose course or moments every recording has of its own: they bend to imitate others."""
+    return frozenset(name for name in names if EFFECTS[name].profile or EFFECTS[name].event)
+
+
 @dataclass
 class Bench:
     """A model and recordings on which hypotheses are fitted, each set of effects once.
@@ -162,8 +167,7 @@ class Bench:
             for release in (releases or [Release((), ((),) * len(self.records))])
         ]
         result = best_fit(problems, warm, iterations)
-        sought = effects if iterations == ITERATIONS else effects - had  # in a few steps, moments of the new one only
-        return polished(result, iterations) if any(EFFECTS[name].event for name in sought) else result
+        return polished(result, iterations) if any(EFFECTS[name].event for name in effects) else result
 
     def _problem(self, effects: Effects, release: Release) -> Problem:
         return make_problem(

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 from estimator.diagnosis.acquisition import Finding
 from estimator.diagnosis.convergence import unconverged
-from estimator.diagnosis.evidence import VERY_STRONG, gain, noise_level
+from estimator.diagnosis.evidence import VERY_STRONG, as_if, gain, noise_level
+from estimator.diagnosis.hypotheses import flexible
 from estimator.diagnosis.phrases import PLACE_NAMES, kind_in_words
 from estimator.diagnosis.result import Verdict
 from estimator.diagnosis.selection import Selection
@@ -120,6 +121,20 @@ def _leaves_a_detail(selection: Selection, floor: float) -> bool:
     return after**2 - min(floor, after) ** 2 <= DETAIL * (before**2 - min(floor, before) ** 2)
 
 
+def _is_seen(selection: Selection, floor: float) -> bool:
+    """Tell whether what an explanation leaves is seen above the noise."""
+    return selection.result.rms > NEAR_FLOOR_PROFILE * noise_level(selection.result, floor)
+
+
+def _is_simpler(unnamed: UnnamedLaw, selection: Selection) -> bool:
+    """Tell whether a law without a name explains as much with clearly less, both told with one number of samples."""
+    before, after = selection.retuned.rms, selection.result.rms
+    named = gain(selection.retuned, selection.result)
+    n = unnamed.gain.n_effective if unnamed.rms < after else named.n_effective
+    rival = as_if(unnamed.gain, before, unnamed.rms, n)
+    return rival > as_if(named, before, after, n) + VERY_STRONG
+
+
 def _is_another_law(selection: Selection, floor: float, unnamed: UnnamedLaw) -> bool:
     """Tell whether a law at the same place leaves so much less that it can't be the named one in other words."""
     if any(EFFECTS[name].phases for name in selection.chosen):  # a wave and its harmonics are sought one by one
@@ -138,16 +153,16 @@ def _objection(selection: Selection, floor: float, unnamed: UnnamedLaw | None, r
     alone = bool(profiles) and len(selection.chosen) == 1
     if leaves := _leaves_too_much(selection, floor, alone):
         return f"{named} would leave {leaves}"
-    if alone and remaining is not None and not _leaves_a_detail(selection, floor):  # an edge in what should be smooth
+    bends = alone or (bool(flexible(selection.chosen)) and _is_seen(selection, floor))
+    if bends and remaining is not None and not _leaves_a_detail(selection, floor):  # an edge in what should be smooth
         law = kind_in_words(remaining.terms[0][0])
         return f"{named} would leave {law} at the {PLACE_NAMES[remaining.element]} unexplained"
     if unnamed is None or not reads_speed(selection.result):  # a free-running position drifts as any flexible law does
         return ""
     named_or_alike = {*selection.chosen, *(twin for twins in selection.lookalikes.values() for twin in twins)}
     elements = {EFFECTS[name].element for name in named_or_alike}
-    rival_is_simpler = unnamed.gain.delta_bic > gain(selection.retuned, selection.result).delta_bic + VERY_STRONG
     elsewhere = bool(profiles) or unnamed.element not in elements
-    if rival_is_simpler and (elsewhere or _is_another_law(selection, floor, unnamed)):
+    if _is_simpler(unnamed, selection) and (elsewhere or _is_another_law(selection, floor, unnamed)):
         law = kind_in_words(unnamed.terms[0][0])
         return f"{law} at the {PLACE_NAMES[unnamed.element]} would explain it with less than {named}"
     return ""

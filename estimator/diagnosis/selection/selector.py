@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from estimator.diagnosis.evidence import VERY_STRONG, gain, information
-from estimator.diagnosis.hypotheses import NOTHING, Effects, Progress
+from estimator.diagnosis.hypotheses import NOTHING, Effects, Progress, flexible
 from estimator.diagnosis.lookalikes import lookalikes
 from estimator.diagnosis.selection.jury import Jury, generalises
 from estimator.diagnosis.selection.outcome import Selection, counting_law
@@ -54,7 +54,7 @@ class Selector:
 
     def may_imitate(self, selection: Selection) -> bool:
         """Tell whether a choice came near the noise by bending: some law still finds something in what it leaves."""
-        bends = bool(_flexible(selection.chosen)) and self._is_near(selection.result)
+        bends = bool(flexible(selection.chosen)) and self._is_near(selection.result)
         return bends and selection.remaining is not None
 
     def by_other_ways(self, selection: Selection) -> Selection:
@@ -66,10 +66,10 @@ class Selector:
         """
         retuned = selection.retuned
         old = path = _Path(selection.chosen, selection.result, selection.accepted)
-        without = _flexible(path.chosen) if self._is_near(path.current) else NOTHING
+        without = flexible(path.chosen) if self._is_near(path.current) else NOTHING
         for first in self._firsts(retuned, without):
             path = self._better(path, self._completed(first, retuned, without), retuned)
-            if path is not old and self._is_near(path.current) and not _flexible(path.chosen):
+            if path is not old and self._is_near(path.current) and not flexible(path.chosen):
                 break
         return selection if path is old else self._concluded(self._grown(path, retuned), retuned)
 
@@ -90,6 +90,7 @@ class Selector:
         return way if best is None else self._with(way, best, retuned)
 
     def _concluded(self, path: _Path, retuned: FitResult) -> Selection:
+        path = self._stiffened(path, retuned)
         chosen, current = path.chosen, path.current
         if any(EFFECTS[name].event for name in chosen):
             current = self.jury.bench.settle(chosen)
@@ -135,6 +136,17 @@ class Selector:
                 path = replace(path, current=self.jury.bench.fit_widely(path.chosen, alone))
         return path
 
+    def _stiffened(self, path: _Path, retuned: FitResult) -> _Path:
+        """Return a path with a law in the place of what bends beside others, where one explains the rest better."""
+        for name in sorted(flexible(path.chosen)) if len(path.chosen) > 1 else ():
+            rest = path.chosen - {name}
+            current = self.jury.bench.fit_less(rest, path.current)
+            trials = self._rounds.try_all(rest, current, flexible(frozenset(EFFECTS)))
+            best = self.jury.best(trials, current, retuned)
+            if best is not None:
+                path = self._better(path, self._with(_Path(rest, current, path.accepted), best, retuned), retuned)
+        return path
+
     def _with(self, path: _Path, best: Trial, retuned: FitResult) -> _Path:
         """Return a path with the effects of a trial, less those it made superfluous, and these as simple as will do."""
         whole = self._to_its_end(best.effects, best.result, retuned)
@@ -157,7 +169,7 @@ class Selector:
         """Return the better of two paths; where nothing was found, another way must end near the noise."""
         if not self._stands(other) or not (path.chosen or self._is_near(other.current)):
             return path
-        n = gain(retuned, other.current).n_effective
+        n = gain(retuned, min(path.current, other.current, key=lambda fit: fit.squares)).n_effective
         return other if information(path.current, other.current, n) > 0.0 else path
 
     def _stands(self, path: _Path) -> bool:
@@ -209,8 +221,3 @@ class Selector:
         if not self.jury.weight.leaves_room(current, retuned):
             return False
         return current.rms >= VISIBLE * self.jury.weight.level(current) or self._law(current) is not None
-
-
-def _flexible(names: Effects) -> Effects:
-    """Return the effects whose course or moments every recording has of its own."""
-    return frozenset(name for name in names if EFFECTS[name].profile or EFFECTS[name].event)
