@@ -8,7 +8,15 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from estimator.diagnosis.evidence import SMALLEST_P, VERY_STRONG, Gain, gain, gain_from_squares, residuals_by_record
+from estimator.diagnosis.evidence import (
+    SMALLEST_P,
+    VERY_STRONG,
+    Gain,
+    as_if,
+    gain,
+    gain_from_squares,
+    residuals_by_record,
+)
 from estimator.diagnosis.noise import effective_samples
 from tests.estimator.diagnosis.regression import autoregressive, regression
 
@@ -52,6 +60,14 @@ def test_so_few_effective_samples_as_unknowns_still_leave_two_degrees_of_freedom
     found = gain_from_squares(2.0, 1.0, 1, 50, drift)
     assert found.n_effective == 52.0
     assert found.p_value == pytest.approx(stats.f.sf(2.0, 1, 2.0))
+
+
+def test_a_gain_is_told_with_another_number_of_samples() -> None:
+    """Squares fall by 20 %; the price of two unknowns and of a choice among e^3 goes with ln n."""
+    n, fall, price = 400.0, math.log(1.25), 2.0 + 6.0 / math.log(400.0)
+    found = Gain(n * fall - price * math.log(n), 1e-9, n)
+    assert as_if(found, math.sqrt(500.0), math.sqrt(400.0), n) == pytest.approx(found.delta_bic)
+    assert as_if(found, math.sqrt(500.0), math.sqrt(400.0), 90.0) == pytest.approx(90.0 * fall - price * math.log(90.0))
 
 
 def test_a_fit_is_compared_by_its_residuals() -> None:

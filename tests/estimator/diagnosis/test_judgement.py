@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -9,14 +10,14 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis.acquisition import Finding
-from estimator.diagnosis.evidence import VERY_STRONG, residuals_by_record
+from estimator.diagnosis.evidence import VERY_STRONG, gain, residuals_by_record
 from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects, everything
 from estimator.diagnosis.judgement import ABOVE_FLOOR, MOST_VISIBLE, NEAR_FLOOR, NEAR_FLOOR_PROFILE, judge
 from estimator.diagnosis.noise import unpredictable
 from estimator.diagnosis.phrases import kind_in_words
 from estimator.diagnosis.result import Verdict
 from estimator.diagnosis.selection import Selection, counting_law
-from estimator.diagnosis.unnamed import best_unnamed
+from estimator.diagnosis.unnamed import UnnamedLaw, best_unnamed
 from estimator.diagnosis.weight import MOST, VISIBLE
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
@@ -25,7 +26,7 @@ from estimator.physics.simulate import Start
 from estimator.signals.record import OutputKind, Record
 from tests.estimator.diagnosis.outcome import outcome
 from tests.estimator.diagnosis.planted import SIGMA, TIGHT, drive_torque, quiet, recordings, rubbing
-from tests.estimator.diagnosis.regression import of_rms
+from tests.estimator.diagnosis.regression import autoregressive, of_rms
 from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, linear_record, model
 
 COULOMB: Effects = frozenset({"coulomb_friction_motor"})
@@ -158,6 +159,39 @@ class TestHowMuchMayBeLeft:
         ripple: Effects = frozenset({"torque_ripple"})
         assert (self.objection(1.0, after, ripple) == "") is believed
         assert self.objection(1.0, after, ripple | COULOMB) != ""
+
+    @pytest.mark.parametrize(
+        ("chosen", "after", "believed"),
+        [
+            (frozenset({"brake_drag"}) | COULOMB, 0.114, True),
+            (frozenset({"brake_drag"}) | COULOMB, 0.117, False),  # seen above the noise
+            (ROAD | COULOMB, 0.117, False),
+            (CUBIC | COULOMB, 0.117, True),  # laws do not bend
+        ],
+    )
+    def test_what_bends_beside_others_may_leave_no_law_that_is_seen(
+        self, chosen: Effects, after: float, believed: bool
+    ) -> None:
+        before = of_rms(0.5, 2)
+        rest = UnnamedLaw(Element.LOAD, (("sign(w_L)", 1.0),), gain(of_rms(0.5, 2), of_rms(0.4, 3)), 0.1)
+        objection = judge(outcome(before, chosen, of_rms(after, 3), remaining=rest), 0.1).objection
+        assert objection.endswith("a law of sign(w_L) at the load side unexplained") is not believed
+        assert (objection == "") is believed
+        assert judge(outcome(before, chosen, of_rms(after, 3)), 0.1).objection == ""
+
+    @pytest.mark.parametrize(("fewer", "believed"), [(0, True), (3, False)])
+    def test_a_rival_is_simpler_with_the_same_number_of_samples_only(self, fewer: int, believed: bool) -> None:
+        """A road and a law leave as much with as many unknowns: none is simpler, however correlated one error is."""
+        before, road = of_rms(1.0, 2), of_rms(0.1, 6)
+        named = gain(before, road)
+        price = (4 - fewer) * math.log(named.n_effective)
+        worth = named.n_effective * 2.0 * math.log(1.0 / 0.0999)
+        rival = UnnamedLaw(Element.LOAD, (("sign(w_L)", 1.0),), replace(named, delta_bic=worth - price), 0.0999)
+        errors = autoregressive(0.3, road.residual.size, np.random.default_rng(5))
+        correlated = replace(road, residual=0.1 / np.sqrt(np.mean(errors**2)) * errors)
+        assert named.delta_bic - gain(before, correlated).delta_bic > 100.0
+        found = outcome(before, ROAD, correlated)
+        assert (judge(replace(found, unnamed=rival), 0.1).objection == "") is believed
 
     @pytest.mark.parametrize(("share", "left"), [(0.6, ""), (0.8, "64% of the mismatch")])
     def test_of_a_position_half(self, share: float, left: str) -> None:

@@ -10,6 +10,7 @@ from estimator.diagnosis.chain import read_through
 from estimator.diagnosis.hypotheses import NOTHING
 from estimator.diagnosis.search import search
 from estimator.diagnosis.selection import Selection, Selector
+from estimator.diagnosis.selection.selector import _Path
 from tests.estimator.diagnosis.planted import quiet, rubbing
 from tests.estimator.diagnosis.selection.mass import COULOMB, LINE, coulomb, late, selector, silent
 from tests.estimator.physics.bench import ONE_MASS
@@ -46,6 +47,18 @@ def test_a_profile_that_imitated_them_is_left_out(select: Selector, found: Selec
     alike = replace(bent, residual=found.result.residual)
     imitated = replace(found, chosen=frozenset({"road_grade"}), result=alike, accepted={})
     assert select.by_other_ways(imitated).chosen == BOTH
+
+
+def test_what_bends_beside_others_gives_way_to_a_law(select: Selector, found: Selection) -> None:
+    """A road in the place of dry friction; a law that explains it less does not take its place."""
+    late_and_road = frozenset({"road_grade", "transport_delay"})
+    delayed = select.jury.bench.fit(frozenset({"transport_delay"}), found.retuned)
+    bent = _Path(late_and_road, select.jury.bench.fit(late_and_road, delayed), {})
+    stiff = select._stiffened(bent, found.retuned)
+    assert stiff.chosen == BOTH
+    assert stiff.current.rms < bent.current.rms
+    stays = selector(late(rubbing(coulomb), 3), ["road_grade", "transport_delay", "actuator_lag"])
+    assert stays._stiffened(bent, found.retuned) is bent
 
 
 def test_what_is_better_stays(select: Selector, found: Selection) -> None:
