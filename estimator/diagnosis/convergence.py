@@ -19,6 +19,6 @@ def unconverged(selection: Selection) -> tuple[str, ...]:
 
 def _sentence(what: str, so: str) -> str:
     return (
-        f"The fit of {what} did not converge: {so}, and no explanation is built on "
-        "it. Check that the nominal values are near the line's, narrow the tolerances, or record what excites more."
+        f"The fit of {what} did not converge: {so}, and no explanation is built on it. Check that the nominal values "
+        "are near the line's, narrow the tolerances, or record what excites more."
     )

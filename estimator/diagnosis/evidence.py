@@ -69,8 +69,11 @@ def information(smaller: FitResult, larger: FitResult, n: float) -> float:
     return n * math.log(ratio) - (larger.free_count - smaller.free_count) * math.log(n)
 
 
-def as_if(gained: Gain, before_rms: float, after_rms: float, n: float) -> float:
-    """Return a gain in BIC as it would be with another number of independent samples, unknowns and choices the same."""
+def delta_bic_with(gained: Gain, before_rms: float, after_rms: float, n: float) -> float:
+    """Return a gain's ``delta_bic`` as it would be with ``n`` independent samples; unknowns and choices cost the same.
+
+    The RMS are those without and with what gains, in one unit.
+    """
     fall = 2.0 * math.log(before_rms / after_rms)
     price = (gained.n_effective * fall - gained.delta_bic) / math.log(gained.n_effective)
     return n * fall - price * math.log(n)

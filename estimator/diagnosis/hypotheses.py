@@ -83,9 +83,7 @@ class Bench:
         had = self._fits[effects]
         releases = [look.release for look in promising(Screen(had, self.model).looks(name, EFFECTS[name].loosened_by))]
         again = self._fit(effects, _forgetting(had, name), releases)
-        if again.squares < had.squares:
-            self._fits[effects] = _without_much(again)
-        return self._fits[effects]
+        return self._better(effects, again)
 
     def fit_widely(self, effects: Effects, name: str) -> FitResult:
         """Fit an effect from every start it has, promising or not, and return the better of this and what is known.
@@ -95,19 +93,22 @@ class Bench:
         had, before = self._fits[effects], self.fit(effects - {name})
         releases = [look.release for look in Screen(before, self.model).looks(name)]
         again = self._fit(effects, before, releases) if len(releases) > 1 else had
-        if again.squares < had.squares:
-            self._fits[effects] = _without_much(again)
-        return self._fits[effects]
+        return self._better(effects, again)
 
     def fit_less(self, effects: Effects, larger: FitResult) -> FitResult:
         """Fit fewer effects from where a fit with more ended, too, and return the better of both.
 
         What was found beside another effect may be out of reach from where these began by themselves.
         """
-        less, known = self._fit(effects, larger, ()), self._fits.get(effects)
-        if known is None or less.squares < known.squares:
-            self._fits[effects] = _without_much(less)
+        self._better(effects, self._fit(effects, larger, ()))
         return self.fit(effects)
+
+    def _better(self, effects: Effects, result: FitResult) -> FitResult:
+        """Remember a fit if it is better than what is known, and return the better one."""
+        known = self._fits.get(effects)
+        if known is None or result.squares < known.squares:
+            self._fits[effects] = _without_much(result)
+        return self._fits[effects]
 
     def fit_by_steps(self, effects: Effects) -> FitResult:
         """Fit a set of effects of which none has been fitted here, one after the other along the chain."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from estimator.diagnosis.acquisition import Finding
 from estimator.diagnosis.convergence import unconverged
-from estimator.diagnosis.evidence import VERY_STRONG, as_if, gain, noise_level
+from estimator.diagnosis.evidence import VERY_STRONG, delta_bic_with, gain, noise_level
 from estimator.diagnosis.hypotheses import flexible
 from estimator.diagnosis.phrases import PLACE_NAMES, kind_in_words
 from estimator.diagnosis.result import Verdict
@@ -131,18 +131,17 @@ def _is_simpler(unnamed: UnnamedLaw, selection: Selection) -> bool:
     before, after = selection.retuned.rms, selection.result.rms
     named = gain(selection.retuned, selection.result)
     n = unnamed.gain.n_effective if unnamed.rms < after else named.n_effective
-    rival = as_if(unnamed.gain, before, unnamed.rms, n)
-    return rival > as_if(named, before, after, n) + VERY_STRONG
+    rival = delta_bic_with(unnamed.gain, before, unnamed.rms, n)
+    return rival > delta_bic_with(named, before, after, n) + VERY_STRONG
 
 
 def _is_another_law(selection: Selection, floor: float, unnamed: UnnamedLaw) -> bool:
     """Tell whether a law at the same place leaves so much less that it can't be the named one in other words."""
     if any(EFFECTS[name].phases for name in selection.chosen):  # a wave and its harmonics are sought one by one
         return False
-    after = selection.result.rms
-    level = noise_level(selection.result, floor)
+    after, level = selection.result.rms, noise_level(selection.result, floor)
     left = max(unnamed.rms**2 - level**2, 0.0)
-    return after > NEAR_FLOOR_PROFILE * level and left < FAR_BETTER * (after**2 - level**2)
+    return _is_seen(selection, floor) and left < FAR_BETTER * (after**2 - level**2)
 
 
 def _objection(selection: Selection, floor: float, unnamed: UnnamedLaw | None, remaining: UnnamedLaw | None) -> str:

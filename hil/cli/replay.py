@@ -62,6 +62,7 @@ def replay(
     from hil.report.outputs import publish
     from hil.rig.live import tracking_settings
     from hil.rig.live_replay import Pace, is_trace
+    from hil.store.alarms import statements
 
     if speed is not None and not speed > 0:
         raise UsageError(f"--speed: expected a multiple of real time above 0, came {speed:g}")
@@ -84,8 +85,8 @@ def replay(
     if out is not None:
         typer.echo(f"{out}: {result['recorded']} samples, {result['flagged']} flagged")
     typer.echo(f"{recording}: {course.samples} samples in {took_s:.2f} s; {course.statement}")
-    for alarm in course.changes:
-        typer.echo(f"  alarm: {alarm.statement}")
+    for statement in statements(course.summary()):
+        typer.echo(f"  alarm: {statement}")
 
 
 def _require(path: Path, what: str, needed: dict[str, object], senseless: dict[str, object]) -> None:

@@ -60,12 +60,6 @@ class Course:
         if len(block):
             self._last = block[len(block) - 1]
 
-    @property
-    def changes(self) -> list[Alarm]:
-        """The alarms, one for each change: one that came before it had settled comes once more."""
-        last = len(self.alarms) - 1
-        return [alarm for number, alarm in enumerate(self.alarms) if alarm.settled or number == last]
-
     def summary(self) -> dict[str, Any]:
         """Return how it ended, and the alarms; JSON-able."""
         settings = self._settings

@@ -108,9 +108,10 @@ class Jury:
     def _simpler(self, trial: Trial, trials: Mapping[str, Trial], current: FitResult) -> Trial:
         for name in EFFECTS[trial.name].contains:
             special = trials.get(name)
-            if special is not None and special.failed is None:
-                if not generalises(special.result, trial.result, current):
-                    return special
+            if special is None or special.failed is not None:
+                continue
+            if not generalises(special.result, trial.result, current):
+                return special
         return trial
 
     def _examine(self, trial: Trial, before: FitResult) -> HoldOut:

@@ -12,6 +12,7 @@ from hil.rig.drive import RunSummary
 from hil.rig.live_course import course_path
 from hil.rig.realtime import NOT_ASKED, RealTimeGrants
 from hil.rig.timing import timing_lines
+from hil.store.alarms import statements
 
 
 def print_result(job: Job, summary: RunSummary, grants: RealTimeGrants, as_json: bool) -> None:
@@ -31,8 +32,8 @@ def print_result(job: Job, summary: RunSummary, grants: RealTimeGrants, as_json:
         typer.echo(f"{job.trace}: every frame of the bus")
     if job.live is not None and summary.recorded:
         typer.echo(f"{course_path(job.out)}: {job.live.course.statement}")
-        for alarm in job.live.course.changes:
-            typer.echo(f"  alarm: {alarm.statement}")
+        for statement in statements(job.live.course.summary()):
+            typer.echo(f"  alarm: {statement}")
 
 
 def _document(job: Job, summary: RunSummary, grants: RealTimeGrants) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from estimator.diagnosis.evidence import (
     SMALLEST_P,
     VERY_STRONG,
     Gain,
-    as_if,
+    delta_bic_with,
     gain,
     gain_from_squares,
     residuals_by_record,
@@ -66,8 +66,10 @@ def test_a_gain_is_told_with_another_number_of_samples() -> None:
     """Squares fall by 20 %; the price of two unknowns and of a choice among e^3 goes with ln n."""
     n, fall, price = 400.0, math.log(1.25), 2.0 + 6.0 / math.log(400.0)
     found = Gain(n * fall - price * math.log(n), 1e-9, n)
-    assert as_if(found, math.sqrt(500.0), math.sqrt(400.0), n) == pytest.approx(found.delta_bic)
-    assert as_if(found, math.sqrt(500.0), math.sqrt(400.0), 90.0) == pytest.approx(90.0 * fall - price * math.log(90.0))
+    before_rms, after_rms = math.sqrt(500.0), math.sqrt(400.0)
+    assert delta_bic_with(found, before_rms, after_rms, n) == pytest.approx(found.delta_bic)
+    fewer = 90.0 * fall - price * math.log(90.0)
+    assert delta_bic_with(found, before_rms, after_rms, 90.0) == pytest.approx(fewer)
 
 
 def test_a_fit_is_compared_by_its_residuals() -> None:

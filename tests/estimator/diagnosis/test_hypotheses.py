@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis import hypotheses
-from estimator.diagnosis.hypotheses import NOTHING, Bench, effects_of, everything, open_hypotheses, with_effect
+from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects, effects_of, everything, open_hypotheses, with_effect
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
 from estimator.physics.layout import flat_values
 from estimator.physics.model import Motion, Structure
 from estimator.physics.simulate import Start, grid_for, simulate
-from estimator.physics.unknowns import effect_unknowns
+from estimator.physics.unknowns import Release, effect_unknowns
 from estimator.signals.record import OutputKind
 from tests.estimator.diagnosis.planted import SIGMA, quiet, rubbing
 from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, linear_record, model, random_steps, record
@@ -96,33 +96,36 @@ def test_effects_that_nothing_starts_from_are_refused() -> None:
         Bench(model(ONE_MASS), records, everything(records)).fit(COULOMB)
 
 
-def test_a_rough_fit_is_gone_on_with() -> None:
-    """From a start ten times too small a few steps do not get there."""
+STRIBECK: Effects = frozenset({"stribeck_friction"})
+
+
+def far_from_the_start() -> tuple[Bench, Release]:
+    """A bench with Stribeck friction, and a start ten times too small: a few steps do not get there."""
     records = rubbing(lambda speed: float(8.0 + 14.0 * np.exp(-((speed / 0.8) ** 2))))
-    fresh, stribeck = Bench(model(ONE_MASS), records, everything(records)), frozenset({"stribeck_friction"})
-    nominal = fresh.fit(NOTHING)
+    fresh = Bench(model(ONE_MASS), records, everything(records))
     start = effect_unknowns("stribeck_friction", fresh.model, records)[0]
-    small = replace(start, shared=tuple(replace(unknown, start=0.1 * unknown.start) for unknown in start.shared))
-    rough = fresh.rough_fit(stribeck, nominal, [small])
-    assert fresh.rough_fit(stribeck, nominal, [small]) is rough
+    return fresh, replace(start, shared=tuple(replace(unknown, start=0.1 * unknown.start) for unknown in start.shared))
+
+
+def test_a_rough_fit_is_gone_on_with() -> None:
+    fresh, small = far_from_the_start()
+    nominal = fresh.fit(NOTHING)
+    rough = fresh.rough_fit(STRIBECK, nominal, [small])
+    assert fresh.rough_fit(STRIBECK, nominal, [small]) is rough
     assert not rough.converged
-    finished = fresh.fit(stribeck)
+    finished = fresh.fit(STRIBECK)
     assert finished.converged
     assert finished.squares < rough.squares < nominal.squares
 
 
 def test_a_rough_fit_that_stays_near_the_best_is_taken_further() -> None:
-    records = rubbing(lambda speed: float(8.0 + 14.0 * np.exp(-((speed / 0.8) ** 2))))
-    fresh, stribeck = Bench(model(ONE_MASS), records, everything(records)), frozenset({"stribeck_friction"})
-    nominal = fresh.fit(NOTHING)
-    start = effect_unknowns("stribeck_friction", fresh.model, records)[0]
-    small = replace(start, shared=tuple(replace(unknown, start=0.1 * unknown.start) for unknown in start.shared))
-    rough = fresh.rough_fit(stribeck, nominal, [small])
-    further = fresh.go_on(stribeck)
+    fresh, small = far_from_the_start()
+    rough = fresh.rough_fit(STRIBECK, fresh.fit(NOTHING), [small])
+    further = fresh.go_on(STRIBECK)
     assert further.squares < rough.squares
-    finished = fresh.fit(stribeck)
+    finished = fresh.fit(STRIBECK)
     assert finished.squares <= further.squares
-    assert fresh.go_on(stribeck) is finished
+    assert fresh.go_on(STRIBECK) is finished
 
 
 def test_fits_but_one_let_their_derivatives_go() -> None:
