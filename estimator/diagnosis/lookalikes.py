@@ -21,8 +21,8 @@ NEARLY = 1.5
 def lookalikes(name: str, chosen: Effects, current: FitResult, bench: Bench, names: Sequence[str]) -> tuple[str, ...]:
     """Return the effects that explain as much in an effect's place, as far as these recordings can tell.
 
-    A rival that is beyond chance worse, but by less than any law is known to, is alike as well: a filter of second
-    order is nearer to a delay than to the catalogue's filter of first order.
+    A rival that is beyond chance worse, but by less than any law is known to, is alike as well; so are its linear
+    equivalents, whose law may be written for fewer cases than its own.
     """
     entry = EFFECTS[name]
     others = chosen - {name}
@@ -45,5 +45,5 @@ def lookalikes(name: str, chosen: Effects, current: FitResult, bench: Bench, nam
             continue
         result = bench.fit(with_effect(others, rival), without)
         if information(result, current, n) < VERY_STRONG or result.squares - current.squares < known:
-            alike.add(rival)
-    return tuple(sorted(alike))
+            alike |= {rival, *EFFECTS[rival].equivalent}
+    return tuple(sorted(alike - chosen))

@@ -319,7 +319,9 @@ def initial_state(start: Start, torque_nm: float, angle_rad: float, p: FloatArra
                 traction=start.load_torque_nm,
             ),
             torque_nm + p[slots.LAGGED_BEFORE],
+            -p[slots.LAGGED_BEFORE],
             sensing.reading(start.speed_rad_s, angle_rad, p) + p[slots.FILTERED_BEFORE],
+            -p[slots.FILTERED_BEFORE],
         ]
     )
 

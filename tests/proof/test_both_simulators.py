@@ -31,6 +31,12 @@ SAME = [
     ({"quadratic_motor": 0.3}, {"quadratic_friction": {"quadratic_nm_s2": 0.3}}, 1e-3),
     ({"quadratic_load": 0.3}, {"aerodynamic_drag": {"drag_nm_s2": 0.3}}, 1e-3),
     ({"filter_time_s": 0.012}, {"speed_filter": {"time_constant_s": 0.012}}, 7e-3),
+    # tau = 2 D / w, shape = 1 / (2 D)^2; 0.1 ms late by the firmware's cycle, at 150 rad/s^2
+    (
+        {"filter_rad_s": 120.0, "filter_damping": 0.8},
+        {"speed_filter": {"time_constant_s": 1.6 / 120.0, "shape": 1.0 / 1.6**2}},
+        2e-2,
+    ),
     # the two contact laws differ in how damping sets in at the first touch
     ({"gap_rad": 0.02}, {"backlash": {"gap_rad": 0.02, "contact_rad": 1e-4}}, 0.15),
 ]

@@ -140,6 +140,8 @@ def active_states(structure: Structure, p: FloatArray, kind: OutputKind) -> tupl
         states += [names.index("branch_twist"), names.index("branch_speed")]
     if p[slots.FILTER] > 0.0:
         states.append(state_vector.FILTERED)
+    if p[slots.FILTER_SHAPE] > 0.0:
+        states.append(state_vector.FILTER_RISE)
     return tuple(states)
 
 

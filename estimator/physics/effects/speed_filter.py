@@ -3,30 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 from estimator.compiled import compiled
-from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start, long_enough
-from estimator.physics.model import DrivelineModel, Motion
-from estimator.signals.record import OutputKind, Record
+from estimator.physics import low_pass
+from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, long_enough
+from estimator.physics.model import Motion
+from estimator.signals.record import OutputKind
 
 
 @compiled
-def step(before: float, after: float, filtered: float, time_constant: float, step_s: float) -> float:
-    """Return the filtered value after a step of input that goes straight from ``before`` to ``after`` (exact)."""
-    slope = (after - before) / step_s
-    decay = math.exp(-step_s / time_constant)
-    return after - slope * time_constant + (filtered - before + slope * time_constant) * decay
-
-
-def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
-    """Return one sampling period."""
-    return (min(record.sample_time_s for record in records),)
-
-
-def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
-    """Return a start below and one above a sampling period."""
-    return [(0.3,), (2.0,)]
+def step(
+    before: float, after: float, filtered: float, rise: float, time_constant: float, shape: float, step_s: float
+) -> tuple[float, float]:
+    """Return the filtered value and its rate times ``tau`` behind an input straight from ``before`` to ``after``."""
+    behind = (after - before) / step_s * time_constant  # as a ramp is followed
+    value, rise = low_pass.faded(filtered - before + behind, rise - behind, step_s / time_constant, shape)
+    return after - behind + value, rise + behind
 
 
 def sentence(values: Mapping[str, float], motion: Motion) -> str:
@@ -38,11 +31,12 @@ EFFECT = Effect(
     name="speed_filter",
     element=Element.SPEED_SENSOR,
     title="filter of the speed",
-    law="tau dy/dt + y = w_M",
+    law="s tau^2 d2y/dt2 + tau dy/dt + y = w_M",
     source="smoothing of a measured speed: Leonhard, Control of Electrical Drives, 3rd ed., Springer 2001",
     excited_by="torque steps: PRBS, tip-in and tip-out",
     parameters=(
-        EffectParameter("time_constant_s", "s", 0.0, 0.0, 50.0, "time constant tau"),
+        low_pass.TIME_CONSTANT,
+        low_pass.SHAPE,
         EffectParameter(
             "before_rad_s",
             "speed",
@@ -59,8 +53,8 @@ EFFECT = Effect(
     equivalent=("actuator_lag",),
     contains=(),
     kinds=frozenset({OutputKind.SPEED}),
-    scales=scales,
-    starts=starts,
+    scales=low_pass.scales,
+    starts=low_pass.starts,
     sentence=sentence,
     unresolved=long_enough("time_constant_s"),
 )

@@ -17,7 +17,7 @@ from estimator.physics.kernel import slots
 from estimator.physics.kernel.conditions import conditions, is_varying, with_torque
 from estimator.physics.kernel.rates import rates
 from estimator.physics.kernel.sensing import entry, reading, shown, travelled
-from estimator.physics.kernel.state_vector import FILTERED, LAGGED, Conditions, State
+from estimator.physics.kernel.state_vector import FILTER_RISE, FILTERED, LAG_RISE, LAGGED, Conditions, State
 from estimator.signals.record import FloatArray
 
 RADIANS_PER_STEP_OF_MODE = 0.6
@@ -98,7 +98,8 @@ def integrate_masses(
     slope = 0.0
     n = torque.shape[0]
     x = unpacked(state)
-    lagged, filtered = state[LAGGED], state[FILTERED]
+    lagged, lag_rise = state[LAGGED], state[LAG_RISE]
+    filtered, filter_rise = state[FILTERED], state[FILTER_RISE]
     now = conditions(masses, start_s, h, 0.0, 0.0, sign_width, p)
     for k in range(first, n):
         turn = angle[k + 1] - angle[k] if k + 1 < n else angle[k] - angle[k - 1]
@@ -115,7 +116,9 @@ def integrate_masses(
             if late:
                 source = place + (place + begun) * p[slots.DRIFT] - delay
                 supplied, rise = transport_delay.delayed(torque, before_all, source, length)
-            mean, rise, lagged = actuator_lag.step(supplied, rise, lagged, p[slots.LAG], h)
+            mean, rise, lagged, lag_rise = actuator_lag.step(
+                supplied, rise, lagged, lag_rise, p[slots.LAG], p[slots.LAG_SHAPE], h
+            )
             before, begun_at = entry(x, output), x
             x = runge_kutta(masses, now, mean, rise, x, p, h)
             after = entry(x, output)
@@ -124,12 +127,15 @@ def integrate_masses(
                 bow = travelled(x, output) / h - travelled(begun_at, output) / h - 0.5 * (before + after)
                 read = reading(before + bow, angle[k] + turn * j * length, p)
                 ends = reading(after + bow, angle[k] + turn * (j + 1) * length, p)
-                filtered = speed_filter.step(read, ends, filtered, p[slots.FILTER], h)
+                filtered, filter_rise = speed_filter.step(
+                    read, ends, filtered, filter_rise, p[slots.FILTER], p[slots.FILTER_SHAPE], h
+                )
             if steep and j == 0:
                 slopes[1, k] = slope
     for i, last in enumerate(x):
         state[i] = last
-    state[LAGGED], state[FILTERED] = lagged, filtered
+    state[LAGGED], state[LAG_RISE] = lagged, lag_rise
+    state[FILTERED], state[FILTER_RISE] = filtered, filter_rise
 
 
 @compiled

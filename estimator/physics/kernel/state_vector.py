@@ -7,10 +7,10 @@ from typing import NamedTuple
 ANGLE, SPEED, TWIST, LOAD_SPEED = 0, 1, 2, 3
 """Mechanical states that can be an output; see ``State``."""
 
-STATES = 13
-"""Length of the state array: ``State``, then the lagged torque [Nm] and the filtered reading [rad/s]."""
+STATES = 15
+"""Length of the state array: ``State``, the lagged torque and its rise [Nm], the filtered reading and its [rad/s]."""
 
-LAGGED, FILTERED = 11, 12
+LAGGED, LAG_RISE, FILTERED, FILTER_RISE = 11, 12, 13, 14
 
 
 class State(NamedTuple):

@@ -74,6 +74,7 @@ def test_nominal_parameters_come_first_then_effects_as_they_were_added(bench: Be
         ("", "b_M"),
         ("transport_delay", "delay_s"),
         ("actuator_lag", "time_constant_s"),
+        ("actuator_lag", "shape"),
     ]
     for basis in both.problem.local:
         assert [(unknown.effect, unknown.name) for unknown in basis.own] == [

@@ -68,6 +68,26 @@ def test_a_filter_is_one_more_state_that_the_line_does_not_feel(tau: float) -> N
     assert_law({"speed_filter": {"time_constant_s": tau}}, expected)
 
 
+@pytest.mark.parametrize("shape", [0.02, 0.25, 0.5])
+def test_a_filter_of_second_order_is_two_more(shape: float) -> None:
+    tau = 0.03
+
+    def rhs(t: float, x: FloatArray, torque: float) -> FloatArray:
+        value, rate = x[4], x[5]
+        lacking = x[reference.SPEED] - value - tau * rate
+        return np.append(two_mass()(t, x[:4], torque), [rate, lacking / (shape * tau**2)])
+
+    start = np.append(start_vector(), [START.speed_rad_s, 0.0])
+    expected = reference.solve(rhs, start, Held.of(TORQUE, SAMPLE_TIME_S), TIME_S)[:, 4]
+    assert_law({"speed_filter": {"time_constant_s": tau, "shape": shape}}, expected)
+
+
+def test_a_filter_whose_second_pole_is_far_away_is_of_first_order() -> None:
+    first = kernel_output({"speed_filter": {"time_constant_s": 0.03}}, measured())
+    second = kernel_output({"speed_filter": {"time_constant_s": 0.03, "shape": 1e-9}}, measured())
+    np.testing.assert_allclose(second, first, atol=1e-7)
+
+
 @pytest.mark.parametrize("share", [1.0, 0.4])
 def test_a_sensor_blind_for_the_sign_reads_the_magnitude(share: float) -> None:
     speed = true_speed()

@@ -128,6 +128,19 @@ def test_a_lag_is_one_more_state(tau: float) -> None:
     assert_law({"actuator_lag": {"time_constant_s": tau}}, expected)
 
 
+@pytest.mark.parametrize("shape", [0.02, 0.25, 0.5])
+def test_a_lag_of_second_order_is_two_more(shape: float) -> None:
+    line, tau = two_mass(), 0.03
+
+    def rhs(t: float, x: FloatArray, torque: float) -> FloatArray:
+        lacking = torque - x[4] - tau * x[5]
+        return np.append(line(t, x[:4], x[4]), [x[5], lacking / (shape * tau**2)])
+
+    start = np.append(start_vector(), [TORQUE[0], 0.0])
+    expected = reference.solve(rhs, start, held(TORQUE), TIME_S)[:, reference.SPEED]
+    assert_law({"actuator_lag": {"time_constant_s": tau, "shape": shape}}, expected)
+
+
 @pytest.mark.parametrize("delay_s", [0.03, 0.0137, 0.0502])
 def test_a_delay_shifts_the_torque(delay_s: float) -> None:
     expected = solved(two_mass(), held=Held.of(TORQUE, SAMPLE_TIME_S, late_s=delay_s))

@@ -52,7 +52,7 @@ PLANTS = {
     "inverter_gain_mismatch": Plant({"gain_m1": 0.9}),
     "torque_derating": Plant({"depth": 0.2, "time_constant_s": 6.0}),
     "torque_saturation": Plant({"limit_m1_nm": 80.0, "limit_m2_nm": 70.0, "sharpness": 12.0}, factor=0.97),
-    "actuator_lag": Plant({"time_constant_s": 0.02}),
+    "actuator_lag": Plant({"time_constant_s": 0.02, "shape": 0.15}),
     "transport_delay": Plant({"delay_s": 0.023}),
     "torque_ripple": Plant({"amplitude_nm": 15.0, "order": 6.0}, PHASES),
     "torque_ripple/share": Plant({"share": 0.04, "order": 6.0}, ({"share_phase_rad": 0.4}, {"share_phase_rad": -1.1})),
@@ -97,7 +97,7 @@ PLANTS = {
             {"once_phase_rad": -0.9, "twice_phase_rad": 0.2},
         ),
     ),
-    "speed_filter": Plant({"time_constant_s": 0.02}),
+    "speed_filter": Plant({"time_constant_s": 0.02, "shape": 0.4}),
     "speed_sign_blind": Plant({"share": 0.6}),
     "clock_drift": Plant({"rate": 1e-3}),
 }

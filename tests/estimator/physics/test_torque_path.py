@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
 from estimator.physics.effects import transport_delay
 from estimator.physics.effects.actuator_lag import step
@@ -79,12 +80,28 @@ def test_no_sub_step_reads_beyond_the_last_sample() -> None:
 def test_a_lagged_step_is_the_exponential(length_s: float) -> None:
     tau = 0.03
     decay = np.exp(-length_s / tau)
-    mean, rise, end = step(40.0, 0.0, 10.0, tau, length_s)
+    mean, rise, end, slowed = step(40.0, 0.0, 10.0, 0.0, tau, 0.0, length_s)
     place = (np.arange(20_000) + 0.5) / 20_000
     torque = 40.0 - 30.0 * np.exp(-place * length_s / tau)
     assert rise == pytest.approx(12.0 * float(np.mean(torque * (place - 0.5))), rel=1e-4)
     assert end == pytest.approx(40.0 - 30.0 * decay)
+    assert slowed == pytest.approx(30.0 * decay)
     assert mean == pytest.approx(40.0 - 30.0 * tau / length_s * (1.0 - decay))
+
+
+@pytest.mark.parametrize("shape", [0.04, 0.25, 0.5])
+@pytest.mark.parametrize("length_s", [0.001, 0.02, 5.0])
+def test_a_lagged_step_of_second_order_is_the_matrix_exponential(shape: float, length_s: float) -> None:
+    tau, torque, lagged, rising = 0.03, 40.0, 10.0, 25.0
+    mean, rise, end, risen = step(torque, 0.0, lagged, rising, tau, shape, length_s)
+    place = (np.arange(2000) + 0.5) / 2000
+    law = np.array([[0.0, 1.0], [-1.0 / shape, -1.0 / shape]]) * length_s / tau
+    off = expm(place[:, None, None] * law) @ [lagged - torque, rising]
+    torques = torque + off[:, 0]
+    last = expm(law) @ [lagged - torque, rising]
+    np.testing.assert_allclose([end - torque, risen], last, rtol=1e-9, atol=1e-9)
+    assert mean == pytest.approx(float(np.mean(torques)), rel=1e-3)
+    assert rise == pytest.approx(12.0 * float(np.mean(torques * (place - 0.5))), rel=1e-3)
 
 
 def test_what_came_before_a_recording_is_delayed_into_it() -> None:

@@ -199,9 +199,9 @@ class TestLookalikes:
         assert with_coulomb.lookalikes == {COULOMB: ()}
 
     def test_what_is_worse_by_next_to_nothing_is(self) -> None:
-        """Two lags of 3 ms in a row are told from a delay beyond chance, and by next to nothing."""
+        """Two lags of 2.4 ms in a row are told from a delay beyond chance, and by next to nothing."""
         late = {"actuator_lag", "speed_filter", "transport_delay"}
-        selection = selector(twice_lagged(0.003, sigma=0.1 * SIGMA), [*sorted(late), COULOMB]).run()
+        selection = selector(twice_lagged(0.0024, sigma=0.1 * SIGMA), [*sorted(late), COULOMB]).run()
         (chosen,) = selection.chosen
         (rival,) = late - {chosen, "speed_filter"}
         n = gain(selection.retuned, selection.result).n_effective
