@@ -64,7 +64,7 @@ def settle(problem: Problem) -> FitResult:
     twist, gap_rad = problem.local[0].twist_index, float(problem.p[slot("backlash", "gap_rad")])
     starts = [start]
     if twist is not None and gap_rad > 0.0:
-        for side in (-0.5, 0.5):
+        for side in (-0.5, -0.25, 0.25, 0.5):
             starts.append(start.copy())
             starts[-1][twist] += side * gap_rad / problem.local[0].scale[twist]
     results = [fit(problem, x0) for x0 in starts]

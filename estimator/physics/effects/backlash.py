@@ -24,10 +24,18 @@ def damping_share(loaded_twist: float, contact: float) -> float:
     return 1.0 - math.exp(-abs(loaded_twist) / contact)
 
 
+@compiled
+def pressed(torque: float, loaded_twist: float, pull: float) -> float:
+    """Return the torque that the faces of a gap pass on: they press; a film of oil between them may also pull."""
+    if loaded_twist == 0.0:
+        return 0.0
+    return torque if torque * loaded_twist > 0.0 else pull * torque
+
+
 def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
     """Return a fifth of the twist that the torque in use gives, and a fiftieth of it for the contact depth."""
     twist = torque_scale(records) / model.parameters["k"].value
-    return (0.2 * twist, 0.01 * twist)
+    return (0.2 * twist, 0.01 * twist, 1.0)
 
 
 def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
@@ -36,7 +44,8 @@ def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
     On a bench nothing can bounce, and the damping engages at once.
     """
     contact: float | Held = Held(0.0) if model.structure is Structure.JOINT else 1.0
-    return [(0.1, contact), (0.4, contact), (1.2, contact)]
+    pull: float | Held = Held(0.0) if model.structure is Structure.JOINT else 0.5
+    return [(0.1, contact, pull), (0.4, contact, pull), (1.2, contact, pull)]
 
 
 CONTACT_PER_GAP = 0.05
@@ -64,12 +73,13 @@ EFFECT = Effect(
     name="backlash",
     element=Element.SHAFT,
     title="backlash in the shaft line",
-    law="T_S = k e + c (1 - exp(-|e|/e_c)) de/dt, e = twist beyond +-gap/2",
+    law="T_S = k e + c (1 - exp(-|e|/e_c)) de/dt, times q where that pulls; e = twist beyond +-gap/2",
     source="Nordin, Gutman: Automatica 38(10), 2002; contact damping after Hunt, Crossley 1975",
     excited_by="shaft torque that changes sign: reversal, tip-in and tip-out",
     parameters=(
         EffectParameter("gap_rad", "angle", 0.0, 0.0, 20.0, "total gap"),
         EffectParameter("contact_rad", "angle", 0.0, 0.02, 20.0, "depth over which the damping engages: e_c", True),
+        EffectParameter("pull", "", 0.0, 0.0, 1.0, "share of a pull that an oil film passes on: q", True),
     ),
     structures=WITH_SPRING,
     resembles=(

@@ -41,7 +41,8 @@ def shaft_torque(twist: float, rate: float, loading: float, p: FloatArray, stiff
     if p[slots.SLIDER_INSIDE] > 0.0:
         stiffness = max(stiffness - p[slots.SLIDER_INSIDE] * p[slots.SLIDER] / p[slots.YIELD], 0.0)
     elastic = stiffness * loaded * stiffness_nonlinearity.factor(loaded, p[slots.HARDENING], p[slots.SHAPE])
-    return float(elastic) + damping + float(p[slots.SLIDER]) * loading
+    torque = float(elastic) + damping + float(p[slots.SLIDER]) * loading
+    return backlash.pressed(torque, loaded, p[slots.PULL]) if p[slots.GAP] > 0.0 else torque
 
 
 @inlined

@@ -224,7 +224,7 @@ class TestStarts:
         small = [linear_record(TRUE, random_steps(400, 5, size_nm=10.0), STARTS["first"], sigma=SIGMA, name="small")]
         gaps = [effect_unknowns("backlash", line, recs)[1].shared for recs in (large, small)]
         shared = [(*nominal_unknowns(line), *gap) for gap in gaps]
-        assert shared[0][-1].scale == pytest.approx(10.0 * shared[1][-1].scale)
+        assert gaps[0][0].scale == pytest.approx(10.0 * gaps[1][0].scale)
         warm = fit(make_problem(line, large, shared[0]))
         problem = make_problem(line, small, shared[1])
         carried = parameters(problem, module._warm_start(problem, warm))

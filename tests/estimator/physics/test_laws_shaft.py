@@ -25,14 +25,17 @@ from tests.estimator.physics.reference import Held, lasting
 K, C = TWO_MASS["k"], TWO_MASS["c"]
 
 
-def test_backlash_is_a_spring_and_a_damper_beyond_the_gap() -> None:
+@pytest.mark.parametrize("pull", [0.0, 0.6, 1.0])
+def test_backlash_is_a_spring_and_a_damper_beyond_the_gap(pull: float) -> None:
     gap, depth = 0.02, 2e-3
 
     def shaft(t: float, twist: float, rate: float) -> float:
         beyond = np.sign(twist) * max(abs(twist) - 0.5 * gap, 0.0)
-        return float(K * beyond + C * (1.0 - np.exp(-abs(beyond) / depth)) * rate)
+        torque = float(K * beyond + C * (1.0 - np.exp(-abs(beyond) / depth)) * rate)
+        return torque * (1.0 if torque * beyond > 0.0 else pull)
 
-    assert_law({"backlash": {"gap_rad": gap, "contact_rad": depth}}, solved(two_mass(shaft=shaft)), tolerance=3e-4)
+    effects = {"backlash": {"gap_rad": gap, "contact_rad": depth, "pull": pull}}
+    assert_law(effects, solved(two_mass(shaft=shaft)), tolerance=3e-4)
 
 
 @pytest.mark.parametrize(("hardening", "shape"), [(900.0, 1.0), (900.0, 2.0), (-600.0, 0.5)])

@@ -67,7 +67,8 @@ def test_the_first_shaft_of_three_masses_may_have_a_gap() -> None:
 
     def shaft(twist: float, rate: float) -> float:
         beyond = np.sign(twist) * max(abs(twist) - 0.5 * gap, 0.0)
-        return float(k * beyond + c * (1.0 - np.exp(-abs(beyond) / depth)) * rate)
+        torque = float(k * beyond + c * (1.0 - np.exp(-abs(beyond) / depth)) * rate)
+        return torque if torque * beyond > 0.0 else 0.0
 
     out = three_mass_output({"backlash": {"gap_rad": gap, "contact_rad": depth}})
     assert_same(out, states(three_masses(shaft=shaft))[:, 1], three_mass_output({}), tolerance=1e-3)

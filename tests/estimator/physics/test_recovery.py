@@ -60,7 +60,7 @@ PLANTS = {
     "stribeck_friction": Plant({"excess_nm": 20.0, "coulomb_nm": 12.0, "stribeck_rad_s": 1.5}),
     "quadratic_friction": Plant({"quadratic_nm_s2": 0.5}),
     "generator_coupled": Plant({"inertia_kg_m2": 0.8}, EVENTS, factor=1.05, off=0.01),
-    "backlash": Plant({"gap_rad": 0.02, "contact_rad": 1e-3}),
+    "backlash": Plant({"gap_rad": 0.02, "contact_rad": 1e-3, "pull": 0.4}),
     "stiffness_nonlinearity": Plant({"hardening_per_rad2": 250.0, "shape": 1.0}),
     "stiffness_change": Plant({"change": -0.2}, EVENTS),
     "shaft_hysteresis": Plant(

@@ -84,6 +84,16 @@ def test_the_damper_engages_over_the_contact_depth() -> None:
     assert damping == pytest.approx(TWO_MASS["c"] * 3.0 * (1.0 - np.exp(-1.0)), rel=1e-9)
 
 
+@pytest.mark.parametrize("pull", [0.0, 0.3, 1.0])
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_faces_press_and_pull_as_much_as_the_oil_between_them(side: float, pull: float) -> None:
+    p = flat_values(TWO_MASS, {"backlash": {"gap_rad": 0.04, "contact_rad": 1e-4, "pull": pull}})
+    spring, damping = 0.001 * TWO_MASS["k"], 5.0 * TWO_MASS["c"]
+    assert spring < damping
+    assert shaft_torque(side * 0.021, side * 5.0, p) == pytest.approx(side * (spring + damping), rel=1e-3)
+    assert shaft_torque(side * 0.021, side * -5.0, p) == pytest.approx(side * pull * (spring - damping), rel=1e-3)
+
+
 @pytest.mark.parametrize(("twist", "share"), [(0.0, 0.0), (1e-9, 1.0), (-0.3, 1.0)])
 def test_without_a_contact_depth_the_damper_acts_at_first_touch(twist: float, share: float) -> None:
     assert damping_share(twist, 0.0) == share

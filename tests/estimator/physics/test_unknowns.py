@@ -42,7 +42,9 @@ def test_an_effect_has_unknowns_once_per_start() -> None:
     for release in ladder:
         shared = release.shared
         assert release.own == ((),)
-        assert [(s.effect, s.name) for s in shared] == [("backlash", "gap_rad"), ("backlash", "contact_rad")]
+        assert [(s.effect, s.name) for s in shared] == [
+            ("backlash", name) for name in ("gap_rad", "contact_rad", "pull")
+        ]
         assert shared[0].scale == pytest.approx(0.2 * 100.0 / TWO_MASS["k"])
 
 
