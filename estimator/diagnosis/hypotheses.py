@@ -56,6 +56,7 @@ class Bench:
     use: Sequence[BoolArray]
     _fits: dict[Effects, FitResult] = field(default_factory=dict)
     _rough: dict[Effects, FitResult] = field(default_factory=dict)
+    _looked_again: set[tuple[Effects, str]] = field(default_factory=set)
 
     def fit(self, effects: Effects, warm: FitResult | None = None, releases: Sequence[Release] = ()) -> FitResult:
         """Fit the nominal parameters, within their tolerances, together with a set of effects.
@@ -78,9 +79,12 @@ class Bench:
     def fit_again(self, effects: Effects, name: str) -> FitResult:
         """Look for the rest of an effect once what it loosens is loose, and return the better of both fits.
 
-        A first look around a fit that its bounds hold sees nothing of what stands behind them.
+        A first look around a fit that its bounds hold sees nothing of what stands behind them. Looked for once.
         """
         had = self._fits[effects]
+        if (effects, name) in self._looked_again:
+            return had
+        self._looked_again.add((effects, name))
         releases = [look.release for look in promising(Screen(had, self.model).looks(name, EFFECTS[name].loosened_by))]
         again = self._fit(effects, _forgetting(had, name), releases)
         return self._better(effects, again)

@@ -228,6 +228,13 @@ class TestLocalMinima:
         assert again is bench.fit(self.MODE)
         assert again.value("extra_torsional_mode", "frequency_hz") == pytest.approx(frequency_hz, rel=0.02)
 
+    def test_the_rest_is_looked_for_once(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        bench = self.with_mode(0.1, 20.0, 0.76)
+        bench.fit(self.MODE, bench.fit(NOTHING))
+        again = bench.fit_again(self.MODE, "extra_torsional_mode")
+        monkeypatch.setattr(bench, "_fit", None)
+        assert bench.fit_again(self.MODE, "extra_torsional_mode") is again
+
     def test_a_better_fit_stays(self) -> None:
         bench = self.with_mode(0.2, 13.0, 0.76)
         first = bench.fit(self.MODE, bench.fit(NOTHING))

@@ -10,12 +10,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.physics.fit import FitResult, fit, make_problem
+from estimator.physics import moments
+from estimator.physics.fit import HEAT, FitResult, Problem, fit, make_problem
 from estimator.physics.layout import flat, slot
 from estimator.physics.moments import OFFSETS_S, polished, without_idle
 from estimator.physics.simulate import Start, grid_for, simulate
 from estimator.physics.unknowns import Shared, own_unknowns
-from estimator.signals.record import Record
+from estimator.signals.record import FloatArray, Record
 from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, linear_record, model, random_steps, record
 
 SIGMA = 0.02
@@ -59,6 +60,19 @@ def test_a_fit_that_is_stuck_nearby_comes_out(cracked: Record, off_s: float) -> 
     result = polished(stuck)
     assert moments_of(result) == pytest.approx([FROM_S, TO_S], abs=0.005)
     assert result.rms == pytest.approx(SIGMA, rel=0.05)
+
+
+def test_behind_a_fit_of_a_few_steps_they_move_once(cracked: Record, monkeypatch: pytest.MonkeyPatch) -> None:
+    fits: list[int] = []
+
+    def counted(problem: Problem, x0: FloatArray, iterations: int) -> FitResult:
+        fits.append(iterations)
+        return fit(problem, x0, iterations)
+
+    monkeypatch.setattr(moments, "fit", counted)
+    stuck = ended(cracked, FROM_S - 0.2, TO_S + 0.2)
+    assert polished(stuck, HEAT).squares < stuck.squares
+    assert fits == [HEAT]
 
 
 def test_where_they_are_right_the_fit_stays(cracked: Record) -> None:
