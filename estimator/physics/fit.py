@@ -11,8 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from estimator.physics.effect import MOMENTS
 from estimator.physics.layout import flat
-from estimator.physics.least_squares import minimise
+from estimator.physics.least_squares import Solution, minimise
 from estimator.physics.model import DrivelineModel
 from estimator.physics.parallel import WORKERS, concurrently
 from estimator.physics.simulate import Case, Grid, Start, grid_for, simulate_each
@@ -30,6 +31,8 @@ HEAT = 3
 
 CLOSE = 1.1
 """Squared error, over the best start's, up to which a start goes on."""
+
+MOMENT_NAMES = frozenset(moment.name for moment in MOMENTS)
 
 BAD = 1e3
 """A simulation that runs away counts as this many times the largest output."""
@@ -253,6 +256,19 @@ def _moving(problem: Problem, free: BoolArray, index: int) -> IntArray:
     return np.concatenate([np.flatnonzero(free[: len(problem.shared)]), own])
 
 
+def _moments(problem: Problem) -> BoolArray:
+    """Return which unknowns are moments of events, shape (U,)."""
+    found = np.zeros(start_vector(problem).size, dtype=bool)
+    first = len(problem.shared)
+    for basis in problem.local:
+        for row, unknown in zip(
+            range(first + basis.own_rows.start, first + basis.own_rows.stop), basis.own, strict=True
+        ):
+            found[row] = unknown.name in MOMENT_NAMES
+        first += basis.guess.size
+    return found
+
+
 def fit(problem: Problem, x0: FloatArray | None = None, iterations: int = ITERATIONS) -> FitResult:
     """Minimise the squared free-run error from one start.
 
@@ -273,14 +289,23 @@ def fit(problem: Problem, x0: FloatArray | None = None, iterations: int = ITERAT
             seen[key] = outputs_at(problem, x)
         return seen[key]
 
-    solution = minimise(
-        lambda x: residual_at(problem, outputs(x)),
-        lambda x: jacobian_at(problem, x, outputs(x)),
-        start_vector(problem) if x0 is None else x0,
-        low,
-        high,
-        iterations,
-    )
+    def least(x: FloatArray, low: FloatArray, high: FloatArray) -> Solution:
+        return minimise(
+            lambda x: residual_at(problem, outputs(x)),
+            lambda x: jacobian_at(problem, x, outputs(x)),
+            x,
+            low,
+            high,
+            iterations,
+        )
+
+    solution = least(start_vector(problem) if x0 is None else x0, low, high)
+    moments = _moments(problem)
+    if solution.stuck and moments.any():
+        # at a sample's edge the error has a kink over a moment, which refuses every step: first without the moments
+        x = solution.x
+        x = least(x, np.where(moments, x, low), np.where(moments, x, high)).x
+        solution = least(x, low, high)
     return FitResult(problem, solution.x, outputs(solution.x), solution.residual, solution.jacobian, solution.converged)
 
 

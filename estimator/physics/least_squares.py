@@ -30,12 +30,16 @@ TINY = 1e-12
 
 @dataclass(frozen=True, slots=True)
 class Solution:
-    """Where a fit ended: unknowns (U,), errors (R,), Jacobian there (R, U)."""
+    """Where a fit ended: unknowns (U,), errors (R,), Jacobian there (R, U).
+
+    ``stuck`` where the derivatives promise a fall and no step, however short, brings one: at a kink of the error.
+    """
 
     x: FloatArray
     residual: FloatArray
     jacobian: FloatArray
     converged: bool
+    stuck: bool = False
 
 
 def minimise(
@@ -63,17 +67,18 @@ def minimise(
         gradient, curvature = derivative.T @ errors, derivative.T @ derivative
         square = float(errors @ errors)
         enough = CONVERGED * square / errors.size
-        moved = False
+        moved = refused = False
         while damping < MOST_DAMPING and not moved:
             step = _step(x, gradient, curvature, damping, low, high)
             if -step @ (2.0 * gradient + curvature @ step) < enough:
-                return Solution(x, errors, derivative, True)
+                return Solution(x, errors, derivative, True, stuck=refused)
             tried = residual(x + step)
             with np.errstate(over="ignore"):  # a simulation that ran away: an infinite error is no improvement
                 moved = float(tried @ tried) < square
+            refused = refused or not moved
             damping = max(damping * (EASE if moved else STIFFEN), LEAST_DAMPING)
         if not moved:
-            return Solution(x, errors, derivative, True)
+            return Solution(x, errors, derivative, True, stuck=True)
         x, errors = x + step, tried
     return Solution(x, errors, jacobian(x), False)
 

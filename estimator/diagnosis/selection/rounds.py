@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from estimator.diagnosis.evidence import VERY_STRONG
-from estimator.diagnosis.hypotheses import NOTHING, Effects, Progress, effects_of, with_effect
+from estimator.diagnosis.hypotheses import NOTHING, Effects, Progress, effects_of, flexible, with_effect
 from estimator.diagnosis.screening import Look, Screen, promising
 from estimator.diagnosis.selection.jury import Jury
 from estimator.diagnosis.trial import Trial, pressed_parameters
@@ -22,7 +22,8 @@ MOST_FITS = 10
 """Effects that are fitted in a round, the most promising ones."""
 
 WORTH_GOING_ON, WORTH_FINISHING = 0.5, 0.8
-"""Share of the best fit's gain below which a rival's fit stays as it is, after the first few steps and a few more."""
+"""Share of the best fit's gain below which a rival's fit stays as it is, after the first few steps and a few more. What
+bends gains in fewer steps: at first, laws are held against the best of them, too."""
 
 
 @dataclass
@@ -63,7 +64,9 @@ class Rounds:
         )
         rough = dict(zip(looks, fits, strict=True))
         self._report("finishing the best of them", 0.7)
-        further = _near_the_best(rough, current, WORTH_GOING_ON)
+        laws = {name: result for name, result in rough.items() if not flexible(frozenset({name}))}
+        near = {*_near_the_best(rough, current, WORTH_GOING_ON), *_near_the_best(laws, current, WORTH_GOING_ON)}
+        further = [name for name in rough if name in near]
         if len(further) > 1:
             fits = concurrently(lambda name: self.jury.bench.go_on(with_effect(chosen, name)), further)
             rough |= dict(zip(further, fits, strict=True))

@@ -154,6 +154,22 @@ def test_a_step_over_a_cliff_is_shortened(measured: FloatArray) -> None:
     np.testing.assert_allclose(ours.x, [3.0, 1.2, 0.5], atol=0.1)
 
 
+def test_at_a_kink_it_is_told_that_no_step_fell_as_promised() -> None:
+    """The slope to the right of 0 asks for a step to the left, where the error rises, too."""
+
+    def residual(x: FloatArray) -> FloatArray:
+        return np.array([10.0 + 5.0 * abs(x[0]), x[1] - 1.0])
+
+    kinked = minimise(residual, lambda x: np.diag([5.0, 1.0]), np.array([0.0, 5.0]), np.full(2, -9.0), np.full(2, 9.0))
+    smooth = minimise(
+        residual, lambda x: np.diag([5.0, 1.0]), np.array([0.0, 5.0]), np.array([0.0, -9.0]), np.full(2, 9.0)
+    )
+    assert kinked.stuck
+    assert kinked.x == pytest.approx([0.0, 5.0], abs=0.1)
+    assert not smooth.stuck
+    assert smooth.x == pytest.approx([0.0, 1.0], abs=0.1)
+
+
 def test_running_out_of_iterations_is_told(measured: FloatArray) -> None:
     ours = minimise(
         lambda x: decay(x) - measured,

@@ -6,13 +6,16 @@ The recording is simulated by the law that is fitted: what is tested is the sear
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
+from estimator.physics import fit as fit_module
 from estimator.physics import moments
 from estimator.physics.fit import HEAT, FitResult, Problem, fit, make_problem
 from estimator.physics.layout import flat, slot
+from estimator.physics.least_squares import Solution, minimise
 from estimator.physics.moments import OFFSETS_S, polished, without_idle
 from estimator.physics.simulate import Start, grid_for, simulate
 from estimator.physics.unknowns import Shared, own_unknowns
@@ -73,6 +76,26 @@ def test_behind_a_fit_of_a_few_steps_they_move_once(cracked: Record, monkeypatch
     stuck = ended(cracked, FROM_S - 0.2, TO_S + 0.2)
     assert polished(stuck, HEAT).squares < stuck.squares
     assert fits == [HEAT]
+
+
+def test_where_a_moment_refuses_every_step_the_others_go_on_without_it(
+    cracked: Record, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    free: list[FloatArray] = []
+
+    def stuck_at_first(*given: Any) -> Solution:
+        free.append(given[3] < given[4])
+        return replace(minimise(*given), stuck=len(free) == 1)
+
+    monkeypatch.setattr(fit_module, "minimise", stuck_at_first)
+    result = ended(cracked, FROM_S + 0.001, TO_S)
+    moments = [unknown.name in ("from_s", "to_s") for unknown in result.problem.local[0].own]
+    every, without, again = (each[result.problem.local[0].own_rows] for each in free)
+    assert all(every)
+    assert all(again)
+    assert not any(without[moments])
+    assert free[1].sum() == free[0].sum() - sum(moments)
+    assert result.rms == pytest.approx(SIGMA, rel=0.05)
 
 
 def test_where_they_are_right_the_fit_stays(cracked: Record) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -40,6 +42,25 @@ def test_only_what_stays_near_the_best_is_finished(monkeypatch: pytest.MonkeyPat
     finished = {name for name in further if further[name] >= WORTH_FINISHING * max(further.values())}
     assert STRIBECK in finished
     assert {name for name in trials if frozenset({name}) in bench._fits} == finished < set(further)
+
+
+def test_a_law_is_not_left_behind_for_what_bends(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A grade takes up what is slow in two steps; dry friction, the best law, goes on however little of that it has."""
+    records = rubbing(lambda speed: 30.0 * np.sign(speed))
+    tried = rounds(records, [COULOMB, "quadratic_friction", "road_grade"])
+    bench, further = tried.jury.bench, {}
+    current = bench.fit(NOTHING)
+    real = Bench.rough_fit
+
+    def quick_grade(bench: Bench, effects: Effects, *given: object) -> FitResult:
+        result = real(bench, effects, *given)
+        left = {"road_grade": 0.1, COULOMB: 0.9, "quadratic_friction": 0.99}[next(iter(effects))]
+        return replace(result, residual=left * current.residual)
+
+    monkeypatch.setattr(Bench, "rough_fit", quick_grade)
+    _spy(monkeypatch, "go_on", further)
+    tried.try_all(NOTHING, current)
+    assert set(further) == {"road_grade", COULOMB}
 
 
 def _spy(monkeypatch: pytest.MonkeyPatch, step: str, found: dict[str, FitResult]) -> None:
