@@ -83,7 +83,7 @@ class Selector:
     def _completed(self, first: Trial, retuned: FitResult, without: Effects) -> _Path:
         """Return the way that begins with an effect, and ends there or with one that completes the explanation."""
         way = self._with(_Path(NOTHING, retuned, {}), first, retuned)
-        if self._is_near(way.current):
+        if not self._has_rest(way.current, retuned):
             return way
         trials = self._rounds.try_all(way.chosen, way.current, without, self._half_of_rest(way.current))
         best = self.jury.best(trials, way.current, retuned)
