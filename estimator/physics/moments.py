@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from estimator.physics.catalogue import EFFECTS
-from estimator.physics.fit import HEAT, ITERATIONS, FitResult, Problem, fit, simulated_each
+from estimator.physics.fit import ITERATIONS, FitResult, Problem, fit, simulated_each
 from estimator.physics.parallel import concurrently
 from estimator.physics.unknowns import LocalBasis
 from estimator.signals.record import FloatArray, Record
@@ -32,11 +32,8 @@ WORTH = 20.0
 
 
 def polished(result: FitResult, iterations: int = ITERATIONS) -> FitResult:
-    """Move the moments of events to where the error is smallest nearby, and fit on from there while it helps.
-
-    Behind a fit of a few steps once: whether it is worth the rest is seen then.
-    """
-    for _ in range(ROUNDS if iterations > HEAT else 1):
+    """Move the moments of events to where the error is smallest nearby, and fit on from there while it helps."""
+    for _ in range(ROUNDS):
         moved = _moved(result)
         if moved is None:
             return result

@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 
 from estimator.physics import fit as fit_module
-from estimator.physics import moments
-from estimator.physics.fit import HEAT, FitResult, Problem, fit, make_problem
+from estimator.physics.fit import FitResult, fit, make_problem
 from estimator.physics.layout import flat, slot
 from estimator.physics.least_squares import Solution, minimise
 from estimator.physics.moments import OFFSETS_S, polished, without_idle
@@ -63,19 +62,6 @@ def test_a_fit_that_is_stuck_nearby_comes_out(cracked: Record, off_s: float) -> 
     result = polished(stuck)
     assert moments_of(result) == pytest.approx([FROM_S, TO_S], abs=0.005)
     assert result.rms == pytest.approx(SIGMA, rel=0.05)
-
-
-def test_behind_a_fit_of_a_few_steps_they_move_once(cracked: Record, monkeypatch: pytest.MonkeyPatch) -> None:
-    fits: list[int] = []
-
-    def counted(problem: Problem, x0: FloatArray, iterations: int) -> FitResult:
-        fits.append(iterations)
-        return fit(problem, x0, iterations)
-
-    monkeypatch.setattr(moments, "fit", counted)
-    stuck = ended(cracked, FROM_S - 0.2, TO_S + 0.2)
-    assert polished(stuck, HEAT).squares < stuck.squares
-    assert fits == [HEAT]
 
 
 def test_where_a_moment_refuses_every_step_the_others_go_on_without_it(
