@@ -33,7 +33,7 @@ def pressed(torque: float, loaded_twist: float, pull: float) -> float:
 
 
 def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
-    """Return a fifth of the twist that the torque in use gives, and a fiftieth of it for the contact depth."""
+    """Return a fifth of the twist that the torque in use gives, a twentieth of that for the contact depth, and 1."""
     twist = torque_scale(records) / model.parameters["k"].value
     return (0.2 * twist, 0.01 * twist, 1.0)
 
