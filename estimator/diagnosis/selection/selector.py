@@ -81,10 +81,15 @@ class Selector:
         return firsts[:OTHER_WAYS]
 
     def _completed(self, first: Trial, retuned: FitResult, without: Effects) -> _Path:
-        """Return the way that begins with an effect, and ends there or with one that completes the explanation."""
+        """Return the way that begins with an effect, and ends there or with one that completes the explanation.
+
+        Near the noise laws alone complete laws: what bends takes up any rest, or leaves one to be taken up.
+        """
         way = self._with(_Path(NOTHING, retuned, {}), first, retuned)
-        if not self._has_rest(way.current, retuned):
-            return way
+        if self._is_near(way.current):
+            if flexible(way.chosen) or not self._has_rest(way.current, retuned):
+                return way
+            without = flexible(frozenset(EFFECTS))
         trials = self._rounds.try_all(way.chosen, way.current, without, self._half_of_rest(way.current))
         best = self.jury.best(trials, way.current, retuned)
         return way if best is None else self._with(way, best, retuned)

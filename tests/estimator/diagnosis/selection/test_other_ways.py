@@ -64,10 +64,14 @@ def test_what_bends_beside_others_gives_way_to_a_law(select: Selector, found: Se
 def test_a_way_is_completed_however_near_to_the_noise_it_ends(
     select: Selector, found: Selection, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """As long as something is left of it."""
+    """As long as something is left of it, and neither bends."""
     monkeypatch.setattr(select, "_is_near", lambda _: True)
     (friction,) = (trial for trial in select._firsts(found.retuned, NOTHING) if trial.name == COULOMB)
     assert select._completed(friction, found.retuned, NOTHING).chosen == BOTH
+    monkeypatch.setattr("estimator.diagnosis.selection.selector.flexible", lambda names: names & {COULOMB})
+    assert select._completed(friction, found.retuned, NOTHING).chosen == {COULOMB}
+    monkeypatch.setattr("estimator.diagnosis.selection.selector.flexible", lambda names: names - {COULOMB})
+    assert select._completed(friction, found.retuned, NOTHING).chosen == {COULOMB}
 
 
 def test_what_is_better_stays(select: Selector, found: Selection) -> None:
