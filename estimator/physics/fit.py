@@ -32,10 +32,11 @@ HEAT = 3
 CLOSE = 1.1
 """Squared error, over the best start's, up to which a start goes on."""
 
-MOMENT_NAMES = frozenset(moment.name for moment in MOMENTS)
-
 BAD = 1e3
 """A simulation that runs away counts as this many times the largest output."""
+
+MOMENT_NAMES = frozenset(moment.name for moment in MOMENTS)
+"""Names of an event's own unknowns: the error over them has a kink at every sample's edge."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -258,15 +259,12 @@ def _moving(problem: Problem, free: BoolArray, index: int) -> IntArray:
 
 def _moments(problem: Problem) -> BoolArray:
     """Return which unknowns are moments of events, shape (U,)."""
-    found = np.zeros(start_vector(problem).size, dtype=bool)
-    first = len(problem.shared)
+    parts = [np.zeros(len(problem.shared), dtype=bool)]
     for basis in problem.local:
-        for row, unknown in zip(
-            range(first + basis.own_rows.start, first + basis.own_rows.stop), basis.own, strict=True
-        ):
-            found[row] = unknown.name in MOMENT_NAMES
-        first += basis.guess.size
-    return found
+        own = np.zeros(basis.guess.size, dtype=bool)
+        own[basis.own_rows] = [unknown.name in MOMENT_NAMES for unknown in basis.own]
+        parts.append(own)
+    return np.concatenate(parts)
 
 
 def fit(problem: Problem, x0: FloatArray | None = None, iterations: int = ITERATIONS) -> FitResult:
@@ -301,8 +299,7 @@ def fit(problem: Problem, x0: FloatArray | None = None, iterations: int = ITERAT
 
     solution = least(start_vector(problem) if x0 is None else x0, low, high)
     moments = _moments(problem)
-    if solution.stuck and moments.any():
-        # at a sample's edge the error has a kink over a moment, which refuses every step: first without the moments
+    if solution.stuck and moments.any():  # at a kink over a moment every step is refused: first without them
         x = solution.x
         x = least(x, np.where(moments, x, low), np.where(moments, x, high)).x
         solution = least(x, low, high)

@@ -32,7 +32,8 @@ TINY = 1e-12
 class Solution:
     """Where a fit ended: unknowns (U,), errors (R,), Jacobian there (R, U).
 
-    ``stuck`` where the derivatives promise a fall and no step, however short, brings one: at a kink of the error.
+    ``stuck`` where a step was refused and shorter ones promised nothing any more, or were refused as well: the error
+    has a kink there, or ``x`` is its least to the last digits.
     """
 
     x: FloatArray
