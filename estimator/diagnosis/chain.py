@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from estimator.diagnosis.acquisition import (
+    OUTPUT,
     Finding,
     Misfit,
     as_read,
@@ -22,7 +23,7 @@ from estimator.physics.fit import FitResult, start_of
 from estimator.physics.free_run import FreeRun, free_run
 from estimator.physics.model import DrivelineModel
 from estimator.physics.simulate import simulate
-from estimator.signals.record import FloatArray, Record
+from estimator.signals.record import BoolArray, FloatArray, Record
 
 PULSE_SHARE = 0.01
 """A torque pulse of this share of the largest torque shows the line's answer without disturbing its motion."""
@@ -74,9 +75,12 @@ class Chain:
         return {f.name: {name: sized.value for name, sized in f.parameters.items()} for f in self.findings}
 
     def errors(self, outputs: Sequence[FloatArray]) -> list[FloatArray]:
-        """Return simulated, as this chain would have read it, less recorded; the good rows of each raw recording."""
+        """Return simulated, as this chain would have read it, less recorded; the good rows of each raw recording.
+
+        Readings that were lost without a flag are no good rows: nothing was read there.
+        """
         return [
-            (as_read(output, record, self.effects()) - record.output)[record.okay]
+            (as_read(output, record, self.effects()) - record.output)[_read_rows(record, self.findings)]
             for output, record in zip(outputs, self.raw, strict=True)
         ]
 
@@ -86,6 +90,15 @@ def read_through(records: Sequence[Record]) -> Chain:
     findings = recognise(records) if records else ()
     filled = compensate(records, findings)
     return Chain(tuple(records), filled, filled, findings)
+
+
+def _read_rows(record: Record, findings: Iterable[Finding]) -> BoolArray:
+    """Return the good rows of which the output was not lost, shape (N,)."""
+    rows = record.okay
+    for finding in findings:
+        if finding.name == "lost_samples":
+            rows = rows & ~finding.touched(record)[:, OUTPUT]
+    return rows
 
 
 def _misfits(result: FitResult) -> list[Misfit]:
@@ -131,22 +144,21 @@ def replay(model: DrivelineModel, record: Record) -> FreeRun:
     parts = tiles(record)
     runs = [_replay(model, part) for part in parts]
     most = max(range(len(parts)), key=lambda i: int(parts[i].okay.sum()))
-    output = np.concatenate([run.output for run in runs])
-    error = (output - record.output)[record.okay]
-    return FreeRun(output, float(np.sqrt(np.mean(error**2))), runs[most].start)
+    output = np.concatenate([run.output for run, _ in runs])
+    read = np.concatenate([rows for _, rows in runs])
+    error = (output - record.output)[read]
+    return FreeRun(output, float(np.sqrt(np.mean(error**2))), runs[most][0].start)
 
 
-def _replay(model: DrivelineModel, record: Record) -> FreeRun:
-    """Simulate one recording without long gaps."""
+def _replay(model: DrivelineModel, record: Record) -> tuple[FreeRun, BoolArray]:
+    """Simulate one recording without long gaps; also returns the rows that were read, shape (N,)."""
     acquired: Mapping[str, Mapping[str, float]] = {
         name: {key: value.value for key, value in values.items()}
         for name, values in model.effects.items()
         if EFFECTS[name].recognised
     }
     if not acquired:
-        return free_run(model, record)
+        return free_run(model, record), record.okay
     found = tuple(finding for finding in recognise([record]) if finding.name in acquired)
     run = free_run(mechanical(model), compensate([record], found)[0])
-    output = as_read(run.output, record, acquired)
-    error = (output - record.output)[record.okay]
-    return replace(run, output=output, rms=float(np.sqrt(np.mean(error**2))))
+    return replace(run, output=as_read(run.output, record, acquired)), _read_rows(record, found)

@@ -4,7 +4,18 @@ from estimator.diagnosis.acquisition.as_read import as_read
 from estimator.diagnosis.acquisition.compensate import compensate
 from estimator.diagnosis.acquisition.finding import OUTPUT, Finding, Sized
 from estimator.diagnosis.acquisition.hidden_jitter import hidden_jitter
-from estimator.diagnosis.acquisition.recognise import recognise
+from estimator.diagnosis.acquisition.recognise import as_if_not_lost, recognise
 from estimator.diagnosis.acquisition.repair import Misfit, repaired
 
-__all__ = ["OUTPUT", "Finding", "Misfit", "Sized", "as_read", "compensate", "hidden_jitter", "recognise", "repaired"]
+__all__ = [
+    "OUTPUT",
+    "Finding",
+    "Misfit",
+    "Sized",
+    "as_if_not_lost",
+    "as_read",
+    "compensate",
+    "hidden_jitter",
+    "recognise",
+    "repaired",
+]

@@ -40,6 +40,10 @@ COMMON_LEVELS = 5
 NEAR_SHARE = 0.02
 """... or within this share of the channel's size, whichever is more."""
 
+MORE_THAN_MEANT = 5.0
+"""Where zeros are lost, those between values near zero are so too if there are so many times as many of them as of any
+value beside zero: rounded noise of half a lattice step around zero shows it four times as often as the next value."""
+
 
 def lost_samples(records: Sequence[Record]) -> Finding | None:
     """Recognise lost readings; None where they are too few to matter."""
@@ -103,7 +107,13 @@ def _zeros_of(series: Sequence[FloatArray]) -> tuple[list[BoolArray], float]:
     expected = (beside + 2.0 * np.sqrt(beside + 1.0)) * step / (2.0 * near)
     p_value = float(stats.poisson.sf(count - 1, expected))
     enough = p_value <= LEVEL and count >= SMALLEST_SHARE * pooled.size
-    return (rows, p_value) if enough and not _has_levels(series, near, count) else (none, 1.0)
+    if not enough or _has_levels(series, near, count):
+        return none, 1.0
+    short = [_out_of_line(values, 0.0) for values in series]
+    near_zero = sum(int(found.sum()) for found in short) - count
+    beside_zero = pooled[(pooled != 0.0) & (np.abs(pooled) <= (NEAR_STEPS + 0.5) * step)]
+    usual = max(np.unique(beside_zero, return_counts=True)[1], default=1)
+    return (short if near_zero > MORE_THAN_MEANT * usual else rows), p_value
 
 
 def _out_of_line(values: FloatArray, near: float) -> BoolArray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from estimator.diagnosis.acquisition.compensate import blanked
+from estimator.diagnosis.acquisition.compensate import blanked, compensate
 from estimator.diagnosis.acquisition.finding import Finding
 from estimator.diagnosis.acquisition.lost import lost_samples
 from estimator.diagnosis.acquisition.quantised import speed_quantisation
@@ -22,3 +22,9 @@ def recognise(records: Sequence[Record]) -> tuple[Finding, ...]:
     read = [blanked(record, lost) for record in records]
     found = (lost, *(look(read) for look in AMONG_READ))
     return tuple(finding for finding in found if finding is not None)
+
+
+def as_if_not_lost(records: Sequence[Record]) -> tuple[Record, ...]:
+    """Return records without the readings that were lost: zeros without a flag are neither noise nor motion."""
+    lost = lost_samples(records)
+    return tuple(records) if lost is None else compensate(records, [lost])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from estimator.diagnosis.acquisition import as_if_not_lost
 from estimator.diagnosis.joined import joined
 from estimator.diagnosis.preconditions.clipped import without_clipped
 from estimator.diagnosis.preconditions.exciting import require_excitation, require_signals
@@ -58,7 +59,7 @@ def prepare(records: Sequence[Record], model: DrivelineModel, holdout: Sequence[
     training = segments.of(record.name for record in records)
     if not training:
         raise NotExciting(" ".join(segments.warnings), tuple(record.name for record in records))
-    require_plausible_units(segments.records, model)
-    warnings += [*model_warnings(model), *segments.warnings, *require_excitation(training, model)]
+    require_plausible_units(as_if_not_lost(segments.records), model)
+    warnings += [*model_warnings(model), *segments.warnings, *require_excitation(as_if_not_lost(training), model)]
     unseen = segments.of(record.name for record in holdout)
     return Prepared(training, unseen, tuple(warnings), segments)

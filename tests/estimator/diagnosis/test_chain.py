@@ -83,6 +83,22 @@ class TestStale:
         assert np.std(true - read.output) > 2.0 * NOISE
 
 
+class TestLostZeros:
+    """The speed was recorded as zero where it was not read."""
+
+    READ = replace(HEALTHY, output=np.where(LOST, 0.0, HEALTHY.output))
+
+    def test_they_are_no_errors(self) -> None:
+        true = TRUTH.speed()
+        (errors,) = read_through([self.READ]).errors([true])
+        np.testing.assert_allclose(errors, (true - HEALTHY.output)[~LOST])
+
+    def test_a_model_that_tells_of_them_does_not_count_them(self) -> None:
+        knows = line_of(TRUTH.line, {"lost_samples": {"share": float(LOST.mean())}})
+        assert replay(knows, self.READ).rms == pytest.approx(NOISE, rel=0.05)
+        assert replay(MODEL, self.READ).rms > 100.0 * NOISE
+
+
 class TestLostTorque:
     def test_it_is_unknown_and_estimated_from_what_the_speed_did(self) -> None:
         read = with_lost_torque()

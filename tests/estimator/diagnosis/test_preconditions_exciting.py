@@ -36,6 +36,16 @@ def test_noise_alone_is_refused() -> None:
         prepare([still], LINE)
 
 
+def test_zeros_of_lost_readings_are_no_noise() -> None:
+    """At 84 rad/s every lost reading is a spike, and 3 % of them are more than all that the torque moves."""
+    run = linear_record(TWO_MASS, random_steps(N, 1), Start(84.0, 0.0, 84.0, 0.0, 84.0), sigma=SIGMA)
+    lost = np.random.default_rng(3).random(N) < 0.03
+    read = replace(run, output=np.where(lost, 0.0, np.round(run.output, 5)))
+    with pytest.raises(NotExciting):
+        require_excitation([read], LINE)
+    assert prepare([read], LINE).warnings == prepare([run], LINE).warnings
+
+
 def test_a_torque_that_moves_nothing_is_refused() -> None:
     """The line coasts: it moves, but the torque has no part in it."""
     coast = record(noise(0.02, 1), 80.0 * np.exp(-0.05 * 0.01 * np.arange(N)) + noise(SIGMA, 2), name="coast")

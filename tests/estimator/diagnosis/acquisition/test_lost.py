@@ -78,3 +78,26 @@ def test_zeros_without_a_flag_are_lost(channels: tuple[int, ...], share: float, 
     for record, where in zip(records, rows, strict=True):
         assert not finding.rows(record)[~where].any()
         assert not np.delete(finding.touched(record), channels, axis=1).any()
+
+
+def test_lost_zeros_between_values_near_zero_are_lost_too() -> None:
+    """The reversal runs through zero all the time: what it lost there lies between values that are near zero."""
+    rows = rows_of(4, 0.03, 2.0)
+    records = [replace(r, output=np.where(where, 0.0, r.output)) for r, where in zip(healthy(4), rows, strict=True)]
+    finding = only(records)
+    for record, where in zip(records, rows, strict=True):
+        np.testing.assert_array_equal(finding.rows(record)[1:-1], where[1:-1])
+
+
+def test_zeros_that_the_values_beside_them_let_expect_are_kept() -> None:
+    """A reading in coarse steps is at zero now and then while the line stands still."""
+    rows = rows_of(5, 0.03)
+    records = [replace(r, output=0.1 * np.round(10.0 * r.output)) for r in healthy(5)]
+    still = 0.1 * np.round(np.random.default_rng(5).standard_normal(1000))
+    with_rest = [replace(r, output=np.concatenate([still, r.output[1000:]])) for r in records]
+    lost = [replace(r, output=np.where(where, 0.0, r.output)) for r, where in zip(with_rest, rows, strict=True)]
+    found = [f for f in recognise(lost) if f.name == "lost_samples"]
+    for finding in found:
+        for record, healthy_one, where in zip(lost, with_rest, rows, strict=True):
+            kept = (healthy_one.output == 0.0) & ~where
+            assert not finding.rows(record)[kept].any()
