@@ -144,16 +144,34 @@ def _is_another_law(selection: Selection, floor: float, unnamed: UnnamedLaw) -> 
     return _is_seen(selection, floor) and left < FAR_BETTER * (after**2 - level**2)
 
 
+def _bends(selection: Selection, floor: float, profile_alone: bool) -> bool:
+    """Tell whether what bends is among the chosen and leaves more than a detail: an edge in what should be smooth."""
+    flexibly = profile_alone or (bool(flexible(selection.chosen)) and _is_seen(selection, floor))
+    return flexibly and not _leaves_a_detail(selection, floor)
+
+
+def _is_filtered(selection: Selection, floor: float) -> bool:
+    """Tell whether several linear systems do not reach the noise together.
+
+    A mode and a filter follow any other linear system, one of fractional order among them, as far as their orders go.
+    And where they are what was left out there is no other way to write them that leaves a detail.
+    """
+    several = len(selection.chosen) > 1 and all(EFFECTS[name].linear for name in selection.chosen)
+    return several and _is_seen(selection, floor)
+
+
 def _objection(selection: Selection, floor: float, unnamed: UnnamedLaw | None, remaining: UnnamedLaw | None) -> str:
     named = " and ".join(EFFECTS[name].title for name in sorted(selection.chosen))
     if unconverged(selection):
         return f"{named} rests on a fit that did not converge"
+    for name, trial in sorted(selection.accepted.items()):
+        if trial.failed is not None:  # it passed beside fewer, or before its last fit
+            return f"{EFFECTS[name].title} does not pass in the last fit: {trial.failed}"
     profiles = [name for name in selection.chosen if EFFECTS[name].profile]
     alone = bool(profiles) and len(selection.chosen) == 1
     if leaves := _leaves_too_much(selection, floor, alone):
         return f"{named} would leave {leaves}"
-    bends = alone or (bool(flexible(selection.chosen)) and _is_seen(selection, floor))
-    if bends and remaining is not None and not _leaves_a_detail(selection, floor):  # an edge in what should be smooth
+    if remaining is not None and (_bends(selection, floor, alone) or _is_filtered(selection, floor)):
         law = kind_in_words(remaining.terms[0][0])
         return f"{named} would leave {law} at the {PLACE_NAMES[remaining.element]} unexplained"
     if unnamed is None or not reads_speed(selection.result):  # a free-running position drifts as any flexible law does

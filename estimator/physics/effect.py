@@ -234,6 +234,8 @@ class Effect:
         where there is none.
     completed : callable
         Values that were given to those a simulation should have: where leaving one out is simpler than any real part.
+    linear : bool
+        True where it is a linear system beside the nominal one, with an order and nothing else to write otherwise.
     recognised : bool
         True where it is recognised in the raw data before any fit (repeated, lost, quantised samples).
     """
@@ -265,6 +267,7 @@ class Effect:
     unresolved: Callable[[DrivelineModel, Sequence[Record], Mapping[str, float]], str] = always_plausible
     rescaled: Callable[[Mapping[str, float]], float] = told_one_way
     completed: Callable[[Mapping[str, float]], Mapping[str, float]] = as_given
+    linear: bool = False
     recognised: bool = False
 
     @property

@@ -295,10 +295,11 @@ def fit(problem: Problem, x0: FloatArray | None = None, iterations: int = ITERAT
             low,
             high,
             iterations,
+            smooth=not moments.any(),
         )
 
-    solution = least(start_vector(problem) if x0 is None else x0, low, high)
     moments = _moments(problem)
+    solution = least(start_vector(problem) if x0 is None else x0, low, high)
     if solution.stuck and moments.any():  # at a kink over a moment every step is refused: first without them
         x = solution.x
         x = least(x, np.where(moments, x, low), np.where(moments, x, high)).x

@@ -3,7 +3,10 @@
 ``scipy.optimize.least_squares`` decomposes the whole Jacobian at every step; with ten thousand errors and twenty
 unknowns that costs more than the simulations that made it. Here the step comes from the normal equations, with
 Marquardt's scaling (SIAM J. Appl. Math. 11, 1963), and is the least of the damped quadratic inside the bounds
-(``scipy.optimize.lsq_linear``: Stark and Parker, Computational Statistics 10, 1995).
+(``scipy.optimize.lsq_linear``: Stark and Parker, Computational Statistics 10, 1995). Near the end, where steps keep
+what they promise, the Jacobian is carried on by Broyden's update (Math. Comp. 19, 1965; with Marquardt's method:
+Madsen, Nielsen and Tingleff, Methods for Non-Linear Least Squares Problems, DTU 2004, 3.5): it costs a simulation per
+unknown, a step one. A fit ends on a Jacobian of its own place.
 """
 
 from __future__ import annotations
@@ -19,6 +22,12 @@ from estimator.signals.record import FloatArray
 
 CONVERGED = 0.01
 """A step that promises less than this in log-likelihood ratio, ``n dS/S``, changes no conclusion: stop there."""
+
+RELIABLE = 0.75
+"""Share of a step's promise that it must keep for the derivative to be carried on to the next and not found again."""
+
+FAR = 0.2
+"""Share of the squared error that such a step takes away at most: far from the end the derivative is soon another."""
 
 FIRST_DAMPING = 1e-3
 EASE, STIFFEN = 0.2, 5.0
@@ -50,6 +59,7 @@ def minimise(
     low: FloatArray,
     high: FloatArray,
     iterations: int = 50,
+    smooth: bool = True,
 ) -> Solution:
     """Minimise ``sum(residual(x)**2)`` subject to ``low <= x <= high`` from one start.
 
@@ -59,29 +69,44 @@ def minimise(
         Unknowns (U,) to errors (R,) and to their derivatives (R, U).
     iterations : int
         Jacobians at most; ``converged`` is False when they were used up.
+    smooth : bool
+        False where the errors have kinks, over which no Jacobian is carried on.
     """
     x = np.clip(x0, low, high)
-    errors = residual(x)
-    damping = FIRST_DAMPING
+    errors, derivative = residual(x), jacobian(x)
+    damping, fresh, refused = FIRST_DAMPING, True, False
     for _ in range(iterations):
-        derivative = jacobian(x)
-        gradient, curvature = derivative.T @ errors, derivative.T @ derivative
-        square = float(errors @ errors)
-        enough = CONVERGED * square / errors.size
-        moved = refused = False
-        while damping < MOST_DAMPING and not moved:
+        while damping < MOST_DAMPING:
+            square = float(errors @ errors)
+            gradient, curvature = derivative.T @ errors, derivative.T @ derivative
             step = _step(x, gradient, curvature, damping, low, high)
-            if -step @ (2.0 * gradient + curvature @ step) < enough:
-                return Solution(x, errors, derivative, True, stuck=refused)
+            promise = float(-step @ (2.0 * gradient + curvature @ step))
+            if promise < CONVERGED * square / errors.size:
+                if fresh:
+                    return Solution(x, errors, derivative, True, stuck=refused)
+                break
             tried = residual(x + step)
             with np.errstate(over="ignore"):  # a simulation that ran away: an infinite error is no improvement
-                moved = float(tried @ tried) < square
-            refused = refused or not moved
-            damping = max(damping * (EASE if moved else STIFFEN), LEAST_DAMPING)
-        if not moved:
+                gained = square - float(tried @ tried)
+            if gained > 0.0:
+                damping = max(damping * EASE, LEAST_DAMPING)
+                derivative, fresh = _secant(derivative, tried - errors, step), False
+                x, errors = x + step, tried
+            elif fresh:
+                damping, refused = damping * STIFFEN, True
+            carried_on = smooth and RELIABLE * promise <= gained < FAR * square
+            if not fresh and not carried_on:
+                break
+        else:
             return Solution(x, errors, derivative, True, stuck=True)
-        x, errors = x + step, tried
-    return Solution(x, errors, jacobian(x), False)
+        derivative, fresh, refused = jacobian(x), True, False
+    return Solution(x, errors, derivative, False)
+
+
+def _secant(derivative: FloatArray, change: FloatArray, step: FloatArray) -> FloatArray:
+    """Return the derivative nearest to the old one that tells the change of the errors over a step."""
+    updated: FloatArray = derivative + np.outer((change - derivative @ step) / (step @ step), step)
+    return updated
 
 
 def _step(

@@ -130,8 +130,8 @@ class Jury:
         return unseen + Z95 * held.spread >= PART_UNSEEN * min(seen, possible)
 
     def examined(self, trial: Trial, before: FitResult) -> Trial:
-        """Return a trial that passed, with what unseen data say."""
-        return replace(trial, holdout=self._examine(trial, before), failed=None)
+        """Return a trial with what unseen data say."""
+        return replace(trial, holdout=self._examine(trial, before))
 
     def final(self, name: str, chosen: Effects, current: FitResult, trial: Trial) -> Trial:
         """Judge an accepted effect once more, against the final set without it; or alone, where its fit got better."""

@@ -70,4 +70,5 @@ EFFECT = Effect(
     starts=low_pass.starts,
     sentence=sentence,
     unresolved=long_enough("time_constant_s"),
+    linear=True,
 )

@@ -78,4 +78,5 @@ EFFECT = Effect(
     loosens=frozenset({"k", "c"}),  # a spring in the line softens it by s and lowers its damping by s^2
     loosened_by="line_share",
     implausible=implausible,
+    linear=True,
 )

@@ -57,4 +57,5 @@ EFFECT = Effect(
     starts=low_pass.starts,
     sentence=sentence,
     unresolved=long_enough("time_constant_s"),
+    linear=True,
 )

@@ -68,4 +68,5 @@ EFFECT = Effect(
     starts=starts,
     sentence=sentence,
     unresolved=long_enough("delay_s"),
+    linear=True,
 )

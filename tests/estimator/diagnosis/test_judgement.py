@@ -17,6 +17,7 @@ from estimator.diagnosis.noise import unpredictable
 from estimator.diagnosis.phrases import kind_in_words
 from estimator.diagnosis.result import Verdict
 from estimator.diagnosis.selection import Selection, counting_law
+from estimator.diagnosis.trial import Trial
 from estimator.diagnosis.unnamed import UnnamedLaw, best_unnamed
 from estimator.diagnosis.weight import MOST, VISIBLE
 from estimator.physics.effect import Element
@@ -179,6 +180,28 @@ class TestHowMuchMayBeLeft:
         assert (objection == "") is believed
         assert judge(outcome(before, chosen, of_rms(after, 3)), 0.1).objection == ""
 
+    @pytest.mark.parametrize(
+        ("chosen", "after", "believed"),
+        [
+            (frozenset({"extra_torsional_mode", "actuator_lag"}), 0.114, True),
+            (
+                frozenset({"extra_torsional_mode", "actuator_lag"}),
+                0.117,
+                False,
+            ),  # seen: a detail of 0.005 % all the same
+            (frozenset({"extra_torsional_mode"}), 0.117, True),
+            (frozenset({"extra_torsional_mode"}) | COULOMB, 0.117, True),  # another way to write the friction
+        ],
+    )
+    def test_several_linear_systems_may_leave_no_law_that_is_seen(
+        self, chosen: Effects, after: float, believed: bool
+    ) -> None:
+        before = of_rms(9.0, 2)
+        rest = UnnamedLaw(Element.SHAFT, (("e", 1.0),), gain(before, of_rms(0.1, 3)), 0.1)
+        objection = judge(outcome(before, chosen, of_rms(after, 3), remaining=rest), 0.1).objection
+        assert objection.endswith("at the shaft unexplained") is not believed
+        assert (objection == "") is believed
+
     @pytest.mark.parametrize(("fewer", "believed"), [(0, True), (3, False)])
     def test_a_rival_is_simpler_with_the_same_number_of_samples_only(self, fewer: int, believed: bool) -> None:
         """A road and a law leave as much with as many unknowns: none is simpler, however correlated one error is."""
@@ -217,6 +240,18 @@ class TestChosen:
         judged = judge(found, SIGMA)
         assert judged.verdict is Verdict.UNEXPLAINED
         assert judged.objection.startswith("lag of the torque would leave 100% of the mismatch, ")
+
+    @pytest.mark.parametrize("failed", [None, "its interval includes the value at which it does nothing"])
+    def test_one_that_fails_a_test_in_the_last_fit_does_not(self, failed: str | None) -> None:
+        found = selection(rubbing(lambda speed: 12.0), COULOMB)
+        last = Trial(
+            "coulomb_friction_motor", COULOMB, found.result, gain(found.retuned, found.result), None, 0.0, failed
+        )
+        judged = judge(replace(found, accepted={last.name: last}), SIGMA)
+        assert judged.objection == (
+            f"dry friction at the motor does not pass in the last fit: {failed}" if failed else ""
+        )
+        assert judged.verdict is (Verdict.UNEXPLAINED if failed else Verdict.EXPLAINED)
 
     def test_a_profile_that_leaves_a_law_does_not(self) -> None:
         """A road may follow anything slow; what it leaves of a little dry friction, it does not explain."""

@@ -116,6 +116,36 @@ def test_rosenbrocks_valley_is_followed_to_its_end() -> None:
     assert ours.converged
 
 
+def test_near_the_end_the_derivative_is_carried_on() -> None:
+    """Two decays of nearly one rate are a long valley: fewer derivatives than without, the last where it ended."""
+    rates = np.array([1.0, 1.6])
+    noise = 0.02 * np.random.default_rng(2).standard_normal(TIME.size)
+
+    def falls(x: FloatArray) -> FloatArray:
+        return np.exp(-np.outer(TIME, x[:2]))
+
+    def residual(x: FloatArray) -> FloatArray:
+        return np.asarray(falls(x) @ x[2:] - falls(rates) @ np.ones(2) - noise)
+
+    def asked(smooth: bool) -> tuple[list[FloatArray], Solution]:
+        points: list[FloatArray] = []
+
+        def jacobian(x: FloatArray) -> FloatArray:
+            points.append(x)
+            return np.hstack([-TIME[:, None] * falls(x) * x[2:], falls(x)])
+
+        start = np.array([0.5, 4.0, 0.3, 1.5])
+        return points, minimise(residual, jacobian, start, np.zeros(4), np.full(4, 10.0), smooth=smooth)
+
+    carried, new = asked(True)
+    found, old = asked(False)
+    assert len(carried) < len(found)
+    assert likelihood_ratio(residual, new.x, old.x) == pytest.approx(0.0, abs=10.0 * CONVERGED)
+    for points, end in ((carried, new), (found, old)):
+        assert end.converged
+        np.testing.assert_array_equal(points[-1], end.x)
+
+
 def test_badly_scaled_unknowns_do_not_matter(measured: FloatArray) -> None:
     scale = np.array([1e-6, 1e3, 1.0])
 
