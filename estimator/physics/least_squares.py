@@ -73,12 +73,12 @@ def minimise(
         False where the errors have kinks, over which no Jacobian is carried on.
     """
     x = np.clip(x0, low, high)
-    errors, derivative = residual(x), jacobian(x)
-    damping, fresh, refused = FIRST_DAMPING, True, False
+    errors, damping = residual(x), FIRST_DAMPING
     for _ in range(iterations):
-        while damping < MOST_DAMPING:
+        derivative, fresh, refused = jacobian(x), True, False
+        gradient, curvature = derivative.T @ errors, derivative.T @ derivative
+        while True:
             square = float(errors @ errors)
-            gradient, curvature = derivative.T @ errors, derivative.T @ derivative
             step = _step(x, gradient, curvature, damping, low, high)
             promise = float(-step @ (2.0 * gradient + curvature @ step))
             if promise < CONVERGED * square / errors.size:
@@ -88,19 +88,21 @@ def minimise(
             tried = residual(x + step)
             with np.errstate(over="ignore"):  # a simulation that ran away: an infinite error is no improvement
                 gained = square - float(tried @ tried)
-            if gained > 0.0:
-                damping = max(damping * EASE, LEAST_DAMPING)
-                derivative, fresh = _secant(derivative, tried - errors, step), False
-                x, errors = x + step, tried
-            elif fresh:
+            if not gained > 0.0:
+                if not fresh:
+                    break
                 damping, refused = damping * STIFFEN, True
-            carried_on = smooth and RELIABLE * promise <= gained < FAR * square
-            if not fresh and not carried_on:
+                if damping >= MOST_DAMPING:
+                    return Solution(x, errors, derivative, True, stuck=True)
+                continue
+            damping = max(damping * EASE, LEAST_DAMPING)
+            change, fresh = tried - errors, False
+            x, errors = x + step, tried
+            if not (smooth and RELIABLE * promise <= gained < FAR * square):
                 break
-        else:
-            return Solution(x, errors, derivative, True, stuck=True)
-        derivative, fresh, refused = jacobian(x), True, False
-    return Solution(x, errors, derivative, False)
+            derivative = _secant(derivative, change, step)
+            gradient, curvature = derivative.T @ errors, derivative.T @ derivative
+    return Solution(x, errors, jacobian(x), False)
 
 
 def _secant(derivative: FloatArray, change: FloatArray, step: FloatArray) -> FloatArray:

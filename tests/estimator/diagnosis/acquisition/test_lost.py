@@ -96,8 +96,8 @@ def test_zeros_that_the_values_beside_them_let_expect_are_kept() -> None:
     still = 0.1 * np.round(np.random.default_rng(5).standard_normal(1000))
     with_rest = [replace(r, output=np.concatenate([still, r.output[1000:]])) for r in records]
     lost = [replace(r, output=np.where(where, 0.0, r.output)) for r, where in zip(with_rest, rows, strict=True)]
-    found = [f for f in recognise(lost) if f.name == "lost_samples"]
-    for finding in found:
-        for record, healthy_one, where in zip(lost, with_rest, rows, strict=True):
-            kept = (healthy_one.output == 0.0) & ~where
-            assert not finding.rows(record)[kept].any()
+    (finding,) = (f for f in recognise(lost) if f.name == "lost_samples")
+    for record, healthy_one, where in zip(lost, with_rest, rows, strict=True):
+        meant = (healthy_one.output == 0.0) & ~where
+        assert meant.sum() > 300
+        assert not finding.rows(record)[meant].any()
