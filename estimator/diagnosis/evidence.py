@@ -75,8 +75,13 @@ def delta_bic_with(gained: Gain, before_rms: float, after_rms: float, n: float) 
     The RMS are those without and with what gains, in one unit.
     """
     fall = 2.0 * math.log(before_rms / after_rms)
-    price = (gained.n_effective * fall - gained.delta_bic) / math.log(gained.n_effective)
-    return n * fall - price * math.log(n)
+    return n * fall - price(gained, before_rms, after_rms) * math.log(n)
+
+
+def price(gained: Gain, before_rms: float, after_rms: float) -> float:
+    """Return how many unknowns a gain was bought with, choices among them; the RMS are those without and with them."""
+    fall = 2.0 * math.log(before_rms / after_rms)
+    return (gained.n_effective * fall - gained.delta_bic) / math.log(gained.n_effective)
 
 
 def gain_from_squares(before: float, after: float, added: int, unknowns: int, errors: Sequence[FloatArray]) -> Gain:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from estimator.diagnosis.acquisition import Finding
 from estimator.diagnosis.convergence import unconverged
-from estimator.diagnosis.evidence import VERY_STRONG, delta_bic_with, gain, noise_level
+from estimator.diagnosis.evidence import VERY_STRONG, delta_bic_with, gain, noise_level, price
 from estimator.diagnosis.hypotheses import flexible
 from estimator.diagnosis.phrases import PLACE_NAMES, kind_in_words
 from estimator.diagnosis.result import Verdict
@@ -127,12 +127,18 @@ def _is_seen(selection: Selection, floor: float) -> bool:
 
 
 def _is_simpler(unnamed: UnnamedLaw, selection: Selection) -> bool:
-    """Tell whether a law without a name explains as much with clearly less, both told with one number of samples."""
+    """Tell whether a law without a name explains as much with clearly less, both told with one number of samples.
+
+    What it gains must be fewer unknowns, or an error that is visibly smaller: with more of them, a law in other words
+    takes up the details that a named one leaves at the noise, such as the second wave of an imbalance.
+    """
     before, after = selection.retuned.rms, selection.result.rms
     named = gain(selection.retuned, selection.result)
     n = unnamed.gain.n_effective if unnamed.rms < after else named.n_effective
     rival = delta_bic_with(unnamed.gain, before, unnamed.rms, n)
-    return rival > delta_bic_with(named, before, after, n) + VERY_STRONG
+    fewer = price(unnamed.gain, before, unnamed.rms) < price(named, before, after)
+    better = rival > delta_bic_with(named, before, after, n) + VERY_STRONG
+    return better and (fewer or after >= VISIBLE * unnamed.rms)
 
 
 def _is_another_law(selection: Selection, floor: float, unnamed: UnnamedLaw) -> bool:

@@ -109,7 +109,12 @@ def _mended(record: Record, inputs: Sequence[int], stale: BoolArray) -> Record:
 
 
 def pooled_p_value(found: Sequence[LateTorque]) -> float:
-    """Return the probability of so many early answers after repeats, if they were as common as elsewhere."""
-    early, others = sum(late.early_others for late in found), sum(late.others for late in found)
-    usual = (early + 1.0) / (others + 2.0)
-    return float(stats.binom.sf(sum(late.early for late in found) - 1, sum(late.repeats for late in found), usual))
+    """Return the probability of so many early answers after repeats, if they were as common as elsewhere.
+
+    Elsewhere in the same recording: where the predictor follows one worse than the others, that one has more of both.
+    """
+    chances = np.ones(1)  # of 0, 1, 2 ... early answers in all
+    for late in found:
+        usual = (late.early_others + 1.0) / (late.others + 2.0)
+        chances = np.convolve(chances, stats.binom.pmf(np.arange(late.repeats + 1), late.repeats, usual))
+    return float(chances[sum(late.early for late in found) :].sum())

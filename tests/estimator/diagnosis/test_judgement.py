@@ -277,6 +277,18 @@ class TestChosen:
             "a law of |w| at the speed reading would explain it with less than hardening or softening shaft"
         )
 
+    @pytest.mark.parametrize(("noises", "unknowns", "believed"), [(1.02, 9, True), (1.02, 0, False), (1.06, 9, False)])
+    def test_a_rival_elsewhere_needs_fewer_unknowns_or_a_visibly_smaller_error(
+        self, noises: float, unknowns: int, believed: bool
+    ) -> None:
+        """Of 1.02 times its error a law with more terms is no objection: it takes up details."""
+        before, after, best = of_rms(1.0, 2), of_rms(0.1 * noises, 3), of_rms(0.1, 4)
+        gained = gain(before, best)
+        cheap = gained.n_effective * 2.0 * math.log(1.0 / 0.1) - unknowns * math.log(gained.n_effective)
+        rival = UnnamedLaw(Element.TORQUE_PATH, (("a wave", 1.0),), replace(gained, delta_bic=cheap), 0.1)
+        found = replace(outcome(before, frozenset({"load_imbalance"}), after), unnamed=rival)
+        assert (judge(found, 0.1).objection == "") is believed
+
     def test_one_whose_look_alike_is_where_the_simple_law_is_is_believed(self) -> None:
         """From torque and speed alone the two are one; the law is at the other's element."""
         found = self.nearly(selection(sensor_error(0.05), CUBIC, model(TWO_MASS, TIGHT)))

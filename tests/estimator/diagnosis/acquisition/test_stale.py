@@ -6,9 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from estimator.diagnosis.acquisition import OUTPUT, Finding, recognise
+from estimator.diagnosis.acquisition.late_torque import LateTorque, pooled_p_value
 from estimator.diagnosis.acquisition.lattice import chance_repeats, lattice_step
+from estimator.diagnosis.acquisition.limits import LEVEL
 from estimator.signals.record import BoolArray, Record
 from tests.estimator.diagnosis.acquisition.bench import healthy, periodic_rows, random_rows, stale
 
@@ -92,6 +95,21 @@ def test_one_stale_row_in_a_thousand_is_no_finding() -> None:
 def test_a_torque_recorded_a_row_late_throughout_is_a_delay_and_not_stale() -> None:
     late = [replace(record, torque_nm=np.roll(record.torque_nm, 1, axis=0)) for record in healthy(8)]
     assert recognise(late) == ()
+
+
+def test_early_answers_count_against_those_of_the_same_recording() -> None:
+    """One recording that the predictor follows poorly has more of them everywhere; the others' do not make it stale."""
+
+    def counted(early: int, repeats: int, early_others: int, others: int) -> LateTorque:
+        return LateTorque(np.zeros(0, dtype=np.bool_), early, repeats, early_others, others)
+
+    poor = counted(13, 230, 5, 540)
+    good = counted(0, 130, 0, 360)
+    alone, among = pooled_p_value([poor]), pooled_p_value([good, poor, good])
+    assert alone == pytest.approx(float(stats.binom.sf(12, 230, 6 / 542)))
+    assert LEVEL < alone < among < 1e-4
+    assert pooled_p_value([counted(13, 230, 0, 540), good]) < LEVEL
+    assert pooled_p_value([good, good]) == pytest.approx(1.0)
 
 
 def test_flagged_repeats_are_lost_and_not_stale() -> None:
