@@ -43,7 +43,7 @@ from tests.rig.serving import EXAMPLE, Samples, run, served
 from tests.wire.traced import traced_run
 
 ANY_PORT = Address("127.0.0.1", 0)
-PATIENCE_S = 30.0
+PATIENCE_S = 60.0
 INTERFACE = "vcan0"
 """A SocketCAN interface a test machine may have: ``ip link add dev vcan0 type vcan``."""
 
