@@ -8,6 +8,7 @@ from types import TracebackType
 from typing import Self
 
 from drivers.errors import CommandRefused
+from drivers.inverter.inverter import Inverter
 from hil.errors import RunAborted
 from hil.rig.build import Devices
 from hil.rig.stop import StopRequest
@@ -55,10 +56,7 @@ class ArmedDrives:
         self._devices.guard.disable()
         # A head start only: what counts is that each drive then confirms it is disarmed.
         not_zeroed = _failures(self._zero_both)
-        not_disarmed: dict[str, list[str]] = {}
-        for name, inverter in (("m1", self._devices.m1), ("m2", self._devices.m2)):
-            for reason in _failures(inverter.disarm):
-                not_disarmed.setdefault(reason, []).append(name)
+        not_disarmed = self._disarm({"m1": self._devices.m1, "m2": self._devices.m2})
         if not_disarmed:
             cause = "" if error is None else f" What ended the run: {error or type(error).__name__}"
             reasons = [f"{' and '.join(names)}: {reason}" for reason, names in not_disarmed.items()]
@@ -67,6 +65,20 @@ class ArmedDrives:
                 f"not every drive is confirmed disarmed: {'; '.join(reasons)}. Expected "
                 f"both to be; cut the power of the drive named before anyone goes near the shaft.{cause}"
             ) from error
+
+    @staticmethod
+    def _disarm(drives: dict[str, Inverter]) -> dict[str, list[str]]:
+        """Disarm all; give each reason why one is not confirmed, with the names of those it holds for.
+
+        An answer that is lost or late says nothing of the drive: who has not confirmed is asked once more, after
+        the others, which must not wait for it.
+        """
+        first = {name: _failures(inverter.disarm) for name, inverter in drives.items()}
+        names_of: dict[str, list[str]] = {}
+        for name in (name for name, reasons in first.items() if reasons):
+            for reason in _failures(drives[name].disarm):
+                names_of.setdefault(reason, []).append(name)
+        return names_of
 
     def _zero_both(self) -> None:
         """Take both to zero with the next SYNC, so that neither waits for the other's disarming."""

@@ -17,7 +17,7 @@ from hil.simulator.inverter_settings import FaultAtStep, InverterFaults
 from hil.simulator.plc_device import PlcDevice, PlcSetup
 from hil.simulator.rig_server import RigFaults, RigServer
 from tests.rig.observer import assert_disarmed
-from tests.rig.serving import Samples, changed, fast, run_once, served, small_rig
+from tests.rig.serving import Samples, changed, fast, run, run_once, served, small_rig
 
 STEP_WITHIN = 250
 """A SYNC inside the measured part of the small rig's reversal, which is SYNC 200 to 300 or so."""
@@ -109,6 +109,29 @@ def test_inverter_that_hangs_does_not_keep_the_other_armed(hung: str, other: int
     assert stale
     assert {row.flags.name for row in stale} == {f"{hung.upper()}_STALE"}
     assert [row.age_ns for row in stale] == [10_000_000 * (k + 1) for k in range(len(stale))]
+
+
+@pytest.mark.parametrize("deaf", ["m1", "m2"])
+def test_one_request_lost_at_the_end_is_made_again(deaf: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    samples, lost = Samples(), []
+    with served() as (server, rig), open_devices(rig) as devices:
+        client = getattr(devices, deaf)._sdo._client
+        send = client.send_request
+
+        def lose_the_first(request: bytes) -> None:
+            if lost:
+                send(request)
+            lost.append(request)
+
+        run(
+            rig,
+            devices,
+            samples,
+            progress=in_the_middle(lambda: monkeypatch.setattr(client, "send_request", lose_the_first)),
+        )
+        assert len(lost) > 1
+        assert_disarmed(server.bus_url, 1, 2)
+    assert len(samples.rows) == 100
 
 
 def test_inverter_that_faults_ends_the_run() -> None:
