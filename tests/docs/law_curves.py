@@ -36,7 +36,7 @@ def friction(name: str) -> Callable[[Values], Curve]:
     def curve(values: Values) -> Curve:
         p = flat_values(BUS, {name: values})
         with_it, without = (
-            np.array([rates.motor_friction(w, each, 0.05) for w in SPEEDS]) for each in (p, flat_values(BUS, {}))
+            np.array([rates.motor_friction(w, each, 0.05, 1.0) for w in SPEEDS]) for each in (p, flat_values(BUS, {}))
         )
         return Curve("motor speed [rad/s]", "friction [Nm]", (("without", SPEEDS, without), ("with", SPEEDS, with_it)))
 

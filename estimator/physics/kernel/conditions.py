@@ -16,12 +16,27 @@ STICK_STABILITY = 1.5
 
 
 @inlined
-def is_varying(p: FloatArray) -> bool:
-    """Tell whether the conditions change within a period: an event, a law over time or over the angle."""
-    events = p[slots.GENERATOR] != 0.0 or p[slots.CRACK] != 0.0 or p[slots.PAYLOAD] != 0.0 or p[slots.BRAKE] != 0.0
+def is_waving(p: FloatArray) -> bool:
+    """Tell whether the conditions change all the time: by a law over the angle, or over time."""
     ripples = p[slots.RIPPLE] != 0.0 or p[slots.RIPPLE_SHARE] != 0.0 or p[slots.IMBALANCE] != 0.0
     joints = p[slots.CARDAN] != 0.0 or p[slots.CARDAN_ANGLE] != 0.0 or p[slots.CARDAN_SHARE] != 0.0
-    return bool(events or ripples or joints or p[slots.WARMING] != 0.0)
+    return bool(ripples or joints or p[slots.WARMING] != 0.0)
+
+
+@inlined
+def is_changing(begin_s: float, end_s: float, p: FloatArray) -> bool:
+    """Tell whether an event begins or ends between two times."""
+    generator = p[slots.GENERATOR] != 0.0 and is_edge(begin_s, end_s, p[slots.GENERATOR_FROM], p[slots.GENERATOR_TO])
+    crack = p[slots.CRACK] != 0.0 and is_edge(begin_s, end_s, p[slots.CRACK_FROM], p[slots.CRACK_TO])
+    payload = p[slots.PAYLOAD] != 0.0 and is_edge(begin_s, end_s, p[slots.PAYLOAD_FROM], p[slots.PAYLOAD_TO])
+    brake = p[slots.BRAKE] != 0.0 and is_edge(begin_s, end_s, p[slots.BRAKE_FROM], p[slots.BRAKE_TO])
+    return bool(generator or crack or payload or brake)
+
+
+@inlined
+def is_edge(begin_s: float, end_s: float, from_s: float, to_s: float) -> bool:
+    """Tell whether one of two moments lies between two times."""
+    return begin_s <= from_s <= end_s or begin_s <= to_s <= end_s
 
 
 @inlined
@@ -44,7 +59,7 @@ def conditions(
     inertia_load = inertia_while(p[slots.J_L], p[slots.PAYLOAD], loaded) if masses > 1 else 0.0
     if masses == 1:
         inertia_motor = inertia_while(inertia_motor, p[slots.PAYLOAD], loaded)
-    dry_motor = p[slots.COULOMB] + p[slots.STRIBECK] + p[slots.STRIBECK_COULOMB]
+    dry_motor = abs(p[slots.COULOMB]) + abs(p[slots.STRIBECK]) + abs(p[slots.STRIBECK_COULOMB])
     dry_load = p[slots.COULOMB_LOAD] + braked * p[slots.BRAKE]
     wheel_inertia = p[slots.SLIP_WHEEL] * inertia_load if p[slots.SLIP] > 0.0 else inertia_load
     carried = inertia_motor if masses == 1 else wheel_inertia
@@ -58,10 +73,12 @@ def conditions(
         shaft_factor,
         joint_angle,
         joint_rate,
-        inertia_motor,
+        1.0 / inertia_motor,
         inertia_load,
+        1.0 / inertia_load if masses > 1 else 0.0,
         p[slots.K] * p[slots.LINE_SHARE] * (1.0 + cracked * p[slots.CRACK]),
         p[slots.B_L] + warming_friction.cold_part(time_s, p[slots.WARMING], p[slots.WARMING_TIME]),
+        dry_motor,
         dry_load,
         max(sign_width, dry_motor / (fastest * inertia_motor)),
         max(sign_width, dry_load / (fastest * carried)),
@@ -71,23 +88,31 @@ def conditions(
 
 
 @inlined
-def with_torque(now: Conditions, torque: float) -> Conditions:
-    """Return the conditions with a torque [Nm] beside the ripple."""
+def with_torques(now: Conditions, torque: float, load: float) -> Conditions:
+    """Return the conditions with other torques [Nm] at the motor and the load."""
     return Conditions(
-        now.torque + torque * now.torque_factor,
-        now.load,
+        torque,
+        load,
         now.torque_factor,
         now.shaft_extra,
         now.shaft_factor,
         now.joint_angle,
         now.joint_rate,
-        now.inertia_motor,
+        now.inverse_motor,
         now.inertia_load,
+        now.inverse_load,
         now.stiffness,
         now.viscous_load,
+        now.dry_motor,
         now.dry_load,
         now.width_motor,
         now.width_load,
         now.fastest,
         now.yield_twist,
     )
+
+
+@inlined
+def with_torque(now: Conditions, torque: float) -> Conditions:
+    """Return the conditions with a torque [Nm] beside the ripple."""
+    return with_torques(now, now.torque + torque * now.torque_factor, now.load)

@@ -14,7 +14,7 @@ from typing import Any
 from estimator.compiled import brief, compiled, inlined
 from estimator.physics.effects import actuator_lag, speed_filter, transport_delay
 from estimator.physics.kernel import slots
-from estimator.physics.kernel.conditions import conditions, is_varying, with_torque
+from estimator.physics.kernel.conditions import conditions, is_changing, is_waving, with_torque, with_torques
 from estimator.physics.kernel.rates import rates
 from estimator.physics.kernel.sensing import entry, reading, shown, travelled
 from estimator.physics.kernel.state_vector import FILTER_RISE, FILTERED, LAG_RISE, LAGGED, Conditions, State
@@ -25,37 +25,50 @@ RADIANS_PER_STEP_OF_MODE = 0.6
 
 
 @inlined
-def moved(x: State, dx: State, h: float) -> State:
-    """Return a state moved along its derivative for a time [s]."""
+def moved(masses: int, extended: bool, x: State, dx: State, h: float) -> State:
+    """Return a state moved along its derivative for a time [s]; what a line lacks stays where it is, at no cost."""
+    twist, load_speed, middle_twist, middle_speed = x.twist, x.load_speed, x.middle_twist, x.middle_speed
+    if masses > 1:
+        twist, load_speed = twist + h * dx.twist, load_speed + h * dx.load_speed
+    if masses == 3:
+        middle_twist, middle_speed = middle_twist + h * dx.middle_twist, middle_speed + h * dx.middle_speed
+    loading, vehicle_speed, traction = x.loading, x.vehicle_speed, x.traction
+    branch_twist, branch_speed = x.branch_twist, x.branch_speed
+    if extended:
+        loading += h * dx.loading
+        vehicle_speed, traction = vehicle_speed + h * dx.vehicle_speed, traction + h * dx.traction
+        branch_twist, branch_speed = branch_twist + h * dx.branch_twist, branch_speed + h * dx.branch_speed
     return State(
         x.angle + h * dx.angle,
         x.speed + h * dx.speed,
-        x.twist + h * dx.twist,
-        x.load_speed + h * dx.load_speed,
-        x.loading + h * dx.loading,
-        x.vehicle_speed + h * dx.vehicle_speed,
-        x.branch_twist + h * dx.branch_twist,
-        x.branch_speed + h * dx.branch_speed,
-        x.middle_twist + h * dx.middle_twist,
-        x.middle_speed + h * dx.middle_speed,
-        x.traction + h * dx.traction,
+        twist,
+        load_speed,
+        loading,
+        vehicle_speed,
+        branch_twist,
+        branch_speed,
+        middle_twist,
+        middle_speed,
+        traction,
     )
 
 
 @inlined
-def runge_kutta(masses: int, now: Conditions, torque: float, rise: float, x: State, p: FloatArray, h: float) -> State:
+def runge_kutta(
+    masses: int, extended: bool, now: Conditions, torque: float, rise: float, x: State, p: FloatArray, h: float
+) -> State:
     """Return the state after one sub-step under constant conditions and a torque of this mean and rise [Nm]."""
     begin = with_torque(now, torque - 0.5 * rise)
     middle = with_torque(now, torque)
     end = with_torque(now, torque + 0.5 * rise)
-    first = rates(masses, begin, x, p)
-    second = rates(masses, middle, moved(x, first, 0.5 * h), p)
-    third = rates(masses, middle, moved(x, second, 0.5 * h), p)
-    fourth = rates(masses, end, moved(x, third, h), p)
-    x = moved(x, first, h / 6.0)
-    x = moved(x, second, h / 3.0)
-    x = moved(x, third, h / 3.0)
-    return moved(x, fourth, h / 6.0)
+    first = rates(masses, extended, begin, x, p)
+    second = rates(masses, extended, middle, moved(masses, extended, x, first, 0.5 * h), p)
+    third = rates(masses, extended, middle, moved(masses, extended, x, second, 0.5 * h), p)
+    fourth = rates(masses, extended, end, moved(masses, extended, x, third, h), p)
+    x = moved(masses, extended, x, first, h / 6.0)
+    x = moved(masses, extended, x, second, h / 3.0)
+    x = moved(masses, extended, x, third, h / 3.0)
+    return moved(masses, extended, x, fourth, h / 6.0)
 
 
 @inlined
@@ -67,8 +80,24 @@ def unpacked(state: FloatArray) -> State:
 
 
 @inlined
+def is_extended(p: FloatArray) -> bool:
+    """Tell whether a line has states beyond those of its masses: an extra mode, a tyre that slips, a slider inside."""
+    return bool(p[slots.BRANCH_INERTIA] > 0.0 or p[slots.SLIP] > 0.0 or p[slots.SLIDER] != 0.0)
+
+
+@inlined
+def with_mode(substeps: int, sample_time_s: float, p: FloatArray) -> int:
+    """Return the integration steps per period that the line and its extra mode need."""
+    if p[slots.BRANCH_INERTIA] <= 0.0:
+        return substeps
+    turn = 2.0 * math.pi * float(p[slots.BRANCH_FREQUENCY]) * sample_time_s
+    return max(substeps, math.ceil(turn / RADIANS_PER_STEP_OF_MODE))
+
+
+@inlined
 def integrate_masses(
     masses: int,
+    extended: bool,
     sample_time_s: float,
     substeps: int,
     sign_width: float,
@@ -84,15 +113,13 @@ def integrate_masses(
     out: FloatArray,
     slopes: FloatArray,
 ) -> None:
-    """Do what ``integrate`` does, for a number of masses that is known when it is compiled."""
-    if p[slots.BRANCH_INERTIA] > 0.0:
-        turn_of_mode = 2.0 * math.pi * p[slots.BRANCH_FREQUENCY] * sample_time_s
-        substeps = max(substeps, math.ceil(turn_of_mode / RADIANS_PER_STEP_OF_MODE))
+    """Do what ``integrate`` does, for masses and states that are known when it is compiled."""
+    substeps = with_mode(substeps, sample_time_s, p)
     h = sample_time_s / substeps
     length = 1.0 / substeps
     delay, begun = p[slots.DELAY] / sample_time_s, start_s / sample_time_s
     before_all = torque[0] + p[slots.DELAYED_BEFORE]
-    varying, filtering = is_varying(p), p[slots.FILTER] > 0.0
+    waving, filtering = is_waving(p), p[slots.FILTER] > 0.0
     late = p[slots.DELAY] != 0.0 or p[slots.DRIFT] != 0.0
     steep = slopes.shape[1] > 0
     slope = 0.0
@@ -100,16 +127,20 @@ def integrate_masses(
     x = unpacked(state)
     lagged, lag_rise = state[LAGGED], state[LAG_RISE]
     filtered, filter_rise = state[FILTERED], state[FILTER_RISE]
-    now = conditions(masses, start_s, h, 0.0, 0.0, sign_width, p)
+    now = conditions(masses, start_s + first * sample_time_s, h, 0.0, 0.0, sign_width, p)
     for k in range(first, n):
         turn = angle[k + 1] - angle[k] if k + 1 < n else angle[k] - angle[k - 1]
         value = entry(x, output)
         out[k] = shown(reading(value, angle[k], p), filtered, p) if sensor else value
         if steep:
             slopes[0, k] = slope
+        time_s = start_s + k * sample_time_s
+        varying = waving or is_changing(time_s - sample_time_s, time_s + sample_time_s, p)
+        if not varying:
+            now = with_torques(now, now.torque, load[k])
         for j in range(substeps):
             place = k + j * length
-            if varying or j == 0:
+            if varying:
                 middle = angle[k] + turn * (j + 0.5) * length
                 now = conditions(masses, start_s + place * sample_time_s, h, middle, load[k], sign_width, p)
             supplied, rise = torque[k], 0.0
@@ -120,7 +151,7 @@ def integrate_masses(
                 supplied, rise, lagged, lag_rise, p[slots.LAG], p[slots.LAG_SHAPE], h
             )
             before, begun_at = entry(x, output), x
-            x = runge_kutta(masses, now, mean, rise, x, p, h)
+            x = runge_kutta(masses, extended, now, mean, rise, x, p, h)
             after = entry(x, output)
             slope = (after - before) / h
             if filtering:
@@ -136,6 +167,15 @@ def integrate_masses(
         state[i] = last
     state[LAGGED], state[LAG_RISE] = lagged, lag_rise
     state[FILTERED], state[FILTER_RISE] = filtered, filter_rise
+
+
+@inlined
+def integrate_line(masses: int, *given: Any) -> None:
+    """Do what ``integrate`` does, for a number of masses that is known when it is compiled."""
+    if is_extended(given[8]):
+        integrate_masses(masses, True, *given)
+    else:
+        integrate_masses(masses, False, *given)
 
 
 @compiled
@@ -192,11 +232,11 @@ def integrate(
     given = (sample_time_s, substeps, sign_width, first, start_s, torque, load, angle, p)
     wanted = (state, output, sensor, out, slopes)
     if masses == 1:
-        integrate_masses(1, *given, *wanted)
+        integrate_line(1, *given, *wanted)
     elif masses == 2:
-        integrate_masses(2, *given, *wanted)
+        integrate_line(2, *given, *wanted)
     else:
-        integrate_masses(3, *given, *wanted)
+        integrate_line(3, *given, *wanted)
 
 
 @brief

@@ -20,14 +20,15 @@ from estimator.signals.record import FloatArray
 
 
 @inlined
-def motor_friction(speed: float, p: FloatArray, width: float) -> float:
-    """Return the torque of every friction law at the motor [Nm], viscous included."""
-    return (
-        float(p[slots.B_M]) * speed
-        + dry_friction(speed, p[slots.COULOMB], width)
-        + stribeck_friction.law(speed, p[slots.STRIBECK], p[slots.STRIBECK_COULOMB], p[slots.STRIBECK_SPEED], width)
-        + float(p[slots.QUADRATIC]) * speed * abs(speed)
-    )
+def motor_friction(speed: float, p: FloatArray, width: float, dry: float) -> float:
+    """Return the torque of every friction law at the motor [Nm], viscous included; the dry ones where there are any."""
+    friction = float(p[slots.B_M]) * speed
+    friction += float(p[slots.QUADRATIC]) * speed * abs(speed)
+    if dry == 0.0:
+        return friction
+    coulomb, excess = p[slots.STRIBECK_COULOMB], p[slots.STRIBECK]
+    friction += dry_friction(speed, p[slots.COULOMB], width)
+    return friction + stribeck_friction.law(speed, excess, coulomb, p[slots.STRIBECK_SPEED], width)
 
 
 @inlined
@@ -46,14 +47,16 @@ def shaft_torque(twist: float, rate: float, loading: float, p: FloatArray, stiff
 
 
 @inlined
-def rates(masses: int, now: Conditions, x: State, p: FloatArray) -> State:
+def rates(masses: int, extended: bool, now: Conditions, x: State, p: FloatArray) -> State:
     """Return the time derivative of the mechanical state under the conditions ``now``."""
-    drive = now.torque - motor_friction(x.speed, p, now.width_motor)
-    branch_acceleration = branch_rate(x.branch_twist, x.speed - x.branch_speed, p)
-    drive -= float(p[slots.BRANCH_INERTIA]) * branch_acceleration
+    drive = now.torque - motor_friction(x.speed, p, now.width_motor, now.dry_motor)
+    branch_acceleration = 0.0
+    if extended:
+        branch_acceleration = branch_rate(x.branch_twist, x.speed - x.branch_speed, p)
+        drive -= float(p[slots.BRANCH_INERTIA]) * branch_acceleration
     if masses == 1:
         drag = load_drag(x.speed, x.speed, now, p) + now.load
-        acceleration = (drive - drag) / now.inertia_motor
+        acceleration = (drive - drag) * now.inverse_motor
         return State(
             x.speed, acceleration, 0.0, 0.0, 0.0, 0.0, x.speed - x.branch_speed, branch_acceleration, 0.0, 0.0, 0.0
         )
@@ -68,13 +71,13 @@ def rates(masses: int, now: Conditions, x: State, p: FloatArray) -> State:
         middle_twist = x.middle_speed - x.load_speed
         pull = float(p[slots.K_2]) * x.middle_twist + float(p[slots.C_2]) * middle_twist
         middle_speed = (shaft - pull) / p[slots.J_2]
-    load, vehicle, traction = load_rates(pull, now, x, p)
+    load, vehicle, traction = load_rates(extended, pull, now, x, p)
     return State(
         x.speed,
-        (drive - reaction) / now.inertia_motor,
+        (drive - reaction) * now.inverse_motor,
         rate,
         load,
-        sliding(x.loading, rate, now, p),
+        sliding(x.loading, rate, now, p) if extended else 0.0,
         vehicle,
         x.speed - x.branch_speed,
         branch_acceleration,
@@ -110,11 +113,11 @@ def load_drag(wheel: float, vehicle: float, now: Conditions, p: FloatArray) -> f
 
 
 @inlined
-def load_rates(pull: float, now: Conditions, x: State, p: FloatArray) -> tuple[float, float, float]:
+def load_rates(extended: bool, pull: float, now: Conditions, x: State, p: FloatArray) -> tuple[float, float, float]:
     """Return the accelerations of the load and, where the tyre slips, of the vehicle [rad/s^2]; the traction's rate."""
     wheel = x.load_speed
-    if p[slots.SLIP] <= 0.0:
-        return (pull - load_drag(wheel, wheel, now, p) - now.load) / now.inertia_load, 0.0, 0.0
+    if not extended or p[slots.SLIP] <= 0.0:
+        return (pull - load_drag(wheel, wheel, now, p) - now.load) * now.inverse_load, 0.0, 0.0
     vehicle = x.vehicle_speed
     slip, creep, relaxation = p[slots.SLIP], p[slots.SLIP_SPEED], p[slots.RELAXATION]
     share, rate = float(p[slots.SLIP_WHEEL]), 0.0

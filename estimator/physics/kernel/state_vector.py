@@ -51,7 +51,7 @@ class Conditions(NamedTuple):
     """What holds during one sub-step: torques [Nm], inertias, stiffness, friction, widths of a sign change [rad/s].
 
     And what the step can follow: the fastest decay [1/s] and, given the friction inside the shaft, the shortest twist
-    over which it yields [rad].
+    over which it yields [rad]. The inverse of an inertia is there because a division takes as long as a law.
     """
 
     torque: float
@@ -61,10 +61,12 @@ class Conditions(NamedTuple):
     shaft_factor: float
     joint_angle: float
     joint_rate: float
-    inertia_motor: float
+    inverse_motor: float
     inertia_load: float
+    inverse_load: float
     stiffness: float
     viscous_load: float
+    dry_motor: float
     dry_load: float
     width_motor: float
     width_load: float
