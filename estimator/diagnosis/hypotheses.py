@@ -10,10 +10,11 @@ import numpy as np
 from estimator.diagnosis.screening import Screen, promising
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Untestable
-from estimator.physics.fit import HEAT, ITERATIONS, FitResult, Problem, best_fit, converge, fit, make_problem
+from estimator.physics.fit import ITERATIONS, FitResult, Problem, fit, make_problem
 from estimator.physics.model import DrivelineModel, Motion
 from estimator.physics.moments import polished, without_idle
 from estimator.physics.simulate import grid_for
+from estimator.physics.starts import HEAT, best_fit, converge
 from estimator.physics.steps import from_their_moment
 from estimator.physics.unknowns import Release, nominal_unknowns, own_unknowns
 from estimator.signals.record import BoolArray, Record
@@ -195,8 +196,10 @@ def _forgetting(result: FitResult, name: str) -> FitResult:
     """Return a fit as if an effect without parameters of a recording's own had not been released in it."""
     keep = [shared.effect != name for shared in result.problem.shared]
     shared = tuple(each for each, kept in zip(result.problem.shared, keep, strict=True) if kept)
-    rest = [True] * (result.x.size - len(keep))
-    return replace(result, problem=replace(result.problem, shared=shared), x=result.x[[*keep, *rest]])
+    left = [*keep, *[True] * (result.x.size - len(keep))]
+    derivative = None if result.derivative is None else result.derivative[:, left]
+    problem = replace(result.problem, shared=shared)
+    return replace(result, problem=problem, x=result.x[left], derivative=derivative)
 
 
 def _without_much(result: FitResult) -> FitResult:

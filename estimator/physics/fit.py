@@ -6,7 +6,7 @@ recording only, so one simulation of every recording gives a column of the Jacob
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,12 +25,6 @@ STEP = 1e-5
 
 ITERATIONS = 50
 """Jacobians at most; a fit that needs more is not converged."""
-
-HEAT = 3
-"""Jacobians that each of several starts gets before only the best ones go on."""
-
-CLOSE = 1.1
-"""Squared error, over the best start's, up to which a start goes on."""
 
 BAD = 1e3
 """A simulation that runs away counts as this many times the largest output."""
@@ -174,8 +168,13 @@ def parameters(problem: Problem, x: FloatArray) -> FloatArray:
 
 def local_part(problem: Problem, x: FloatArray, index: int) -> FloatArray:
     """Return the scaled unknowns of one recording."""
+    return x[own_part(problem, index)]
+
+
+def own_part(problem: Problem, index: int) -> slice:
+    """Return where the unknowns of one recording stand among all."""
     first = len(problem.shared) + sum(basis.guess.size for basis in problem.local[:index])
-    return x[first : first + problem.local[index].guess.size]
+    return slice(first, first + problem.local[index].guess.size)
 
 
 def bounds(problem: Problem) -> tuple[FloatArray, FloatArray]:
@@ -227,34 +226,47 @@ def residual_at(problem: Problem, outputs: Sequence[FloatArray]) -> FloatArray:
     return _stack(problem, [out - record.output for out, record in zip(outputs, problem.records, strict=True)])
 
 
-def jacobian_at(problem: Problem, x: FloatArray, outputs: Sequence[FloatArray]) -> FloatArray:
-    """Return the derivative of the errors by the scaled unknowns, shape (R, U), by differences inside the bounds."""
+def jacobian_at(
+    problem: Problem, x: FloatArray, outputs: Sequence[FloatArray], sought: BoolArray | None = None
+) -> FloatArray:
+    """Return the derivative of the errors by the scaled unknowns, shape (R, U), by differences inside the bounds.
+
+    By those that are ``sought``, shape (U,), or by all; it is 0 by the others, and by what can't change.
+    """
     low, high = bounds(problem)
-    steps = np.where(x + STEP <= high, STEP, -STEP)
-    columns = [_moving(problem, low < high, i) for i in range(len(problem.records))]
+    sought = low < high if sought is None else sought & (low < high)
+    columns = [_moving(problem, sought, i) for i in range(len(problem.records))]
     parts = [(i, part) for i, mine in enumerate(columns) for part in np.array_split(mine, WORKERS)]
     rows = np.cumsum([0, *(int(use.sum()) for use in problem.use)])
     jacobian = np.zeros((rows[-1], x.size))
 
     def fill(work: tuple[int, IntArray]) -> None:
         i, mine = work
-        points = []
-        for j in mine:
-            moved = x.copy()
-            moved[j] += steps[j]
-            points.append((parameters(problem, moved), local_part(problem, moved, i)))
-        change = (simulated_each(problem, points, i) - outputs[i])[:, problem.use[i]]
-        jacobian[rows[i] : rows[i + 1], mine] = (change / steps[mine, None]).T
+        jacobian[rows[i] : rows[i + 1], mine] = changes(problem, x, i, mine, outputs[i])
 
     concurrently(fill, [work for work in parts if work[1].size])
     return jacobian
 
 
-def _moving(problem: Problem, free: BoolArray, index: int) -> IntArray:
-    """Return which unknowns move one recording: those of all, as far as they are free, and its own."""
-    first = len(problem.shared) + sum(basis.guess.size for basis in problem.local[:index])
-    own = np.arange(first, first + problem.local[index].guess.size)
-    return np.concatenate([np.flatnonzero(free[: len(problem.shared)]), own])
+def changes(problem: Problem, x: FloatArray, index: int, columns: IntArray, output: FloatArray) -> FloatArray:
+    """Return the derivative of one recording's errors by some of the scaled unknowns, shape (R_i, columns.size)."""
+    _, high = bounds(problem)
+    steps = np.where(x + STEP <= high, STEP, -STEP)
+    points = []
+    for j in columns:
+        moved = x.copy()
+        moved[j] += steps[j]
+        points.append((parameters(problem, moved), local_part(problem, moved, index)))
+    change = (simulated_each(problem, points, index) - output)[:, problem.use[index]]
+    return np.asarray((change / steps[columns, None]).T)
+
+
+def _moving(problem: Problem, sought: BoolArray, index: int) -> IntArray:
+    """Return which of the unknowns that are sought move one recording: those of all, and its own."""
+    moving = sought.copy()
+    moving[len(problem.shared) :] = False
+    moving[own_part(problem, index)] = sought[own_part(problem, index)]
+    return np.flatnonzero(moving)
 
 
 def _moments(problem: Problem) -> BoolArray:
@@ -267,7 +279,9 @@ def _moments(problem: Problem) -> BoolArray:
     return np.concatenate(parts)
 
 
-def fit(problem: Problem, x0: FloatArray | None = None, iterations: int = ITERATIONS) -> FitResult:
+def fit(
+    problem: Problem, x0: FloatArray | None = None, iterations: int = ITERATIONS, begun: FloatArray | None = None
+) -> FitResult:
     """Minimise the squared free-run error from one start.
 
     Parameters
@@ -276,6 +290,8 @@ def fit(problem: Problem, x0: FloatArray | None = None, iterations: int = ITERAT
         Scaled start; ``start_vector`` by default.
     iterations : int
         Jacobians at most.
+    begun : ndarray, shape (R, U), optional
+        Derivative of the errors at some place near the start, for the first step.
     """
     low, high = bounds(problem)
     seen: dict[bytes, tuple[FloatArray, ...]] = {}
@@ -287,7 +303,7 @@ def fit(problem: Problem, x0: FloatArray | None = None, iterations: int = ITERAT
             seen[key] = outputs_at(problem, x)
         return seen[key]
 
-    def least(x: FloatArray, low: FloatArray, high: FloatArray) -> Solution:
+    def least(x: FloatArray, low: FloatArray, high: FloatArray, begun: FloatArray | None = None) -> Solution:
         return minimise(
             lambda x: residual_at(problem, outputs(x)),
             lambda x: jacobian_at(problem, x, outputs(x)),
@@ -296,53 +312,13 @@ def fit(problem: Problem, x0: FloatArray | None = None, iterations: int = ITERAT
             high,
             iterations,
             smooth=not moments.any(),
+            begun=begun,
         )
 
     moments = _moments(problem)
-    solution = least(start_vector(problem) if x0 is None else x0, low, high)
+    solution = least(start_vector(problem) if x0 is None else x0, low, high, begun)
     if solution.stuck and moments.any():  # at a kink over a moment every step is refused: first without them
         x = solution.x
         x = least(x, np.where(moments, x, low), np.where(moments, x, high)).x
         solution = least(x, low, high)
     return FitResult(problem, solution.x, outputs(solution.x), solution.residual, solution.jacobian, solution.converged)
-
-
-def best_fit(problems: Sequence[Problem], warm: FitResult | None = None, iterations: int = ITERATIONS) -> FitResult:
-    """Fit from several starts and return the best; nominal and local unknowns start where ``warm`` ended.
-
-    Every start gets a few steps; those that are then close to the best go on.
-    """
-    starts = [start_vector(problem) if warm is None else _warm_start(problem, warm) for problem in problems]
-    if len(problems) == 1:
-        return fit(problems[0], starts[0], iterations)
-    heat = [fit(problem, x0, min(HEAT, iterations)) for problem, x0 in zip(problems, starts, strict=True)]
-    least = min(result.squares for result in heat)
-    finals = [converge(result, iterations) for result in heat if result.squares <= CLOSE * least]
-    return min(finals, key=lambda result: result.squares)
-
-
-def converge(result: FitResult, iterations: int = ITERATIONS) -> FitResult:
-    """Go on with a fit that its iteration limit ended."""
-    return result if result.converged or iterations <= HEAT else fit(result.problem, result.x, iterations)
-
-
-def _warm_start(problem: Problem, warm: FitResult) -> FloatArray:
-    known: Mapping[tuple[str, str], float] = {
-        (s.effect, s.name): s.scale * x for s, x in zip(warm.problem.shared, warm.x, strict=False)
-    }
-    shared = np.array([known.get((s.effect, s.name), s.scale * s.start) / s.scale for s in problem.shared])
-    return np.concatenate([shared, *(_warm_local(problem, warm, i) for i in range(len(problem.local)))])
-
-
-def _warm_local(problem: Problem, warm: FitResult, index: int) -> FloatArray:
-    """Return a recording's own unknowns where a fit left them; what that fit lacks, at its guess."""
-    basis, old, ended = problem.local[index], warm.problem.local[index], warm.local_of(index)
-    x = basis.guess.copy()
-    state = slice(0, min(basis.own_rows.start, old.own_rows.start))
-    x[state] = ended[state] * old.scale[state] / basis.scale[state]
-    known = {(s.effect, s.name): value for s, value in zip(old.own, ended[old.own_rows], strict=True)}
-    x[basis.own_rows] = [known.get((s.effect, s.name), s.start) for s in basis.own]
-    if basis.profile.shape == old.profile.shape:
-        rows = basis.profile_rows
-        x[rows] = ended[old.profile_rows] * old.scale[old.profile_rows] / basis.scale[rows]
-    return x

@@ -6,7 +6,7 @@ Marquardt's scaling (SIAM J. Appl. Math. 11, 1963), and is the least of the damp
 (``scipy.optimize.lsq_linear``: Stark and Parker, Computational Statistics 10, 1995). Near the end, where steps keep
 what they promise, the Jacobian is carried on by Broyden's update (Math. Comp. 19, 1965; with Marquardt's method:
 Madsen, Nielsen and Tingleff, Methods for Non-Linear Least Squares Problems, DTU 2004, 3.5): it costs a simulation per
-unknown, a step one. A fit ends on a Jacobian of its own place.
+unknown, a step one. A fit ends a last small step from a Jacobian found anew.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from scipy.optimize import lsq_linear
 
 from estimator.signals.record import FloatArray
 
-CONVERGED = 0.01
-"""A step that promises less than this in log-likelihood ratio, ``n dS/S``, changes no conclusion: stop there."""
+CONVERGED = 0.1
+"""A step that promises less than this in log-likelihood ratio, ``n dS/S``, changes no conclusion: it is the last."""
 
 RELIABLE = 0.75
 """Share of a step's promise that it must keep for the derivative to be carried on to the next and not found again."""
@@ -39,15 +39,16 @@ TINY = 1e-12
 
 @dataclass(frozen=True, slots=True)
 class Solution:
-    """Where a fit ended: unknowns (U,), errors (R,), Jacobian there (R, U).
+    """Where a fit ended: unknowns (U,), errors (R,), Jacobian there, or one last small step before (R, U).
 
+    No Jacobian where the iterations were used up: whoever goes on finds it, and few do.
     ``stuck`` where a step was refused and shorter ones promised nothing any more, or were refused as well: the error
     has a kink there, or ``x`` is its least to the last digits.
     """
 
     x: FloatArray
     residual: FloatArray
-    jacobian: FloatArray
+    jacobian: FloatArray | None
     converged: bool
     stuck: bool = False
 
@@ -60,6 +61,7 @@ def minimise(
     high: FloatArray,
     iterations: int = 50,
     smooth: bool = True,
+    begun: FloatArray | None = None,
 ) -> Solution:
     """Minimise ``sum(residual(x)**2)`` subject to ``low <= x <= high`` from one start.
 
@@ -71,23 +73,27 @@ def minimise(
         Jacobians at most; ``converged`` is False when they were used up.
     smooth : bool
         False where the errors have kinks, over which no Jacobian is carried on.
+    begun : ndarray, shape (R, U), optional
+        A Jacobian of some place near ``x0``, for the first step.
     """
     x = np.clip(x0, low, high)
     errors, damping = residual(x), FIRST_DAMPING
     for _ in range(iterations):
-        derivative, fresh, refused = jacobian(x), True, False
+        derivative, fresh, refused = (jacobian(x), True, False) if begun is None else (begun, False, False)
+        begun = None
         gradient, curvature = derivative.T @ errors, derivative.T @ derivative
         while True:
             square = float(errors @ errors)
             step = _step(x, gradient, curvature, damping, low, high)
             promise = float(-step @ (2.0 * gradient + curvature @ step))
             if promise < CONVERGED * square / errors.size:
-                if fresh:
-                    return Solution(x, errors, derivative, True, stuck=refused)
-                break
+                if not fresh:
+                    break
+                tried = residual(x + step)
+                x, errors = (x + step, tried) if _gained(errors, tried) > 0.0 else (x, errors)
+                return Solution(x, errors, derivative, True, stuck=refused)
             tried = residual(x + step)
-            with np.errstate(over="ignore"):  # a simulation that ran away: an infinite error is no improvement
-                gained = square - float(tried @ tried)
+            gained = _gained(errors, tried)
             if not gained > 0.0:
                 if not fresh:
                     break
@@ -102,7 +108,13 @@ def minimise(
                 break
             derivative = _secant(derivative, change, step)
             gradient, curvature = derivative.T @ errors, derivative.T @ derivative
-    return Solution(x, errors, jacobian(x), False)
+    return Solution(x, errors, None, False)
+
+
+def _gained(errors: FloatArray, tried: FloatArray) -> float:
+    """Return by how much the squared error falls; a simulation that ran away has an infinite one."""
+    with np.errstate(over="ignore"):
+        return float(errors @ errors) - float(tried @ tried)
 
 
 def _secant(derivative: FloatArray, change: FloatArray, step: FloatArray) -> FloatArray:

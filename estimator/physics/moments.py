@@ -9,8 +9,9 @@ from dataclasses import replace
 import numpy as np
 
 from estimator.physics.catalogue import EFFECTS
-from estimator.physics.fit import ITERATIONS, FitResult, Problem, fit, simulated_each
+from estimator.physics.fit import ITERATIONS, FitResult, Problem, changes, fit, own_part, simulated_each
 from estimator.physics.parallel import concurrently
+from estimator.physics.starts import HEAT
 from estimator.physics.unknowns import LocalBasis
 from estimator.signals.record import FloatArray, Record
 
@@ -21,8 +22,11 @@ OFFSETS_S = np.concatenate([-OFFSETS_S[::-1], OFFSETS_S])
 REACH_S = 0.5
 """How far a fit may go on from a moment that was moved: beyond it others match."""
 
-ROUNDS = 3
-"""Moves and fits from there, in turn."""
+ROUNDS, ROUGH_ROUNDS = 3, 1
+"""Moves and fits from there, in turn; of a fit that is only begun."""
+
+WORTH_MOVING = 2.0
+"""Gain in log-likelihood ratio, twice, that moments elsewhere must bring: they are sought among hundreds."""
 
 MOVES = 4
 """Moves of one event in one recording before the next fit."""
@@ -33,7 +37,7 @@ WORTH = 20.0
 
 def polished(result: FitResult, iterations: int = ITERATIONS) -> FitResult:
     """Move the moments of events to where the error is smallest nearby, and fit on from there while it helps."""
-    for _ in range(ROUNDS):
+    for _ in range(ROUNDS if iterations > HEAT else ROUGH_ROUNDS):
         moved = _moved(result)
         if moved is None:
             return result
@@ -73,7 +77,7 @@ def _silenced(result: FitResult, index: int) -> tuple[Problem, FloatArray] | Non
     )
     local = tuple(replace(b, own=held) if i == index else b for i, b in enumerate(result.problem.local))
     x = result.x.copy()
-    first = len(result.problem.shared) + sum(b.guess.size for b in result.problem.local[:index])
+    first = own_part(result.problem, index).start
     for row, unknown in zip(range(first + basis.own_rows.start, first + basis.own_rows.stop), held, strict=True):
         if EFFECTS[unknown.effect].event:
             x[row] = unknown.start
@@ -100,6 +104,7 @@ def _moved_in(result: FitResult, index: int) -> FloatArray | None:
         return None
     misfit = _Misfit(result, index)
     began = best = float(misfit.squares([local])[0])
+    least = WORTH_MOVING * result.squares / result.residual.size
     first, last = result.problem.records[index].since_start_s[[0, -1]]
     for begin, end in ends:
         may_move = [row for row in (begin, end) if basis.low[row] < basis.high[row]]
@@ -112,7 +117,7 @@ def _moved_in(result: FitResult, index: int) -> FloatArray | None:
                 break
             best = float(squares.min())
             local = tried[int(squares.argmin())]
-    return local if best < began else None
+    return local if best < began - least else None
 
 
 def _shifted(local: FloatArray, rows: list[int], offset_s: float) -> FloatArray:
@@ -145,10 +150,9 @@ class _Misfit:
 
     def __init__(self, result: FitResult, index: int) -> None:
         self._problem, self._p, self._index = result.problem, result.p, index
-        rows = np.cumsum([0, *(int(use.sum()) for use in result.problem.use)])
-        first = len(result.problem.shared) + sum(b.guess.size for b in result.problem.local[:index])
+        first = own_part(result.problem, index).start
         columns = np.arange(first, first + result.problem.local[index].own_rows.start)
-        self._taken_up = np.linalg.qr(result.jacobian[rows[index] : rows[index + 1], columns])[0]
+        self._taken_up = np.linalg.qr(changes(result.problem, result.x, index, columns, result.outputs[index]))[0]
 
     def squares(self, tried: Sequence[FloatArray]) -> FloatArray:
         """Return the squared error for each of several vectors of the recording's unknowns, shape (K,)."""

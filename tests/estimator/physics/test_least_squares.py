@@ -38,6 +38,10 @@ def both(
     return minimise(residual, jacobian, x0, low, high), np.asarray(theirs.x)
 
 
+A_STEP_AWAY = 2e-3
+"""A Jacobian of entries up to 1 a last small step before: a tenth of a standard deviation at most, here 0.001."""
+
+
 def likelihood_ratio(residual: Function, x: FloatArray, best: FloatArray) -> float:
     """n (S - S_best) / S_best: how far from the optimum in the unit that ``CONVERGED`` is in."""
     errors, least = residual(x), residual(best)
@@ -54,7 +58,8 @@ def test_a_decay_is_fitted_as_scipy_does(measured: FloatArray, x0: tuple[float, 
     assert ours.converged
     assert likelihood_ratio(residual, ours.x, theirs) < CONVERGED
     np.testing.assert_array_equal(ours.residual, residual(ours.x))
-    np.testing.assert_array_equal(ours.jacobian, decay_jacobian(ours.x))
+    assert ours.jacobian is not None
+    np.testing.assert_allclose(ours.jacobian, decay_jacobian(ours.x), atol=A_STEP_AWAY)
 
 
 @pytest.mark.parametrize(
@@ -139,11 +144,11 @@ def test_near_the_end_the_derivative_is_carried_on() -> None:
 
     carried, new = asked(True)
     found, old = asked(False)
-    assert len(carried) < len(found)
+    assert len(carried) <= len(found)
     assert likelihood_ratio(residual, new.x, old.x) == pytest.approx(0.0, abs=10.0 * CONVERGED)
     for points, end in ((carried, new), (found, old)):
         assert end.converged
-        np.testing.assert_array_equal(points[-1], end.x)
+        assert likelihood_ratio(residual, points[-1], end.x) < 2.0 * CONVERGED
 
 
 def test_badly_scaled_unknowns_do_not_matter(measured: FloatArray) -> None:
@@ -210,7 +215,29 @@ def test_running_out_of_iterations_is_told(measured: FloatArray) -> None:
         iterations=1,
     )
     assert not ours.converged
-    np.testing.assert_array_equal(ours.jacobian, decay_jacobian(ours.x))
+    assert ours.jacobian is None
+
+
+@pytest.mark.parametrize(("nearby", "does"), [((3.1, 1.3, 0.4), True), ((-0.2, 1.3, 0.4), False)])
+def test_a_derivative_of_nearby_does_for_the_first_step(
+    measured: FloatArray, nearby: tuple[float, ...], does: bool
+) -> None:
+    """One that leads astray is found out by the step it promises."""
+    points: list[FloatArray] = []
+
+    def residual(x: FloatArray) -> FloatArray:
+        return decay(x) - measured
+
+    def jacobian(x: FloatArray) -> FloatArray:
+        points.append(x)
+        return decay_jacobian(x)
+
+    start, begun = np.array([3.3, 1.1, 0.6]), decay_jacobian(np.array(nearby))
+    ours = minimise(residual, jacobian, start, -UNBOUNDED, UNBOUNDED, begun=begun)
+    assert ours.converged
+    assert np.array_equal(points[0], start) is not does
+    theirs = least_squares(residual, start, decay_jacobian).x
+    assert likelihood_ratio(residual, ours.x, theirs) < CONVERGED
 
 
 def test_a_start_at_the_optimum_costs_one_jacobian() -> None:

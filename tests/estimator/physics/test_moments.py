@@ -69,9 +69,9 @@ def test_where_a_moment_refuses_every_step_the_others_go_on_without_it(
 ) -> None:
     free: list[FloatArray] = []
 
-    def stuck_at_first(*given: Any, smooth: bool) -> Solution:
+    def stuck_at_first(*given: Any, **options: Any) -> Solution:
         free.append(given[3] < given[4])
-        return replace(minimise(*given, smooth=smooth), stuck=len(free) == 1)
+        return replace(minimise(*given, **options), stuck=len(free) == 1)
 
     monkeypatch.setattr(fit_module, "minimise", stuck_at_first)
     result = ended(cracked, FROM_S + 0.001, TO_S)

@@ -1,0 +1,96 @@
+"""Fits from several starts, and from where another fit ended."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from estimator.physics.fit import ITERATIONS, FitResult, Problem, bounds, fit, jacobian_at, outputs_at, start_vector
+from estimator.signals.record import BoolArray, FloatArray, IntArray
+
+HEAT = 3
+"""Jacobians that each of several starts gets before only the best ones go on."""
+
+CLOSE = 1.1
+"""Squared error, over the best start's, up to which a start goes on."""
+
+Name = tuple[object, ...]
+
+
+def best_fit(problems: Sequence[Problem], warm: FitResult | None = None, iterations: int = ITERATIONS) -> FitResult:
+    """Fit from several starts and return the best; what a fit ``warm`` has in common starts where that one ended.
+
+    Every start gets a few steps; those that are then close to the best go on.
+    """
+    if len(problems) == 1:
+        return _begun(problems[0], warm, iterations)
+    heat = [_begun(problem, warm, min(HEAT, iterations)) for problem in problems]
+    least = min(result.squares for result in heat)
+    finals = [converge(result, iterations) for result in heat if result.squares <= CLOSE * least]
+    return min(finals, key=lambda result: result.squares)
+
+
+def converge(result: FitResult, iterations: int = ITERATIONS) -> FitResult:
+    """Go on with a fit that its iteration limit ended."""
+    return result if result.converged or iterations <= HEAT else fit(result.problem, result.x, iterations)
+
+
+def _begun(problem: Problem, warm: FitResult | None, iterations: int) -> FitResult:
+    if warm is None:
+        return fit(problem, iterations=iterations)
+    x = warm_start(problem, warm)
+    return fit(problem, x, iterations, _derivative(problem, warm, x))
+
+
+def warm_start(problem: Problem, warm: FitResult) -> FloatArray:
+    """Return scaled unknowns, shape (U,): where a fit left them, and those that it lacks where a fit starts."""
+    x = start_vector(problem)
+    columns, taken, ratio = _common(problem, warm.problem)
+    x[columns] = warm.x[taken] / ratio
+    return x
+
+
+def _derivative(problem: Problem, warm: FitResult, x: FloatArray) -> FloatArray | None:
+    """Return the derivative of the errors near ``x``, shape (R, U): as a fit has it, what that lacks found at ``x``.
+
+    None where it was let go, or is that of other samples.
+    """
+    if warm.derivative is None or not _is_of_the_same(problem.use, warm.problem.use):
+        return None
+    low, high = bounds(warm.problem)
+    columns, taken, ratio = _common(problem, warm.problem)
+    free = (low < high)[taken]
+    columns, taken, ratio = columns[free], taken[free], ratio[free]
+    sought = np.ones(x.size, dtype=bool)
+    sought[columns] = False
+    x = np.clip(x, *bounds(problem))
+    derivative = jacobian_at(problem, x, outputs_at(problem, x), sought)
+    derivative[:, columns] = warm.derivative[:, taken] * ratio
+    return derivative
+
+
+def _is_of_the_same(use: Sequence[BoolArray], other: Sequence[BoolArray]) -> bool:
+    return len(use) == len(other) and all(np.array_equal(a, b) for a, b in zip(use, other, strict=True))
+
+
+def _common(problem: Problem, other: Problem) -> tuple[IntArray, IntArray, FloatArray]:
+    """Return where the unknowns that two problems have in common stand in each, and the ratio of their scales."""
+    place = {name: column for column, name in enumerate(_names(other))}
+    pairs = [(column, place[name]) for column, name in enumerate(_names(problem)) if name in place]
+    columns, taken = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
+    return columns, taken, _scales(problem)[columns] / _scales(other)[taken]
+
+
+def _names(problem: Problem) -> list[Name]:
+    """Return what tells each unknown from all others."""
+    names: list[Name] = [(shared.effect, shared.name) for shared in problem.shared]
+    for i, basis in enumerate(problem.local):
+        names += [(i, row) for row in range(basis.own_rows.start)]
+        names += [(i, own.effect, own.name) for own in basis.own]
+        names += [(i, *basis.profile.shape, row) for row in range(basis.profile.shape[0])]
+    return names
+
+
+def _scales(problem: Problem) -> FloatArray:
+    return np.concatenate([[shared.scale for shared in problem.shared], *(basis.scale for basis in problem.local)])
