@@ -115,15 +115,17 @@ def effect_problems(name: str, values: Mapping[str, EffectValue], model: Driveli
         for key, entry_value in values.items()
         if not math.isfinite(entry_value.value)
     ]
-    return problems + _sign_problems(entry, values)
+    return problems + _limit_problems(entry, values)
 
 
-def _sign_problems(entry: Effect, values: Mapping[str, EffectValue]) -> list[str]:
-    """Refuse values on the far side of zero: a negative delay would read the future, a negative gap overlaps."""
+def _limit_problems(entry: Effect, values: Mapping[str, EffectValue]) -> list[str]:
+    """Refuse values that no line has: a negative delay would read the future, a share is no more than the whole."""
     problems = []
     for parameter in entry.parameters:
         value = values[parameter.name].value if parameter.name in values else parameter.null
         least = "greater than 0" if parameter.low > 0 and parameter.null > 0 else "0 or greater"
-        if value < 0 <= parameter.low or (value == 0 and least == "greater than 0"):
-            problems.append(f"effects.{entry.name}.{parameter.name}.value: expected a number {least}, came {value}")
+        allowed = least if math.isinf(parameter.most) else f"{least}, up to {parameter.most:g}"
+        too_small = value < 0 <= parameter.low or (value == 0 and least == "greater than 0")
+        if too_small or value > parameter.most:
+            problems.append(f"effects.{entry.name}.{parameter.name}.value: expected a number {allowed}, came {value}")
     return problems

@@ -59,6 +59,8 @@ class EffectParameter:
     own : bool
         True where every recording has its own value (the phase of an angle, the moments of an event): it is estimated
         with the recording's initial state and belongs to no model.
+    most : float
+        Largest value that makes sense in a model, whatever the data: a share has no more than 1.
     """
 
     name: str
@@ -69,6 +71,7 @@ class EffectParameter:
     meaning: str
     optional: bool = False
     own: bool = False
+    most: float = math.inf
 
     def unit(self, motion: Motion) -> str:
         """Return the parameter's unit in a kind of motion."""

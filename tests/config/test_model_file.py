@@ -271,7 +271,7 @@ def models(draw: st.DrawFn) -> DrivelineModel:
         parameters={name: Parameter(draw(finite), draw(st.floats(0, 0.99))) for name in structure.parameter_names},
         effects={
             name: {
-                parameter.name: EffectValue(draw(finite), draw(st.none() | pairs))
+                parameter.name: EffectValue(min(draw(finite), parameter.most), draw(st.none() | pairs))
                 for parameter in EFFECTS[name].parameters
             }
             for name in chosen

@@ -79,7 +79,7 @@ EFFECT = Effect(
     parameters=(
         EffectParameter("gap_rad", "angle", 0.0, 0.0, 20.0, "total gap"),
         EffectParameter("contact_rad", "angle", 0.0, 0.02, 20.0, "depth over which the damping engages: e_c", True),
-        EffectParameter("pull", "", 0.0, 0.0, 1.0, "share of a pull that an oil film passes on: q", True),
+        EffectParameter("pull", "", 0.0, 0.0, 1.0, "share of a pull that an oil film passes on: q", True, most=1.0),
     ),
     structures=WITH_SPRING,
     resembles=(

@@ -65,7 +65,9 @@ EFFECT = Effect(
         EffectParameter("inertia_kg_m2", "inertia", 0.0, 0.0, 50.0, "inertia J_X"),
         EffectParameter("frequency_hz", "Hz", 1.0, 0.05, 8.0, "its frequency with the motor held: f"),
         EffectParameter("damping_ratio", "", 0.05, 0.02, 8.0, "its damping ratio: c_X / (2 sqrt(k_X J_X))"),
-        EffectParameter("line_share", "", 1.0, 0.4, 1.0, "share of the twist that the main shaft has: s", True),
+        EffectParameter(
+            "line_share", "", 1.0, 0.4, 1.0, "share of the twist that the main shaft has: s", True, most=1.0
+        ),
     ),
     structures=WITH_SHAFT,
     resembles=("actuator_lag", "stiffness_nonlinearity", "tyre_slip", "speed_filter"),

@@ -23,7 +23,7 @@ EFFECT = Effect(
     law="x_read[k] = NaN, flagged, or 0 in a share of the rows",
     source="missed SYNC or PDO time-out: CiA 301, communication objects",
     excited_by="nothing: it shows in any recording",
-    parameters=(EffectParameter("share", "", 0.0, 0.0, 1.0, "share of lost rows"),),
+    parameters=(EffectParameter("share", "", 0.0, 0.0, 1.0, "share of lost rows", most=1.0),),
     structures=EVERY_STRUCTURE,
     resembles=(),
     equivalent=(),

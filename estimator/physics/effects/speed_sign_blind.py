@@ -44,7 +44,7 @@ EFFECT = Effect(
     law="y = (1 - s) w_M + s |w_M|",
     source="pick-up with a single track: Fraden, Handbook of Modern Sensors, 5th ed., Springer 2016",
     excited_by="speed that changes sign: reversal",
-    parameters=(EffectParameter("share", "", 0.0, 0.0, 1.0, "share of the magnitude: s"),),
+    parameters=(EffectParameter("share", "", 0.0, 0.0, 1.0, "share of the magnitude: s", most=1.0),),
     structures=EVERY_LINE,
     resembles=("resolver_error",),
     equivalent=(),

@@ -23,7 +23,7 @@ EFFECT = Effect(
     law="x_read[k] = x_read[k-1] in a share of the rows",
     source="asynchronous process data: CiA 301, synchronous and event-driven PDO; sample-and-hold with missed updates",
     excited_by="speed and torque that change from row to row: PRBS",
-    parameters=(EffectParameter("share", "", 0.0, 0.0, 1.0, "share of stale rows"),),
+    parameters=(EffectParameter("share", "", 0.0, 0.0, 1.0, "share of stale rows", most=1.0),),
     structures=EVERY_STRUCTURE,
     resembles=("transport_delay",),
     equivalent=(),

@@ -47,7 +47,7 @@ EFFECT = Effect(
     source="magnet flux and temperature: Pyrhönen, Jokinen, Hrabovcová, Design of Rotating Electrical Machines, 2014",
     excited_by="a long pull at high torque",
     parameters=(
-        EffectParameter("depth", "", 0.0, 0.0, 1.0, "share of the torque that is lost in the end: d"),
+        EffectParameter("depth", "", 0.0, 0.0, 1.0, "share of the torque that is lost in the end: d", most=1.0),
         EffectParameter("time_constant_s", "s", 1.0, 0.02, 10.0, "time constant of the decay: tau"),
     ),
     structures=EVERY_LINE,

@@ -95,6 +95,10 @@ def test_every_fault_is_told_at_once() -> None:
             {"stiffness_nonlinearity": {"hardening_per_rad2": 80.0, "shape": 0.0}},
             "effects.stiffness_nonlinearity.shape.value: expected a number greater than 0, came 0.0",
         ),
+        (
+            {"backlash": {"gap_rad": 0.02, "pull": 1.5}},
+            "effects.backlash.pull.value: expected a number 0 or greater, up to 1, came 1.5",
+        ),
     ],
 )
 def test_a_wrong_effect_is_refused(effects: dict[str, dict[str, float]], message: str) -> None:
