@@ -6,7 +6,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from estimator.physics.fit import ITERATIONS, FitResult, Problem, bounds, fit, jacobian_at, outputs_at, start_vector
+from estimator.physics.fit import (
+    ITERATIONS,
+    FitResult,
+    Problem,
+    bounds,
+    fit,
+    jacobian_at,
+    outputs_at,
+    residual_at,
+    start_vector,
+)
 from estimator.signals.record import BoolArray, FloatArray, IntArray
 
 HEAT = 3
@@ -14,6 +24,9 @@ HEAT = 3
 
 CLOSE = 1.1
 """Squared error, over the best start's, up to which a start goes on."""
+
+NEARBY = 1.5
+"""Squared error at a start, over that of the fit it comes from, up to which that fit's derivative does for a step."""
 
 Name = tuple[object, ...]
 
@@ -54,9 +67,15 @@ def warm_start(problem: Problem, warm: FitResult) -> FloatArray:
 def _derivative(problem: Problem, warm: FitResult, x: FloatArray) -> FloatArray | None:
     """Return the derivative of the errors near ``x``, shape (R, U): as a fit has it, what that lacks found at ``x``.
 
-    None where it was let go, or is that of other samples.
+    None where it was let go, is that of other samples, or that of another place: far from where the fit ended, as
+    without one of its effects, it leads astray.
     """
     if warm.derivative is None or not _is_of_the_same(problem.use, warm.problem.use):
+        return None
+    x = np.clip(x, *bounds(problem))
+    outputs = outputs_at(problem, x)
+    errors = residual_at(problem, outputs)
+    if not float(errors @ errors) <= NEARBY * warm.squares:
         return None
     low, high = bounds(warm.problem)
     columns, taken, ratio = _common(problem, warm.problem)
@@ -64,8 +83,7 @@ def _derivative(problem: Problem, warm: FitResult, x: FloatArray) -> FloatArray 
     columns, taken, ratio = columns[free], taken[free], ratio[free]
     sought = np.ones(x.size, dtype=bool)
     sought[columns] = False
-    x = np.clip(x, *bounds(problem))
-    derivative = jacobian_at(problem, x, outputs_at(problem, x), sought)
+    derivative = jacobian_at(problem, x, outputs, sought)
     derivative[:, columns] = warm.derivative[:, taken] * ratio
     return derivative
 

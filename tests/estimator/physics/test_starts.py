@@ -87,6 +87,10 @@ class TestFirstDerivative:
         assert starts._derivative(warm.problem, warm.light(), warm.x) is None
         np.testing.assert_array_equal(starts._derivative(warm.problem, warm, warm.x), warm.jacobian)
 
+    def test_far_from_where_the_fit_ended_it_is_none(self) -> None:
+        warm = fit(nominal_problem(self.RECORDS))
+        assert starts._derivative(warm.problem, warm, 1.1 * warm.x) is None
+
     def test_what_was_held_before_is_found(self) -> None:
         """A derivative by what could not change is not known, and no zero."""
         problem = nominal_problem(self.RECORDS)
