@@ -17,7 +17,7 @@ from estimator.physics.fit import (
     residual_at,
     start_vector,
 )
-from estimator.signals.record import BoolArray, FloatArray, IntArray
+from estimator.signals.record import FloatArray, IntArray
 
 HEAT = 3
 """Jacobians that each of several starts gets before only the best ones go on."""
@@ -70,7 +70,7 @@ def _derivative(problem: Problem, warm: FitResult, x: FloatArray) -> FloatArray 
     None where it was let go, is that of other samples, or that of another place: far from where the fit ended, as
     without one of its effects, it leads astray.
     """
-    if warm.derivative is None or not _is_of_the_same(problem.use, warm.problem.use):
+    if warm.derivative is None or not _has_the_same_samples(problem, warm.problem):
         return None
     x = np.clip(x, *bounds(problem))
     outputs = outputs_at(problem, x)
@@ -88,8 +88,10 @@ def _derivative(problem: Problem, warm: FitResult, x: FloatArray) -> FloatArray 
     return derivative
 
 
-def _is_of_the_same(use: Sequence[BoolArray], other: Sequence[BoolArray]) -> bool:
-    return len(use) == len(other) and all(np.array_equal(a, b) for a, b in zip(use, other, strict=True))
+def _has_the_same_samples(problem: Problem, other: Problem) -> bool:
+    pairs = zip(problem.records, other.records, problem.use, other.use, strict=False)
+    same = all(mine is theirs and np.array_equal(use, used) for mine, theirs, use, used in pairs)
+    return same and len(problem.records) == len(other.records)
 
 
 def _common(problem: Problem, other: Problem) -> tuple[IntArray, IntArray, FloatArray]:

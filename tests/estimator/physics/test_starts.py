@@ -85,6 +85,8 @@ class TestFirstDerivative:
         cut = replace(warm.problem, use=less)
         assert starts._derivative(cut, warm, warm.x) is None
         assert starts._derivative(warm.problem, warm.light(), warm.x) is None
+        others = replace(warm.problem, records=tuple(recordings(samples=400)))
+        assert starts._derivative(others, warm, warm.x) is None
         np.testing.assert_array_equal(starts._derivative(warm.problem, warm, warm.x), warm.jacobian)
 
     def test_far_from_where_the_fit_ended_it_is_none(self) -> None:
