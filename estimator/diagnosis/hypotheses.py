@@ -197,9 +197,8 @@ def _forgetting(result: FitResult, name: str) -> FitResult:
     keep = [shared.effect != name for shared in result.problem.shared]
     shared = tuple(each for each, kept in zip(result.problem.shared, keep, strict=True) if kept)
     left = [*keep, *[True] * (result.x.size - len(keep))]
-    derivative = None if result.derivative is None else result.derivative[:, left]
     problem = replace(result.problem, shared=shared)
-    return replace(result, problem=problem, x=result.x[left], derivative=derivative)
+    return replace(result, problem=problem, x=result.x[left], derivative=None)  # which was found with the effect
 
 
 def _without_much(result: FitResult) -> FitResult:

@@ -226,16 +226,13 @@ def residual_at(problem: Problem, outputs: Sequence[FloatArray]) -> FloatArray:
     return _stack(problem, [out - record.output for out, record in zip(outputs, problem.records, strict=True)])
 
 
-def jacobian_at(
-    problem: Problem, x: FloatArray, outputs: Sequence[FloatArray], sought: BoolArray | None = None
-) -> FloatArray:
+def jacobian_at(problem: Problem, x: FloatArray, outputs: Sequence[FloatArray]) -> FloatArray:
     """Return the derivative of the errors by the scaled unknowns, shape (R, U), by differences inside the bounds.
 
-    By those that are ``sought``, shape (U,), or by all; it is 0 by the others, and by what can't change.
+    It is 0 by what can't change.
     """
     low, high = bounds(problem)
-    sought = low < high if sought is None else sought & (low < high)
-    columns = [_moving(problem, sought, i) for i in range(len(problem.records))]
+    columns = [_moving(problem, low < high, i) for i in range(len(problem.records))]
     parts = [(i, part) for i, mine in enumerate(columns) for part in np.array_split(mine, WORKERS)]
     rows = np.cumsum([0, *(int(use.sum()) for use in problem.use)])
     jacobian = np.zeros((rows[-1], x.size))
@@ -261,11 +258,11 @@ def changes(problem: Problem, x: FloatArray, index: int, columns: IntArray, outp
     return np.asarray((change / steps[columns, None]).T)
 
 
-def _moving(problem: Problem, sought: BoolArray, index: int) -> IntArray:
-    """Return which of the unknowns that are sought move one recording: those of all, and its own."""
-    moving = sought.copy()
+def _moving(problem: Problem, free: BoolArray, index: int) -> IntArray:
+    """Return which of the free unknowns move one recording: those of all, and its own."""
+    moving = free.copy()
     moving[len(problem.shared) :] = False
-    moving[own_part(problem, index)] = sought[own_part(problem, index)]
+    moving[own_part(problem, index)] = free[own_part(problem, index)]
     return np.flatnonzero(moving)
 
 
@@ -279,9 +276,7 @@ def _moments(problem: Problem) -> BoolArray:
     return np.concatenate(parts)
 
 
-def fit(
-    problem: Problem, x0: FloatArray | None = None, iterations: int = ITERATIONS, begun: FloatArray | None = None
-) -> FitResult:
+def fit(problem: Problem, x0: FloatArray | None = None, iterations: int = ITERATIONS) -> FitResult:
     """Minimise the squared free-run error from one start.
 
     Parameters
@@ -290,8 +285,6 @@ def fit(
         Scaled start; ``start_vector`` by default.
     iterations : int
         Jacobians at most.
-    begun : ndarray, shape (R, U), optional
-        Derivative of the errors at some place near the start, for the first step.
     """
     low, high = bounds(problem)
     seen: dict[bytes, tuple[FloatArray, ...]] = {}
@@ -303,7 +296,7 @@ def fit(
             seen[key] = outputs_at(problem, x)
         return seen[key]
 
-    def least(x: FloatArray, low: FloatArray, high: FloatArray, begun: FloatArray | None = None) -> Solution:
+    def least(x: FloatArray, low: FloatArray, high: FloatArray) -> Solution:
         return minimise(
             lambda x: residual_at(problem, outputs(x)),
             lambda x: jacobian_at(problem, x, outputs(x)),
@@ -312,11 +305,10 @@ def fit(
             high,
             iterations,
             smooth=not moments.any(),
-            begun=begun,
         )
 
     moments = _moments(problem)
-    solution = least(start_vector(problem) if x0 is None else x0, low, high, begun)
+    solution = least(start_vector(problem) if x0 is None else x0, low, high)
     if solution.stuck and moments.any():  # at a kink over a moment every step is refused: first without them
         x = solution.x
         x = least(x, np.where(moments, x, low), np.where(moments, x, high)).x

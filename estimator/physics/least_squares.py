@@ -61,7 +61,6 @@ def minimise(
     high: FloatArray,
     iterations: int = 50,
     smooth: bool = True,
-    begun: FloatArray | None = None,
 ) -> Solution:
     """Minimise ``sum(residual(x)**2)`` subject to ``low <= x <= high`` from one start.
 
@@ -73,14 +72,11 @@ def minimise(
         Jacobians at most; ``converged`` is False when they were used up.
     smooth : bool
         False where the errors have kinks, over which no Jacobian is carried on.
-    begun : ndarray, shape (R, U), optional
-        A Jacobian of some place near ``x0``, for the first step.
     """
     x = np.clip(x0, low, high)
     errors, damping = residual(x), FIRST_DAMPING
     for _ in range(iterations):
-        derivative, fresh, refused = (jacobian(x), True, False) if begun is None else (begun, False, False)
-        begun = None
+        derivative, fresh, refused = jacobian(x), True, False
         gradient, curvature = derivative.T @ errors, derivative.T @ derivative
         while True:
             square = float(errors @ errors)

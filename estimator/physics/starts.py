@@ -6,17 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from estimator.physics.fit import (
-    ITERATIONS,
-    FitResult,
-    Problem,
-    bounds,
-    fit,
-    jacobian_at,
-    outputs_at,
-    residual_at,
-    start_vector,
-)
+from estimator.physics.fit import ITERATIONS, FitResult, Problem, fit, start_vector
 from estimator.signals.record import FloatArray, IntArray
 
 HEAT = 3
@@ -24,9 +14,6 @@ HEAT = 3
 
 CLOSE = 1.1
 """Squared error, over the best start's, up to which a start goes on."""
-
-NEARBY = 1.5
-"""Squared error at a start, over that of the fit it comes from, up to which that fit's derivative does for a step."""
 
 Name = tuple[object, ...]
 
@@ -50,10 +37,7 @@ def converge(result: FitResult, iterations: int = ITERATIONS) -> FitResult:
 
 
 def _begun(problem: Problem, warm: FitResult | None, iterations: int) -> FitResult:
-    if warm is None:
-        return fit(problem, iterations=iterations)
-    x = warm_start(problem, warm)
-    return fit(problem, x, iterations, _derivative(problem, warm, x))
+    return fit(problem, None if warm is None else warm_start(problem, warm), iterations)
 
 
 def warm_start(problem: Problem, warm: FitResult) -> FloatArray:
@@ -62,36 +46,6 @@ def warm_start(problem: Problem, warm: FitResult) -> FloatArray:
     columns, taken, ratio = _common(problem, warm.problem)
     x[columns] = warm.x[taken] / ratio
     return x
-
-
-def _derivative(problem: Problem, warm: FitResult, x: FloatArray) -> FloatArray | None:
-    """Return the derivative of the errors near ``x``, shape (R, U): as a fit has it, what that lacks found at ``x``.
-
-    None where it was let go, is that of other samples, or that of another place: far from where the fit ended, as
-    without one of its effects, it leads astray.
-    """
-    if warm.derivative is None or not _has_the_same_samples(problem, warm.problem):
-        return None
-    x = np.clip(x, *bounds(problem))
-    outputs = outputs_at(problem, x)
-    errors = residual_at(problem, outputs)
-    if not float(errors @ errors) <= NEARBY * warm.squares:
-        return None
-    low, high = bounds(warm.problem)
-    columns, taken, ratio = _common(problem, warm.problem)
-    free = (low < high)[taken]
-    columns, taken, ratio = columns[free], taken[free], ratio[free]
-    sought = np.ones(x.size, dtype=bool)
-    sought[columns] = False
-    derivative = jacobian_at(problem, x, outputs, sought)
-    derivative[:, columns] = warm.derivative[:, taken] * ratio
-    return derivative
-
-
-def _has_the_same_samples(problem: Problem, other: Problem) -> bool:
-    pairs = zip(problem.records, other.records, problem.use, other.use, strict=False)
-    same = all(mine is theirs and np.array_equal(use, used) for mine, theirs, use, used in pairs)
-    return same and len(problem.records) == len(other.records)
 
 
 def _common(problem: Problem, other: Problem) -> tuple[IntArray, IntArray, FloatArray]:

@@ -218,28 +218,6 @@ def test_running_out_of_iterations_is_told(measured: FloatArray) -> None:
     assert ours.jacobian is None
 
 
-@pytest.mark.parametrize(("nearby", "does"), [((3.1, 1.3, 0.4), True), ((-0.2, 1.3, 0.4), False)])
-def test_a_derivative_of_nearby_does_for_the_first_step(
-    measured: FloatArray, nearby: tuple[float, ...], does: bool
-) -> None:
-    """One that leads astray is found out by the step it promises."""
-    points: list[FloatArray] = []
-
-    def residual(x: FloatArray) -> FloatArray:
-        return decay(x) - measured
-
-    def jacobian(x: FloatArray) -> FloatArray:
-        points.append(x)
-        return decay_jacobian(x)
-
-    start, begun = np.array([3.3, 1.1, 0.6]), decay_jacobian(np.array(nearby))
-    ours = minimise(residual, jacobian, start, -UNBOUNDED, UNBOUNDED, begun=begun)
-    assert ours.converged
-    assert np.array_equal(points[0], start) is not does
-    theirs = least_squares(residual, start, decay_jacobian).x
-    assert likelihood_ratio(residual, ours.x, theirs) < CONVERGED
-
-
 def test_a_start_at_the_optimum_costs_one_jacobian() -> None:
     calls = []
 

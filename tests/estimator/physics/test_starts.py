@@ -1,4 +1,4 @@
-"""A fit from several starts takes the best, and one from where another ended begins with what that one knew."""
+"""A fit from several starts takes the best, and one from where another ended begins with what that one found."""
 
 from __future__ import annotations
 
@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.physics import starts
-from estimator.physics.fit import fit, jacobian_at, local_part, make_problem, outputs_at, parameters, start_of
+from estimator.physics.fit import fit, local_part, make_problem, parameters, start_of
 from estimator.physics.layout import slot
 from estimator.physics.simulate import Start
 from estimator.physics.starts import best_fit, warm_start
@@ -60,46 +59,3 @@ def test_a_warm_start_from_other_recordings_keeps_values_not_scaled_unknowns() -
     problem = make_problem(line, small, shared[1])
     carried = parameters(problem, warm_start(problem, warm))
     np.testing.assert_allclose(carried, warm.p)
-
-
-class TestFirstDerivative:
-    """Of a fit with a delay, begun where one without it ended."""
-
-    LINE, RECORDS = model(TWO_MASS), recordings(samples=400)
-
-    def test_it_is_that_of_the_fit_before_and_found_for_what_is_new(self) -> None:
-        warm = fit(nominal_problem(self.RECORDS))
-        delay = effect_unknowns("transport_delay", self.LINE, self.RECORDS)[0].shared
-        small = tuple(replace(shared, start=1e-3) for shared in delay)
-        problem = make_problem(self.LINE, self.RECORDS, (*nominal_unknowns(self.LINE), *small), profile=True)
-        x = warm_start(problem, warm)
-        taken = starts._derivative(problem, warm, x)
-        assert taken is not None
-        found = jacobian_at(problem, x, outputs_at(problem, x))
-        scale = np.abs(found).max(axis=0)
-        np.testing.assert_allclose(taken / scale, found / scale, atol=0.02)
-
-    def test_of_other_samples_or_let_go_it_is_none(self) -> None:
-        warm = fit(nominal_problem(self.RECORDS))
-        less = tuple(record.okay & (np.arange(record.okay.size) > 9) for record in self.RECORDS)
-        cut = replace(warm.problem, use=less)
-        assert starts._derivative(cut, warm, warm.x) is None
-        assert starts._derivative(warm.problem, warm.light(), warm.x) is None
-        others = replace(warm.problem, records=tuple(recordings(samples=400)))
-        assert starts._derivative(others, warm, warm.x) is None
-        np.testing.assert_array_equal(starts._derivative(warm.problem, warm, warm.x), warm.jacobian)
-
-    def test_far_from_where_the_fit_ended_it_is_none(self) -> None:
-        warm = fit(nominal_problem(self.RECORDS))
-        assert starts._derivative(warm.problem, warm, 1.1 * warm.x) is None
-
-    def test_what_was_held_before_is_found(self) -> None:
-        """A derivative by what could not change is not known, and no zero."""
-        problem = nominal_problem(self.RECORDS)
-        held = tuple(replace(s, low=1.0, high=1.0) if s.name == "k" else s for s in problem.shared)
-        warm = fit(replace(problem, shared=held))
-        column = [shared.name for shared in held].index("k")
-        assert not warm.jacobian[:, column].any()
-        taken = starts._derivative(problem, warm, warm.x)
-        assert taken is not None
-        assert taken[:, column].any()
