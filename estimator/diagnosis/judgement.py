@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from estimator.diagnosis.acquisition import Finding
 from estimator.diagnosis.convergence import unconverged
-from estimator.diagnosis.evidence import VERY_STRONG, delta_bic_with, gain, noise_level, price
+from estimator.diagnosis.evidence import VERY_STRONG, Gain, delta_bic_with, gain, noise_level, price
 from estimator.diagnosis.hypotheses import flexible
 from estimator.diagnosis.phrases import PLACE_NAMES, kind_in_words
 from estimator.diagnosis.result import Verdict
 from estimator.diagnosis.selection import Selection
+from estimator.diagnosis.trial import scan_choices
 from estimator.diagnosis.unnamed import UnnamedLaw
 from estimator.diagnosis.weight import VISIBLE, least_share, reads_speed, share_removed
 from estimator.physics.catalogue import EFFECTS
@@ -129,16 +131,24 @@ def _is_seen(selection: Selection, floor: float) -> bool:
 def _is_simpler(unnamed: UnnamedLaw, selection: Selection) -> bool:
     """Tell whether a law without a name explains as much with clearly less, both told with one number of samples.
 
-    What it gains must be fewer unknowns, or an error that is visibly smaller: with more of them, a law in other words
-    takes up the details that a named one leaves at the noise, such as the second wave of an imbalance.
+    What it gains must be a lower price, or an error that is visibly smaller: for more, a law in other words takes up
+    the details that a named one leaves at the noise, such as the second wave of an imbalance.
     """
     before, after = selection.retuned.rms, selection.result.rms
-    named = gain(selection.retuned, selection.result)
+    named = _gain_of_names(selection)
     n = unnamed.gain.n_effective if unnamed.rms < after else named.n_effective
     rival = delta_bic_with(unnamed.gain, before, unnamed.rms, n)
-    fewer = price(unnamed.gain, before, unnamed.rms) < price(named, before, after)
+    cheaper = price(unnamed.gain, before, unnamed.rms) < price(named, before, after)
     better = rival > delta_bic_with(named, before, after, n) + VERY_STRONG
-    return better and (fewer or after >= VISIBLE * unnamed.rms)
+    return better and (cheaper or after >= VISIBLE * unnamed.rms)
+
+
+def _gain_of_names(selection: Selection) -> Gain:
+    """Return what the chosen effects gain, paid for as a law's gain is: each was one of all that were tried."""
+    plain = gain(selection.retuned, selection.result)
+    tried = len({*selection.chosen, *selection.trials, *selection.dismissed})
+    choices = sum(math.log(tried) + scan_choices(name, selection.result) for name in selection.chosen)
+    return replace(plain, delta_bic=plain.delta_bic - 2.0 * choices)
 
 
 def _is_another_law(selection: Selection, floor: float, unnamed: UnnamedLaw) -> bool:

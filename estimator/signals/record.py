@@ -55,6 +55,8 @@ class Record:
         When the recording began that this one is a part of [s]: laws over time count from there. None: at its start.
     torque_okay : ndarray of bool, shape (N, M) or (N,), optional
         False where a torque was not read, or not to be trusted, and ``torque_nm`` holds a stand-in. None: all read.
+    reference_nm : ndarray, shape (N,), optional
+        Torque that was asked for, of all inputs together [Nm]; NaN where not known. None: not recorded.
     imposed : ndarray, shape (N,), optional
         Motion that a bench imposes on a joint [rad; translation m]; the output is then the torque it takes, which
         ``torque_nm`` holds too. None: the torque acts and the motion is measured.
@@ -74,11 +76,12 @@ class Record:
     torque_okay: BoolArray | None = None
     offset_s: FloatArray | None = None
     imposed: FloatArray | None = None
+    reference_nm: FloatArray | None = None
 
     def __post_init__(self) -> None:
         n = self.time_s.shape[0]
         shapes = {"torque_nm": self.torque_nm.shape[:1], "output": self.output.shape, "okay": self.okay.shape}
-        optional = {"offset_s": self.offset_s, "imposed": self.imposed}
+        optional = {"offset_s": self.offset_s, "imposed": self.imposed, "reference_nm": self.reference_nm}
         shapes |= {name: values.shape for name, values in optional.items() if values is not None}
         for name, shape in shapes.items():
             if shape != (n,):

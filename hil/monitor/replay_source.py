@@ -20,7 +20,7 @@ from hil.rig.sample import Sample, SampleFlag
 
 NS_PER_S = 1_000_000_000
 
-OPTIONAL = ("torque_ref_nm", "prbs_nm", columns.FLAGS)
+OPTIONAL = (columns.REFERENCE, "prbs_nm", columns.FLAGS)
 """Columns a recording may lack; zero stands for them."""
 
 

@@ -9,12 +9,13 @@ TIME: Final = "time_s"
 TORQUE_M1: Final = "torque_m1_nm"
 TORQUE_M2: Final = "torque_m2_nm"
 SPEED: Final = "speed_rad_s"
+REFERENCE: Final = "torque_ref_nm"
 FLAGS: Final = "flags"
 
 UNITS: Final = MappingProxyType(
     {
         TIME: "s",
-        "torque_ref_nm": "Nm",
+        REFERENCE: "Nm",
         TORQUE_M1: "Nm",
         TORQUE_M2: "Nm",
         SPEED: "rad/s",
@@ -30,7 +31,7 @@ UNITS: Final = MappingProxyType(
 COMMENTS: Final = MappingProxyType(
     {
         TIME: "time since the first recorded cycle",
-        "torque_ref_nm": "torque reference of both inverters, PRBS included",
+        REFERENCE: "torque reference of both inverters, PRBS included",
         TORQUE_M1: "torque actual value of inverter m1 (0x6077)",
         TORQUE_M2: "torque actual value of inverter m2 (0x6077)",
         SPEED: "motor speed from the resolver (0x606C)",

@@ -82,6 +82,7 @@ def to_record(table: Table, signals: SignalsConfig) -> Record:
         kind=kind,
         location=output.at,
         torque_okay=None if read.all() else read,
+        reference_nm=_reference(table, signals),
     )
 
 
@@ -112,6 +113,13 @@ def _flagged(table: Table, signals: SignalsConfig) -> NDArray[np.bool_]:
         return np.zeros(table.n_rows, dtype=np.bool_)
     flagged: NDArray[np.bool_] = table.numeric([columns.FLAGS])[columns.FLAGS] != 0
     return flagged
+
+
+def _reference(table: Table, signals: SignalsConfig) -> FloatArray | None:
+    """Return the torque that was asked for, where a recording of the rig has it; NaN where it doesn't."""
+    if not (signals.is_own_recording and columns.REFERENCE in table.columns):
+        return None
+    return table.numeric([columns.REFERENCE])[columns.REFERENCE]
 
 
 def _inside_own(values: FloatArray, column: str, masks: dict[MaskRange, NDArray[np.bool_]]) -> NDArray[np.bool_]:

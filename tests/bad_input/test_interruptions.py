@@ -9,14 +9,11 @@ import subprocess
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import NoReturn
 
 import pytest
 
-from drivers.inverter.cia402 import PowerState
 from hil.cli.main import run
-from tests.cli.conftest import await_rows
-from tests.rig.observer import power_state
 
 Spawn = Callable[..., subprocess.Popen[str]]
 
@@ -74,20 +71,3 @@ def test_while_it_imports(monkeypatch: pytest.MonkeyPatch, capsys: pytest.Captur
     monkeypatch.setattr(importlib, "import_module", interrupt)
     assert run(["effects"]) == 130
     assert capsys.readouterr().err == "interrupted\n"
-
-
-def test_a_host_that_is_killed_leaves_no_drive_enabled_and_the_rig_up(
-    spawn: Spawn, simulate: Callable[..., Any], short_rig: Path, tmp_path: Path
-) -> None:
-    """Nothing of ours can act on SIGKILL: it is the drives that miss the host's heartbeat."""
-    simulation = simulate(short_rig)
-    process = spawn("run", str(short_rig), "cruise", "--out", str(tmp_path / "run.csv"), *simulation.addresses)
-    await_rows(tmp_path / "run.part.csv", process)
-    process.kill()
-    process.wait()
-    while any(power_state(simulation.bus, node_id) is PowerState.OPERATION_ENABLED for node_id in (1, 2)):
-        assert simulation.process.poll() is None
-        time.sleep(0.01)
-    simulation.process.send_signal(signal.SIGTERM)
-    assert simulation.process.communicate(timeout=20) == ("", "")
-    assert simulation.process.returncode == 0

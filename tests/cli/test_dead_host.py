@@ -47,7 +47,7 @@ def test_drives_of_a_host_that_dies_leave_operation(
     short_rig: Path,
     death: signal.Signals,
 ) -> None:
-    """Killed, or suspended as by a debugger: the heartbeat ends, and with it the torque."""
+    """Killed, or suspended as by a debugger: the heartbeat ends, and with it the torque; the rig stays up."""
     simulation = simulate(short_rig, "--real-time")
     out = short_rig.parent / "run.csv"
     host = spawn("run", str(short_rig), "cruise", "--out", str(out), *simulation.addresses)
@@ -55,6 +55,10 @@ def test_drives_of_a_host_that_dies_leave_operation(
     host.send_signal(death)
     for node_id in (1, 2):
         await_end_of_operation(simulation.bus, node_id)
+    assert simulation.process.poll() is None
+    simulation.process.send_signal(signal.SIGTERM)
+    assert simulation.process.communicate(timeout=20) == ("", "")
+    assert simulation.process.returncode == 0
 
 
 @pytest.fixture

@@ -68,6 +68,14 @@ def test_missing_and_flagged_samples_hold_the_last_good_torque(changed: Changed)
     assert np.flatnonzero(~record.torque_trusted[:, 1]).tolist() == [10]
 
 
+def test_the_reference_is_taken_along_where_a_recording_of_the_rig_has_it(changed: Changed) -> None:
+    reference = np.where(np.arange(40) == 7, np.nan, np.arange(40.0))
+    table = changed(torque_ref_nm=reference)
+    np.testing.assert_array_equal(to_record(table, SignalsConfig()).reference_nm, reference)
+    assert to_record(table, signals(torque=[{"column": "torque_m1_nm"}])).reference_nm is None
+    assert to_record(changed(torque_ref_nm=None), SignalsConfig()).reference_nm is None
+
+
 def test_flags_of_a_foreign_recording_mean_nothing(changed: Changed) -> None:
     table = changed(flags=np.ones(40, dtype=np.int64))
     assert to_record(table, signals(torque=[{"column": "torque_m1_nm"}])).okay.all()

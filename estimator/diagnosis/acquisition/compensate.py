@@ -20,9 +20,10 @@ UNREAD = frozenset({"stale_samples", "lost_samples"})
 def compensate(records: Sequence[Record], findings: Sequence[Finding]) -> tuple[Record, ...]:
     """Return the records as they would be without what was found.
 
-    Outputs that are stale or lost are masked. Torques that are stale or lost are filled in, by their clock where they
-    have one, and ``torque_okay`` is False where that leaves them unknown. Stamped jitter becomes ``offset_s``, and
-    the time uniform. Quantisation can't be undone. Records nothing was found in are returned as they are.
+    Outputs that are stale or lost are masked. Torques that are stale or lost are filled in, by their reference or
+    their clock where they have one, and ``torque_okay`` is False where that leaves them unknown. Stamped jitter becomes
+    ``offset_s``, and the time uniform. Quantisation can't be undone. Records nothing was found in are returned
+    as they are.
     """
     return tuple(_compensated(record, findings) for record in records)
 
@@ -51,7 +52,7 @@ def blanked(record: Record, finding: Finding | None) -> Record:
 
 def _without(record: Record, unread: np.ndarray[tuple[int, int], np.dtype[np.bool_]]) -> Record:
     trusted = record.torque_trusted & ~unread[:, 1:]
-    filled = [fill(record.torque_nm[:, i], trusted[:, i]) for i in range(trusted.shape[1])]
+    filled = [fill(record.torque_nm[:, i], trusted[:, i], record.reference_nm) for i in range(trusted.shape[1])]
     known = np.column_stack([known for _, known in filled])
     return replace(
         record,

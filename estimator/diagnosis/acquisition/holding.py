@@ -1,4 +1,4 @@
-"""What a torque was in rows where it was not read: by its clock where it has one, else by a straight line.
+"""What a torque was in rows where it was not read: by its reference or its clock, else by a straight line.
 
 A pseudo-random torque changes only at the ticks of its clock, every h samples, and always by the same step. Between the
 last good reading and the next one there are none, one or more ticks. None: the torque stayed. One: it changed at that
@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from estimator.diagnosis.acquisition.following import followed
 from estimator.diagnosis.acquisition.readings import runs
 from estimator.signals.record import BoolArray, FloatArray
 
@@ -72,21 +73,33 @@ def clock_of(torque: FloatArray, trusted: BoolArray) -> Clock | None:
     return None
 
 
-def fill(torque: FloatArray, trusted: BoolArray) -> tuple[FloatArray, BoolArray]:
+def fill(torque: FloatArray, trusted: BoolArray, reference: FloatArray | None = None) -> tuple[FloatArray, BoolArray]:
     """Return a torque with what is not trusted replaced, and where the replacement is as good as a reading.
 
     Parameters
     ----------
     torque, trusted : ndarray, shape (N,)
         Readings [Nm], and where they are to be trusted.
+    reference : ndarray, shape (N,), optional
+        What the torque follows [Nm], NaN where not known.
 
     Returns
     -------
     ndarray, shape (N,)
         Filled torque [Nm].
     ndarray of bool, shape (N,)
-        True where read, or known by the clock.
+        True where read, or known by reference or clock.
     """
+    filled, known = _by_clock(torque, trusted)
+    if reference is None or trusted.all():
+        return filled, known
+    by_reference, told, as_good = followed(torque, trusted, reference)
+    unread = told & ~trusted & (as_good | ~known)
+    filled[unread] = by_reference[unread]
+    return filled, known | (unread & as_good)
+
+
+def _by_clock(torque: FloatArray, trusted: BoolArray) -> tuple[FloatArray, BoolArray]:
     clock = clock_of(torque, trusted)
     filled, known = torque.copy(), trusted.copy()
     for begin, end in runs(~trusted):

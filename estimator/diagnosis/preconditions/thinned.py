@@ -11,8 +11,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from estimator.diagnosis.stretches import share_of
 from estimator.physics.model import DrivelineModel, Structure, natural_frequencies_rad_s
@@ -44,15 +46,21 @@ def _thin(record: Record, factor: int) -> Record:
         return record
     count = record.okay.size // factor
     kept = slice(0, count * factor, factor)
-    blocks = count, factor
-    trusted = np.asarray(record.torque_trusted[: count * factor].reshape(*blocks, -1).all(axis=1))
+    trusted = np.asarray(_blocks(record.torque_trusted, factor).all(axis=1))
     return replace(
         record,
         sample_time_s=factor * record.sample_time_s,
         time_s=record.time_s[kept],
-        torque_nm=record.torque_nm[: count * factor].reshape(*blocks, -1).mean(axis=1),
+        torque_nm=_blocks(record.torque_nm, factor).mean(axis=1),
         output=record.output[kept],
         okay=record.okay[kept],
         torque_okay=None if record.torque_okay is None else trusted,
         offset_s=None if record.offset_s is None else record.offset_s[kept],
+        reference_nm=None if record.reference_nm is None else _blocks(record.reference_nm, factor).mean(axis=1),
     )
+
+
+def _blocks(values: NDArray[Any], factor: int) -> NDArray[Any]:
+    """Return values by row, shape (N,) or (N, M), in blocks of so many rows; shape (N // factor, factor) or with M."""
+    count = values.shape[0] // factor
+    return values[: count * factor].reshape(count, factor, *values.shape[1:])

@@ -49,6 +49,7 @@ def _differenced(record: Record, output: FloatArray) -> Record:
         okay=record.okay[1:] & record.okay[:-1],
         torque_okay=None,
         offset_s=None,
+        reference_nm=None,
     )
 
 

@@ -20,6 +20,7 @@ from estimator.diagnosis.selection import Selection, counting_law
 from estimator.diagnosis.trial import Trial
 from estimator.diagnosis.unnamed import UnnamedLaw, best_unnamed
 from estimator.diagnosis.weight import MOST, VISIBLE
+from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
 from estimator.physics.model import DrivelineModel
@@ -288,6 +289,18 @@ class TestChosen:
         rival = UnnamedLaw(Element.TORQUE_PATH, (("a wave", 1.0),), replace(gained, delta_bic=cheap), 0.1)
         found = replace(outcome(before, frozenset({"load_imbalance"}), after), unnamed=rival)
         assert (judge(found, 0.1).objection == "") is believed
+
+    @pytest.mark.parametrize(("tried", "believed"), [(1, True), (30, False)])
+    def test_a_name_chosen_among_many_costs_its_choice_as_a_law_does(self, tried: int, believed: bool) -> None:
+        """One unknown each; the law was chosen among 15, as the bend of a sensor that looks like an inverter's gain."""
+        before, after, best = of_rms(1.0, 2), of_rms(0.1015, 3), of_rms(0.1, 3)
+        gained = gain(before, best)
+        rival = replace(gained, delta_bic=gained.delta_bic - 2.0 * math.log(15.0))
+        found = outcome(before, frozenset({"inverter_gain_mismatch"}), after)
+        dismissed = {name: 0.0 for name in [*EFFECTS][: tried - 1] if name != "inverter_gain_mismatch"}
+        law = UnnamedLaw(Element.SPEED_SENSOR, (("w |w|", 1.0),), rival, 0.1)
+        judged = judge(replace(found, unnamed=law, dismissed=dismissed), 0.1)
+        assert (judged.objection == "") is believed
 
     def test_one_whose_look_alike_is_where_the_simple_law_is_is_believed(self) -> None:
         """From torque and speed alone the two are one; the law is at the other's element."""

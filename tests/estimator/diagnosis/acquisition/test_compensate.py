@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from estimator.diagnosis.acquisition import OUTPUT, Misfit, as_read, compensate, recognise, repaired
 from estimator.diagnosis.acquisition.holding import clock_of, fill
@@ -154,6 +155,55 @@ def test_a_step_of_another_size_is_not_the_clocks() -> None:
     trusted = np.arange(SAMPLES) != 1501
     assert not fill(torque, trusted)[1][1501]
     assert fill(torque, np.arange(SAMPLES) != 1201)[1][1201]
+
+
+def commanded(rng: np.random.Generator, noise: float = TORQUE_NOISE, lag: float = 0.0) -> tuple[FloatArray, FloatArray]:
+    """A reference that steps at any row, and a drive's share of it: with an offset, noise and a lag."""
+    reference = 200.0 + 40.0 * np.sin(np.arange(SAMPLES) / 300.0) + prbs(rng, 60.0, 1)
+    answer = lfilter([1.0 - lag], [1.0, -lag], 0.6 * reference) + 3.0
+    return reference, answer + noise * rng.standard_normal(SAMPLES)
+
+
+@pytest.mark.parametrize("lag", [0.0, 0.2])
+def test_a_torque_that_follows_a_reference_is_known_by_it(lag: float) -> None:
+    rng = np.random.default_rng(5)
+    reference, torque = commanded(rng, lag=lag)
+    trusted = ~random_rows(rng, 0.1, 4.0)
+    filled, known = fill(np.where(trusted, torque, 0.0), trusted, reference)
+    assert known.all()
+    np.testing.assert_array_equal(filled[trusted], torque[trusted])
+    assert np.std((filled - torque)[~trusted]) < 2.5 * TORQUE_NOISE
+    assert np.std((fill(torque, trusted)[0] - torque)[~trusted]) > 20.0
+
+
+def test_one_that_follows_roughly_is_filled_by_it_and_unknown() -> None:
+    """A drive with a slow lag: three references tell most of it, and more than the noise is left."""
+    rng = np.random.default_rng(5)
+    reference, torque = commanded(rng, lag=0.7)
+    trusted = ~random_rows(rng, 0.1, 4.0)
+    filled, known = fill(torque, trusted, reference)
+    np.testing.assert_array_equal(known, trusted)
+    assert np.std((filled - torque)[~trusted]) < 0.6 * np.std((fill(torque, trusted)[0] - torque)[~trusted])
+
+
+@pytest.mark.parametrize("gone", [np.nan, 0.0])
+def test_a_reference_that_was_lost_with_the_torque_tells_nothing(gone: float) -> None:
+    rng = np.random.default_rng(5)
+    reference, torque = commanded(rng)
+    trusted = ~random_rows(rng, 0.1, 4.0)
+    filled, known = fill(torque, trusted, np.where(trusted, reference, gone))
+    plain, _ = fill(torque, trusted)
+    np.testing.assert_array_equal(known, trusted)
+    np.testing.assert_array_equal(filled, plain)
+
+
+def test_one_that_follows_something_else_is_interpolated() -> None:
+    rng = np.random.default_rng(5)
+    _, torque = commanded(rng)
+    trusted = ~random_rows(rng, 0.1, 4.0)
+    filled, known = fill(torque, trusted, 100.0 * rng.standard_normal(SAMPLES))
+    np.testing.assert_array_equal(known, trusted)
+    np.testing.assert_array_equal(filled, fill(torque, trusted)[0])
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -9,7 +9,7 @@ import pytest
 
 from estimator.diagnosis.acquisition import Finding, recognise
 from estimator.signals.record import BoolArray, Record
-from tests.estimator.diagnosis.acquisition.bench import healthy, random_rows
+from tests.estimator.diagnosis.acquisition.bench import SAMPLES, healthy, random_rows
 
 
 def only(records: list[Record]) -> Finding:
@@ -87,6 +87,49 @@ def test_lost_zeros_between_values_near_zero_are_lost_too() -> None:
     finding = only(records)
     for record, where in zip(records, rows, strict=True):
         np.testing.assert_array_equal(finding.rows(record)[1:-1], where[1:-1])
+
+
+def test_of_a_torque_that_rests_at_zero_what_is_lost_with_the_speed_is_lost() -> None:
+    """Around zero its zeros are nothing special by themselves; its own are kept."""
+    rows, resting = rows_of(6, 0.02, 4.0), np.arange(SAMPLES)[:, None] % 500 < 200
+    records = [
+        replace(r, torque_nm=np.where(resting, 0.6 * np.round(r.torque_nm / 100.0), r.torque_nm)) for r in healthy(6)
+    ]
+    lost = [
+        replace(r, output=np.where(where, 0.0, r.output), torque_nm=np.where(where[:, None], 0.0, r.torque_nm))
+        for r, where in zip(records, rows, strict=True)
+    ]
+    finding = only(lost)
+    for before, record, where in zip(records, lost, rows, strict=True):
+        assert (before.torque_nm == 0.0).sum() > 300
+        touched = finding.touched(record)
+        assert touched[where & touched[:, 0]].all()
+        assert not touched[~where].any()
+        assert touched[where, 0].mean() > 0.9
+
+
+@pytest.mark.parametrize("at_start", [True, False])
+def test_zeros_at_an_end_are_lost_where_as_many_are_elsewhere(at_start: bool) -> None:
+    rows = rows_of(3, 0.03, 4.0)
+    for where in rows:
+        where[:3] = where[-3:] = False
+        where[slice(0, 2) if at_start else slice(-2, None)] = True
+    records = [replace(r, output=np.where(w, 0.0, r.output)) for r, w in zip(healthy(3, 3), rows, strict=True)]
+    finding = only(records)
+    (far_from_zero, *_) = records
+    np.testing.assert_array_equal(finding.rows(far_from_zero), rows[0])
+
+
+def test_a_torque_that_begins_at_zero_for_longer_is_kept() -> None:
+    rows = rows_of(3, 0.03)
+    records = []
+    for record, where in zip(healthy(3, 3), rows, strict=True):
+        where[:10] = False
+        torque = np.where(where[:, None], 0.0, record.torque_nm)
+        torque[:8] = 0.0
+        records.append(replace(record, torque_nm=torque))
+    finding = only(records)
+    assert not any(finding.rows(record)[:8].any() for record in records)
 
 
 def test_zeros_that_the_values_beside_them_let_expect_are_kept() -> None:
