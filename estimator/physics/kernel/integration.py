@@ -12,11 +12,11 @@ import math
 from typing import Any
 
 from estimator.compiled import brief, compiled, inlined
-from estimator.physics.effects import actuator_lag, speed_filter, transport_delay
+from estimator.physics.effects import actuator_lag, transport_delay
 from estimator.physics.kernel import slots
 from estimator.physics.kernel.conditions import conditions, is_changing, is_waving, with_torque, with_torques
 from estimator.physics.kernel.rates import rates
-from estimator.physics.kernel.sensing import entry, reading, shown, travelled
+from estimator.physics.kernel.sensing import entry, reading, shown, smoothed
 from estimator.physics.kernel.state_vector import FILTER_RISE, FILTERED, LAG_RISE, LAGGED, Conditions, State
 from estimator.signals.record import FloatArray
 
@@ -150,17 +150,12 @@ def integrate_masses(
             mean, rise, lagged, lag_rise = actuator_lag.step(
                 supplied, rise, lagged, lag_rise, p[slots.LAG], p[slots.LAG_SHAPE], h
             )
-            before, begun_at = entry(x, output), x
+            before = x
             x = runge_kutta(masses, extended, now, mean, rise, x, p, h)
-            after = entry(x, output)
-            slope = (after - before) / h
+            slope = (entry(x, output) - entry(before, output)) / h
             if filtering:
-                bow = travelled(x, output) / h - travelled(begun_at, output) / h - 0.5 * (before + after)
-                read = reading(before + bow, angle[k] + turn * j * length, p)
-                ends = reading(after + bow, angle[k] + turn * (j + 1) * length, p)
-                filtered, filter_rise = speed_filter.step(
-                    read, ends, filtered, filter_rise, p[slots.FILTER], p[slots.FILTER_SHAPE], h
-                )
+                turned, turns = angle[k] + turn * j * length, angle[k] + turn * (j + 1) * length
+                filtered, filter_rise = smoothed(before, x, output, turned, turns, filtered, filter_rise, p, h)
             if steep and j == 0:
                 slopes[1, k] = slope
     for i, last in enumerate(x):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from estimator.compiled import inlined
-from estimator.physics.effects import resolver_error
+from estimator.physics.effects import resolver_error, speed_filter
 from estimator.physics.kernel import slots
 from estimator.physics.kernel.state_vector import LOAD_SPEED, SPEED, TWIST, State
 from estimator.signals.record import FloatArray
@@ -32,6 +32,28 @@ def reading(speed: float, angle: float, p: FloatArray) -> float:
     """Return the speed that the resolver gives [rad/s] at a motor angle [rad]."""
     once, twice = p[slots.RESOLVER_ONCE], p[slots.RESOLVER_TWICE]
     return speed * resolver_error.slope(angle, once, p[slots.RESOLVER_ONCE_PHASE], twice, p[slots.RESOLVER_TWICE_PHASE])
+
+
+@inlined
+def smoothed(
+    before: State,
+    after: State,
+    output: int,
+    angle_before: float,
+    angle_after: float,
+    filtered: float,
+    rise: float,
+    p: FloatArray,
+    h: float,
+) -> tuple[float, float]:
+    """Return the filtered reading and its rise [rad/s] after a step of ``h`` [s] between two states and motor angles.
+
+    The filter's input is a straight line whose mean is what the output has been in the mean.
+    """
+    begin, end = entry(before, output), entry(after, output)
+    bow = travelled(after, output) / h - travelled(before, output) / h - 0.5 * (begin + end)
+    read, ends = reading(begin + bow, angle_before, p), reading(end + bow, angle_after, p)
+    return speed_filter.step(read, ends, filtered, rise, p[slots.FILTER], p[slots.FILTER_SHAPE], h)
 
 
 @inlined
