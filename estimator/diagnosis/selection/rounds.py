@@ -43,6 +43,7 @@ class Rounds:
     trials: dict[str, Trial] = field(default_factory=dict)
     dismissed: dict[str, float] = field(default_factory=dict)
     _count: int = 0
+    _seen: dict[tuple[Effects, bytes], dict[str, list[Look]]] = field(default_factory=dict)
 
     def try_all(
         self, chosen: Effects, current: FitResult, without: Effects = NOTHING, least: float = 0.0
@@ -93,8 +94,7 @@ class Rounds:
         And what would let a parameter go that is pressed against its bound.
         """
         self._report("looking at every effect", 0.0)
-        screen = Screen(current, self.jury.bench.model)
-        looks = dict(zip(names, concurrently(screen.looks, names), strict=True))
+        looks = self._around(current, names)
         promises = {name: found[0].promise for name, found in looks.items()}
         most = max((promise for promise in promises.values() if math.isfinite(promise)), default=0.0)
         least = max(least, WORTH_FITTING * most, current.squares * -math.expm1(-VERY_STRONG / current.residual.size))
@@ -110,6 +110,13 @@ class Rounds:
                 name: max(promises[name], 0.0) / current.squares for name in names if name not in worth[:MOST_FITS]
             }
         return {name: promising(looks[name]) for name in worth[:MOST_FITS]}
+
+    def _around(self, current: FitResult, names: Sequence[str]) -> dict[str, list[Look]]:
+        """Return looks at effects from a fit, each made once: several ways lead past the same fit."""
+        seen = self._seen.setdefault((effects_of(current), current.x.tobytes()), {})
+        if new := [name for name in names if name not in seen]:
+            seen.update(zip(new, concurrently(Screen(current, self.jury.bench.model).looks, new), strict=True))
+        return {name: seen[name] for name in names}
 
     def _report(self, what: str, part: float) -> None:
         share = 0.9 * (1.0 - 0.5**self._count * (1.0 - 0.5 * part))  # a round is half of the rest

@@ -22,6 +22,10 @@ MOST_EFFECTS = 4
 NEAR_NOISE = 1.5
 """Error over the noise that an explanation may leave: another way to write the same law leaves that much."""
 
+PART_OF_REST = 0.25
+"""Share of what still stands above the noise that a first look must promise for a further effect to be fitted: of two
+effects that were there, the second promised a third or more (seventy sealed pairs); beside what only imitates, less."""
+
 PATIENCE = 4
 """How many times its iterations a fit may take on which a verdict is built."""
 
@@ -63,12 +67,15 @@ class Selector:
         Of two effects that hide each other none passes alone: each moves the free run by more than what the other
         leaves, and pays for itself out of an error that stays correlated. And a load profile, or an event whose
         moments are sought, bends to imitate two at once: where it came near the noise, the ways go without it.
+        Two are looked at once, from the one that by itself leaves less: what the other adds shows there. A profile
+        hides that.
         """
         retuned = selection.retuned
         old = path = _Path(selection.chosen, selection.result, selection.accepted)
         without = flexible(path.chosen) if self._is_near(path.current) else NOTHING
         for first in self._firsts(retuned, without):
             path = self._better(path, self._completed(first, retuned, without), retuned)
+            without |= NOTHING if EFFECTS[first.name].profile else {first.name}
             if path is not old and self._is_near(path.current) and not flexible(path.chosen):
                 break
         return selection if path is old else self._concluded(self._grown(path, retuned), retuned)
@@ -89,8 +96,8 @@ class Selector:
         if self._is_near(way.current):
             if flexible(way.chosen) or not self._has_rest(way.current, retuned):
                 return way
-            without = flexible(frozenset(EFFECTS))
-        trials = self._rounds.try_all(way.chosen, way.current, without, self._half_of_rest(way.current))
+            without |= flexible(frozenset(EFFECTS))
+        trials = self._rounds.try_all(way.chosen, way.current, without, 0.5 * self._rest(way.current))
         best = self.jury.best(trials, way.current, retuned)
         return way if best is None else self._with(way, best, retuned)
 
@@ -122,15 +129,12 @@ class Selector:
     def _grown(self, path: _Path, retuned: FitResult) -> _Path:
         """Add effects to a path while one earns its place.
 
-        A further round of fits is only made where some law, named or not, still has something to explain. Where two
-        leave too much to stand, a third must promise to complete them: what imitates takes a little each time.
+        A further round of fits is only made where some law, named or not, still has something to explain.
         """
         for _ in range(MOST_EFFECTS - len(path.chosen)):
             if path.chosen and not self._has_rest(path.current, retuned):
                 break
-            hopeless = len(path.chosen) > 1 and not self.jury.weight.may_stand(path.current, retuned)
-            least = self._half_of_rest(path.current) if hopeless else 0.0
-            trials = self._rounds.try_all(path.chosen, path.current, least=least)
+            trials = self._rounds.try_all(path.chosen, path.current, least=self._least_promise(path, retuned))
             best = self.jury.best(trials, path.current, retuned)
             self._rounds.let_go(path.current if best is None else best.result)
             if best is None:
@@ -214,9 +218,20 @@ class Selector:
     def _is_near(self, result: FitResult) -> bool:
         return result.rms <= NEAR_NOISE * self.jury.weight.level(result)
 
-    def _half_of_rest(self, result: FitResult) -> float:
-        """Return half of the squared error that a fit leaves above the noise."""
-        return 0.5 * max(result.squares - self.jury.weight.level(result) ** 2 * result.residual.size, 0.0)
+    def _least_promise(self, path: _Path, retuned: FitResult) -> float:
+        """Return by how much an effect must promise to lower the squared error of a path to be fitted.
+
+        Where two leave too much to stand, a third must promise to complete them: what imitates takes a little each
+        time. Beside a profile a first look promises too little: it has taken up part of what is another's.
+        """
+        if len(path.chosen) > 1 and not self.jury.weight.may_stand(path.current, retuned):
+            return 0.5 * self._rest(path.current)
+        bends = any(EFFECTS[name].profile for name in path.chosen)
+        return PART_OF_REST * self._rest(path.current) if path.chosen and not bends else 0.0
+
+    def _rest(self, result: FitResult) -> float:
+        """Return the squared error that a fit leaves above the noise."""
+        return max(result.squares - self.jury.weight.level(result) ** 2 * result.residual.size, 0.0)
 
     def _has_rest(self, current: FitResult, retuned: FitResult) -> bool:
         """Tell whether what a fit leaves could make another effect count, and is no noise.

@@ -7,10 +7,12 @@ from dataclasses import replace
 import pytest
 
 from estimator.diagnosis.chain import read_through
-from estimator.diagnosis.hypotheses import NOTHING
+from estimator.diagnosis.hypotheses import NOTHING, Effects
 from estimator.diagnosis.search import search
 from estimator.diagnosis.selection import Selection, Selector
 from estimator.diagnosis.selection.selector import _Path
+from estimator.diagnosis.trial import Trial
+from estimator.physics.fit import FitResult
 from tests.estimator.diagnosis.planted import quiet, rubbing
 from tests.estimator.diagnosis.selection.mass import COULOMB, LINE, coulomb, late, selector, silent
 from tests.estimator.physics.bench import ONE_MASS
@@ -72,6 +74,21 @@ def test_a_way_is_completed_however_near_to_the_noise_it_ends(
     assert select._completed(friction, found.retuned, NOTHING).chosen == {COULOMB}
     monkeypatch.setattr("estimator.diagnosis.selection.selector.flexible", lambda names: names - {COULOMB})
     assert select._completed(friction, found.retuned, NOTHING).chosen == {COULOMB}
+
+
+def test_two_are_looked_at_once(select: Selector, found: Selection, monkeypatch: pytest.MonkeyPatch) -> None:
+    """From the one that by itself leaves less; but a profile takes up what another would add."""
+    firsts, asked = select._firsts(found.retuned, NOTHING), []
+
+    def completed(first: Trial, retuned: FitResult, without: Effects) -> _Path:
+        asked.append(without)
+        return _Path(NOTHING, retuned, {})
+
+    monkeypatch.setattr(select, "_completed", completed)
+    select.by_other_ways(nothing_of(found))
+    names = [first.name for first in firsts]
+    assert {"road_grade", COULOMB} <= set(names)
+    assert asked == [frozenset(names[:i]) - {"road_grade"} for i in range(len(names))]
 
 
 def test_what_is_better_stays(select: Selector, found: Selection) -> None:

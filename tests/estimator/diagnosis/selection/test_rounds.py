@@ -27,6 +27,25 @@ def test_what_lets_a_pressed_parameter_go_is_fitted_whatever_a_look_promises(mon
         assert set(tried._looks(tried.jury.names, NOTHING, current)) == looked_at
 
 
+def test_a_fit_is_looked_around_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    tried = rounds(quiet(values=ONE_MASS, samples=600), [COULOMB, STRIBECK])
+    asked: list[str] = []
+    looks = Screen.looks
+
+    def counted(screen: Screen, name: str) -> list[Look]:
+        asked.append(name)
+        return looks(screen, name)
+
+    monkeypatch.setattr(Screen, "looks", counted)
+    current = tried.jury.bench.fit(NOTHING)
+    first = tried._around(current, [COULOMB])
+    both = tried._around(replace(current), [COULOMB, STRIBECK])
+    assert asked == [COULOMB, STRIBECK]
+    assert both[COULOMB] is first[COULOMB]
+    tried._around(replace(current, x=current.x + 0.001), [COULOMB])
+    assert asked == [COULOMB, STRIBECK, COULOMB]
+
+
 def test_only_what_stays_near_the_best_is_finished(monkeypatch: pytest.MonkeyPatch) -> None:
     """Friction that falls with speed: after a few more steps its dry part alone is left behind."""
     records = rubbing(lambda speed: float(2.0 + 30.0 * np.exp(-((speed / 2.0) ** 2))))

@@ -12,7 +12,7 @@ from estimator.diagnosis.hypotheses import NOTHING, Effects, open_hypotheses
 from estimator.diagnosis.screening import Screen
 from estimator.diagnosis.selection import Selection, Selector
 from estimator.diagnosis.selection.rounds import MOST_FITS, WORTH_FITTING
-from estimator.diagnosis.selection.selector import MOST_EFFECTS, _Path
+from estimator.diagnosis.selection.selector import MOST_EFFECTS, PART_OF_REST, _Path
 from estimator.diagnosis.trial import Trial
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult
@@ -130,11 +130,21 @@ class TestSeveralEffects:
         assert simple.chosen == set(simple.accepted) == {COULOMB, "transport_delay"}
         assert simple.current.rms == pytest.approx(SIGMA, rel=0.1)
 
-    @pytest.mark.parametrize(("left", "least"), [(0.5, 0.5 * 2000 * (0.5**2 - 0.1**2)), (0.3, 0.0)])
-    def test_a_third_must_promise_to_complete_two_that_leave_too_much(
-        self, monkeypatch: pytest.MonkeyPatch, left: float, least: float
+    @pytest.mark.parametrize(
+        ("chosen", "left", "part"),
+        [
+            (set(), 0.5, 0.0),
+            ({COULOMB}, 0.5, PART_OF_REST),
+            ({COULOMB, "actuator_lag"}, 0.3, PART_OF_REST),
+            ({COULOMB, "actuator_lag"}, 0.5, 0.5),
+            ({COULOMB, "road_grade"}, 0.3, 0.0),
+            ({COULOMB, "road_grade"}, 0.5, 0.5),
+        ],
+    )
+    def test_a_further_effect_must_promise_a_part_of_the_rest(
+        self, monkeypatch: pytest.MonkeyPatch, chosen: set[str], left: float, part: float
     ) -> None:
-        """Of a mismatch of 1 they leave 25 % of the power or 9 %; the noise holds 1 %."""
+        """Half of it where two leave too much: of a mismatch of 1, 25 % of the power or 9 %; the noise holds 1 %."""
         select, asked = Selector(jury(quiet(values=ONE_MASS, samples=600), floor=0.1), silent), []
 
         def nothing_fitted(chosen: Effects, current: FitResult, *, least: float) -> dict[str, Trial]:
@@ -143,9 +153,9 @@ class TestSeveralEffects:
 
         monkeypatch.setattr(select._rounds, "try_all", nothing_fitted)
         monkeypatch.setattr(select, "_has_rest", lambda *_: True)
-        two = _Path(frozenset({COULOMB, "actuator_lag"}), of_rms(left, 4), {})
-        assert select._grown(two, of_rms(1.0, 2)) is two
-        assert asked == pytest.approx([least])
+        path = _Path(frozenset(chosen), of_rms(left, 4), {})
+        assert select._grown(path, of_rms(1.0, 2)) is path
+        assert asked == pytest.approx([part * 2000 * (left**2 - 0.1**2)])
 
     def test_there_is_an_end(self) -> None:
         assert 1 <= MOST_EFFECTS <= 6
