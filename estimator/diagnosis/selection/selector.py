@@ -222,12 +222,14 @@ class Selector:
         """Return by how much an effect must promise to lower the squared error of a path to be fitted.
 
         Where two leave too much to stand, a third must promise to complete them: what imitates takes a little each
-        time. Beside a profile a first look promises too little: it has taken up part of what is another's.
+        time. Beside a profile a first look promises too little: it has taken up part of what is another's. So may any
+        law where next to nothing is left.
         """
         if len(path.chosen) > 1 and not self.jury.weight.may_stand(path.current, retuned):
             return 0.5 * self._rest(path.current)
-        bends = any(EFFECTS[name].profile for name in path.chosen)
-        return PART_OF_REST * self._rest(path.current) if path.chosen and not bends else 0.0
+        if not path.chosen or self._is_near(path.current) or any(EFFECTS[name].profile for name in path.chosen):
+            return 0.0
+        return PART_OF_REST * self._rest(path.current)
 
     def _rest(self, result: FitResult) -> float:
         """Return the squared error that a fit leaves above the noise."""

@@ -135,6 +135,7 @@ class TestSeveralEffects:
         [
             (set(), 0.5, 0.0),
             ({COULOMB}, 0.5, PART_OF_REST),
+            ({COULOMB}, 0.14, 0.0),
             ({COULOMB, "actuator_lag"}, 0.3, PART_OF_REST),
             ({COULOMB, "actuator_lag"}, 0.5, 0.5),
             ({COULOMB, "road_grade"}, 0.3, 0.0),
