@@ -85,13 +85,16 @@ def pursue(pool: Sequence[Candidate], ground: Ground) -> Path:
         best = int(worth.argmax())
         if worth[best] <= 0.0 or counts[-1] + ranks[best] > MOST_COEFFICIENTS:
             break
-        chosen.append(best)
-        squares.append(float(remaining[best]))
-        counts.append(counts[-1] + int(ranks[best]))
-        members = np.flatnonzero(np.isin(group, chosen))
+        members = np.flatnonzero(np.isin(group, [*chosen, best]))
         weights = np.linalg.lstsq(full[np.ix_(members, members)], full_match[members], rcond=TOO_ALIKE)[0]
-        answers = np.hstack([pool[each].answers for each in sorted(chosen)])
+        answers = np.hstack([pool[each].answers for each in sorted([*chosen, best])])
         left = ground.error - ground.rest(answers @ (scale[members] * weights))
+        after = float(left @ left)  # what the sweeps promise is off by all their rounding
+        if n * math.log(squares[-1] / after) <= ranks[best] * math.log(n):
+            break
+        chosen.append(best)
+        squares.append(after)
+        counts.append(counts[-1] + int(ranks[best]))
         gram, match = _swept(gram, match, np.flatnonzero(group == best))
     columns = [pool[each].answers for each in chosen]
     term = np.repeat(np.arange(len(chosen)), [each.shape[1] for each in columns])

@@ -23,14 +23,14 @@ def test_what_re_tuning_explains_is_not_a_law() -> None:
     drag = pool["w_L |w_L|"].answers
     assert np.linalg.norm(ground.rest(inertia)) < 0.3 * np.linalg.norm(inertia)
     assert np.linalg.norm(ground.rest(drag)) > 0.05 * np.linalg.norm(drag)
-    free = result.jacobian[:, ~result.pinned]
-    assert np.max(np.abs(free.T @ ground.rest(drag))) < 1e-8 * np.max(np.abs(result.jacobian)) * np.linalg.norm(drag)
+    free = ground.jacobian[:, ~result.pinned]
+    assert np.max(np.abs(free.T @ ground.rest(drag))) < 1e-8 * np.max(np.abs(ground.jacobian)) * np.linalg.norm(drag)
 
 
 def test_a_column_of_the_jacobian_is_nothing_at_all() -> None:
     result = nominal_fit(quiet((1,)))
     ground = ground_of(scene(result, SIGMA))
-    path = pursue([Candidate(Element.MOTOR, "a parameter", result.jacobian[:, [2]].copy())], ground)
+    path = pursue([Candidate(Element.MOTOR, "a parameter", ground.jacobian[:, [2]].copy())], ground)
     assert path.chosen == []
     assert path.alone.tolist() == [0.0]
 
