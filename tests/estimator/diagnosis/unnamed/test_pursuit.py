@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -53,3 +55,23 @@ def test_a_group_is_worth_its_coefficients_and_not_more() -> None:
     np.testing.assert_allclose(planted.answers @ coefficients, signal @ [0.1, -0.05], atol=0.005)
     assert left @ left == pytest.approx(path.squares[1], rel=1e-6)
     assert left.std() == pytest.approx(0.02, rel=0.1)
+
+
+def test_what_re_tuning_explains_is_of_where_the_fit_ended() -> None:
+    """A fit's own derivative is of the place before its last step."""
+    result = nominal_fit(quiet((1,)))
+    plain = ground_of(scene(result, SIGMA))
+    before = replace(result, derivative=1.01 * result.jacobian + 0.1)
+    np.testing.assert_array_equal(ground_of(scene(before, SIGMA)).jacobian, plain.jacobian)
+
+
+def test_what_is_left_is_computed_and_not_promised(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As if the sweeps' rounding promised all of the error to a column that has nothing to do with it."""
+    rng = np.random.default_rng(5)
+    ground = ground_of(scene(nominal_fit(quiet((1,))), SIGMA))
+    pool = [Candidate(Element.MOTOR, "noise", rng.standard_normal((ground.error.size, 1)))]
+    whole = float(ground.error @ ground.error)
+    monkeypatch.setattr("estimator.diagnosis.unnamed.pursuit._gains", lambda *_: (np.array([whole]), np.array([1.0])))
+    path = pursue(pool, ground)
+    assert path.chosen == []
+    assert path.squares == [pytest.approx(whole)]
