@@ -19,7 +19,7 @@ import time
 import uuid
 from collections import Counter
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import can
@@ -68,6 +68,16 @@ def program(module: str, *arguments: str) -> Iterator[subprocess.Popen[str]]:
         process.communicate()
 
 
+def interrupt(process: subprocess.Popen[str]) -> None:
+    """Press Ctrl-C until the program ends: one may fall where the program, or its closing of a socket, swallows it."""
+    deadline = time.monotonic() + PATIENCE_S
+    while process.poll() is None:
+        assert time.monotonic() < deadline, f"{process.args} goes on after every Ctrl-C"
+        process.send_signal(signal.SIGINT)
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(5.0)
+
+
 def await_line(process: subprocess.Popen[str], word: str) -> None:
     assert process.stdout is not None
     for line in process.stdout:
@@ -88,8 +98,7 @@ def test_logger_logs_every_frame_of_a_run(tmp_path: Path) -> None:
                 run(rig, devices, Samples(), experiment="reversal")
                 devices.link.trace_by(None)
             await_frames(logged, sum(frames_of(traced).values()))
-            logger.send_signal(signal.SIGINT)
-            logger.wait(PATIENCE_S)
+            interrupt(logger)
     missing = frames_of(traced) - frames_of(logged)
     assert not missing, f"frames the logger did not see: {missing}"
 
