@@ -3,10 +3,10 @@
 ``scipy.optimize.least_squares`` decomposes the whole Jacobian at every step; with ten thousand errors and twenty
 unknowns that costs more than the simulations that made it. Here the step comes from the normal equations, with
 Marquardt's scaling (SIAM J. Appl. Math. 11, 1963), and is the least of the damped quadratic inside the bounds
-(``scipy.optimize.lsq_linear``: Stark and Parker, Computational Statistics 10, 1995). Near the end, where steps keep
-what they promise, the Jacobian is carried on by Broyden's update (Math. Comp. 19, 1965; with Marquardt's method:
-Madsen, Nielsen and Tingleff, Methods for Non-Linear Least Squares Problems, DTU 2004, 3.5): it costs a simulation per
-unknown, a step one. A fit ends a last small step from a Jacobian found anew.
+(``estimator.physics.bounded``). Near the end, where steps keep what they promise, the Jacobian is carried on by
+Broyden's update (Math. Comp. 19, 1965; with Marquardt's method: Madsen, Nielsen and Tingleff, Methods for Non-Linear
+Least Squares Problems, DTU 2004, 3.5): it costs a simulation per unknown, a step one. A fit ends a last small step from
+a Jacobian found anew.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy import linalg
-from scipy.optimize import lsq_linear
 
+from estimator.physics.bounded import least_inside, unbounded_first
 from estimator.signals.record import FloatArray
 
 CONVERGED = 0.1
@@ -32,9 +32,6 @@ FAR = 0.2
 FIRST_DAMPING = 1e-3
 EASE, STIFFEN = 0.2, 5.0
 LEAST_DAMPING, MOST_DAMPING = 1e-10, 1e9
-
-TINY = 1e-12
-"""Room that a bound always leaves: an interval of no length is none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,16 +125,12 @@ def _step(
     high: FloatArray,
 ) -> FloatArray:
     """Return the damped Gauss-Newton step inside the bounds: the least of the damped quadratic there."""
-    free = low < high
+    free = unbounded_first(low, high, low < high)
     diagonal = np.diag(curvature)
     damped = curvature + np.diag(damping * np.maximum(diagonal, 1e-12 * diagonal.max()))
-    step = np.zeros_like(x)
     factor = linalg.cholesky(damped[np.ix_(free, free)])  # upper triangular
     target = -linalg.solve_triangular(factor, gradient[free], trans="T")
-    inside = linalg.solve_triangular(factor, target)
+    step = np.zeros_like(x)
     down, up = low[free] - x[free], high[free] - x[free]
-    if np.any((inside < down) | (inside > up)):
-        room = (np.minimum(down, 0.0), np.maximum(up, 0.0) + TINY)
-        inside = np.clip(lsq_linear(factor, target, room, method="bvls").x, down, up)
-    step[free] = inside
+    step[free] = least_inside(factor, target, np.minimum(down, 0.0), np.maximum(up, 0.0))
     return step

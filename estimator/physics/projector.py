@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import lsq_linear
 
+from estimator.physics.bounded import least_inside, unbounded_first
 from estimator.physics.fit import FitResult, bounds
 from estimator.signals.record import FloatArray
 
@@ -20,8 +20,8 @@ class Projector:
 
     def __init__(self, result: FitResult) -> None:
         low, high = bounds(result.problem)
-        movable = low < high
         jacobian = result.jacobian
+        movable = unbounded_first(low, high, (low < high) & jacobian.any(axis=0))
         self._free = np.linalg.qr(jacobian[:, ~result.pinned])[0]
         self._all, self._triangle = np.linalg.qr(jacobian[:, movable])
         x = result.x[movable]
@@ -53,13 +53,9 @@ class Projector:
         if across == 0.0:
             return 0.0, 0.0
         target = -np.append(self._all.T @ self._residual, float(rest @ self._residual) / across)
-        corner = np.append(np.zeros(self._triangle.shape[1]), across)
-        matrix = np.vstack([np.column_stack([self._triangle, along]), corner])
+        corner = np.append(np.zeros(along.size), across)
+        triangle = np.vstack([np.column_stack([self._triangle, along]), corner])
         lowest, highest = np.append(self._room[0], low), np.append(self._room[1], high)
-        solution = lsq_linear(matrix, target, (np.minimum(lowest, 0.0), np.maximum(highest, 0.0) + TINY), method="bvls")
-        fall = float(target @ target) - 2.0 * float(solution.cost)
-        return float(solution.x[-1]), fall
-
-
-TINY = 1e-12
-"""Room that a bound always leaves: an interval of no length is none."""
+        moved = least_inside(triangle, target, np.minimum(lowest, 0.0), np.maximum(highest, 0.0))
+        left = triangle @ moved - target
+        return float(moved[-1]), float(target @ target - left @ left)

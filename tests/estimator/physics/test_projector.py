@@ -93,3 +93,11 @@ class TestPromise:
         size, fall = project.promise(along, 0.0, 5.0)
         assert size == pytest.approx(0.0, abs=1e-9)
         assert fall == pytest.approx(0.0, abs=1e-6)
+
+    def test_an_unknown_that_does_nothing_changes_no_promise(self, design: np.ndarray, noise: np.ndarray) -> None:
+        """As a phase does while its amplitude is 0."""
+        along = np.random.default_rng(7).standard_normal(SAMPLES)
+        y = design @ [0.3, -0.2, 0.1] + 1.5 * along + noise
+        idle = np.column_stack([design, np.zeros(SAMPLES)])
+        with_idle = Projector(regression([idle], [y])).promise(along, -5.0, 5.0)
+        assert with_idle == pytest.approx(Projector(regression([design], [y])).promise(along, -5.0, 5.0))

@@ -1,0 +1,51 @@
+"""What is least inside bounds is what scipy finds from the whole matrix."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import lsq_linear
+
+from estimator.physics.bounded import least_inside, unbounded_first
+
+UNKNOWNS = 8
+NO_BOUND = np.full(UNKNOWNS, np.inf)
+
+
+@pytest.fixture
+def rng(request: pytest.FixtureRequest) -> np.random.Generator:
+    return np.random.default_rng(request.param)
+
+
+@pytest.mark.parametrize("rng", range(20), indirect=True)
+@pytest.mark.parametrize("bounded", [0, 1, 5, UNKNOWNS])
+def test_it_is_the_least_whatever_has_bounds(rng: np.random.Generator, bounded: int) -> None:
+    matrix, target = rng.standard_normal((30, UNKNOWNS)), 5.0 * rng.standard_normal(30)
+    high = NO_BOUND.copy()
+    high[UNKNOWNS - bounded :] = 0.1
+    q, triangle = np.linalg.qr(matrix)
+    x = least_inside(triangle, q.T @ target, -high, high)
+    theirs = lsq_linear(matrix, target, (-high, high), method="bvls", tol=1e-14)
+    assert np.all(np.abs(x) <= high)
+    np.testing.assert_allclose(x, theirs.x, atol=1e-9)
+
+
+def test_where_the_free_least_lies_inside_it_is_that() -> None:
+    rng = np.random.default_rng(3)
+    triangle, target = np.triu(rng.standard_normal((4, 4))) + 3.0 * np.eye(4), rng.standard_normal(4)
+    x = least_inside(triangle, target, np.full(4, -9.0), np.full(4, 9.0))
+    np.testing.assert_allclose(triangle @ x, target, atol=1e-12)
+
+
+def test_a_bound_of_no_room_holds_its_unknown() -> None:
+    """Pressed against it from the start: the other takes what it can."""
+    triangle = np.array([[1.0, 1.0], [0.0, 1.0]])
+    x = least_inside(triangle, np.array([2.0, 1.0]), np.array([-np.inf, -1.0]), np.array([np.inf, 0.0]))
+    np.testing.assert_allclose(x, [2.0, 0.0], atol=1e-12)
+
+
+def test_unknowns_without_bounds_come_first_the_rest_in_order() -> None:
+    low = np.array([0.0, -np.inf, -np.inf, -1.0, -np.inf])
+    high = np.array([1.0, np.inf, 3.0, 1.0, np.inf])
+    assert unbounded_first(low, high, np.ones(5, dtype=bool)).tolist() == [1, 4, 0, 2, 3]
+    assert unbounded_first(low, high, np.array([True, False, True, True, True])).tolist() == [4, 0, 2, 3]
