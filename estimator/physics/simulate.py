@@ -14,7 +14,7 @@ from estimator.physics import joint, own_law, own_law_run
 from estimator.physics.kernel import integration, sensing, slots, state_vector
 from estimator.physics.model import DrivelineModel, Structure, natural_frequencies_rad_s
 from estimator.physics.motion import reverses, speed_scale
-from estimator.physics.torque_path import shaft_torque
+from estimator.physics.torque_path import shaft_torques
 from estimator.signals.record import FloatArray, Location, OutputKind, Record
 
 RADIANS_PER_STEP = 0.2
@@ -195,7 +195,7 @@ def simulate_each(grid: Grid, record: Record, cases: Sequence[Case], output: int
         return np.array([_joint_output(record, case, wanted) for case in cases])
     if any(own_law.active(case.p) for case in cases):
         return np.array([_under_laws(grid, record, case, wanted, output is None) for case in cases])
-    inputs = [_input(record, case) for case in cases]
+    given = _inputs(record, cases)
     shape = (len(cases), record.time_s.size)
     slopes = np.zeros((shape[0], 2, shape[1] if output is None and record.offset_s is not None else 0))
     out = np.empty(shape)
@@ -205,11 +205,11 @@ def simulate_each(grid: Grid, record: Record, cases: Sequence[Case], output: int
         grid.substeps,
         grid.sign_width,
         record.since_start_s[0],
-        np.array([each.torque for each in inputs]),
-        np.array([each.load for each in inputs]),
-        _angle(record, [case.p for case in cases]),
-        np.array([case.p for case in cases]),
-        np.array([each.state for each in inputs]),
+        given.torque,
+        given.load,
+        _angle(record, given.p),
+        given.p,
+        given.state,
         wanted,
         output is None and wanted != state_vector.ANGLE,
         out,
@@ -218,25 +218,41 @@ def simulate_each(grid: Grid, record: Record, cases: Sequence[Case], output: int
     return _sampled_off_time(out, slopes, record.offset_s)
 
 
-class _Input(NamedTuple):
-    """What drives a line: torque on its shaft and load torque [Nm], shape (N,) each, and the kernel's start state."""
+class _Inputs(NamedTuple):
+    """What drives a line in each of K simulations.
 
+    Attributes
+    ----------
+    p : ndarray, shape (K, layout.SIZE)
+        Parameters.
+    torque, load : ndarray, shape (K, N)
+        Torque on its shaft and load torque [Nm].
+    state : ndarray, shape (K, STATES)
+        The kernel's start state, which a simulation overwrites.
+    """
+
+    p: FloatArray
     torque: FloatArray
     load: FloatArray
     state: FloatArray
 
 
-def _input(record: Record, case: Case) -> _Input:
-    torque = shaft_torque(record.torque_nm, record.since_start_s, case.p)
-    load = np.full(torque.shape, case.start.load_torque_nm)
-    if case.extra_load_nm is not None:
-        load += case.extra_load_nm
-    return _Input(torque, load, initial_state(case.start, torque[0], 0.0, case.p))
+def _inputs(record: Record, cases: Sequence[Case]) -> _Inputs:
+    parameters = [case.p for case in cases]
+    torque = shaft_torques(record.torque_nm, record.since_start_s, parameters)
+    load = np.empty_like(torque)
+    for row, case in zip(load, cases, strict=True):
+        row[:] = case.start.load_torque_nm
+        if case.extra_load_nm is not None:
+            row += case.extra_load_nm
+    firsts = torque[:, 0].tolist()
+    state = np.array([initial_state(case.start, first, 0.0, case.p) for case, first in zip(cases, firsts, strict=True)])
+    return _Inputs(np.array(parameters), torque, load, state)
 
 
-def _angle(record: Record, parameters: Sequence[FloatArray]) -> FloatArray:
-    """Return the angle that periodic laws take their phase from; 0 where none needs it."""
-    if any(p[PERIODIC].any() for p in parameters):
+def _angle(record: Record, p: FloatArray) -> FloatArray:
+    """Return the angle that periodic laws take their phase from; 0 where none of the parameters (K, SIZE) needs it."""
+    if p[:, PERIODIC].any():
         return motor_angle(record)
     return np.zeros(record.time_s.size)
 
@@ -256,11 +272,12 @@ def _joint_output(record: Record, case: Case, output: int) -> FloatArray:
 
 def _under_laws(grid: Grid, record: Record, case: Case, output: int, recorded: bool) -> FloatArray:
     """Simulate with laws of a user's own: their torques are held over an integration step, which is a sample then."""
-    laws, given = own_law.active(case.p), _input(record, case)
-    angle, masses = _angle(record, [case.p]), MASSES[grid.structure]
-    run = own_law_run.Run.of(
-        masses, grid.substeps, grid.sign_width, record, given.torque, given.load, angle, case.p
-    ).under(laws, given.state)
+    laws, given = own_law.active(case.p), _inputs(record, [case])
+    torque, load, state = given.torque[0], given.load[0], given.state[0]
+    angle, masses = _angle(record, given.p), MASSES[grid.structure]
+    run = own_law_run.Run.of(masses, grid.substeps, grid.sign_width, record, torque, load, angle, case.p).under(
+        laws, state
+    )
     slopes = np.zeros((2, run.torque.size if recorded and record.offset_s is not None else 0))
     out = np.empty_like(run.torque)
     integration.integrate(
@@ -274,14 +291,14 @@ def _under_laws(grid: Grid, record: Record, case: Case, output: int, recorded: b
         run.load,
         run.angle,
         case.p,
-        given.state.copy(),
+        state.copy(),
         output,
         recorded and output != state_vector.ANGLE,
         out,
         slopes,
     )
     if recorded:
-        out += run.misread(laws, given.state)
+        out += run.misread(laws, state)
     every = grid.substeps
     return _sampled_off_time(out[::every], slopes[:, ::every], record.offset_s)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -18,6 +19,7 @@ _SHARPNESS = slot("torque_saturation", "sharpness")
 _LIMIT_SUM = slot("torque_saturation", "limit_sum_nm")
 _DEPTH = slot("torque_derating", "depth")
 _DERATING_TIME = slot("torque_derating", "time_constant_s")
+_PATH = np.array([_GAIN_M1, _GAIN_M2, _LIMIT_M1, _LIMIT_M2, _SHARPNESS, _LIMIT_SUM, _DEPTH, _DERATING_TIME])
 
 
 def limited(torque: FloatArray, limit: float, sharpness: float) -> FloatArray:
@@ -61,3 +63,11 @@ def shaft_torque(torque_nm: FloatArray, since_start_s: FloatArray, p: FloatArray
     if p[_DEPTH] != 0.0:
         total = total * (1.0 + p[_DEPTH] * np.expm1(-since_start_s / p[_DERATING_TIME]))
     return total
+
+
+def shaft_torques(torque_nm: FloatArray, since_start_s: FloatArray, parameters: Sequence[FloatArray]) -> FloatArray:
+    """Return ``shaft_torque`` for each of K parameter vectors, shape (K, N): most are alike in what acts on it."""
+    keys = [p[_PATH].tobytes() for p in parameters]
+    distinct = dict(zip(keys, parameters, strict=True))
+    torques = {key: shaft_torque(torque_nm, since_start_s, p) for key, p in distinct.items()}
+    return np.array([torques[key] for key in keys])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from estimator.physics.layout import flat_values
-from estimator.physics.torque_path import limited, shaft_torque
+from estimator.physics.torque_path import limited, shaft_torque, shaft_torques
 from estimator.signals.record import FloatArray
 from tests.estimator.physics import reference
 from tests.estimator.physics.bench import SAMPLE_TIME_S, TWO_MASS, random_steps
@@ -49,6 +49,23 @@ def test_gains_beyond_two_inputs_stay_at_one() -> None:
     out = supplied(three, inverter_gain_mismatch={"gain_m1": 2.0, "gain_m2": 3.0})
     np.testing.assert_allclose(out, 2.0 * BOTH[:, 0] + 3.0 * BOTH[:, 1] + 5.0)
     np.testing.assert_allclose(supplied(BOTH[:, :1], inverter_gain_mismatch={"gain_m1": 2.0}), 2.0 * BOTH[:, 0])
+
+
+def test_several_parameter_vectors_at_once_are_those_one_by_one() -> None:
+    """Of those alike in what acts on the torque, too."""
+    each = [
+        flat_values(TWO_MASS | {"k": stiffness}, effects)
+        for stiffness in (TWO_MASS["k"], 2.0 * TWO_MASS["k"])
+        for effects in (
+            {},
+            {"inverter_gain_mismatch": {"gain_m1": 1.1, "gain_m2": 0.9}},
+            {"torque_saturation": {"limit_m1_nm": 30.0}},
+            {"torque_saturation": {"limit_sum_nm": 50.0, "sharpness": 4.0}},
+            {"torque_derating": {"depth": -0.2, "time_constant_s": 1.0}},
+            {"torque_derating": {"depth": -0.2, "time_constant_s": 2.0}},
+        )
+    ]
+    np.testing.assert_array_equal(shaft_torques(BOTH, TIME_S, each), [shaft_torque(BOTH, TIME_S, p) for p in each])
 
 
 def knee(torque_nm: FloatArray, limit_nm: float, sharpness: float) -> FloatArray:
