@@ -208,9 +208,9 @@ class Screen:
         start = start_of(problem, self._result.x, index)
         extra = basis.extra_load(self._result.local_of(index))
 
-        def run(parameters: Sequence[FloatArray]) -> FloatArray:
+        def run(parameters: Sequence[FloatArray], alike_s: FloatArray | None = None) -> FloatArray:
             cases = [Case(p, start, extra) for p in parameters]
-            return simulate_each(problem.grid, record, cases)[:, problem.use[index]]
+            return simulate_each(problem.grid, record, cases, alike_s=alike_s)[:, problem.use[index]]
 
         return run
 

@@ -206,11 +206,19 @@ def simulated(problem: Problem, p: FloatArray, local: FloatArray, index: int) ->
     return only
 
 
-def simulated_each(problem: Problem, points: Sequence[tuple[FloatArray, FloatArray]], index: int) -> FloatArray:
-    """Return the outputs of one recording for parameter vectors and the recording's own unknowns, shape (K, N)."""
+def simulated_each(
+    problem: Problem,
+    points: Sequence[tuple[FloatArray, FloatArray]],
+    index: int,
+    alike_s: FloatArray | None = None,
+) -> FloatArray:
+    """Return the outputs of one recording for parameter vectors and the recording's own unknowns, shape (K, N).
+
+    ``alike_s``, shape (K,), tells up to when each is as the first one (``simulate.simulate_each``).
+    """
     record, basis = problem.records[index], problem.local[index]
     cases = [Case(basis.parameters(p, local), basis.start(local), basis.extra_load(local)) for p, local in points]
-    out = simulate_each(problem.grid, record, cases)
+    out = simulate_each(problem.grid, record, cases, alike_s=alike_s)
     worst = BAD * (float(np.abs(record.output[record.okay]).max()) or 1.0)
     if np.abs(out).max() <= worst:  # False where it is no number
         return out

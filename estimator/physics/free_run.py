@@ -84,8 +84,9 @@ def _with_own(problem: Problem) -> FloatArray:
     rest = Projector(still)
     begin, extra = start_of(still.problem, still.x, 0), basis.extra_load(still.x)
 
-    def run(parameters: Sequence[FloatArray]) -> FloatArray:
-        return simulate_each(problem.grid, record, [Case(p, begin, extra) for p in parameters])[:, use]
+    def run(parameters: Sequence[FloatArray], alike_s: FloatArray | None = None) -> FloatArray:
+        cases = [Case(p, begin, extra) for p in parameters]
+        return simulate_each(problem.grid, record, cases, alike_s=alike_s)[:, use]
 
     found: dict[tuple[str, str], float] = {}
     for name in names:

@@ -111,9 +111,9 @@ def _moved_in(result: FitResult, index: int) -> FloatArray | None:
         moves = [[row] for row in may_move] + ([may_move] if len(may_move) > 1 else [])
         for _ in range(MOVES):
             tried = [_shifted(local, rows, offset) for rows in moves for offset in OFFSETS_S]
-            tried = [x for x in tried if first <= x[begin] < x[end] <= last]
+            tried = [local, *(x for x in tried if first <= x[begin] < x[end] <= last)]
             squares = misfit.squares(tried)
-            if not tried or squares.min() >= best:
+            if squares.min() >= best:
                 break
             best = float(squares.min())
             local = tried[int(squares.argmin())]
@@ -145,6 +145,13 @@ def _around(basis: LocalBasis, local: FloatArray, record: Record) -> LocalBasis:
     return replace(basis, own=own)
 
 
+def _alike_s(tried: Sequence[FloatArray]) -> FloatArray:
+    """Return up to when each of several vectors that differ in moments is as the first, shape (K,) [s]."""
+    earliest = np.minimum(tried, tried[0])
+    alike: FloatArray = np.where(tried == tried[0], np.inf, earliest).min(axis=1)
+    return alike
+
+
 class _Misfit:
     """The error of one recording for other moments, less what its load torque and initial state could take up."""
 
@@ -155,11 +162,9 @@ class _Misfit:
         self._taken_up = np.linalg.qr(changes(result.problem, result.x, index, columns, result.outputs[index]))[0]
 
     def squares(self, tried: Sequence[FloatArray]) -> FloatArray:
-        """Return the squared error for each of several vectors of the recording's unknowns, shape (K,)."""
-        if not tried:
-            return np.empty(0)
+        """Return the squared error for each of several vectors that differ in moments, shape (K,)."""
         record, use = self._problem.records[self._index], self._problem.use[self._index]
-        outputs = simulated_each(self._problem, [(self._p, local) for local in tried], self._index)
+        outputs = simulated_each(self._problem, [(self._p, x) for x in tried], self._index, _alike_s(tried))
         errors = (outputs - record.output)[:, use]
         left: FloatArray = (errors**2).sum(axis=1) - ((errors @ self._taken_up) ** 2).sum(axis=1)
         return left

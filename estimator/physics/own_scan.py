@@ -8,9 +8,10 @@ and a sine, and moments from the answers to the effect in every cell of a grid o
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Protocol
 
 import numpy as np
 
@@ -19,8 +20,16 @@ from estimator.physics.layout import slot
 from estimator.physics.unknowns import Shared
 from estimator.signals.record import FloatArray
 
-Simulate = Callable[[Sequence[FloatArray]], FloatArray]
-"""K parameter vectors to the simulated samples that count, shape (K, R)."""
+
+class Simulate(Protocol):
+    """K parameter vectors to the simulated samples that count, shape (K, R).
+
+    ``alike_s``, shape (K,), tells up to when each is as the first one (``simulate.simulate_each``).
+    """
+
+    def __call__(self, parameters: Sequence[FloatArray], alike_s: FloatArray | None = None) -> FloatArray:
+        """Return the simulated samples."""
+
 
 MOST_CELLS = 40
 SHORTEST_CELL_S = 0.5
@@ -87,7 +96,7 @@ def cells(entry: Effect, p: FloatArray, own: tuple[Shared, ...], sizes: Mapping[
         moved.append(silent.copy())
         moved[-1][slot(entry.name, size_name)] = SMALL * size
         moved[-1][begin.slot], moved[-1][end.slot] = low, high
-    outputs = run(moved)
+    outputs = run(moved, moments[[0, *range(count)]])
     return Cells(moments, np.cumsum((outputs - outputs[0]) / (SMALL * size), axis=0))
 
 

@@ -15,7 +15,7 @@ from estimator.physics.kernel import integration, sensing, slots, state_vector
 from estimator.physics.model import DrivelineModel, Structure, natural_frequencies_rad_s
 from estimator.physics.motion import reverses, speed_scale
 from estimator.physics.torque_path import shaft_torques
-from estimator.signals.record import FloatArray, Location, OutputKind, Record
+from estimator.signals.record import FloatArray, IntArray, Location, OutputKind, Record
 
 RADIANS_PER_STEP = 0.2
 """Integration step in radians of the line's natural frequency, or its fastest decay. Fourth order would allow more; a
@@ -183,8 +183,19 @@ def simulate(
     return only
 
 
-def simulate_each(grid: Grid, record: Record, cases: Sequence[Case], output: int | None = None) -> FloatArray:
+def simulate_each(
+    grid: Grid,
+    record: Record,
+    cases: Sequence[Case],
+    output: int | None = None,
+    alike_s: FloatArray | None = None,
+) -> FloatArray:
     """Simulate a recording several times; see ``simulate``.
+
+    Parameters
+    ----------
+    alike_s : ndarray, shape (len(cases),), optional
+        Time since the recording began up to which each case is as the first one [s]: it is simulated from there on.
 
     Returns
     -------
@@ -214,8 +225,18 @@ def simulate_each(grid: Grid, record: Record, cases: Sequence[Case], output: int
         output is None and wanted != state_vector.ANGLE,
         out,
         slopes,
+        _samples_alike(record, len(cases), alike_s),
     )
     return _sampled_off_time(out, slopes, record.offset_s)
+
+
+def _samples_alike(record: Record, count: int, alike_s: FloatArray | None) -> IntArray:
+    """Return how many samples each case has in common with the first one; all for that one itself."""
+    alike = np.zeros(count, dtype=np.int64)
+    if alike_s is not None:
+        alike[:] = np.searchsorted(record.since_start_s, alike_s - record.sample_time_s)
+    alike[0] = record.time_s.size
+    return alike
 
 
 class _Inputs(NamedTuple):

@@ -11,6 +11,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
+
 from estimator.compiled import brief, compiled, inlined
 from estimator.physics.effects import actuator_lag, transport_delay
 from estimator.physics.kernel import slots
@@ -18,7 +20,7 @@ from estimator.physics.kernel.conditions import conditions, is_changing, is_wavi
 from estimator.physics.kernel.rates import rates
 from estimator.physics.kernel.sensing import entry, reading, shown, smoothed
 from estimator.physics.kernel.state_vector import FILTER_RISE, FILTERED, LAG_RISE, LAGGED, Conditions, State
-from estimator.signals.record import FloatArray
+from estimator.signals.record import FloatArray, IntArray
 
 RADIANS_PER_STEP_OF_MODE = 0.6
 """Integration step in radians of the extra mode, which is seen through the motor's inertia only."""
@@ -95,6 +97,19 @@ def with_mode(substeps: int, sample_time_s: float, p: FloatArray) -> int:
 
 
 @inlined
+def slope_before(k: int, slopes: FloatArray) -> float:
+    """Return the slope that was left before a sample; 0 where none are wanted."""
+    return float(slopes[0, k]) if k < slopes.shape[1] else 0.0
+
+
+@inlined
+def leave_slope(k: int, slope: float, slopes: FloatArray) -> None:
+    """Leave the slope before a sample where there is room for it."""
+    if k < slopes.shape[1]:
+        slopes[0, k] = slope
+
+
+@inlined
 def integrate_masses(
     masses: int,
     extended: bool,
@@ -122,18 +137,17 @@ def integrate_masses(
     waving, filtering = is_waving(p), p[slots.FILTER] > 0.0
     late = p[slots.DELAY] != 0.0 or p[slots.DRIFT] != 0.0
     steep = slopes.shape[1] > 0
-    slope = 0.0
+    slope = slope_before(first, slopes)
     n = torque.shape[0]
     x = unpacked(state)
     lagged, lag_rise = state[LAGGED], state[LAG_RISE]
     filtered, filter_rise = state[FILTERED], state[FILTER_RISE]
     now = conditions(masses, start_s + first * sample_time_s, h, 0.0, 0.0, sign_width, p)
     for k in range(first, n):
-        turn = angle[k + 1] - angle[k] if k + 1 < n else angle[k] - angle[k - 1]
+        turn = angle[k + 1] - angle[k] if k + 1 < angle.shape[0] else angle[k] - angle[k - 1]
         value = entry(x, output)
         out[k] = shown(reading(value, angle[k], p), filtered, p) if sensor else value
-        if steep:
-            slopes[0, k] = slope
+        leave_slope(k, slope, slopes)
         time_s = start_s + k * sample_time_s
         varying = waving or is_changing(time_s - sample_time_s, time_s + sample_time_s, p)
         if not varying:
@@ -158,6 +172,7 @@ def integrate_masses(
                 filtered, filter_rise = smoothed(before, x, output, turned, turns, filtered, filter_rise, p, h)
             if steep and j == 0:
                 slopes[1, k] = slope
+    leave_slope(n, slope, slopes)
     for i, last in enumerate(x):
         state[i] = last
     state[LAGGED], state[LAG_RISE] = lagged, lag_rise
@@ -209,7 +224,7 @@ def integrate(
         Time of sample 0, for laws over time [s].
     torque, load : ndarray, shape (N,)
         Torque on the motor shaft before delay and lag, held over each period, and load torque [Nm].
-    angle : ndarray, shape (N,)
+    angle : ndarray, shape (N,) or longer
         Motor angle at each sample, which periodic laws take their phase from [rad].
     p : ndarray, shape (layout.SIZE,)
         Parameters of the superset model.
@@ -222,7 +237,8 @@ def integrate(
     out : ndarray, shape (N,)
         Filled from ``first`` on.
     slopes : ndarray, shape (2, N) or (2, 0)
-        Where it has room: slope of the output just before and just after each sample [unit of the output / s].
+        Where it has room: slope of the output just before and just after each sample [unit of the output / s]. That
+        before ``first`` is taken from it, and where it is longer that before the next sample is left in it.
     """
     given = (sample_time_s, substeps, sign_width, first, start_s, torque, load, angle, p)
     wanted = (state, output, sensor, out, slopes)
@@ -256,12 +272,24 @@ def integrate_each(
     sensor: bool,
     out: FloatArray,
     slopes: FloatArray,
+    alike: IntArray,
 ) -> None:
     """Do what ``integrate`` does for every row of ``torque``, ``load``, ``p``, ``state``, ``out`` and ``slopes``.
 
-    One call for many simulations: threads do not wait for the interpreter in between.
+    One call for many simulations: threads do not wait for the interpreter in between. Row i is as row 0 before sample
+    ``alike[i]`` and is simulated from there on; ``alike[0]`` is the number of samples.
     """
-    given = (sample_time_s, substeps, sign_width, 0, start_s)
-    for i in range(torque.shape[0]):
+    given = (sample_time_s, substeps, sign_width)
+    reached = 0
+    for i in np.argsort(alike):
+        if alike[i] > reached:
+            known = (torque[0, : alike[i]], load[0], angle, p[0], state[0])
+            integrate(masses, *given, reached, start_s, *known, output, sensor, out[0], slopes[0])
+            reached = alike[i]
+        if reached > 0 and i > 0:
+            state[i] = state[0]
+            out[i, :reached] = out[0, :reached]
+            slopes[i, :, : reached + 1] = slopes[0, :, : reached + 1]
+    for i in range(1, torque.shape[0]):
         rows = (torque[i], load[i], angle, p[i], state[i])
-        integrate(masses, *given, *rows, output, sensor, out[i], slopes[i])
+        integrate(masses, *given, alike[i], start_s, *rows, output, sensor, out[i], slopes[i])

@@ -20,7 +20,7 @@ BRAKE, IMBALANCE, RESOLVER = EFFECTS["brake_drag"], EFFECTS["load_imbalance"], E
 
 def each(run: Callable[[FloatArray], FloatArray]) -> Simulate:
     """One simulation after the other."""
-    return lambda parameters: np.array([run(p) for p in parameters])
+    return lambda parameters, alike_s=None: np.array([run(p) for p in parameters])
 
 
 class TestBestStretch:

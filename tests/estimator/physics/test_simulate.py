@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 
 from estimator.errors import BadModel
 from estimator.physics.kernel import state_vector
-from estimator.physics.layout import flat, slot
+from estimator.physics.layout import flat, flat_values, slot
 from estimator.physics.model import Structure, natural_frequencies_rad_s
 from estimator.physics.simulate import (
     FASTEST_IN_NYQUIST,
@@ -166,3 +167,25 @@ def test_many_simulations_in_one_call_are_those_of_single_calls() -> None:
     single = [simulate(grid, recording, case.p, case.start, case.extra_load_nm) for case in cases]
     np.testing.assert_array_equal(simulate_each(grid, recording, cases), single)
     assert np.ptp([out[-1] for out in single]) > 0.1
+
+
+@pytest.mark.parametrize(
+    "effects", [{}, {"transport_delay": {"delay_s": 0.013}}, {"torque_ripple": {"amplitude_nm": 2.0}}]
+)
+def test_what_is_alike_up_to_a_moment_is_simulated_from_there_to_the_last_digit(
+    effects: Mapping[str, Mapping[str, float]],
+) -> None:
+    """Through delay, filter, samples off their time, and whatever else has a memory."""
+    bus = model(TWO_MASS)
+    off_time = np.random.default_rng(4).uniform(-0.002, 0.002, 400)
+    recording = replace(record(random_steps(400, seed=4)), offset_s=off_time)
+    brake = {"brake_nm": 8.0, "from_s": 0.5, "to_s": 0.5}
+    still = flat_values(bus.values(), {**effects, "speed_filter": {"time_constant_s": 0.03}, "brake_drag": brake})
+    begins_s = np.array([0.5, 2.5, 0.0, 1.003, 3.99, 1.0])
+    cases = [Case(still.copy(), Start(5.0, 0.0, 20.0, load_speed_rad_s=20.0)) for _ in begins_s]
+    for case, begin in zip(cases[1:], begins_s[1:], strict=True):
+        case.p[slot("brake_drag", "from_s")], case.p[slot("brake_drag", "to_s")] = begin, begin + 0.7
+    grid = grid_for(bus, [recording])
+    whole = simulate_each(grid, recording, cases)
+    np.testing.assert_array_equal(simulate_each(grid, recording, cases, alike_s=begins_s), whole)
+    assert min(np.ptp(out - whole[0]) for out in whole[[1, 2, 3, 5]]) > 0.1
