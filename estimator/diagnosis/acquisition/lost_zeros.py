@@ -21,6 +21,9 @@ NEAR_STEPS = 5
 COMMON_LEVELS = 5
 """So many of the commonest other values are looked at, whether they come as zero does."""
 
+AS_EXACTLY = 0.5
+"""Of what is near another level for short as large a share must be that level exactly, times this, as for zero."""
+
 NEAR_SHARE = 0.02
 """... or within this share of the channel's size, whichever is more."""
 
@@ -110,9 +113,21 @@ def _out_of_line(values: FloatArray, near: float) -> BoolArray:
 
 
 def _has_levels(series: Sequence[FloatArray], near: float, count: int) -> bool:
-    """Tell whether zero may be one of the signal's own levels: others come alone as often, for short, from afar."""
+    """Tell whether zero may be one of the signal's own levels: others come alone as often, for short, from afar.
+
+    And as exactly: what a signal jumps to and back is read with its noise, so that values beside it come as well.
+    """
     pooled = np.concatenate(series)
     levels, times = np.unique(pooled[np.isfinite(pooled) & (pooled != 0.0)], return_counts=True)
     common = levels[np.argsort(times)[-COMMON_LEVELS:]]
     alone = [sum(int(_out_of_line(values - level, near).sum()) for values in series) for level in common]
-    return max(alone, default=0) >= 0.25 * count
+    exactly = count / _visits(series, near)
+    return any(
+        rows >= 0.25 * count and rows >= AS_EXACTLY * exactly * _visits([values - level for values in series], near)
+        for level, rows in zip(common, alone, strict=True)
+    )
+
+
+def _visits(series: Sequence[FloatArray], near: float) -> int:
+    """Return how many values are near zero for a short while, or on their way through it."""
+    return sum(int(shorter_runs(np.abs(values) <= near, LONGEST_ZERO).sum()) for values in series)

@@ -108,6 +108,33 @@ def test_of_a_torque_that_rests_at_zero_what_is_lost_with_the_speed_is_lost() ->
         assert touched[where, 0].mean() > 0.9
 
 
+def jumping(records: list[Record], levels_nm: list[float], noise_nm: float) -> list[Record]:
+    """A torque that jumps between levels every other sample, and follows at once; read in steps of 0.6 Nm."""
+    rng, jumped = np.random.default_rng(8), []
+    for record in records:
+        held = np.repeat(rng.choice(levels_nm, (SAMPLES + 1) // 2), 2)[:SAMPLES, None]
+        read = held + noise_nm * rng.standard_normal(record.torque_nm.shape)
+        jumped.append(replace(record, torque_nm=0.6 * np.round(read / 0.6)))
+    return jumped
+
+
+def test_of_a_torque_that_jumps_between_levels_zeros_are_lost() -> None:
+    """It comes to each of its levels alone and for short as well, but with its noise: zero comes to the last digit."""
+    records, rows = jumping(healthy(7), [-60.0, 13.2, 171.6, 244.2], 0.3), rows_of(7, 0.015, 5.0)
+    lost = [
+        replace(r, torque_nm=np.where(where[:, None] & [False, True], 0.0, r.torque_nm))
+        for r, where in zip(records, rows, strict=True)
+    ]
+    finding = only(lost)
+    for record, where in zip(lost, rows, strict=True):
+        np.testing.assert_array_equal(finding.touched(record)[1:-1, 2], where[1:-1])
+
+
+@pytest.mark.parametrize("noise_nm", [0.0, 0.3])
+def test_a_level_at_zero_is_one_of_its_levels(noise_nm: float) -> None:
+    assert not recognise(jumping(healthy(7), [-60.0, 0.0, 171.6, 244.2], noise_nm))
+
+
 @pytest.mark.parametrize("at_start", [True, False])
 def test_zeros_at_an_end_are_lost_where_as_many_are_elsewhere(at_start: bool) -> None:
     rows = rows_of(3, 0.03, 4.0)
