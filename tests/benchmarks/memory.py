@@ -6,7 +6,6 @@ Written as one line: peak resident memory once the recordings are loaded and onc
 from __future__ import annotations
 
 import json
-import resource
 import sys
 from pathlib import Path
 
@@ -47,8 +46,12 @@ def _record(index: int, time_s: FloatArray, torque_nm: FloatArray, output: Float
 
 
 def peak_mib() -> float:
-    """Return the peak resident memory of this process [MiB]; Linux counts it in KiB."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / KIB_PER_MIB
+    """Return the peak resident memory of this program [MiB], by Linux.
+
+    ``getrusage`` won't do: its peak begins with that of the process that started this one.
+    """
+    status = dict(line.split(":", 1) for line in Path("/proc/self/status").read_text().splitlines())
+    return float(status["VmHWM"].removesuffix("kB")) / KIB_PER_MIB
 
 
 def main(arguments: list[str]) -> int:
