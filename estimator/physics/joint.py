@@ -4,8 +4,9 @@ Equation (translation: read N, m, N s/m)::
 
     T = k e f(e) + T_h z + c de/dt - T_0
 
-``e`` is the twist; ``f`` belongs to ``stiffness_nonlinearity``, ``T_h z`` to ``shaft_hysteresis``. The
-constant torque ``T_0`` and the twist at the start are unknown in every recording.
+``e`` is the twist; ``f`` belongs to ``stiffness_nonlinearity``, ``T_h z`` to ``shaft_hysteresis``, of which a joint
+has Dahl's slider alone: n = u = 1, m = 0, whatever those are set to. The constant torque ``T_0`` and the twist at the
+start are unknown in every recording.
 
 ``backlash`` is a gap in series with spring and slider: of the twist they get ``e``, and the gap takes the rest, at most
 half of itself to either side. Faces only push: they touch on one side where the torque is positive, on the other where
@@ -137,7 +138,7 @@ def behind_gap(twist: float, before: float, loading: float, stiffness: float, p:
 
 @compiled
 def slid(loading: float, change: float, p: FloatArray) -> float:
-    """Return a slider's loading after a change of its twist [rad]: the law of ``shaft_hysteresis``, solved exactly."""
+    """Return a slider's loading after a change of its twist [rad]: Dahl's law, solved exactly."""
     if p[slots.SLIDER] == 0.0 or change == 0.0:
         return loading
     towards = math.copysign(1.0, change)
