@@ -20,6 +20,7 @@ _LIMIT_SUM = slot("torque_saturation", "limit_sum_nm")
 _DEPTH = slot("torque_derating", "depth")
 _DERATING_TIME = slot("torque_derating", "time_constant_s")
 _PATH = np.array([_GAIN_M1, _GAIN_M2, _LIMIT_M1, _LIMIT_M2, _SHARPNESS, _LIMIT_SUM, _DEPTH, _DERATING_TIME])
+"""Where all stands that ``shaft_torque`` depends on."""
 
 
 def limited(torque: FloatArray, limit: float, sharpness: float) -> FloatArray:

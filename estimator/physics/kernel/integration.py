@@ -138,7 +138,7 @@ def integrate_masses(
     late = p[slots.DELAY] != 0.0 or p[slots.DRIFT] != 0.0
     steep = slopes.shape[1] > 0
     slope = slope_before(first, slopes)
-    n = torque.shape[0]
+    n = min(torque.shape[0], out.shape[0])
     x = unpacked(state)
     lagged, lag_rise = state[LAGGED], state[LAG_RISE]
     filtered, filter_rise = state[FILTERED], state[FILTER_RISE]
@@ -206,7 +206,9 @@ def integrate(
     out: FloatArray,
     slopes: FloatArray,
 ) -> None:
-    """Simulate samples ``first`` to the end of ``torque``; row k of ``out`` is the state entry before torque k acts.
+    """Simulate samples ``first`` to the end of ``torque`` or of ``out``, whichever comes first.
+
+    Row k of ``out`` is the state entry before torque k acts.
 
     Parameters
     ----------
@@ -224,7 +226,7 @@ def integrate(
         Time of sample 0, for laws over time [s].
     torque, load : ndarray, shape (N,)
         Torque on the motor shaft before delay and lag, held over each period, and load torque [Nm].
-    angle : ndarray, shape (N,) or longer
+    angle : ndarray, shape (N,)
         Motor angle at each sample, which periodic laws take their phase from [rad].
     p : ndarray, shape (layout.SIZE,)
         Parameters of the superset model.
@@ -234,7 +236,7 @@ def integrate(
         Which state is the output.
     sensor : bool
         Whether the output is seen through the speed sensor.
-    out : ndarray, shape (N,)
+    out : ndarray, shape (N,), or shorter where the simulation ends before
         Filled from ``first`` on.
     slopes : ndarray, shape (2, N) or (2, 0)
         Where it has room: slope of the output just before and just after each sample [unit of the output / s]. That
@@ -283,8 +285,8 @@ def integrate_each(
     reached = 0
     for i in np.argsort(alike):
         if alike[i] > reached:
-            known = (torque[0, : alike[i]], load[0], angle, p[0], state[0])
-            integrate(masses, *given, reached, start_s, *known, output, sensor, out[0], slopes[0])
+            known = (torque[0], load[0], angle, p[0], state[0])
+            integrate(masses, *given, reached, start_s, *known, output, sensor, out[0, : alike[i]], slopes[0])
             reached = alike[i]
         if reached > 0 and i > 0:
             state[i] = state[0]

@@ -170,7 +170,13 @@ def test_many_simulations_in_one_call_are_those_of_single_calls() -> None:
 
 
 @pytest.mark.parametrize(
-    "effects", [{}, {"transport_delay": {"delay_s": 0.013}}, {"torque_ripple": {"amplitude_nm": 2.0}}]
+    "effects",
+    [
+        {},
+        {"transport_delay": {"delay_s": 0.013}},
+        {"torque_ripple": {"amplitude_nm": 2.0}},
+        {"clock_drift": {"rate": 0.01}},  # which looks at torques to come
+    ],
 )
 def test_what_is_alike_up_to_a_moment_is_simulated_from_there_to_the_last_digit(
     effects: Mapping[str, Mapping[str, float]],
