@@ -59,7 +59,9 @@ def frames_of(path: Path) -> Frames:
 def program(module: str, *arguments: str) -> Iterator[subprocess.Popen[str]]:
     """Run one of python-can's programs; it is ended with the block."""
     command = [sys.executable, "-u", "-m", module, *arguments]
+    ignored = signal.signal(signal.SIGINT, signal.default_int_handler)  # what ignores Ctrl-C hands that down, as nohup
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    signal.signal(signal.SIGINT, ignored)
     try:
         yield process
     finally:
