@@ -12,7 +12,8 @@ from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Untestable
 from estimator.physics.fit import ITERATIONS, FitResult, Problem, fit, make_problem
 from estimator.physics.model import DrivelineModel, Motion
-from estimator.physics.moments import polished, without_idle
+from estimator.physics.moments import without_idle
+from estimator.physics.polish import polished
 from estimator.physics.simulate import grid_for
 from estimator.physics.starts import HEAT, best_fit, converge
 from estimator.physics.steps import from_their_moment
@@ -172,8 +173,7 @@ class Bench:
             )
             for release in (releases or [Release((), ((),) * len(self.records))])
         ]
-        result = best_fit(problems, warm, iterations)
-        return polished(result, iterations) if any(EFFECTS[name].event for name in effects) else result
+        return polished(best_fit(problems, warm, iterations), iterations)
 
     def _problem(self, effects: Effects, release: Release) -> Problem:
         return make_problem(

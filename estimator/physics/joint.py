@@ -2,15 +2,16 @@
 
 Equation (translation: read N, m, N s/m)::
 
-    T = k e f(e) + T_h z + c de/dt - T_0
+    T = (k - m T_h / y) e f(e) + T_h z + c de/dt - T_0
 
-``e`` is the twist; ``f`` belongs to ``stiffness_nonlinearity``, ``T_h z`` to ``shaft_hysteresis``, of which a joint
-has Dahl's slider alone: n = u = 1, m = 0, whatever those are set to. The constant torque ``T_0`` and the twist at the
-start are unknown in every recording.
+``e`` is the twist; ``f`` belongs to ``stiffness_nonlinearity``, ``T_h z``, y and m to ``shaft_hysteresis``. The
+constant torque ``T_0`` and the twist at the start are unknown in every recording.
 
-``backlash`` is a gap in series with spring and slider: of the twist they get ``e``, and the gap takes the rest, at most
-half of itself to either side. Faces only push: they touch on one side where the torque is positive, on the other where
-it is negative; in between there is none, and no damping. Where the slider has moved, the gap has moved with it.
+``backlash`` is a gap in series with all of them: of the twist they get ``e``, and the gap takes the rest, at most half
+of itself to either side. Faces only push: they touch on one side where the torque is positive, on the other where it is
+negative; in between there is none, and no damping. So ``T_0`` is a preload behind the gap, as of a slider that yields
+at another torque one way than the other, and no error of the load cell's zero, which an open gap would show. Where the
+slider has moved, the gap has moved with it.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ import numpy as np
 
 from estimator.compiled import compiled
 from estimator.physics.effects import backlash, stiffness_nonlinearity
+from estimator.physics.effects.shaft_hysteresis import loading_rate
 from estimator.physics.kernel import slots, state_vector
 from estimator.physics.laws import beyond_gap, share_inside
 from estimator.physics.motion import measured_speed
@@ -29,14 +31,20 @@ from estimator.signals.record import FloatArray, Record
 TORQUE = -1
 """The output that a joint has beside the kernel's states: the torque it carries."""
 
-HALVINGS = 60
-"""Of the range in which the balance inside an open gap lies: to the last bit."""
+PART_OF_TORQUE, MOST_SECANTS = 1e-12, 100
+"""How near the balance inside an open gap is found, as part of the torques at its ends; it takes ten secants."""
+
+PART_OF_YIELD = 0.5
+"""Longest step over a slider's twist, in multiples of that over which it yields and its sharpness: errors near 1e-4."""
+
+FARTHEST = 100.0
+"""Beyond so many times the twist over which it yields a slider has forgotten where it came from."""
 
 
 def simulate(
     record: Record,
     p: FloatArray,
-    load_torque_nm: FloatArray,
+    preload_nm: FloatArray,
     twist_rad: float,
     output: int = TORQUE,
 ) -> FloatArray:
@@ -46,7 +54,7 @@ def simulate(
     ----------
     p : ndarray, shape (layout.SIZE,)
         Parameters of the superset model.
-    load_torque_nm : ndarray, shape (N,)
+    preload_nm : ndarray, shape (N,)
         Constant torque T_0, and what there is beside it [Nm].
     twist_rad : float
         Twist at the first sample [rad].
@@ -68,9 +76,8 @@ def simulate(
     if output != TORQUE:
         return motion[output] if output in motion else np.zeros(twist.shape)
     out: FloatArray = np.empty_like(twist)
-    respond(record.since_start_s, record.sample_time_s, twist, rate, p, out)
-    taken: FloatArray = out - load_torque_nm
-    return taken
+    respond(record.since_start_s, record.sample_time_s, twist, rate, preload_nm, p, out)
+    return out
 
 
 def _imposed(record: Record) -> FloatArray:
@@ -93,60 +100,82 @@ def respond(
     period_s: float,
     twist: FloatArray,
     rate: FloatArray,
+    preload_nm: FloatArray,
     p: FloatArray,
     out: FloatArray,
 ) -> None:
-    """Fill ``out`` with the torque under an imposed twist [rad] and its rate [rad/s]; all of shape (N,)."""
+    """Fill ``out`` with the torque under an imposed twist [rad], its rate [rad/s] and a preload; all of shape (N,)."""
     inside, loading = beyond_gap(twist[0], p[slots.GAP]), 0.0
     for k in range(twist.shape[0]):
         broken = share_inside(time_s[k], period_s, p[slots.CRACK_FROM], p[slots.CRACK_TO])
         stiffness = p[slots.K] * (1.0 + broken * p[slots.CRACK])
         before = inside
-        inside = behind_gap(twist[k], before, loading, stiffness, p)
+        inside = behind_gap(twist[k], before, loading, stiffness, preload_nm[k], p)
         loading = slid(loading, inside - before, p)
         share = 1.0
         if p[slots.GAP] > 0.0:
             moved = twist[k] - twist[k - 1] if k > 0 else 0.0
             share = min(max((inside - before) / moved, 0.0), 1.0) if moved != 0.0 else 0.0
             share *= backlash.damping_share(inside, p[slots.CONTACT])
-        out[k] = carried(inside, loading, stiffness, p) + share * p[slots.C] * rate[k]
+        out[k] = carried(inside, loading, stiffness, preload_nm[k], p) + share * p[slots.C] * rate[k]
 
 
 @compiled
-def behind_gap(twist: float, before: float, loading: float, stiffness: float, p: FloatArray) -> float:
+def behind_gap(twist: float, before: float, loading: float, stiffness: float, preload: float, p: FloatArray) -> float:
     """Return which part of a twist spring and slider get [rad].
 
-    ``before`` and ``loading`` are their part and the slider's loading so far. On the way from there the torque only
-    rises with their part, so that one of the three cases holds.
+    ``before`` and ``loading`` are their part and the slider's loading so far. The torque only rises with their part: it
+    stays as it is as far as the faces let it, or goes to where the torque is none, or to where a face holds it.
     """
-    if p[slots.GAP] <= 0.0:
-        return twist
     half = 0.5 * float(p[slots.GAP])
-    low, high = twist - half, twist + half
-    if carried(low, slid(loading, low - before, p), stiffness, p) >= 0.0:
-        return low
-    if carried(high, slid(loading, high - before, p), stiffness, p) <= 0.0:
-        return high
-    for _ in range(HALVINGS):
-        middle = 0.5 * (low + high)
-        if carried(middle, slid(loading, middle - before, p), stiffness, p) < 0.0:
-            low = middle
+    if half <= 0.0:
+        return twist
+    start = min(max(before, twist - half), twist + half)
+    at_start = carried(start, slid(loading, start - before, p), stiffness, preload, p)
+    end = twist - half if at_start > 0.0 else twist + half
+    at_end = carried(end, slid(loading, end - before, p), stiffness, preload, p)
+    if at_start == 0.0 or start == end:
+        return start
+    if at_start * at_end >= 0.0:
+        return end
+    least = PART_OF_TORQUE * abs(at_end - at_start)
+    middle = start
+    for _ in range(MOST_SECANTS):  # false position after Illinois
+        middle = end - at_end * (end - start) / (at_end - at_start)
+        torque = carried(middle, slid(loading, middle - before, p), stiffness, preload, p)
+        if abs(torque) <= least:
+            break
+        if torque * at_end < 0.0:
+            start, at_start = end, at_end
         else:
-            high = middle
-    return 0.5 * (low + high)
+            at_start *= 0.5
+        end, at_end = middle, torque
+    return middle
 
 
 @compiled
 def slid(loading: float, change: float, p: FloatArray) -> float:
-    """Return a slider's loading after a change of its twist [rad]: Dahl's law, solved exactly."""
+    """Return a slider's loading after a change of its twist [rad], however fast: Runge-Kutta steps over the twist."""
     if p[slots.SLIDER] == 0.0 or change == 0.0:
         return loading
+    sharpness, unloading = float(p[slots.SHARPNESS]), float(p[slots.UNLOADING])
     towards = math.copysign(1.0, change)
-    return towards + (loading - towards) * math.exp(-abs(change) / float(p[slots.YIELD]))
+    way = min(abs(change) / float(p[slots.YIELD]), FARTHEST)
+    steps = math.ceil(way * max(sharpness, 1.0) / PART_OF_YIELD)
+    h = way / steps
+    for _ in range(steps):
+        first = loading_rate(loading, towards, 1.0, sharpness, unloading, math.inf)
+        second = loading_rate(loading + 0.5 * h * first, towards, 1.0, sharpness, unloading, math.inf)
+        third = loading_rate(loading + 0.5 * h * second, towards, 1.0, sharpness, unloading, math.inf)
+        fourth = loading_rate(loading + h * third, towards, 1.0, sharpness, unloading, math.inf)
+        loading += h * (first + 2.0 * second + 2.0 * third + fourth) / 6.0
+    return loading
 
 
 @compiled
-def carried(inside: float, loading: float, stiffness: float, p: FloatArray) -> float:
-    """Return the torque of spring and slider [Nm]."""
+def carried(inside: float, loading: float, stiffness: float, preload: float, p: FloatArray) -> float:
+    """Return the torque of spring and slider, less the preload [Nm]."""
+    if p[slots.SLIDER_INSIDE] > 0.0:
+        stiffness = max(stiffness - float(p[slots.SLIDER_INSIDE] * p[slots.SLIDER] / p[slots.YIELD]), 0.0)
     factor = stiffness_nonlinearity.factor(inside, p[slots.HARDENING], p[slots.SHAPE])
-    return stiffness * inside * factor + float(p[slots.SLIDER]) * loading
+    return stiffness * inside * factor + float(p[slots.SLIDER]) * loading - preload

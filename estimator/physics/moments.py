@@ -11,7 +11,6 @@ import numpy as np
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import ITERATIONS, FitResult, Problem, changes, fit, own_part, simulated_each
 from estimator.physics.parallel import concurrently
-from estimator.physics.starts import HEAT
 from estimator.physics.unknowns import LocalBasis
 from estimator.signals.record import FloatArray, Record
 
@@ -22,9 +21,6 @@ OFFSETS_S = np.concatenate([-OFFSETS_S[::-1], OFFSETS_S])
 REACH_S = 0.5
 """How far a fit may go on from a moment that was moved: beyond it others match."""
 
-ROUNDS, ROUGH_ROUNDS = 3, 1
-"""Moves and fits from there, in turn; of a fit that is only begun."""
-
 WORTH_MOVING = 2.0
 """Gain in log-likelihood ratio, twice, that moments elsewhere must bring: they are sought among hundreds."""
 
@@ -33,19 +29,6 @@ MOVES = 4
 
 WORTH = 20.0
 """Gain in log-likelihood ratio, twice, that an event in one recording must bring: it was sought among hundreds."""
-
-
-def polished(result: FitResult, iterations: int = ITERATIONS) -> FitResult:
-    """Move the moments of events to where the error is smallest nearby, and fit on from there while it helps."""
-    for _ in range(ROUNDS if iterations > HEAT else ROUGH_ROUNDS):
-        moved = _moved(result)
-        if moved is None:
-            return result
-        better = fit(*moved, iterations)
-        if better.squares >= result.squares:
-            return result
-        result = better
-    return result
 
 
 def without_idle(result: FitResult, iterations: int = ITERATIONS) -> FitResult:
@@ -84,7 +67,7 @@ def _silenced(result: FitResult, index: int) -> tuple[Problem, FloatArray] | Non
     return replace(result.problem, local=local), x
 
 
-def _moved(result: FitResult) -> tuple[Problem, FloatArray] | None:
+def moved(result: FitResult) -> tuple[Problem, FloatArray] | None:
     """Return the problem around moments that were moved, and its unknowns; None where none is better elsewhere."""
     found = concurrently(lambda i: _moved_in(result, i), range(len(result.problem.records)))
     if all(local is None for local in found):

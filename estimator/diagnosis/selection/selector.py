@@ -26,10 +26,6 @@ PART_OF_REST = 0.25
 """Share of what still stands above the noise that a first look must promise for a further effect to be fitted: of two
 effects that were there, the second promised a third or more (seventy sealed pairs); beside what only imitates, less."""
 
-FEW = 4
-"""Where so few effects are possible, as in a joint on a bench, all may be fitted: a gap beside a slider, which yields
-where the gap would open, shows little of itself in a first look."""
-
 PATIENCE = 4
 """How many times its iterations a fit may take on which a verdict is built."""
 
@@ -227,12 +223,10 @@ class Selector:
 
         Where two leave too much to stand, a third must promise to complete them: what imitates takes a little each
         time. Beside a profile a first look promises too little: it has taken up part of what is another's. So may any
-        law where next to nothing is left. Where few are possible a look need not save any time.
+        law where next to nothing is left.
         """
         if len(path.chosen) > 1 and not self.jury.weight.may_stand(path.current, retuned):
             return 0.5 * self._rest(path.current)
-        if len(self.jury.names) <= FEW:
-            return 0.0
         if not path.chosen or self._is_near(path.current) or any(EFFECTS[name].profile for name in path.chosen):
             return 0.0
         return PART_OF_REST * self._rest(path.current)

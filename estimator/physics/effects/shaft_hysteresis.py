@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 
 from estimator.compiled import compiled
-from estimator.physics.effect import WITH_SPRING, Effect, EffectParameter, Element, Start
-from estimator.physics.model import DrivelineModel, Motion, unit
+from estimator.physics.effect import WITH_SPRING, Effect, EffectParameter, Element, Held, Start
+from estimator.physics.model import DrivelineModel, Motion, Structure, unit
 from estimator.physics.motion import torque_scale
 from estimator.signals.record import Record
 
@@ -34,8 +34,12 @@ def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...
 
 
 def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
-    """Return sliders that yield early and late, a part of them in the nominal stiffness."""
-    return [(0.5, 0.5, 1.0, 0.7, 0.2), (1.0, 4.0, 1.0, 0.7, 0.5)]
+    """Return sliders that yield early and late, a part of them in the nominal stiffness.
+
+    That of a joint is a guess and free.
+    """
+    early, late = (Held(0.0), Held(0.0)) if model.structure is Structure.JOINT else (0.2, 0.5)
+    return [(0.5, 0.5, 1.0, 0.7, early), (1.0, 4.0, 1.0, 0.7, late)]
 
 
 def sentence(values: Mapping[str, float], motion: Motion) -> str:

@@ -3,16 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from estimator.errors import BadModel, BadShape
-from estimator.physics import joint
+from estimator.physics import joint, place_in_gap
 from estimator.physics.fit import fit, make_problem
 from estimator.physics.kernel import state_vector
+from estimator.physics.laws import beyond_gap
 from estimator.physics.layout import flat_values
-from estimator.physics.model import DrivelineModel, Parameter, Structure, natural_frequencies_rad_s, parameter_unit
+from estimator.physics.model import (
+    DrivelineModel,
+    EffectValue,
+    Parameter,
+    Structure,
+    natural_frequencies_rad_s,
+    parameter_unit,
+)
+from estimator.physics.polish import polished
 from estimator.physics.simulate import Start, grid_for, motor_angle, output_state, simulate
 from estimator.physics.unknowns import nominal_unknowns
 from estimator.signals.record import FloatArray, OutputKind, Record
@@ -73,9 +84,67 @@ def test_a_slider_follows_its_law_and_forgets_where_it_began() -> None:
     slider = {"shaft_hysteresis": {"friction_nm": friction, "yield_rad": yield_rad}}
     found = torque(twist, slider) - STIFFNESS * twist
     rising = slice(0, 501)  # the first quarter: z = 1 - exp(-x / y) from rest
-    assert found[rising] == pytest.approx(friction * (1.0 - np.exp(-twist[rising] / yield_rad)), abs=1e-9)
+    assert found[rising] == pytest.approx(friction * (1.0 - np.exp(-twist[rising] / yield_rad)), abs=1e-6)
     forgotten = friction * np.exp(-0.2 / yield_rad)  # by the first turn, and over one stroke more
     assert found[3000:4000] == pytest.approx(found[1000:2000], abs=forgotten)
+
+
+@pytest.mark.parametrize(("yield_rad", "within"), [(0.02, 1e-6), (1e-4, 1e-3)])
+def test_a_slider_of_any_shape_follows_its_law(yield_rad: float, within: float) -> None:
+    """Sharp, soft on the way back and partly in the spring, against scipy; one yields within a fraction of a sample."""
+    twist, friction, sharpness, unloading = up_and_down(0.1), 1.0, 3.0, 0.4
+
+    def law(_: float, z: FloatArray, direction: float) -> FloatArray:
+        back = direction * z[0] < 0.0
+        yielded = (-unloading if back else 1.0) * min(abs(z[0]), 1.0) ** sharpness
+        return np.array([direction * (1.0 - yielded) / yield_rad])
+
+    z = [0.0]
+    for begin, end in pairwise(twist[::500]):
+        way = np.linspace(0.0, abs(end - begin), 501)
+        direction = float(np.sign(end - begin))
+        stroke = solve_ivp(law, way[[0, -1]], z[-1:], args=(direction,), t_eval=way, rtol=1e-9, atol=1e-12)
+        z += stroke.y[0, 1:].tolist()
+    shape = {"sharpness": sharpness, "unloading": unloading, "inside": 0.3}
+    found = torque(twist, {"shaft_hysteresis": {"friction_nm": friction, "yield_rad": yield_rad, **shape}})
+    stiffness = max(STIFFNESS - 0.3 * friction / yield_rad, 0.0)
+    assert found == pytest.approx(stiffness * twist + friction * np.array(z), abs=within * friction)
+
+
+def test_an_open_gap_carries_nothing_whatever_the_preload_behind_it() -> None:
+    """A preloaded slider yields at another torque one way than the other; in between the torque is none."""
+    gap, preload, friction = 0.03, 100.0, 500.0
+    slider = {"friction_nm": friction, "yield_rad": 1e-3}
+    record = recording(up_and_down(0.1, 20001))
+    p = flat_values({"k": 1e-3, "c": 0.0}, {"backlash": {"gap_rad": gap}, "shaft_hysteresis": slider})
+    found = simulate(grid_for(MODEL, [record]), record, p, Start(preload, 0.0, 0.0))
+    assert found.max() == pytest.approx(friction - preload, rel=1e-3)
+    assert found.min() == pytest.approx(-friction - preload, rel=1e-3)
+    assert record.imposed is not None
+    travelled = np.abs(np.diff(record.imposed, prepend=0.0))
+    assert travelled[2500:7500][np.abs(found[2500:7500]) < 1e-6].sum() == pytest.approx(gap, rel=0.01)
+
+
+@pytest.mark.parametrize("begun_rad", [-0.5, 0.03, 2.0])
+def test_a_fit_finds_back_into_a_gap_it_has_left(begun_rad: float) -> None:
+    """Beyond the gap the twist at the start does nothing that the constant torque could not: no fit leads back."""
+    phase = np.arange(3000) * PERIOD_S
+    twist = 0.1 * np.sin(4.0 * np.pi * phase) * phase / 3.0
+    effects = {"backlash": {"gap_rad": 0.03}, "shaft_hysteresis": {"friction_nm": 30.0, "yield_rad": 0.01}}
+    known = {name: {key: EffectValue(value) for key, value in values.items()} for name, values in effects.items()}
+    model = DrivelineModel(Structure.JOINT, {"k": Parameter(100.0, 0.0), "c": Parameter(0.1, 0.0)}, effects=known)
+    p = flat_values(model.values(), effects)
+    clean = simulate(grid_for(model, [recording(twist)]), recording(twist), p, Start(4.0, 0.0, 0.0, 0.007))
+    noise = 0.1 * np.random.default_rng(8).standard_normal(clean.size)
+    problem = make_problem(model, [recording(twist, clean + noise)], ())
+    scale = problem.local[0].scale
+    made_up = model.values()["k"] * beyond_gap(begun_rad, 0.03)
+    caught = fit(problem, np.array([4.0 + made_up, begun_rad]) / scale)
+    assert caught.rms > 0.2
+    found = polished(caught)
+    assert found.rms == pytest.approx(0.1, rel=0.05)
+    assert (found.local_of(0) * scale)[1] == pytest.approx(0.007, abs=5e-4)
+    assert place_in_gap.moved(found) is None
 
 
 def test_a_gap_in_series_with_a_slider_moves_with_it() -> None:

@@ -15,7 +15,8 @@ from estimator.physics import fit as fit_module
 from estimator.physics.fit import FitResult, fit, make_problem
 from estimator.physics.layout import flat, slot
 from estimator.physics.least_squares import Solution, minimise
-from estimator.physics.moments import OFFSETS_S, polished, without_idle
+from estimator.physics.moments import OFFSETS_S, without_idle
+from estimator.physics.polish import polished
 from estimator.physics.simulate import Start, grid_for, simulate
 from estimator.physics.unknowns import Shared, own_unknowns
 from estimator.signals.record import FloatArray, Record
