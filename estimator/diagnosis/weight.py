@@ -66,8 +66,8 @@ class Weight:
         At an element of its own it may be small, if it can be seen. Beside another effect of the same element it must
         be a real part of the mismatch: a law written another way leaves just such a small remainder. A profile is no
         law, its knots follow whatever is slow; what it leaves at the load is another's. But it could take up any slow
-        rest itself, and so must be a real part. A wave is an echo of another wave alone: no machine's is a pure sine,
-        and no law of twist or speed leaves one that is in step with the motor's angle.
+        rest itself, and so must be a real part. A wave is an echo of another wave alone, and none leaves one of a law:
+        no machine's is a pure sine, but a law of twist or speed is not in step with the motor's angle.
         """
         if before.rms < self.least_ratio * after.rms:
             return False
@@ -107,7 +107,8 @@ def _echoes(name: str, others: Effects) -> bool:
     entry = EFFECTS[name]
     if entry.phases:
         return any(EFFECTS[other].phases for other in others)
-    return entry.profile or entry.element in {EFFECTS[other].element for other in others if not EFFECTS[other].profile}
+    laws = [EFFECTS[other] for other in others if not (EFFECTS[other].profile or EFFECTS[other].phases)]
+    return entry.profile or entry.element in {law.element for law in laws}
 
 
 def earns_detail(special: FitResult, general: FitResult, before: FitResult) -> bool:

@@ -148,12 +148,13 @@ def make_problem(
     """
     if own is None:
         own = [own_unknowns(model.effects, record) for record in records]
+    effects = frozenset(model.effects) | {unknown.effect for unknown in shared}
     return Problem(
         grid or grid_for(model, records),
         tuple(records),
         flat(model),
         tuple(shared),
-        tuple(local_basis(model, record, profile, mine) for record, mine in zip(records, own, strict=True)),
+        tuple(local_basis(model, record, profile, mine, effects) for record, mine in zip(records, own, strict=True)),
         tuple(record.okay for record in records) if use is None else tuple(use),
     )
 

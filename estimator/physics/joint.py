@@ -2,16 +2,18 @@
 
 Equation (translation: read N, m, N s/m)::
 
-    T = (k - m T_h / y) e f(e) + T_h z + c de/dt - T_0
+    T = (k - m T_h / y) e f(e) + T_h z + c de/dt - T_0 - preload
 
 ``e`` is the twist; ``f`` belongs to ``stiffness_nonlinearity``, ``T_h z``, y and m to ``shaft_hysteresis``. The
 constant torque ``T_0`` and the twist at the start are unknown in every recording.
 
 ``backlash`` is a gap in series with all of them: of the twist they get ``e``, and the gap takes the rest, at most half
 of itself to either side. Faces only push: they touch on one side where the torque is positive, on the other where it is
-negative; in between there is none, and no damping. So ``T_0`` is a preload behind the gap, as of a slider that yields
-at another torque one way than the other, and no error of the load cell's zero, which an open gap would show. Where the
-slider has moved, the gap has moved with it.
+negative; in between there is none, and no damping. Where the slider has moved, the gap has moved with it.
+
+So a constant torque is one of two with a gap. ``T_0`` stays where the gap is open: the zero of the load cell. A preload
+behind the gap, unknown in every recording, too, does not: of a slider that yields at another torque one way than the
+other. Without a gap they are the same.
 """
 
 from __future__ import annotations
@@ -44,8 +46,9 @@ FARTHEST = 100.0
 def simulate(
     record: Record,
     p: FloatArray,
-    preload_nm: FloatArray,
+    load_torque_nm: FloatArray,
     twist_rad: float,
+    preload_nm: float,
     output: int = TORQUE,
 ) -> FloatArray:
     """Simulate the torque of a joint, or its motion, under the imposed motion of a recording.
@@ -54,10 +57,12 @@ def simulate(
     ----------
     p : ndarray, shape (layout.SIZE,)
         Parameters of the superset model.
-    preload_nm : ndarray, shape (N,)
+    load_torque_nm : ndarray, shape (N,)
         Constant torque T_0, and what there is beside it [Nm].
     twist_rad : float
         Twist at the first sample [rad].
+    preload_nm : float
+        Constant torque behind a gap [Nm].
     output : int
         ``TORQUE``, or a state of the kernel; the far end is at rest.
 
@@ -77,7 +82,8 @@ def simulate(
         return motion[output] if output in motion else np.zeros(twist.shape)
     out: FloatArray = np.empty_like(twist)
     respond(record.since_start_s, record.sample_time_s, twist, rate, preload_nm, p, out)
-    return out
+    taken: FloatArray = out - load_torque_nm
+    return taken
 
 
 def _imposed(record: Record) -> FloatArray:
@@ -100,24 +106,24 @@ def respond(
     period_s: float,
     twist: FloatArray,
     rate: FloatArray,
-    preload_nm: FloatArray,
+    preload: float,
     p: FloatArray,
     out: FloatArray,
 ) -> None:
-    """Fill ``out`` with the torque under an imposed twist [rad], its rate [rad/s] and a preload; all of shape (N,)."""
+    """Fill ``out`` with the torque under an imposed twist [rad] and its rate [rad/s]; all of shape (N,)."""
     inside, loading = beyond_gap(twist[0], p[slots.GAP]), 0.0
     for k in range(twist.shape[0]):
         broken = share_inside(time_s[k], period_s, p[slots.CRACK_FROM], p[slots.CRACK_TO])
         stiffness = p[slots.K] * (1.0 + broken * p[slots.CRACK])
         before = inside
-        inside = behind_gap(twist[k], before, loading, stiffness, preload_nm[k], p)
+        inside = behind_gap(twist[k], before, loading, stiffness, preload, p)
         loading = slid(loading, inside - before, p)
         share = 1.0
         if p[slots.GAP] > 0.0:
             moved = twist[k] - twist[k - 1] if k > 0 else 0.0
             share = min(max((inside - before) / moved, 0.0), 1.0) if moved != 0.0 else 0.0
             share *= backlash.damping_share(inside, p[slots.CONTACT])
-        out[k] = carried(inside, loading, stiffness, preload_nm[k], p) + share * p[slots.C] * rate[k]
+        out[k] = carried(inside, loading, stiffness, preload, p) + share * p[slots.C] * rate[k]
 
 
 @compiled

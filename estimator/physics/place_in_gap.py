@@ -1,6 +1,6 @@
 """Where in its gap a joint stood when a recording began: once a fit has left the gap it does not find back.
 
-Beyond the gap the twist at the start only adds to the spring's torque, and ``T_0`` makes up for that.
+Beyond the gap the twist at the start only adds to the spring's torque, and the preload makes up for that.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from estimator.physics.kernel import slots
 from estimator.physics.laws import beyond_gap
 from estimator.physics.model import Structure
 from estimator.physics.parallel import concurrently
-from estimator.physics.unknowns import LOAD_TORQUE
+from estimator.physics.unknowns import PRELOAD
 from estimator.signals.record import FloatArray
 
 PLACES = np.linspace(-1.0, 1.0, 9)
@@ -43,13 +43,13 @@ def _moved_in(result: FitResult, index: int) -> FloatArray | None:
     if twist is None:
         raise ValueError(f"recording {problem.records[index].name}: a joint has a twist at the start, came none")
     p = result.p_of(index)
-    gap, load_scale, twist_scale = p[slots.GAP], basis.scale[LOAD_TORQUE], basis.scale[twist]
+    gap, torque_scale, twist_scale = p[slots.GAP], basis.scale[PRELOAD], basis.scale[twist]
     made_up = p[slots.K] * beyond_gap(local[twist] * twist_scale, gap)
     tried = [local]
     for place in PLACES:
         other = local.copy()
         other[twist] = 0.5 * gap * place / twist_scale
-        other[LOAD_TORQUE] -= made_up / load_scale
+        other[PRELOAD] -= made_up / torque_scale
         tried.append(other)
     outputs = simulated_each(problem, [(result.p, x) for x in tried], index)
     use = problem.use[index]

@@ -56,7 +56,10 @@ class Grid:
 
 @dataclass(frozen=True, slots=True)
 class Start:
-    """What is unknown in every recording: constant load torque [Nm] and initial state [rad, rad/s]."""
+    """What is unknown in every recording: constant load torque [Nm] and initial state [rad, rad/s].
+
+    Of a joint also the preload behind its gap [Nm].
+    """
 
     load_torque_nm: float
     angle_rad: float
@@ -65,6 +68,7 @@ class Start:
     load_speed_rad_s: float = 0.0
     middle_twist_rad: float = 0.0
     middle_speed_rad_s: float = 0.0
+    preload_nm: float = 0.0
 
 
 def substeps_for(values: Mapping[str, float], period_s: float) -> int:
@@ -288,7 +292,8 @@ def _sampled_off_time(out: FloatArray, slopes: FloatArray, offset_s: FloatArray 
 
 def _joint_output(record: Record, case: Case, output: int) -> FloatArray:
     load = case.start.load_torque_nm + (0.0 if case.extra_load_nm is None else case.extra_load_nm)
-    return joint.simulate(record, case.p, np.broadcast_to(load, record.output.shape), case.start.twist_rad, output)
+    load = np.broadcast_to(load, record.output.shape)
+    return joint.simulate(record, case.p, load, case.start.twist_rad, case.start.preload_nm, output)
 
 
 def _under_laws(grid: Grid, record: Record, case: Case, output: int, recorded: bool) -> FloatArray:

@@ -103,8 +103,11 @@ def _own_unknowns(entry: Effect, record: Record) -> tuple[Shared, ...]:
     )
 
 
-LOAD_TORQUE = 0
-"""Where the constant load torque stands among a recording's own unknowns."""
+LOAD_TORQUE, TWIST, PRELOAD = 0, 1, 2
+"""Where the constant load torque stands among a recording's own unknowns; a joint's twist at the start, and preload."""
+
+TELLS_REST = frozenset({"backlash", "stiffness_nonlinearity", "stiffness_change"})
+"""Effects with which it matters where a joint is without twist; without them the constant torque says as much."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,6 +124,8 @@ class LocalBasis:
         Own parameters of effects, O of them; they stand behind the load torque and the initial state.
     profile : ndarray, shape (K, N)
         Basis of the load profile, whose K unknowns stand last; K = 0 without one.
+    held : tuple of int
+        Unknowns that stay where a fit starts: others say as much.
     """
 
     structure: Structure
@@ -129,6 +134,7 @@ class LocalBasis:
     guess: FloatArray
     own: tuple[Shared, ...]
     profile: FloatArray
+    held: tuple[int, ...] = ()
 
     @property
     def low(self) -> FloatArray:
@@ -142,6 +148,7 @@ class LocalBasis:
 
     def _bounds(self, of_own: Sequence[float], free: float) -> FloatArray:
         bounds = np.full(self.guess.size, free)
+        bounds[list(self.held)] = self.guess[list(self.held)]
         bounds[self.own_rows] = of_own
         return bounds
 
@@ -160,7 +167,7 @@ class LocalBasis:
         """Return the start state of scaled unknowns ``x``, shape (L,)."""
         values = x * self.scale
         if self.structure is Structure.JOINT:
-            return Start(float(values[0]), 0.0, 0.0, float(values[1]))
+            return Start(float(values[0]), 0.0, 0.0, float(values[1]), preload_nm=float(values[PRELOAD]))
         angle = float(values[2]) if self.has_angle else 0.0
         i = self.twist_index
         state = () if i is None else (float(value) for value in values[i : self.own_rows.start])
@@ -172,7 +179,7 @@ class LocalBasis:
         if self.structure is Structure.ONE_MASS:
             return None
         if self.structure is Structure.JOINT:
-            return 1
+            return TWIST
         return 3 if self.has_angle else 2
 
     def parameters(self, p: FloatArray, x: FloatArray) -> FloatArray:
@@ -192,10 +199,16 @@ class LocalBasis:
         return load
 
 
-def local_basis(model: DrivelineModel, record: Record, profile: bool, own: tuple[Shared, ...] = ()) -> LocalBasis:
-    """Set up the unknowns of one recording, with a start read off its first samples."""
+def local_basis(
+    model: DrivelineModel,
+    record: Record,
+    profile: bool,
+    own: tuple[Shared, ...] = (),
+    effects: frozenset[str] = frozenset(),
+) -> LocalBasis:
+    """Set up the unknowns of one recording under some effects, with a start read off its first samples."""
     if model.structure is Structure.JOINT:
-        return _joint_basis(record, own)
+        return _joint_basis(record, own, effects)
     speed = measured_speed(record)
     v_scale, t_scale = speed_scale([record]), torque_scale([record])
     first = speed[np.flatnonzero(np.isfinite(speed))[:3]].mean()
@@ -219,14 +232,16 @@ def local_basis(model: DrivelineModel, record: Record, profile: bool, own: tuple
     return LocalBasis(model.structure, has_angle, all_scales, all_guesses / all_scales, own, shape)
 
 
-def _joint_basis(record: Record, own: tuple[Shared, ...]) -> LocalBasis:
-    """Set up the constant torque of a joint and its twist at the start, which is none until the fit knows better."""
+def _joint_basis(record: Record, own: tuple[Shared, ...], effects: frozenset[str]) -> LocalBasis:
+    """Set up the constant torque of a joint, its twist at the start and its preload, none until a fit knows better."""
+    held = (*(() if effects & TELLS_REST else (TWIST,)), *(() if "backlash" in effects else (PRELOAD,)))
     twist = max(0.1 * float(np.ptp(motor_angle(record))), np.finfo(float).tiny)
-    scale = np.array([0.1 * torque_scale([record]), twist, *[1.0] * len(own)])
+    torque = 0.1 * torque_scale([record])
+    scale = np.array([torque, twist, torque, *[1.0] * len(own)])
     load = -float(record.output[record.okay].mean())
-    guess = np.array([load, 0.0, *(unknown.start for unknown in own)])
+    guess = np.array([load, 0.0, 0.0, *(unknown.start for unknown in own)])
     nothing = np.empty((0, record.time_s.size))
-    return LocalBasis(Structure.JOINT, False, scale, guess / scale, own, nothing)
+    return LocalBasis(Structure.JOINT, False, scale, guess / scale, own, nothing, held)
 
 
 def _mean_load(model: DrivelineModel, record: Record, speed: FloatArray) -> float:

@@ -6,8 +6,8 @@ A reading taken ``tau`` off its time is off by ``slope * tau``. So the error's v
 
 Missing mechanics leaves errors that are large where the slope is large, too. But such an error goes on from one row to
 the next and follows the motion, while jitter changes from row to row at random. What the error's own past and the
-slopes around explain is taken off first; of the rest it is asked whether its square follows the squared slope, in the
-many and not in a few rows only, and whether neighbours are independent.
+slopes around explain is taken off first; of the rest it is asked whether its square follows the squared slope, within
+each recording (their noise may differ), in the many and not in a few rows only, and whether neighbours are independent.
 """
 
 from __future__ import annotations
@@ -51,8 +51,12 @@ NEIGHBOURS = 0.5
 
 @dataclass(frozen=True, slots=True)
 class _Rest:
-    """What is left of the errors of all recordings, with slopes, and the same of the row after; shape (n,)."""
+    """What is left of the errors of all recordings, with slopes, and the same of the row after; shape (n,).
 
+    ``lengths`` holds how many of the rows each recording has.
+    """
+
+    lengths: tuple[int, ...]
     error: FloatArray
     slope: FloatArray
     next_error: FloatArray
@@ -84,7 +88,7 @@ def hidden_jitter(
     within = _rests(errors, slopes, okay, BLOCK)
     if rest is None or within is None or _likeliest(within.error, within.slope) is None:
         return None
-    p_value = _score_p_value(rest.error, rest.slope)
+    p_value = _score_p_value(rest)
     if p_value > LEVEL:
         return None
     found = _likeliest(rest.error, rest.slope)
@@ -118,7 +122,10 @@ def _rests(
     found = [_rest(*data, block) for data in zip(errors, slopes, okay, strict=True)]
     rests = [rest for rest in found if rest is not None]
     fields = ("error", "slope", "next_error", "next_slope")
-    return _Rest(*(np.concatenate([getattr(one, name) for one in rests]) for name in fields)) if rests else None
+    if not rests:
+        return None
+    lengths = tuple(length for one in rests for length in one.lengths)
+    return _Rest(lengths, *(np.concatenate([getattr(one, name) for one in rests]) for name in fields))
 
 
 def _rest(error: FloatArray, slope: FloatArray, okay: BoolArray, block: int | None) -> _Rest | None:
@@ -146,20 +153,24 @@ def _rest(error: FloatArray, slope: FloatArray, okay: BoolArray, block: int | No
             left[rows] = now - a @ np.linalg.lstsq(a, now, rcond=None)[0]
     pairs = np.isfinite(left[:-1]) & np.isfinite(left[1:])
     inner = slope[first:last]
-    return _Rest(left[:-1][pairs], inner[:-1][pairs], left[1:][pairs], inner[1:][pairs])
+    return _Rest((int(pairs.sum()),), left[:-1][pairs], inner[:-1][pairs], left[1:][pairs], inner[1:][pairs])
 
 
-def _score_p_value(error: FloatArray, slope: FloatArray) -> float:
-    """Test whether the squared error follows the squared slope.
+def _score_p_value(rest: _Rest) -> float:
+    """Test whether the squared error follows the squared slope within the recordings.
 
-    Breusch and Pagan's score test in Koenker's studentised form (J. Econometrics 17, 1981), one-sided.
+    Breusch and Pagan's score test, one-sided, with White's variance (Econometrica 48, 1980): neither noise that differs
+    from recording to recording nor a few large errors where the slope is large may pass for it.
     """
-    power, drive = error**2 - np.mean(error**2), slope**2 - np.mean(slope**2)
-    scale = float(np.sqrt((power**2).mean() * (drive**2).mean()))
-    if scale <= 0.0:
-        return 1.0
-    correlation = float((power * drive).mean()) / scale
-    return float(stats.norm.sf(correlation * np.sqrt(error.size)))
+    power, drive = (_about_its_mean(signal**2, rest.lengths) for signal in (rest.error, rest.slope))
+    spread = float(np.sqrt((power**2) @ (drive**2)))
+    return float(stats.norm.sf(float(power @ drive) / spread)) if spread > 0.0 else 1.0
+
+
+def _about_its_mean(signal: FloatArray, lengths: tuple[int, ...]) -> FloatArray:
+    """Return a signal of all recordings in a row, less its mean in each, shape (n,)."""
+    parts = np.split(signal, np.cumsum(lengths)[:-1])
+    return np.concatenate([part - part.mean() for part in parts])
 
 
 @dataclass(frozen=True, slots=True)

@@ -40,6 +40,7 @@ SCALES: Mapping[str, Scale] = {
     "actuator_lag": Scale("current_loop_time_s", "s", 1e-3),
     "coulomb_friction_motor": Scale("coulomb_nm", "Nm", 1.0),
     "quadratic_friction": Scale("drag_nm_s2", "Nm s^2/rad^2", 1e-3),
+    "coulomb_friction_load": Scale("coulomb_nm", "Nm", 1.0),
     "backlash": Scale("gap_rad", "rad", 1e-3, least=1e-9),
 }
 """Effects whose strength is one number, by their names."""

@@ -98,6 +98,15 @@ def test_a_small_wave_beside_a_law_of_its_element_is_no_echo_of_it() -> None:
         assert WEIGHT.counts(name, frozenset({"backlash", name}), after, before, RETUNED) is counts
 
 
+def test_a_small_law_beside_a_wave_of_its_element_is_no_echo_of_it() -> None:
+    """What is in step with an angle leaves no dry friction; another friction does, written another way."""
+    after, before = of_rms(0.101, 4), of_rms(0.12, 3)
+    for other, counts in (("load_imbalance", True), ("coulomb_friction_load", False)):
+        assert (
+            WEIGHT.counts("aerodynamic_drag", frozenset({other, "aerodynamic_drag"}), after, before, RETUNED) is counts
+        )
+
+
 def test_what_is_next_to_nothing_of_the_mismatch_is_not_told_from_the_law_that_explains_it() -> None:
     """All that stands above the noise, and visible; but of the first mismatch more or less than one in a thousand."""
     after, before = of_rms(0.101, 4), of_rms(0.12, 3)

@@ -111,18 +111,19 @@ def test_a_slider_of_any_shape_follows_its_law(yield_rad: float, within: float) 
     assert found == pytest.approx(stiffness * twist + friction * np.array(z), abs=within * friction)
 
 
-def test_an_open_gap_carries_nothing_whatever_the_preload_behind_it() -> None:
+@pytest.mark.parametrize(("offset", "preload"), [(0.0, 100.0), (70.0, 100.0), (70.0, 0.0)])
+def test_an_open_gap_shows_the_zero_of_the_load_cell_and_no_preload(offset: float, preload: float) -> None:
     """A preloaded slider yields at another torque one way than the other; in between the torque is none."""
-    gap, preload, friction = 0.03, 100.0, 500.0
+    gap, friction = 0.03, 500.0
     slider = {"friction_nm": friction, "yield_rad": 1e-3}
     record = recording(up_and_down(0.1, 20001))
     p = flat_values({"k": 1e-3, "c": 0.0}, {"backlash": {"gap_rad": gap}, "shaft_hysteresis": slider})
-    found = simulate(grid_for(MODEL, [record]), record, p, Start(preload, 0.0, 0.0))
+    found = simulate(grid_for(MODEL, [record]), record, p, Start(offset, 0.0, 0.0, preload_nm=preload)) + offset
     assert found.max() == pytest.approx(friction - preload, rel=1e-3)
     assert found.min() == pytest.approx(-friction - preload, rel=1e-3)
     assert record.imposed is not None
     travelled = np.abs(np.diff(record.imposed, prepend=0.0))
-    assert travelled[2500:7500][np.abs(found[2500:7500]) < 1e-6].sum() == pytest.approx(gap, rel=0.01)
+    assert travelled[2500:7500][np.abs(found[2500:7500]) < 1e-6 * friction].sum() == pytest.approx(gap, rel=0.01)
 
 
 @pytest.mark.parametrize("begun_rad", [-0.5, 0.03, 2.0])
@@ -134,12 +135,13 @@ def test_a_fit_finds_back_into_a_gap_it_has_left(begun_rad: float) -> None:
     known = {name: {key: EffectValue(value) for key, value in values.items()} for name, values in effects.items()}
     model = DrivelineModel(Structure.JOINT, {"k": Parameter(100.0, 0.0), "c": Parameter(0.1, 0.0)}, effects=known)
     p = flat_values(model.values(), effects)
-    clean = simulate(grid_for(model, [recording(twist)]), recording(twist), p, Start(4.0, 0.0, 0.0, 0.007))
+    begun = Start(4.0, 0.0, 0.0, 0.007, preload_nm=2.0)
+    clean = simulate(grid_for(model, [recording(twist)]), recording(twist), p, begun)
     noise = 0.1 * np.random.default_rng(8).standard_normal(clean.size)
     problem = make_problem(model, [recording(twist, clean + noise)], ())
     scale = problem.local[0].scale
     made_up = model.values()["k"] * beyond_gap(begun_rad, 0.03)
-    caught = fit(problem, np.array([4.0 + made_up, begun_rad]) / scale)
+    caught = fit(problem, np.array([4.0, begun_rad, 2.0 + made_up]) / scale)
     assert caught.rms > 0.2
     found = polished(caught)
     assert found.rms == pytest.approx(0.1, rel=0.05)
@@ -214,7 +216,7 @@ def test_structure_and_recording_must_agree() -> None:
     with pytest.raises(BadModel, match="came force as the output, expected the torque under an imposed motion"):
         output_state(replace(bench, imposed=None), Structure.JOINT)
     with pytest.raises(ValueError, match="imposed motion, came none"):
-        joint.simulate(replace(bench, imposed=None), flat_values(MODEL.values(), {}), bench.output, 0.0)
+        joint.simulate(replace(bench, imposed=None), flat_values(MODEL.values(), {}), bench.output, 0.0, 0.0)
 
 
 def test_an_imposed_motion_is_known_throughout() -> None:
