@@ -128,10 +128,10 @@ def test_a_few_wild_rows_are_no_jitter() -> None:
 def test_noise_that_differs_from_recording_to_recording_is_no_jitter() -> None:
     """The steepest recordings have the most noise: pooled, the squared error follows the squared slope."""
     truths = drives(1)
-    records, sizes = [truth.record(kind) for kind, truth in zip(KINDS, truths, strict=True)], (0.5, 1.0, 2.0)
-    slopes = [size * slope(truth) for size, truth in zip(sizes, truths, strict=True)]
+    records = [truth.record(kind) for kind, truth in zip(KINDS, truths, strict=True)]
+    slopes = [steep * slope(truth) / np.std(slope(truth)) for steep, truth in zip((0.3, 1.0, 3.0), truths, strict=True)]
     rng = np.random.default_rng(4)
-    errors = [size * rng.standard_normal(SAMPLES) for size in sizes]
+    errors = [noise * rng.standard_normal(SAMPLES) for noise in (0.7, 1.0, 1.6)]
     assert hidden_jitter(records, errors, slopes, [record.okay for record in records]) is None
 
 
