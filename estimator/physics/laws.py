@@ -58,6 +58,15 @@ def inertia_while(inertia: float, extra: float, share: float) -> float:
 
 
 @compiled
+def overtoned_wave(amplitude: float, angle: float, phase: float, in_step: float, across: float) -> float:
+    """Return ``A (cos(x) + a cos(2 x) + b sin(2 x))``, ``x = angle + phase``; 0 without an amplitude, at no cost."""
+    if amplitude == 0.0:
+        return 0.0
+    cosine, sine = math.cos(angle + phase), math.sin(angle + phase)
+    return amplitude * (cosine + in_step * (2.0 * cosine * cosine - 1.0) + across * 2.0 * sine * cosine)
+
+
+@compiled
 def wave(amplitude: float, angle: float, phase: float) -> float:
     """Return ``A cos(angle + phase)``; 0 without an amplitude, at no cost."""
     if amplitude == 0.0:

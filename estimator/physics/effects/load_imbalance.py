@@ -1,4 +1,4 @@
-"""An unbalanced wheel: a load torque once per wheel turn."""
+"""An unbalanced, a little oval wheel: a load torque once and twice per wheel turn."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from estimator.signals.record import Record
 
 
 def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
-    """Return a twentieth of the torque in use, and 1."""
-    return (0.05 * torque_scale(records), 1.0)
+    """Return a twentieth of the torque in use, 1, and a tenth of the amplitude for twice per turn."""
+    return (0.05 * torque_scale(records), 1.0, 0.1, 0.1)
 
 
 def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
     """Return one start: the problem is linear in amplitude and phase together."""
-    return [(0.5, Held(model.gear_ratio or 1.0))]
+    return [(0.5, Held(model.gear_ratio or 1.0), 0.0, 0.0)]
 
 
 def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
@@ -37,12 +37,14 @@ EFFECT = Effect(
     name="load_imbalance",
     element=Element.LOAD,
     title="imbalance of the load",
-    law="T_load = T_0 + A cos(phi_M / i + alpha)",
+    law="T_load = T_0 + A (cos(x) + a cos(2 x) + b sin(2 x)), x = phi_M / i + alpha",
     source="Genta, Dynamics of Rotating Systems, Springer 2005",
     excited_by="speeds at which the wheel's turn is felt",
     parameters=(
         EffectParameter("amplitude_nm", "torque", 0.0, 0.0, 100.0, "amplitude A"),
         EffectParameter("motor_turns_per_turn", "", 1.0, 0.01, 100.0, "motor turns per turn of the load: i", True),
+        EffectParameter("overtone_in_step", "", 0.0, -5.0, 5.0, "twice per turn, as a share of A: a", True),
+        EffectParameter("overtone_across", "", 0.0, -5.0, 5.0, "the same a quarter of its turn on: b", True),
         EffectParameter("phase_rad", "rad", 0.0, -10.0, 10.0, "phase alpha, of each recording", True, True),
     ),
     structures=EVERY_LINE,

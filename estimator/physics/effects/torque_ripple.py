@@ -14,8 +14,8 @@ ORDERS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 18, 20, 24, 30, 36, 48)
 
 
 def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
-    """Return a twentieth of the torque in use, by itself and as a share, and 1 for the order."""
-    return (0.05 * torque_scale(records), 0.05, 1.0)
+    """Return a twentieth of the torque in use, by itself and as a share, 1 for the order, a tenth for its overtone."""
+    return (0.05 * torque_scale(records), 0.05, 1.0, 0.1, 0.1)
 
 
 def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
@@ -23,7 +23,10 @@ def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
     return [
         start
         for order in ORDERS
-        for start in ((0.5, Held(0.0), Held(float(order))), (Held(0.0), 0.5, Held(float(order))))
+        for start in (
+            (0.5, Held(0.0), Held(float(order)), 0.0, 0.0),
+            (Held(0.0), 0.5, Held(float(order)), 0.0, 0.0),
+        )
     ]
 
 
@@ -45,13 +48,16 @@ EFFECT = Effect(
     name="torque_ripple",
     element=Element.TORQUE_PATH,
     title="torque ripple",
-    law="T = T_read (1 + r cos(n phi_M + alpha)) + A cos(n phi_M + alpha), one of r and A zero",
+    law="T = T_read (1 + r w(x)) + A w(x), one of r and A zero, w = cos(x) + a cos(2 x) + b sin(2 x), "
+    "x = n phi_M + alpha",
     source="cogging and commutation: Jahns, Soong, IEEE Trans. Ind. Electron. 43(2), 1996",
     excited_by="slow speeds at which n times the speed passes the resonance",
     parameters=(
         EffectParameter("amplitude_nm", "torque", 0.0, 0.0, 20.0, "amplitude A, of cogging", True),
         EffectParameter("share", "", 0.0, 0.0, 20.0, "amplitude as a share of the torque: r", True),
         EffectParameter("order", "", 6.0, 1.0, 96.0, "periods per motor turn: n"),
+        EffectParameter("overtone_in_step", "", 0.0, -5.0, 5.0, "twice as often, as a share: a", True),
+        EffectParameter("overtone_across", "", 0.0, -5.0, 5.0, "the same a quarter of its turn on: b", True),
         EffectParameter("phase_rad", "rad", 0.0, -10.0, 10.0, "phase alpha of A, of each recording", True, True),
         EffectParameter("share_phase_rad", "rad", 0.0, -10.0, 10.0, "phase alpha of r, of each recording", True, True),
     ),

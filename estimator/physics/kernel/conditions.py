@@ -8,7 +8,7 @@ from estimator.compiled import inlined
 from estimator.physics.effects import warming_friction
 from estimator.physics.kernel import slots
 from estimator.physics.kernel.state_vector import Conditions
-from estimator.physics.laws import inertia_while, share_inside, wave
+from estimator.physics.laws import inertia_while, overtoned_wave, share_inside, wave
 from estimator.signals.record import FloatArray
 
 STICK_STABILITY = 1.5
@@ -48,9 +48,11 @@ def conditions(
     cracked = share_inside(time_s, h, p[slots.CRACK_FROM], p[slots.CRACK_TO])
     loaded = share_inside(time_s, h, p[slots.PAYLOAD_FROM], p[slots.PAYLOAD_TO])
     braked = share_inside(time_s, h, p[slots.BRAKE_FROM], p[slots.BRAKE_TO])
-    ripple = wave(p[slots.RIPPLE], p[slots.RIPPLE_ORDER] * angle, p[slots.RIPPLE_PHASE])
-    torque_factor = 1.0 + wave(p[slots.RIPPLE_SHARE], p[slots.RIPPLE_ORDER] * angle, p[slots.RIPPLE_SHARE_PHASE])
-    load += wave(p[slots.IMBALANCE], angle / p[slots.IMBALANCE_RATIO], p[slots.IMBALANCE_PHASE])
+    turned, overtone = p[slots.RIPPLE_ORDER] * angle, (p[slots.RIPPLE_IN_STEP], p[slots.RIPPLE_ACROSS])
+    ripple = overtoned_wave(p[slots.RIPPLE], turned, p[slots.RIPPLE_PHASE], *overtone)
+    torque_factor = 1.0 + overtoned_wave(p[slots.RIPPLE_SHARE], turned, p[slots.RIPPLE_SHARE_PHASE], *overtone)
+    rolled, oval = angle / p[slots.IMBALANCE_RATIO], (p[slots.IMBALANCE_IN_STEP], p[slots.IMBALANCE_ACROSS])
+    load += overtoned_wave(p[slots.IMBALANCE], rolled, p[slots.IMBALANCE_PHASE], *oval)
     cardan = wave(p[slots.CARDAN], 2.0 * angle, p[slots.CARDAN_PHASE])
     shaft_factor = 1.0 + wave(p[slots.CARDAN_SHARE], 2.0 * angle, p[slots.CARDAN_SHARE_PHASE])
     joint_angle = wave(p[slots.CARDAN_ANGLE], 2.0 * angle, p[slots.CARDAN_ANGLE_PHASE])

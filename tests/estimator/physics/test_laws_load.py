@@ -78,11 +78,16 @@ def test_in_a_part_of_a_recording_time_counts_from_its_beginning() -> None:
 
 
 @pytest.mark.parametrize("motor_turns", [1.0, 3.3])
-def test_an_unbalanced_wheel_swings_the_load_once_per_its_turn(motor_turns: float) -> None:
+def test_an_unbalanced_oval_wheel_swings_the_load_once_and_twice_per_its_turn(motor_turns: float) -> None:
     turning = 15.0 + 6.0 * np.cos(2.1 * TIME_S)
     angle = np.concatenate([[0.0], np.cumsum(0.5 * SAMPLE_TIME_S * (turning[1:] + turning[:-1]))])
-    line = two_mass(drag=lambda t, w: 40.0 * np.cos(np.interp(t, TIME_S, angle) / motor_turns + 1.1))
-    values = {"amplitude_nm": 40.0, "motor_turns_per_turn": motor_turns, "phase_rad": 1.1}
+
+    def heavy_and_oval(t: float, w: float) -> float:
+        wheel = float(np.interp(t, TIME_S, angle)) / motor_turns
+        return 40.0 * np.cos(wheel + 1.1) + 8.0 * np.sin(2.0 * (wheel + 1.1))
+
+    line = two_mass(drag=heavy_and_oval)
+    values = {"amplitude_nm": 40.0, "motor_turns_per_turn": motor_turns, "phase_rad": 1.1, "overtone_across": 0.2}
     assert_law({"load_imbalance": values}, solved(line), measured(turning))
 
 

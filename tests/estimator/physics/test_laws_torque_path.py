@@ -178,13 +178,21 @@ def test_in_a_part_of_a_recording_the_clock_has_drifted_since_its_beginning(rate
     assert_law({"clock_drift": {"rate": rate}}, expected, rec, tolerance=2e-4)
 
 
+OVERTONE = {"overtone_in_step": 0.3 * np.cos(0.5), "overtone_across": 0.3 * np.sin(0.5)}
+
+
+def _pulsating(angle: FloatArray | float) -> FloatArray:
+    """A wave with an overtone of three tenths of its size, half a radian of its own turn late."""
+    return np.asarray(np.cos(angle) + 0.3 * np.cos(2.0 * np.asarray(angle) - 0.5))
+
+
 @pytest.mark.parametrize("order", [1.0, 6.0])
 def test_a_ripple_follows_the_measured_angle(order: float) -> None:
     """The reading is a known speed, so that the angle is known: the phase comes from it and not from the fit."""
     turning = 8.0 + 3.0 * np.sin(1.7 * TIME_S)
     angle = np.concatenate([[0.0], np.cumsum(0.5 * SAMPLE_TIME_S * (turning[1:] + turning[:-1]))])
-    line = two_mass(ripple=lambda t: 25.0 * np.cos(order * np.interp(t, TIME_S, angle) + 0.7))
-    effects = {"torque_ripple": {"amplitude_nm": 25.0, "order": order, "phase_rad": 0.7}}
+    line = two_mass(ripple=lambda t: 25.0 * _pulsating(order * np.interp(t, TIME_S, angle) + 0.7))
+    effects = {"torque_ripple": {"amplitude_nm": 25.0, "order": order, "phase_rad": 0.7} | OVERTONE}
     assert_law(effects, solved(line), measured(turning))
 
 
@@ -193,9 +201,9 @@ def test_a_ripple_may_grow_with_the_torque() -> None:
     line = two_mass()
 
     def rhs(t: float, x: FloatArray, torque: float) -> FloatArray:
-        return line(t, x, torque * (1.0 + 0.2 * np.cos(6.0 * 10.0 * t + 0.7)))
+        return line(t, x, torque * (1.0 + 0.2 * _pulsating(6.0 * 10.0 * t + 0.7)))
 
-    effects = {"torque_ripple": {"share": 0.2, "order": 6.0, "share_phase_rad": 0.7}}
+    effects = {"torque_ripple": {"share": 0.2, "order": 6.0, "share_phase_rad": 0.7} | OVERTONE}
     assert_law(effects, solved(rhs), measured(turning))
 
 

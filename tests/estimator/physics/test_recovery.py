@@ -47,6 +47,7 @@ class Plant:
 
 
 EVENTS = ({"from_s": 3.21, "to_s": 8.4}, {"from_s": 5.5, "to_s": 11.03})
+OVERTONE = {"overtone_in_step": 0.12, "overtone_across": -0.15}
 PHASES = ({"phase_rad": 0.4}, {"phase_rad": -1.1})
 PLANTS = {
     "inverter_gain_mismatch": Plant({"gain_m1": 0.9}),
@@ -54,8 +55,10 @@ PLANTS = {
     "torque_saturation": Plant({"limit_m1_nm": 80.0, "limit_m2_nm": 70.0, "sharpness": 12.0}, factor=0.97),
     "actuator_lag": Plant({"time_constant_s": 0.02, "shape": 0.15}),
     "transport_delay": Plant({"delay_s": 0.023}),
-    "torque_ripple": Plant({"amplitude_nm": 15.0, "order": 6.0}, PHASES),
-    "torque_ripple/share": Plant({"share": 0.04, "order": 6.0}, ({"share_phase_rad": 0.4}, {"share_phase_rad": -1.1})),
+    "torque_ripple": Plant({"amplitude_nm": 15.0, "order": 6.0} | OVERTONE, PHASES),
+    "torque_ripple/share": Plant(
+        {"share": 0.04, "order": 6.0} | OVERTONE, ({"share_phase_rad": 0.4}, {"share_phase_rad": -1.1})
+    ),
     "coulomb_friction_motor": Plant({"friction_nm": 15.0}),
     "stribeck_friction": Plant({"excess_nm": 20.0, "coulomb_nm": 12.0, "stribeck_rad_s": 1.5}),
     "quadratic_friction": Plant({"quadratic_nm_s2": 0.5}),
@@ -87,7 +90,7 @@ PLANTS = {
             "grip_nm": 450.0,
         }
     ),
-    "load_imbalance": Plant({"amplitude_nm": 40.0, "motor_turns_per_turn": 3.0}, PHASES),
+    "load_imbalance": Plant({"amplitude_nm": 40.0, "motor_turns_per_turn": 3.0} | OVERTONE, PHASES),
     "inertia_change": Plant({"change_kg_m2": 6.0}, EVENTS),
     "warming_friction": Plant({"cold_nm_s": 3.0, "time_constant_s": 5.0}),
     "resolver_error": Plant(

@@ -97,7 +97,7 @@ def test_three_masses_start_with_two_twists() -> None:
     rec = linear_record(TWO_MASS, random_steps(500, seed=2), CRUISE)
     basis = local_basis(line, rec, profile=False)
     start = basis.start(np.arange(1.0, 7.0) / basis.scale)
-    np.testing.assert_allclose(astuple(start), [1.0, 0.0, 2.0, 3.0, 4.0, 5.0, 6.0])
+    np.testing.assert_allclose(astuple(start), [1.0, 0.0, 2.0, 3.0, 4.0, 5.0, 6.0, 0.0])
 
 
 @pytest.mark.parametrize("kind", [OutputKind.SPEED, OutputKind.POSITION])
