@@ -54,6 +54,7 @@ def prove(
     key_path = out.with_name(f"{out.name}.key")
     if not key_path.exists():
         make(out, cases, seed, jobs, key_path)
+    _require_set(out, key_path)
     run(out, jobs)
     if rigs:
         wire(out, None, RIG_SEED if seed is None else seed)
@@ -187,6 +188,16 @@ def _key_text(key: str | None, key_file: Path | None) -> str:
     if (key is None) == (key_file is None):
         raise UsageError("expected the key once, with --key or --key-file. hil prove make has printed or written it.")
     return key if key is not None else Path(str(key_file)).read_text(encoding="utf-8")
+
+
+def _require_set(folder: Path, key_file: Path) -> None:
+    from hil.errors import UsageError
+
+    if not folder.exists():
+        raise UsageError(
+            f"{key_file}: expected the set that this key opens in {folder}, which is not there (deleted?). "
+            f"Remove the key to make a new set, or choose another folder."
+        )
 
 
 def _require_outside(key_file: Path, folder: Path) -> None:
