@@ -112,7 +112,7 @@ def interval(result: FitResult, cov: FloatArray, index: int) -> tuple[float, flo
     """
     shared = result.problem.shared[index]
     spread = Z95 * float(np.sqrt(max(cov[index, index], 0.0)))
-    x = float(result.x[index])
+    x = min(max(float(result.x[index]), shared.low), shared.high)  # a fit may end beyond a bound by its last digit
     return (shared.scale * max(x - spread, shared.low), shared.scale * min(x + spread, shared.high))
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import stats
@@ -72,6 +74,18 @@ def test_the_covariance_of_white_errors_is_the_textbooks() -> None:
     result = regression([design], [design @ TRUE + 0.5 * rng.standard_normal(50_000)])
     expected = 0.25 * np.linalg.inv(design.T @ design)
     np.testing.assert_allclose(np.diag(covariance(result)), np.diag(expected), rtol=0.06)
+
+
+@pytest.mark.parametrize("beyond", [-1.0, 1.0])
+def test_an_interval_begins_before_it_ends_where_a_fit_is_beyond_a_bound_by_its_last_digit(beyond: float) -> None:
+    rng = np.random.default_rng(2)
+    design = rng.standard_normal((200, 1))
+    result = regression([design], [design[:, 0]])
+    held = float(np.nextafter(result.x[0], beyond * np.inf))
+    shared = replace(result.problem.shared[0], low=held, high=held)
+    pinned = replace(result, problem=replace(result.problem, shared=(shared,)))
+    low, high = interval(pinned, np.zeros((1, 1)), 0)
+    assert low == high == shared.scale * held
 
 
 def test_the_interval_is_in_the_parameters_unit() -> None:
