@@ -34,7 +34,7 @@ TORQUE = -1
 """The output that a joint has beside the kernel's states: the torque it carries."""
 
 PART_OF_TORQUE, MOST_SECANTS = 1e-12, 100
-"""How near the balance inside an open gap is found, as part of the torques at its ends; it takes ten secants."""
+"""How near the balance inside an open gap is found, as part of the torques at its ends, and by how many secants."""
 
 PART_OF_YIELD = 0.5
 """Longest step over a slider's twist, in multiples of that over which it yields and its sharpness: errors near 1e-4."""

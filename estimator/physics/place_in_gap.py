@@ -12,7 +12,7 @@ from estimator.physics.kernel import slots
 from estimator.physics.laws import beyond_gap
 from estimator.physics.model import Structure
 from estimator.physics.parallel import concurrently
-from estimator.physics.unknowns import PRELOAD
+from estimator.physics.unknowns import PRELOAD, TWIST
 from estimator.signals.record import FloatArray
 
 PLACES = np.linspace(-1.0, 1.0, 9)
@@ -23,7 +23,7 @@ WORTH_MOVING = 0.99
 
 
 def moved(result: FitResult) -> tuple[Problem, FloatArray] | None:
-    """Return the problem and its unknowns with the start elsewhere in the gap; None where none is better."""
+    """Return the problem and its unknowns, (U,), with the start elsewhere in the gap; None where none is better."""
     if result.problem.local[0].structure is not Structure.JOINT or result.p[slots.GAP] <= 0.0:
         return None
     found = concurrently(lambda index: _moved_in(result, index), range(len(result.problem.records)))
@@ -39,19 +39,15 @@ def moved(result: FitResult) -> tuple[Problem, FloatArray] | None:
 def _moved_in(result: FitResult, index: int) -> FloatArray | None:
     """Return one recording's unknowns with the start moved; None where it stays."""
     problem, basis, local = result.problem, result.problem.local[index], result.local_of(index)
-    twist = basis.twist_index
-    if twist is None:
-        raise ValueError(f"recording {problem.records[index].name}: a joint has a twist at the start, came none")
-    p = result.p_of(index)
-    gap, torque_scale, twist_scale = p[slots.GAP], basis.scale[PRELOAD], basis.scale[twist]
-    made_up = p[slots.K] * beyond_gap(local[twist] * twist_scale, gap)
+    p, gap = result.p, result.p[slots.GAP]
+    made_up = p[slots.K] * beyond_gap(local[TWIST] * basis.scale[TWIST], gap)
     tried = [local]
     for place in PLACES:
         other = local.copy()
-        other[twist] = 0.5 * gap * place / twist_scale
-        other[PRELOAD] -= made_up / torque_scale
+        other[TWIST] = 0.5 * gap * place / basis.scale[TWIST]
+        other[PRELOAD] -= made_up / basis.scale[PRELOAD]
         tried.append(other)
-    outputs = simulated_each(problem, [(result.p, x) for x in tried], index)
+    outputs = simulated_each(problem, [(p, x) for x in tried], index)
     use = problem.use[index]
     squares = (((outputs - problem.records[index].output)[:, use]) ** 2).sum(axis=1)
     best = int(squares.argmin())
