@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 
 from estimator.compiled import compiled
 from estimator.physics.effect import WITH_SPRING, Effect, EffectParameter, Element, Held, Start, Untestable
+from estimator.physics.laws import fading
 from estimator.physics.model import DrivelineModel, Motion, Structure, unit
 from estimator.physics.motion import torque_reverses, torque_scale
 from estimator.signals.record import Record
@@ -21,7 +21,7 @@ def damping_share(loaded_twist: float, contact: float) -> float:
     """
     if contact <= 0.0:
         return 0.0 if loaded_twist == 0.0 else 1.0
-    return 1.0 - math.exp(-abs(loaded_twist) / contact)
+    return 1.0 - fading(abs(loaded_twist) / contact)
 
 
 @compiled

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 
 from estimator.compiled import compiled
 from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start, Untestable
 from estimator.physics.effects import coulomb_friction_motor
-from estimator.physics.laws import smooth_sign
+from estimator.physics.laws import fading, smooth_sign
 from estimator.physics.model import DrivelineModel, Motion, unit
 from estimator.physics.motion import speed_scale, torque_scale
 from estimator.signals.record import Record
@@ -20,7 +19,7 @@ def law(speed: float, excess: float, coulomb: float, stribeck_speed: float, widt
     if stribeck_speed <= 0.0:
         return 0.0
     ratio = speed / stribeck_speed
-    return (coulomb + excess * math.exp(-ratio * ratio)) * smooth_sign(speed, width)
+    return (coulomb + excess * fading(ratio * ratio)) * smooth_sign(speed, width)
 
 
 def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:

@@ -17,6 +17,7 @@ from estimator.compiled import brief, compiled, inlined
 from estimator.physics.effects import actuator_lag, transport_delay
 from estimator.physics.kernel import slots
 from estimator.physics.kernel.conditions import conditions, is_changing, is_waving, with_torque, with_torques
+from estimator.physics.kernel.line import Line, is_elastic, is_extended
 from estimator.physics.kernel.rates import rates
 from estimator.physics.kernel.sensing import entry, reading, shown, smoothed
 from estimator.physics.kernel.state_vector import FILTER_RISE, FILTERED, LAG_RISE, LAGGED, Conditions, State
@@ -27,16 +28,16 @@ RADIANS_PER_STEP_OF_MODE = 0.6
 
 
 @inlined
-def moved(masses: int, extended: bool, x: State, dx: State, h: float) -> State:
+def moved(line: Line, x: State, dx: State, h: float) -> State:
     """Return a state moved along its derivative for a time [s]; what a line lacks stays where it is, at no cost."""
     twist, load_speed, middle_twist, middle_speed = x.twist, x.load_speed, x.middle_twist, x.middle_speed
-    if masses > 1:
+    if line.masses > 1:
         twist, load_speed = twist + h * dx.twist, load_speed + h * dx.load_speed
-    if masses == 3:
+    if line.masses == 3:
         middle_twist, middle_speed = middle_twist + h * dx.middle_twist, middle_speed + h * dx.middle_speed
     loading, vehicle_speed, traction = x.loading, x.vehicle_speed, x.traction
     branch_twist, branch_speed = x.branch_twist, x.branch_speed
-    if extended:
+    if line.extended:
         loading += h * dx.loading
         vehicle_speed, traction = vehicle_speed + h * dx.vehicle_speed, traction + h * dx.traction
         branch_twist, branch_speed = branch_twist + h * dx.branch_twist, branch_speed + h * dx.branch_speed
@@ -56,21 +57,19 @@ def moved(masses: int, extended: bool, x: State, dx: State, h: float) -> State:
 
 
 @inlined
-def runge_kutta(
-    masses: int, extended: bool, now: Conditions, torque: float, rise: float, x: State, p: FloatArray, h: float
-) -> State:
+def runge_kutta(line: Line, now: Conditions, torque: float, rise: float, x: State, p: FloatArray, h: float) -> State:
     """Return the state after one sub-step under constant conditions and a torque of this mean and rise [Nm]."""
     begin = with_torque(now, torque - 0.5 * rise)
     middle = with_torque(now, torque)
     end = with_torque(now, torque + 0.5 * rise)
-    first = rates(masses, extended, begin, x, p)
-    second = rates(masses, extended, middle, moved(masses, extended, x, first, 0.5 * h), p)
-    third = rates(masses, extended, middle, moved(masses, extended, x, second, 0.5 * h), p)
-    fourth = rates(masses, extended, end, moved(masses, extended, x, third, h), p)
-    x = moved(masses, extended, x, first, h / 6.0)
-    x = moved(masses, extended, x, second, h / 3.0)
-    x = moved(masses, extended, x, third, h / 3.0)
-    return moved(masses, extended, x, fourth, h / 6.0)
+    first = rates(line, begin, x, p)
+    second = rates(line, middle, moved(line, x, first, 0.5 * h), p)
+    third = rates(line, middle, moved(line, x, second, 0.5 * h), p)
+    fourth = rates(line, end, moved(line, x, third, h), p)
+    x = moved(line, x, first, h / 6.0)
+    x = moved(line, x, second, h / 3.0)
+    x = moved(line, x, third, h / 3.0)
+    return moved(line, x, fourth, h / 6.0)
 
 
 @inlined
@@ -79,12 +78,6 @@ def unpacked(state: FloatArray) -> State:
     return State(
         state[0], state[1], state[2], state[3], state[4], state[5], state[6], state[7], state[8], state[9], state[10]
     )
-
-
-@inlined
-def is_extended(p: FloatArray) -> bool:
-    """Tell whether a line has states beyond those of its masses: an extra mode, a tyre that slips, a slider inside."""
-    return bool(p[slots.BRANCH_INERTIA] > 0.0 or p[slots.SLIP] > 0.0 or p[slots.SLIDER] != 0.0)
 
 
 @inlined
@@ -110,9 +103,8 @@ def leave_slope(k: int, slope: float, slopes: FloatArray) -> None:
 
 
 @inlined
-def integrate_masses(
-    masses: int,
-    extended: bool,
+def integrate_made(
+    line: Line,
     sample_time_s: float,
     substeps: int,
     sign_width: float,
@@ -128,7 +120,7 @@ def integrate_masses(
     out: FloatArray,
     slopes: FloatArray,
 ) -> None:
-    """Do what ``integrate`` does, for masses and states that are known when it is compiled."""
+    """Do what ``integrate`` does, for a line whose make is known when it is compiled."""
     substeps = with_mode(substeps, sample_time_s, p)
     h = sample_time_s / substeps
     length = 1.0 / substeps
@@ -142,7 +134,7 @@ def integrate_masses(
     x = unpacked(state)
     lagged, lag_rise = state[LAGGED], state[LAG_RISE]
     filtered, filter_rise = state[FILTERED], state[FILTER_RISE]
-    now = conditions(masses, start_s + first * sample_time_s, h, 0.0, 0.0, sign_width, p)
+    now = conditions(line.masses, start_s + first * sample_time_s, h, 0.0, 0.0, sign_width, p)
     for k in range(first, n):
         turn = angle[k + 1] - angle[k] if k + 1 < angle.shape[0] else angle[k] - angle[k - 1]
         value = entry(x, output)
@@ -156,7 +148,7 @@ def integrate_masses(
             place = k + j * length
             if varying:
                 middle = angle[k] + turn * (j + 0.5) * length
-                now = conditions(masses, start_s + place * sample_time_s, h, middle, load[k], sign_width, p)
+                now = conditions(line.masses, start_s + place * sample_time_s, h, middle, load[k], sign_width, p)
             supplied, rise = torque[k], 0.0
             if late:
                 source = place + (place + begun) * p[slots.DRIFT] - delay
@@ -165,7 +157,7 @@ def integrate_masses(
                 supplied, rise, lagged, lag_rise, p[slots.LAG], p[slots.LAG_SHAPE], h
             )
             before = x
-            x = runge_kutta(masses, extended, now, mean, rise, x, p, h)
+            x = runge_kutta(line, now, mean, rise, x, p, h)
             slope = (entry(x, output) - entry(before, output)) / h
             if filtering:
                 turned, turns = angle[k] + turn * j * length, angle[k] + turn * (j + 1) * length
@@ -180,12 +172,21 @@ def integrate_masses(
 
 
 @inlined
-def integrate_line(masses: int, *given: Any) -> None:
-    """Do what ``integrate`` does, for a number of masses that is known when it is compiled."""
+def integrate_line(masses: int, elastic: bool, *given: Any) -> None:
+    """Do what ``integrate`` does, for masses and a shaft that are known when it is compiled."""
     if is_extended(given[8]):
-        integrate_masses(masses, True, *given)
+        integrate_made(Line(masses, elastic, True), *given)
     else:
-        integrate_masses(masses, False, *given)
+        integrate_made(Line(masses, elastic, False), *given)
+
+
+@inlined
+def integrate_shaft(masses: int, *given: Any) -> None:
+    """Do what ``integrate`` does, for masses with a shaft between them, known when it is compiled."""
+    if is_elastic(given[8]):
+        integrate_line(masses, True, *given)
+    else:
+        integrate_line(masses, False, *given)
 
 
 @compiled
@@ -245,11 +246,11 @@ def integrate(
     given = (sample_time_s, substeps, sign_width, first, start_s, torque, load, angle, p)
     wanted = (state, output, sensor, out, slopes)
     if masses == 1:
-        integrate_line(1, *given, *wanted)
+        integrate_line(1, True, *given, *wanted)
     elif masses == 2:
-        integrate_line(2, *given, *wanted)
+        integrate_shaft(2, *given, *wanted)
     else:
-        integrate_line(3, *given, *wanted)
+        integrate_shaft(3, *given, *wanted)
 
 
 @brief

@@ -14,6 +14,7 @@ from estimator.physics.effects import (
     tyre_slip,
 )
 from estimator.physics.kernel import slots
+from estimator.physics.kernel.line import Line
 from estimator.physics.kernel.state_vector import Conditions, State
 from estimator.physics.laws import beyond_gap, dry_friction
 from estimator.signals.record import FloatArray
@@ -32,9 +33,15 @@ def motor_friction(speed: float, p: FloatArray, width: float, dry: float) -> flo
 
 
 @inlined
+def damping_torque(rate: float, p: FloatArray) -> float:
+    """Return the torque of the shaft's damper [Nm] at the rate of its twist [rad/s]."""
+    return float(p[slots.C] * p[slots.LINE_SHARE] ** 2) * rate
+
+
+@inlined
 def shaft_torque(twist: float, rate: float, loading: float, p: FloatArray, stiffness: float) -> float:
     """Return the torque the shaft carries [Nm] at a twist [rad], its rate [rad/s] and the hysteresis' loading [-]."""
-    damping = float(p[slots.C] * p[slots.LINE_SHARE] ** 2) * rate
+    damping = damping_torque(rate, p)
     loaded = twist
     if p[slots.GAP] > 0.0:
         loaded = beyond_gap(twist, p[slots.GAP])
@@ -47,37 +54,46 @@ def shaft_torque(twist: float, rate: float, loading: float, p: FloatArray, stiff
 
 
 @inlined
-def rates(masses: int, extended: bool, now: Conditions, x: State, p: FloatArray) -> State:
+def shaft_torques(line: Line, rate: float, now: Conditions, x: State, p: FloatArray) -> tuple[float, float]:
+    """Return the torque the first shaft passes on to the load, and the one it takes from the motor [Nm]."""
+    if line.elastic:
+        shaft = now.stiffness * x.twist + damping_torque(rate, p)
+        return shaft, shaft
+    joint_rate = now.joint_rate * x.speed
+    shaft = shaft_torque(x.twist + now.joint_angle, rate + joint_rate, x.loading, p, now.stiffness)
+    shaft = shaft * now.shaft_factor + now.shaft_extra
+    return shaft, shaft * (1.0 + now.joint_rate)  # a joint that turns unevenly passes on power, not torque
+
+
+@inlined
+def rates(line: Line, now: Conditions, x: State, p: FloatArray) -> State:
     """Return the time derivative of the mechanical state under the conditions ``now``."""
     drive = now.torque - motor_friction(x.speed, p, now.width_motor, now.dry_motor)
     branch_acceleration = 0.0
-    if extended:
+    if line.extended:
         branch_acceleration = branch_rate(x.branch_twist, x.speed - x.branch_speed, p)
         drive -= float(p[slots.BRANCH_INERTIA]) * branch_acceleration
-    if masses == 1:
+    if line.masses == 1:
         drag = load_drag(x.speed, x.speed, now, p) + now.load
         acceleration = (drive - drag) * now.inverse_motor
         return State(
             x.speed, acceleration, 0.0, 0.0, 0.0, 0.0, x.speed - x.branch_speed, branch_acceleration, 0.0, 0.0, 0.0
         )
-    rate = x.speed - (x.middle_speed if masses == 3 else x.load_speed)
-    joint_rate = now.joint_rate * x.speed
-    shaft = shaft_torque(x.twist + now.joint_angle, rate + joint_rate, x.loading, p, now.stiffness)
-    shaft = shaft * now.shaft_factor + now.shaft_extra
+    rate = x.speed - (x.middle_speed if line.masses == 3 else x.load_speed)
+    shaft, reaction = shaft_torques(line, rate, now, x, p)
     pull = shaft
-    reaction = shaft * (1.0 + now.joint_rate)  # a joint that turns unevenly passes on power, not torque
     middle_twist, middle_speed = 0.0, 0.0
-    if masses == 3:
+    if line.masses == 3:
         middle_twist = x.middle_speed - x.load_speed
         pull = float(p[slots.K_2]) * x.middle_twist + float(p[slots.C_2]) * middle_twist
         middle_speed = (shaft - pull) / p[slots.J_2]
-    load, vehicle, traction = load_rates(extended, pull, now, x, p)
+    load, vehicle, traction = load_rates(line, pull, now, x, p)
     return State(
         x.speed,
         (drive - reaction) * now.inverse_motor,
         rate,
         load,
-        sliding(x.loading, rate, now, p) if extended else 0.0,
+        sliding(x.loading, rate, now, p) if line.extended else 0.0,
         vehicle,
         x.speed - x.branch_speed,
         branch_acceleration,
@@ -113,10 +129,10 @@ def load_drag(wheel: float, vehicle: float, now: Conditions, p: FloatArray) -> f
 
 
 @inlined
-def load_rates(extended: bool, pull: float, now: Conditions, x: State, p: FloatArray) -> tuple[float, float, float]:
+def load_rates(line: Line, pull: float, now: Conditions, x: State, p: FloatArray) -> tuple[float, float, float]:
     """Return the accelerations of the load and, where the tyre slips, of the vehicle [rad/s^2]; the traction's rate."""
     wheel = x.load_speed
-    if not extended or p[slots.SLIP] <= 0.0:
+    if not line.extended or p[slots.SLIP] <= 0.0:
         return (pull - load_drag(wheel, wheel, now, p) - now.load) * now.inverse_load, 0.0, 0.0
     vehicle = x.vehicle_speed
     slip, creep, relaxation = p[slots.SLIP], p[slots.SLIP_SPEED], p[slots.RELAXATION]

@@ -1,0 +1,41 @@
+"""What a line is made of, known when its simulation is compiled: what it lacks costs nothing."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from estimator.compiled import inlined
+from estimator.physics.kernel import slots
+from estimator.signals.record import FloatArray
+
+
+class Line(NamedTuple):
+    """What a line is made of.
+
+    Attributes
+    ----------
+    masses : int
+        1, 2 or 3.
+    elastic : bool
+        Whether the first shaft is a spring and a damper, and no law beside them.
+    extended : bool
+        Whether it has states beyond those of its masses: an extra mode, a tyre that slips, a slider inside.
+    """
+
+    masses: int
+    elastic: bool
+    extended: bool
+
+
+@inlined
+def is_elastic(p: FloatArray) -> bool:
+    """Tell whether the first shaft is a spring and a damper, and no law beside them."""
+    bent = p[slots.GAP] > 0.0 or p[slots.HARDENING] != 0.0 or p[slots.SLIDER] != 0.0 or p[slots.SLIDER_INSIDE] > 0.0
+    jointed = p[slots.CARDAN] != 0.0 or p[slots.CARDAN_ANGLE] != 0.0 or p[slots.CARDAN_SHARE] != 0.0
+    return not (bent or jointed)
+
+
+@inlined
+def is_extended(p: FloatArray) -> bool:
+    """Tell whether a line has states beyond those of its masses."""
+    return bool(p[slots.BRANCH_INERTIA] > 0.0 or p[slots.SLIP] > 0.0 or p[slots.SLIDER] != 0.0)
