@@ -16,6 +16,7 @@ from estimator.diagnosis.unnamed import UnnamedLaw
 from estimator.diagnosis.weight import VISIBLE
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult
+from estimator.physics.parallel import concurrently
 
 MOST_EFFECTS = 4
 
@@ -114,6 +115,7 @@ class Selector:
         named = chosen if self.jury.weight.may_stand(current, retuned) else NOTHING
         alike = {name: lookalikes(name, chosen, current, self.jury.bench, self.jury.names) for name in named}
         self._progress("looking for laws without a name", 0.9)
+        unnamed, *remaining = concurrently(self._law, [retuned, current] if chosen else [retuned])
         return Selection(
             retuned,
             chosen,
@@ -122,8 +124,8 @@ class Selector:
             self._rounds.trials,
             self._rounds.dismissed,
             alike,
-            unnamed=self._law(retuned),
-            remaining=self._law(current) if chosen else None,
+            unnamed=unnamed,
+            remaining=remaining[0] if remaining else None,
         )
 
     def _grown(self, path: _Path, retuned: FitResult) -> _Path:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 
@@ -26,6 +25,7 @@ from estimator.diagnosis.unnamed.pursuit import MOST_COEFFICIENTS
 from estimator.diagnosis.unnamed.scene import Scene, elements, scene
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
+from estimator.physics.parallel import concurrently
 
 ROUNDS = 5
 """Rounds that locate: the first promises, the others try what it promised."""
@@ -80,15 +80,13 @@ def judged(view: Scene, hunts: Sequence[Hunt]) -> list[UnnamedLaw]:
 def hunts_of(view: Scene, rounds: int = 1) -> list[Hunt]:
     """Look for a law at every element, and again where it is among the best."""
     ground = ground_of(view)
-    with ThreadPoolExecutor(2) as pool:
-        if rounds == 1:
-            return list(pool.map(partial(first, view, ground), elements(view.result)))
-        hunts = list(pool.map(partial(_tried, view, ground), elements(view.result)))
-        for _ in range(rounds - 2):
-            least = min(hunt.mean_square for hunt in hunts)
-            near = [i for i, h in enumerate(hunts) if not h.stuck and h.mean_square <= IN_REACH**2 * least]
-            for i, moved in zip(near, pool.map(again, [hunts[i] for i in near]), strict=True):
-                hunts[i] = moved
+    look = partial(first if rounds == 1 else _tried, view, ground)
+    hunts = concurrently(look, elements(view.result))
+    for _ in range(rounds - 2):
+        least = min(hunt.mean_square for hunt in hunts)
+        near = [i for i, h in enumerate(hunts) if not h.stuck and h.mean_square <= IN_REACH**2 * least]
+        for i, moved in zip(near, concurrently(again, [hunts[i] for i in near]), strict=True):
+            hunts[i] = moved
     return hunts
 
 
