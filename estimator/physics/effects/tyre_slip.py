@@ -134,7 +134,7 @@ EFFECT = Effect(
         EffectParameter(
             "wheel_share", "", 0.05, LIGHTEST, 0.7, "share of J_L that is the wheel's: J_W / J_L", True, most=0.99
         ),
-        EffectParameter("creep_rad_s", "speed", 1.0, 0.1, 100.0, "speed below which slip is a slide: w_0", True),
+        EffectParameter("creep_rad_s", "speed", 1.0, 0.1, 20.0, "speed below which slip is a slide: w_0", True),
         EffectParameter("relaxation_rad", "angle", 0.0, 0.05, 100.0, "angle over which traction builds up: l", True),
         EffectParameter("carcass_s", "s", 0.0, 0.0, 20.0, "damping of the carcass at standstill: t_c", True),
         EffectParameter("grip_nm", "torque", math.inf, 0.6, 20.0, "torque at which the tyre slides: G", True),
