@@ -9,8 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
-from estimator.diagnosis.noise import effective_samples, unpredictable
+from estimator.diagnosis.noise import unpredictable
 from estimator.physics.fit import FitResult
+from estimator.signals.correlation import effective_samples
 from estimator.signals.record import FloatArray
 
 VERY_STRONG = 10.0

@@ -6,9 +6,10 @@ import numpy as np
 from scipy import stats
 
 from estimator.diagnosis.evidence import residuals_by_record
-from estimator.diagnosis.noise import correlation_length, unpredictable
+from estimator.diagnosis.noise import unpredictable
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import STEP, FitResult
+from estimator.signals.correlation import correlation_length
 from estimator.signals.record import BoolArray, FloatArray
 
 Z95 = 1.959963984540054

@@ -18,10 +18,18 @@ import numpy as np
 from scipy import linalg
 
 from estimator.physics.bounded import least_inside, unbounded_first
+from estimator.signals.correlation import effective_samples
 from estimator.signals.record import FloatArray
 
 CONVERGED = 0.1
 """A step that promises less than this in log-likelihood ratio, ``n dS/S``, changes no conclusion: it is the last."""
+
+MOST_AS_ONE = 30.0
+"""Correlated errors of which one counts in n, at most.
+
+What a wrong law leaves keeps its sign for long. Along a valley that leads nowhere its fit would go on for a part of the
+error that chance alone moves further. But where all of the error is such, a plateau on the way looks like the end.
+"""
 
 RELIABLE = 0.75
 """Share of a step's promise that it must keep for the derivative to be carried on to the next and not found again."""
@@ -64,7 +72,7 @@ def minimise(
     Parameters
     ----------
     residual, jacobian : callable
-        Unknowns (U,) to errors (R,) and to their derivatives (R, U).
+        Unknowns (U,) to errors (R,), in the order of time, and to their derivatives (R, U).
     iterations : int
         Jacobians at most; ``converged`` is False when they were used up.
     smooth : bool
@@ -79,7 +87,7 @@ def minimise(
             square = float(errors @ errors)
             step = _step(x, gradient, curvature, damping, low, high)
             promise = float(-step @ (2.0 * gradient + curvature @ step))
-            if promise < CONVERGED * square / errors.size:
+            if promise < CONVERGED * square / _independent(errors):
                 if not fresh:
                     break
                 tried = residual(x + step)
@@ -102,6 +110,11 @@ def minimise(
             derivative = _secant(derivative, change, step)
             gradient, curvature = derivative.T @ errors, derivative.T @ derivative
     return Solution(x, errors, None, False)
+
+
+def _independent(errors: FloatArray) -> float:
+    """Return how many of the errors count as independent."""
+    return max(effective_samples([errors]), errors.size / MOST_AS_ONE)
 
 
 def _gained(errors: FloatArray, tried: FloatArray) -> float:

@@ -9,7 +9,6 @@ from dataclasses import replace
 import numpy as np
 
 from estimator.diagnosis.line import PLACES
-from estimator.diagnosis.noise import effective_samples
 from estimator.diagnosis.unnamed.candidates import answers, candidates
 from estimator.diagnosis.unnamed.forms import forms
 from estimator.diagnosis.unnamed.ground import Ground
@@ -19,6 +18,7 @@ from estimator.diagnosis.unnamed.pursuit import pursue
 from estimator.diagnosis.unnamed.scene import Scene
 from estimator.diagnosis.unnamed.strays import apart_from_neighbours, strays
 from estimator.physics.effect import Element
+from estimator.signals.correlation import effective_samples
 
 KEPT = 40
 """Forms that by themselves explain most, which further rounds choose from."""

@@ -9,12 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimator.diagnosis.line import PLACES, Place
-from estimator.diagnosis.noise import effective_samples
 from estimator.diagnosis.unnamed.forms import Form
 from estimator.diagnosis.unnamed.ground import Ground
 from estimator.diagnosis.unnamed.pursuit import Path
 from estimator.diagnosis.unnamed.scene import Scene
 from estimator.physics.effect import Element
+from estimator.signals.correlation import effective_samples
 from estimator.signals.record import FloatArray
 
 RIDGE = 1e-5

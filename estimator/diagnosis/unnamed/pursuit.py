@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.diagnosis.noise import effective_samples
 from estimator.diagnosis.unnamed.candidates import Candidate
 from estimator.diagnosis.unnamed.ground import Ground
+from estimator.signals.correlation import effective_samples
 from estimator.signals.record import FloatArray
 
 MOST_TERMS = 9

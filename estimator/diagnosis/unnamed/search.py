@@ -16,7 +16,7 @@ from scipy import stats
 
 from estimator.diagnosis.evidence import SMALLEST_P, Gain
 from estimator.diagnosis.line import PLACES, Place
-from estimator.diagnosis.noise import effective_samples, noise_floor
+from estimator.diagnosis.noise import noise_floor
 from estimator.diagnosis.unnamed.first_look import first, first_along_motion
 from estimator.diagnosis.unnamed.ground import Ground, ground_of
 from estimator.diagnosis.unnamed.hunt import Hunt
@@ -26,6 +26,7 @@ from estimator.diagnosis.unnamed.scene import Scene, elements, scene
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
 from estimator.physics.parallel import concurrently
+from estimator.signals.correlation import effective_samples
 
 ROUNDS = 5
 """Rounds that locate: the first promises, the others try what it promised."""

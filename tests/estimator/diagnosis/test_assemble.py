@@ -20,7 +20,6 @@ from estimator.diagnosis.chain import Chain
 from estimator.diagnosis.holdout import Examiner
 from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects, everything
 from estimator.diagnosis.intervals import Z95, interval, interval_both_ways, reported_covariance
-from estimator.diagnosis.noise import effective_samples
 from estimator.diagnosis.result import FoundEffect
 from estimator.diagnosis.selection import Jury, Selection, Selector
 from estimator.diagnosis.weight import Weight
@@ -30,6 +29,7 @@ from estimator.physics.free_run import free_run
 from estimator.physics.model import EffectValue, Motion
 from estimator.physics.simulate import Start
 from estimator.physics.unknowns import Shared
+from estimator.signals.correlation import effective_samples
 from estimator.signals.record import FloatArray, Record
 from tests.estimator.diagnosis.outcome import outcome
 from tests.estimator.diagnosis.planted import SIGMA, drive_torque, rubbing

@@ -17,7 +17,7 @@ from estimator.diagnosis.evidence import (
     gain_from_squares,
     residuals_by_record,
 )
-from estimator.diagnosis.noise import effective_samples
+from estimator.signals.correlation import effective_samples
 from tests.estimator.diagnosis.regression import autoregressive, regression
 
 

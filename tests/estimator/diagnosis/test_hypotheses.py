@@ -101,11 +101,11 @@ STRIBECK: Effects = frozenset({"stribeck_friction"})
 
 
 def far_from_the_start() -> tuple[Bench, Release]:
-    """A bench with Stribeck friction, and a start ten times too small: a few steps do not get there."""
+    """A bench with Stribeck friction, and a start twenty times too small: a few steps do not get there."""
     records = rubbing(lambda speed: float(8.0 + 14.0 * np.exp(-((speed / 0.8) ** 2))))
     fresh = Bench(model(ONE_MASS), records, everything(records))
     start = effect_unknowns("stribeck_friction", fresh.model, records)[0]
-    return fresh, replace(start, shared=tuple(replace(unknown, start=0.1 * unknown.start) for unknown in start.shared))
+    return fresh, replace(start, shared=tuple(replace(unknown, start=0.05 * unknown.start) for unknown in start.shared))
 
 
 def test_a_rough_fit_is_gone_on_with() -> None:

@@ -1,4 +1,4 @@
-"""The noise floor on recordings of known noise, and correlation lengths against the closed formula."""
+"""The noise floor on recordings of known noise."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.noise import PREDICTOR_ORDER, correlation_length, effective_samples, noise_floor, unpredictable
+from estimator.diagnosis.noise import PREDICTOR_ORDER, noise_floor, unpredictable
 from estimator.errors import NotExciting
 from estimator.physics.simulate import Start
 from estimator.signals.record import Record
@@ -70,55 +70,6 @@ def test_a_recording_with_hardly_two_good_samples_in_a_row_is_refused() -> None:
     message = f"run_1: 0 samples follow {PREDICTOR_ORDER} samples of which most are good, expected at least 82"
     with pytest.raises(NotExciting, match=message):
         noise_floor([replace(rec, okay=okay)])
-
-
-def first_order_length(a: float) -> float:
-    """1 + 2 sum a^(2k) = (1 + a^2) / (1 - a^2)."""
-    return (1.0 + a**2) / (1.0 - a**2)
-
-
-def expected_length(a: float) -> float:
-    """What the estimate comes to: Bartlett's scatter l (N - k) / N^2 over N/4 lags, less the 1/N that is taken out."""
-    true = first_order_length(a)
-    return true + 2.0 * (true * (1.0 - 0.125) * 0.25 - 0.25)
-
-
-@pytest.mark.parametrize("a", [0.0, 0.5, 0.8, 0.95, -0.7])
-def test_the_correlation_length_of_a_first_order_series(a: float) -> None:
-    rng = np.random.default_rng(5)
-    lengths = [correlation_length([autoregressive(a, 5000, rng)]) for _ in range(20)]
-    assert np.mean(lengths) == pytest.approx(expected_length(a), rel=0.1)
-
-
-def test_it_errs_on_the_careful_side() -> None:
-    assert first_order_length(0.8) < expected_length(0.8) < 1.44 * first_order_length(0.8)
-
-
-def test_several_recordings_are_pooled() -> None:
-    rng = np.random.default_rng(6)
-    parts = [autoregressive(0.8, 5000, rng) for _ in range(20)]
-    pooled = correlation_length(parts)
-    assert first_order_length(0.8) < pooled < np.mean([correlation_length([part]) for part in parts])
-
-
-def test_an_error_without_variation_counts_as_independent() -> None:
-    assert correlation_length([np.full(100, 3.0)]) == 1.0
-
-
-def test_effective_samples_are_samples_by_correlation_length() -> None:
-    rng = np.random.default_rng(7)
-    errors = [autoregressive(0.9, 5000, rng), autoregressive(0.9, 3000, rng)]
-    assert effective_samples(errors) == 8000 / correlation_length(errors)
-
-
-def test_the_effective_samples_give_the_scatter_of_the_mean_square() -> None:
-    """For a Gaussian series of unit variance the mean square scatters with variance 2 / n_effective."""
-    rng = np.random.default_rng(8)
-    series = [autoregressive(0.9, 2000, rng) for _ in range(400)]
-    scatter = np.var([np.mean(s**2) for s in series])
-    n_effective = np.mean([effective_samples([s]) for s in series])
-    errs_upward = expected_length(0.9) / first_order_length(0.9)
-    assert scatter == pytest.approx(2.0 / (n_effective * errs_upward), rel=0.25)  # 400 runs: 7 % standard error
 
 
 class TestUnpredictable:

@@ -9,7 +9,9 @@ import pytest
 from scipy.optimize import least_squares, lsq_linear
 
 from estimator.physics.least_squares import CONVERGED, Solution, minimise
+from estimator.signals.correlation import effective_samples
 from estimator.signals.record import FloatArray
+from tests.estimator.diagnosis.regression import autoregressive
 
 Function = Callable[[FloatArray], FloatArray]
 UNBOUNDED = np.full(3, np.inf)
@@ -45,7 +47,7 @@ A_STEP_AWAY = 2e-3
 def likelihood_ratio(residual: Function, x: FloatArray, best: FloatArray) -> float:
     """n (S - S_best) / S_best: how far from the optimum in the unit that ``CONVERGED`` is in."""
     errors, least = residual(x), residual(best)
-    return float(errors.size * (errors @ errors - least @ least) / (least @ least))
+    return float(effective_samples([least]) * (errors @ errors / (least @ least) - 1.0))
 
 
 @pytest.mark.parametrize("x0", [(1.0, 0.3, 0.0), (10.0, 4.0, -2.0), (0.1, 0.01, 3.0)])
@@ -80,7 +82,7 @@ def test_an_active_bound_is_held_and_the_rest_solved(
     ours, theirs = both(residual, decay_jacobian, np.clip([2.0, 3.0, 1.0], *bounds), *bounds)
     assert ours.converged
     assert ours.x[pressed] in (low[pressed], high[pressed])
-    np.testing.assert_allclose(ours.x, theirs, atol=5e-3)
+    np.testing.assert_allclose(ours.x, theirs, atol=0.01)  # what the bound leaves of the error keeps its sign for long
     assert likelihood_ratio(residual, ours.x, theirs) < CONVERGED
 
 
@@ -149,6 +151,30 @@ def test_near_the_end_the_derivative_is_carried_on() -> None:
     for points, end in ((carried, new), (found, old)):
         assert end.converged
         assert likelihood_ratio(residual, points[-1], end.x) < 2.0 * CONVERGED
+
+
+def test_a_slow_way_ends_where_the_independent_errors_can_not_tell_any_more() -> None:
+    """A derivative ten times too steep makes every step a tenth of the way, and its promise all that is left."""
+    rng = np.random.default_rng(4)
+
+    def ended(error: FloatArray) -> tuple[int, float]:
+        asked: list[FloatArray] = []
+
+        def jacobian(x: FloatArray) -> FloatArray:
+            asked.append(x)
+            return np.full((error.size, 1), 10.0)
+
+        low, high = np.full(1, -9.0), np.full(1, 9.0)
+        ours = minimise(lambda x: x + error, jacobian, np.ones(1), low, high, 200, smooth=False)
+        assert ours.converged
+        best = error - error.mean()
+        left = float(ours.residual @ ours.residual / (best @ best)) - 1.0
+        return len(asked), effective_samples([best]) * left
+
+    steps, left = ended(autoregressive(0.0, 4000, rng))
+    fewer, left_of_correlated = ended(autoregressive(0.95, 4000, rng))
+    assert max(left, left_of_correlated) < CONVERGED
+    assert fewer < steps
 
 
 def test_badly_scaled_unknowns_do_not_matter(measured: FloatArray) -> None:
