@@ -67,7 +67,7 @@ def test_a_study_goes_on_where_it_ended_and_says_what_it_adds_up_to(tool, tmp_pa
     assert figures["points"][0]["best"]["recorded"] == pytest.approx(0.9, abs=0.01)
     assert figures["outcomes"] == {"right": 2, "missed": 1}
     assert "| `coulomb_friction_motor` | 2 | 0 of 1 |" in (tmp_path / "summary.md").read_text()
-    circles = ET.parse(tmp_path / "power.svg").getroot().findall("{http://www.w3.org/2000/svg}circle")
+    circles = ET.parse(tmp_path / "power.svg").getroot().findall(".//{http://www.w3.org/2000/svg}circle")
     assert len(circles) == 3
     assert float(circles[1].get("cy")) > float(circles[0].get("cy"))  # what was not found is lower
 

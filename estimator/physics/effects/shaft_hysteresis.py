@@ -21,9 +21,7 @@ def loading_rate(
     A slider that yields within one integration step is held to the ``fastest`` decay [1/s] the step can follow.
     """
     pace = min(abs(rate) / yield_twist, fastest)
-    yielded = min(abs(loading), 1.0)
-    if yielded < 1.0 and sharpness != 1.0:  # a power takes as long as the rest of a step
-        yielded **= sharpness
+    yielded = min(abs(loading), 1.0) ** sharpness
     if rate * loading < 0.0:
         yielded *= -unloading
     return pace * math.copysign(1.0 - yielded, rate)

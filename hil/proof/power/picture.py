@@ -15,6 +15,9 @@ from hil.proof.power.fit import Curve
 from hil.proof.power.report import BASE, KNOWLEDGE
 
 WIDTH_PX, HEIGHT_PX, LEFT_PX, TOP_PX, GAP_PX, BOTTOM_PX = 250, 170, 52, 46, 40, 40
+PER_ROW = 3
+"""Panels beside each other: a page shows them at the size of its text."""
+
 TOOL = "#1f77b4"
 
 BEST = {"recorded": "#2ca02c", "bus_unknown": "#98df8a", "known": "#7f7f7f"}
@@ -40,8 +43,10 @@ def power_svg(effects: Mapping[str, Any]) -> str:
     str
         An SVG document; across is the size over that of the best test that has the recordings alone, logarithmic.
     """
-    width = LEFT_PX + (WIDTH_PX + GAP_PX) * max(len(effects), 3)
-    height = TOP_PX + HEIGHT_PX + BOTTOM_PX
+    rows = math.ceil(len(effects) / PER_ROW)
+    row_px = HEIGHT_PX + BOTTOM_PX + GAP_PX
+    width = LEFT_PX + (WIDTH_PX + GAP_PX) * PER_ROW
+    height = TOP_PX + rows * row_px - GAP_PX
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" viewBox="0 0 {width} {height}" '
         'font-family="sans-serif" font-size="11">',
@@ -49,7 +54,9 @@ def power_svg(effects: Mapping[str, Any]) -> str:
         *_legend(),
     ]
     for place, (effect, figures) in enumerate(effects.items()):
-        parts += _panel(effect, figures, LEFT_PX + place * (WIDTH_PX + GAP_PX))
+        row, column = divmod(place, PER_ROW)
+        panel = _panel(effect, figures, LEFT_PX + column * (WIDTH_PX + GAP_PX))
+        parts += [f'<g transform="translate(0 {row * row_px})">', *panel, "</g>"]
     return "\n".join([*parts, "</svg>", ""])
 
 
