@@ -72,7 +72,8 @@ def minimise(
     Parameters
     ----------
     residual, jacobian : callable
-        Unknowns (U,) to errors (R,), in the order of time, and to their derivatives (R, U).
+        Unknowns (U,) to errors (R,), in the order of time (one recording after the other), and to their derivatives
+        (R, U).
     iterations : int
         Jacobians at most; ``converged`` is False when they were used up.
     smooth : bool

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from estimator.compiled import compiled
 from estimator.physics.effect import WITH_SHAFT, Effect, EffectParameter, Element, Start
-from estimator.physics.laws import tangent
+from estimator.physics.laws import hyperbolic_tangent
 from estimator.physics.model import DrivelineModel, Motion, unit
 from estimator.physics.motion import speed_scale, torque_scale
 from estimator.signals.record import Record
@@ -76,7 +76,7 @@ def gripped(traction: float, grip: float) -> float:
     """Return the torque that a tyre passes on [Nm], of what it would without an end to its grip."""
     if math.isinf(grip):
         return traction
-    return grip * tangent(traction / grip)
+    return grip * hyperbolic_tangent(traction / grip)
 
 
 def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:

@@ -7,27 +7,27 @@ import math
 import numpy as np
 import pytest
 
-from estimator.physics.laws import BENT, BEYOND, NOTHING_LEFT, fading, tangent
+from estimator.physics.laws import BENT, BEYOND, NOTHING_LEFT, fading, hyperbolic_tangent
 
 LAST_BIT = np.finfo(float).eps
 
 
-def test_the_tangent_is_the_librarys_to_the_last_two_bits() -> None:
+def test_the_hyperbolic_tangent_is_the_librarys_to_the_last_two_bits() -> None:
     sizes = np.concatenate([np.geomspace(1e-300, 2.0 * BEYOND, 20_000), np.linspace(0.0, 1.1 * BEYOND, 20_000)[1:]])
     for size in sizes:
-        assert tangent(size) == pytest.approx(math.tanh(size), rel=2.0 * LAST_BIT, abs=0.0)
-        assert tangent(-size) == -tangent(size)
+        assert hyperbolic_tangent(size) == pytest.approx(math.tanh(size), rel=2.0 * LAST_BIT, abs=0.0)
+        assert hyperbolic_tangent(-size) == -hyperbolic_tangent(size)
 
 
 @pytest.mark.parametrize("edge", [BENT, BEYOND])
-def test_the_tangent_does_not_fall_where_its_form_changes(edge: float) -> None:
+def test_the_hyperbolic_tangent_does_not_fall_where_its_form_changes(edge: float) -> None:
     below, above = math.nextafter(edge, 0.0), math.nextafter(edge, math.inf)
-    assert tangent(below) <= tangent(above) <= tangent(below) + 2.0 * LAST_BIT
+    assert hyperbolic_tangent(below) <= hyperbolic_tangent(above) <= hyperbolic_tangent(below) + 2.0 * LAST_BIT
 
 
-def test_the_tangent_of_what_runs_away() -> None:
-    assert (tangent(0.0), tangent(math.inf), tangent(-math.inf)) == (0.0, 1.0, -1.0)
-    assert math.isnan(tangent(math.nan))
+def test_the_hyperbolic_tangent_of_what_runs_away() -> None:
+    assert (hyperbolic_tangent(0.0), hyperbolic_tangent(math.inf), hyperbolic_tangent(-math.inf)) == (0.0, 1.0, -1.0)
+    assert math.isnan(hyperbolic_tangent(math.nan))
 
 
 def test_what_fades_is_exponential_until_it_is_lost_beside_one() -> None:
