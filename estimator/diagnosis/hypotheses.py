@@ -10,12 +10,12 @@ import numpy as np
 from estimator.diagnosis.screening import Screen, promising
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Untestable
-from estimator.physics.fit import ITERATIONS, FitResult, Problem, fit, make_problem
+from estimator.physics.fit import FitResult, Problem, fit, make_problem
 from estimator.physics.model import DrivelineModel, Motion
 from estimator.physics.moments import without_idle
 from estimator.physics.polish import polished
 from estimator.physics.simulate import grid_for
-from estimator.physics.starts import HEAT, best_fit, converge
+from estimator.physics.starts import HEAT, begun, best_fit, close, converge
 from estimator.physics.steps import from_their_moment
 from estimator.physics.unknowns import Release, nominal_unknowns, own_unknowns
 from estimator.signals.record import BoolArray, Record
@@ -25,6 +25,10 @@ NOTHING: Effects = frozenset()
 
 FURTHER = 8
 """Jacobians that a rough fit gets before it is compared once more."""
+
+WORTH_ANOTHER_FIT = 0.1
+"""Share of the squared error that a look from a fit must promise for an effect to be fitted once more: those that found
+another minimum promised half of it, those that came back to where they were a fiftieth."""
 
 MUCH_BYTES = 2**24
 """Room of a derivative that is rather found again than kept: a round of the search has a dozen of them."""
@@ -59,6 +63,7 @@ class Bench:
     _fits: dict[Effects, FitResult] = field(default_factory=dict)
     _rough: dict[Effects, FitResult] = field(default_factory=dict)
     _looked_again: set[tuple[Effects, str]] = field(default_factory=set)
+    _tried: dict[Effects, list[Release]] = field(default_factory=dict)
 
     def fit(self, effects: Effects, warm: FitResult | None = None, releases: Sequence[Release] = ()) -> FitResult:
         """Fit the nominal parameters, within their tolerances, together with a set of effects.
@@ -87,19 +92,22 @@ class Bench:
         if (effects, name) in self._looked_again:
             return had
         self._looked_again.add((effects, name))
-        releases = [look.release for look in promising(Screen(had, self.model).looks(name, EFFECTS[name].loosened_by))]
-        again = self._fit(effects, _forgetting(had, name), releases)
-        return self._better(effects, again)
+        looks = promising(Screen(had, self.model).looks(name, EFFECTS[name].loosened_by))
+        if looks[0].promise < WORTH_ANOTHER_FIT * had.squares:
+            return had
+        return self._better(effects, self._fit(effects, _forgetting(had, name), [look.release for look in looks]))
 
     def fit_widely(self, effects: Effects, name: str) -> FitResult:
-        """Fit an effect from every start it has, promising or not, and return the better of this and what is known.
+        """Fit an effect from every start not yet tried, promising or not, and return the best of these and the known.
 
         What one effect leaves in a poorer minimum, another would be named for.
         """
-        had, before = self._fits[effects], self.fit(effects - {name})
-        releases = [look.release for look in Screen(before, self.model).looks(name)]
-        again = self._fit(effects, before, releases) if len(releases) > 1 else had
-        return self._better(effects, again)
+        before, tried = self.fit(effects - {name}), self._tried.get(effects, [])
+        looks = Screen(before, self.model).looks(name)
+        releases = [look.release for look in looks if look.release not in tried]
+        if not releases:
+            return self._fits[effects]
+        return self._better(effects, self._fit(effects, before, releases))
 
     def fit_less(self, effects: Effects, larger: FitResult) -> FitResult:
         """Fit fewer effects from where a fit with more ended, too, and return the better of both.
@@ -125,11 +133,17 @@ class Bench:
         return result
 
     def rough_fit(self, effects: Effects, warm: FitResult, releases: Sequence[Release]) -> FitResult:
-        """Fit as ``fit`` does, a few steps only; ``fit`` goes on from there."""
+        """Fit as ``fit`` does, a few steps only; ``fit`` goes on from there.
+
+        Starts that stay close behind the best one count as not yet tried.
+        """
         if effects in self._fits:
             return self._fits[effects]
         if effects not in self._rough:
-            self._rough[effects] = _without_much(self._fit(effects, warm, releases, HEAT))
+            heat = begun(self._problems(effects, warm, releases), warm)
+            best, *behind = close(heat)
+            self._tried[effects] = [release for i, release in enumerate(releases) if i not in behind]
+            self._rough[effects] = _without_much(polished(heat[best], HEAT))
         return self._rough[effects]
 
     def go_on(self, effects: Effects) -> FitResult:
@@ -153,9 +167,11 @@ class Bench:
         self._fits[effects] = from_their_moment(without_idle(self._fits[effects]), self.model)
         return self._fits[effects]
 
-    def _fit(
-        self, effects: Effects, warm: FitResult | None, releases: Sequence[Release], iterations: int = ITERATIONS
-    ) -> FitResult:
+    def _fit(self, effects: Effects, warm: FitResult | None, releases: Sequence[Release]) -> FitResult:
+        return polished(best_fit(self._problems(effects, warm, releases), warm))
+
+    def _problems(self, effects: Effects, warm: FitResult | None, releases: Sequence[Release]) -> list[Problem]:
+        """Return the fit of a set of effects from each start of the one that ``warm`` lacks."""
         had = NOTHING if warm is None else effects_of(warm)
         kept = _kept(warm, effects, self) if warm is not None else self._nominal()
         new = sorted(name for name in effects - had if not EFFECTS[name].profile)
@@ -163,7 +179,7 @@ class Bench:
             if warm is None:
                 raise ValueError("a set of effects is fitted from a fit without them, came none")
             releases = [look.release for look in promising(Screen(warm, self.model).looks(new[0]))]
-        problems = [
+        return [
             self._problem(
                 effects,
                 Release(
@@ -173,7 +189,6 @@ class Bench:
             )
             for release in (releases or [Release((), ((),) * len(self.records))])
         ]
-        return polished(best_fit(problems, warm, iterations), iterations)
 
     def _problem(self, effects: Effects, release: Release) -> Problem:
         return make_problem(

@@ -124,7 +124,7 @@ class Screen:
     def _periodic(self, entry: Effect, release: Release) -> Look:
         sizes = _sizes(release)
         found = [
-            waves(entry, _filled(self._result.p_of(i), release.shared), sizes, self._runner(i))
+            waves(entry, _filled(self._result.p_of(i), release.shared), sizes, self._runner(i), self._output(i))
             for i in range(len(self._result.problem.records))
         ]
         amplitudes, phases, promise = self._regress(found)

@@ -100,7 +100,7 @@ def _with_own(problem: Problem) -> FloatArray:
             found[name, "from_s"] = float(grid.moments_s[stretch.first])
             found[name, "to_s"] = float(grid.moments_s[stretch.last])
             continue
-        for wave in waves(entry, alone, sizes[name], run):
+        for wave in waves(entry, alone, sizes[name], run, still.outputs[0][use]):
             along, across = -np.linalg.lstsq(rest.rest(wave.answers).T, rest.error, rcond=None)[0]
             found[name, wave.phase] = float(np.arctan2(across, along))
     x = still.x.copy()

@@ -19,6 +19,7 @@ other. Without a gap they are the same.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -43,8 +44,23 @@ FARTHEST = 100.0
 """Beyond so many times the twist over which it yields a slider has forgotten where it came from."""
 
 
+class Imposed(NamedTuple):
+    """The imposed motion of a recording at every sample: its twist since the first one [rad], its rate [rad/s]."""
+
+    twist: FloatArray
+    rate: FloatArray
+
+
+def imposed_in(record: Record) -> Imposed:
+    """Return the imposed motion of a recording, which is the same in every simulation of it."""
+    if record.imposed is None:
+        raise ValueError(f"recording {record.name}: a joint is simulated from an imposed motion, came none")
+    return Imposed(record.imposed - record.imposed[0], _rate(record))
+
+
 def simulate(
     record: Record,
+    imposed: Imposed,
     p: FloatArray,
     load_torque_nm: FloatArray,
     twist_rad: float,
@@ -55,6 +71,8 @@ def simulate(
 
     Parameters
     ----------
+    imposed : Imposed
+        That motion.
     p : ndarray, shape (layout.SIZE,)
         Parameters of the superset model.
     load_torque_nm : ndarray, shape (N,)
@@ -71,12 +89,11 @@ def simulate(
     ndarray, shape (N,)
         Torque [Nm], rad or rad/s.
     """
-    imposed = _imposed(record)
-    twist, rate = imposed - imposed[0] + twist_rad, _rate(record)
+    twist, rate = imposed.twist + twist_rad, imposed.rate
     motion: dict[int, FloatArray] = {
         state_vector.TWIST: twist,
         state_vector.SPEED: rate,
-        state_vector.ANGLE: imposed - imposed[0],
+        state_vector.ANGLE: imposed.twist,
     }
     if output != TORQUE:
         return motion[output] if output in motion else np.zeros(twist.shape)
@@ -84,12 +101,6 @@ def simulate(
     respond(record.since_start_s, record.sample_time_s, twist, rate, preload_nm, p, out)
     taken: FloatArray = out - load_torque_nm
     return taken
-
-
-def _imposed(record: Record) -> FloatArray:
-    if record.imposed is None:
-        raise ValueError(f"recording {record.name}: a joint is simulated from an imposed motion, came none")
-    return record.imposed
 
 
 def _rate(record: Record) -> FloatArray:
@@ -170,10 +181,10 @@ def slid(loading: float, change: float, p: FloatArray) -> float:
     steps = math.ceil(way * max(sharpness, 1.0) / PART_OF_YIELD)
     h = way / steps
     for _ in range(steps):
-        first = loading_rate(loading, towards, 1.0, sharpness, unloading, math.inf)
-        second = loading_rate(loading + 0.5 * h * first, towards, 1.0, sharpness, unloading, math.inf)
-        third = loading_rate(loading + 0.5 * h * second, towards, 1.0, sharpness, unloading, math.inf)
-        fourth = loading_rate(loading + h * third, towards, 1.0, sharpness, unloading, math.inf)
+        first = loading_rate(loading, towards, sharpness, unloading, math.inf)
+        second = loading_rate(loading + 0.5 * h * first, towards, sharpness, unloading, math.inf)
+        third = loading_rate(loading + 0.5 * h * second, towards, sharpness, unloading, math.inf)
+        fourth = loading_rate(loading + h * third, towards, sharpness, unloading, math.inf)
         loading += h * (first + 2.0 * second + 2.0 * third + fourth) / 6.0
     return loading
 

@@ -88,7 +88,7 @@ def minimise(
             square = float(errors @ errors)
             step = _step(x, gradient, curvature, damping, low, high)
             promise = float(-step @ (2.0 * gradient + curvature @ step))
-            if promise < CONVERGED * square / _independent(errors):
+            if _is_little(promise, square, errors):
                 if not fresh:
                     break
                 tried = residual(x + step)
@@ -113,9 +113,12 @@ def minimise(
     return Solution(x, errors, None, False)
 
 
-def _independent(errors: FloatArray) -> float:
-    """Return how many of the errors count as independent."""
-    return max(effective_samples([errors]), errors.size / MOST_AS_ONE)
+def _is_little(promise: float, square: float, errors: FloatArray) -> bool:
+    """Tell whether a fall of the squared error is too small to count, of errors that are partly independent."""
+    least = CONVERGED * square / errors.size
+    if not least <= promise < MOST_AS_ONE * least:
+        return promise < least
+    return promise < CONVERGED * square / effective_samples([errors])
 
 
 def _gained(errors: FloatArray, tried: FloatArray) -> float:

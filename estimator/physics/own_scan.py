@@ -64,21 +64,21 @@ class Cells:
     answers: FloatArray
 
 
-def waves(entry: Effect, p: FloatArray, sizes: Mapping[str, float], run: Simulate) -> list[Wave]:
-    """Return the answers of one recording to each amplitude of a periodic effect."""
+def waves(entry: Effect, p: FloatArray, sizes: Mapping[str, float], run: Simulate, still: FloatArray) -> list[Wave]:
+    """Return the answers of one recording to each amplitude of a periodic effect; ``still`` is its output without."""
     silent = p.copy()
     for amplitude in entry.phases.values():
         silent[slot(entry.name, amplitude)] = 0.0
     acting = [(phase, amplitude) for phase, amplitude in entry.phases.items() if sizes[amplitude] != 0.0]
-    moved = [silent]
+    moved = []
     for phase, amplitude in acting:
         for angle in (0.0, 0.5 * math.pi):
             moved.append(silent.copy())
             moved[-1][slot(entry.name, amplitude)] = SMALL * sizes[amplitude]
             moved[-1][slot(entry.name, phase)] = angle
-    still, *outputs = run(moved)
+    outputs = run(moved) if moved else still
     return [
-        Wave(phase, amplitude, (np.array(outputs[2 * i : 2 * i + 2]) - still) / (SMALL * sizes[amplitude]))
+        Wave(phase, amplitude, (outputs[2 * i : 2 * i + 2] - still) / (SMALL * sizes[amplitude]))
         for i, (phase, amplitude) in enumerate(acting)
     ]
 

@@ -207,7 +207,8 @@ def simulate_each(
     """
     wanted = output_state(record, grid.structure) if output is None else output
     if grid.structure is Structure.JOINT:
-        return np.array([_joint_output(record, case, wanted) for case in cases])
+        imposed = joint.imposed_in(record)
+        return np.array([_joint_output(record, imposed, case, wanted) for case in cases])
     if any(own_law.active(case.p) for case in cases):
         return np.array([_under_laws(grid, record, case, wanted, output is None) for case in cases])
     given = _inputs(record, cases)
@@ -290,10 +291,10 @@ def _sampled_off_time(out: FloatArray, slopes: FloatArray, offset_s: FloatArray 
     return moved
 
 
-def _joint_output(record: Record, case: Case, output: int) -> FloatArray:
+def _joint_output(record: Record, imposed: joint.Imposed, case: Case, output: int) -> FloatArray:
     load = case.start.load_torque_nm + (0.0 if case.extra_load_nm is None else case.extra_load_nm)
     load = np.broadcast_to(load, record.output.shape)
-    return joint.simulate(record, case.p, load, case.start.twist_rad, case.start.preload_nm, output)
+    return joint.simulate(record, imposed, case.p, load, case.start.twist_rad, case.start.preload_nm, output)
 
 
 def _under_laws(grid: Grid, record: Record, case: Case, output: int, recorded: bool) -> FloatArray:

@@ -25,10 +25,21 @@ def best_fit(problems: Sequence[Problem], warm: FitResult | None = None, iterati
     """
     if len(problems) == 1:
         return _begun(problems[0], warm, iterations)
-    heat = [_begun(problem, warm, min(HEAT, iterations)) for problem in problems]
-    least = min(result.squares for result in heat)
-    finals = [converge(result, iterations) for result in heat if result.squares <= CLOSE * least]
+    heat = begun(problems, warm, min(HEAT, iterations))
+    finals = [converge(heat[i], iterations) for i in close(heat)]
     return min(finals, key=lambda result: result.squares)
+
+
+def begun(problems: Sequence[Problem], warm: FitResult | None = None, iterations: int = HEAT) -> list[FitResult]:
+    """Fit a few steps from each of several starts."""
+    return [_begun(problem, warm, iterations) for problem in problems]
+
+
+def close(heat: Sequence[FitResult]) -> list[int]:
+    """Return which of several fits are close to the best, that first; the others were tried in vain."""
+    least = min(result.squares for result in heat)
+    order = sorted(range(len(heat)), key=lambda i: heat[i].squares)
+    return [i for i in order if heat[i].squares <= CLOSE * least]
 
 
 def converge(result: FitResult, iterations: int = ITERATIONS) -> FitResult:

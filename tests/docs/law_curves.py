@@ -78,7 +78,7 @@ def hysteresis(values: Values) -> Curve:
     loading = np.zeros_like(twist)
     for i, step in enumerate(np.diff(twist)):
         rate = step / 1e-3
-        loading[i + 1] = loading[i] + 1e-3 * loading_rate(loading[i], rate, values["yield_rad"], 1.0, 1.0, 1e9)
+        loading[i + 1] = loading[i] + 1e-3 * loading_rate(loading[i], rate / values["yield_rad"], 1.0, 1.0, 1e9)
     late = phase > np.pi
     torque = BUS["k"] * twist + values["friction_nm"] * loading
     lines = (

@@ -3,7 +3,7 @@
 from estimator.diagnosis.line.averages import block_mean_of
 from estimator.diagnosis.line.blocks import Line, lines
 from estimator.diagnosis.line.equivalent import Explanation, Input, explain, explain_all, smooth
-from estimator.diagnosis.line.motion import NO_FORCE, Force, Motion, motion_of, simulated
+from estimator.diagnosis.line.motion import NO_FORCE, Force, Motion, motion_of, simulated, simulated_each
 from estimator.diagnosis.line.places import DRIVES, FORCES, PLACES, Place, size_at
 
 __all__ = [
@@ -23,6 +23,7 @@ __all__ = [
     "lines",
     "motion_of",
     "simulated",
+    "simulated_each",
     "size_at",
     "smooth",
 ]

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from estimator.diagnosis.line.averages import block_mean
 from estimator.diagnosis.line.tangent import LOAD, MOTOR
-from estimator.physics.fit import FitResult, start_of
+from estimator.physics.fit import FitResult, Problem, local_part, parameters
 from estimator.physics.kernel import state_vector
 from estimator.physics.model import Structure
-from estimator.physics.simulate import motor_angle, simulate
+from estimator.physics.simulate import Case, motor_angle, simulate_each
 from estimator.signals.record import FloatArray, Record
 
 
@@ -39,19 +40,27 @@ NO_FORCE: Force = (0.0, 0.0)
 
 def simulated(result: FitResult, index: int, force: Force = NO_FORCE, state: int | None = None) -> FloatArray:
     """Simulate a recording at a fit's unknowns under further torques: its output, or a state; shape (N,)."""
+    only: FloatArray = simulated_each(result, [result.x], index, force, state)[0]
+    return only
+
+
+def simulated_each(
+    result: FitResult, points: Sequence[FloatArray], index: int, force: Force = NO_FORCE, state: int | None = None
+) -> FloatArray:
+    """Simulate a recording at K vectors of a fit's unknowns under further torques, shape (K, N); see ``simulated``."""
     problem = result.problem
-    record, basis = problem.records[index], problem.local[index]
-    torque = record.torque_nm.copy()
+    torque = problem.records[index].torque_nm.copy()
     torque[:, 0] += force[MOTOR]
-    load = basis.extra_load(result.local_of(index))
-    return simulate(
-        problem.grid,
-        replace(record, torque_nm=torque),
-        result.p_of(index),
-        start_of(problem, result.x, index),
-        force[LOAD] + (np.zeros(torque.shape[0]) if load is None else load),
-        state,
-    )
+    record = replace(problem.records[index], torque_nm=torque)
+    cases = [_case(problem, x, index, force[LOAD] + np.zeros(torque.shape[0])) for x in points]
+    return simulate_each(problem.grid, record, cases, state)
+
+
+def _case(problem: Problem, x: FloatArray, index: int, load_nm: FloatArray) -> Case:
+    basis, local = problem.local[index], local_part(problem, x, index)
+    profile = basis.extra_load(local)
+    loaded = load_nm if profile is None else load_nm + profile
+    return Case(basis.parameters(parameters(problem, x), local), basis.start(local), loaded)
 
 
 def motion_of(result: FitResult, index: int) -> Motion:

@@ -122,17 +122,24 @@ class Rounds:
         share = 0.9 * (1.0 - 0.5**self._count * (1.0 - 0.5 * part))  # a round is half of the rest
         self.progress(what, share)
 
-    def finished_first(self, retuned: FitResult) -> list[Trial]:
-        """Return the effects of the first round, each fitted to its end, the one that leaves least first."""
-        alone = [trial for trial in self.trials.values() if len(trial.effects) == 1]
+    def finished_first(self, retuned: FitResult, without: Effects, most: int) -> list[Trial]:
+        """Return effects of the first round that leave least, each fitted to its end, the one that leaves least first.
+
+        Some are left out, and a general law where its special case is among them; ``most`` is how many are wanted.
+        """
+        alone = {trial.name: trial for trial in self.trials.values() if len(trial.effects) == 1}
+        able = [t for t in alone.values() if t.name not in without and not alone.keys() & set(EFFECTS[t.name].contains)]
+        gains = sorted((retuned.squares - trial.result.squares for trial in able), reverse=True)
+        if len(gains) > most:  # what is far behind them after a few steps is not among them at its end
+            able = [t for t in able if retuned.squares - t.result.squares >= WORTH_GOING_ON * gains[most - 1]]
 
         def finished(trial: Trial) -> Trial:
             return self.jury.trial(trial.name, trial.effects, retuned, self.jury.bench.fit(trial.effects, retuned))
 
         self._report("finishing all of them", 0.0)
-        trials = concurrently(finished, alone)
+        trials = concurrently(finished, able)
         self.trials |= {trial.name: trial for trial in trials}
-        return sorted(trials, key=lambda trial: trial.result.squares)
+        return sorted(trials, key=lambda trial: trial.result.squares)[:most]
 
     def let_go(self, kept: FitResult) -> None:
         """Let the derivatives of what lost a round go."""

@@ -74,19 +74,12 @@ class Selector:
         retuned = selection.retuned
         old = path = _Path(selection.chosen, selection.result, selection.accepted)
         without = flexible(path.chosen) if self._is_near(path.current) else NOTHING
-        for first in self._firsts(retuned, without):
+        for first in self._rounds.finished_first(retuned, without, OTHER_WAYS):
             path = self._better(path, self._completed(first, retuned, without), retuned)
             without |= NOTHING if EFFECTS[first.name].profile else {first.name}
             if path is not old and self._is_near(path.current) and not flexible(path.chosen):
                 break
         return selection if path is old else self._concluded(self._grown(path, retuned), retuned)
-
-    def _firsts(self, retuned: FitResult, without: Effects) -> list[Trial]:
-        """Return the trials that other ways begin with; a general law comes after its special case, where it pays."""
-        alone = self._rounds.finished_first(retuned)
-        names = {trial.name for trial in alone}
-        firsts = [t for t in alone if t.name not in without and not names & set(EFFECTS[t.name].contains)]
-        return firsts[:OTHER_WAYS]
 
     def _completed(self, first: Trial, retuned: FitResult, without: Effects) -> _Path:
         """Return the way that begins with an effect, and ends there or with one that completes the explanation.

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from estimator.diagnosis.line import DRIVES, FORCES, NO_FORCE, PLACES, Force, Place, simulated
+from estimator.diagnosis.line import DRIVES, FORCES, NO_FORCE, PLACES, Force, Place, simulated_each
 from estimator.diagnosis.unnamed.scene import Scene
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
@@ -21,9 +21,9 @@ class Extra:
     forces: list[Force]
     readings: list[FloatArray]
 
-    def output(self, result: FitResult, x: FloatArray, index: int) -> FloatArray:
-        """Simulate the output of one recording with the law at unknowns ``x``, shape (N,)."""
-        moved: FloatArray = simulated(replace(result, x=x), index, self.forces[index]) + self.readings[index]
+    def outputs(self, result: FitResult, points: Sequence[FloatArray], index: int) -> FloatArray:
+        """Simulate the output of one recording with the law at K vectors of unknowns, shape (K, N)."""
+        moved: FloatArray = simulated_each(result, points, index, self.forces[index]) + self.readings[index]
         return moved
 
 

@@ -19,7 +19,8 @@ from estimator.diagnosis.unnamed.ground import Ground
 from estimator.diagnosis.unnamed.hunt import NO_LAW, RIDGE, Found, Hunt, cost, terms_of, weights_of, worthwhile
 from estimator.diagnosis.unnamed.pursuit import pursue
 from estimator.diagnosis.unnamed.scene import Scene
-from estimator.physics.fit import STEP, FitResult, bounds, residual_at
+from estimator.physics.fit import STEP, FitResult, bounds, own_part, residual_at
+from estimator.physics.parallel import concurrently
 from estimator.signals.record import FloatArray
 
 STEPS = (1.0, 0.5, 0.2, 0.05)
@@ -40,7 +41,7 @@ def again(hunt: Hunt) -> Hunt:
         weights = [old + share * (new - old) for old, new in zip(hunt.weights, wanted, strict=True)]
         x = np.clip(before.x + share * step, *bounds(before.problem))
         extra = extra_of(hunt.view, hunt.element, weights)
-        moved = replace(before, x=x, outputs=tuple(extra.output(before, x, i) for i in range(len(weights))))
+        moved = replace(before, x=x, outputs=tuple(extra.outputs(before, [x], i)[0] for i in range(len(weights))))
         if _squares(moved) < _squares(before):
             return _looked(hunt, moved, extra, weights, cost(hunt, terms, terms_of(hunt, terms, coefficients)))
     return _given_up(hunt)
@@ -89,20 +90,21 @@ def _squares(result: FitResult) -> float:
 
 def _jacobian(view: Scene, extra: Extra) -> FloatArray:
     """Return the derivative of the output by every unknown with a law in place, shape (rows, U)."""
-    result = view.result
-    _, high = bounds(result.problem)
-    shared = len(result.problem.shared)
-    first_local = shared + np.cumsum([0, *(basis.guess.size for basis in result.problem.local)])
-    parts = []
-    for i, line in enumerate(view.cut):
-        part = np.zeros((int(line.rows.sum()), result.x.size))
-        for j in [*range(shared), *range(first_local[i], first_local[i + 1])]:
-            x = result.x.copy()
-            x[j] += STEP if x[j] + STEP <= high[j] else -STEP
-            change = (extra.output(result, x, i) - result.outputs[i]) / (x[j] - result.x[j])
-            part[:, j] = block_mean_of(change, result.problem.use[i], line.length)[0][line.rows]
-        parts.append(part)
-    return np.vstack(parts)
+    problem, x = view.result.problem, view.result.x
+    _, high = bounds(problem)
+    steps = np.where(x + STEP <= high, STEP, -STEP)
+    shared = np.arange(len(problem.shared))
+
+    def part(i: int) -> FloatArray:
+        mine = np.concatenate([shared, np.arange(x.size)[own_part(problem, i)]])
+        points = x + steps[mine, None] * np.eye(x.size)[mine]
+        changes = (extra.outputs(view.result, points, i) - view.result.outputs[i]) / steps[mine, None]
+        found = np.zeros((int(view.cut[i].rows.sum()), x.size))
+        for j, change in zip(mine, changes, strict=True):
+            found[:, j] = block_mean_of(change, problem.use[i], view.cut[i].length)[0][view.cut[i].rows]
+        return found
+
+    return np.vstack(concurrently(part, range(len(view.cut))))
 
 
 def _solution(hunt: Hunt, terms: int) -> tuple[FloatArray, FloatArray]:

@@ -7,21 +7,21 @@ from collections.abc import Mapping, Sequence
 
 from estimator.compiled import compiled
 from estimator.physics.effect import WITH_SPRING, Effect, EffectParameter, Element, Held, Start
+from estimator.physics.laws import power
 from estimator.physics.model import DrivelineModel, Motion, Structure, unit
 from estimator.physics.motion import torque_scale
 from estimator.signals.record import Record
 
 
 @compiled
-def loading_rate(
-    loading: float, rate: float, yield_twist: float, sharpness: float, unloading: float, fastest: float
-) -> float:
-    """Return how fast the slider loads [1/s] at a twist rate: towards 1 against the motion, and no further.
+def loading_rate(loading: float, rate: float, sharpness: float, unloading: float, fastest: float) -> float:
+    """Return how fast the slider loads [1/s]: towards 1 against the motion, and no further.
 
-    A slider that yields within one integration step is held to the ``fastest`` decay [1/s] the step can follow.
+    ``rate`` is that of the twist, over the twist in which the slider yields [1/s]. One that yields within a step of the
+    integration is held to the ``fastest`` decay [1/s] the step can follow.
     """
-    pace = min(abs(rate) / yield_twist, fastest)
-    yielded = min(abs(loading), 1.0) ** sharpness
+    pace = min(abs(rate), fastest)
+    yielded = power(min(abs(loading), 1.0), sharpness)
     if rate * loading < 0.0:
         yielded *= -unloading
     return pace * math.copysign(1.0 - yielded, rate)

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from estimator.compiled import compiled
 from estimator.physics.effect import WITH_SPRING, Effect, EffectParameter, Element, Start
+from estimator.physics.laws import power
 from estimator.physics.model import DrivelineModel, Motion, unit
 from estimator.physics.motion import torque_scale
 from estimator.signals.record import Record
@@ -22,7 +23,7 @@ def factor(twist: float, hardening: float, shape: float) -> float:
     if hardening == 0.0:
         return 1.0
     size = 1.0 + abs(hardening) * twist * twist / shape
-    return math.pow(size, shape if hardening > 0.0 else -shape)
+    return power(size, shape if hardening > 0.0 else -shape)
 
 
 def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:

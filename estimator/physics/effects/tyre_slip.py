@@ -36,47 +36,26 @@ def coupling(
 
 
 @compiled
-def build_up(
-    slide: float,
-    roll: float,
-    traction: float,
-    slip_per_nm: float,
-    relaxation: float,
-    wheel_inertia: float,
-    fastest: float,
-) -> float:
+def build_up(slide: float, roll: float, traction: float, tread: float, relaxation: float) -> float:
     """Return how fast the traction builds up [Nm/s]: over the angle that the tyre has to roll.
 
-    The relaxation is lengthened to what the integration step can follow: ``fastest`` is the fastest decay [1/s].
+    ``tread`` is the torque per slip [Nm], ``relaxation`` what the integration step can follow at this roll [rad].
     """
-    least = max(roll / fastest, 1.0 / (slip_per_nm * wheel_inertia * fastest * fastest))
-    return (slide / slip_per_nm - roll * traction) / max(relaxation, least)
+    return (slide * tread - roll * traction) / relaxation
 
 
 @compiled
-def carcass(
-    slide: float,
-    vehicle: float,
-    slip_per_nm: float,
-    creep_speed: float,
-    relaxation: float,
-    carcass_s: float,
-    stiffest: float,
-) -> float:
-    """Return the torque by which the carcass damps its wind-up [Nm], near standstill where rolling can't relax it.
-
-    ``stiffest`` is the damping that the integration step can follow [Nm s/rad].
-    """
-    damping = min(carcass_s / (slip_per_nm * relaxation), stiffest)
-    return damping * slide / (1.0 + (vehicle / creep_speed) ** 2)
+def carcass(slide: float, vehicle: float, winding: float, inverse_creep: float) -> float:
+    """Return the torque by which the carcass damps its wind-up [Nm], near standstill where rolling can't relax it."""
+    return winding * slide / (1.0 + (vehicle * inverse_creep) ** 2)
 
 
 @compiled
-def gripped(traction: float, grip: float) -> float:
+def gripped(traction: float, grip: float, inverse_grip: float) -> float:
     """Return the torque that a tyre passes on [Nm], of what it would without an end to its grip."""
-    if math.isinf(grip):
+    if inverse_grip == 0.0:
         return traction
-    return grip * hyperbolic_tangent(traction / grip)
+    return grip * hyperbolic_tangent(traction * inverse_grip)
 
 
 def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:

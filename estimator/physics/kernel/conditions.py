@@ -7,7 +7,7 @@ import math
 from estimator.compiled import inlined
 from estimator.physics.effects import warming_friction
 from estimator.physics.kernel import slots
-from estimator.physics.kernel.state_vector import Conditions
+from estimator.physics.kernel.state_vector import Conditions, Tyre
 from estimator.physics.laws import inertia_while, overtoned_wave, share_inside, wave
 from estimator.signals.record import FloatArray
 
@@ -67,6 +67,12 @@ def conditions(
     carried = inertia_motor if masses == 1 else wheel_inertia
     fastest = STICK_STABILITY / h
     lightest = min(inertia_motor, p[slots.J_2] if masses == 3 else carried)
+    stiffness = p[slots.K] * p[slots.LINE_SHARE] * (1.0 + cracked * p[slots.CRACK])
+    inverse_yield = 0.0
+    if p[slots.SLIDER] != 0.0:
+        inverse_yield = 1.0 / max(p[slots.YIELD], p[slots.SLIDER] / (fastest * fastest * lightest))
+        if p[slots.SLIDER_INSIDE] > 0.0:
+            stiffness = max(stiffness - p[slots.SLIDER_INSIDE] * p[slots.SLIDER] / p[slots.YIELD], 0.0)
     return Conditions(
         ripple,
         load,
@@ -78,14 +84,36 @@ def conditions(
         1.0 / inertia_motor,
         inertia_load,
         1.0 / inertia_load if masses > 1 else 0.0,
-        p[slots.K] * p[slots.LINE_SHARE] * (1.0 + cracked * p[slots.CRACK]),
+        stiffness,
         p[slots.B_L] + warming_friction.cold_part(time_s, p[slots.WARMING], p[slots.WARMING_TIME]),
         dry_motor,
         dry_load,
         max(sign_width, dry_motor / (fastest * inertia_motor)),
         max(sign_width, dry_load / (fastest * carried)),
         fastest,
-        max(p[slots.YIELD], p[slots.SLIDER] / (fastest * fastest * lightest)),
+        inverse_yield,
+        tyre(inertia_load, fastest, p),
+    )
+
+
+@inlined
+def tyre(inertia: float, fastest: float, p: FloatArray) -> Tyre:
+    """Return what a tyre's law takes from its parameters, the load's inertia and the fastest decay; 0 without slip."""
+    if p[slots.SLIP] <= 0.0:
+        return Tyre(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    wheel, vehicle = p[slots.SLIP_WHEEL] * inertia, (1.0 - p[slots.SLIP_WHEEL]) * inertia
+    tread = 1.0 / p[slots.SLIP]
+    winding = 0.0
+    if p[slots.RELAXATION] > 0.0:
+        winding = min(p[slots.CARCASS] * tread / p[slots.RELAXATION], wheel * fastest)
+    return Tyre(
+        tread,
+        tread / (wheel * fastest * fastest),
+        winding,
+        1.0 / p[slots.SLIP_SPEED],
+        1.0 / p[slots.GRIP],
+        1.0 / wheel,
+        1.0 / vehicle,
     )
 
 
@@ -110,7 +138,8 @@ def with_torques(now: Conditions, torque: float, load: float) -> Conditions:
         now.width_motor,
         now.width_load,
         now.fastest,
-        now.yield_twist,
+        now.inverse_yield,
+        now.tyre,
     )
 
 

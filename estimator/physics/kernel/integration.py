@@ -37,8 +37,9 @@ def moved(line: Line, x: State, dx: State, h: float) -> State:
         middle_twist, middle_speed = middle_twist + h * dx.middle_twist, middle_speed + h * dx.middle_speed
     loading, vehicle_speed, traction = x.loading, x.vehicle_speed, x.traction
     branch_twist, branch_speed = x.branch_twist, x.branch_speed
-    if line.extended:
+    if line.sliding:
         loading += h * dx.loading
+    if line.extended:
         vehicle_speed, traction = vehicle_speed + h * dx.vehicle_speed, traction + h * dx.traction
         branch_twist, branch_speed = branch_twist + h * dx.branch_twist, branch_speed + h * dx.branch_speed
     return State(
@@ -175,9 +176,11 @@ def integrate_made(
 def integrate_line(masses: int, elastic: bool, *given: Any) -> None:
     """Do what ``integrate`` does, for masses and a shaft that are known when it is compiled."""
     if is_extended(given[8]):
-        integrate_made(Line(masses, elastic, True), *given)
+        integrate_made(Line(masses, elastic, not elastic, True), *given)
+    elif not elastic and given[8][slots.SLIDER] != 0.0:
+        integrate_made(Line(masses, elastic, True, False), *given)
     else:
-        integrate_made(Line(masses, elastic, False), *given)
+        integrate_made(Line(masses, elastic, False, False), *given)
 
 
 @inlined

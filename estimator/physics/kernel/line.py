@@ -18,12 +18,15 @@ class Line(NamedTuple):
         1, 2 or 3.
     elastic : bool
         Whether the first shaft is a spring and a damper, and no law beside them.
+    sliding : bool
+        Whether there may be a slider inside that shaft.
     extended : bool
-        Whether it has states beyond those of its masses: an extra mode, a tyre that slips, a slider inside.
+        Whether it has states beyond those of its masses and a slider: an extra mode, a tyre that slips.
     """
 
     masses: int
     elastic: bool
+    sliding: bool
     extended: bool
 
 
@@ -37,5 +40,5 @@ def is_elastic(p: FloatArray) -> bool:
 
 @inlined
 def is_extended(p: FloatArray) -> bool:
-    """Tell whether a line has states beyond those of its masses."""
-    return bool(p[slots.BRANCH_INERTIA] > 0.0 or p[slots.SLIP] > 0.0 or p[slots.SLIDER] != 0.0)
+    """Tell whether a line has states beyond those of its masses and a slider."""
+    return bool(p[slots.BRANCH_INERTIA] > 0.0 or p[slots.SLIP] > 0.0)

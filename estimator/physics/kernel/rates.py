@@ -46,8 +46,6 @@ def shaft_torque(twist: float, rate: float, loading: float, p: FloatArray, stiff
     if p[slots.GAP] > 0.0:
         loaded = beyond_gap(twist, p[slots.GAP])
         damping *= backlash.damping_share(loaded, p[slots.CONTACT])
-    if p[slots.SLIDER_INSIDE] > 0.0:
-        stiffness = max(stiffness - p[slots.SLIDER_INSIDE] * p[slots.SLIDER] / p[slots.YIELD], 0.0)
     elastic = stiffness * loaded * stiffness_nonlinearity.factor(loaded, p[slots.HARDENING], p[slots.SHAPE])
     torque = float(elastic) + damping + float(p[slots.SLIDER]) * loading
     return backlash.pressed(torque, loaded, p[slots.PULL]) if p[slots.GAP] > 0.0 else torque
@@ -93,7 +91,7 @@ def rates(line: Line, now: Conditions, x: State, p: FloatArray) -> State:
         (drive - reaction) * now.inverse_motor,
         rate,
         load,
-        sliding(x.loading, rate, now, p) if line.extended else 0.0,
+        sliding(x.loading, rate, now, p) if line.sliding else 0.0,
         vehicle,
         x.speed - x.branch_speed,
         branch_acceleration,
@@ -109,7 +107,7 @@ def sliding(loading: float, rate: float, now: Conditions, p: FloatArray) -> floa
     if p[slots.SLIDER] == 0.0:
         return 0.0
     sharpness, unloading = p[slots.SHARPNESS], p[slots.UNLOADING]
-    return shaft_hysteresis.loading_rate(loading, rate, now.yield_twist, sharpness, unloading, now.fastest)
+    return shaft_hysteresis.loading_rate(loading, rate * now.inverse_yield, sharpness, unloading, now.fastest)
 
 
 @inlined
@@ -135,20 +133,19 @@ def load_rates(line: Line, pull: float, now: Conditions, x: State, p: FloatArray
     if not line.extended or p[slots.SLIP] <= 0.0:
         return (pull - load_drag(wheel, wheel, now, p) - now.load) * now.inverse_load, 0.0, 0.0
     vehicle = x.vehicle_speed
-    slip, creep, relaxation = p[slots.SLIP], p[slots.SLIP_SPEED], p[slots.RELAXATION]
-    share, rate = float(p[slots.SLIP_WHEEL]), 0.0
-    if relaxation > 0.0:
-        traction = x.traction
-        inertia = share * now.inertia_load
-        rate = tyre_slip.build_up(wheel - vehicle, abs(vehicle), traction, slip, relaxation, inertia, now.fastest)
-        steepest = inertia * now.fastest
-        traction += tyre_slip.carcass(wheel - vehicle, vehicle, slip, creep, relaxation, p[slots.CARCASS], steepest)
+    tyre, slide, rate = now.tyre, wheel - vehicle, 0.0
+    inverse_wheel, inverse_vehicle = tyre.inverse_wheel, tyre.inverse_vehicle
+    if p[slots.RELAXATION] > 0.0:
+        traction, roll = x.traction, abs(vehicle)
+        relaxation = max(p[slots.RELAXATION], roll / now.fastest, tyre.least_relaxation)
+        rate = tyre_slip.build_up(slide, roll, traction, tyre.tread, relaxation)
+        traction += tyre_slip.carcass(slide, vehicle, tyre.winding, tyre.inverse_creep)
     else:
         steepest = now.fastest * now.inertia_load
-        slope, share = tyre_slip.coupling(vehicle, slip, creep, share, steepest)
-        traction = slope * (wheel - vehicle)
-    traction = tyre_slip.gripped(traction, p[slots.GRIP])
+        slope, share = tyre_slip.coupling(vehicle, p[slots.SLIP], p[slots.SLIP_SPEED], p[slots.SLIP_WHEEL], steepest)
+        inverse_wheel, inverse_vehicle = now.inverse_load / share, now.inverse_load / (1.0 - share)
+        traction = slope * slide
+    traction = tyre_slip.gripped(traction, p[slots.GRIP], tyre.inverse_grip)
     dry = dry_friction(wheel, now.dry_load, now.width_load)
     drag = load_drag(wheel, vehicle, now, p) - dry
-    wheel_rate = (pull - dry - traction) / (share * now.inertia_load)
-    return wheel_rate, (traction - drag - now.load) / ((1.0 - share) * now.inertia_load), rate
+    return (pull - dry - traction) * inverse_wheel, (traction - drag - now.load) * inverse_vehicle, rate

@@ -47,11 +47,35 @@ class State(NamedTuple):
     traction: float
 
 
+class Tyre(NamedTuple):
+    """What the law of a tyre takes from its parameters; inverses, because a division takes as long as a law.
+
+    Attributes
+    ----------
+    tread : float
+        Torque per slip [Nm].
+    least_relaxation : float
+        Angle to roll for a torque to build up that the step can follow at standstill [rad].
+    winding : float
+        Damping by the carcass at standstill, as far as the step can follow it [Nm s/rad].
+    inverse_creep, inverse_grip, inverse_wheel, inverse_vehicle : float
+        Of the speed below which it creeps [rad/s], of the grip [Nm] and of the inertias before and behind it [kg m^2].
+    """
+
+    tread: float
+    least_relaxation: float
+    winding: float
+    inverse_creep: float
+    inverse_grip: float
+    inverse_wheel: float
+    inverse_vehicle: float
+
+
 class Conditions(NamedTuple):
     """What holds during one sub-step: torques [Nm], inertias, stiffness, friction, widths of a sign change [rad/s].
 
-    And what the step can follow: the fastest decay [1/s] and, given the friction inside the shaft, the shortest twist
-    over which it yields [rad]. The inverse of an inertia is there because a division takes as long as a law.
+    And what the step can follow: the fastest decay [1/s] and, as an inverse [1/rad], the shortest twist over which
+    friction inside the shaft yields.
     """
 
     torque: float
@@ -71,4 +95,5 @@ class Conditions(NamedTuple):
     width_motor: float
     width_load: float
     fastest: float
-    yield_twist: float
+    inverse_yield: float
+    tyre: Tyre

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -9,12 +10,14 @@ import pytest
 
 from estimator.diagnosis import hypotheses
 from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects, effects_of, everything, open_hypotheses, with_effect
+from estimator.diagnosis.screening import Screen
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
 from estimator.physics.layout import flat_values
 from estimator.physics.model import Motion, Structure
 from estimator.physics.simulate import Start, grid_for, simulate
+from estimator.physics.starts import begun, close
 from estimator.physics.unknowns import Release, effect_unknowns
 from estimator.signals.record import OutputKind
 from tests.estimator.diagnosis.planted import SIGMA, quiet, rubbing
@@ -236,6 +239,12 @@ class TestLocalMinima:
         monkeypatch.setattr(bench, "_fit", None)
         assert bench.fit_again(self.MODE, "extra_torsional_mode") is again
 
+    def test_where_a_look_promises_next_to_nothing_nothing_is_fitted(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        bench = self.with_mode(0.2, 13.0, 0.76)
+        first = bench.fit(self.MODE, bench.fit(NOTHING))
+        monkeypatch.setattr(bench, "_fit", None)
+        assert bench.fit_again(self.MODE, "extra_torsional_mode") is first
+
     def test_a_better_fit_stays(self) -> None:
         bench = self.with_mode(0.2, 13.0, 0.76)
         first = bench.fit(self.MODE, bench.fit(NOTHING))
@@ -247,6 +256,24 @@ class TestLocalMinima:
         right = bench.fit(self.MODE, bench.fit(NOTHING))
         bench._fits[self.MODE] = replace(right, residual=5.0 * right.residual)  # as if it had ended elsewhere
         assert bench.fit_widely(self.MODE, "extra_torsional_mode").squares == pytest.approx(right.squares, rel=1e-4)
+
+    def test_no_start_is_tried_twice_but_one_that_stayed_close_behind_the_best(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        bench, name = self.with_mode(0.2, 13.0, 0.76), "extra_torsional_mode"
+        before, tried = bench.fit(NOTHING), list[Sequence[Release]]()
+        releases = [look.release for look in Screen(before, bench.model).looks(name)]
+        bench.rough_fit(self.MODE, before, releases)
+        known = bench.fit(self.MODE)
+
+        def fitted(effects: Effects, warm: FitResult | None, releases: Sequence[Release]) -> FitResult:
+            tried.append(releases)
+            return known
+
+        monkeypatch.setattr(bench, "_fit", fitted)
+        assert bench.fit_widely(self.MODE, name) is known
+        heat = begun(bench._problems(self.MODE, before, releases), before)
+        assert tried == [[releases[i] for i in sorted(close(heat)[1:])]]
 
     def test_fewer_effects_start_from_where_more_ended_too(self) -> None:
         records = rubbing(lambda speed: FRICTION_NM)

@@ -216,7 +216,7 @@ def test_structure_and_recording_must_agree() -> None:
     with pytest.raises(BadModel, match="came force as the output, expected the torque under an imposed motion"):
         output_state(replace(bench, imposed=None), Structure.JOINT)
     with pytest.raises(ValueError, match="imposed motion, came none"):
-        joint.simulate(replace(bench, imposed=None), flat_values(MODEL.values(), {}), bench.output, 0.0, 0.0)
+        joint.imposed_in(replace(bench, imposed=None))
 
 
 def test_an_imposed_motion_is_known_throughout() -> None:

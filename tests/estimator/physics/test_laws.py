@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from estimator.physics.laws import BENT, BEYOND, NOTHING_LEFT, fading, hyperbolic_tangent
+from estimator.physics.laws import BENT, BEYOND, NOTHING_LEFT, fading, hyperbolic_tangent, power
 
 LAST_BIT = np.finfo(float).eps
 
@@ -28,6 +28,16 @@ def test_the_hyperbolic_tangent_does_not_fall_where_its_form_changes(edge: float
 def test_the_hyperbolic_tangent_of_what_runs_away() -> None:
     assert (hyperbolic_tangent(0.0), hyperbolic_tangent(math.inf), hyperbolic_tangent(-math.inf)) == (0.0, 1.0, -1.0)
     assert math.isnan(hyperbolic_tangent(math.nan))
+
+
+@pytest.mark.parametrize("exponent", [0.3, 1.0, 2.0, -0.5, 7.5])
+def test_a_power_is_the_librarys_to_13_digits(exponent: float) -> None:
+    for size in np.concatenate([np.geomspace(1e-6, 1e3, 5_000), [1.0]]):
+        assert power(size, exponent) == pytest.approx(size**exponent, rel=1e-13, abs=0.0)
+
+
+def test_a_power_of_nothing_is_nothing() -> None:
+    assert power(0.0, 0.3) == 0.0
 
 
 def test_what_fades_is_exponential_until_it_is_lost_beside_one() -> None:

@@ -101,13 +101,17 @@ class TestWaves:
             amplitude, phase = (p[slot("load_imbalance", name)] for name in ("amplitude_nm", "phase_rad"))
             return 3.0 + amplitude * np.cos(self.ANGLE + phase)
 
-        (wave,) = waves(IMBALANCE, np.zeros(SIZE), {"amplitude_nm": 6.0, "motor_turns_per_turn": 5.6}, each(run))
+        sizes, still = {"amplitude_nm": 6.0, "motor_turns_per_turn": 5.6}, run(np.zeros(SIZE))
+        (wave,) = waves(IMBALANCE, np.zeros(SIZE), sizes, each(run), still)
         assert (wave.phase, wave.amplitude) == ("phase_rad", "amplitude_nm")
         np.testing.assert_allclose(wave.answers, [np.cos(self.ANGLE), -np.sin(self.ANGLE)], atol=1e-9)
 
-    @pytest.mark.parametrize(("sizes", "found"), [({"once_rad": 0.1, "twice_rad": 0.0}, ["once_phase_rad"])])
+    @pytest.mark.parametrize(
+        ("sizes", "found"),
+        [({"once_rad": 0.1, "twice_rad": 0.0}, ["once_phase_rad"]), ({"once_rad": 0.0, "twice_rad": 0.0}, [])],
+    )
     def test_an_amplitude_that_is_not_tried_has_no_wave(self, sizes: Mapping[str, float], found: list[str]) -> None:
-        answers = waves(RESOLVER, np.zeros(SIZE), sizes, each(lambda _: np.zeros(3)))
+        answers = waves(RESOLVER, np.zeros(SIZE), sizes, each(lambda _: np.zeros(3)), np.zeros(3))
         assert [wave.phase for wave in answers] == found
 
     def test_every_amplitude_answers_with_the_others_silent(self) -> None:
@@ -121,6 +125,6 @@ class TestWaves:
 
         p = np.zeros(SIZE)
         p[slot("resolver_error", "once_rad")] = p[slot("resolver_error", "twice_rad")] = 0.4
-        once, twice = waves(RESOLVER, p, {"once_rad": 0.1, "twice_rad": 0.1}, each(run))
+        once, twice = waves(RESOLVER, p, {"once_rad": 0.1, "twice_rad": 0.1}, each(run), run(np.zeros(SIZE)))
         np.testing.assert_allclose(once.answers[0], np.cos(self.ANGLE), atol=1e-9)
         np.testing.assert_allclose(twice.answers[1], np.cos(2.0 * self.ANGLE + 0.5 * math.pi), atol=1e-9)

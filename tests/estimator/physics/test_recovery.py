@@ -187,7 +187,7 @@ def test_the_fit_finds_what_was_planted(case: str) -> None:
     errors = standard_errors(result)
     wanted = {("", key): value for key, value in TRUE.items()} | {(name, k): v for k, v in plant.shared.items()}
     for i, unknown in enumerate(result.problem.shared):
-        if unknown.low == unknown.high:
+        if unknown.low == unknown.high or unknown.name in plant.undetermined:
             continue
         found, sigma = result.x[i] * unknown.scale, errors[i] * unknown.scale
         assert abs(found - wanted[unknown.effect, unknown.name]) < 4.5 * sigma + 1e-9
@@ -200,6 +200,14 @@ def test_the_fit_finds_what_was_planted(case: str) -> None:
         for unknown, value in zip(basis.own, x[basis.own_rows], strict=True):
             if unknown.name in own:
                 assert value == pytest.approx(own[unknown.name], abs=0.15)
+
+
+def test_of_a_slider_within_the_stiffness_what_it_leaves_is_found() -> None:
+    plant = PLANTS["shaft_hysteresis"]
+    result = fitted("shaft_hysteresis", plant)
+    slider, inside, over = (result.value("shaft_hysteresis", name) for name in ("friction_nm", "inside", "yield_rad"))
+    true = TRUE["k"] - plant.shared["inside"] * plant.shared["friction_nm"] / plant.shared["yield_rad"]
+    assert result.value("", "k") - inside * slider / over == pytest.approx(true, rel=1e-3)
 
 
 def test_a_held_start_is_a_choice_and_not_an_unknown() -> None:

@@ -118,21 +118,21 @@ def test_the_slider_of_a_hysteresis_adds_its_torque_by_its_loading() -> None:
 
 @pytest.mark.parametrize(("loading", "rate"), [(1.0, 2.0), (-1.0, -2.0), (0.3, 0.0)])
 def test_a_slider_that_slides_or_rests_loads_no_further(loading: float, rate: float) -> None:
-    assert loading_rate(loading, rate, 1e-3, 1.0, 1.0, 600.0) == 0.0
+    assert loading_rate(loading, rate / 1e-3, 1.0, 1.0, 600.0) == 0.0
 
 
 def test_a_slider_loads_by_the_twist_and_not_by_time() -> None:
-    slow, fast = (loading_rate(0.2, rate, 0.05, 1.0, 1.0, 1e9) for rate in (0.1, 1.0))
+    slow, fast = (loading_rate(0.2, rate / 0.05, 1.0, 1.0, 1e9) for rate in (0.1, 1.0))
     assert fast == pytest.approx(10.0 * slow)
     assert slow == pytest.approx((0.1 - 0.1 * 0.2) / 0.05)
-    assert loading_rate(0.2, -0.1, 0.05, 1.0, 1.0, 1e9) == pytest.approx((-0.1 - 0.1 * 0.2) / 0.05)
-    assert loading_rate(0.2, 1.0, 1e-9, 1.0, 1.0, 600.0) == pytest.approx(600.0 * 0.8)
+    assert loading_rate(0.2, -0.1 / 0.05, 1.0, 1.0, 1e9) == pytest.approx((-0.1 - 0.1 * 0.2) / 0.05)
+    assert loading_rate(0.2, 1.0 / 1e-9, 1.0, 1.0, 600.0) == pytest.approx(600.0 * 0.8)
 
 
 def test_a_sharp_slider_holds_longer_and_may_come_back_elastically() -> None:
     """n = 2 yields by z^2; u = 0 unloads with the stiffness of the start (Bouc-Wen with equal coefficients)."""
-    assert loading_rate(0.5, 1.0, 0.1, 2.0, 0.0, 1e9) == pytest.approx((1.0 - 0.25) / 0.1)
-    assert loading_rate(0.5, -1.0, 0.1, 2.0, 0.0, 1e9) == pytest.approx(-1.0 / 0.1)
+    assert loading_rate(0.5, 1.0 / 0.1, 2.0, 0.0, 1e9) == pytest.approx((1.0 - 0.25) / 0.1)
+    assert loading_rate(0.5, -1.0 / 0.1, 2.0, 0.0, 1e9) == pytest.approx(-1.0 / 0.1)
 
 
 @pytest.mark.parametrize(("share", "inertia"), [(0.0, 2.0), (1.0, 8.0), (0.5, 3.2)])

@@ -10,7 +10,7 @@ from estimator.diagnosis.chain import read_through
 from estimator.diagnosis.hypotheses import NOTHING, Effects
 from estimator.diagnosis.search import search
 from estimator.diagnosis.selection import Selection, Selector
-from estimator.diagnosis.selection.selector import _Path
+from estimator.diagnosis.selection.selector import OTHER_WAYS, _Path
 from estimator.diagnosis.trial import Trial
 from estimator.physics.fit import FitResult
 from tests.estimator.diagnosis.planted import quiet, rubbing
@@ -68,7 +68,9 @@ def test_a_way_is_completed_however_near_to_the_noise_it_ends(
 ) -> None:
     """As long as something is left of it, and neither bends."""
     monkeypatch.setattr(select, "_is_near", lambda _: True)
-    (friction,) = (trial for trial in select._firsts(found.retuned, NOTHING) if trial.name == COULOMB)
+    (friction,) = (
+        trial for trial in select._rounds.finished_first(found.retuned, NOTHING, OTHER_WAYS) if trial.name == COULOMB
+    )
     assert select._completed(friction, found.retuned, NOTHING).chosen == BOTH
     monkeypatch.setattr("estimator.diagnosis.selection.selector.flexible", lambda names: names & {COULOMB})
     assert select._completed(friction, found.retuned, NOTHING).chosen == {COULOMB}
@@ -78,7 +80,7 @@ def test_a_way_is_completed_however_near_to_the_noise_it_ends(
 
 def test_two_are_looked_at_once(select: Selector, found: Selection, monkeypatch: pytest.MonkeyPatch) -> None:
     """From the one that by itself leaves less; but a profile takes up what another would add."""
-    firsts, asked = select._firsts(found.retuned, NOTHING), []
+    firsts, asked = select._rounds.finished_first(found.retuned, NOTHING, OTHER_WAYS), []
 
     def completed(first: Trial, retuned: FitResult, without: Effects) -> _Path:
         asked.append(without)
@@ -89,6 +91,24 @@ def test_two_are_looked_at_once(select: Selector, found: Selection, monkeypatch:
     names = [first.name for first in firsts]
     assert {"road_grade", COULOMB} <= set(names)
     assert asked == [frozenset(names[:i]) - {"road_grade"} for i in range(len(names))]
+
+
+def test_another_way_begins_with_what_leaves_least_and_what_is_far_behind_is_not_finished(
+    select: Selector, found: Selection, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rounds, fit, finished = select._rounds, select.jury.bench.fit, list[Effects]()
+
+    def noted(effects: Effects, warm: FitResult) -> FitResult:
+        finished.append(effects)
+        return fit(effects, warm)
+
+    monkeypatch.setattr(select.jury.bench, "fit", noted)
+    alone = [name for name, trial in rounds.trials.items() if len(trial.effects) == 1]
+    (best,) = rounds.finished_first(found.retuned, NOTHING, 1)
+    assert best.result.squares == min(fit(frozenset({name}), found.retuned).squares for name in alone)
+    assert 1 <= len(finished) < len(alone)
+    (next_best,) = rounds.finished_first(found.retuned, frozenset({best.name}), 1)
+    assert next_best.name != best.name
 
 
 def test_what_is_better_stays(select: Selector, found: Selection) -> None:
