@@ -4,13 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from estimator.diagnosis.chain import Chain
 from estimator.diagnosis.evidence import gain_from_squares
 from estimator.diagnosis.holdout import Examiner
-from estimator.diagnosis.intervals import Z95, interval, interval_both_ways, reported_covariance, trusted
+from estimator.diagnosis.intervals import (
+    Z95,
+    interval,
+    interval_both_ways,
+    interval_that_follows,
+    reported_covariance,
+    trusted,
+)
 from estimator.diagnosis.result import Estimated, Evidence, FoundEffect, Interval, Profile, Retuned
 from estimator.diagnosis.selection import Selection
 from estimator.diagnosis.trial import Trial
@@ -18,6 +26,7 @@ from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
 from estimator.physics.effects import road_grade
 from estimator.physics.fit import FitResult, local_part
+from estimator.physics.layout import slot
 from estimator.physics.model import DrivelineModel, EffectValue, parameter_unit, unit
 from estimator.physics.steps import moments_of
 from estimator.physics.unknowns import LOAD_TORQUE
@@ -121,21 +130,40 @@ def _parameters(name: str, result: FitResult, cov: FloatArray, model: DrivelineM
         if parameter.dimension in IN_PROPORTION and entry.element is not Element.TORQUE_PATH
     }
     left_out = {parameter.name: parameter.null for parameter in EFFECTS[name].parameters if parameter.optional}
-    return {
-        shared.name: Estimated(
-            float(result.x[i]) * shared.scale,
-            (interval_both_ways if shared.name in torques else interval)(result, cov, i),
-            units[shared.name],
-        )
-        for i, shared in enumerate(result.problem.shared)
-        if shared.effect == name and shared.low < shared.high
-    } | {
-        shared.name: Estimated(value, (value, value), units[shared.name])
-        for i, shared in enumerate(result.problem.shared)
-        if shared.effect == name and shared.low == shared.high
-        for value in [float(result.x[i]) * shared.scale]
-        if value != left_out.get(shared.name)
-    }
+    follow = _derived(name, result)
+    return (
+        {
+            shared.name: Estimated(
+                float(result.x[i]) * shared.scale,
+                (interval_both_ways if shared.name in torques else interval)(result, cov, i),
+                units[shared.name],
+            )
+            for i, shared in enumerate(result.problem.shared)
+            if shared.effect == name and shared.low < shared.high
+        }
+        | {
+            shared.name: Estimated(value, (value, value), units[shared.name])
+            for i, shared in enumerate(result.problem.shared)
+            if shared.effect == name and shared.low == shared.high
+            for value in [float(result.x[i]) * shared.scale]
+            if value != left_out.get(shared.name) and shared.name not in follow
+        }
+        | {
+            key: Estimated(value, interval_that_follows(result, cov, partial(_derived_value, name, key)), units[key])
+            for key, value in follow.items()
+        }
+    )
+
+
+def _derived(name: str, result: FitResult) -> Mapping[str, float]:
+    """Return the values of an effect that are held but follow from what was fitted."""
+    of_line = result.problem.grid.structure.parameter_names
+    nominal = {key: float(result.p[slot("", key)]) for key in of_line}
+    return EFFECTS[name].derived(result.values_of(name), nominal)
+
+
+def _derived_value(name: str, key: str, result: FitResult) -> float:
+    return _derived(name, result)[key]
 
 
 def _profiles(result: FitResult, cov: FloatArray, model: DrivelineModel) -> dict[str, Profile]:

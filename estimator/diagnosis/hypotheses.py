@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from estimator.diagnosis.evidence import gain
 from estimator.diagnosis.screening import Screen, promising
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Untestable
@@ -17,8 +18,14 @@ from estimator.physics.polish import polished
 from estimator.physics.simulate import grid_for
 from estimator.physics.starts import HEAT, begun, best_fit, close, converge
 from estimator.physics.steps import from_their_moment
-from estimator.physics.unknowns import Release, nominal_unknowns, own_unknowns
+from estimator.physics.unknowns import Release, nominal_unknowns, own_unknowns, released
 from estimator.signals.record import BoolArray, Record
+
+STEPS_OF_RETOLD = 5
+"""Jacobians that another way to write a law gets before it is given up: it starts from what was no fit of it."""
+
+HOPELESS = 2.0
+"""Squared error after them, over that of the law as it was, beyond which it is."""
 
 Effects = frozenset[str]
 NOTHING: Effects = frozenset()
@@ -63,6 +70,7 @@ class Bench:
     _fits: dict[Effects, FitResult] = field(default_factory=dict)
     _rough: dict[Effects, FitResult] = field(default_factory=dict)
     _looked_again: set[tuple[Effects, str]] = field(default_factory=set)
+    _retold: set[tuple[Effects, str]] = field(default_factory=set)
     _tried: dict[Effects, list[Release]] = field(default_factory=dict)
 
     def fit(self, effects: Effects, warm: FitResult | None = None, releases: Sequence[Release] = ()) -> FitResult:
@@ -96,6 +104,37 @@ class Bench:
         if looks[0].promise < WORTH_ANOTHER_FIT * had.squares:
             return had
         return self._better(effects, self._fit(effects, _forgetting(had, name), [look.release for look in looks]))
+
+    def fit_retold(self, effects: Effects, name: str) -> FitResult:
+        """Fit an effect's law written other ways from where it ended, and return what explains best, per unknown.
+
+        Once.
+        """
+        had = self._fits[effects]
+        values = had.values_of(name)
+        if not values or (effects, name) in self._retold:
+            return had
+        self._retold.add((effects, name))
+        entry = EFFECTS[name]
+        fits = []
+        for other in entry.retold(self.model, self.records, values, had.values_of("")):
+            warm = _placed(_forgetting(had, name), other.line)
+            starts = released(name, self.model, self.records, [other.start])
+            (heat,) = begun(self._problems(effects, warm, starts), warm, STEPS_OF_RETOLD)
+            if heat.squares <= HOPELESS * had.squares:
+                fits.append(polished(converge(heat)))
+        plausible = [fit for fit in fits if not entry.implausible(self.model, self.records, fit.values_of(name))]
+        best = min(plausible, key=lambda fit: fit.squares, default=had)
+        if gain(best, had).delta_bic <= 0.0:
+            self._fits[effects] = _without_much(best)
+        return self.fit(effects)
+
+    def fit_in_place(self, effects: Effects, name: str, rival: str, had: FitResult) -> FitResult:
+        """Fit an effect beside others from where these stand in a fit with a rival in its place; return the better fit.
+
+        What a rival follows nearly as well has brought the others near their place; a fit from elsewhere may have not.
+        """
+        return self._better(effects, self._fit(effects, _forgetting(had, rival), []))
 
     def fit_widely(self, effects: Effects, name: str) -> FitResult:
         """Fit an effect from every start not yet tried, promising or not, and return the best of these and the known.
@@ -214,6 +253,15 @@ def _forgetting(result: FitResult, name: str) -> FitResult:
     left = [*keep, *[True] * (result.x.size - len(keep))]
     problem = replace(result.problem, shared=shared)
     return replace(result, problem=problem, x=result.x[left], derivative=None)  # which was found with the effect
+
+
+def _placed(result: FitResult, line: Mapping[str, float]) -> FitResult:
+    """Return a fit with some of the line's own parameters elsewhere, within what they are trusted to."""
+    x = result.x.copy()
+    for i, shared in enumerate(result.problem.shared):
+        if not shared.effect and shared.name in line:
+            x[i] = min(max(line[shared.name] / shared.scale, shared.low), shared.high)
+    return replace(result, x=x)
 
 
 def _without_much(result: FitResult) -> FitResult:

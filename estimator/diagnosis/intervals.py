@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
+
 import numpy as np
 from scipy import stats
 
@@ -115,6 +118,20 @@ def interval(result: FitResult, cov: FloatArray, index: int) -> tuple[float, flo
     spread = Z95 * float(np.sqrt(max(cov[index, index], 0.0)))
     x = min(max(float(result.x[index]), shared.low), shared.high)  # a fit may end beyond a bound by its last digit
     return (shared.scale * max(x - spread, shared.low), shared.scale * min(x + spread, shared.high))
+
+
+def interval_that_follows(
+    result: FitResult, cov: FloatArray, told: Callable[[FitResult], float]
+) -> tuple[float, float]:
+    """Return the 95 % interval of what follows from the unknowns, to first order; never of the other sign."""
+    value, slope = told(result), np.zeros(result.x.size)
+    for i in np.flatnonzero(np.diag(cov) > 0.0):
+        moved = result.x.copy()
+        moved[i] -= STEP
+        slope[i] = (value - told(replace(result, x=moved))) / STEP
+    spread = Z95 * float(np.sqrt(max(float(slope @ cov @ slope), 0.0)))
+    low, high = value - spread, value + spread
+    return (max(low, 0.0), high) if value > 0.0 else (low, min(high, 0.0))
 
 
 def trusted(result: FitResult, index: int) -> tuple[float, float]:

@@ -35,16 +35,7 @@ class Trial:
     @property
     def values(self) -> dict[str, float]:
         """Fitted values of the parameters that all recordings share."""
-        return values_of(self.name, self.result)
-
-
-def values_of(name: str, result: FitResult) -> dict[str, float]:
-    """Return the values of an effect's parameters that all recordings share."""
-    return {
-        shared.name: float(x) * shared.scale
-        for shared, x in zip(result.problem.shared, result.x, strict=False)
-        if shared.effect == name
-    }
+        return self.result.values_of(self.name)
 
 
 def pressed_parameters(result: FitResult) -> frozenset[str]:

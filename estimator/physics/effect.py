@@ -86,6 +86,15 @@ class Held:
 
 
 @dataclass(frozen=True, slots=True)
+class Within:
+    """A start value with bounds of its own: of a variant of the law that can't be followed everywhere."""
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, slots=True)
 class Untestable:
     """Why a set of recordings can't tell whether an effect is there, and which test would.
 
@@ -98,7 +107,18 @@ class Untestable:
 
 
 Scales = Callable[[DrivelineModel, Sequence[Record]], tuple[float, ...]]
-Start = tuple[float | Held, ...]
+Start = tuple[float | Held | Within, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Retelling:
+    """Where a fit of a law that is written another way starts: its own values, and those of the line that change."""
+
+    start: Start
+    line: Mapping[str, float]
+
+
+Retold = Callable[[DrivelineModel, Sequence[Record], Mapping[str, float], Mapping[str, float]], list[Retelling]]
 Starts = Callable[[DrivelineModel, Sequence[Record]], list[Start]]
 Testable = Callable[[DrivelineModel, Sequence[Record]], Untestable | None]
 
@@ -121,6 +141,18 @@ def in_any_recording(_model: DrivelineModel, _records: Sequence[Record]) -> Unte
 def as_given(values: Mapping[str, float]) -> Mapping[str, float]:
     """Leave values as they were given."""
     return values
+
+
+def never_retold(
+    _model: DrivelineModel, _records: Sequence[Record], _values: Mapping[str, float], _line: Mapping[str, float]
+) -> list[Retelling]:
+    """Know no other way to write the law."""
+    return []
+
+
+def nothing_derived(_values: Mapping[str, float], _nominal: Mapping[str, float]) -> Mapping[str, float]:
+    """Take every held value as it is."""
+    return {}
 
 
 def told_one_way(_values: Mapping[str, float]) -> float:
@@ -204,7 +236,7 @@ class Effect:
         Model and records to a typical size of each parameter that all recordings share (positive).
     starts : callable
         Model and records to start points of the fit, in units of the scales, one value per parameter that all
-        recordings share; ``Held`` values are not fitted.
+        recordings share; ``Held`` values are not fitted, those ``Within`` bounds of their own stay there.
     testable : callable
         Model and records to None, or to the reason why they can't tell; by default any recording can.
     sentence : callable
@@ -237,6 +269,11 @@ class Effect:
         where there is none.
     completed : callable
         Values that were given to those a simulation should have: where leaving one out is simpler than any real part.
+    retold : callable
+        Model, records and fitted values, of the effect and of the line, to where fits of other ways to write the law
+        start.
+    derived : callable
+        Parameter values, and the line's own, to those of parameters that are held but follow from the others.
     linear : bool
         True where it is a linear system beside the nominal one, with an order and nothing else to write otherwise.
     recognised : bool
@@ -270,6 +307,8 @@ class Effect:
     unresolved: Callable[[DrivelineModel, Sequence[Record], Mapping[str, float]], str] = always_plausible
     rescaled: Callable[[Mapping[str, float]], float] = told_one_way
     completed: Callable[[Mapping[str, float]], Mapping[str, float]] = as_given
+    retold: Retold = never_retold
+    derived: Callable[[Mapping[str, float], Mapping[str, float]], Mapping[str, float]] = nothing_derived
     linear: bool = False
     recognised: bool = False
 

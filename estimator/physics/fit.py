@@ -123,6 +123,12 @@ class FitResult:
         """Fitted value of a parameter (``effect`` empty for a nominal one)."""
         return float(self.p[next(s.slot for s in self.problem.shared if (s.effect, s.name) == (effect, name))])
 
+    def values_of(self, effect: str) -> dict[str, float]:
+        """Return the values of an effect's parameters that all recordings share."""
+        return {
+            s.name: float(x) * s.scale for s, x in zip(self.problem.shared, self.x, strict=False) if s.effect == effect
+        }
+
     def p_of(self, index: int) -> FloatArray:
         """Parameter vector of one recording, its own parameters among them; shape (layout.SIZE,)."""
         return self.problem.local[index].parameters(self.p, self.local_of(index))

@@ -12,6 +12,8 @@ import numpy as np
 from estimator.errors import BadModel
 from estimator.physics import joint, own_law, own_law_run
 from estimator.physics.kernel import integration, sensing, slots, state_vector
+from estimator.physics.kernel.conditions import branch_frequency, branch_inertia
+from estimator.physics.kernel.line import is_within
 from estimator.physics.model import DrivelineModel, Structure, natural_frequencies_rad_s
 from estimator.physics.motion import reverses, speed_scale
 from estimator.physics.torque_path import shaft_torques
@@ -356,8 +358,8 @@ def initial_state(start: Start, torque_nm: float, angle_rad: float, p: FloatArra
                 load_speed=start.load_speed_rad_s,
                 loading=0.0,
                 vehicle_speed=start.load_speed_rad_s,
-                branch_twist=0.0,
-                branch_speed=start.speed_rad_s,
+                branch_twist=_twist_beside_shaft(start.twist_rad, p),
+                branch_speed=start.load_speed_rad_s if p[slots.BEHIND] > 0.0 else start.speed_rad_s,
                 middle_twist=start.middle_twist_rad,
                 middle_speed=start.middle_speed_rad_s,
                 traction=start.load_torque_nm,
@@ -368,6 +370,13 @@ def initial_state(start: Start, torque_nm: float, angle_rad: float, p: FloatArra
             -p[slots.FILTERED_BEFORE],
         ]
     )
+
+
+def _twist_beside_shaft(twist_rad: float, p: FloatArray) -> float:
+    """Return the twist of another spring of the line [rad] that carries what the shaft does; 0 where there is none."""
+    if not is_within(p):
+        return 0.0
+    return float(p[slots.K] * twist_rad / (branch_inertia(p) * branch_frequency(p) ** 2))
 
 
 def motor_angle(record: Record) -> FloatArray:

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from estimator.physics import effect
 from estimator.physics.catalogue import EFFECTS
-from estimator.physics.effect import Effect, EffectParameter, Held
+from estimator.physics.effect import Effect, EffectParameter, Held, Within
 from estimator.physics.effects import road_grade
 from estimator.physics.layout import slot
 from estimator.physics.model import DrivelineModel, Structure, natural_frequencies_rad_s
@@ -64,9 +65,17 @@ def effect_unknowns(name: str, model: DrivelineModel, records: Sequence[Record])
     (``estimator.diagnosis.screening``).
     """
     entry = EFFECTS[name]
-    own = tuple(_own_unknowns(entry, record) for record in records)
     if entry.profile:
-        return [Release((), own)]
+        return [Release((), tuple(_own_unknowns(entry, record) for record in records))]
+    return released(name, model, records, entry.starts(model, records))
+
+
+def released(
+    name: str, model: DrivelineModel, records: Sequence[Record], starts: Sequence[effect.Start]
+) -> list[Release]:
+    """Return an effect's parameters as unknowns from start points in units of its scales."""
+    entry = EFFECTS[name]
+    own = tuple(_own_unknowns(entry, record) for record in records)
     scales = entry.scales(model, records)
     return [
         Release(
@@ -76,7 +85,7 @@ def effect_unknowns(name: str, model: DrivelineModel, records: Sequence[Record])
             ),
             own,
         )
-        for start in entry.starts(model, records)
+        for start in starts
     ]
 
 
@@ -85,9 +94,11 @@ def own_unknowns(names: Iterable[str], record: Record) -> tuple[Shared, ...]:
     return tuple(unknown for name in sorted(names) for unknown in _own_unknowns(EFFECTS[name], record))
 
 
-def _unknown(effect: str, parameter: EffectParameter, scale: float, x: float | Held) -> Shared:
+def _unknown(effect: str, parameter: EffectParameter, scale: float, x: float | Held | Within) -> Shared:
     if isinstance(x, Held):
         return Shared(effect, parameter.name, scale, x.value, x.value, x.value)
+    if isinstance(x, Within):
+        return Shared(effect, parameter.name, scale, x.low, x.high, x.value)
     return Shared(effect, parameter.name, scale, parameter.low, parameter.high, x)
 
 

@@ -10,7 +10,7 @@ from estimator.diagnosis.evidence import VERY_STRONG, Gain, gain
 from estimator.diagnosis.holdout import Examiner, HoldOut
 from estimator.diagnosis.hypotheses import Bench, Effects, effects_of
 from estimator.diagnosis.intervals import Z95, chance_of_coherent, reported_covariance
-from estimator.diagnosis.trial import Trial, has_edge, healed_in, null_inside, ranks, scan_choices, values_of
+from estimator.diagnosis.trial import Trial, has_edge, healed_in, null_inside, ranks, scan_choices
 from estimator.diagnosis.weight import VISIBLE, Weight, earns_detail
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult
@@ -58,7 +58,7 @@ class Jury:
             return "it would act in whole recordings or not at all: no moment is seen at which it begins or ends"
         if healed := healed_in(name, result):
             return f"it would begin and end within recording {healed}, and such a change does not go back"
-        values = values_of(name, result)
+        values = result.values_of(name)
         entry, given = EFFECTS[name], (self.bench.model, self.bench.records, values)
         return entry.implausible(*given) or entry.unresolved(*given) or None
 

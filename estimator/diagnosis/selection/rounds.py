@@ -73,18 +73,42 @@ class Rounds:
             rough |= dict(zip(further, fits, strict=True))
             further = _near_the_best(rough, current, WORTH_FINISHING)
         pressed = pressed_parameters(current)
+        freed = [name for name in rough if EFFECTS[name].loosens & pressed]
 
         def finished(name: str) -> Trial:
-            effects = with_effect(chosen, name)
-            result = self.jury.bench.fit(effects, current) if name in further else rough[name]
-            if name in further and EFFECTS[name].loosens & pressed:
-                result = self.jury.bench.fit_again(effects, name)
+            effects, result = with_effect(chosen, name), rough[name]
+            if name in further or (name in freed and not chosen):  # what sets others free shows itself late
+                self.jury.bench.fit(effects, current)
+                if name in freed:
+                    self.jury.bench.fit_again(effects, name)
+                result = self.jury.bench.fit_retold(effects, name)
             return self.jury.trial(name, effects, current, result)
 
         trials = dict(zip(rough, concurrently(finished, list(rough)), strict=True))
+        if chosen:
+            trials |= self._in_place_of_the_best(trials, chosen, current)
         self._count += 1
         self.trials = trials | self.trials
         return trials
+
+    def _in_place_of_the_best(
+        self, trials: Mapping[str, Trial], chosen: Effects, current: FitResult
+    ) -> dict[str, Trial]:
+        """Try the linear systems that look like the best, if it is one, from where the others stand beside it.
+
+        Beside a gap the fit of one may end elsewhere, and then the wrong one of two look-alikes is named.
+        """
+        best = min((t for t in trials.values() if t.failed is None), key=lambda t: t.result.squares, default=None)
+        if best is None or not EFFECTS[best.name].linear:
+            return {}
+        alike = [name for name in EFFECTS[best.name].resembles if name in trials and EFFECTS[name].linear]
+
+        def tried(name: str) -> Trial:
+            effects = with_effect(chosen, name)
+            result = self.jury.bench.fit_in_place(effects, name, best.name, best.result)
+            return self.jury.trial(name, effects, current, result)
+
+        return dict(zip(alike, concurrently(tried, alike), strict=True))
 
     def _looks(
         self, names: Sequence[str], chosen: Effects, current: FitResult, least: float = 0.0
@@ -134,7 +158,9 @@ class Rounds:
             able = [t for t in able if retuned.squares - t.result.squares >= WORTH_GOING_ON * gains[most - 1]]
 
         def finished(trial: Trial) -> Trial:
-            return self.jury.trial(trial.name, trial.effects, retuned, self.jury.bench.fit(trial.effects, retuned))
+            self.jury.bench.fit(trial.effects, retuned)
+            result = self.jury.bench.fit_retold(trial.effects, trial.name)
+            return self.jury.trial(trial.name, trial.effects, retuned, result)
 
         self._report("finishing all of them", 0.0)
         trials = concurrently(finished, able)

@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from estimator.physics.effect import WITH_SHAFT, Effect, EffectParameter, Element, Start
+from estimator.compiled import compiled
+from estimator.physics.effect import WITH_SHAFT, Effect, EffectParameter, Element, Held, Retelling, Start, Within
 from estimator.physics.model import DrivelineModel, Motion, natural_frequencies_rad_s, unit
 from estimator.signals.record import Record
 
@@ -18,34 +19,123 @@ LEAST_AMPLIFIED = 2.0
 """By which a resonance amplifies at least, ``1 / (2 zeta)``, whatever damps it."""
 
 
+LIGHTEST, STIFFEST = 0.03, 0.95
+"""Inertia within the line, over the motor's, and share of the twist on the shaft behind it, beyond which it
+would take too many steps to follow them."""
+
+MOST = 50.0
+"""Most inertia, in tenths of the motor's."""
+
+SOFTEST = 0.4
+"""Share of the twist on the shaft below which the shaft would be the stiffer of both springs by far."""
+
+
+NEAR_HALF_RATE = 0.4
+"""Frequency over the sampling rate up to which an inertia within the line is looked for: from farther above a
+fit may end at its image on the other side of half the rate."""
+
+ABOVE = 5.0
+"""Frequency over the line's own near which it is looked for where the samples are fast."""
+
+
+@compiled
+def frequency_within(inertia: float, stiffness: float, line_share: float) -> float:
+    """Return the frequency [rad/s] of an inertia within the line on the spring that softens the shaft so."""
+    return math.sqrt(stiffness * line_share / ((1.0 - line_share) * inertia))
+
+
+def within(values: Mapping[str, float]) -> float:
+    """Return the inertia within the line [kg m^2], before the shaft or behind it; 0 for one beside it."""
+    return values.get("between_kg_m2", 0.0) + values.get("behind_kg_m2", 0.0)
+
+
+def derived(values: Mapping[str, float], nominal: Mapping[str, float]) -> Mapping[str, float]:
+    """Return the frequency of an inertia within the line: it is not fitted but follows."""
+    if not within(values):
+        return {}
+    fastest = frequency_within(within(values), nominal["k"], values["line_share"])
+    return {"frequency_hz": fastest / (2.0 * math.pi)}
+
+
 def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
-    """Return a tenth of the motor's inertia, the line's own frequency, a usual damping, and 1."""
+    """Return a tenth of the motor's inertia, the line's own frequency, 1, a usual damping, and that inertia twice."""
     frequency = float(natural_frequencies_rad_s(model.values())[0]) / (2.0 * math.pi)
-    return (0.1 * model.parameters["J_M"].value, frequency, 0.05, 1.0)
+    tenth = 0.1 * model.parameters["J_M"].value
+    return (tenth, frequency, 1.0, 0.05, tenth, tenth)
 
 
 def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
     """Return heavy modes far above the first resonance, and light ones below, around and above it, as close as narrow.
 
-    The heavy ones come first: where only what their spring does to the line shows, nothing else tells them apart.
+    The heavy ones come first: where only what their spring does to the line shows, nothing else tells them apart. An
+    inertia within the line is looked for from where such a branch has been fitted (``retold``).
     """
-    heavy = [(1.5, ratio, 1.0, 0.95) for ratio in (3.0, 4.0, 5.0, 6.0)]
-    return [*heavy, *((0.2, float(ratio), 1.0, 1.0) for ratio in np.geomspace(0.3, 5.0, 24))]
+    none = Held(0.0)
+    heavy = [(1.5, ratio, 0.95, 1.0, none, none) for ratio in (3.0, 4.0, 5.0, 6.0)]
+    light = [(0.2, float(ratio), 1.0, 1.0, none, none) for ratio in np.geomspace(0.3, 5.0, 24)]
+    return [*heavy, *light]
+
+
+def retold(
+    model: DrivelineModel, records: Sequence[Record], values: Mapping[str, float], line: Mapping[str, float]
+) -> list[Retelling]:
+    """Return an inertia before the shaft and one behind it that leave the line as compliant and as heavy as a branch.
+
+    Its spring and the shaft's are as soft together, within what ``k`` is trusted to. Well below its resonance it moves
+    by s with the side of its own spring, by 1 - s with the other. One behind the shaft swings against both springs
+    while the motor stands: at the branch's frequency.
+    """
+    if within(values):
+        return []
+    trusted, stiffness = model.parameters["k"], line["k"] * values["line_share"]
+    low = max(stiffness / (trusted.value * (1.0 + trusted.tolerance)), SOFTEST)
+    high = min(stiffness / (trusted.value * max(1.0 - trusted.tolerance, SOFTEST)), STIFFEST)
+    if low >= high:
+        return []
+    *_, usual, tenth, _ = scales(model, records)
+    share = 0.5 * (low + high)
+    own, branch = float(natural_frequencies_rad_s(model.values())[0]), 2.0 * math.pi * values["frequency_hz"]
+    slowest = max(record.sample_time_s for record in records)
+    before = min(ABOVE * own, 2.0 * math.pi * NEAR_HALF_RATE / slowest)
+    behind = min(before, math.sqrt(share) * branch) if branch > own else before
+    none, motor, load = Held(0.0), line["J_M"] + values["inertia_kg_m2"], line["J_L"]
+    shaped = none, Held(1.0), Within(share, SOFTEST, STIFFEST), Within(1.0, 0.02, MOST_DAMPING / usual)
+
+    def retelling(omega: float, at_motor: bool) -> Retelling:
+        inertia = stiffness / ((1.0 - share) * omega**2)
+        size = Within(min(max(inertia / tenth, 10.0 * LIGHTEST), MOST), 10.0 * LIGHTEST, MOST)
+        of_motor, of_load = (share, 1.0 - share) if at_motor else (1.0 - share, share)
+        lighter = {"J_M": motor - of_motor**2 * inertia, "J_L": load - of_load**2 * inertia}
+        return Retelling((*shaped, *((size, none) if at_motor else (none, size))), {"k": stiffness / share, **lighter})
+
+    return [retelling(before, at_motor=True), retelling(behind, at_motor=False)]
 
 
 def sentence(values: Mapping[str, float], motion: Motion) -> str:
     """Say what was found."""
+    place = f"{within(values) or values['inertia_kg_m2']:.3g} {unit('inertia', motion)} on a spring"
+    if values.get("between_kg_m2"):
+        place += " between motor and shaft"
+    if values.get("behind_kg_m2"):
+        place += " between shaft and load"
     return (
-        f"the line has one more torsional mode: {values['inertia_kg_m2']:.3g} {unit('inertia', motion)} on a spring, "
+        f"the line has one more torsional mode: {place}, "
         f"{values['frequency_hz']:.3g} Hz by itself with damping ratio {values['damping_ratio']:.2g}"
     )
 
 
 def implausible(model: DrivelineModel, records: Sequence[Record], values: Mapping[str, float]) -> str:
-    """Object to a branch that is damped so much that it has no resonance of its own to speak of.
+    """Object to a mode damped so much that it has no resonance to speak of, and to one too light or stiff to follow.
 
-    An inertia within the line is damped by the shaft beside it, too: ``c / (2 J_X w)`` comes on top of its own.
+    A branch that stands for an inertia within the line is damped by the shaft beside it, too: ``c / (2 J_X w)`` comes
+    on top of its own.
     """
+    if inertia := within(values):
+        if inertia <= 1.01 * LIGHTEST * model.parameters["J_M"].value:
+            return f"{inertia:.2g} {unit('inertia', model.motion)} within the line are too little to be told"
+        belongs = "motor" if values.get("between_kg_m2") else "load"
+        too_stiff = values["line_share"] >= 0.99 * STIFFEST
+        return f"an inertia on so stiff a spring belongs to the {belongs}" if too_stiff else ""
     impedance = 4.0 * math.pi * values["inertia_kg_m2"] * values["frequency_hz"]
     most = min(MOST_DAMPING + model.parameters["c"].value / impedance, 0.5 / LEAST_AMPLIFIED)
     if values["damping_ratio"] <= most:
@@ -58,16 +148,22 @@ EFFECT = Effect(
     element=Element.SHAFT,
     title="one more torsional mode",
     law="J_X dw_X/dt = k_X (phi_M - phi_X) + c_X (w_M - w_X), reacting on the motor; k_X = J_X (2 pi f)^2; "
-    "T_S = s k twist + s^2 c d twist/dt, s < 1 where the spring is in the line",
+    "T_S = s k twist + s^2 c d twist/dt, s < 1 where the spring is in the line; or between "
+    "motor and shaft: J_X dw_X/dt = k_X (phi_M - phi_X) + c_X (w_M - w_X) - T_S, k_X = k s / (1 - s); or between shaft "
+    "and load: J_X dw_X/dt = T_S - k_X (phi_X - phi_L) - c_X (w_X - w_L)",
     source="an inertia on a spring beside the main one: Den Hartog, Mechanical Vibrations, 4th ed., 1956",
     excited_by="PRBS that reaches the mode's frequency",
     parameters=(
-        EffectParameter("inertia_kg_m2", "inertia", 0.0, 0.0, 50.0, "inertia J_X"),
+        EffectParameter("inertia_kg_m2", "inertia", 0.0, 0.0, MOST, "inertia beside the line: J_X", True),
         EffectParameter("frequency_hz", "Hz", 1.0, 0.05, 8.0, "its frequency with the motor held: f"),
+        EffectParameter(
+            "line_share", "", 1.0, SOFTEST, 1.0, "share of the twist that the main shaft has: s", True, most=1.0
+        ),
         EffectParameter("damping_ratio", "", 0.05, 0.02, 8.0, "its damping ratio: c_X / (2 sqrt(k_X J_X))"),
         EffectParameter(
-            "line_share", "", 1.0, 0.4, 1.0, "share of the twist that the main shaft has: s", True, most=1.0
+            "between_kg_m2", "inertia", 0.0, 0.0, MOST, "inertia between motor and shaft instead: J_X", True
         ),
+        EffectParameter("behind_kg_m2", "inertia", 0.0, 0.0, MOST, "inertia between shaft and load instead: J_X", True),
     ),
     structures=WITH_SHAFT,
     resembles=("actuator_lag", "stiffness_nonlinearity", "tyre_slip", "speed_filter"),
@@ -76,9 +172,11 @@ EFFECT = Effect(
     scales=scales,
     starts=starts,
     sentence=sentence,
-    decisive=("inertia_kg_m2", "line_share"),
+    decisive=("inertia_kg_m2", "line_share", "between_kg_m2", "behind_kg_m2"),
     loosens=frozenset({"k", "c"}),  # a spring in the line softens it by s and lowers its damping by s^2
     loosened_by="line_share",
     implausible=implausible,
+    retold=retold,
+    derived=derived,
     linear=True,
 )

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 
 from estimator.compiled import inlined
-from estimator.physics.effects import warming_friction
+from estimator.physics.effects import extra_torsional_mode, warming_friction
 from estimator.physics.kernel import slots
+from estimator.physics.kernel.line import is_within
 from estimator.physics.kernel.state_vector import Conditions, Tyre
 from estimator.physics.laws import inertia_while, overtoned_wave, share_inside, wave
 from estimator.signals.record import FloatArray
@@ -40,6 +41,26 @@ def is_edge(begin_s: float, end_s: float, from_s: float, to_s: float) -> bool:
 
 
 @inlined
+def line_share(p: FloatArray) -> float:
+    """Return by which share of its stiffness the shaft stands for itself and a spring in the line with it."""
+    return 1.0 if is_within(p) else float(p[slots.LINE_SHARE])
+
+
+@inlined
+def branch_inertia(p: FloatArray) -> float:
+    """Return the inertia of the extra mode [kg m^2], beside the line, before the shaft or behind it."""
+    return float(p[slots.BRANCH_INERTIA] + p[slots.BETWEEN] + p[slots.BEHIND])
+
+
+@inlined
+def branch_frequency(p: FloatArray) -> float:
+    """Return the frequency of the extra mode on its own spring [rad/s]; within the line that follows."""
+    if is_within(p):
+        return extra_torsional_mode.frequency_within(branch_inertia(p), p[slots.K], p[slots.LINE_SHARE])
+    return 2.0 * math.pi * float(p[slots.BRANCH_FREQUENCY])
+
+
+@inlined
 def conditions(
     masses: int, time_s: float, h: float, angle: float, load: float, sign_width: float, p: FloatArray
 ) -> Conditions:
@@ -67,7 +88,9 @@ def conditions(
     carried = inertia_motor if masses == 1 else wheel_inertia
     fastest = STICK_STABILITY / h
     lightest = min(inertia_motor, p[slots.J_2] if masses == 3 else carried)
-    stiffness = p[slots.K] * p[slots.LINE_SHARE] * (1.0 + cracked * p[slots.CRACK])
+    if is_within(p):
+        lightest = min(lightest, branch_inertia(p))
+    stiffness = p[slots.K] * line_share(p) * (1.0 + cracked * p[slots.CRACK])
     inverse_yield = 0.0
     if p[slots.SLIDER] != 0.0:
         inverse_yield = 1.0 / max(p[slots.YIELD], p[slots.SLIDER] / (fastest * fastest * lightest))
@@ -90,6 +113,8 @@ def conditions(
         dry_load,
         max(sign_width, dry_motor / (fastest * inertia_motor)),
         max(sign_width, dry_load / (fastest * carried)),
+        branch_inertia(p),
+        branch_frequency(p),
         fastest,
         inverse_yield,
         tyre(inertia_load, fastest, p),
@@ -137,6 +162,8 @@ def with_torques(now: Conditions, torque: float, load: float) -> Conditions:
         now.dry_load,
         now.width_motor,
         now.width_load,
+        now.branch_inertia,
+        now.branch_frequency,
         now.fastest,
         now.inverse_yield,
         now.tyre,

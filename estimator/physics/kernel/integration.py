@@ -16,8 +16,16 @@ import numpy as np
 from estimator.compiled import brief, compiled, inlined
 from estimator.physics.effects import actuator_lag, transport_delay
 from estimator.physics.kernel import slots
-from estimator.physics.kernel.conditions import conditions, is_changing, is_waving, with_torque, with_torques
-from estimator.physics.kernel.line import Line, is_elastic, is_extended
+from estimator.physics.kernel.conditions import (
+    branch_frequency,
+    branch_inertia,
+    conditions,
+    is_changing,
+    is_waving,
+    with_torque,
+    with_torques,
+)
+from estimator.physics.kernel.line import Line, is_elastic, is_extended, is_within
 from estimator.physics.kernel.rates import rates
 from estimator.physics.kernel.sensing import entry, reading, shown, smoothed
 from estimator.physics.kernel.state_vector import FILTER_RISE, FILTERED, LAG_RISE, LAGGED, Conditions, State
@@ -84,10 +92,14 @@ def unpacked(state: FloatArray) -> State:
 @inlined
 def with_mode(substeps: int, sample_time_s: float, p: FloatArray) -> int:
     """Return the integration steps per period that the line and its extra mode need."""
-    if p[slots.BRANCH_INERTIA] <= 0.0:
+    inertia = branch_inertia(p)
+    if inertia <= 0.0:
         return substeps
-    turn = 2.0 * math.pi * float(p[slots.BRANCH_FREQUENCY]) * sample_time_s
-    return max(substeps, math.ceil(turn / RADIANS_PER_STEP_OF_MODE))
+    fastest = branch_frequency(p)
+    if is_within(p):  # it moves against what is beyond its spring, and on the shaft's spring, too
+        beyond = float(p[slots.J_M] if p[slots.BETWEEN] > 0.0 else p[slots.J_L])
+        fastest = math.sqrt(fastest * fastest * (1.0 + inertia / beyond) + float(p[slots.K]) / inertia)
+    return max(substeps, math.ceil(fastest * sample_time_s / RADIANS_PER_STEP_OF_MODE))
 
 
 @inlined

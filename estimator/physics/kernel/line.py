@@ -41,4 +41,10 @@ def is_elastic(p: FloatArray) -> bool:
 @inlined
 def is_extended(p: FloatArray) -> bool:
     """Tell whether a line has states beyond those of its masses and a slider."""
-    return bool(p[slots.BRANCH_INERTIA] > 0.0 or p[slots.SLIP] > 0.0)
+    return bool(p[slots.BRANCH_INERTIA] > 0.0 or is_within(p) or p[slots.SLIP] > 0.0)
+
+
+@inlined
+def is_within(p: FloatArray) -> bool:
+    """Tell whether the inertia of an extra mode is in the line, before the shaft or behind it, and not beside it."""
+    return bool(p[slots.BETWEEN] > 0.0 or p[slots.BEHIND] > 0.0)

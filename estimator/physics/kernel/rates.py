@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from estimator.compiled import inlined
 from estimator.physics.effects import (
     aerodynamic_drag,
@@ -14,6 +12,7 @@ from estimator.physics.effects import (
     tyre_slip,
 )
 from estimator.physics.kernel import slots
+from estimator.physics.kernel.conditions import line_share
 from estimator.physics.kernel.line import Line
 from estimator.physics.kernel.state_vector import Conditions, State
 from estimator.physics.laws import beyond_gap, dry_friction
@@ -35,7 +34,7 @@ def motor_friction(speed: float, p: FloatArray, width: float, dry: float) -> flo
 @inlined
 def damping_torque(rate: float, p: FloatArray) -> float:
     """Return the torque of the shaft's damper [Nm] at the rate of its twist [rad/s]."""
-    return float(p[slots.C] * p[slots.LINE_SHARE] ** 2) * rate
+    return float(p[slots.C] * line_share(p) ** 2) * rate
 
 
 @inlined
@@ -67,24 +66,32 @@ def shaft_torques(line: Line, rate: float, now: Conditions, x: State, p: FloatAr
 def rates(line: Line, now: Conditions, x: State, p: FloatArray) -> State:
     """Return the time derivative of the mechanical state under the conditions ``now``."""
     drive = now.torque - motor_friction(x.speed, p, now.width_motor, now.dry_motor)
-    branch_acceleration = 0.0
-    if line.extended:
-        branch_acceleration = branch_rate(x.branch_twist, x.speed - x.branch_speed, p)
-        drive -= float(p[slots.BRANCH_INERTIA]) * branch_acceleration
     if line.masses == 1:
         drag = load_drag(x.speed, x.speed, now, p) + now.load
-        acceleration = (drive - drag) * now.inverse_motor
-        return State(
-            x.speed, acceleration, 0.0, 0.0, 0.0, 0.0, x.speed - x.branch_speed, branch_acceleration, 0.0, 0.0, 0.0
-        )
-    rate = x.speed - (x.middle_speed if line.masses == 3 else x.load_speed)
+        branch = branch_rate(x.branch_twist, x.speed - x.branch_speed, now, p) if line.extended else 0.0
+        acceleration = (drive - now.branch_inertia * branch - drag) * now.inverse_motor
+        return State(x.speed, acceleration, 0.0, 0.0, 0.0, 0.0, x.speed - x.branch_speed, branch, 0.0, 0.0, 0.0)
+    between, behind = line.extended and p[slots.BETWEEN] > 0.0, line.extended and p[slots.BEHIND] > 0.0
+    driven = x.middle_speed if line.masses == 3 else x.load_speed
+    own_rate = x.branch_speed - driven if behind else x.speed - x.branch_speed
+    rate = (x.branch_speed if between else x.speed) - (x.branch_speed if behind else driven)
     shaft, reaction = shaft_torques(line, rate, now, x, p)
-    pull = shaft
+    pull, branch = shaft, 0.0
+    if line.extended:
+        branch = branch_rate(x.branch_twist, own_rate, now, p)
+        own = now.branch_inertia * branch
+        if behind:
+            branch, pull = (shaft - own) / now.branch_inertia, own
+        else:
+            drive -= own
+        if between:
+            branch, reaction = branch - reaction / now.branch_inertia, 0.0
     middle_twist, middle_speed = 0.0, 0.0
     if line.masses == 3:
+        carried = pull
         middle_twist = x.middle_speed - x.load_speed
         pull = float(p[slots.K_2]) * x.middle_twist + float(p[slots.C_2]) * middle_twist
-        middle_speed = (shaft - pull) / p[slots.J_2]
+        middle_speed = (carried - pull) / p[slots.J_2]
     load, vehicle, traction = load_rates(line, pull, now, x, p)
     return State(
         x.speed,
@@ -93,8 +100,8 @@ def rates(line: Line, now: Conditions, x: State, p: FloatArray) -> State:
         load,
         sliding(x.loading, rate, now, p) if line.sliding else 0.0,
         vehicle,
-        x.speed - x.branch_speed,
-        branch_acceleration,
+        own_rate,
+        branch,
         middle_twist,
         middle_speed,
         traction,
@@ -111,11 +118,11 @@ def sliding(loading: float, rate: float, now: Conditions, p: FloatArray) -> floa
 
 
 @inlined
-def branch_rate(twist: float, rate: float, p: FloatArray) -> float:
-    """Return the acceleration of the extra mode's inertia on its spring [rad/s^2]; 0 where there is none."""
-    if p[slots.BRANCH_INERTIA] <= 0.0:
+def branch_rate(twist: float, rate: float, now: Conditions, p: FloatArray) -> float:
+    """Return the acceleration that its spring gives the extra mode's inertia [rad/s^2]; 0 where there is none."""
+    if now.branch_inertia <= 0.0:
         return 0.0
-    frequency = 2.0 * math.pi * float(p[slots.BRANCH_FREQUENCY])
+    frequency = now.branch_frequency
     return frequency * (frequency * twist + 2.0 * float(p[slots.BRANCH_DAMPING]) * rate)
 
 

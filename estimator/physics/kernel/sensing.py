@@ -7,6 +7,7 @@ import math
 from estimator.compiled import inlined
 from estimator.physics.effects import resolver_error, speed_filter
 from estimator.physics.kernel import slots
+from estimator.physics.kernel.line import is_within
 from estimator.physics.kernel.state_vector import LOAD_SPEED, SPEED, TWIST, State
 from estimator.signals.record import FloatArray
 
@@ -22,9 +23,11 @@ def entry(x: State, output: int) -> float:
 
 
 @inlined
-def travelled(x: State, output: int) -> float:
+def travelled(x: State, output: int, p: FloatArray) -> float:
     """Return the angle whose rate is the output [rad]: what a filter's input has been in the mean is its change."""
-    return x.angle if output == SPEED else x.angle - x.twist - x.middle_twist
+    if output == SPEED:
+        return x.angle
+    return x.angle - x.twist - x.middle_twist - (x.branch_twist if is_within(p) else 0.0)
 
 
 @inlined
@@ -51,7 +54,7 @@ def smoothed(
     The filter's input is a straight line whose mean is what the output has been in the mean.
     """
     begin, end = entry(before, output), entry(after, output)
-    bow = travelled(after, output) / h - travelled(before, output) / h - 0.5 * (begin + end)
+    bow = travelled(after, output, p) / h - travelled(before, output, p) / h - 0.5 * (begin + end)
     read, ends = reading(begin + bow, angle_before, p), reading(end + bow, angle_after, p)
     return speed_filter.step(read, ends, filtered, rise, p[slots.FILTER], p[slots.FILTER_SHAPE], h)
 

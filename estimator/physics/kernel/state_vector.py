@@ -29,7 +29,7 @@ class State(NamedTuple):
     vehicle_speed, traction : float
         Of the vehicle behind the tyre [rad/s], and the torque of a tyre that has to roll to build it up [Nm].
     branch_twist, branch_speed : float
-        Of the extra mode [rad, rad/s].
+        Of the extra mode: of its spring, and of its inertia [rad, rad/s].
     middle_twist, middle_speed : float
         Twist of the second shaft [rad] and speed of the mass before it [rad/s].
     """
@@ -94,6 +94,8 @@ class Conditions(NamedTuple):
     dry_load: float
     width_motor: float
     width_load: float
+    branch_inertia: float
+    branch_frequency: float
     fastest: float
     inverse_yield: float
     tyre: Tyre

@@ -275,6 +275,31 @@ class TestLocalMinima:
         heat = begun(bench._problems(self.MODE, before, releases), before)
         assert tried == [[releases[i] for i in sorted(close(heat)[1:])]]
 
+    def test_a_mode_near_half_the_sampling_rate_is_told_between_motor_and_shaft(self) -> None:
+        """A branch beside the line comes near, but with a damping and an inertia that no mode has."""
+        name, values = "extra_torsional_mode", {"between_kg_m2": 0.2, "line_share": 0.7, "damping_ratio": 0.02}
+        nominal, records = model(TWO_MASS), []
+        for seed in (3, 4):
+            silent = record(random_steps(1500, seed, hold=3), np.zeros(1500), name=f"run_{seed}")
+            flat = flat_values(TWO_MASS, {name: values})
+            output = simulate(grid_for(nominal, [silent]), silent, flat, Start(5.0, 0.0, 2.0))
+            noise = SIGMA * np.random.default_rng(seed).standard_normal(output.size)
+            records.append(replace(silent, output=output + noise))
+        bench = Bench(nominal, records, everything(records))
+        before = bench.fit(NOTHING)
+        beside = bench.fit(self.MODE, before)
+        found = bench.fit_retold(self.MODE, name)
+        assert bench.fit_retold(self.MODE, name) is found is bench.fit(self.MODE)
+        assert found.rms == pytest.approx(SIGMA, rel=0.05)
+        assert found.squares < beside.squares
+        for key in ("between_kg_m2", "line_share"):  # so little damping is hardly seen
+            assert found.value(name, key) == pytest.approx(values[key], rel=0.1)
+        true_hz = np.sqrt(TWO_MASS["k"] * 0.7 / 0.3 / 0.2) / (2.0 * np.pi)
+        fitted = {key: found.value(name, key) for key in values}
+        assert EFFECTS[name].derived(fitted, {"k": found.value("", "k")})["frequency_hz"] == pytest.approx(
+            true_hz, rel=0.05
+        )
+
     def test_fewer_effects_start_from_where_more_ended_too(self) -> None:
         records = rubbing(lambda speed: FRICTION_NM)
         bench = Bench(model(ONE_MASS), records, everything(records))

@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from estimator.diagnosis.intervals import Z95, chance_of_coherent, covariance, interval, reported_covariance
+from estimator.diagnosis.intervals import (
+    Z95,
+    chance_of_coherent,
+    covariance,
+    interval,
+    interval_that_follows,
+    reported_covariance,
+)
 from estimator.physics.fit import FitResult
 from estimator.signals.record import FloatArray
 from tests.estimator.diagnosis.regression import autoregressive, regression
@@ -193,3 +200,24 @@ def test_what_is_there_is_beyond_chance() -> None:
     rest = 0.5 * autoregressive(0.97, SAMPLES, rng) + rng.standard_normal(SAMPLES) + 3.0 * design[:, 1]
     before, after = (regression([design[:, :unknowns]], [rest]) for unknowns in (1, 2))
     assert chance_of_coherent(before, after) < 1e-6
+
+
+def test_the_interval_of_what_follows_is_that_of_the_formula() -> None:
+    """Of a product, the relative variances add up with the covariance: the delta method."""
+    rng = np.random.default_rng(0)
+    design = rng.standard_normal((SAMPLES, 3))
+    result = regression([design], [design @ TRUE + rng.standard_normal(SAMPLES)])
+    cov = covariance(result)
+    a, b = result.x[:2]
+    low, high = interval_that_follows(result, cov, lambda fit: float(fit.x[0] * fit.x[1]))
+    spread = Z95 * np.sqrt(b**2 * cov[0, 0] + a**2 * cov[1, 1] + 2.0 * a * b * cov[0, 1])
+    assert (low, high) == pytest.approx((a * b - spread, a * b + spread), rel=1e-6)
+
+
+def test_the_interval_of_what_follows_stays_on_its_side_of_zero() -> None:
+    design = np.random.default_rng(0).standard_normal((20, 1))
+    result = regression([design], [0.01 * design[:, 0] + np.random.default_rng(1).standard_normal(20)])
+    cov = covariance(result)
+    size = abs(float(result.x[0]))
+    assert interval_that_follows(result, cov, lambda fit: abs(float(fit.x[0])))[0] == 0.0 < size
+    assert interval_that_follows(result, cov, lambda fit: -abs(float(fit.x[0])))[1] == 0.0

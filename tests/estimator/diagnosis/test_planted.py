@@ -7,7 +7,8 @@ the catalogue does not have, and pairs. All with the first seed, none chosen; 20
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import itertools
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -164,6 +165,31 @@ def test_what_was_planted_is_named_and_nothing_else(name: str) -> None:
         assert fit.holdout_augmented < fit.holdout_retuned
     if name in WITH_FRESH_RECORDINGS:
         assert_explains_fresh_recordings(case)
+
+
+ABOVE_HZ = 40.0
+"""Where samples of 10 ms hardly show what a mode does beyond softening the shaft."""
+
+
+def own_frequency_hz(sizes: Mapping[str, float]) -> float:
+    """Frequency of an inertia on its spring, the other end held."""
+    return float(np.sqrt(sizes["stiffness_nm_per_rad"] / sizes["inertia_kg_m2"])) / (2.0 * np.pi)
+
+
+@pytest.mark.parametrize("at_motor", [True, False], ids=["motor", "load"])
+def test_a_mode_is_named_with_its_frequency_on_either_side_of_the_shaft(at_motor: bool) -> None:
+    """The first seed that hides one at the motor, near half the sampling rate or above, and the first at the load."""
+    name = "extra_torsional_mode"
+    drawn = ((seed, draw_specimen(name, seed).sizes[name]) for seed in itertools.count())
+    hidden = ((seed, own_frequency_hz(sizes)) for seed, sizes in drawn if bool(sizes["at_motor"]) is at_motor)
+    seed, true_hz = next((seed, hz) for seed, hz in hidden if hz > ABOVE_HZ or not at_motor)
+    case = planted(name, seed)
+    assert_named(case, [name])
+    told = case.effect_that_stands_for(name).parameters
+    assert ("between_kg_m2" if at_motor else "behind_kg_m2") in told
+    assert told["frequency_hz"].ci95[0] <= true_hz <= told["frequency_hz"].ci95[1]
+    assert told["frequency_hz"].value == pytest.approx(true_hz, rel=0.05)
+    assert told["frequency_hz"].ci95[1] - told["frequency_hz"].ci95[0] < 0.2 * true_hz
 
 
 PAIRS = (("backlash", "actuator_lag"), ("speed_quantisation", "backlash"), ("clock_drift", "coulomb_friction_motor"))

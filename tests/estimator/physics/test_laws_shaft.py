@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from estimator.signals.record import FloatArray
+from estimator.signals.record import FloatArray, Location
 from tests.estimator.physics import reference
 from tests.estimator.physics.bench import SAMPLE_TIME_S, TWO_MASS
 from tests.estimator.physics.law_bench import (
     SAMPLES,
+    START,
     SUBSTEPS,
     TIME_S,
     TORQUE,
@@ -139,6 +142,39 @@ def test_an_extra_mode_is_an_inertia_on_a_spring_at_the_motor(frequency_hz: floa
     expected = reference.solve(rhs, start, held, TIME_S)[:, reference.SPEED]
     values = {"inertia_kg_m2": inertia, "frequency_hz": frequency_hz, "damping_ratio": ratio}
     assert_law({"extra_torsional_mode": values}, expected)
+
+
+@pytest.mark.parametrize("location", Location)
+@pytest.mark.parametrize("share", [0.6, 0.9])
+@pytest.mark.parametrize("place", ["between_kg_m2", "behind_kg_m2"])
+def test_an_inertia_within_the_line_is_on_the_spring_that_softens_the_shaft(
+    place: str, share: float, location: Location
+) -> None:
+    inertia, ratio = 0.3, 0.04
+    k_X = K * share / (1.0 - share)
+    c_X = 2.0 * ratio * np.sqrt(k_X * inertia)
+    at_motor = place == "between_kg_m2"
+
+    def rhs(t: float, x: FloatArray, torque: float) -> FloatArray:
+        """Return the rates of motor, shaft and load, of the twist of the other spring, and of the inertia."""
+        motor, load, inner = x[reference.SPEED], x[reference.LOAD_SPEED], x[5]
+        shaft = inner - load if at_motor else motor - inner
+        beside = motor - inner if at_motor else inner - load
+        through_shaft, through_spring = K * x[reference.TWIST] + C * shaft, k_X * x[4] + c_X * beside
+        taken, given = (through_spring, through_shaft) if at_motor else (through_shaft, through_spring)
+        of_motor = (torque - TWO_MASS["b_M"] * motor - taken) / TWO_MASS["J_M"]
+        of_load = (given - TWO_MASS["b_L"] * load - START.load_torque_nm) / TWO_MASS["J_L"]
+        return np.array([motor, of_motor, shaft, of_load, beside, (taken - given) / inertia])
+
+    carried = K * START.twist_rad / k_X
+    start = np.concatenate([start_vector(), [carried, START.speed_rad_s if at_motor else START.load_speed_rad_s]])
+    state = reference.SPEED if location is Location.MOTOR else reference.LOAD_SPEED
+    expected = reference.solve(rhs, start, Held.of(TORQUE, SAMPLE_TIME_S), TIME_S)[:, state]
+    values = {place: inertia, "line_share": share, "damping_ratio": ratio}
+    rec = replace(measured(), location=location)
+    assert_law({"extra_torsional_mode": values}, expected, rec)
+    quick = {"extra_torsional_mode": values, "speed_filter": {"time_constant_s": 1e-5}}
+    np.testing.assert_allclose(kernel_output(quick, rec)[1:], expected[1:], atol=2e-3 * np.ptp(expected))
 
 
 def test_the_bench_is_fine_enough_for_what_it_compares() -> None:

@@ -64,6 +64,23 @@ def test_a_mode_may_be_damped_by_itself_and_by_the_shaft_beside_it(
     assert "is no mode" in implausible(LINE, RECORDS, {**branch, "damping_ratio": most + 0.002})
 
 
+def test_an_inertia_within_the_line_is_not_too_light() -> None:
+    implausible = EFFECTS["extra_torsional_mode"].implausible
+    between = {"inertia_kg_m2": 0.0, "frequency_hz": 40.0, "line_share": 0.8, "between_kg_m2": 0.3}
+    assert implausible(LINE, RECORDS, {**between, "damping_ratio": 0.15}) == ""
+    lightest = 0.03 * LINE.parameters["J_M"].value
+    assert "too little" in implausible(LINE, RECORDS, {**between, "between_kg_m2": lightest, "damping_ratio": 0.1})
+
+
+def test_an_inertia_on_a_spring_too_stiff_to_follow_is_no_mode() -> None:
+    implausible = EFFECTS["extra_torsional_mode"].implausible
+    between = {"inertia_kg_m2": 0.0, "frequency_hz": 40.0, "between_kg_m2": 0.3, "damping_ratio": 0.05}
+    assert implausible(LINE, RECORDS, {**between, "line_share": 0.94}) == ""
+    assert "belongs to the motor" in implausible(LINE, RECORDS, {**between, "line_share": 0.95})
+    behind = {**between, "between_kg_m2": 0.0, "behind_kg_m2": 0.3}
+    assert "belongs to the load" in implausible(LINE, RECORDS, {**behind, "line_share": 0.95})
+
+
 def test_a_loss_that_is_complete_at_once_is_not_from_warming() -> None:
     implausible = EFFECTS["torque_derating"].implausible
     assert implausible(LINE, RECORDS, {"depth": 0.2, "time_constant_s": 3.0}) == ""

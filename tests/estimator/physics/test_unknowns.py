@@ -7,12 +7,13 @@ from dataclasses import astuple, replace
 import numpy as np
 import pytest
 
+from estimator.physics.effect import Held, Within
 from estimator.physics.effects import road_grade
 from estimator.physics.effects.torque_ripple import ORDERS
 from estimator.physics.layout import flat, slot
 from estimator.physics.model import DrivelineModel, Parameter, Structure
 from estimator.physics.simulate import Start
-from estimator.physics.unknowns import Release, effect_unknowns, local_basis, nominal_unknowns, own_unknowns
+from estimator.physics.unknowns import Release, effect_unknowns, local_basis, nominal_unknowns, own_unknowns, released
 from estimator.signals.record import OutputKind
 from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, linear_record, model, random_steps
 
@@ -46,6 +47,16 @@ def test_an_effect_has_unknowns_once_per_start() -> None:
             ("backlash", name) for name in ("gap_rad", "contact_rad", "pull")
         ]
         assert shared[0].scale == pytest.approx(0.2 * 100.0 / TWO_MASS["k"])
+
+
+def test_a_start_may_hold_a_value_or_have_bounds_of_its_own() -> None:
+    rec = linear_record(TWO_MASS, random_steps(500, seed=1), CRUISE)
+    (release,) = released("backlash", model(TWO_MASS), [rec], [(Within(1.0, 0.5, 2.0), Held(0.3), 0.4)])
+    usual = effect_unknowns("backlash", model(TWO_MASS), [rec])[0].shared
+    gap, contact, pull = release.shared
+    assert (gap.low, gap.start, gap.high, gap.scale) == (0.5, 1.0, 2.0, usual[0].scale)
+    assert contact.low == contact.start == contact.high == 0.3
+    assert pull == replace(usual[2], start=0.4)
 
 
 def test_a_profile_has_no_shared_unknowns() -> None:

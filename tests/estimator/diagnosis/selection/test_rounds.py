@@ -6,15 +6,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects
 from estimator.diagnosis.screening import Look, Screen
 from estimator.diagnosis.selection.rounds import WORTH_FINISHING, WORTH_GOING_ON
 from estimator.physics.fit import FitResult
+from estimator.physics.simulate import Start
 from estimator.physics.unknowns import Release
-from tests.estimator.diagnosis.planted import quiet, rubbing
+from tests.estimator.diagnosis.planted import SIGMA, drive_torque, quiet, rubbing, rubbing_speed
 from tests.estimator.diagnosis.selection.mass import COULOMB, STRIBECK, rounds
-from tests.estimator.physics.bench import ONE_MASS
+from tests.estimator.physics.bench import ONE_MASS, record
+
+LAG = 0.7
+"""Part of a first-order lag's output that is left after a sample."""
 
 
 def test_what_lets_a_pressed_parameter_go_is_fitted_whatever_a_look_promises(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -80,6 +85,30 @@ def test_a_law_is_not_left_behind_for_what_bends(monkeypatch: pytest.MonkeyPatch
     _spy(monkeypatch, "go_on", further)
     tried.try_all(NOTHING, current)
     assert set(further) == {"road_grade", COULOMB}
+
+
+def test_a_look_alike_of_the_best_is_tried_in_its_place() -> None:
+    """A lag whose fit beside friction has ended elsewhere, and a delay that stands near the place of the lag."""
+    records = []
+    for seed in (1, 2):
+        torque = drive_torque(seed, 1200)
+        lagged = lfilter([1.0 - LAG], [1.0, -LAG], torque)
+        speed = rubbing_speed(lambda w: 12.0, lagged, Start(5.0, 0.0, 2.0))
+        noise = SIGMA * np.random.default_rng(seed).standard_normal(torque.size)
+        records.append(record(torque, speed + noise, name=f"run_{seed}"))
+    tried, chosen = rounds(records, ["actuator_lag", "transport_delay"]), frozenset({COULOMB})
+    bench = tried.jury.bench
+    current = bench.fit(chosen, bench.fit(NOTHING))
+    trials = tried.try_all(chosen, current)
+    lag, delay = trials["actuator_lag"], trials["transport_delay"]
+    assert lag.result.squares < delay.result.squares
+    elsewhere = replace(lag.result, residual=3.0 * delay.result.residual)
+    bench._fits[lag.effects] = elsewhere
+    poor = tried.jury.trial("actuator_lag", lag.effects, current, elsewhere)
+    again = tried._in_place_of_the_best({"actuator_lag": poor, "transport_delay": delay}, chosen, current)
+    assert again["actuator_lag"].result.squares == pytest.approx(lag.result.squares, rel=1e-3)
+    assert bench.fit(lag.effects) is again["actuator_lag"].result
+    assert tried._in_place_of_the_best({COULOMB: poor}, NOTHING, current) == {}
 
 
 def _spy(monkeypatch: pytest.MonkeyPatch, step: str, found: dict[str, FitResult]) -> None:
