@@ -9,6 +9,7 @@ import threading
 from collections.abc import Callable
 from enum import IntEnum
 
+from drivers.canopen.silence import Silence
 from drivers.errors import BusDown, DeviceTimeout
 
 NMT_COB_ID = 0x000
@@ -61,13 +62,14 @@ class HeartbeatMonitor:
     def __init__(self, where: str, timeout_ns: int, started_ns: int) -> None:
         self._where = where
         self._timeout_ns = timeout_ns
-        self._last_ns = started_ns
+        self._silence = Silence(timeout_ns)
+        self._silence.beat(started_ns)
         self.state: NmtState | None = None
 
     def beat(self, state: NmtState, t_ns: int) -> None:
         """Take one heartbeat."""
         self.state = state
-        self._last_ns = t_ns
+        self._silence.beat(t_ns)
 
     def raise_if_lost(self, now_ns: int) -> None:
         """Check at ``now_ns``.
@@ -75,11 +77,11 @@ class HeartbeatMonitor:
         Raises
         ------
         DeviceTimeout
-            If the last heartbeat is too old, or none ever came.
+            If the last heartbeat is too old, or none ever came, and none has come since this was first found.
         """
-        age_ns = now_ns - self._last_ns
-        if age_ns <= self._timeout_ns:
+        if not self._silence.has_ended(now_ns):
             return
+        age_ns = self._silence.length_ns(now_ns)
         seen = "never" if self.state is None else f"{age_ns / 1e6:.0f} ms ago, in {self.state.title}"
         raise DeviceTimeout(
             f"{self._where}: last heartbeat {seen}, expected one every {self._timeout_ns / 1e6:.0f} ms at "

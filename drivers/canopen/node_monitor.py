@@ -31,6 +31,7 @@ class NodeMonitor:
         self._heartbeat = HeartbeatMonitor(where, heartbeat_timeout_ns, time.monotonic_ns())
         self._changed = threading.Condition()
         self._emergency: emcy.Emergency | None = None
+        self._past_emergency: emcy.Emergency | None = None
         self._expected: NmtState | None = None
         self._beats = 0
 
@@ -68,7 +69,7 @@ class NodeMonitor:
         """
         emergency = emcy.decode(data)
         if emergency.is_reset:
-            self._emergency = None
+            self._past_emergency, self._emergency = self._emergency or self._past_emergency, None
         elif self._emergency is None:
             self._emergency = emergency
 
@@ -84,6 +85,7 @@ class NodeMonitor:
     def expect(self, state: NmtState | None) -> None:
         """Have `raise_if_unwell` refuse any other NMT state from now on."""
         self._expected = state
+        self._past_emergency = None
 
     def await_state(self, state: NmtState, timeout_s: float) -> None:
         """Wait for a heartbeat, from now on, that reports ``state``.
@@ -123,9 +125,12 @@ class NodeMonitor:
             state = self._heartbeat.state
         self._heartbeat.raise_if_lost(now_ns)
         if self._expected is not None and state is not self._expected:
+            cause = "Something else reset or stopped the drive"
+            if self._past_emergency is not None:
+                cause = f"It told {self._past_emergency}, and took that back"
             raise DeviceFault(
-                f"{self._where}: NMT state is {_title(state)}, expected "
-                f"{self._expected.title}. Something else reset or stopped the drive; configure it again."
+                f"{self._where}: NMT state is {_title(state)}, expected {self._expected.title}. {cause}; "
+                "configure it again."
             )
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import Self
 
 from drivers.canopen.heartbeat import HEARTBEAT_COB_ID
+from drivers.canopen.silence import Silence
 
 NS_PER_MS = 1_000_000
 
@@ -24,12 +25,12 @@ class HeartbeatConsumer:
         Longest time between two [ms]; 0 for no watching.
     """
 
-    __slots__ = ("_last_ns", "_timeout_ns", "cob_id")
+    __slots__ = ("_silence", "_watches", "cob_id")
 
     def __init__(self, node_id: int = 0, timeout_ms: int = 0) -> None:
         self.cob_id = HEARTBEAT_COB_ID + node_id
-        self._timeout_ns = timeout_ms * NS_PER_MS
-        self._last_ns: int | None = None
+        self._watches = timeout_ms > 0
+        self._silence = Silence(timeout_ms * NS_PER_MS)
 
     @classmethod
     def from_object(cls, value: int) -> Self:
@@ -38,11 +39,11 @@ class HeartbeatConsumer:
 
     def beat(self, t_ns: int) -> None:
         """Take one heartbeat."""
-        self._last_ns = t_ns
+        self._silence.beat(t_ns)
 
     def lost(self, now_ns: int) -> bool:
         """Whether the heartbeat has ended; once, then watching starts anew with the next one."""
-        if self._timeout_ns == 0 or self._last_ns is None or now_ns - self._last_ns <= self._timeout_ns:
+        if not self._watches or not self._silence.has_ended(now_ns):
             return False
-        self._last_ns = None
+        self._silence.end()
         return True

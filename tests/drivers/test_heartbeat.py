@@ -8,6 +8,7 @@ import pytest
 
 from drivers.canopen.heartbeat import HeartbeatMonitor, HeartbeatProducer, NmtCommand, NmtState, nmt_frame
 from drivers.canopen.node_monitor import NodeMonitor
+from drivers.canopen.silence import GRACE_NS
 from drivers.errors import BusDown, DeviceFault, DeviceTimeout, ProtocolViolation
 
 MS = 1_000_000
@@ -16,18 +17,28 @@ MS = 1_000_000
 def test_node_that_never_comes_is_lost_after_the_timeout() -> None:
     monitor = HeartbeatMonitor("node 5", timeout_ns=100 * MS, started_ns=1000 * MS)
     monitor.raise_if_lost(1100 * MS)
+    monitor.raise_if_lost(1100 * MS + 1)
     with pytest.raises(DeviceTimeout, match="node 5: last heartbeat never, expected one every 100 ms"):
-        monitor.raise_if_lost(1100 * MS + 1)
+        monitor.raise_if_lost(1100 * MS + 1 + GRACE_NS)
 
 
 def test_node_that_stops_is_lost_after_the_timeout_and_found_again() -> None:
     monitor = HeartbeatMonitor("node 5", timeout_ns=100 * MS, started_ns=0)
     monitor.beat(NmtState.OPERATIONAL, 250 * MS)
     monitor.raise_if_lost(350 * MS)
-    with pytest.raises(DeviceTimeout, match="last heartbeat 101 ms ago, in OPERATIONAL"):
-        monitor.raise_if_lost(351 * MS)
-    monitor.beat(NmtState.OPERATIONAL, 352 * MS)
-    monitor.raise_if_lost(452 * MS)
+    monitor.raise_if_lost(351 * MS)
+    with pytest.raises(DeviceTimeout, match="last heartbeat 201 ms ago, in OPERATIONAL"):
+        monitor.raise_if_lost(351 * MS + GRACE_NS)
+    monitor.beat(NmtState.OPERATIONAL, 452 * MS)
+    monitor.raise_if_lost(552 * MS)
+
+
+def test_listener_that_stood_still_itself_reads_what_came_meanwhile_before_it_judges() -> None:
+    monitor = HeartbeatMonitor("node 5", timeout_ns=100 * MS, started_ns=0)
+    for stood_still_ns in (1000 * MS, 3000 * MS):
+        monitor.raise_if_lost(stood_still_ns)
+        monitor.beat(NmtState.OPERATIONAL, stood_still_ns + 20 * MS)
+        monitor.raise_if_lost(stood_still_ns + GRACE_NS)
 
 
 def test_producer_sends_the_present_state_and_nothing_after_stop() -> None:
@@ -82,6 +93,16 @@ def test_node_that_left_its_nmt_state_is_a_fault() -> None:
     monitor.raise_if_unwell(0)
     monitor.on_heartbeat(b"\x00", 0)
     with pytest.raises(DeviceFault, match="NMT state is INITIALISING, expected OPERATIONAL"):
+        monitor.raise_if_unwell(0)
+
+
+def test_node_that_took_its_emergency_back_is_named_with_it() -> None:
+    monitor = node_monitor()
+    monitor.expect(NmtState.OPERATIONAL)
+    monitor.on_emergency(bytes.fromhex("30 81 11 00 00 00 00 00"), 0)
+    monitor.on_emergency(bytes(8), 0)
+    monitor.on_heartbeat(b"\x7f", 0)
+    with pytest.raises(DeviceFault, match=r"PRE-OPERATIONAL, expected OPERATIONAL\. It told EMCY 0x8130"):
         monitor.raise_if_unwell(0)
 
 
