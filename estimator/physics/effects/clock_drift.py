@@ -8,22 +8,29 @@ from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Elemen
 from estimator.physics.model import DrivelineModel, Motion
 from estimator.signals.record import Record
 
+PARTED_S = 0.03
+"""How far apart the clocks of the scale are at the end [s]: less than half a period of the line's resonance. A fit that
+begins further off ends where another of its periods fits as well."""
+
 
 def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
-    """Return a thousandth."""
-    return (1e-3,)
+    """Return the rate of clocks that part by ``PARTED_S`` over the longest recording."""
+    return (PARTED_S / _longest_s(records),)
 
 
 def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
-    """Return starts on both sides: the error is not convex in the rate."""
-    return [(-1.0,), (-0.25,), (0.25,), (1.0,)]
+    """Return starts on both sides, none further than a scale from the next: the error is not convex in the rate."""
+    return [(side * parted,) for parted in (0.3, 1.0, 2.0, 3.0) for side in (-1.0, 1.0)]
+
+
+def _longest_s(records: Sequence[Record]) -> float:
+    return max(float(record.time_s[-1] - record.time_s[0]) for record in records)
 
 
 def unresolved(model: DrivelineModel, records: Sequence[Record], values: Mapping[str, float]) -> str:
     """Object to clocks that part by less than a tenth of a sampling period over the longest recording."""
-    longest_s = max(float(record.time_s[-1] - record.time_s[0]) for record in records)
     least_s = 0.1 * min(record.sample_time_s for record in records)
-    parted_s = abs(values["rate"]) * longest_s
+    parted_s = abs(values["rate"]) * _longest_s(records)
     if parted_s >= least_s:
         return ""
     return f"the clocks part by {1e3 * parted_s:.2g} ms, less than a tenth of the sampling period"

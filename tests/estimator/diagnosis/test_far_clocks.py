@@ -1,0 +1,45 @@
+"""Clocks that part by more than half a period of the resonance before the recording ends are found from the start."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimator.diagnosis.hypotheses import NOTHING, Bench, everything
+from estimator.diagnosis.screening import Screen, promising
+from estimator.physics.layout import flat_values
+from estimator.physics.model import natural_frequencies_rad_s
+from estimator.physics.simulate import Start, grid_for, simulate
+from estimator.signals.record import Record
+from tests.estimator.physics.bench import SAMPLE_TIME_S, TWO_MASS, model, random_steps, record, scaled
+
+LINE = model(TWO_MASS)
+TRUE = scaled(TWO_MASS, J_M=1.1, k=0.93, c=1.15)
+SIGMA = 0.02
+
+
+def drifting(rate: float, samples: int) -> list[Record]:
+    records = []
+    for seed in (1, 2):
+        rec = record(random_steps(samples, seed, hold=30), name=f"run_{seed}")
+        p = flat_values(TRUE, {"clock_drift": {"rate": rate}})
+        clean = simulate(grid_for(LINE, [rec]), rec, p, Start(0.0, 0.0, 2.0, 0.0, 2.0))
+        noise = SIGMA * np.random.default_rng(seed).standard_normal(samples)
+        records.append(replace(rec, output=clean + noise))
+    return records
+
+
+@pytest.mark.parametrize("samples", [1500, 6000])
+@pytest.mark.parametrize("periods", [-0.65, 0.25, 0.65])
+def test_the_rate_is_found_however_many_periods_the_clocks_part(periods: float, samples: int) -> None:
+    duration_s = samples * SAMPLE_TIME_S
+    rate = periods * 2.0 * np.pi / natural_frequencies_rad_s(TRUE)[-1] / duration_s
+    records = drifting(rate, samples)
+    bench = Bench(LINE, records, everything(records))
+    nominal = bench.fit(NOTHING)
+    looks = promising(Screen(nominal, LINE).looks("clock_drift"))
+    found = bench.fit(frozenset({"clock_drift"}), nominal, [look.release for look in looks])
+    assert found.value("clock_drift", "rate") == pytest.approx(rate, rel=0.01)
+    assert found.rms == pytest.approx(SIGMA, rel=0.05)
