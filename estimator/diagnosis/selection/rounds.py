@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from estimator.diagnosis.evidence import VERY_STRONG
@@ -94,7 +94,7 @@ class Rounds:
     def _in_place_of_the_best(
         self, trials: Mapping[str, Trial], chosen: Effects, current: FitResult
     ) -> dict[str, Trial]:
-        """Try the linear systems that look like the best, if it is one, from where the others stand beside it.
+        """Try the linear systems that look like the best, if it is one, in its place.
 
         Beside a gap the fit of one may end elsewhere, and then the wrong one of two look-alikes is named.
         """
@@ -102,13 +102,19 @@ class Rounds:
         if best is None or not EFFECTS[best.name].linear:
             return {}
         alike = [name for name in EFFECTS[best.name].resembles if name in trials and EFFECTS[name].linear]
+        return self.try_in_place(best.name, best.result, alike, chosen, current)
+
+    def try_in_place(
+        self, rival: str, had: FitResult, names: Iterable[str], chosen: Effects, current: FitResult
+    ) -> dict[str, Trial]:
+        """Try effects beside those chosen from where a rival, in a fit that has it, has brought these."""
+        names = list(names)
 
         def tried(name: str) -> Trial:
             effects = with_effect(chosen, name)
-            result = self.jury.bench.fit_in_place(effects, name, best.name, best.result)
-            return self.jury.trial(name, effects, current, result)
+            return self.jury.trial(name, effects, current, self.jury.bench.fit_in_place(effects, name, rival, had))
 
-        return dict(zip(alike, concurrently(tried, alike), strict=True))
+        return dict(zip(names, concurrently(tried, names), strict=True))
 
     def _looks(
         self, names: Sequence[str], chosen: Effects, current: FitResult, least: float = 0.0

@@ -141,11 +141,15 @@ class Selector:
         return path
 
     def _stiffened(self, path: _Path, retuned: FitResult) -> _Path:
-        """Return a path with a law in the place of what bends beside others, where one explains the rest better."""
+        """Return a path with a law in the place of what bends beside others, where one explains the rest better.
+
+        From where that has brought the others, too: an event whose moments are off leaves a law nothing to explain.
+        """
         for name in sorted(flexible(path.chosen)) if len(path.chosen) > 1 else ():
             rest = path.chosen - {name}
             current = self.jury.bench.fit_less(rest, path.current)
             trials = self._rounds.try_all(rest, current, flexible(frozenset(EFFECTS)))
+            trials |= self._rounds.try_in_place(name, path.current, trials, rest, current)
             best = self.jury.best(trials, current, retuned)
             if best is not None:
                 path = self._better(path, self._with(_Path(rest, current, path.accepted), best, retuned), retuned)

@@ -17,7 +17,7 @@ from tests.estimator.diagnosis.planted import quiet, rubbing
 from tests.estimator.diagnosis.selection.mass import COULOMB, LINE, coulomb, late, selector, silent
 from tests.estimator.physics.bench import ONE_MASS
 
-BOTH = {COULOMB, "transport_delay"}
+BOTH = frozenset({COULOMB, "transport_delay"})
 
 
 def nothing_of(selection: Selection) -> Selection:
@@ -26,13 +26,22 @@ def nothing_of(selection: Selection) -> Selection:
 
 
 @pytest.fixture(scope="module")
-def select() -> Selector:
-    return selector(late(rubbing(coulomb), 3))
+def searched() -> tuple[Selector, Selection]:
+    select = selector(late(rubbing(coulomb), 3))
+    return select, select.run()
 
 
-@pytest.fixture(scope="module")
-def found(select: Selector) -> Selection:
-    return select.run()
+@pytest.fixture
+def select(searched: tuple[Selector, Selection], monkeypatch: pytest.MonkeyPatch) -> Selector:
+    """With the fits of the search alone: what a test finds a hair better is no other's."""
+    bench = searched[0].jury.bench
+    monkeypatch.setattr(bench, "_fits", dict(bench._fits))
+    return searched[0]
+
+
+@pytest.fixture
+def found(searched: tuple[Selector, Selection]) -> Selection:
+    return searched[1]
 
 
 def test_two_of_which_none_passed_alone_are_found_together(select: Selector, found: Selection) -> None:
@@ -61,6 +70,23 @@ def test_what_bends_beside_others_gives_way_to_a_law(select: Selector, found: Se
     assert stiff.current.rms < bent.current.rms
     stays = selector(late(rubbing(coulomb), 3), ["road_grade", "transport_delay", "actuator_lag"])
     assert stays._stiffened(bent, found.retuned) is bent
+
+
+def test_the_law_may_begin_where_what_bends_has_brought_the_others(
+    select: Selector, found: Selection, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The delay that friction's own fit has left a long way off stands right beside the road."""
+    late_and_road, bench = frozenset({"road_grade", "transport_delay"}), select.jury.bench
+    delayed = bench.fit(frozenset({"transport_delay"}), found.retuned)
+    bent = _Path(late_and_road, bench.fit(late_and_road, delayed), {})
+    right = bench.fit(BOTH)
+    elsewhere = replace(right, residual=10.0 * right.residual)
+    poor = replace(found.accepted[COULOMB], name=COULOMB, effects=BOTH, result=elsewhere, failed="explains nothing")
+    bench._fits[BOTH] = elsewhere
+    monkeypatch.setattr(select._rounds, "try_all", lambda *_: {COULOMB: poor})
+    stiff = select._stiffened(bent, found.retuned)
+    assert stiff.chosen == BOTH
+    assert stiff.current.rms == pytest.approx(right.rms, rel=1e-3)
 
 
 def test_a_way_is_completed_however_near_to_the_noise_it_ends(
