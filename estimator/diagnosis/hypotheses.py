@@ -87,8 +87,7 @@ class Bench:
         if known is None or not known.converged:
             begun = self._rough.get(effects) if known is None else known
             result = self._fit(effects, warm, releases) if begun is None else polished(converge(begun))
-            told = from_their_moment(result, self.model)
-            self._fits[effects] = _without_much(result if told is result else polished(told))
+            self._fits[effects] = self._told(result)
         return self._fits[effects]
 
     def fit_again(self, effects: Effects, name: str) -> FitResult:
@@ -160,8 +159,13 @@ class Bench:
         """Remember a fit if it is better than what is known, and return the better one."""
         known = self._fits.get(effects)
         if known is None or result.squares < known.squares:
-            self._fits[effects] = _without_much(result)
+            self._fits[effects] = self._told(result)
         return self._fits[effects]
+
+    def _told(self, result: FitResult) -> FitResult:
+        """Return a fit to be remembered: its steps told from their moment on, which may explain more."""
+        told = from_their_moment(result, self.model)
+        return _without_much(result if told is result else polished(told))
 
     def fit_by_steps(self, effects: Effects) -> FitResult:
         """Fit a set of effects of which none has been fitted here, one after the other along the chain."""

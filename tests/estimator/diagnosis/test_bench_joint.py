@@ -41,7 +41,7 @@ def test_what_was_planted_is_named_and_nothing_else(joint: Joint, named: set[str
 @pytest.mark.parametrize(
     ("preload", "zero_error"),
     [
-        (900.0, 0.0),
+        pytest.param(900.0, 0.0, marks=pytest.mark.campaign),
         pytest.param(0.0, 0.0, marks=pytest.mark.campaign),
         pytest.param(0.0, 900.0, marks=pytest.mark.campaign),
     ],

@@ -22,6 +22,7 @@ from estimator.physics.unknowns import Release, effect_unknowns
 from estimator.signals.record import OutputKind
 from tests.estimator.diagnosis.planted import SIGMA, quiet, rubbing
 from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, linear_record, model, random_steps, record
+from tests.estimator.physics.cracking import AT_S, CRACK, LAST_S, SOUND, cracking, the_other_way_round
 
 COULOMB = frozenset({"coulomb_friction_motor"})
 FRICTION_NM = 12.0
@@ -98,6 +99,16 @@ def test_effects_that_nothing_starts_from_are_refused() -> None:
     records = quiet(seeds=(1,), values=ONE_MASS, samples=300)
     with pytest.raises(ValueError, match="fitted from a fit without them, came none"):
         Bench(model(ONE_MASS), records, everything(records)).fit(COULOMB)
+
+
+def test_a_step_that_a_larger_fit_brought_is_told_from_its_moment_on_too() -> None:
+    """Else what it can not explain the other way round is left to another effect."""
+    records = [cracking(1, AT_S, LAST_S), cracking(2, 0.0, LAST_S)]
+    the_wrong_way = the_other_way_round(SOUND, records, [(0.0, AT_S), (0.0, 0.0)])
+    crack = Bench(SOUND, records, everything(records))
+    told = crack.fit_less(frozenset({CRACK}), the_wrong_way)
+    assert the_wrong_way.value(CRACK, "change") > 0.0 > told.value(CRACK, "change")
+    assert told.value("", "k") == pytest.approx(TWO_MASS["k"], rel=0.01)
 
 
 STRIBECK: Effects = frozenset({"stribeck_friction"})

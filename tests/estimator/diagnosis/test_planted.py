@@ -176,7 +176,7 @@ def own_frequency_hz(sizes: Mapping[str, float]) -> float:
     return float(np.sqrt(sizes["stiffness_nm_per_rad"] / sizes["inertia_kg_m2"])) / (2.0 * np.pi)
 
 
-@pytest.mark.parametrize("at_motor", [True, False], ids=["motor", "load"])
+@pytest.mark.parametrize("at_motor", [pytest.param(True, marks=pytest.mark.campaign), False], ids=["motor", "load"])
 def test_a_mode_is_named_with_its_frequency_on_either_side_of_the_shaft(at_motor: bool) -> None:
     """The first seed that hides one at the motor, near half the sampling rate or above, and the first at the load."""
     name = "extra_torsional_mode"
