@@ -42,6 +42,10 @@ FAR_BETTER = 0.5
 """Share of what an explanation leaves above the noise that a simpler law at the same place leaves at most, where that
 law is another."""
 
+BELIEVED_TOGETHER = 2
+"""Effects that may be a simpler law at the place of one of them in other words. More of them put together what is one
+thing at one place."""
+
 ABOVE_FLOOR = 1.25
 """A re-tuned nominal model whose error is above the floor by this factor does not explain a speed recording: the
 torque reading's own noise adds a few per cent, the estimate of the floor errs upward."""
@@ -194,7 +198,7 @@ def _objection(selection: Selection, floor: float, unnamed: UnnamedLaw | None, r
         return ""
     named_or_alike = {*selection.chosen, *(twin for twins in selection.lookalikes.values() for twin in twins)}
     elements = {EFFECTS[name].element for name in named_or_alike}
-    elsewhere = bool(profiles) or unnamed.element not in elements
+    elsewhere = bool(profiles) or unnamed.element not in elements or len(selection.chosen) > BELIEVED_TOGETHER
     if _is_simpler(unnamed, selection) and (elsewhere or _is_another_law(selection, floor, unnamed)):
         law = kind_in_words(unnamed.terms[0][0])
         return f"{law} at the {PLACE_NAMES[unnamed.element]} would explain it with less than {named}"

@@ -308,6 +308,19 @@ class TestChosen:
         judged = judge(replace(found, lookalikes=dict.fromkeys(found.chosen, ("resolver_error",))), SIGMA)
         assert judged.objection == ""
 
+    @pytest.mark.parametrize(
+        ("names", "believed"),
+        [("speed_sign_blind", True), ("speed_sign_blind torque_saturation quadratic_friction", False)],
+    )
+    def test_one_law_at_one_place_speaks_against_many_names_though_one_of_them_is_there(
+        self, names: str, believed: bool
+    ) -> None:
+        """A sensor that bends, put together from a sensor's fault, a saturation and a drag."""
+        before, after, best = of_rms(1.0, 2), of_rms(0.105, 6), of_rms(0.1, 3)
+        law = UnnamedLaw(Element.SPEED_SENSOR, (("w |w|", 1.0),), gain(before, best), 0.1)
+        found = replace(outcome(before, frozenset(names.split()), after), unnamed=law)
+        assert (judge(found, 0.1).objection == "") is believed
+
     def test_the_same_at_the_laws_own_element_is_believed(self) -> None:
         records = recordings(Element.SHAFT, lambda moved: moved.twist**3, 4e4)
         judged = judge(self.nearly(selection(records, CUBIC, model(TWO_MASS, TIGHT))), SIGMA)
