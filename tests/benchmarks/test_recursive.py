@@ -47,6 +47,7 @@ def test_least_squares_has_the_rows_that_padasip_is_given() -> None:
     np.testing.assert_allclose(estimator.theta, batch, rtol=1e-6)
 
 
+@pytest.mark.campaign  # each is compiled for this
 def test_every_estimator_is_timed() -> None:
     lines = recursive.single(pairs=1, n=recursive.BLOCK)
     assert [line[0] for line in lines] == list(ESTIMATORS)

@@ -48,7 +48,7 @@ def nothing_installed() -> Iterator[None]:
 
 def retarded(path: Path, seed: int) -> None:
     """Write a recording of the bench's drive with a retarder on it, by a fine midpoint rule."""
-    bench.record(path, seed)
+    bench.record(path, seed, n=900)
     table = np.genfromtxt(path, delimiter=",", names=True)
     torque = table["torque_m1_nm"] + table["torque_m2_nm"]
     speed, w, h = np.empty_like(torque), 1.0, bench.DT / bench.SUBSTEPS

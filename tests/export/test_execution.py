@@ -40,8 +40,8 @@ def test_every_number_is_the_hosts_to_the_bit(drive: Cycles, L: FloatArray | Non
         (Orders(2, 3, 0), 0.01, 0.02),
         (Orders(3, 2, 5), 0.005, 0.02),
         (Orders(0, 6, 1), 0.01, 0.01),  # no poles at all
-        (Orders(1, 1, 1), 0.01, 0.04),
-        (Orders(7, 5, 2), 0.01, 0.02),
+        pytest.param(Orders(1, 1, 1), 0.01, 0.04, marks=pytest.mark.campaign),
+        pytest.param(Orders(7, 5, 2), 0.01, 0.02, marks=pytest.mark.campaign),
     ],
     ids=str,
 )
