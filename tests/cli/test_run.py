@@ -52,7 +52,9 @@ def test_recording_says_what_it_is(short_rig: Path, tmp_path: Path) -> None:
     assert len(metadata["eds_m1_sha256"]) == 64
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize(
+    "number", [signal.SIGINT, signal.SIGTERM, pytest.param(signal.SIGHUP, marks=pytest.mark.campaign)]
+)
 def test_signal_in_the_middle_keeps_the_recording_and_disarms(
     spawn: Callable[..., subprocess.Popen[str]], short_rig: Path, tmp_path: Path, number: signal.Signals
 ) -> None:

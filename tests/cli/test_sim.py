@@ -14,7 +14,9 @@ from hil.simulator.can_bridge import CanBridge
 from hil.simulator.loopback import Address
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize(
+    "number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.campaign), signal.SIGHUP]
+)
 def test_serves_until_a_signal_and_prints_one_line(
     simulate: Callable[..., Any], short_rig: Path, number: signal.Signals
 ) -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from hil.commission.model_json import model_json
 from hil.commission.steps import prbs
 from hil.simulator.simulation_model import DEFAULT_BUS
@@ -33,6 +35,7 @@ def test_gain_of_one_inverter_is_measured(tmp_path: Path) -> None:
     assert finding.measured.endswith("% less")
 
 
+@pytest.mark.campaign
 def test_delay_is_counted_in_samples(tmp_path: Path) -> None:
     with bench(tmp_path, effects=["transport_delay:delay_s=0.02"]) as rig:
         rig.call("scales")
@@ -42,6 +45,7 @@ def test_delay_is_counted_in_samples(tmp_path: Path) -> None:
     assert rig.finding("m2 against m1: delay").within is True
 
 
+@pytest.mark.campaign
 def test_weak_prbs_is_raised(tmp_path: Path) -> None:
     weak = (*SHORT, ("amplitude_nm = 120.0", "amplitude_nm = 2.0"))
     with bench(tmp_path, changes=weak) as rig:

@@ -26,7 +26,9 @@ def test_a_spring_and_a_damper_miss_nothing(zero_error: float) -> None:
         (Joint(friction=4000.0), {"shaft_hysteresis"}),
         (Joint(hardening=400.0), {"stiffness_nonlinearity"}),
         (Joint(crack=-0.3), {"stiffness_change"}),
-        (Joint(gap=0.012, hardening=300.0), {"backlash", "stiffness_nonlinearity"}),
+        pytest.param(
+            Joint(gap=0.012, hardening=300.0), {"backlash", "stiffness_nonlinearity"}, marks=pytest.mark.campaign
+        ),
     ],
 )
 def test_what_was_planted_is_named_and_nothing_else(joint: Joint, named: set[str]) -> None:
