@@ -87,7 +87,7 @@ class Bench:
         if known is None or not known.converged:
             begun = self._rough.get(effects) if known is None else known
             result = self._fit(effects, warm, releases) if begun is None else polished(converge(begun))
-            self._fits[effects] = self._told(result)
+            self._remember(effects, result)
         return self._fits[effects]
 
     def fit_again(self, effects: Effects, name: str) -> FitResult:
@@ -107,7 +107,7 @@ class Bench:
     def fit_retold(self, effects: Effects, name: str) -> FitResult:
         """Fit an effect's law written other ways from where it ended, and return what explains best, per unknown.
 
-        Once.
+        Each law beside the same others is written other ways once.
         """
         had = self._fits[effects]
         values = had.values_of(name)
@@ -125,7 +125,7 @@ class Bench:
         plausible = [fit for fit in fits if not entry.implausible(self.model, self.records, fit.values_of(name))]
         best = min(plausible, key=lambda fit: fit.squares, default=had)
         if gain(best, had).delta_bic <= 0.0:
-            self._fits[effects] = _without_much(best)
+            self._remember(effects, best)
         return self.fit(effects)
 
     def fit_in_place(self, effects: Effects, name: str, rival: str, had: FitResult) -> FitResult:
@@ -159,13 +159,13 @@ class Bench:
         """Remember a fit if it is better than what is known, and return the better one."""
         known = self._fits.get(effects)
         if known is None or result.squares < known.squares:
-            self._fits[effects] = self._told(result)
+            self._remember(effects, result)
         return self._fits[effects]
 
-    def _told(self, result: FitResult) -> FitResult:
-        """Return a fit to be remembered: its steps told from their moment on, which may explain more."""
+    def _remember(self, effects: Effects, result: FitResult) -> None:
+        """Remember a fit with its steps told from their moment on, which may explain more."""
         told = from_their_moment(result, self.model)
-        return _without_much(result if told is result else polished(told))
+        self._fits[effects] = _without_much(result if told is result else polished(told))
 
     def fit_by_steps(self, effects: Effects) -> FitResult:
         """Fit a set of effects of which none has been fitted here, one after the other along the chain."""

@@ -123,7 +123,15 @@ def interval(result: FitResult, cov: FloatArray, index: int) -> tuple[float, flo
 def interval_that_follows(
     result: FitResult, cov: FloatArray, told: Callable[[FitResult], float]
 ) -> tuple[float, float]:
-    """Return the 95 % interval of what follows from the unknowns, to first order; never of the other sign."""
+    """Return the 95 % interval of what follows from the unknowns, to first order; never of the other sign.
+
+    Parameters
+    ----------
+    cov : ndarray, shape (n, n)
+        Covariance of all unknowns, in their scales.
+    told : callable
+        A fit to the value, in the value's own unit, which is the interval's.
+    """
     value, slope = told(result), np.zeros(result.x.size)
     for i in np.flatnonzero(np.diag(cov) > 0.0):
         moved = result.x.copy()

@@ -87,7 +87,7 @@ class Held:
 
 @dataclass(frozen=True, slots=True)
 class Within:
-    """A start value with bounds of its own: of a variant of the law that can't be followed everywhere."""
+    """A start value with bounds of its own, in scales: of a variant of the law that can't be followed everywhere."""
 
     value: float
     low: float
@@ -112,7 +112,15 @@ Start = tuple[float | Held | Within, ...]
 
 @dataclass(frozen=True, slots=True)
 class Retelling:
-    """Where a fit of a law that is written another way starts: its own values, and those of the line that change."""
+    """Where a fit of a law that is written another way starts.
+
+    Attributes
+    ----------
+    start : tuple
+        Of the law's own parameters, in scales.
+    line : mapping of str to float
+        Of the line's own that change with it, by name, in their units.
+    """
 
     start: Start
     line: Mapping[str, float]

@@ -36,6 +36,11 @@ def torque_scale(records: Sequence[Record]) -> float:
     return max(_typical(record.total_torque_nm) for record in records)
 
 
+def longest_s(records: Sequence[Record]) -> float:
+    """Return the length of the longest recording [s]."""
+    return max(float(record.time_s[-1] - record.time_s[0]) for record in records)
+
+
 def _typical(signal: FloatArray) -> float:
     """Return the 99th percentile of a signal's size.
 

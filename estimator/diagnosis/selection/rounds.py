@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from estimator.diagnosis.evidence import VERY_STRONG
@@ -105,10 +105,9 @@ class Rounds:
         return self.try_in_place(best.name, best.result, alike, chosen, current)
 
     def try_in_place(
-        self, rival: str, had: FitResult, names: Iterable[str], chosen: Effects, current: FitResult
+        self, rival: str, had: FitResult, names: Sequence[str], chosen: Effects, current: FitResult
     ) -> dict[str, Trial]:
         """Try effects beside those chosen from where a rival, in a fit that has it, has brought these."""
-        names = list(names)
 
         def tried(name: str) -> Trial:
             effects = with_effect(chosen, name)

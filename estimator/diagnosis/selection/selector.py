@@ -149,7 +149,7 @@ class Selector:
             rest = path.chosen - {name}
             current = self.jury.bench.fit_less(rest, path.current)
             trials = self._rounds.try_all(rest, current, flexible(frozenset(EFFECTS)))
-            trials |= self._rounds.try_in_place(name, path.current, trials, rest, current)
+            trials |= self._rounds.try_in_place(name, path.current, list(trials), rest, current)
             best = self.jury.best(trials, current, retuned)
             if best is not None:
                 path = self._better(path, self._with(_Path(rest, current, path.accepted), best, retuned), retuned)

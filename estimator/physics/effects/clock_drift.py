@@ -6,16 +6,17 @@ from collections.abc import Mapping, Sequence
 
 from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start
 from estimator.physics.model import DrivelineModel, Motion
+from estimator.physics.motion import longest_s
 from estimator.signals.record import Record
 
 PARTED_S = 0.03
-"""How far apart the clocks of the scale are at the end [s]: less than half a period of the line's resonance. A fit that
-begins further off ends where another of its periods fits as well."""
+"""How far apart the clocks of the scale are at the end [s]: half a period of a resonance at 16 Hz. A fit that begins
+further off ends where another of its periods matches."""
 
 
 def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
     """Return the rate of clocks that part by ``PARTED_S`` over the longest recording."""
-    return (PARTED_S / _longest_s(records),)
+    return (PARTED_S / longest_s(records),)
 
 
 def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
@@ -23,14 +24,10 @@ def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
     return [(side * parted,) for parted in (0.3, 1.0, 2.0, 3.0) for side in (-1.0, 1.0)]
 
 
-def _longest_s(records: Sequence[Record]) -> float:
-    return max(float(record.time_s[-1] - record.time_s[0]) for record in records)
-
-
 def unresolved(model: DrivelineModel, records: Sequence[Record], values: Mapping[str, float]) -> str:
     """Object to clocks that part by less than a tenth of a sampling period over the longest recording."""
     least_s = 0.1 * min(record.sample_time_s for record in records)
-    parted_s = abs(values["rate"]) * _longest_s(records)
+    parted_s = abs(values["rate"]) * longest_s(records)
     if parted_s >= least_s:
         return ""
     return f"the clocks part by {1e3 * parted_s:.2g} ms, less than a tenth of the sampling period"

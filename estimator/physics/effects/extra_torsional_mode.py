@@ -40,7 +40,7 @@ ABOVE = 5.0
 
 @compiled
 def frequency_within(inertia: float, stiffness: float, line_share: float) -> float:
-    """Return the frequency [rad/s] of an inertia within the line on the spring that softens the shaft so."""
+    """Return the frequency [rad/s] of an inertia [kg m^2] on the spring that softens a shaft [Nm/rad] to this share."""
     return math.sqrt(stiffness * line_share / ((1.0 - line_share) * inertia))
 
 
@@ -50,7 +50,7 @@ def within(values: Mapping[str, float]) -> float:
 
 
 def derived(values: Mapping[str, float], nominal: Mapping[str, float]) -> Mapping[str, float]:
-    """Return the frequency of an inertia within the line: it is not fitted but follows."""
+    """Return the frequency [Hz] of an inertia within the line: it is not fitted but follows."""
     if not within(values):
         return {}
     fastest = frequency_within(within(values), nominal["k"], values["line_share"])

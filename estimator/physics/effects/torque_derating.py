@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start
 from estimator.physics.model import DrivelineModel, Motion
+from estimator.physics.motion import longest_s
 from estimator.signals.record import Record
 
 QUICKEST = 0.04
@@ -15,7 +16,7 @@ is a gain, or what a recording began with."""
 
 def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
     """Return 1 for the depth and the longest recording's length."""
-    return (1.0, max(record.time_s[-1] - record.time_s[0] for record in records))
+    return (1.0, longest_s(records))
 
 
 def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:

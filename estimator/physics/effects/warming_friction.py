@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from estimator.compiled import compiled
 from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start
 from estimator.physics.model import DrivelineModel, Motion, unit
-from estimator.physics.motion import speed_scale, torque_scale
+from estimator.physics.motion import longest_s, speed_scale, torque_scale
 from estimator.signals.record import Record
 
 
@@ -22,8 +22,7 @@ def cold_part(time_s: float, cold: float, time_constant_s: float) -> float:
 
 def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
     """Return a twentieth of the torque in use at the top speed, and the longest recording's length."""
-    longest = max(record.time_s[-1] - record.time_s[0] for record in records)
-    return (0.05 * torque_scale(records) / speed_scale(records), longest)
+    return (0.05 * torque_scale(records) / speed_scale(records), longest_s(records))
 
 
 def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
