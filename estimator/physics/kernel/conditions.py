@@ -171,6 +171,34 @@ def with_torques(now: Conditions, torque: float, load: float) -> Conditions:
 
 
 @inlined
+def without_dry_friction(now: Conditions) -> Conditions:
+    """Return the conditions without what changes its sign with the speed."""
+    return Conditions(
+        now.torque,
+        now.load,
+        now.torque_factor,
+        now.shaft_extra,
+        now.shaft_factor,
+        now.joint_angle,
+        now.joint_rate,
+        now.inverse_motor,
+        now.inertia_load,
+        now.inverse_load,
+        now.stiffness,
+        now.viscous_load,
+        0.0,
+        0.0,
+        now.width_motor,
+        now.width_load,
+        now.branch_inertia,
+        now.branch_frequency,
+        now.fastest,
+        now.inverse_yield,
+        now.tyre,
+    )
+
+
+@inlined
 def with_torque(now: Conditions, torque: float) -> Conditions:
     """Return the conditions with a torque [Nm] beside the ripple."""
     return with_torques(now, now.torque + torque * now.torque_factor, now.load)

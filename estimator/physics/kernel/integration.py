@@ -3,7 +3,7 @@
 Chain of one sub-step: torque on the shaft -> delay -> lag -> motor -> shaft -> load -> sensor. Fixed-step Runge-Kutta
 of fourth order; the torque of a sub-step is a straight line with the exact mean and first moment of the delayed,
 lagged, zero-order-held input over it. What changes with time or angle, but not with the state, is set once per
-sub-step.
+sub-step. A line that is linear takes the same steps as sums (``linear``).
 """
 
 from __future__ import annotations
@@ -22,63 +22,16 @@ from estimator.physics.kernel.conditions import (
     conditions,
     is_changing,
     is_waving,
-    with_torque,
     with_torques,
 )
 from estimator.physics.kernel.line import Line, is_elastic, is_extended, is_within
-from estimator.physics.kernel.rates import rates
+from estimator.physics.kernel.linear import WORTHWHILE_SAMPLES, answers, has_dry_friction, is_linear, led_on
 from estimator.physics.kernel.sensing import entry, reading, shown, smoothed
-from estimator.physics.kernel.state_vector import FILTER_RISE, FILTERED, LAG_RISE, LAGGED, Conditions, State
+from estimator.physics.kernel.state_vector import FILTER_RISE, FILTERED, LAG_RISE, LAGGED, State
 from estimator.signals.record import FloatArray, IntArray
 
 RADIANS_PER_STEP_OF_MODE = 0.6
 """Integration step in radians of the extra mode, which is seen through the motor's inertia only."""
-
-
-@inlined
-def moved(line: Line, x: State, dx: State, h: float) -> State:
-    """Return a state moved along its derivative for a time [s]; what a line lacks stays where it is, at no cost."""
-    twist, load_speed, middle_twist, middle_speed = x.twist, x.load_speed, x.middle_twist, x.middle_speed
-    if line.masses > 1:
-        twist, load_speed = twist + h * dx.twist, load_speed + h * dx.load_speed
-    if line.masses == 3:
-        middle_twist, middle_speed = middle_twist + h * dx.middle_twist, middle_speed + h * dx.middle_speed
-    loading, vehicle_speed, traction = x.loading, x.vehicle_speed, x.traction
-    branch_twist, branch_speed = x.branch_twist, x.branch_speed
-    if line.sliding:
-        loading += h * dx.loading
-    if line.extended:
-        vehicle_speed, traction = vehicle_speed + h * dx.vehicle_speed, traction + h * dx.traction
-        branch_twist, branch_speed = branch_twist + h * dx.branch_twist, branch_speed + h * dx.branch_speed
-    return State(
-        x.angle + h * dx.angle,
-        x.speed + h * dx.speed,
-        twist,
-        load_speed,
-        loading,
-        vehicle_speed,
-        branch_twist,
-        branch_speed,
-        middle_twist,
-        middle_speed,
-        traction,
-    )
-
-
-@inlined
-def runge_kutta(line: Line, now: Conditions, torque: float, rise: float, x: State, p: FloatArray, h: float) -> State:
-    """Return the state after one sub-step under constant conditions and a torque of this mean and rise [Nm]."""
-    begin = with_torque(now, torque - 0.5 * rise)
-    middle = with_torque(now, torque)
-    end = with_torque(now, torque + 0.5 * rise)
-    first = rates(line, begin, x, p)
-    second = rates(line, middle, moved(line, x, first, 0.5 * h), p)
-    third = rates(line, middle, moved(line, x, second, 0.5 * h), p)
-    fourth = rates(line, end, moved(line, x, third, h), p)
-    x = moved(line, x, first, h / 6.0)
-    x = moved(line, x, second, h / 3.0)
-    x = moved(line, x, third, h / 3.0)
-    return moved(line, x, fourth, h / 6.0)
 
 
 @inlined
@@ -144,10 +97,14 @@ def integrate_made(
     steep = slopes.shape[1] > 0
     slope = slope_before(first, slopes)
     n = min(torque.shape[0], out.shape[0])
+    linear = torque.shape[0] >= WORTHWHILE_SAMPLES and is_linear(line, p)
+    whole = not (late or filtering or steep or p[slots.LAG] > 0.0 or has_dry_friction(p))
+    leap = substeps if whole else 1
     x = unpacked(state)
     lagged, lag_rise = state[LAGGED], state[LAG_RISE]
     filtered, filter_rise = state[FILTERED], state[FILTER_RISE]
     now = conditions(line.masses, start_s + first * sample_time_s, h, 0.0, 0.0, sign_width, p)
+    to, read = answers(line, now, p, h, 0), False
     for k in range(first, n):
         turn = angle[k + 1] - angle[k] if k + 1 < angle.shape[0] else angle[k] - angle[k - 1]
         value = entry(x, output)
@@ -157,7 +114,11 @@ def integrate_made(
         varying = waving or is_changing(time_s - sample_time_s, time_s + sample_time_s, p)
         if not varying:
             now = with_torques(now, now.torque, load[k])
-        for j in range(substeps):
+        summing = linear and not varying
+        if summing and not read:
+            to = answers(line, now, p, h, leap)
+        read = summing
+        for j in range(0, substeps, leap if summing else 1):
             place = k + j * length
             if varying:
                 middle = angle[k] + turn * (j + 0.5) * length
@@ -170,7 +131,7 @@ def integrate_made(
                 supplied, rise, lagged, lag_rise, p[slots.LAG], p[slots.LAG_SHAPE], h
             )
             before = x
-            x = runge_kutta(line, now, mean, rise, x, p, h)
+            x = led_on(line, summing, to, now, mean, rise, before, p, h)
             slope = (entry(x, output) - entry(before, output)) / h
             if filtering:
                 turned, turns = angle[k] + turn * j * length, angle[k] + turn * (j + 1) * length

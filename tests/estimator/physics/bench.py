@@ -37,6 +37,11 @@ def model(
     )
 
 
+def assert_same_to_rounding(actual: FloatArray, desired: FloatArray) -> None:
+    """Outputs are the same whether a linear line took sub-steps or their sum (``kernel.linear``), to rounding."""
+    np.testing.assert_allclose(actual, desired, rtol=0.0, atol=1e-11 * np.ptp(desired))
+
+
 def scaled(values: Mapping[str, float], **factors: float) -> dict[str, float]:
     """Multiply some of the values."""
     return {name: value * factors.get(name, 1.0) for name, value in values.items()}

@@ -17,7 +17,7 @@ from estimator.physics.layout import flat, flat_values
 from estimator.physics.model import Motion, Structure
 from estimator.physics.simulate import Start, grid_for, simulate
 from estimator.signals.record import FloatArray, Record
-from tests.estimator.physics.bench import TWO_MASS, linear_record, model, random_steps
+from tests.estimator.physics.bench import TWO_MASS, assert_same_to_rounding, linear_record, model, random_steps
 
 # The table of CONTRACT.md, "The catalogue: names".
 CONTRACT = {
@@ -163,7 +163,7 @@ def test_the_decisive_parameter_at_its_null_is_no_effect_whatever_the_others_are
         several = entry.name in each or len(entry.phases) > 1
         decisive = entry.shared_parameters if several else entry.shared_parameters[:1]
         silent = values | {parameter.name: parameter.null for parameter in decisive}
-        np.testing.assert_array_equal(output_with(entry, silent, reversal), nominal)
+        assert_same_to_rounding(output_with(entry, silent, reversal), nominal)
 
 
 @released

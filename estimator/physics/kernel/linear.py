@@ -1,0 +1,157 @@
+"""Of a linear line, where a stretch of time leads to: read off the Runge-Kutta steps once, then only added up.
+
+What leads a linear line on is a sum: of what its state leads to, entry by entry, and of what its torques do. Each of
+these is found by the sub-steps themselves, from one unit of it alone, so nothing is said twice and the result is that
+of the sub-steps to rounding. A period without a change inside takes one sum in place of all its sub-steps.
+
+Dry friction is a constant torque while the speed is well away from its change of sign: the line is linear there, too,
+which is looked at sub-step by sub-step.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from estimator.compiled import compiled, inlined
+from estimator.physics.kernel import slots
+from estimator.physics.kernel.conditions import with_torques, without_dry_friction
+from estimator.physics.kernel.line import Line
+from estimator.physics.kernel.runge_kutta import moved, runge_kutta
+from estimator.physics.kernel.state_vector import Conditions, State
+from estimator.physics.laws import BEYOND, dry_friction
+from estimator.signals.record import FloatArray
+
+WORTHWHILE_SAMPLES = 50
+"""Samples from which on reading the answers takes less time than they save."""
+
+REST = State(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+class Answers(NamedTuple):
+    """The state to which a unit of each entry of the state, and of each torque, leads a line at rest.
+
+    Attributes
+    ----------
+    angle, speed, twist, load_speed, branch_twist, branch_speed, middle_twist, middle_speed : State
+        To one unit of the entry of that name [unit of the state / unit of the entry].
+    torque, rise, load : State
+        To a torque on the shaft of this mean, of this rise from end to end, and to a load torque [unit of the state /
+        Nm].
+    """
+
+    angle: State
+    speed: State
+    twist: State
+    load_speed: State
+    branch_twist: State
+    branch_speed: State
+    middle_twist: State
+    middle_speed: State
+    torque: State
+    rise: State
+    load: State
+
+
+@inlined
+def is_linear(line: Line, p: FloatArray) -> bool:
+    """Tell whether a line is linear while its conditions are constant and dry friction has its full size."""
+    dragged = p[slots.QUADRATIC] != 0.0 or p[slots.AERO] != 0.0 or p[slots.SLIP] > 0.0
+    sticky = p[slots.STRIBECK] != 0.0 or p[slots.STRIBECK_COULOMB] != 0.0
+    return bool(line.elastic and not dragged and not sticky)
+
+
+@inlined
+def has_dry_friction(p: FloatArray) -> bool:
+    """Tell whether there is dry friction at the motor or at the load, be it for a while only."""
+    return bool(p[slots.COULOMB] != 0.0 or p[slots.COULOMB_LOAD] != 0.0 or p[slots.BRAKE] != 0.0)
+
+
+@inlined
+def kept_friction(line: Line, now: Conditions, before: State, after: State) -> bool:
+    """Tell whether dry friction, where there is any, had its full size in one direction from one state to the next."""
+    begun, ended = before.speed, after.speed
+    motor = now.dry_motor == 0.0 or is_beyond(begun, ended, BEYOND * now.width_motor)
+    if line.masses > 1:
+        begun, ended = before.load_speed, after.load_speed
+    return motor and (now.dry_load == 0.0 or is_beyond(begun, ended, BEYOND * now.width_load))
+
+
+@inlined
+def is_beyond(begun: float, ended: float, limit: float) -> bool:
+    """Tell whether two speeds are further from zero than a limit, on the same side of it."""
+    return min(begun, ended) > limit or max(begun, ended) < -limit
+
+
+@compiled
+def answers(line: Line, now: Conditions, p: FloatArray, h: float, steps: int) -> Answers:
+    """Return what ``steps`` sub-steps of ``h`` [s] make of each unit of a state and of a torque, without friction."""
+    now = with_torques(without_dry_friction(now), 0.0, 0.0)
+    pulled = with_torques(now, 0.0, 1.0)
+    return Answers(
+        after(line, now, 0.0, 0.0, State(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), p, h, steps),
+        after(line, now, 0.0, 0.0, State(0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), p, h, steps),
+        after(line, now, 0.0, 0.0, State(0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), p, h, steps),
+        after(line, now, 0.0, 0.0, State(0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), p, h, steps),
+        after(line, now, 0.0, 0.0, State(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0), p, h, steps),
+        after(line, now, 0.0, 0.0, State(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0), p, h, steps),
+        after(line, now, 0.0, 0.0, State(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0), p, h, steps),
+        after(line, now, 0.0, 0.0, State(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0), p, h, steps),
+        after(line, now, 1.0, 0.0, REST, p, h, steps),
+        after(line, now, 0.0, 1.0, REST, p, h, steps),
+        after(line, pulled, 0.0, 0.0, REST, p, h, steps),
+    )
+
+
+@compiled
+def after(
+    line: Line, now: Conditions, torque: float, rise: float, x: State, p: FloatArray, h: float, steps: int
+) -> State:
+    """Return the state after ``steps`` sub-steps of ``h`` [s] under one torque of this mean and rise [Nm]."""
+    for _ in range(steps):
+        x = runge_kutta(line, now, torque, rise, x, p, h)
+    return x
+
+
+@inlined
+def led_on(
+    line: Line,
+    summing: bool,
+    to: Answers,
+    now: Conditions,
+    torque: float,
+    rise: float,
+    x: State,
+    p: FloatArray,
+    h: float,
+) -> State:
+    """Return the state that follows on ``x``: the sum of the answers where that is asked for and right, else a step."""
+    if summing:
+        after = answered(line, to, now, torque, rise, x, p)
+        if kept_friction(line, now, x, after):
+            return after
+    return runge_kutta(line, now, torque, rise, x, p, h)
+
+
+@inlined
+def answered(line: Line, to: Answers, now: Conditions, torque: float, rise: float, x: State, p: FloatArray) -> State:
+    """Return the state that follows on ``x`` under a torque of this mean and rise [Nm] and full dry friction."""
+    carried = x.speed if line.masses == 1 else x.load_speed
+    torque -= dry_friction(x.speed, p[slots.COULOMB], now.width_motor)
+    load = now.load + dry_friction(carried, now.dry_load, now.width_load)
+    after = State(0.0, 0.0, 0.0, 0.0, x.loading, x.vehicle_speed, 0.0, 0.0, 0.0, 0.0, x.traction)
+    after = moved(line, after, to.torque, torque)
+    after = moved(line, after, to.load, load)
+    if rise != 0.0:
+        after = moved(line, after, to.rise, rise)
+    after = moved(line, after, to.angle, x.angle)
+    after = moved(line, after, to.speed, x.speed)
+    if line.masses > 1:
+        after = moved(line, after, to.twist, x.twist)
+        after = moved(line, after, to.load_speed, x.load_speed)
+    if line.masses == 3:
+        after = moved(line, after, to.middle_twist, x.middle_twist)
+        after = moved(line, after, to.middle_speed, x.middle_speed)
+    if line.extended:
+        after = moved(line, after, to.branch_twist, x.branch_twist)
+        after = moved(line, after, to.branch_speed, x.branch_speed)
+    return after
