@@ -11,12 +11,12 @@ from estimator.diagnosis.evidence import gain
 from estimator.diagnosis.screening import Screen, promising
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Untestable
-from estimator.physics.fit import FitResult, Problem, fit, make_problem
+from estimator.physics.fit import FitResult, Problem, fit, make_problem, not_fitted
 from estimator.physics.model import DrivelineModel, Motion
 from estimator.physics.moments import without_idle
 from estimator.physics.polish import polished
 from estimator.physics.simulate import grid_for
-from estimator.physics.starts import HEAT, begun, best_fit, close, converge
+from estimator.physics.starts import HEAT, begun, best_fit, close, converge, warm_start
 from estimator.physics.steps import from_their_moment
 from estimator.physics.unknowns import Release, nominal_unknowns, own_unknowns, released
 from estimator.signals.record import BoolArray, Record
@@ -128,12 +128,20 @@ class Bench:
             self._remember(effects, best)
         return self.fit(effects)
 
-    def fit_in_place(self, effects: Effects, name: str, rival: str, had: FitResult) -> FitResult:
-        """Fit an effect beside others from where these stand in a fit with a rival in its place; return the better fit.
+    def left_without(self, effects: Effects, rival: str, had: FitResult) -> FitResult:
+        """Return what is left of a fit without one of its effects, the others where it has brought them."""
+        warm = _forgetting(had, rival)
+        (problem,) = self._problems(effects, warm, ())
+        return not_fitted(problem, warm_start(problem, warm))
 
-        What a rival follows nearly as well has brought the others near their place; a fit from elsewhere may have not.
-        """
-        return self._better(effects, self._fit(effects, _forgetting(had, rival), []))
+    def rough_in_place(self, effects: Effects, placed: FitResult, releases: Sequence[Release]) -> FitResult:
+        """Fit an effect beside others from where these were placed, a few steps only."""
+        heat = begun(self._problems(effects, placed, releases), placed)
+        return heat[close(heat)[0]]
+
+    def finish_in_place(self, effects: Effects, rough: FitResult) -> FitResult:
+        """Take such a fit to its end, and return the better of it and the one that is known."""
+        return self._better(effects, polished(converge(rough)))
 
     def fit_widely(self, effects: Effects, name: str) -> FitResult:
         """Fit an effect from every start not yet tried, promising or not, and return the best of these and the known.

@@ -199,7 +199,9 @@ def start_vector(problem: Problem) -> FloatArray:
 def outputs_at(problem: Problem, x: FloatArray) -> tuple[FloatArray, ...]:
     """Simulate every recording at scaled unknowns ``x``."""
     p = parameters(problem, x)
-    return tuple(simulated(problem, p, local_part(problem, x, i), i) for i in range(len(problem.records)))
+    return tuple(
+        concurrently(lambda i: simulated(problem, p, local_part(problem, x, i), i), range(len(problem.records)))
+    )
 
 
 def start_of(problem: Problem, x: FloatArray, index: int) -> Start:
@@ -230,6 +232,12 @@ def simulated_each(
     if np.abs(out).max() <= worst:  # False where it is no number
         return out
     return np.clip(np.nan_to_num(out, nan=worst), -worst, worst)
+
+
+def not_fitted(problem: Problem, x: FloatArray) -> FitResult:
+    """Return the free run at scaled unknowns ``x`` as a fit that has not begun."""
+    outputs = outputs_at(problem, x)
+    return FitResult(problem, x, outputs, residual_at(problem, outputs), None, False)
 
 
 def _stack(problem: Problem, arrays: Sequence[FloatArray]) -> FloatArray:

@@ -107,13 +107,28 @@ class Rounds:
     def try_in_place(
         self, rival: str, had: FitResult, names: Sequence[str], chosen: Effects, current: FitResult
     ) -> dict[str, Trial]:
-        """Try effects beside those chosen from where a rival, in a fit that has it, has brought these."""
+        """Try effects beside those chosen from where a rival, in a fit that has it, has brought these.
 
-        def tried(name: str) -> Trial:
+        What a rival follows nearly as well has brought the others near their place; a fit from elsewhere may have not.
+        Those are tried that promise, beside what moving the others back does, a fair part of what the rival explains,
+        and those are finished that stay near the best of them.
+        """
+        placed = self.jury.bench.left_without(chosen, rival, had)
+        least = placed.squares - current.squares + WORTH_FITTING * (current.squares - had.squares)
+        looks = {name: found for name, found in self._around(placed, names).items() if found[0].promise >= least}
+
+        def begun(name: str) -> FitResult:
+            releases = [look.release for look in promising(looks[name])]
+            return self.jury.bench.rough_in_place(with_effect(chosen, name), placed, releases)
+
+        rough = dict(zip(looks, concurrently(begun, list(looks)), strict=True))
+
+        def finished(name: str) -> Trial:
             effects = with_effect(chosen, name)
-            return self.jury.trial(name, effects, current, self.jury.bench.fit_in_place(effects, name, rival, had))
+            return self.jury.trial(name, effects, current, self.jury.bench.finish_in_place(effects, rough[name]))
 
-        return dict(zip(names, concurrently(tried, names), strict=True))
+        near = _near_the_best(rough, current, WORTH_GOING_ON)
+        return dict(zip(near, concurrently(finished, near), strict=True))
 
     def _looks(
         self, names: Sequence[str], chosen: Effects, current: FitResult, least: float = 0.0

@@ -12,17 +12,49 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+
 from estimator.compiled import compiled, inlined
+from estimator.physics.catalogue import BUILT_IN
 from estimator.physics.kernel import slots
 from estimator.physics.kernel.conditions import with_torques, without_dry_friction
 from estimator.physics.kernel.line import Line
 from estimator.physics.kernel.runge_kutta import moved, runge_kutta
 from estimator.physics.kernel.state_vector import Conditions, State
 from estimator.physics.laws import BEYOND, dry_friction
+from estimator.physics.layout import slot
 from estimator.signals.record import FloatArray
 
 WORTHWHILE_SAMPLES = 50
 """Samples from which on reading the answers takes less time than they save."""
+
+LINEAR = frozenset(
+    {
+        "inverter_gain_mismatch",
+        "torque_derating",
+        "torque_saturation",
+        "actuator_lag",
+        "transport_delay",
+        "clock_drift",
+        "coulomb_friction_motor",
+        "generator_coupled",
+        "extra_torsional_mode",
+        "stiffness_change",
+        "coulomb_friction_load",
+        "brake_drag",
+        "inertia_change",
+        "resolver_error",
+        "speed_filter",
+        "speed_quantisation",
+        "speed_sign_blind",
+    }
+)
+"""Effects with which a line is linear, or that act before it or behind it. With any other it takes its sub-steps."""
+
+_OTHERS = [(entry.name, each) for entry in BUILT_IN.values() if entry.name not in LINEAR for each in entry.parameters]
+BENDING = np.array([slot(effect, parameter.name) for effect, parameter in _OTHERS])
+NULLS = np.array([parameter.null for _, parameter in _OTHERS])
+"""Where the parameters of all other effects stand, and what each is where its effect is not there."""
 
 REST = State(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -55,9 +87,12 @@ class Answers(NamedTuple):
 @inlined
 def is_linear(line: Line, p: FloatArray) -> bool:
     """Tell whether a line is linear while its conditions are constant and dry friction has its full size."""
-    dragged = p[slots.QUADRATIC] != 0.0 or p[slots.AERO] != 0.0 or p[slots.SLIP] > 0.0
-    sticky = p[slots.STRIBECK] != 0.0 or p[slots.STRIBECK_COULOMB] != 0.0
-    return bool(line.elastic and not dragged and not sticky)
+    if not line.elastic:
+        return False
+    for i in range(BENDING.size):
+        if p[BENDING[i]] != NULLS[i]:
+            return False
+    return True
 
 
 @inlined

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
+from estimator.physics.catalogue import BUILT_IN
 from estimator.physics.kernel import linear, state_vector
 from estimator.physics.kernel.line import Line
 from estimator.physics.layout import flat, slot
@@ -105,3 +106,14 @@ def test_what_bends_slips_or_drags_is_not_linear() -> None:
 )
 def test_dry_friction_is_constant_on_one_side_of_zero(begun: float, ended: float, beyond: bool) -> None:
     assert linear.is_beyond(begun, ended, 2.0) is beyond
+
+
+def test_whatever_bends_in_the_catalogue_takes_the_sub_steps() -> None:
+    """By its place in no list: a new effect is not taken for linear before somebody says so."""
+    nulls = flat(model(TWO_MASS))
+    elastic = Line(2, True, False, False)
+    for name, entry in BUILT_IN.items():
+        for parameter in entry.parameters:
+            p = nulls.copy()
+            p[slot(name, parameter.name)] += 1.0
+            assert linear.is_linear(elastic, p) is (name in linear.LINEAR or not np.isfinite(parameter.null))
