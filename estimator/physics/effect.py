@@ -257,6 +257,8 @@ class Effect:
         True where it acts during an interval of each recording, from its own ``from_s`` to its own ``to_s``.
     step : Step or None
         Where the event is a step of a nominal parameter: of which.
+    permanent : str
+        The effect that the event is where it acts all along, if that is one.
     phases : mapping of str to str
         Own phase to the shared amplitude that it belongs to, for effects periodic in an angle.
     decisive : tuple[str, ...]
@@ -307,6 +309,7 @@ class Effect:
     profile: bool = False
     event: bool = False
     step: Step | None = None
+    permanent: str = ""
     phases: Mapping[str, str] = field(default_factory=dict)
     decisive: tuple[str, ...] = ()
     loosens: frozenset[str] = frozenset()

@@ -41,6 +41,7 @@ EFFECT = Effect(
     equivalent=(),
     contains=(),
     event=True,
+    permanent="coulomb_friction_load",
     scales=scales,
     starts=starts,
     sentence=sentence,

@@ -14,6 +14,8 @@ from estimator.physics.catalogue import EFFECTS
 from estimator.physics.own_scan import MOST_CELLS
 from tests.estimator.diagnosis.selection.mass import BRAKE_NM, COULOMB, braked_records, selector
 
+WHOLE_S = (0.0, 11.99)
+
 
 class TestEvents:
     """Intervals are chosen among many: each that was placed is paid for."""
@@ -35,6 +37,15 @@ class TestEvents:
 
     def test_it_begins_and_ends_inside_a_recording(self, braked: Selection) -> None:
         assert has_edge("brake_drag", braked.result)
+
+    @pytest.mark.parametrize(("seen_s", "edged"), [((4.0, 7.0), True), ((4.0, 4.5), False), (WHOLE_S, False)])
+    def test_a_glimpse_beside_whole_recordings_is_no_beginning(
+        self, braked: Selection, monkeypatch: pytest.MonkeyPatch, seen_s: tuple[float, float], edged: bool
+    ) -> None:
+        """Dry friction at the load is hidden in recordings that do not reverse: there a brake would act for no time."""
+        moments = [seen_s, WHOLE_S, (0.0, 0.0)]
+        monkeypatch.setattr("estimator.diagnosis.trial.moments_of", lambda *_: moments)
+        assert has_edge("brake_drag", braked.result) is edged
 
     def test_a_brake_may_be_let_go_a_crack_does_not_heal(
         self, braked: Selection, monkeypatch: pytest.MonkeyPatch
