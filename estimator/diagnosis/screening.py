@@ -173,7 +173,7 @@ class Screen:
             for i, own in enumerate(release.own)
         ]
         scans = [
-            scanned(*self._projector.products(grid.answers, slice(*self._rows[i : i + 2])))
+            scanned(*self._projector.products(grid.answers, slice(*self._rows[i : i + 2])), entry.lasting)
             for i, grid in enumerate(grids)
         ]
         tried = [value for value in SIZES * size.scale * abs(size.start) if self._may_be(size, value)]
@@ -246,15 +246,16 @@ def _zero(unknown: Shared, null: float) -> float:
 
 
 def _between(own: tuple[Shared, ...], entry: Effect, grid: Cells, stretch: Stretch) -> tuple[Shared, ...]:
-    """Return a recording's moments as the scan found them; a fit may move them by a cell: beyond it others match."""
-    moments = {"from_s": float(grid.moments_s[stretch.first]), "to_s": float(grid.moments_s[stretch.last])}
+    """Return a recording's moments as the scan found them; a fit may move them by a cell: beyond it others match.
+
+    Of an event that is lasting it moves the one at which it changes: the other is the recording's own end.
+    """
+    rows = {"from_s": stretch.first, "to_s": stretch.last}
+    ends = (0, grid.moments_s.size - 1) if entry.lasting else ()
     cell = float(grid.moments_s[1] - grid.moments_s[0]) if stretch.last > stretch.first else 0.0
-    return tuple(
-        replace(
-            unknown,
-            start=moments[unknown.name],
-            low=max(unknown.low, moments[unknown.name] - cell),
-            high=min(unknown.high, moments[unknown.name] + cell),
-        )
-        for unknown in own
-    )
+    found = []
+    for unknown in own:
+        row = rows[unknown.name]
+        at, reach = float(grid.moments_s[row]), 0.0 if row in ends else cell
+        found.append(replace(unknown, start=at, low=max(unknown.low, at - reach), high=min(unknown.high, at + reach)))
+    return tuple(found)

@@ -73,7 +73,8 @@ def scan_choices(name: str, result: FitResult) -> float:
     if not EFFECTS[name].event:
         return 0.0
     acting = sum(to_s > from_s for from_s, to_s in moments_of(result, name))
-    return acting * math.log(0.5 * MOST_CELLS**2)
+    tried = 2.0 * MOST_CELLS if EFFECTS[name].lasting else 0.5 * MOST_CELLS**2
+    return acting * math.log(tried)
 
 
 def has_edge(name: str, result: FitResult) -> bool:
@@ -93,8 +94,7 @@ def has_edge(name: str, result: FitResult) -> bool:
 
 def healed_in(name: str, result: FitResult) -> str:
     """Return a recording within which a lasting step begins and ends; "" where there is none."""
-    step = EFFECTS[name].step
-    if step is None or not step.lasting:
+    if not EFFECTS[name].lasting:
         return ""
     for record, (from_s, to_s) in zip(result.problem.records, moments_of(result, name), strict=True):
         if to_s > from_s and inside(record, from_s) and inside(record, to_s):

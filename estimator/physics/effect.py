@@ -324,6 +324,11 @@ class Effect:
     recognised: bool = False
 
     @property
+    def lasting(self) -> bool:
+        """Whether it is a step that does not go back within a recording."""
+        return self.step is not None and self.step.lasting
+
+    @property
     def shared_parameters(self) -> tuple[EffectParameter, ...]:
         """Parameters that all recordings share, in order."""
         return tuple(parameter for parameter in self.parameters if not parameter.own)

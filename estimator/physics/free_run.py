@@ -96,7 +96,8 @@ def _with_own(problem: Problem) -> FloatArray:
             alone[slot(name, parameter)] = size
         if entry.event:
             grid = cells(entry, alone, basis.own, sizes[name], run)
-            stretch = scan(rest.rest(grid.answers), rest.error).best(next(iter(sizes[name].values())))
+            size = next(iter(sizes[name].values()))
+            stretch = scan(rest.rest(grid.answers), rest.error, entry.lasting).best(size)
             found[name, "from_s"] = float(grid.moments_s[stretch.first])
             found[name, "to_s"] = float(grid.moments_s[stretch.last])
             continue

@@ -11,6 +11,7 @@ import numpy as np
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import ITERATIONS, FitResult, Problem, changes, fit, own_part, simulated_each
 from estimator.physics.parallel import concurrently
+from estimator.physics.steps import EDGE_S, inside, moments_of
 from estimator.physics.unknowns import LocalBasis
 from estimator.signals.record import FloatArray, Record
 
@@ -34,7 +35,8 @@ WORTH = 20.0
 def without_idle(result: FitResult, iterations: int = ITERATIONS) -> FitResult:
     """Take an event out of each recording that does as well without it.
 
-    An event that lasts all along is the constant load torque in another guise; one of no weight fits the noise.
+    An event that lasts all along is the constant load torque in another guise; one of no weight fits the noise; one of
+    less than half a second at a recording's end fits what the start of a simulation leaves.
     """
     n = result.residual.size
     for index in range(len(result.problem.records)):
@@ -43,9 +45,18 @@ def without_idle(result: FitResult, iterations: int = ITERATIONS) -> FitResult:
             continue
         problem, x = silent
         without = fit(problem, x, iterations)
-        if n * math.log(without.squares / result.squares) < WORTH:
+        if _is_at_an_end(result, index) or n * math.log(without.squares / result.squares) < WORTH:
             result = without
     return result
+
+
+def _is_at_an_end(result: FitResult, index: int) -> bool:
+    """Tell whether all that events do in a recording, they do so near to an end of it that it could be none."""
+    record, names = result.problem.records[index], {u.effect for u in result.problem.local[index].own}
+    acting = [moments_of(result, name)[index] for name in names if EFFECTS[name].event]
+    return all(
+        to_s - from_s < EDGE_S and not (inside(record, from_s) and inside(record, to_s)) for from_s, to_s in acting
+    )
 
 
 def _silenced(result: FitResult, index: int) -> tuple[Problem, FloatArray] | None:
@@ -94,7 +105,7 @@ def _moved_in(result: FitResult, index: int) -> FloatArray | None:
         moves = [[row] for row in may_move] + ([may_move] if len(may_move) > 1 else [])
         for _ in range(MOVES):
             tried = [_shifted(local, rows, offset) for rows in moves for offset in OFFSETS_S]
-            tried = [local, *(x for x in tried if first <= x[begin] < x[end] <= last)]
+            tried = [local, *(x for x in tried if first <= x[begin] < x[end] <= max(last, local[end]))]
             squares = misfit.squares(tried)
             if squares.min() >= best:
                 break

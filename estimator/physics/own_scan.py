@@ -139,7 +139,7 @@ class Scan:
         return Stretch(int(first), int(last), float(taken[first, last]), along, power)
 
 
-def scan(answers: FloatArray, error: FloatArray) -> Scan:
+def scan(answers: FloatArray, error: FloatArray, lasting: bool = False) -> Scan:
     """Prepare the search of all intervals of a grid.
 
     Parameters
@@ -148,11 +148,19 @@ def scan(answers: FloatArray, error: FloatArray) -> Scan:
         Summed answers, as ``Cells`` has them, with what is explained otherwise projected out.
     error : ndarray, shape (R,)
         Simulated less measured.
+    lasting : bool
+        See ``scanned``.
     """
-    return scanned(answers @ answers.T, answers @ error)
+    return scanned(answers @ answers.T, answers @ error, lasting)
 
 
-def scanned(gram: FloatArray, match: FloatArray) -> Scan:
-    """Prepare the same search from the products of the answers with each other, (M, M), and with the error, (M,)."""
+def scanned(gram: FloatArray, match: FloatArray, lasting: bool = False) -> Scan:
+    """Prepare the same search from the products of the answers with each other, (M, M), and with the error, (M,).
+
+    An event that is ``lasting`` ends with its recording; told the other way round, it begins with it.
+    """
+    along = match[None, :] - match[:, None]
     power = np.maximum(np.diag(gram)[:, None] - 2.0 * gram + np.diag(gram)[None, :], 0.0)
-    return Scan(match[None, :] - match[:, None], power)
+    if lasting:
+        along[1:, :-1] = power[1:, :-1] = 0.0
+    return Scan(along, power)

@@ -5,6 +5,7 @@ The recording is simulated by the law that is fitted: what is tested is the sear
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -142,6 +143,11 @@ class TestWithoutIdle:
     def test_one_of_no_weight_is_taken_out(self) -> None:
         without = without_idle(self.fitted((2.2, 4.8), (3.0, 3.05)))
         assert self.lasts_s(without)[1] == 0.0
+
+    def test_one_that_is_over_at_once_is_taken_out_whatever_it_explains(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr("estimator.physics.moments.WORTH", -math.inf)
+        assert self.lasts_s(without_idle(self.fitted((2.2, 4.8), (0.0, 0.4))))[1] == 0.0
+        assert self.lasts_s(without_idle(self.fitted((2.2, 4.8), (3.0, 3.4))))[1] > 0.0
 
     def test_one_that_is_needed_stays(self) -> None:
         result = self.fitted((2.2, 4.8), (0.0, 0.0))

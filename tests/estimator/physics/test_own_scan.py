@@ -46,6 +46,19 @@ class TestBestStretch:
         assert [found.first, found.last] == rows == [first, last]
         assert found.taken == pytest.approx(taken)
 
+    @pytest.mark.parametrize("seed", range(8))
+    def test_what_is_lasting_begins_or_ends_with_the_recording(self, seed: int) -> None:
+        rng = np.random.default_rng(seed)
+        answers = np.vstack([np.zeros(200), np.cumsum(rng.standard_normal((12, 200)), axis=0)])
+        error = rng.standard_normal(200) - 0.7 * (answers[12] - answers[4]) + 0.7 * (answers[9] - answers[7])
+        taken, first, last = max(
+            (float(error @ error - np.sum((error + 0.7 * (answers[b] - answers[a])) ** 2)), a, b)
+            for a, b in [*((a, 12) for a in range(12)), *((0, b) for b in range(1, 13))]
+        )
+        found = scan(answers, error, lasting=True).best(0.7)
+        assert (found.first, found.last) == (first, last)
+        assert found.taken == pytest.approx(taken)
+
     def test_the_best_size_there_follows_from_match_and_power(self) -> None:
         """By regression on the answer of that interval alone."""
         rng = np.random.default_rng(1)
