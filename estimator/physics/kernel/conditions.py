@@ -143,8 +143,8 @@ def tyre(inertia: float, fastest: float, p: FloatArray) -> Tyre:
 
 
 @inlined
-def with_torques(now: Conditions, torque: float, load: float) -> Conditions:
-    """Return the conditions with other torques [Nm] at the motor and the load."""
+def with_friction(now: Conditions, torque: float, load: float, dry_motor: float, dry_load: float) -> Conditions:
+    """Return the conditions with other torques and other dry friction [Nm] at the motor and the load."""
     return Conditions(
         torque,
         load,
@@ -158,8 +158,8 @@ def with_torques(now: Conditions, torque: float, load: float) -> Conditions:
         now.inverse_load,
         now.stiffness,
         now.viscous_load,
-        now.dry_motor,
-        now.dry_load,
+        dry_motor,
+        dry_load,
         now.width_motor,
         now.width_load,
         now.branch_inertia,
@@ -171,31 +171,9 @@ def with_torques(now: Conditions, torque: float, load: float) -> Conditions:
 
 
 @inlined
-def without_dry_friction(now: Conditions) -> Conditions:
-    """Return the conditions without what changes its sign with the speed."""
-    return Conditions(
-        now.torque,
-        now.load,
-        now.torque_factor,
-        now.shaft_extra,
-        now.shaft_factor,
-        now.joint_angle,
-        now.joint_rate,
-        now.inverse_motor,
-        now.inertia_load,
-        now.inverse_load,
-        now.stiffness,
-        now.viscous_load,
-        0.0,
-        0.0,
-        now.width_motor,
-        now.width_load,
-        now.branch_inertia,
-        now.branch_frequency,
-        now.fastest,
-        now.inverse_yield,
-        now.tyre,
-    )
+def with_torques(now: Conditions, torque: float, load: float) -> Conditions:
+    """Return the conditions with other torques [Nm] at the motor and the load."""
+    return with_friction(now, torque, load, now.dry_motor, now.dry_load)
 
 
 @inlined

@@ -17,7 +17,7 @@ import numpy as np
 from estimator.compiled import compiled, inlined
 from estimator.physics.catalogue import BUILT_IN
 from estimator.physics.kernel import slots
-from estimator.physics.kernel.conditions import with_torques, without_dry_friction
+from estimator.physics.kernel.conditions import with_friction, with_torques
 from estimator.physics.kernel.line import Line
 from estimator.physics.kernel.runge_kutta import moved, runge_kutta
 from estimator.physics.kernel.state_vector import Conditions, State
@@ -119,8 +119,8 @@ def is_beyond(begun: float, ended: float, limit: float) -> bool:
 
 @compiled
 def answers(line: Line, now: Conditions, p: FloatArray, h: float, steps: int) -> Answers:
-    """Return what ``steps`` sub-steps of ``h`` [s] make of each unit of a state and of a torque, without friction."""
-    now = with_torques(without_dry_friction(now), 0.0, 0.0)
+    """Return what ``steps`` sub-steps of ``h`` [s] make of each unit of a state and a torque, without dry friction."""
+    now = with_friction(now, 0.0, 0.0, 0.0, 0.0)
     pulled = with_torques(now, 0.0, 1.0)
     return Answers(
         after(line, now, 0.0, 0.0, State(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), p, h, steps),
