@@ -18,7 +18,7 @@ from numba.core import config as numba_config
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
-PACKAGES = ("signals", "identification", "physics", "diagnosis/line")
+PACKAGES = ("abreast", "signals", "identification", "physics", "diagnosis/line")
 """Packages that hold compiled code, or constants that it freezes."""
 
 
@@ -37,6 +37,10 @@ def _cache_folder() -> Path:
 
 if not os.environ.get("NUMBA_CACHE_DIR"):
     vars(numba_config)["CACHE_DIR"] = str(_cache_folder())  # numba defines its settings at run time
+
+
+IS_COMPILED = not numba_config.DISABLE_JIT
+"""Whether code is compiled, and not run by Python, for a debugger, because of ``NUMBA_DISABLE_JIT``."""
 
 
 def compiled(function: Function) -> Function:

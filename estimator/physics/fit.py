@@ -6,17 +6,19 @@ recording only, so one simulation of every recording gives a column of the Jacob
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from estimator.abreast import LANES
 from estimator.physics.effect import MOMENTS
 from estimator.physics.layout import flat
 from estimator.physics.least_squares import Solution, minimise
 from estimator.physics.model import DrivelineModel
 from estimator.physics.parallel import WORKERS, concurrently
-from estimator.physics.simulate import Case, Grid, Start, grid_for, simulate_each
+from estimator.physics.simulate import Case, Grid, Start, grid_for, simulate_each, simulate_records
 from estimator.physics.unknowns import LocalBasis, Shared, local_basis, own_unknowns
 from estimator.signals.record import BoolArray, FloatArray, IntArray, Record
 
@@ -199,20 +201,14 @@ def start_vector(problem: Problem) -> FloatArray:
 def outputs_at(problem: Problem, x: FloatArray) -> tuple[FloatArray, ...]:
     """Simulate every recording at scaled unknowns ``x``."""
     p = parameters(problem, x)
-    return tuple(
-        concurrently(lambda i: simulated(problem, p, local_part(problem, x, i), i), range(len(problem.records)))
-    )
+    cases = [_case(basis, p, local_part(problem, x, i)) for i, basis in enumerate(problem.local)]
+    outputs = simulate_records(problem.grid, problem.records, cases)
+    return tuple(_within_reason(out, record) for out, record in zip(outputs, problem.records, strict=True))
 
 
 def start_of(problem: Problem, x: FloatArray, index: int) -> Start:
     """Return load torque and initial state of one recording."""
     return problem.local[index].start(local_part(problem, x, index))
-
-
-def simulated(problem: Problem, p: FloatArray, local: FloatArray, index: int) -> FloatArray:
-    """Return the output of one recording for a parameter vector and the recording's own unknowns, shape (N,)."""
-    only: FloatArray = simulated_each(problem, [(p, local)], index)[0]
-    return only
 
 
 def simulated_each(
@@ -226,8 +222,16 @@ def simulated_each(
     ``alike_s``, shape (K,), tells up to when each is as the first one (``simulate.simulate_each``).
     """
     record, basis = problem.records[index], problem.local[index]
-    cases = [Case(basis.parameters(p, local), basis.start(local), basis.extra_load(local)) for p, local in points]
-    out = simulate_each(problem.grid, record, cases, alike_s=alike_s)
+    cases = [_case(basis, p, local) for p, local in points]
+    return _within_reason(simulate_each(problem.grid, record, cases, alike_s=alike_s), record)
+
+
+def _case(basis: LocalBasis, p: FloatArray, local: FloatArray) -> Case:
+    return Case(basis.parameters(p, local), basis.start(local), basis.extra_load(local))
+
+
+def _within_reason(out: FloatArray, record: Record) -> FloatArray:
+    """Return outputs (..., N) of a recording, far away where the simulation runs away."""
     worst = BAD * (float(np.abs(record.output[record.okay]).max()) or 1.0)
     if np.abs(out).max() <= worst:  # False where it is no number
         return out
@@ -256,7 +260,7 @@ def jacobian_at(problem: Problem, x: FloatArray, outputs: Sequence[FloatArray]) 
     """
     low, high = bounds(problem)
     columns = [_moving(problem, low < high, i) for i in range(len(problem.records))]
-    parts = [(i, part) for i, mine in enumerate(columns) for part in np.array_split(mine, WORKERS)]
+    parts = [(i, part) for i, mine in enumerate(columns) for part in np.array_split(mine, _parts(mine.size))]
     rows = np.cumsum([0, *(int(use.sum()) for use in problem.use)])
     jacobian = np.zeros((rows[-1], x.size))
 
@@ -266,6 +270,11 @@ def jacobian_at(problem: Problem, x: FloatArray, outputs: Sequence[FloatArray]) 
 
     concurrently(fill, [work for work in parts if work[1].size])
     return jacobian
+
+
+def _parts(columns: int) -> int:
+    """Return into how many parts so many columns are cut: enough for both cores, none wider than the lanes."""
+    return max(WORKERS, math.ceil(columns / LANES))
 
 
 def changes(problem: Problem, x: FloatArray, index: int, columns: IntArray, output: FloatArray) -> FloatArray:

@@ -1,9 +1,10 @@
-"""Small pieces that several laws share, compiled."""
+"""Small pieces that several laws share, compiled: of one simulation, or of many abreast."""
 
 from __future__ import annotations
 
 import math
 
+from estimator.abreast import choose, every
 from estimator.compiled import compiled
 
 BEYOND = 20.0
@@ -11,6 +12,9 @@ BEYOND = 20.0
 
 NOTHING_LEFT = 40.0
 """From here on the exponential of the negative is lost beside 1."""
+
+LEAST = 1e-300
+"""A size that is next to nothing and has a logarithm."""
 
 BENT = 0.625
 """Up to here the hyperbolic tangent is a rational function of its argument to the last bit."""
@@ -23,26 +27,29 @@ def hyperbolic_tangent(x: float) -> float:
     Moshier, Methods and Programs for Mathematical Functions, 1989 (Cephes' ``tanh``).
     """
     size = abs(x)
-    if size > BEYOND:
+    if every(size > BEYOND):
         return math.copysign(1.0, x)
-    if size > BENT:
-        return math.copysign(1.0 - 2.0 / (math.exp(2.0 * size) + 1.0), x)
+    steep = math.copysign(1.0 - 2.0 / (math.exp(2.0 * min(size, BEYOND)) + 1.0), x)
+    if every(size > BENT):
+        return steep
     z = x * x
     above = (-9.64399179425052238628e-1 * z - 9.92877231001918586564e1) * z - 1.61468768441708447952e3
     below = ((z + 1.12811678491632931402e2) * z + 2.23548839060100448583e3) * z + 4.84406305325125486048e3
-    return x + x * z * above / below
+    return choose(size > BENT, steep, x + x * z * above / below)
 
 
 @compiled
 def power(size: float, exponent: float) -> float:
     """Return ``size ** exponent`` of what is not negative, to 13 digits; the C library's takes longer for the rest."""
-    return math.exp(exponent * math.log(size)) if size > 0.0 else 0.0
+    return choose(size > 0.0, math.exp(exponent * math.log(max(size, LEAST))), 0.0)
 
 
 @compiled
 def fading(x: float) -> float:
     """Return ``exp(-x)`` of what is not negative; 0 where nothing is left of it, at no cost."""
-    return math.exp(-x) if x < NOTHING_LEFT else 0.0
+    if every(x >= NOTHING_LEFT):
+        return 0.0
+    return choose(x < NOTHING_LEFT, math.exp(-x), 0.0)
 
 
 @compiled
@@ -54,7 +61,7 @@ def smooth_sign(speed: float, width: float) -> float:
 @compiled
 def dry_friction(speed: float, friction: float, width: float) -> float:
     """Return the torque ``T_c sign(w)`` against a speed [rad/s], rounded within ``width``."""
-    if friction == 0.0:
+    if every(friction == 0.0):
         return 0.0
     return friction * smooth_sign(speed, width)
 
@@ -63,18 +70,14 @@ def dry_friction(speed: float, friction: float, width: float) -> float:
 def beyond_gap(twist: float, gap: float) -> float:
     """Return the part of a twist that loads the shaft: zero inside a gap of total width ``gap`` [rad]."""
     half = 0.5 * gap
-    if twist > half:
-        return twist - half
-    if twist < -half:
-        return twist + half
-    return 0.0
+    return choose(twist > half, twist - half, choose(twist < -half, twist + half, 0.0))
 
 
 @compiled
 def share_inside(start: float, length: float, low: float, high: float) -> float:
     """Return which share of ``[start, start + length]`` lies in ``[low, high]``: smooth in both, as a fit needs."""
     inside = min(start + length, high) - max(start, low)
-    return inside / length if inside > 0.0 else 0.0
+    return choose(inside > 0.0, inside / length, 0.0)
 
 
 @compiled
@@ -83,16 +86,16 @@ def inertia_while(inertia: float, extra: float, share: float) -> float:
 
     Accelerations add up over time, not inertias: it is the harmonic mean. Without a share it is ``inertia``, exactly.
     """
-    if share == 0.0:
+    if every(share == 0.0):
         return inertia
     whole = inertia + extra
-    return inertia * (whole / (whole - share * extra))
+    return choose(share == 0.0, inertia, inertia * (whole / (whole - share * extra)))
 
 
 @compiled
 def overtoned_wave(amplitude: float, angle: float, phase: float, in_step: float, across: float) -> float:
     """Return ``A (cos(x) + a cos(2 x) + b sin(2 x))``, ``x = angle + phase``; 0 without an amplitude, at no cost."""
-    if amplitude == 0.0:
+    if every(amplitude == 0.0):
         return 0.0
     cosine, sine = math.cos(angle + phase), math.sin(angle + phase)
     return amplitude * (cosine + in_step * (2.0 * cosine * cosine - 1.0) + across * 2.0 * sine * cosine)
@@ -101,6 +104,6 @@ def overtoned_wave(amplitude: float, angle: float, phase: float, in_step: float,
 @compiled
 def wave(amplitude: float, angle: float, phase: float) -> float:
     """Return ``A cos(angle + phase)``; 0 without an amplitude, at no cost."""
-    if amplitude == 0.0:
+    if every(amplitude == 0.0):
         return 0.0
     return amplitude * math.cos(angle + phase)

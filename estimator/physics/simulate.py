@@ -9,13 +9,15 @@ from typing import NamedTuple
 
 import numpy as np
 
+from estimator.abreast import LANES
 from estimator.errors import BadModel
 from estimator.physics import joint, own_law, own_law_run
-from estimator.physics.kernel import integration, sensing, slots, state_vector
+from estimator.physics.kernel import integration, many, sensing, side_by_side, slots, state_vector
 from estimator.physics.kernel.conditions import branch_frequency, branch_inertia
 from estimator.physics.kernel.line import is_within
 from estimator.physics.model import DrivelineModel, Structure, natural_frequencies_rad_s
 from estimator.physics.motion import reverses, speed_scale
+from estimator.physics.parallel import concurrently
 from estimator.physics.torque_path import shaft_torques
 from estimator.signals.record import FloatArray, IntArray, Location, OutputKind, Record
 
@@ -217,7 +219,7 @@ def simulate_each(
     shape = (len(cases), record.time_s.size)
     slopes = np.zeros((shape[0], 2, shape[1] if output is None and record.offset_s is not None else 0))
     out = np.empty(shape)
-    integration.integrate_each(
+    many.integrate_each(
         MASSES[grid.structure],
         record.sample_time_s,
         grid.substeps,
@@ -235,6 +237,54 @@ def simulate_each(
         _samples_alike(record, len(cases), alike_s),
     )
     return _sampled_off_time(out, slopes, record.offset_s)
+
+
+def simulate_records(grid: Grid, records: Sequence[Record], cases: Sequence[Case]) -> list[FloatArray]:
+    """Simulate several recordings, a case of each: side by side where they can be, else on both cores."""
+    if _go_side_by_side(grid, records, cases):
+        return _simulated_side_by_side(grid, records, cases)
+    return concurrently(lambda i: simulate_each(grid, records[i], [cases[i]])[0], range(len(records)))
+
+
+def _go_side_by_side(grid: Grid, records: Sequence[Record], cases: Sequence[Case]) -> bool:
+    """Tell whether several recordings can be simulated as if they were one."""
+    if grid.structure is Structure.JOINT or len(records) > LANES or any(own_law.active(case.p) for case in cases):
+        return False
+    p = np.array([case.p for case in cases])
+    made = {(record.kind, record.location, record.sample_time_s, record.since_start_s[0]) for record in records}
+    on_time = all(record.offset_s is None for record in records)
+    if len(made) > 1 or not on_time or p[:, PERIODIC].any():
+        return False
+    return side_by_side.go_side_by_side(MASSES[grid.structure], p, np.arange(len(cases)))
+
+
+def _simulated_side_by_side(grid: Grid, records: Sequence[Record], cases: Sequence[Case]) -> list[FloatArray]:
+    """Simulate several recordings as if they were one; the shorter ones go on under the torques they ended with."""
+    wanted, sizes = output_state(records[0], grid.structure), [record.time_s.size for record in records]
+    inputs = [_inputs(record, [case]) for record, case in zip(records, cases, strict=True)]
+    torque, load = np.empty((2, len(records), max(sizes)))
+    for i, (given, size) in enumerate(zip(inputs, sizes, strict=True)):
+        torque[i, :size], torque[i, size:] = given.torque[0], given.torque[0, -1]
+        load[i, :size], load[i, size:] = given.load[0], given.load[0, -1]
+    out = np.empty_like(torque)
+    many.integrate_each(
+        MASSES[grid.structure],
+        records[0].sample_time_s,
+        grid.substeps,
+        grid.sign_width,
+        records[0].since_start_s[0],
+        torque,
+        load,
+        np.zeros(max(sizes)),
+        np.concatenate([given.p for given in inputs]),
+        np.concatenate([given.state for given in inputs]),
+        wanted,
+        wanted != state_vector.ANGLE,
+        out,
+        np.zeros((len(records), 2, 0)),
+        np.zeros(len(records), dtype=np.int64),
+    )
+    return [row[:size] for row, size in zip(out, sizes, strict=True)]
 
 
 def _samples_alike(record: Record, count: int, alike_s: FloatArray | None) -> IntArray:

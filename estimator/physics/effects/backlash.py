@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from estimator.abreast import choose, every
 from estimator.compiled import compiled
 from estimator.physics.effect import WITH_SPRING, Effect, EffectParameter, Element, Held, Start, Untestable
 from estimator.physics.laws import fading
@@ -19,17 +20,17 @@ def damping_share(loaded_twist: float, contact: float) -> float:
     Damping that switched on at full size at first touch would pull the faces together and kick the motor; flanks
     in contact squeeze out their play first (Hunt and Crossley, J. Appl. Mech. 42, 1975). No depth: all at once.
     """
-    if contact <= 0.0:
-        return 0.0 if loaded_twist == 0.0 else 1.0
-    return 1.0 - fading(abs(loaded_twist) / contact)
+    at_once = choose(loaded_twist == 0.0, 0.0, 1.0)
+    if every(contact <= 0.0):
+        return at_once
+    return choose(contact <= 0.0, at_once, 1.0 - fading(abs(loaded_twist) / contact))
 
 
 @compiled
 def pressed(torque: float, loaded_twist: float, pull: float) -> float:
     """Return the torque that the faces of a gap pass on: they press; a film of oil between them may also pull."""
-    if loaded_twist == 0.0:
-        return 0.0
-    return torque if torque * loaded_twist > 0.0 else pull * torque
+    passed_on = choose(torque * loaded_twist > 0.0, torque, pull * torque)
+    return choose(loaded_twist == 0.0, 0.0, passed_on)
 
 
 def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
+from estimator.abreast import choose
 from estimator.compiled import compiled
 from estimator.physics.effect import WITH_SPRING, Effect, EffectParameter, Element, Held, Start
 from estimator.physics.laws import power
@@ -22,8 +23,7 @@ def loading_rate(loading: float, rate: float, sharpness: float, unloading: float
     """
     pace = min(abs(rate), fastest)
     yielded = power(min(abs(loading), 1.0), sharpness)
-    if rate * loading < 0.0:
-        yielded *= -unloading
+    yielded = choose(rate * loading < 0.0, -unloading * yielded, yielded)
     return pace * math.copysign(1.0 - yielded, rate)
 
 

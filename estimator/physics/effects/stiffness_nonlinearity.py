@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
+from estimator.abreast import choose, every
 from estimator.compiled import compiled
 from estimator.physics.effect import WITH_SPRING, Effect, EffectParameter, Element, Start
 from estimator.physics.laws import power
@@ -20,10 +21,10 @@ def factor(twist: float, hardening: float, shape: float) -> float:
     To first order it is ``1 + h e^2`` whatever the shape m. A hardening shaft with m = 1 is the Duffing spring; a
     softening one with m = 1/2 ends in a constant torque, and none ever pulls the wrong way.
     """
-    if hardening == 0.0:
+    if every(hardening == 0.0):
         return 1.0
     size = 1.0 + abs(hardening) * twist * twist / shape
-    return power(size, shape if hardening > 0.0 else -shape)
+    return power(size, choose(hardening > 0.0, shape, -shape))
 
 
 def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from estimator.abreast import choose, every
 from estimator.compiled import compiled
 from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start, Untestable
 from estimator.physics.effects import coulomb_friction_motor
@@ -16,10 +17,11 @@ from estimator.signals.record import Record
 @compiled
 def law(speed: float, excess: float, coulomb: float, stribeck_speed: float, width: float) -> float:
     """Return ``(T_c + T_x exp(-(w/w_s)^2)) sign(w)``, the friction torque against the motion."""
-    if stribeck_speed <= 0.0:
+    if every(stribeck_speed <= 0.0):
         return 0.0
     ratio = speed / stribeck_speed
-    return (coulomb + excess * fading(ratio * ratio)) * smooth_sign(speed, width)
+    torque = (coulomb + excess * fading(ratio * ratio)) * smooth_sign(speed, width)
+    return choose(stribeck_speed > 0.0, torque, 0.0)
 
 
 def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
+from estimator.abreast import choose, every
 from estimator.compiled import compiled
 from estimator.physics.effect import WITH_SHAFT, Effect, EffectParameter, Element, Start
 from estimator.physics.laws import hyperbolic_tangent
@@ -28,11 +29,11 @@ def coupling(
     """
     slope = 1.0 / (slip_per_nm * (abs(vehicle) + creep_speed))
     needed = slope / steepest
-    if wheel_share * (1.0 - wheel_share) >= needed:
+    enough = wheel_share * (1.0 - wheel_share) >= needed
+    if every(enough):
         return slope, wheel_share
-    if needed >= 0.25:
-        return 0.25 * steepest, 0.5
-    return slope, 0.5 + math.copysign(math.sqrt(0.25 - needed), wheel_share - 0.5)
+    half = 0.5 + math.copysign(math.sqrt(max(0.25 - needed, 0.0)), wheel_share - 0.5)
+    return min(slope, 0.25 * steepest), choose(enough, wheel_share, half)
 
 
 @compiled
@@ -47,15 +48,16 @@ def build_up(slide: float, roll: float, traction: float, tread: float, relaxatio
 @compiled
 def carcass(slide: float, vehicle: float, winding: float, inverse_creep: float) -> float:
     """Return the torque by which the carcass damps its wind-up [Nm], near standstill where rolling can't relax it."""
-    return winding * slide / (1.0 + (vehicle * inverse_creep) ** 2)
+    crept = vehicle * inverse_creep
+    return winding * slide / (1.0 + crept * crept)
 
 
 @compiled
 def gripped(traction: float, grip: float, inverse_grip: float) -> float:
     """Return the torque that a tyre passes on [Nm], of what it would without an end to its grip."""
-    if inverse_grip == 0.0:
+    if every(inverse_grip == 0.0):
         return traction
-    return grip * hyperbolic_tangent(traction * inverse_grip)
+    return choose(inverse_grip == 0.0, traction, grip * hyperbolic_tangent(traction * inverse_grip))
 
 
 def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:

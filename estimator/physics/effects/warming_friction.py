@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
+from estimator.abreast import every
 from estimator.compiled import compiled
 from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start
 from estimator.physics.model import DrivelineModel, Motion, unit
@@ -15,7 +16,7 @@ from estimator.signals.record import Record
 @compiled
 def cold_part(time_s: float, cold: float, time_constant_s: float) -> float:
     """Return the viscous friction that has not gone away yet [Nm s/rad]."""
-    if cold == 0.0:
+    if every(cold == 0.0):
         return 0.0
     return cold * math.exp(-time_s / time_constant_s)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from estimator.abreast import choose, every, like, some
 from estimator.compiled import inlined
 from estimator.physics.effects import extra_torsional_mode, warming_friction
 from estimator.physics.kernel import slots
@@ -27,17 +28,21 @@ def is_waving(p: FloatArray) -> bool:
 @inlined
 def is_changing(begin_s: float, end_s: float, p: FloatArray) -> bool:
     """Tell whether an event begins or ends between two times."""
-    generator = p[slots.GENERATOR] != 0.0 and is_edge(begin_s, end_s, p[slots.GENERATOR_FROM], p[slots.GENERATOR_TO])
-    crack = p[slots.CRACK] != 0.0 and is_edge(begin_s, end_s, p[slots.CRACK_FROM], p[slots.CRACK_TO])
-    payload = p[slots.PAYLOAD] != 0.0 and is_edge(begin_s, end_s, p[slots.PAYLOAD_FROM], p[slots.PAYLOAD_TO])
-    brake = p[slots.BRAKE] != 0.0 and is_edge(begin_s, end_s, p[slots.BRAKE_FROM], p[slots.BRAKE_TO])
-    return bool(generator or crack or payload or brake)
+    generator = some(p[slots.GENERATOR] != 0.0) and is_edge(
+        begin_s, end_s, p[slots.GENERATOR_FROM], p[slots.GENERATOR_TO]
+    )
+    crack = some(p[slots.CRACK] != 0.0) and is_edge(begin_s, end_s, p[slots.CRACK_FROM], p[slots.CRACK_TO])
+    payload = some(p[slots.PAYLOAD] != 0.0) and is_edge(begin_s, end_s, p[slots.PAYLOAD_FROM], p[slots.PAYLOAD_TO])
+    brake = some(p[slots.BRAKE] != 0.0) and is_edge(begin_s, end_s, p[slots.BRAKE_FROM], p[slots.BRAKE_TO])
+    return generator or crack or payload or brake
 
 
 @inlined
 def is_edge(begin_s: float, end_s: float, from_s: float, to_s: float) -> bool:
     """Tell whether one of two moments lies between two times."""
-    return begin_s <= from_s <= end_s or begin_s <= to_s <= end_s
+    begins = (begin_s <= from_s) & (from_s <= end_s)
+    ends = (begin_s <= to_s) & (to_s <= end_s)
+    return some(begins | ends)
 
 
 @inlined
@@ -84,7 +89,7 @@ def conditions(
         inertia_motor = inertia_while(inertia_motor, p[slots.PAYLOAD], loaded)
     dry_motor = abs(p[slots.COULOMB]) + abs(p[slots.STRIBECK]) + abs(p[slots.STRIBECK_COULOMB])
     dry_load = p[slots.COULOMB_LOAD] + braked * p[slots.BRAKE]
-    wheel_inertia = p[slots.SLIP_WHEEL] * inertia_load if p[slots.SLIP] > 0.0 else inertia_load
+    wheel_inertia = choose(p[slots.SLIP] > 0.0, p[slots.SLIP_WHEEL] * inertia_load, inertia_load)
     carried = inertia_motor if masses == 1 else wheel_inertia
     fastest = STICK_STABILITY / h
     lightest = min(inertia_motor, p[slots.J_2] if masses == 3 else carried)
@@ -92,9 +97,9 @@ def conditions(
         lightest = min(lightest, branch_inertia(p))
     stiffness = p[slots.K] * line_share(p) * (1.0 + cracked * p[slots.CRACK])
     inverse_yield = 0.0
-    if p[slots.SLIDER] != 0.0:
+    if some(p[slots.SLIDER] != 0.0):
         inverse_yield = 1.0 / max(p[slots.YIELD], p[slots.SLIDER] / (fastest * fastest * lightest))
-        if p[slots.SLIDER_INSIDE] > 0.0:
+        if some(p[slots.SLIDER_INSIDE] > 0.0):
             stiffness = max(stiffness - p[slots.SLIDER_INSIDE] * p[slots.SLIDER] / p[slots.YIELD], 0.0)
     return Conditions(
         ripple,
@@ -124,12 +129,13 @@ def conditions(
 @inlined
 def tyre(inertia: float, fastest: float, p: FloatArray) -> Tyre:
     """Return what a tyre's law takes from its parameters, the load's inertia and the fastest decay; 0 without slip."""
-    if p[slots.SLIP] <= 0.0:
-        return Tyre(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    if every(p[slots.SLIP] <= 0.0):
+        none = like(0.0, inertia)
+        return Tyre(none, none, none, none, none, none, none)
     wheel, vehicle = p[slots.SLIP_WHEEL] * inertia, (1.0 - p[slots.SLIP_WHEEL]) * inertia
     tread = 1.0 / p[slots.SLIP]
     winding = 0.0
-    if p[slots.RELAXATION] > 0.0:
+    if some(p[slots.RELAXATION] > 0.0):
         winding = min(p[slots.CARCASS] * tread / p[slots.RELAXATION], wheel * fastest)
     return Tyre(
         tread,

@@ -11,8 +11,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-
 from estimator.compiled import brief, compiled, inlined
 from estimator.physics.effects import actuator_lag, transport_delay
 from estimator.physics.kernel import slots
@@ -24,11 +22,12 @@ from estimator.physics.kernel.conditions import (
     is_waving,
     with_torques,
 )
-from estimator.physics.kernel.line import Line, is_elastic, is_extended, is_within
+from estimator.physics.kernel.line import Line, is_within
 from estimator.physics.kernel.linear import WORTHWHILE_SAMPLES, answers, has_dry_friction, is_linear, led_on
+from estimator.physics.kernel.makes import for_its_make
 from estimator.physics.kernel.sensing import entry, reading, shown, smoothed
 from estimator.physics.kernel.state_vector import FILTER_RISE, FILTERED, LAG_RISE, LAGGED, State
-from estimator.signals.record import FloatArray, IntArray
+from estimator.signals.record import FloatArray
 
 RADIANS_PER_STEP_OF_MODE = 0.6
 """Integration step in radians of the extra mode, which is seen through the motor's inertia only."""
@@ -145,26 +144,6 @@ def integrate_made(
     state[FILTERED], state[FILTER_RISE] = filtered, filter_rise
 
 
-@inlined
-def integrate_line(masses: int, elastic: bool, *given: Any) -> None:
-    """Do what ``integrate`` does, for masses and a shaft that are known when it is compiled."""
-    if is_extended(given[8]):
-        integrate_made(Line(masses, elastic, not elastic, True), *given)
-    elif not elastic and given[8][slots.SLIDER] != 0.0:
-        integrate_made(Line(masses, elastic, True, False), *given)
-    else:
-        integrate_made(Line(masses, elastic, False, False), *given)
-
-
-@inlined
-def integrate_shaft(masses: int, *given: Any) -> None:
-    """Do what ``integrate`` does, for masses with a shaft between them, known when it is compiled."""
-    if is_elastic(given[8]):
-        integrate_line(masses, True, *given)
-    else:
-        integrate_line(masses, False, *given)
-
-
 @compiled
 def integrate(
     masses: int,
@@ -220,55 +199,10 @@ def integrate(
         before ``first`` is taken from it, and where it is longer that before the next sample is left in it.
     """
     given = (sample_time_s, substeps, sign_width, first, start_s, torque, load, angle, p)
-    wanted = (state, output, sensor, out, slopes)
-    if masses == 1:
-        integrate_line(1, True, *given, *wanted)
-    elif masses == 2:
-        integrate_shaft(2, *given, *wanted)
-    else:
-        integrate_shaft(3, *given, *wanted)
+    for_its_make(masses, integrate_made, p, *given, state, output, sensor, out, slopes)
 
 
 @brief
 def integrate_period(*given: Any) -> None:
     """Do what ``integrate`` does, with its arguments, for a rig that is stepped period by period."""
     integrate(*given)
-
-
-@compiled
-def integrate_each(
-    masses: int,
-    sample_time_s: float,
-    substeps: int,
-    sign_width: float,
-    start_s: float,
-    torque: FloatArray,
-    load: FloatArray,
-    angle: FloatArray,
-    p: FloatArray,
-    state: FloatArray,
-    output: int,
-    sensor: bool,
-    out: FloatArray,
-    slopes: FloatArray,
-    alike: IntArray,
-) -> None:
-    """Do what ``integrate`` does for every row of ``torque``, ``load``, ``p``, ``state``, ``out`` and ``slopes``.
-
-    One call for many simulations: threads do not wait for the interpreter in between. Row i is as row 0 before sample
-    ``alike[i]`` and is simulated from there on; ``alike[0]`` is the number of samples.
-    """
-    given = (sample_time_s, substeps, sign_width)
-    reached = 0
-    for i in np.argsort(alike):
-        if alike[i] > reached:
-            known = (torque[0], load[0], angle, p[0], state[0])
-            integrate(masses, *given, reached, start_s, *known, output, sensor, out[0, : alike[i]], slopes[0])
-            reached = alike[i]
-        if reached > 0 and i > 0:
-            state[i] = state[0]
-            out[i, :reached] = out[0, :reached]
-            slopes[i, :, : reached + 1] = slopes[0, :, : reached + 1]
-    for i in range(1, torque.shape[0]):
-        rows = (torque[i], load[i], angle, p[i], state[i])
-        integrate(masses, *given, alike[i], start_s, *rows, output, sensor, out[i], slopes[i])

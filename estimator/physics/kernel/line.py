@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from estimator.abreast import some
 from estimator.compiled import inlined
 from estimator.physics.kernel import slots
 from estimator.signals.record import FloatArray
@@ -47,4 +48,4 @@ def is_extended(p: FloatArray) -> bool:
 @inlined
 def is_within(p: FloatArray) -> bool:
     """Tell whether the inertia of an extra mode is in the line, before the shaft or behind it, and not beside it."""
-    return bool(p[slots.BETWEEN] > 0.0 or p[slots.BEHIND] > 0.0)
+    return some(p[slots.BETWEEN] > 0.0) or some(p[slots.BEHIND] > 0.0)

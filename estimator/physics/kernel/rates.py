@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from estimator.abreast import every, like
 from estimator.compiled import inlined
 from estimator.physics.effects import (
     aerodynamic_drag,
@@ -24,7 +25,7 @@ def motor_friction(speed: float, p: FloatArray, width: float, dry: float) -> flo
     """Return the torque of every friction law at the motor [Nm], viscous included; the dry ones where there are any."""
     friction = float(p[slots.B_M]) * speed
     friction += float(p[slots.QUADRATIC]) * speed * abs(speed)
-    if dry == 0.0:
+    if every(dry == 0.0):
         return friction
     coulomb, excess = p[slots.STRIBECK_COULOMB], p[slots.STRIBECK]
     friction += dry_friction(speed, p[slots.COULOMB], width)
@@ -34,20 +35,21 @@ def motor_friction(speed: float, p: FloatArray, width: float, dry: float) -> flo
 @inlined
 def damping_torque(rate: float, p: FloatArray) -> float:
     """Return the torque of the shaft's damper [Nm] at the rate of its twist [rad/s]."""
-    return float(p[slots.C] * line_share(p) ** 2) * rate
+    share = line_share(p)
+    return float(p[slots.C]) * share * share * rate
 
 
 @inlined
 def shaft_torque(twist: float, rate: float, loading: float, p: FloatArray, stiffness: float) -> float:
     """Return the torque the shaft carries [Nm] at a twist [rad], its rate [rad/s] and the hysteresis' loading [-]."""
     damping = damping_torque(rate, p)
-    loaded = twist
-    if p[slots.GAP] > 0.0:
+    loaded, closed = twist, every(p[slots.GAP] <= 0.0)
+    if not closed:
         loaded = beyond_gap(twist, p[slots.GAP])
         damping *= backlash.damping_share(loaded, p[slots.CONTACT])
     elastic = stiffness * loaded * stiffness_nonlinearity.factor(loaded, p[slots.HARDENING], p[slots.SHAPE])
     torque = float(elastic) + damping + float(p[slots.SLIDER]) * loading
-    return backlash.pressed(torque, loaded, p[slots.PULL]) if p[slots.GAP] > 0.0 else torque
+    return torque if closed else backlash.pressed(torque, loaded, p[slots.PULL])
 
 
 @inlined
@@ -70,13 +72,17 @@ def rates(line: Line, now: Conditions, x: State, p: FloatArray) -> State:
         drag = load_drag(x.speed, x.speed, now, p) + now.load
         branch = branch_rate(x.branch_twist, x.speed - x.branch_speed, now, p) if line.extended else 0.0
         acceleration = (drive - now.branch_inertia * branch - drag) * now.inverse_motor
-        return State(x.speed, acceleration, 0.0, 0.0, 0.0, 0.0, x.speed - x.branch_speed, branch, 0.0, 0.0, 0.0)
-    between, behind = line.extended and p[slots.BETWEEN] > 0.0, line.extended and p[slots.BEHIND] > 0.0
+        still = like(0.0, x.speed)
+        own_rate = x.speed - x.branch_speed
+        return State(
+            x.speed, acceleration, still, still, still, still, own_rate, like(branch, x.speed), still, still, still
+        )
+    between, behind = line.extended and every(p[slots.BETWEEN] > 0.0), line.extended and every(p[slots.BEHIND] > 0.0)
     driven = x.middle_speed if line.masses == 3 else x.load_speed
     own_rate = x.branch_speed - driven if behind else x.speed - x.branch_speed
     rate = (x.branch_speed if between else x.speed) - (x.branch_speed if behind else driven)
     shaft, reaction = shaft_torques(line, rate, now, x, p)
-    pull, branch = shaft, 0.0
+    pull, branch = shaft, like(0.0, x.speed)
     if line.extended:
         branch = branch_rate(x.branch_twist, own_rate, now, p)
         own = now.branch_inertia * branch
@@ -85,8 +91,8 @@ def rates(line: Line, now: Conditions, x: State, p: FloatArray) -> State:
         else:
             drive -= own
         if between:
-            branch, reaction = branch - reaction / now.branch_inertia, 0.0
-    middle_twist, middle_speed = 0.0, 0.0
+            branch, reaction = branch - reaction / now.branch_inertia, like(0.0, x.speed)
+    middle_twist, middle_speed = like(0.0, x.speed), like(0.0, x.speed)
     if line.masses == 3:
         carried = pull
         middle_twist = x.middle_speed - x.load_speed
@@ -98,7 +104,7 @@ def rates(line: Line, now: Conditions, x: State, p: FloatArray) -> State:
         (drive - reaction) * now.inverse_motor,
         rate,
         load,
-        sliding(x.loading, rate, now, p) if line.sliding else 0.0,
+        like(sliding(x.loading, rate, now, p) if line.sliding else 0.0, x.speed),
         vehicle,
         own_rate,
         branch,
@@ -111,7 +117,7 @@ def rates(line: Line, now: Conditions, x: State, p: FloatArray) -> State:
 @inlined
 def sliding(loading: float, rate: float, now: Conditions, p: FloatArray) -> float:
     """Return how fast the slider inside the shaft loads [1/s]; 0 where there is none."""
-    if p[slots.SLIDER] == 0.0:
+    if every(p[slots.SLIDER] == 0.0):
         return 0.0
     sharpness, unloading = p[slots.SHARPNESS], p[slots.UNLOADING]
     return shaft_hysteresis.loading_rate(loading, rate * now.inverse_yield, sharpness, unloading, now.fastest)
@@ -120,7 +126,7 @@ def sliding(loading: float, rate: float, now: Conditions, p: FloatArray) -> floa
 @inlined
 def branch_rate(twist: float, rate: float, now: Conditions, p: FloatArray) -> float:
     """Return the acceleration that its spring gives the extra mode's inertia [rad/s^2]; 0 where there is none."""
-    if now.branch_inertia <= 0.0:
+    if every(now.branch_inertia <= 0.0):
         return 0.0
     frequency = now.branch_frequency
     return frequency * (frequency * twist + 2.0 * float(p[slots.BRANCH_DAMPING]) * rate)
@@ -137,14 +143,15 @@ def load_drag(wheel: float, vehicle: float, now: Conditions, p: FloatArray) -> f
 def load_rates(line: Line, pull: float, now: Conditions, x: State, p: FloatArray) -> tuple[float, float, float]:
     """Return the accelerations of the load and, where the tyre slips, of the vehicle [rad/s^2]; the traction's rate."""
     wheel = x.load_speed
-    if not line.extended or p[slots.SLIP] <= 0.0:
-        return (pull - load_drag(wheel, wheel, now, p) - now.load) * now.inverse_load, 0.0, 0.0
+    still = like(0.0, wheel)
+    if not line.extended or every(p[slots.SLIP] <= 0.0):
+        return (pull - load_drag(wheel, wheel, now, p) - now.load) * now.inverse_load, still, still
     vehicle = x.vehicle_speed
-    tyre, slide, rate = now.tyre, wheel - vehicle, 0.0
+    tyre, slide, rate = now.tyre, wheel - vehicle, still
     inverse_wheel, inverse_vehicle = tyre.inverse_wheel, tyre.inverse_vehicle
-    if p[slots.RELAXATION] > 0.0:
+    if every(p[slots.RELAXATION] > 0.0):
         traction, roll = x.traction, abs(vehicle)
-        relaxation = max(p[slots.RELAXATION], roll / now.fastest, tyre.least_relaxation)
+        relaxation = max(p[slots.RELAXATION], max(roll / now.fastest, tyre.least_relaxation))
         rate = tyre_slip.build_up(slide, roll, traction, tyre.tread, relaxation)
         traction += tyre_slip.carcass(slide, vehicle, tyre.winding, tyre.inverse_creep)
     else:

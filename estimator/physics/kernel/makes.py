@@ -1,0 +1,45 @@
+"""From parameters to the make of their line: a simulation is compiled for each make, and what one lacks costs nothing.
+
+``made`` is that simulation, a compiled function of a `Line` and of what is ``given`` to it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from estimator.compiled import inlined
+from estimator.physics.kernel import slots
+from estimator.physics.kernel.line import Line, is_elastic, is_extended
+from estimator.signals.record import FloatArray
+
+Made = Callable[..., None]
+
+
+@inlined
+def for_its_make(masses: int, made: Made, p: FloatArray, *given: Any) -> None:
+    """Call what is compiled for the make of the line that has these parameters, of 1, 2 or 3 masses."""
+    if masses == 1:
+        _for_its_states(1, True, made, p, *given)
+    elif masses == 2:
+        _for_its_shaft(2, made, p, *given)
+    else:
+        _for_its_shaft(3, made, p, *given)
+
+
+@inlined
+def _for_its_shaft(masses: int, made: Made, p: FloatArray, *given: Any) -> None:
+    if is_elastic(p):
+        _for_its_states(masses, True, made, p, *given)
+    else:
+        _for_its_states(masses, False, made, p, *given)
+
+
+@inlined
+def _for_its_states(masses: int, elastic: bool, made: Made, p: FloatArray, *given: Any) -> None:
+    if is_extended(p):
+        made(Line(masses, elastic, not elastic, True), *given)
+    elif not elastic and p[slots.SLIDER] != 0.0:
+        made(Line(masses, elastic, True, False), *given)
+    else:
+        made(Line(masses, elastic, False, False), *given)

@@ -1,0 +1,71 @@
+"""Many simulations of one recording in one call: threads do not wait for the interpreter in between."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from estimator.abreast import LANES
+from estimator.compiled import compiled
+from estimator.physics.kernel.integration import integrate, with_mode
+from estimator.physics.kernel.side_by_side import go_side_by_side, integrate_side_by_side
+from estimator.signals.record import FloatArray, IntArray
+
+
+@compiled
+def integrate_each(
+    masses: int,
+    sample_time_s: float,
+    substeps: int,
+    sign_width: float,
+    start_s: float,
+    torque: FloatArray,
+    load: FloatArray,
+    angle: FloatArray,
+    p: FloatArray,
+    state: FloatArray,
+    output: int,
+    sensor: bool,
+    out: FloatArray,
+    slopes: FloatArray,
+    alike: IntArray,
+) -> None:
+    """Do what ``integrate`` does for every row of ``torque``, ``load``, ``p``, ``state``, ``out`` and ``slopes``.
+
+    Row i is as row 0 before sample ``alike[i]`` and is simulated from about there on; ``alike[0]`` is the number of
+    samples. Rows that can be go side by side, and leave their states as they were.
+    """
+    given = (sample_time_s, substeps, sign_width)
+    apart = not np.any(alike[1:])
+    order = np.argsort(alike) if apart else 1 + np.argsort(alike[1:])
+    reached, i = 0, 0
+    while i < order.size:
+        rows = order[i : i + LANES]
+        together = slopes.shape[2] == 0 and go_side_by_side(masses, p, rows)
+        if not together:
+            rows = rows[:1]
+        i += rows.size
+        common = 0 if apart else alike[rows[0]]
+        if common > reached:
+            known = (torque[0], load[0], angle, p[0], state[0])
+            integrate(masses, *given, reached, start_s, *known, output, sensor, out[0, :common], slopes[0])
+            reached = common
+        if reached > 0:
+            for row in rows:
+                state[row] = state[0]
+                out[row, :reached] = out[0, :reached]
+                slopes[row, :, : reached + 1] = slopes[0, :, : reached + 1]
+        if together:
+            finest = substeps
+            for row in rows:
+                finest = max(finest, with_mode(substeps, sample_time_s, p[row]))
+            them = (torque, load, angle, p, state)
+            integrate_side_by_side(
+                masses, sample_time_s, finest, sign_width, reached, start_s, rows, *them, output, sensor, out
+            )
+        else:
+            row = rows[0]
+            it = (torque[row], load[row], angle, p[row], state[row])
+            integrate(masses, *given, reached, start_s, *it, output, sensor, out[row], slopes[row])
+    if not apart:
+        rest = (torque[0], load[0], angle, p[0], state[0])
+        integrate(masses, *given, reached, start_s, *rest, output, sensor, out[0], slopes[0])

@@ -1,0 +1,133 @@
+"""Up to eight simulations side by side, as a Jacobian takes them: one instruction for all.
+
+The laws are those of one simulation (``rates``), compiled for numbers abreast. A line whose torque or output is
+delayed, filtered or differentiated takes its simulations one by one, and so does a linear one: it adds up what it
+knows.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from estimator.abreast import LANES, abreast
+from estimator.compiled import IS_COMPILED, compiled, inlined
+from estimator.physics.kernel import slots
+from estimator.physics.kernel.conditions import conditions, is_changing, is_waving, with_torques
+from estimator.physics.kernel.line import Line, is_elastic
+from estimator.physics.kernel.linear import is_linear
+from estimator.physics.kernel.makes import for_its_make
+from estimator.physics.kernel.runge_kutta import runge_kutta
+from estimator.physics.kernel.sensing import entry, reading, shown
+from estimator.physics.kernel.state_vector import State
+from estimator.signals.record import FloatArray, IntArray
+
+
+@compiled
+def go_side_by_side(masses: int, p: FloatArray, rows: IntArray) -> bool:
+    """Tell whether some of the lines, a row of parameters each, are simulated side by side."""
+    first = p[rows[0]]
+    on_time = first[slots.DELAY] == 0.0 and first[slots.DRIFT] == 0.0
+    at_once = first[slots.LAG] == 0.0 and first[slots.FILTER] == 0.0
+    if rows.size == 1 or not (IS_COMPILED and on_time and at_once):
+        return False
+    if is_linear(Line(masses, masses == 1 or is_elastic(first), False, False), first):
+        return False
+    return are_kin(p, rows)
+
+
+@inlined
+def are_kin(p: FloatArray, rows: IntArray) -> bool:
+    """Tell whether some of the lines, a row of parameters each, are alike but for the size of their parameters."""
+    for row in rows[1:]:
+        for slot in range(p.shape[1]):
+            if (p[row, slot] == 0.0) != (p[rows[0], slot] == 0.0):
+                return False
+    return True
+
+
+@inlined
+def in_lanes(values: FloatArray, rows: IntArray) -> FloatArray:
+    """Return some of the rows (K, N) as columns (N, LANES); lanes that are left over do what the first one does."""
+    columns = np.empty((values.shape[1], LANES))
+    for lane in range(LANES):
+        columns[:, lane] = values[rows[lane if lane < rows.size else 0]]
+    return columns
+
+
+@inlined
+def advance(
+    line: Line,
+    sample_time_s: float,
+    substeps: int,
+    sign_width: float,
+    first: int,
+    start_s: float,
+    torque_lanes: FloatArray,
+    load_lanes: FloatArray,
+    angle: FloatArray,
+    one_of_them: FloatArray,
+    p_lanes: FloatArray,
+    state_lanes: FloatArray,
+    output: int,
+    out_lanes: FloatArray,
+) -> None:
+    """Simulate lines of one make; ``one_of_them`` is the parameters of one."""
+    torque, load, p = abreast(torque_lanes), abreast(load_lanes), abreast(p_lanes)
+    start, out = abreast(state_lanes), abreast(out_lanes)
+    h = sample_time_s / substeps
+    length = 1.0 / substeps
+    waving = is_waving(one_of_them)
+    x = State(
+        start[0], start[1], start[2], start[3], start[4], start[5], start[6], start[7], start[8], start[9], start[10]
+    )
+    now = conditions(line.masses, start_s + first * sample_time_s, h, 0.0, load[first], sign_width, p)
+    for k in range(first, torque_lanes.shape[0]):
+        out[k] = entry(x, output)
+        turn = angle[k + 1] - angle[k] if k + 1 < angle.shape[0] else angle[k] - angle[k - 1]
+        time_s = start_s + k * sample_time_s
+        varying = waving or is_changing(time_s - sample_time_s, time_s + sample_time_s, p)
+        if not varying:
+            now = with_torques(now, now.torque, load[k])
+        for j in range(substeps):
+            if varying:
+                middle, place = angle[k] + turn * (j + 0.5) * length, k + j * length
+                now = conditions(line.masses, start_s + place * sample_time_s, h, middle, load[k], sign_width, p)
+            x = runge_kutta(line, now, torque[k], 0.0, x, p, h)
+
+
+@compiled
+def integrate_side_by_side(
+    masses: int,
+    sample_time_s: float,
+    substeps: int,
+    sign_width: float,
+    first: int,
+    start_s: float,
+    rows: IntArray,
+    torque: FloatArray,
+    load: FloatArray,
+    angle: FloatArray,
+    p: FloatArray,
+    state: FloatArray,
+    output: int,
+    sensor: bool,
+    out: FloatArray,
+) -> None:
+    """Do what ``integration.integrate`` does for some rows, at most `LANES`; their states stay as they are.
+
+    Parameters
+    ----------
+    rows : ndarray of int
+        Which of the following.
+    torque, load, p, state, out
+        As there, a row each: (K, N), (K, N), (K, layout.SIZE), (K, STATES), (K, N).
+    """
+    values = np.empty((torque.shape[1], LANES))
+    given = (sample_time_s, substeps, sign_width, first, start_s, in_lanes(torque, rows), in_lanes(load, rows), angle)
+    them = (in_lanes(p, rows), in_lanes(state, rows))
+    for_its_make(masses, advance, p[rows[0]], *given, p[rows[0]], *them, output, values)
+    for lane in range(rows.size):
+        own = p[rows[lane]]
+        for k in range(first, torque.shape[1]):
+            value = values[k, lane]
+            out[rows[lane], k] = shown(reading(value, angle[k], own), value, own) if sensor else value
