@@ -39,7 +39,7 @@ if not os.environ.get("NUMBA_CACHE_DIR"):
     vars(numba_config)["CACHE_DIR"] = str(_cache_folder())  # numba defines its settings at run time
 
 
-IS_COMPILED = not numba_config.DISABLE_JIT
+IS_COMPILED = not vars(numba_config)["DISABLE_JIT"]
 """Whether code is compiled, and not run by Python, for a debugger, because of ``NUMBA_DISABLE_JIT``."""
 
 
