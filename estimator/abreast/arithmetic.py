@@ -15,6 +15,9 @@ from estimator.abreast.types import LANES, NUMBERS, LanesType, MaskType, lanes, 
 Make = Callable[..., Any]
 """From an instruction builder and the arguments' values to the result's."""
 
+FUSED = ("contract",)
+"""A product and the sum it goes into may be one instruction, rounded once."""
+
 NUMBER = (LanesType, types.Number)
 ANSWER = (MaskType, types.Boolean)
 
@@ -59,11 +62,11 @@ def _larger(builder: Any, x: Any, y: Any) -> Any:
 
 
 for _function in (operator.add, operator.iadd):
-    _define_numbers(_function, lambda builder, x, y: builder.fadd(x, y))
+    _define_numbers(_function, lambda builder, x, y: builder.fadd(x, y, flags=FUSED))
 for _function in (operator.sub, operator.isub):
-    _define_numbers(_function, lambda builder, x, y: builder.fsub(x, y))
+    _define_numbers(_function, lambda builder, x, y: builder.fsub(x, y, flags=FUSED))
 for _function in (operator.mul, operator.imul):
-    _define_numbers(_function, lambda builder, x, y: builder.fmul(x, y))
+    _define_numbers(_function, lambda builder, x, y: builder.fmul(x, y, flags=FUSED))
 for _function in (operator.truediv, operator.itruediv):
     _define_numbers(_function, lambda builder, x, y: builder.fdiv(x, y))
 _define_numbers(operator.neg, lambda builder, x: builder.fneg(x))

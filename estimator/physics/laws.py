@@ -29,13 +29,13 @@ def hyperbolic_tangent(x: float) -> float:
     size = abs(x)
     if every(size > BEYOND):
         return math.copysign(1.0, x)
-    steep = math.copysign(1.0 - 2.0 / (math.exp(2.0 * min(size, BEYOND)) + 1.0), x)
-    if every(size > BENT):
-        return steep
     z = x * x
     above = (-9.64399179425052238628e-1 * z - 9.92877231001918586564e1) * z - 1.61468768441708447952e3
     below = ((z + 1.12811678491632931402e2) * z + 2.23548839060100448583e3) * z + 4.84406305325125486048e3
-    return choose(size > BENT, steep, x + x * z * above / below)
+    straight = x + x * z * above / below
+    if every(size <= BENT):
+        return straight
+    return choose(size > BENT, math.copysign(1.0 - 2.0 / (math.exp(2.0 * min(size, BEYOND)) + 1.0), x), straight)
 
 
 @compiled

@@ -11,6 +11,7 @@ import numpy as np
 
 from estimator.abreast import LANES, abreast
 from estimator.compiled import IS_COMPILED, compiled, inlined
+from estimator.physics.catalogue import BUILT_IN
 from estimator.physics.kernel import slots
 from estimator.physics.kernel.conditions import conditions, is_changing, is_waving, with_torques
 from estimator.physics.kernel.line import Line, is_elastic
@@ -19,7 +20,13 @@ from estimator.physics.kernel.makes import for_its_make
 from estimator.physics.kernel.runge_kutta import runge_kutta
 from estimator.physics.kernel.sensing import entry, reading, shown
 from estimator.physics.kernel.state_vector import State
+from estimator.physics.layout import slot
 from estimator.signals.record import FloatArray, IntArray
+
+MAKING = np.array(
+    [slot(entry.name, each.name) for entry in BUILT_IN.values() for each in entry.parameters if not each.own]
+)
+"""Where it is written what a line is made of; phases and moments, which are a recording's own, say when."""
 
 
 @compiled
@@ -39,8 +46,8 @@ def go_side_by_side(masses: int, p: FloatArray, rows: IntArray) -> bool:
 def are_kin(p: FloatArray, rows: IntArray) -> bool:
     """Tell whether some of the lines, a row of parameters each, are alike but for the size of their parameters."""
     for row in rows[1:]:
-        for slot in range(p.shape[1]):
-            if (p[row, slot] == 0.0) != (p[rows[0], slot] == 0.0):
+        for i in MAKING:
+            if (p[row, i] == 0.0) != (p[rows[0], i] == 0.0):
                 return False
     return True
 
