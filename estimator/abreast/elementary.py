@@ -1,4 +1,4 @@
-"""The exponential, the logarithm and the cosine of lanes."""
+"""The exponential, the logarithm, the sine and the cosine of lanes."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 from llvmlite import ir
 
-from estimator.abreast.tools import intrinsic, overload, types
+from estimator.abreast.tools import intrinsic, overload, register_jitable, types
 from estimator.abreast.types import BITS, LANES, NUMBERS, lanes
 
 LARGEST = 708.0
@@ -17,6 +17,11 @@ LOG2_E = 1.4426950408889634
 LN_2, LN_2_HIGH, LN_2_LOW = 0.6931471805599453, 6.93147180369123816490e-01, 1.90821492927058770002e-10
 WHOLE = 6755399441055744.0
 """Added to a number, ``1.5 * 2**52`` leaves its whole part in the last bits."""
+
+TWO_BY_PI = 0.6366197723675814
+QUARTER_HIGH, QUARTER_MIDDLE = 1.57079632673412561417e00, 6.07710050630396597660e-11
+QUARTER_LOW = 2.02226624879595063154e-21
+"""Parts of a quarter turn; times a whole number up to a million the first two are exact."""
 
 _BITS_OF_WHOLE = 0x4338000000000000
 _BITS_OF_HALF_OCTAVE = 0x3FE6A09E667F3BCD
@@ -96,26 +101,44 @@ def _log(x: Any) -> Any:
 
 
 @intrinsic
-def _cosine(typingctx: Any, x: Any) -> Any:
-    """Take the cosine of one lane after the other: laws over the angle take it once a step, not four times."""
+def _quarter_turn(typingctx: Any, quarter: Any, sine: Any, cosine: Any) -> Any:
+    """Return the sine of what is ``WHOLE + q`` quarter turns beyond an angle with this sine and cosine."""
 
     def made(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        one = types.float64(types.float64)
-        cosine = context.get_function(math.cos, one)
-        result = args[0]
-        for i in range(LANES):
-            at = ir.IntType(32)(i)
-            result = builder.insert_element(result, cosine(builder, [builder.extract_element(args[0], at)]), at)
-        return result
+        bits, (_, sine, cosine) = builder.bitcast(args[0], BITS), args
+        odd = builder.icmp_signed("!=", builder.and_(bits, _bits(1)), _bits(0))
+        sign = builder.shl(builder.and_(bits, _bits(2)), _bits(62))
+        value = builder.bitcast(builder.select(odd, cosine, sine), BITS)
+        return builder.bitcast(builder.xor(value, sign), NUMBERS)
 
-    return lanes(lanes), made
+    return lanes(lanes, lanes, lanes), made
+
+
+@register_jitable
+def _sine_beyond(x: Any, quarters: Any) -> Any:
+    """Return the sine of an angle and so many quarter turns (fdlibm: ``k_sin.c``, ``k_cos.c``, ``e_rem_pio2.c``)."""
+    whole = x * TWO_BY_PI + WHOLE
+    count = whole - WHOLE
+    r = ((x - count * QUARTER_HIGH) - count * QUARTER_MIDDLE) - count * QUARTER_LOW
+    z = r * r
+    w = z * z
+    sine = (8.33333333332248946124e-03 + z * -1.98412698298579493134e-04) + w * (
+        (2.75573137070700676789e-06 + z * -2.50507602534068634195e-08) + w * 1.58969099521155010221e-10
+    )
+    cosine = (4.16666666666666019037e-02 + z * -1.38888888888741095749e-03) + w * (
+        (2.48015872894767294178e-05 + z * -2.75573143513906633035e-07)
+        + w * (2.08757232129817482790e-09 + z * -1.13596475577881948265e-11)
+    )
+    sine = r + r * z * (z * sine - 1.66666666666666324348e-01)
+    cosine = 1.0 - (0.5 * z - w * cosine)
+    return _quarter_turn(whole + quarters, sine, cosine)
 
 
 @overload(math.cos, strict=False)
 def _cos(x: Any) -> Any:
-    return (lambda x: _cosine(x)) if x is lanes else None
+    return (lambda x: _sine_beyond(x, 1.0)) if x is lanes else None
 
 
 @overload(math.sin, strict=False)
 def _sin(x: Any) -> Any:
-    return (lambda x: _cosine(x - 0.5 * math.pi)) if x is lanes else None
+    return (lambda x: _sine_beyond(x, 0.0)) if x is lanes else None

@@ -18,4 +18,5 @@ overload: Any = extending.overload
 type_callable: Any = extending.type_callable
 lower_builtin: Any = extending.lower_builtin
 lower_cast: Any = extending.lower_cast
+register_jitable: Any = extending.register_jitable
 register_model: Any = extending.register_model

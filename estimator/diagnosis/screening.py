@@ -7,8 +7,9 @@ could explain little next to the best are not worth a fit; the others start wher
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Effect
 from estimator.physics.fit import FitResult, start_of
 from estimator.physics.model import DrivelineModel
-from estimator.physics.own_scan import Cells, Simulate, Stretch, Wave, cells, scanned, waves
+from estimator.physics.own_scan import Cells, Simulate, Stretch, Wave, answers_to, cells, scanned, small_waves
 from estimator.physics.projector import Projector
 from estimator.physics.simulate import Case, simulate_each
 from estimator.physics.unknowns import Release, Shared, effect_unknowns
@@ -27,6 +28,9 @@ SMALLEST_SCALING, LARGEST_SCALING = 0.1, 4.0
 
 SIZES = np.geomspace(0.05, 10.0, 15)
 """Sizes of an event that are tried, in multiples of its start's: all recordings share it, each finds its interval."""
+
+ROOM_SAMPLES = 2**21
+"""Samples that are simulated in one call at most, in whole starts: side by side they take less time, and more room."""
 
 STEP_SHARES = (1.0, 0.1)
 """Shares of a start's size that are looked along: what is not smooth shows in full, what moves far in small."""
@@ -65,6 +69,27 @@ def promising(looks: Sequence[Look]) -> list[Look]:
     return [*near[:STARTS], *others.values()]
 
 
+@dataclass(frozen=True, slots=True)
+class _Steps:
+    """What a start of a plain effect is tried with: steps of its first free unknown from where that does nothing."""
+
+    release: Release
+    first: Shared
+    zero: float
+    sizes: tuple[float, ...]
+
+    @classmethod
+    def of(cls, entry: Effect, release: Release) -> _Steps:
+        first = next(shared for shared in release.shared if shared.low < shared.high)
+        null = next(parameter.null for parameter in entry.shared_parameters if parameter.name == first.name)
+        zero = _zero(first, null)
+        return cls(release, first, zero, tuple(share * (first.start - zero) for share in STEP_SHARES))
+
+    def filled(self, p: FloatArray) -> list[FloatArray]:
+        """Return parameters with each of the steps."""
+        return [_filled(p, _with_start(self.release, self.first, self.zero + size).shared) for size in self.sizes]
+
+
 class Screen:
     """Looks at effects around one fit."""
 
@@ -85,8 +110,8 @@ class Screen:
             releases = [self._keeping(kept, release) for release in releases]
         if entry.profile:
             return [Look(release, np.inf) for release in releases]
-        looker = self._periodic if entry.phases else self._event if entry.event else self._plain
-        return sorted((looker(entry, release) for release in releases), key=lambda look: -look.promise)
+        looker = self._periodic if entry.phases else self._events if entry.event else self._plain
+        return sorted(looker(entry, releases), key=lambda look: -look.promise)
 
     def _keeping(self, kept: str, release: Release) -> Release:
         p = self._result.p
@@ -95,23 +120,41 @@ class Screen:
             shared=tuple(replace(u, start=p[u.slot] / u.scale) if u.name == kept else u for u in release.shared),
         )
 
-    def _plain(self, entry: Effect, release: Release) -> Look:
-        first = next(shared for shared in release.shared if shared.low < shared.high)
-        null = next(parameter.null for parameter in entry.shared_parameters if parameter.name == first.name)
-        zero = _zero(first, null)
-        steps = [share * (first.start - zero) for share in STEP_SHARES]
-        stepped = [_with_start(release, first, zero + step).shared for step in steps]
-        moved = np.hstack(
-            [
-                self._runner(i)([_filled(self._result.p_of(i), shared) for shared in stepped]) - self._output(i)
-                for i in range(len(self._result.problem.records))
-            ]
-        )
-        looks = [self._along(release, first, zero, step, change) for step, change in zip(steps, moved, strict=True)]
-        return max(looks, key=lambda look: look.promise)
+    def _plain(self, entry: Effect, releases: Sequence[Release]) -> list[Look]:
+        found = []
+        for some in self._at_a_time(releases, len(STEP_SHARES)):
+            tried = [_Steps.of(entry, release) for release in some]
+            outputs = self._each([steps.filled for steps in tried])
+            for steps, mine in zip(tried, outputs, strict=True):
+                moved = np.hstack([output - self._output(i) for i, output in enumerate(mine)])
+                looks = [self._along(steps, step, change) for step, change in zip(steps.sizes, moved, strict=True)]
+                found.append(max(looks, key=lambda look: look.promise))
+        return found
 
-    def _along(self, release: Release, first: Shared, zero: float, step: float, moved: FloatArray) -> Look:
+    def _at_a_time(self, releases: Sequence[Release], simulations: int) -> Iterator[Sequence[Release]]:
+        """Return the starts that are looked at in one call, of so many simulations each: as many as there is room."""
+        longest = max(record.time_s.size for record in self._result.problem.records)
+        count = max(1, ROOM_SAMPLES // (simulations * longest))
+        return (releases[first : first + count] for first in range(0, len(releases), count))
+
+    def _each(self, tried: Sequence[Callable[[FloatArray], list[FloatArray]]]) -> list[list[FloatArray]]:
+        """Simulate every recording with the parameters that several functions make of its own, in one call for all.
+
+        Returns
+        -------
+        list of list of ndarray, shape (K, R_i)
+            For each function and each recording.
+        """
+        found = []
+        for i in range(len(self._result.problem.records)):
+            lists = [make(self._result.p_of(i)) for make in tried]
+            ends = np.cumsum([len(each) for each in lists])
+            found.append(np.split(self._runner(i)([p for each in lists for p in each]), ends[:-1]))
+        return [list(each) for each in zip(*found, strict=True)]
+
+    def _along(self, steps: _Steps, step: float, moved: FloatArray) -> Look:
         """Look along the change of the output that one size of an effect makes."""
+        release, first, zero = steps.release, steps.first, steps.zero
         if not np.isfinite(moved).all():  # so far out that the line flies apart: this start promises nothing
             return Look(release, 0.0)
         ends = sorted((limit - zero) / step for limit in (first.low, first.high))
@@ -121,12 +164,17 @@ class Screen:
         size = float(np.copysign(max(abs(reached), least), reached))
         return Look(_with_start(release, first, float(np.clip(zero + size * step, first.low, first.high))), promise)
 
-    def _periodic(self, entry: Effect, release: Release) -> Look:
-        sizes = _sizes(release)
-        found = [
-            waves(entry, _filled(self._result.p_of(i), release.shared), sizes, self._runner(i), self._output(i))
-            for i in range(len(self._result.problem.records))
-        ]
+    def _periodic(self, entry: Effect, releases: Sequence[Release]) -> list[Look]:
+        found = []
+        for some in self._at_a_time(releases, 2 * len(entry.phases)):
+            outputs = self._each([partial(_waved, entry, release) for release in some])
+            for release, mine in zip(some, outputs, strict=True):
+                sizes = _sizes(release)
+                answers = [answers_to(entry, sizes, output, self._output(i)) for i, output in enumerate(mine)]
+                found.append(self._in_phase(release, answers))
+        return found
+
+    def _in_phase(self, release: Release, found: list[list[Wave]]) -> Look:
         amplitudes, phases, promise = self._regress(found)
         shared = tuple(
             replace(u, start=float(np.clip(amplitudes[u.name] / u.scale, u.low, u.high))) if u.name in amplitudes else u
@@ -164,6 +212,9 @@ class Screen:
                 angle = angles[wave.phase]
                 change += amplitudes[wave.amplitude] * (np.cos(angle) * at_zero + np.sin(angle) * at_quarter)
         return amplitudes, phases, self._projector.promise(change, 0.0, 1.0)[1]
+
+    def _events(self, entry: Effect, releases: Sequence[Release]) -> list[Look]:
+        return [self._event(entry, release) for release in releases]
 
     def _event(self, entry: Effect, release: Release) -> Look:
         sizes = _sizes(release)
@@ -229,6 +280,10 @@ def _filled(p: FloatArray, shared: tuple[Shared, ...]) -> FloatArray:
     for unknown in shared:
         filled[unknown.slot] = unknown.scale * unknown.start
     return filled
+
+
+def _waved(entry: Effect, release: Release, p: FloatArray) -> list[FloatArray]:
+    return small_waves(entry, _filled(p, release.shared), _sizes(release))
 
 
 def _sizes(release: Release) -> Mapping[str, float]:

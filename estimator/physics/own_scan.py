@@ -66,21 +66,34 @@ class Cells:
 
 def waves(entry: Effect, p: FloatArray, sizes: Mapping[str, float], run: Simulate, still: FloatArray) -> list[Wave]:
     """Return the answers of one recording to each amplitude of a periodic effect; ``still`` is its output without."""
+    moved = small_waves(entry, p, sizes)
+    return answers_to(entry, sizes, run(moved), still) if moved else []
+
+
+def small_waves(entry: Effect, p: FloatArray, sizes: Mapping[str, float]) -> list[FloatArray]:
+    """Return parameters with a small one of each amplitude alone, at phase 0 and a quarter turn on, one by one."""
     silent = p.copy()
     for amplitude in entry.phases.values():
         silent[slot(entry.name, amplitude)] = 0.0
-    acting = [(phase, amplitude) for phase, amplitude in entry.phases.items() if sizes[amplitude] != 0.0]
     moved = []
-    for phase, amplitude in acting:
+    for phase, amplitude in _acting(entry, sizes):
         for angle in (0.0, 0.5 * math.pi):
             moved.append(silent.copy())
             moved[-1][slot(entry.name, amplitude)] = SMALL * sizes[amplitude]
             moved[-1][slot(entry.name, phase)] = angle
-    outputs = run(moved) if moved else still
+    return moved
+
+
+def answers_to(entry: Effect, sizes: Mapping[str, float], outputs: FloatArray, still: FloatArray) -> list[Wave]:
+    """Return the answers to `small_waves` from their outputs, shape (K, R), and the one without them, shape (R,)."""
     return [
         Wave(phase, amplitude, (outputs[2 * i : 2 * i + 2] - still) / (SMALL * sizes[amplitude]))
-        for i, (phase, amplitude) in enumerate(acting)
+        for i, (phase, amplitude) in enumerate(_acting(entry, sizes))
     ]
+
+
+def _acting(entry: Effect, sizes: Mapping[str, float]) -> list[tuple[str, str]]:
+    return [(phase, amplitude) for phase, amplitude in entry.phases.items() if sizes[amplitude] != 0.0]
 
 
 def cells(entry: Effect, p: FloatArray, own: tuple[Shared, ...], sizes: Mapping[str, float], run: Simulate) -> Cells:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
+from estimator.physics import bounded
 from estimator.physics.bounded import least_inside, unbounded_first
 
 UNKNOWNS = 8
@@ -18,16 +19,27 @@ def rng(request: pytest.FixtureRequest) -> np.random.Generator:
 
 
 @pytest.mark.parametrize("rng", range(20), indirect=True)
-@pytest.mark.parametrize("bounded", [0, 1, 5, UNKNOWNS])
-def test_it_is_the_least_whatever_has_bounds(rng: np.random.Generator, bounded: int) -> None:
+@pytest.mark.parametrize("count", [0, 1, 5, UNKNOWNS])
+def test_it_is_the_least_whatever_has_bounds(rng: np.random.Generator, count: int) -> None:
     matrix, target = rng.standard_normal((30, UNKNOWNS)), 5.0 * rng.standard_normal(30)
     high = NO_BOUND.copy()
-    high[UNKNOWNS - bounded :] = 0.1
+    high[UNKNOWNS - count :] = 0.1
     q, triangle = np.linalg.qr(matrix)
     x = least_inside(triangle, q.T @ target, -high, high)
     theirs = lsq_linear(matrix, target, (-high, high), method="bvls", tol=1e-14)
     assert np.all(np.abs(x) <= high)
     np.testing.assert_allclose(x, theirs.x, atol=1e-9)
+
+
+@pytest.mark.parametrize("rng", range(5), indirect=True)
+def test_where_pivoting_goes_round_in_circles_one_unknown_at_a_time_is_taken(
+    rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    triangle, target = np.linalg.qr(rng.standard_normal((30, UNKNOWNS)))[1], 5.0 * rng.standard_normal(UNKNOWNS)
+    inside = np.full(UNKNOWNS, 0.1)
+    pivoted = least_inside(triangle, target, -inside, inside)
+    monkeypatch.setattr(bounded, "EXCHANGES", 0)
+    np.testing.assert_allclose(least_inside(triangle, target, -inside, inside), pivoted, atol=1e-9)
 
 
 def test_where_the_free_least_lies_inside_it_is_that() -> None:
