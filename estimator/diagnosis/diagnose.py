@@ -147,7 +147,7 @@ def _raw_fit(chain: Chain, model: DrivelineModel, result: FitResult) -> FitResul
     """Return the fit of a hypothesis to the recordings as they were read, faults of the acquisition and all."""
     if not chain.findings:
         return result
-    return Bench(model, chain.raw, everything(chain.raw)).fit(effects_of(result), result)
+    return Bench(model, chain.raw, everything(chain.raw), result.problem.grid).fit(effects_of(result), result)
 
 
 def _fit_figures(

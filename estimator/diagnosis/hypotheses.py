@@ -15,7 +15,7 @@ from estimator.physics.fit import FitResult, Problem, fit, make_problem, not_fit
 from estimator.physics.model import DrivelineModel, Motion
 from estimator.physics.moments import without_idle
 from estimator.physics.polish import polished
-from estimator.physics.simulate import grid_for
+from estimator.physics.simulate import Grid
 from estimator.physics.starts import HEAT, begun, best_fit, close, converge, warm_start
 from estimator.physics.steps import from_their_moment
 from estimator.physics.unknowns import Release, nominal_unknowns, own_unknowns, released
@@ -62,11 +62,14 @@ class Bench:
     ----------
     use : sequence of ndarray of bool
         Which samples count in each recording.
+    grid : Grid, optional
+        What they are simulated on; by default as fine as the line needs.
     """
 
     model: DrivelineModel
     records: Sequence[Record]
     use: Sequence[BoolArray]
+    grid: Grid | None = None
     _fits: dict[Effects, FitResult] = field(default_factory=dict)
     _rough: dict[Effects, FitResult] = field(default_factory=dict)
     _looked_again: set[tuple[Effects, str]] = field(default_factory=set)
@@ -249,7 +252,7 @@ class Bench:
             own=release.own,
             profile=any(EFFECTS[name].profile for name in effects),
             use=self.use,
-            grid=grid_for(self.model, self.records),
+            grid=self.grid,
         )
 
     def _nominal(self) -> Release:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from estimator.diagnosis.assemble import rms_of
 from estimator.diagnosis.chain import Chain
+from estimator.diagnosis.evidence import noise_level
 from estimator.diagnosis.holdout import Examiner
 from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects, Progress, everything, open_hypotheses
 from estimator.diagnosis.judgement import judge
@@ -14,8 +16,18 @@ from estimator.diagnosis.result import Verdict
 from estimator.diagnosis.selection import Jury, Selection, Selector
 from estimator.diagnosis.weight import VISIBLE, Weight
 from estimator.physics.effect import Untestable
+from estimator.physics.fit import FitResult, outputs_at
 from estimator.physics.model import DrivelineModel
+from estimator.physics.simulate import Grid, grid_for
 from estimator.signals.record import Record
+
+FINER = 2
+"""Steps of the integration in place of one where these have a part in an explanation."""
+
+STEPS_IN_NOISE = 0.2
+"""RMS by which finer steps may change the free run of an explanation, over the noise. True ones change by a tenth of it
+at most, most by a hundredth; a tyre that was none, so stiff that the steps' own error drew the shape of the mismatch,
+changed by all of it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,17 +45,44 @@ class Search:
 def search(chain: Chain, model: DrivelineModel, unseen: Sequence[Record], progress: Progress) -> Search:
     """Look for what is missing.
 
+    The search begins anew, on finer steps, where those of the integration are part of what explains the recordings.
+    """
+    grid = grid_for(model, chain.records)
+    found = _search(chain, model, unseen, progress, grid)
+    if is_made_by_steps(found.selection.result, found.floor):
+        found = _search(chain, model, unseen, progress, _finer(grid))
+    return found
+
+
+def is_made_by_steps(result: FitResult, floor: float) -> bool:
+    """Tell whether the free run of a fit would be another on finer steps."""
+    problem = replace(result.problem, grid=_finer(result.problem.grid))
+    changes = [
+        (finer - output)[rows]
+        for finer, output, rows in zip(outputs_at(problem, result.x), result.outputs, problem.use, strict=True)
+    ]
+    return rms_of(changes) > STEPS_IN_NOISE * noise_level(result, floor)
+
+
+def _finer(grid: Grid) -> Grid:
+    return replace(grid, substeps=FINER * grid.substeps)
+
+
+def _search(chain: Chain, model: DrivelineModel, unseen: Sequence[Record], progress: Progress, grid: Grid) -> Search:
+    """Look for what is missing, on one grid.
+
     Torques that were not read are estimated from the nominal fit first. Where effects are found, they are estimated
     again with these, and the search begins anew: a torque estimated with physics missing hides the rest. It begins
     anew, too, where the errors show jitter and an effect is hardly seen: such errors grow with the acceleration, and
     every test takes them for noise of one size.
     """
     least_ratio = VISIBLE if chain.torque_is_unknown else 1.0
-    found = _searched(_repaired(chain, model, NOTHING), model, unseen, progress, least_ratio)
+    found = _searched(_repaired(chain, model, NOTHING, grid), model, unseen, progress, grid, least_ratio)
     if chain.torque_is_unknown and found.selection.chosen:
-        found = _searched(_repaired(chain, model, found.selection.chosen), model, unseen, progress, least_ratio)
+        again = _repaired(chain, model, found.selection.chosen, grid)
+        found = _searched(again, model, unseen, progress, grid, least_ratio)
     if any(hardly_seen(name, found) for name in found.selection.chosen) and is_shaken(found):
-        found = _searched(found.chain, model, unseen, progress, VISIBLE)
+        found = _searched(found.chain, model, unseen, progress, grid, VISIBLE)
     return found
 
 
@@ -58,18 +97,23 @@ def hardly_seen(name: str, found: Search) -> bool:
     return found.bench.fit(found.selection.chosen - {name}, result).rms < VISIBLE * result.rms
 
 
-def _repaired(chain: Chain, model: DrivelineModel, effects: Effects) -> Chain:
+def _repaired(chain: Chain, model: DrivelineModel, effects: Effects, grid: Grid) -> Chain:
     """Return a chain with torques that were not read estimated from a fit with these effects."""
     if not chain.torque_is_unknown:
         return chain
-    bench = Bench(model, chain.records, everything(chain.records))
+    bench = Bench(model, chain.records, everything(chain.records), grid)
     return chain.with_torques_from(bench.fit_by_steps(effects))
 
 
 def _searched(
-    chain: Chain, model: DrivelineModel, unseen: Sequence[Record], progress: Progress, least_ratio: float
+    chain: Chain,
+    model: DrivelineModel,
+    unseen: Sequence[Record],
+    progress: Progress,
+    grid: Grid,
+    least_ratio: float,
 ) -> Search:
-    bench = Bench(model, chain.records, everything(chain.records))
+    bench = Bench(model, chain.records, everything(chain.records), grid)
     examiner = Examiner(model, chain.records, unseen)
     floor = noise_floor(chain.records)
     names, untestable = open_hypotheses(model, chain.records)

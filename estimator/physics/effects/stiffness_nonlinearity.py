@@ -64,4 +64,5 @@ EFFECT = Effect(
     scales=scales,
     starts=starts,
     sentence=sentence,
+    loosens=frozenset({"k", "c"}),  # of an oscillation whose frequency goes with its size a linear line damps the beats
 )

@@ -18,6 +18,7 @@ from estimator.compiled import compiled, inlined
 from estimator.physics.catalogue import BUILT_IN
 from estimator.physics.kernel import slots
 from estimator.physics.kernel.conditions import with_friction, with_torques
+from estimator.physics.kernel.contact import stepped
 from estimator.physics.kernel.line import Line
 from estimator.physics.kernel.runge_kutta import moved, runge_kutta
 from estimator.physics.kernel.state_vector import Conditions, State
@@ -164,7 +165,7 @@ def led_on(
         after = answered(line, to, now, torque, rise, x, p)
         if kept_friction(line, now, x, after):
             return after
-    return runge_kutta(line, now, torque, rise, x, p, h)
+    return stepped(line, now, torque, rise, x, p, h)
 
 
 @inlined

@@ -14,10 +14,10 @@ from estimator.compiled import IS_COMPILED, compiled, inlined
 from estimator.physics.catalogue import BUILT_IN
 from estimator.physics.kernel import slots
 from estimator.physics.kernel.conditions import conditions, is_changing, is_waving, with_torques
+from estimator.physics.kernel.contact import stepped
 from estimator.physics.kernel.line import Line, is_elastic
 from estimator.physics.kernel.linear import is_linear
 from estimator.physics.kernel.makes import for_its_make
-from estimator.physics.kernel.runge_kutta import runge_kutta
 from estimator.physics.kernel.sensing import entry, reading, shown
 from estimator.physics.kernel.state_vector import State
 from estimator.physics.layout import slot
@@ -99,7 +99,7 @@ def advance(
             if varying:
                 middle, place = angle[k] + turn * (j + 0.5) * length, k + j * length
                 now = conditions(line.masses, start_s + place * sample_time_s, h, middle, load[k], sign_width, p)
-            x = runge_kutta(line, now, torque[k], 0.0, x, p, h)
+            x = stepped(line, now, torque[k], 0.0, x, p, h)
 
 
 @compiled

@@ -1,4 +1,4 @@
-"""The search: where samples were taken off their time, what is named must be seen."""
+"""The search: what is named must be seen where samples were taken off their time, and stay on finer steps."""
 
 from __future__ import annotations
 
@@ -9,11 +9,13 @@ import pytest
 
 from estimator.diagnosis import search as search_module
 from estimator.diagnosis.chain import read_through
-from estimator.diagnosis.hypotheses import NOTHING, Effects
-from estimator.diagnosis.search import Search, hardly_seen, is_shaken, search
+from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects, everything
+from estimator.diagnosis.noise import noise_floor
+from estimator.diagnosis.search import FINER, Search, hardly_seen, is_made_by_steps, is_shaken, search
+from estimator.physics.simulate import grid_for
 from estimator.signals.record import Record
-from tests.estimator.diagnosis.planted import rubbing
-from tests.estimator.physics.bench import ONE_MASS, model
+from tests.estimator.diagnosis.planted import quiet, rubbing
+from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, model
 
 FRICTION: Effects = frozenset({"coulomb_friction_motor"})
 JITTER_S = 2e-3
@@ -55,3 +57,24 @@ def test_off_time_a_friction_that_is_seen_is_named() -> None:
     assert is_shaken(found)
     assert found.selection.chosen == FRICTION
     assert not hardly_seen("coulomb_friction_motor", found)
+
+
+def test_what_steps_too_coarse_draw_is_seen_on_finer_ones() -> None:
+    records, line = quiet(), model(TWO_MASS)
+    grid, floor = grid_for(line, records), noise_floor(records)
+    drawn = [
+        is_made_by_steps(Bench(line, records, everything(records), replace(grid, substeps=steps)).fit(NOTHING), floor)
+        for steps in (1, grid.substeps)
+    ]
+    assert drawn == [True, False]
+
+
+def test_where_steps_have_a_part_in_an_explanation_the_search_begins_anew_on_finer_ones(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    records = rubbing(lambda speed: 1.5)
+    usual = searched(records).selection.result.problem.grid
+    monkeypatch.setattr(search_module, "is_made_by_steps", lambda result, floor: result.problem.grid == usual)
+    found = searched(records)
+    assert found.selection.retuned.problem.grid == replace(usual, substeps=FINER * usual.substeps)
+    assert found.selection.chosen == FRICTION
