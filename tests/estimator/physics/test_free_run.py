@@ -69,7 +69,7 @@ def test_an_output_that_the_structure_lacks_is_refused() -> None:
         free_run(model(ONE_MASS), rec)
 
 
-@pytest.mark.parametrize(("seed", "twist_rad", "speed_rad_s"), [(8, 0.06, 0.0), (4, -0.06, 0.0), (7, -0.06, 0.5)])
+@pytest.mark.parametrize(("seed", "twist_rad", "speed_rad_s"), [(8, 0.06, 0.0), (10, -0.06, 0.0), (5, -0.06, 0.5)])
 def test_a_recording_may_begin_on_either_flank_of_a_gap(seed: int, twist_rad: float, speed_rad_s: float) -> None:
     """The mean load tells the flank of the average, not that of the first sample: from there the fit gets stuck."""
     geared = model(TWO_MASS, effects={"backlash": {"gap_rad": 0.1, "contact_rad": 1e-3}})
