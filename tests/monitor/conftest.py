@@ -15,7 +15,7 @@ def rig_path(tmp_path: Path) -> Path:
     text = EXAMPLE.read_text(encoding="utf-8")
     for before, after in (
         ("speed_rad_s = 60.0", "speed_rad_s = 0.0"),
-        ("feedback_timeout_s = 0.2", "feedback_timeout_s = 1.0"),
+        ("feedback_timeout_s = 0.2", "feedback_timeout_s = 3.0"),
     ):
         assert text.count(before) == 1
         text = text.replace(before, after)
