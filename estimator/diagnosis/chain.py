@@ -22,6 +22,7 @@ from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult, start_of
 from estimator.physics.free_run import FreeRun, free_run
 from estimator.physics.model import DrivelineModel
+from estimator.physics.rates import rates
 from estimator.physics.simulate import simulate
 from estimator.signals.record import BoolArray, FloatArray, Record
 
@@ -61,13 +62,10 @@ class Chain:
 
     def with_jitter_in(self, result: FitResult) -> Chain:
         """Return the chain with the jitter that only the errors of a converged fit show, where they show any."""
-        slopes = [
-            np.gradient(output, record.sample_time_s) for output, record in zip(result.outputs, self.raw, strict=True)
-        ]
-        errors = [record.output - output for output, record in zip(result.outputs, self.records, strict=True)]
         if any(finding.name == "sample_jitter" for finding in self.findings):
             return self
-        found = hidden_jitter(self.records, errors, slopes, [record.okay for record in self.records])
+        errors = [record.output - output for output, record in zip(result.outputs, self.records, strict=True)]
+        found = hidden_jitter(self.records, errors, rates(result), [record.okay for record in self.records])
         return self if found is None else replace(self, findings=(*self.findings, found))
 
     def effects(self) -> dict[str, dict[str, float]]:

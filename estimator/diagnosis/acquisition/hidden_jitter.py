@@ -4,6 +4,10 @@ A reading taken ``tau`` off its time is off by ``slope * tau``. So the error's v
 
     var e = s^2 + sigma_t^2 slope^2
 
+A torque that steps at the sample gives the output two slopes there, ``b`` for readings that come early and ``a`` for
+those that come late. Such a row's error has a mean, ``E|tau| (a - b) / 2``, and its variance about it follows
+``(a^2 + b^2) / 2 - ((a - b) E|tau| / 2 sigma_t)^2`` in place of slope^2.
+
 Missing mechanics leaves errors that are large where the slope is large, too. But such an error goes on from one row to
 the next and follows the motion, while jitter changes from row to row at random. What the error's own past and the
 slopes around explain is taken off first; of the rest it is asked whether its square follows the squared slope, within
@@ -37,6 +41,9 @@ all rows: so many coefficients follow a part of the jitter too."""
 LEAST_GAIN = 0.05
 """Share of the error's variance that jitter must account for, on average: less changes no fit."""
 
+OF_A_KINK = 0.17
+"""``(E|tau| / 2 sigma_t)^2``: 1 / 2 pi for Gaussian offsets, 3 / 16 for uniform ones."""
+
 MOST_OF_IT = 0.5
 """Share of the error's variance beyond the noise that must be jitter: where other things leave more, the model has not
 converged, and what is left of their error may follow the slope in ways that nothing here accounts for."""
@@ -53,11 +60,13 @@ NEIGHBOURS = 0.5
 class _Rest:
     """What is left of the errors of all recordings, with slopes, and the same of the row after; shape (n,).
 
-    ``lengths`` holds how many of the rows each recording has.
+    ``lengths`` holds how many of the rows each recording has, ``steepness`` the slope that the spread of a row's errors
+    follows, ``slope`` the mean of those before and after it.
     """
 
     lengths: tuple[int, ...]
     error: FloatArray
+    steepness: FloatArray
     slope: FloatArray
     next_error: FloatArray
     next_slope: FloatArray
@@ -74,8 +83,8 @@ def hidden_jitter(
         Name the recordings.
     errors : sequence of ndarray, shape (N,)
         Recorded less simulated output, per recording.
-    slopes : sequence of ndarray, shape (N,)
-        Rate of the simulated output [its unit per second].
+    slopes : sequence of ndarray, shape (2, N)
+        Rates of the simulated output just before each row and just after it [its unit per second].
     okay : sequence of ndarray of bool, shape (N,)
         Rows that count.
 
@@ -86,16 +95,16 @@ def hidden_jitter(
     """
     rest = _rests(errors, slopes, okay)
     within = _rests(errors, slopes, okay, BLOCK)
-    if rest is None or within is None or _likeliest(within.error, within.slope) is None:
+    if rest is None or within is None or _likeliest(within.error, within.steepness) is None:
         return None
     p_value = _score_p_value(rest)
     if p_value > LEVEL:
         return None
-    found = _likeliest(rest.error, rest.slope)
+    found = _likeliest(rest.error, rest.steepness)
     if found is None or not (_of_the_many(rest, found) and _independent(rest, found)):
         return None
     whole = np.concatenate([error[good] - error[good].mean() for error, good in zip(errors, okay, strict=True)])
-    if found.jitter_s**2 * np.mean(rest.slope**2) < MOST_OF_IT * (np.mean(whole**2) - found.noise**2):
+    if found.jitter_s**2 * np.mean(rest.steepness**2) < MOST_OF_IT * (np.mean(whole**2) - found.noise**2):
         return None
     jitter_s, ci95 = found.jitter_s, found.ci95
     return Finding(
@@ -121,14 +130,14 @@ def _rests(
     """Return the rests of all recordings in a row; None where no recording is long enough."""
     found = [_rest(*data, block) for data in zip(errors, slopes, okay, strict=True)]
     rests = [rest for rest in found if rest is not None]
-    fields = ("error", "slope", "next_error", "next_slope")
+    fields = ("error", "steepness", "slope", "next_error", "next_slope")
     if not rests:
         return None
     lengths = tuple(length for one in rests for length in one.lengths)
     return _Rest(lengths, *(np.concatenate([getattr(one, name) for one in rests]) for name in fields))
 
 
-def _rest(error: FloatArray, slope: FloatArray, okay: BoolArray, block: int | None) -> _Rest | None:
+def _rest(error: FloatArray, slopes: FloatArray, okay: BoolArray, block: int | None) -> _Rest | None:
     """Take off what past errors and the slopes around explain, all along or in blocks of so many rows.
 
     Rows whose surroundings are not okay are left out.
@@ -138,12 +147,14 @@ def _rest(error: FloatArray, slope: FloatArray, okay: BoolArray, block: int | No
     first, last = PAST, error.size - AROUND
     if last - first < 10 * (PAST + width):
         return None
+    slope, kink = slopes.mean(axis=0), slopes[1] - slopes[0]
+    steepness = np.sqrt(np.mean(slopes**2, axis=0) - OF_A_KINK * kink**2)
     past = sliding_window_view(filled, PAST)[: last - first]
     around = sliding_window_view(slope, width)[first - AROUND : last - AROUND]
     usable: BoolArray = np.all(sliding_window_view(okay, PAST + 1)[: last - first], axis=1)
     if usable.sum() < 5 * (PAST + width):
         return None
-    regressors = np.column_stack([past, around, np.ones(last - first)])
+    regressors = np.column_stack([past, around, kink[first:last], np.ones(last - first)])
     left = np.full(last - first, np.nan)
     blocks = 1 if block is None else max(1, (last - first) // block)
     for stretch in np.array_split(np.arange(last - first), blocks):
@@ -152,8 +163,15 @@ def _rest(error: FloatArray, slope: FloatArray, okay: BoolArray, block: int | No
             a, now = regressors[rows], filled[first:last][rows]
             left[rows] = now - a @ np.linalg.lstsq(a, now, rcond=None)[0]
     pairs = np.isfinite(left[:-1]) & np.isfinite(left[1:])
-    inner = slope[first:last]
-    return _Rest((int(pairs.sum()),), left[:-1][pairs], inner[:-1][pairs], left[1:][pairs], inner[1:][pairs])
+    this, following = slice(first, last - 1), slice(first + 1, last)
+    return _Rest(
+        lengths=(int(pairs.sum()),),
+        error=left[:-1][pairs],
+        steepness=steepness[this][pairs],
+        slope=slope[this][pairs],
+        next_error=left[1:][pairs],
+        next_slope=slope[following][pairs],
+    )
 
 
 def _score_p_value(rest: _Rest) -> float:
@@ -162,7 +180,7 @@ def _score_p_value(rest: _Rest) -> float:
     Breusch and Pagan's score test, one-sided, with White's variance (Econometrica 48, 1980): neither noise that differs
     from recording to recording nor a few large errors where the slope is large may pass for it.
     """
-    power, drive = (_about_its_mean(signal**2, rest.lengths) for signal in (rest.error, rest.slope))
+    power, drive = (_about_its_mean(signal**2, rest.lengths) for signal in (rest.error, rest.steepness))
     spread = float(np.sqrt((power**2) @ (drive**2)))
     return float(stats.norm.sf(float(power @ drive) / spread)) if spread > 0.0 else 1.0
 
@@ -180,14 +198,14 @@ class _Jitter:
     noise: float
 
 
-def _likeliest(error: FloatArray, slope: FloatArray) -> _Jitter | None:
+def _likeliest(error: FloatArray, steepness: FloatArray) -> _Jitter | None:
     """Fit both variances by maximum likelihood; the interval is that of the likelihood ratio. None if too small."""
 
     def cost(logs: FloatArray, jitter: float | None = None) -> float:
-        variance = np.exp(2.0 * logs[0]) + (np.exp(2.0 * logs[1]) if jitter is None else jitter**2) * slope**2
+        variance = np.exp(2.0 * logs[0]) + (np.exp(2.0 * logs[1]) if jitter is None else jitter**2) * steepness**2
         return float(np.sum(np.log(variance) + error**2 / variance))
 
-    size, steep = float(np.std(error)), float(np.sqrt(np.mean(slope**2)))
+    size, steep = float(np.std(error)), float(np.sqrt(np.mean(steepness**2)))
     start = np.array([np.log(size), np.log(0.5 * size / steep)])
     best = optimize.minimize(cost, start, method="Nelder-Mead", options={"xatol": 1e-5, "fatol": 1e-4})
     noise, jitter = (float(value) for value in np.exp(best.x))
@@ -216,10 +234,10 @@ def _crossing(excess: Callable[[float], float], inside: float, outside: float) -
 
 def _of_the_many(rest: _Rest, found: _Jitter) -> bool:
     """Tell whether the typical row shows the jitter, by the median absolute error of the steep half of the rows."""
-    steep = np.abs(rest.slope) > np.median(np.abs(rest.slope))
+    steep = rest.steepness > np.median(rest.steepness)
     mad_to_sigma = 1.0 / float(stats.norm.ppf(0.75))
     typical = (mad_to_sigma * np.median(np.abs(rest.error[steep]))) ** 2
-    expected = found.noise**2 + found.jitter_s**2 * float(np.median(rest.slope[steep] ** 2))
+    expected = found.noise**2 + found.jitter_s**2 * float(np.median(rest.steepness[steep] ** 2))
     return bool(typical - found.noise**2 > OF_THE_MANY * (expected - found.noise**2))
 
 

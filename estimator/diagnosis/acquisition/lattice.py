@@ -21,6 +21,9 @@ one so fine that gaps are a matter of chance it is too large, which errs to the 
 CORE_QUANTILE = 0.05
 """Differences that count as near zero: the smallest twentieth of them. A density varies little over that."""
 
+DECIMALS = 9
+"""Values with more decimals than this are taken as not rounded."""
+
 ROUND_OFF = 1e-9
 """Values closer than this share of the largest are the same number, scaled in another way."""
 
@@ -36,6 +39,15 @@ def lattice_step(values: FloatArray) -> float:
     gaps = np.diff(levels)
     gaps = gaps[gaps > ROUND_OFF * float(np.abs(levels).max())]
     return float(np.quantile(gaps, STEP_QUANTILE, method="lower")) if gaps.size else 0.0
+
+
+def decimal_place(values: FloatArray) -> float:
+    """Return the decimal place that values were rounded to when they were written [their unit], 0 where to none."""
+    for decimals in range(DECIMALS + 1):
+        ticks = values * 10.0**decimals
+        if float(np.abs(ticks - np.round(ticks)).max()) < 1e-6 * max(1.0, 1e-9 * float(np.abs(ticks).max())):
+            return float(10.0**-decimals)
+    return 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,13 +7,14 @@ exponentially distributed with mean 1 (Rayleigh's test of uniformity).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from estimator.diagnosis.acquisition.finding import OUTPUT, Finding, Sized, no_cells
-from estimator.diagnosis.acquisition.lattice import lattice_step
+from estimator.diagnosis.acquisition.lattice import decimal_place, lattice_step
 from estimator.diagnosis.acquisition.limits import LEVEL, SMALLEST_P
 from estimator.diagnosis.acquisition.predictor import predict
 from estimator.signals.record import FloatArray, OutputKind, Record
@@ -120,12 +121,30 @@ def _refined(values: FloatArray, step: float) -> tuple[float, float, float]:
     for _ in range(3):
         phase = float(np.angle(np.mean(np.exp(2j * np.pi * values / step)))) / (2.0 * np.pi)
         counts = np.round(values / step - phase)
-        centred = counts - counts.mean()
-        power = float(centred @ centred)
-        step = float(centred @ values) / power
-        left = values - values.mean() - step * centred
-        error = float(np.sqrt(left @ left / (values.size - 2) / power))
+        step, error = _per_count(values, counts)
     return step, _regularity(values, step), error
+
+
+def _per_count(values: FloatArray, counts: FloatArray) -> tuple[float, float]:
+    """Return what the values grow by per count, by least squares, and its standard error.
+
+    Readings of one level were rounded alike when they were written: their errors are one and not many (the variance of
+    clustered errors, Liang and Zeger, Biometrika 73, 1986). It is not below that of rounding alone.
+    """
+    centred = counts - counts.mean()
+    power = float(centred @ centred)
+    step = float(centred @ values) / power
+    left = values - values.mean() - step * centred
+    _, level = np.unique(counts, return_inverse=True)
+    of_levels = math.sqrt(float(np.sum(np.bincount(level, centred * left) ** 2)))
+    of_rounding = _rounding(values, step) * math.sqrt(float(np.sum(np.bincount(level, centred) ** 2)))
+    return step, max(of_levels, of_rounding) / power
+
+
+def _rounding(values: FloatArray, step: float) -> float:
+    """Return the standard deviation of what writing with so many decimals adds to each level of a lattice."""
+    place = decimal_place(values)
+    return place / math.sqrt(12.0) if place < 0.5 * step else 0.0
 
 
 def _regularity(values: FloatArray, step: float) -> float:

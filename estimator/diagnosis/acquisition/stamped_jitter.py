@@ -12,6 +12,7 @@ import numpy as np
 from scipy import stats
 
 from estimator.diagnosis.acquisition.finding import OUTPUT, Finding, Sized, no_cells
+from estimator.diagnosis.acquisition.lattice import decimal_place
 from estimator.diagnosis.acquisition.limits import LEVEL, SMALLEST_P
 from estimator.diagnosis.acquisition.predictor import predict, slope_test
 from estimator.signals.record import FloatArray, Record
@@ -22,9 +23,6 @@ AGREEMENT = 0.5
 
 ABOVE_ROUNDING = 2.0
 """Offsets of this many times what rounding the stamps leaves are more than rounding."""
-
-DECIMALS = 9
-"""Stamps with more decimals than this are taken as not rounded."""
 
 SMALLEST_PERIODS = 1e-3
 """Jitter below this share of the period is not looked into."""
@@ -38,7 +36,7 @@ def stamp_offsets_s(record: Record) -> FloatArray:
     """
     since = record.time_s - uniform_period_s(record.time_s) * np.arange(record.time_s.size)
     offset: FloatArray = since - since.mean()
-    rounding_s = _resolution_s(record.time_s) / np.sqrt(12.0)
+    rounding_s = decimal_place(record.time_s) / np.sqrt(12.0)
     smallest = max(ABOVE_ROUNDING * rounding_s, SMALLEST_PERIODS * record.sample_time_s)
     return offset if float(np.std(offset)) > smallest else np.zeros_like(offset)
 
@@ -67,15 +65,6 @@ def stamped_jitter(records: Sequence[Record]) -> Finding | None:
         p_value=max(p_value, SMALLEST_P),
         statement=f"the samples were taken off their time by {1e3 * jitter_s:.2g} ms (rms), as their stamps tell",
     )
-
-
-def _resolution_s(time_s: FloatArray) -> float:
-    """Return the decimal place that time stamps are rounded to [s], 0 where they are not."""
-    for decimals in range(DECIMALS + 1):
-        ticks = time_s * 10.0**decimals
-        if float(np.abs(ticks - np.round(ticks)).max()) < 1e-6 * max(1.0, 1e-9 * float(np.abs(ticks).max())):
-            return float(10.0**-decimals)
-    return 0.0
 
 
 def _confirmed(record: Record, offset_s: FloatArray) -> tuple[float, float] | None:

@@ -61,11 +61,13 @@ def test_stamps_to_the_millisecond_still_tell_of_two() -> None:
     assert finding.parameters["jitter_s"].value == pytest.approx(0.002, rel=0.05)
 
 
-def slope(truth: Truth) -> FloatArray:
+def slopes_of(truth: Truth) -> FloatArray:
+    """Before and after each sample; before the first there is nothing."""
     h = 1e-4
-    back = np.where(np.arange(SAMPLES) > 0, -h, h)
-    ahead = np.full(SAMPLES, 2.0 * h)
-    return (truth.speed(ahead) - truth.speed(back)) / (ahead - back)
+    now = truth.speed()
+    after = (truth.speed(np.full(SAMPLES, h)) - now) / h
+    early = np.where(np.arange(SAMPLES) > 0, -h, 0.0)
+    return np.stack([np.where(early < 0.0, (now - truth.speed(early)) / h, after), after])
 
 
 def seen(seed: int, jitter_s: float, gaussian: bool = True, **mistaken: float) -> Finding | None:
@@ -77,7 +79,7 @@ def seen(seed: int, jitter_s: float, gaussian: bool = True, **mistaken: float) -
         line = replace(truth.line, **{name: factor * getattr(truth.line, name) for name, factor in mistaken.items()})
         error = record.output - line.speed(truth.torque, truth.start)
         errors.append(error - drift @ np.linalg.lstsq(drift, error, rcond=None)[0])
-        slopes.append(slope(truth))
+        slopes.append(slopes_of(truth))
         records.append(record)
     return hidden_jitter(records, errors, slopes, [record.okay for record in records])
 
@@ -121,7 +123,7 @@ def test_a_few_wild_rows_are_no_jitter() -> None:
         read = repeating(record.output, random_rows(np.random.default_rng(k), 0.03))
         records.append(record)
         errors.append(read - truth.speed())
-        slopes.append(slope(truth))
+        slopes.append(slopes_of(truth))
     assert hidden_jitter(records, errors, slopes, [record.okay for record in records]) is None
 
 
@@ -129,7 +131,8 @@ def test_noise_that_differs_from_recording_to_recording_is_no_jitter() -> None:
     """The steepest recordings have the most noise: pooled, the squared error follows the squared slope."""
     truths = drives(1)
     records = [truth.record(kind) for kind, truth in zip(KINDS, truths, strict=True)]
-    slopes = [steep * slope(truth) / np.std(slope(truth)) for steep, truth in zip((0.3, 1.0, 3.0), truths, strict=True)]
+    steeps = (slopes_of(truth) for truth in truths)
+    slopes = [times * steep / np.std(steep) for times, steep in zip((0.3, 1.0, 3.0), steeps, strict=True)]
     rng = np.random.default_rng(4)
     errors = [noise * rng.standard_normal(SAMPLES) for noise in (0.7, 1.0, 1.6)]
     assert hidden_jitter(records, errors, slopes, [record.okay for record in records]) is None
@@ -139,7 +142,7 @@ def test_too_few_rows_tell_nothing() -> None:
     record = drives(1)[0].record()
     few = np.zeros(SAMPLES, dtype=bool)
     few[:40] = True
-    assert hidden_jitter([record], [record.output], [record.output], [few]) is None
+    assert hidden_jitter([record], [record.output], [np.tile(record.output, (2, 1))], [few]) is None
 
 
 @pytest.mark.parametrize("delay_s", [0.00014, 0.0003])
@@ -155,6 +158,6 @@ def test_a_delay_that_comes_and_goes_is_no_jitter(delay_s: float) -> None:
         steep = 100.0 * rng.standard_normal(SAMPLES)
         late_s = np.sqrt(2.0) * delay_s * np.sin(2.0 * np.pi * record.time_s / 8.0 + i)
         records.append(record)
-        slopes.append(steep)
+        slopes.append(np.stack([steep, steep]))
         errors.append(steep * late_s + 0.05 * rng.standard_normal(SAMPLES))
     assert hidden_jitter(records, errors, slopes, [record.okay for record in records]) is None
