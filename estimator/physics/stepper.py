@@ -61,7 +61,7 @@ class Stepper:
     def speed_rad_s(self) -> float:
         """Motor speed now, as the sensor shows it [rad/s]."""
         state = self._state
-        read = sensing.reading(state[state_vector.SPEED], state[state_vector.ANGLE], self._p)
+        read = sensing.reading(state[state_vector.SPEED], self._read_angle(), self._p)
         return float(sensing.shown(read, state[state_vector.FILTERED], self._p))
 
     @property
@@ -74,7 +74,7 @@ class Stepper:
         now = np.array([self._steps * self._period_s])
         self._torque[:-1] = self._torque[1:]
         self._torque[-1] = shaft_torque(np.array([torque_nm]), now, self._p)[0]
-        self._angle[-1] = self._state[state_vector.ANGLE]
+        self._angle[-1] = self._read_angle()
         self._angle[-2] = self._angle[-1] - self._state[state_vector.SPEED] * self._period_s  # it goes straight on
         last = self._torque.size - 1
         integration.integrate_period(
@@ -95,3 +95,7 @@ class Stepper:
             self._slopes,
         )
         self._steps += 1
+
+    def _read_angle(self) -> float:
+        """Return the motor angle that the resolver gives now [rad]: laws that are periodic in it know no other."""
+        return float(sensing.read_angle(self._state[state_vector.ANGLE], self._p))

@@ -10,6 +10,15 @@ from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Elemen
 from estimator.physics.model import DrivelineModel, Motion
 from estimator.signals.record import OutputKind, Record
 
+STEEPEST = -0.5
+"""A resolver whose error falls by more than this per radian is no resolver; Newton's steps stay finite there."""
+
+
+@compiled
+def error(angle: float, once: float, once_phase: float, twice: float, twice_phase: float) -> float:
+    """Return how far the read angle is off at a true one [rad]."""
+    return once * math.sin(angle + once_phase) + twice * math.sin(2.0 * angle + twice_phase)
+
 
 @compiled
 def slope(angle: float, once: float, once_phase: float, twice: float, twice_phase: float) -> float:
@@ -20,6 +29,17 @@ def slope(angle: float, once: float, once_phase: float, twice: float, twice_phas
     if twice != 0.0:
         value += 2.0 * twice * math.cos(2.0 * angle + twice_phase)
     return value
+
+
+@compiled
+def true_angle(read: float, once: float, once_phase: float, twice: float, twice_phase: float) -> float:
+    """Return the angle at which a resolver reads another [rad]; three of Newton's steps leave less than 1e-9."""
+    angle = read
+    for _ in range(3):
+        off = angle + error(angle, once, once_phase, twice, twice_phase) - read
+        rise = slope(angle, once, once_phase, twice, twice_phase) - 1.0
+        angle -= off / (1.0 + max(rise, STEEPEST))
+    return angle
 
 
 def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:

@@ -31,10 +31,21 @@ def travelled(x: State, output: int, p: FloatArray) -> float:
 
 
 @inlined
-def reading(speed: float, angle: float, p: FloatArray) -> float:
-    """Return the speed that the resolver gives [rad/s] at a motor angle [rad]."""
+def read_angle(angle: float, p: FloatArray) -> float:
+    """Return the angle that the resolver gives at a motor angle [rad]."""
     once, twice = p[slots.RESOLVER_ONCE], p[slots.RESOLVER_TWICE]
-    return speed * resolver_error.slope(angle, once, p[slots.RESOLVER_ONCE_PHASE], twice, p[slots.RESOLVER_TWICE_PHASE])
+    return angle + resolver_error.error(angle, once, p[slots.RESOLVER_ONCE_PHASE], twice, p[slots.RESOLVER_TWICE_PHASE])
+
+
+@inlined
+def reading(speed: float, angle: float, p: FloatArray) -> float:
+    """Return the speed that the resolver gives [rad/s] where it gives an angle [rad]: a recording knows no other."""
+    once, twice = p[slots.RESOLVER_ONCE], p[slots.RESOLVER_TWICE]
+    if once == 0.0 and twice == 0.0:
+        return speed
+    phases = p[slots.RESOLVER_ONCE_PHASE], p[slots.RESOLVER_TWICE_PHASE]
+    true = resolver_error.true_angle(angle, once, phases[0], twice, phases[1])
+    return speed * resolver_error.slope(true, once, phases[0], twice, phases[1])
 
 
 @inlined
@@ -49,7 +60,7 @@ def smoothed(
     p: FloatArray,
     h: float,
 ) -> tuple[float, float]:
-    """Return the filtered reading and its rise [rad/s] after a step of ``h`` [s] between two states and motor angles.
+    """Return the filtered reading and its rise [rad/s] after a step of ``h`` [s] between two states and read angles.
 
     The filter's input is a straight line whose mean is what the output has been in the mean.
     """
