@@ -13,7 +13,6 @@ from estimator.diagnosis.evidence import gain_from_squares
 from estimator.diagnosis.holdout import Examiner
 from estimator.diagnosis.intervals import (
     Z95,
-    interval,
     interval_both_ways,
     interval_that_follows,
     reported_covariance,
@@ -23,7 +22,6 @@ from estimator.diagnosis.result import Estimated, Evidence, FoundEffect, Interva
 from estimator.diagnosis.selection import Selection
 from estimator.diagnosis.trial import Trial
 from estimator.physics.catalogue import EFFECTS
-from estimator.physics.effect import Element
 from estimator.physics.effects import road_grade
 from estimator.physics.fit import FitResult, local_part
 from estimator.physics.layout import slot
@@ -31,9 +29,6 @@ from estimator.physics.model import DrivelineModel, EffectValue, parameter_unit,
 from estimator.physics.steps import moments_of
 from estimator.physics.unknowns import LOAD_TORQUE
 from estimator.signals.record import FloatArray
-
-IN_PROPORTION = frozenset({"inertia", "stiffness", "damping", "torque", "quadratic_drag"})
-"""Dimensions that change with the torque where every torque of the line is told another way."""
 
 PROFILE_POINTS_S = 1.0
 """A profile is reported every second."""
@@ -124,18 +119,13 @@ def _parameters(name: str, result: FitResult, cov: FloatArray, model: DrivelineM
     """Return what was fitted, and what was held; a held value at its null only where a model file needs it."""
     entry = EFFECTS[name]
     units = {parameter.name: parameter.unit(model.motion) for parameter in entry.parameters}
-    torques = {
-        parameter.name
-        for parameter in entry.parameters
-        if parameter.dimension in IN_PROPORTION and entry.element is not Element.TORQUE_PATH
-    }
     left_out = {parameter.name: parameter.null for parameter in EFFECTS[name].parameters if parameter.optional}
     follow = _derived(name, result)
     return (
         {
             shared.name: Estimated(
                 float(result.x[i]) * shared.scale,
-                (interval_both_ways if shared.name in torques else interval)(result, cov, i),
+                interval_both_ways(result, cov, i),
                 units[shared.name],
             )
             for i, shared in enumerate(result.problem.shared)

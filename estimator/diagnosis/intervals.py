@@ -11,7 +11,10 @@ from scipy import stats
 from estimator.diagnosis.evidence import residuals_by_record
 from estimator.diagnosis.noise import unpredictable
 from estimator.physics.catalogue import EFFECTS
+from estimator.physics.effect import Element
 from estimator.physics.fit import STEP, FitResult
+from estimator.physics.model import parameter_dimension
+from estimator.physics.unknowns import Shared
 from estimator.signals.correlation import correlation_length
 from estimator.signals.record import BoolArray, FloatArray
 
@@ -149,30 +152,40 @@ def trusted(result: FitResult, index: int) -> tuple[float, float]:
 
 
 def interval_both_ways(result: FitResult, cov: FloatArray, index: int) -> tuple[float, float]:
-    """Return the 95 % interval of a torque, or of what is in proportion to one, that holds it told either way.
+    """Return the 95 % interval of a shared parameter that holds it where the same motion is told the other way, too.
 
-    In the other way every torque is multiplied by a factor, itself estimated: ``d(x f) = f dx + x df``.
+    In the other way it is multiplied by a factor, itself estimated: ``d(x f) = f dx + x df``.
     """
     low, high = interval(result, cov, index)
-    factor, slope = _rescaled(result, result.x), np.zeros_like(result.x)
+    dimension = _dimension_in_line(result.problem.shared[index])
+    factor, slope = _rescaled(result, result.x, dimension), np.zeros_like(result.x)
     if factor == 1.0:
         return low, high
     for i, shared in enumerate(result.problem.shared):
         if shared.effect and shared.low < shared.high:
             moved = result.x.copy()
             moved[i] += STEP
-            slope[i] = result.x[index] * (_rescaled(result, moved) - factor) / STEP
+            slope[i] = result.x[index] * (_rescaled(result, moved, dimension) - factor) / STEP
     slope[index] += factor
     scale = result.problem.shared[index].scale
     other, spread = scale * factor * float(result.x[index]), scale * Z95 * float(np.sqrt(slope @ cov @ slope))
     return (min(low, other - spread), max(high, other + spread))
 
 
-def _rescaled(result: FitResult, x: FloatArray) -> float:
-    """Return the factor on every torque of the line in the other way to tell the same motion; 1 where there is none."""
+def _dimension_in_line(shared: Shared) -> str:
+    """Return the dimension of a parameter of the line or of an effect in it; none of what stands before the line."""
+    if not shared.effect:
+        return parameter_dimension(shared.name)
+    entry = EFFECTS[shared.effect]
+    (dimension,) = (parameter.dimension for parameter in entry.parameters if parameter.name == shared.name)
+    return "" if entry.element is Element.TORQUE_PATH else dimension
+
+
+def _rescaled(result: FitResult, x: FloatArray, dimension: str) -> float:
+    """Return the factor on a dimension in the other way to tell the same motion; 1 where there is none."""
     factor = 1.0
     for name, entry in EFFECTS.items():
         values = {s.name: float(x[i]) * s.scale for i, s in enumerate(result.problem.shared) if s.effect == name}
         if values:
-            factor *= entry.rescaled(values)
+            factor *= entry.rescaled(values).get(dimension, 1.0)
     return factor

@@ -163,9 +163,9 @@ def nothing_derived(_values: Mapping[str, float], _nominal: Mapping[str, float])
     return {}
 
 
-def told_one_way(_values: Mapping[str, float]) -> float:
+def told_one_way(_values: Mapping[str, float]) -> Mapping[str, float]:
     """Know no other way to tell the same motion."""
-    return 1.0
+    return {}
 
 
 MOMENTS = (
@@ -275,8 +275,8 @@ class Effect:
         The same, to the reason why such values are too small to tell from another way of sampling, or "". Where such
         an effect explains most, nothing that explains less is named in its place.
     rescaled : callable
-        Parameter values to the factor that every torque of the line takes in the other way to tell the same motion; 1
-        where there is none.
+        Parameter values to the factors that parameters of the line take in the other way to tell the same motion, by
+        their dimension; one that is not named stays as it is.
     completed : callable
         Values that were given to those a simulation should have: where leaving one out is simpler than any real part.
     retold : callable
@@ -316,7 +316,7 @@ class Effect:
     loosened_by: str = ""
     implausible: Callable[[DrivelineModel, Sequence[Record], Mapping[str, float]], str] = always_plausible
     unresolved: Callable[[DrivelineModel, Sequence[Record], Mapping[str, float]], str] = always_plausible
-    rescaled: Callable[[Mapping[str, float]], float] = told_one_way
+    rescaled: Callable[[Mapping[str, float]], Mapping[str, float]] = told_one_way
     completed: Callable[[Mapping[str, float]], Mapping[str, float]] = as_given
     retold: Retold = never_retold
     derived: Callable[[Mapping[str, float], Mapping[str, float]], Mapping[str, float]] = nothing_derived

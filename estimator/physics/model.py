@@ -101,9 +101,14 @@ def unit(dimension: str, motion: Motion) -> str:
     return _UNITS[motion].get(dimension, dimension)
 
 
+def parameter_dimension(name: str) -> str:
+    """Return the dimension of a nominal parameter, for example ``inertia`` for ``J_M``."""
+    return _DIMENSIONS[name]
+
+
 def parameter_unit(name: str, motion: Motion) -> str:
     """Return the unit of a nominal parameter, for example ``kg m^2`` for ``J_M``."""
-    return unit(_DIMENSIONS[name], motion)
+    return unit(parameter_dimension(name), motion)
 
 
 @dataclass(frozen=True, slots=True)

@@ -33,6 +33,15 @@ def unresolved(model: DrivelineModel, records: Sequence[Record], values: Mapping
     return f"the clocks part by {1e3 * parted_s:.2g} ms, less than a tenth of the sampling period"
 
 
+def rescaled(values: Mapping[str, float]) -> Mapping[str, float]:
+    """Return what the line takes by the torque's clock: the fit keeps to the speed's, and either may be right.
+
+    Torques and speeds stay as they were read. In a time that is longer, accelerations are smaller and twists larger.
+    """
+    longer = 1.0 + values["rate"]
+    return {"inertia": longer, "stiffness": 1.0 / longer}
+
+
 def sentence(values: Mapping[str, float], motion: Motion) -> str:
     """Say what was found."""
     return f"the torque's clock runs {1e6 * values['rate']:+.0f} ppm off the speed's"
@@ -54,4 +63,5 @@ EFFECT = Effect(
     starts=starts,
     unresolved=unresolved,
     sentence=sentence,
+    rescaled=rescaled,
 )

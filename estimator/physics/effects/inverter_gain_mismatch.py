@@ -33,9 +33,13 @@ def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | N
     )
 
 
-def rescaled(values: Mapping[str, float]) -> float:
+IN_PROPORTION = ("inertia", "stiffness", "damping", "torque", "quadratic_drag")
+"""Dimensions that change with the torque."""
+
+
+def rescaled(values: Mapping[str, float]) -> Mapping[str, float]:
     """Return what every torque is multiplied by where the other inverter is the wrong one: only their ratio shows."""
-    return 1.0 / (values["gain_m1"] * values["gain_m2"])
+    return dict.fromkeys(IN_PROPORTION, 1.0 / (values["gain_m1"] * values["gain_m2"]))
 
 
 def sentence(values: Mapping[str, float], motion: Motion) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -34,7 +35,7 @@ from estimator.signals.record import FloatArray, Record
 from tests.estimator.diagnosis.outcome import outcome
 from tests.estimator.diagnosis.planted import SIGMA, drive_torque, rubbing
 from tests.estimator.diagnosis.regression import regression
-from tests.estimator.physics.bench import ONE_MASS, linear_record, model, random_steps, scaled
+from tests.estimator.physics.bench import ONE_MASS, SAMPLE_TIME_S, linear_record, model, random_steps, record, scaled
 
 COULOMB = "coulomb_friction_motor"
 FRICTION_NM = 12.0
@@ -139,6 +140,30 @@ def test_the_other_way_is_as_uncertain_as_the_factor_between_both() -> None:
         (min(interval(result, cov, inertia)[0], told[0]), max(interval(result, cov, inertia)[1], told[1])), rel=1e-6
     )
     assert np.ptp(told) > 1.2 * np.ptp(interval(result, cov, inertia)) / result.x[gain]
+
+
+def by_another_clock(values: Mapping[str, float], seed: int, rate: float) -> Record:
+    """Speeds of a single mass taken at ``(1 + rate) t``, exact under held torques: the torque's clock is right."""
+    samples, line = 3000, Start(5.0, 0.0, 2.0)
+    torque = random_steps(samples + 100, seed, hold=20)
+    on_time = linear_record(values, torque, line).output
+    instants_s = SAMPLE_TIME_S * (1.0 + rate) * np.arange(samples)
+    held = np.floor(instants_s / SAMPLE_TIME_S + 1e-9).astype(int)
+    left = np.exp(-values["b_M"] / values["J_M"] * (instants_s - SAMPLE_TIME_S * held))
+    speed = left * on_time[held] + (1.0 - left) * (torque[held] - line.load_torque_nm) / values["b_M"]
+    noise = SIGMA * np.random.default_rng(seed).standard_normal(samples)
+    return record(torque[:samples], speed + noise, name=f"run_{seed}")
+
+
+def test_whichever_clock_is_right_the_intervals_hold_the_line() -> None:
+    """The fit keeps to the speed's: by it an inertia is off by the rate, many times what the noise leaves open."""
+    rate = 0.002
+    records = [by_another_clock(ONE_MASS, seed, rate) for seed in (1, 2)]
+    result = assembled(records, "clock_drift")[0].result
+    assert result.value("clock_drift", "rate") == pytest.approx(rate, rel=0.02)
+    inertia = retuned_parameters(result, LINE, whole=True)["J_M"]
+    assert inertia.value == pytest.approx(ONE_MASS["J_M"] / (1.0 + rate), rel=2e-4)
+    assert inertia.ci95[0] < inertia.value < ONE_MASS["J_M"] < inertia.ci95[1] < (1.0 + 2.0 * rate) * ONE_MASS["J_M"]
 
 
 class TestAnEffect:
