@@ -14,6 +14,7 @@ from estimator.diagnosis.acquisition import (
     as_read,
     compensate,
     hidden_jitter,
+    mean_shift,
     recognise,
     repaired,
 )
@@ -41,15 +42,18 @@ class Chain:
     filled : tuple of Record
         With the faults compensated, torques that were not read filled in.
     records : tuple of Record
-        The same with these torques estimated, for fits.
+        The same with these torques estimated, and without what jitter adds in the mean, for fits.
     findings : tuple of Finding
         What was recognised.
+    shifts : tuple of ndarray, shape (N,)
+        What hidden jitter adds to the readings of each recording in the mean; empty where there is none.
     """
 
     raw: tuple[Record, ...]
     filled: tuple[Record, ...]
     records: tuple[Record, ...]
     findings: tuple[Finding, ...]
+    shifts: tuple[FloatArray, ...] = ()
 
     @property
     def torque_is_unknown(self) -> bool:
@@ -61,12 +65,21 @@ class Chain:
         return replace(self, records=repaired(self.records, _misfits(result), self.filled))
 
     def with_jitter_in(self, result: FitResult) -> Chain:
-        """Return the chain with the jitter that only the errors of a converged fit show, where they show any."""
+        """Return the chain with the jitter that only the errors of a converged fit show, where they show any.
+
+        What cannot be known is by how much each reading is off. What they are off in the mean is taken off them.
+        """
         if any(finding.name == "sample_jitter" for finding in self.findings):
             return self
         errors = [record.output - output for output, record in zip(result.outputs, self.records, strict=True)]
-        found = hidden_jitter(self.records, errors, rates(result), [record.okay for record in self.records])
-        return self if found is None else replace(self, findings=(*self.findings, found))
+        slopes = rates(result)
+        found = hidden_jitter(self.records, errors, slopes, [record.okay for record in self.records])
+        if found is None:
+            return self
+        jitter_s = found.parameters["jitter_s"].value
+        shifts = tuple(mean_shift(steep, jitter_s) for steep in slopes)
+        steady = tuple(replace(r, output=r.output - shift) for r, shift in zip(self.records, shifts, strict=True))
+        return replace(self, records=steady, findings=(*self.findings, found), shifts=shifts)
 
     def effects(self) -> dict[str, dict[str, float]]:
         """Return what was recognised as effects of a model: name to parameter values."""
@@ -77,9 +90,11 @@ class Chain:
 
         Readings that were lost without a flag are no good rows: nothing was read there.
         """
+        read = [as_read(output, record, self.effects()) for output, record in zip(outputs, self.raw, strict=True)]
+        shifted = [each + shift for each, shift in zip(read, self.shifts, strict=True)] if self.shifts else read
         return [
-            (as_read(output, record, self.effects()) - record.output)[_read_rows(record, self.findings)]
-            for output, record in zip(outputs, self.raw, strict=True)
+            (each - record.output)[_read_rows(record, self.findings)]
+            for each, record in zip(shifted, self.raw, strict=True)
         ]
 
 

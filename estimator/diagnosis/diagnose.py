@@ -98,9 +98,8 @@ def _diagnose(
     line = mechanical(model)
     chain, unseen = read_through(records), read_through(holdout)
     found = search(chain, line, unseen.records, progress)
-    examiner, selection, floor = found.examiner, found.selection, found.floor
+    chain, examiner, selection, floor = found.chain, found.examiner, found.selection, found.floor
     progress("weighing the verdict", 0.9)
-    chain = found.chain.with_jitter_in(selection.result)
     judgement = judge(selection, floor, chain.findings)
     believed = judgement.verdict is Verdict.EXPLAINED
     final = selection.result if believed else selection.retuned

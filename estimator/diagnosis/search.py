@@ -73,28 +73,16 @@ def _search(chain: Chain, model: DrivelineModel, unseen: Sequence[Record], progr
 
     Torques that were not read are estimated from the nominal fit first. Where effects are found, they are estimated
     again with these, and the search begins anew: a torque estimated with physics missing hides the rest. It begins
-    anew, too, where the errors show jitter and an effect is hardly seen: such errors grow with the acceleration, and
-    every test takes them for noise of one size.
+    anew, too, where the errors show jitter, without what that adds in the mean, and for what can be seen only: such
+    errors grow with the acceleration, and every test takes them for noise of one size.
     """
     least_ratio = VISIBLE if chain.torque_is_unknown else 1.0
     found = _searched(_repaired(chain, model, NOTHING, grid), model, unseen, progress, grid, least_ratio)
     if chain.torque_is_unknown and found.selection.chosen:
         again = _repaired(chain, model, found.selection.chosen, grid)
         found = _searched(again, model, unseen, progress, grid, least_ratio)
-    if any(hardly_seen(name, found) for name in found.selection.chosen) and is_shaken(found):
-        found = _searched(found.chain, model, unseen, progress, grid, VISIBLE)
-    return found
-
-
-def is_shaken(found: Search) -> bool:
-    """Tell whether what the chosen effects leave shows jitter that no stamp tells."""
-    return found.chain.with_jitter_in(found.selection.result) is not found.chain
-
-
-def hardly_seen(name: str, found: Search) -> bool:
-    """Tell whether a chosen effect lowers the error by less than can be seen."""
-    result = found.selection.result
-    return found.bench.fit(found.selection.chosen - {name}, result).rms < VISIBLE * result.rms
+    steady = found.chain.with_jitter_in(found.selection.result)
+    return found if steady is found.chain else _searched(steady, model, unseen, progress, grid, VISIBLE)
 
 
 def _repaired(chain: Chain, model: DrivelineModel, effects: Effects, grid: Grid) -> Chain:

@@ -3,7 +3,7 @@
 from estimator.diagnosis.acquisition.as_read import as_read
 from estimator.diagnosis.acquisition.compensate import compensate
 from estimator.diagnosis.acquisition.finding import OUTPUT, Finding, Sized
-from estimator.diagnosis.acquisition.hidden_jitter import hidden_jitter
+from estimator.diagnosis.acquisition.hidden_jitter import hidden_jitter, mean_shift
 from estimator.diagnosis.acquisition.recognise import as_if_not_lost, recognise
 from estimator.diagnosis.acquisition.repair import Misfit, repaired
 
@@ -16,6 +16,7 @@ __all__ = [
     "as_read",
     "compensate",
     "hidden_jitter",
+    "mean_shift",
     "recognise",
     "repaired",
 ]

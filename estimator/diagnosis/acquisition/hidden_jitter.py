@@ -116,6 +116,18 @@ def hidden_jitter(
     )
 
 
+def mean_shift(slopes: FloatArray, jitter_s: float) -> FloatArray:
+    """Return what readings off their time by ``jitter_s`` (rms) are off in the mean, shape (N,): a kink is cut short.
+
+    Parameters
+    ----------
+    slopes : ndarray, shape (2, N)
+        As in ``hidden_jitter``.
+    """
+    shift: FloatArray = np.sqrt(OF_A_KINK) * jitter_s * (slopes[1] - slopes[0])
+    return shift
+
+
 def _outputs(records: Sequence[Record], okay: Sequence[BoolArray]) -> Mapping[str, BoolArray]:
     cells = {}
     for record, good in zip(records, okay, strict=True):

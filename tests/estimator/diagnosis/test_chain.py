@@ -8,11 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from estimator.diagnosis.assemble import rms_of
 from estimator.diagnosis.chain import Chain, mechanical, read_through, replay
 from estimator.diagnosis.hypotheses import NOTHING, Bench, everything
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult
 from estimator.physics.free_run import free_run
+from estimator.physics.layout import slot
 from estimator.physics.model import DrivelineModel, EffectValue, Parameter, Structure
 from estimator.signals.record import Record
 from tests.estimator.diagnosis.acquisition.bench import NOISE, SAMPLES, Line, drives, periodic_rows, random_rows, stale
@@ -139,6 +141,28 @@ class TestHiddenJitter:
         assert [finding.name for finding in found.findings] == ["sample_jitter"]
         assert found.effects()["sample_jitter"]["jitter_s"] == pytest.approx(1.5e-3, rel=0.1)
         assert found.with_jitter_in(result) is found
+
+    def test_what_it_adds_in_the_mean_is_taken_off(self) -> None:
+        """Where the torque steps, readings are off to one side, come they early or late: the line seems heavier."""
+        heavier = []
+        for seed in range(4):
+            offset_s = 2.2e-3 * np.random.default_rng(seed).standard_normal(SAMPLES)
+            records = [TRUTH.record("cruise", speed=TRUTH.speed(offset_s))]
+            as_read = Bench(MODEL, records, everything(records)).fit(NOTHING)
+            steady = read_through(records).with_jitter_in(as_read).records
+            without = Bench(MODEL, steady, everything(steady)).fit(NOTHING, as_read)
+            heavier.append([fit.p[slot("", "J_M")] / TRUTH.line.j_m - 1.0 for fit in (as_read, without)])
+        before, after = np.mean(heavier, axis=0)
+        assert before > 0.008
+        assert abs(after) < 0.4 * before
+
+    def test_explained_by_it_the_errors_are_less(self) -> None:
+        records = [self.jittered()]
+        as_read = Bench(MODEL, records, everything(records)).fit(NOTHING)
+        chain = read_through(records).with_jitter_in(as_read)
+        steady = Bench(MODEL, chain.records, everything(chain.records)).fit(NOTHING, as_read)
+        assert rms_of(chain.errors(steady.outputs)) == pytest.approx(steady.rms)
+        assert steady.rms < as_read.rms
 
     def test_a_healthy_chain_stays(self) -> None:
         chain, result = read_through([HEALTHY]), Bench(MODEL, [HEALTHY], everything([HEALTHY])).fit(NOTHING)

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis import search as search_module
-from estimator.diagnosis.chain import read_through
+from estimator.diagnosis.chain import Chain, read_through
 from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects, everything
 from estimator.diagnosis.noise import noise_floor
-from estimator.diagnosis.search import FINER, Search, hardly_seen, is_made_by_steps, is_shaken, search
+from estimator.diagnosis.search import FINER, Search, is_made_by_steps, search
+from estimator.diagnosis.weight import VISIBLE
 from estimator.physics.simulate import grid_for
 from estimator.signals.record import Record
 from tests.estimator.diagnosis.planted import quiet, rubbing
@@ -36,27 +37,31 @@ def searched(records: list[Record]) -> Search:
     return search(read_through(records), model(ONE_MASS), (), lambda what, share: None)
 
 
+def faults(found: Search) -> list[str]:
+    return [finding.name for finding in found.chain.findings]
+
+
 def test_on_time_a_friction_that_is_hardly_seen_is_named() -> None:
     found = searched(rubbing(lambda speed: 0.5))
     assert found.selection.chosen == FRICTION
-    assert hardly_seen("coulomb_friction_motor", found)
-    assert not is_shaken(found)
+    assert found.selection.retuned.rms < VISIBLE * found.selection.result.rms
+    assert faults(found) == []
 
 
 def test_off_time_it_is_not(monkeypatch: pytest.MonkeyPatch) -> None:
     records = shaken(rubbing(lambda speed: 0.5))
     found = searched(records)
-    assert is_shaken(found)
+    assert faults(found) == ["sample_jitter"]
     assert found.selection.chosen == NOTHING
-    monkeypatch.setattr(search_module, "is_shaken", lambda found: False)
+    monkeypatch.setattr(Chain, "with_jitter_in", lambda chain, result: chain)
     assert searched(records).selection.chosen == FRICTION
 
 
 def test_off_time_a_friction_that_is_seen_is_named() -> None:
     found = searched(shaken(rubbing(lambda speed: 1.5)))
-    assert is_shaken(found)
+    assert faults(found) == ["sample_jitter"]
     assert found.selection.chosen == FRICTION
-    assert not hardly_seen("coulomb_friction_motor", found)
+    assert found.selection.retuned.rms > VISIBLE * found.selection.result.rms
 
 
 def test_what_steps_too_coarse_draw_is_seen_on_finer_ones() -> None:
