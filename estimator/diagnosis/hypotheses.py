@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from estimator.diagnosis.evidence import gain
+from estimator.diagnosis.evidence import VERY_STRONG, gain
 from estimator.diagnosis.screening import Screen, promising
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Untestable
@@ -127,7 +127,7 @@ class Bench:
                 fits.append(polished(converge(heat)))
         plausible = [fit for fit in fits if not entry.implausible(self.model, self.records, fit.values_of(name))]
         best = min(plausible, key=lambda fit: fit.squares, default=had)
-        if gain(best, had).delta_bic <= 0.0:
+        if _is_told_better(had, best):
             self._remember(effects, best)
         return self.fit(effects)
 
@@ -259,6 +259,13 @@ class Bench:
         """Return the nominal parameters, and what the model's own effects leave to every recording."""
         own = tuple(own_unknowns(self.model.effects, record) for record in self.records)
         return Release(nominal_unknowns(self.model), own)
+
+
+def _is_told_better(had: FitResult, other: FitResult) -> bool:
+    """Tell whether a law written another way is to be kept: with more unknowns it must say clearly more."""
+    if other.free_count > had.free_count:
+        return gain(had, other).delta_bic >= VERY_STRONG
+    return gain(other, had).delta_bic <= 0.0
 
 
 def _forgetting(result: FitResult, name: str) -> FitResult:

@@ -12,7 +12,7 @@ import numpy as np
 from estimator.abreast import LANES
 from estimator.errors import BadModel
 from estimator.physics import joint, own_law, own_law_run
-from estimator.physics.kernel import integration, many, sensing, side_by_side, slots, state_vector
+from estimator.physics.kernel import bristles, integration, many, sensing, side_by_side, slots, state_vector
 from estimator.physics.kernel.conditions import branch_frequency, branch_inertia
 from estimator.physics.kernel.line import is_within
 from estimator.physics.model import DrivelineModel, Structure, natural_frequencies_rad_s
@@ -418,6 +418,7 @@ def initial_state(start: Start, torque_nm: float, angle_rad: float, p: FloatArra
             -p[slots.LAGGED_BEFORE],
             sensing.reading(start.speed_rad_s, angle_rad, p) + p[slots.FILTERED_BEFORE],
             -p[slots.FILTERED_BEFORE],
+            bristles.slid(start.speed_rad_s, p),
         ]
     )
 

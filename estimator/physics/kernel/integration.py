@@ -14,6 +14,7 @@ from typing import Any
 from estimator.compiled import brief, compiled, inlined
 from estimator.physics.effects import actuator_lag, transport_delay
 from estimator.physics.kernel import slots
+from estimator.physics.kernel.bristles import bent, rubbed
 from estimator.physics.kernel.conditions import (
     branch_frequency,
     branch_inertia,
@@ -22,11 +23,19 @@ from estimator.physics.kernel.conditions import (
     is_waving,
     with_torques,
 )
-from estimator.physics.kernel.line import Line, is_within
-from estimator.physics.kernel.linear import WORTHWHILE_SAMPLES, answers, has_dry_friction, is_linear, led_on
+from estimator.physics.kernel.line import Line, is_bristled, is_within
+from estimator.physics.kernel.linear import WORTHWHILE_SAMPLES, Answers, answers, has_dry_friction, is_linear, led_on
 from estimator.physics.kernel.makes import for_its_make
 from estimator.physics.kernel.sensing import entry, reading, shown, smoothed
-from estimator.physics.kernel.state_vector import FILTER_RISE, FILTERED, LAG_RISE, LAGGED, State
+from estimator.physics.kernel.state_vector import (
+    BRISTLES,
+    FILTER_RISE,
+    FILTERED,
+    LAG_RISE,
+    LAGGED,
+    Conditions,
+    State,
+)
 from estimator.signals.record import FloatArray
 
 RADIANS_PER_STEP_OF_MODE = 0.6
@@ -68,6 +77,30 @@ def leave_slope(k: int, slope: float, slopes: FloatArray) -> None:
 
 
 @inlined
+def rubbed_on(
+    line: Line,
+    summing: bool,
+    to: Answers,
+    now: Conditions,
+    torque: float,
+    rise: float,
+    x: State,
+    bristles: float,
+    p: FloatArray,
+    h: float,
+) -> tuple[State, float]:
+    """Return the state that follows on ``x`` and the torque of the bristles, where there are any [Nm]."""
+    bristled, felt = is_bristled(p), now
+    if bristled:
+        bristles = bent(bristles, x.speed, now, p, 0.5 * h)
+        felt = rubbed(now, bristles)
+    after = led_on(line, summing, to, felt, torque, rise, x, p, h)
+    if bristled:
+        bristles = bent(bristles, after.speed, now, p, 0.5 * h)
+    return after, bristles
+
+
+@inlined
 def integrate_made(
     line: Line,
     sample_time_s: float,
@@ -102,6 +135,7 @@ def integrate_made(
     x = unpacked(state)
     lagged, lag_rise = state[LAGGED], state[LAG_RISE]
     filtered, filter_rise = state[FILTERED], state[FILTER_RISE]
+    bristles = state[BRISTLES]
     now = conditions(line.masses, start_s + first * sample_time_s, h, 0.0, 0.0, sign_width, p)
     to, read = answers(line, now, p, h, 0), False
     for k in range(first, n):
@@ -130,7 +164,7 @@ def integrate_made(
                 supplied, rise, lagged, lag_rise, p[slots.LAG], p[slots.LAG_SHAPE], h
             )
             before = x
-            x = led_on(line, summing, to, now, mean, rise, before, p, h)
+            x, bristles = rubbed_on(line, summing, to, now, mean, rise, before, bristles, p, h)
             slope = (entry(x, output) - entry(before, output)) / h
             if filtering:
                 turned, turns = angle[k] + turn * j * length, angle[k] + turn * (j + 1) * length
@@ -142,6 +176,7 @@ def integrate_made(
         state[i] = last
     state[LAGGED], state[LAG_RISE] = lagged, lag_rise
     state[FILTERED], state[FILTER_RISE] = filtered, filter_rise
+    state[BRISTLES] = bristles
 
 
 @compiled

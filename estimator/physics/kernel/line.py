@@ -40,6 +40,12 @@ def is_elastic(p: FloatArray) -> bool:
 
 
 @inlined
+def is_bristled(p: FloatArray) -> bool:
+    """Tell whether dry friction at the motor bends before it slides."""
+    return some(p[slots.COULOMB_PRESLIDING] > 0.0) or some(p[slots.STRIBECK_PRESLIDING] > 0.0)
+
+
+@inlined
 def is_extended(p: FloatArray) -> bool:
     """Tell whether a line has states beyond those of its masses and a slider."""
     return bool(p[slots.BRANCH_INERTIA] > 0.0 or is_within(p) or p[slots.SLIP] > 0.0)

@@ -19,7 +19,7 @@ from estimator.physics.catalogue import BUILT_IN
 from estimator.physics.kernel import slots
 from estimator.physics.kernel.conditions import with_friction, with_torques
 from estimator.physics.kernel.contact import stepped
-from estimator.physics.kernel.line import Line
+from estimator.physics.kernel.line import Line, is_bristled
 from estimator.physics.kernel.runge_kutta import moved, runge_kutta
 from estimator.physics.kernel.state_vector import Conditions, State
 from estimator.physics.laws import BEYOND, dry_friction
@@ -38,6 +38,7 @@ LINEAR = frozenset(
         "transport_delay",
         "clock_drift",
         "coulomb_friction_motor",
+        "stribeck_friction",
         "generator_coupled",
         "extra_torsional_mode",
         "stiffness_change",
@@ -87,8 +88,11 @@ class Answers(NamedTuple):
 
 @inlined
 def is_linear(line: Line, p: FloatArray) -> bool:
-    """Tell whether a line is linear while its conditions are constant and dry friction has its full size."""
-    if not line.elastic:
+    """Tell whether a line is linear while its conditions are constant and dry friction has its full size.
+
+    Bristles leave it linear at any speed: what they hold is a torque like another.
+    """
+    if not (line.elastic and (is_bristled(p) or p[slots.STRIBECK] == p[slots.STRIBECK_COULOMB] == 0.0)):
         return False
     for i in range(BENDING.size):
         if p[BENDING[i]] != NULLS[i]:
@@ -99,7 +103,7 @@ def is_linear(line: Line, p: FloatArray) -> bool:
 @inlined
 def has_dry_friction(p: FloatArray) -> bool:
     """Tell whether there is dry friction at the motor or at the load, be it for a while only."""
-    return bool(p[slots.COULOMB] != 0.0 or p[slots.COULOMB_LOAD] != 0.0 or p[slots.BRAKE] != 0.0)
+    return bool(is_bristled(p) or p[slots.COULOMB] != 0.0 or p[slots.COULOMB_LOAD] != 0.0 or p[slots.BRAKE] != 0.0)
 
 
 @inlined
@@ -172,7 +176,9 @@ def led_on(
 def answered(line: Line, to: Answers, now: Conditions, torque: float, rise: float, x: State, p: FloatArray) -> State:
     """Return the state that follows on ``x`` under a torque of this mean and rise [Nm] and full dry friction."""
     carried = x.speed if line.masses == 1 else x.load_speed
-    torque -= dry_friction(x.speed, p[slots.COULOMB], now.width_motor)
+    torque += now.torque
+    if now.dry_motor != 0.0:
+        torque -= dry_friction(x.speed, p[slots.COULOMB], now.width_motor)
     load = now.load + dry_friction(carried, now.dry_load, now.width_load)
     after = State(0.0, 0.0, 0.0, 0.0, x.loading, x.vehicle_speed, 0.0, 0.0, 0.0, 0.0, x.traction)
     after = moved(line, after, to.torque, torque)

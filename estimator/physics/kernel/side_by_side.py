@@ -13,13 +13,14 @@ from estimator.abreast import LANES, abreast
 from estimator.compiled import IS_COMPILED, compiled, inlined
 from estimator.physics.catalogue import BUILT_IN
 from estimator.physics.kernel import slots
+from estimator.physics.kernel.bristles import bent, rubbed
 from estimator.physics.kernel.conditions import conditions, is_changing, is_waving, with_torques
 from estimator.physics.kernel.contact import stepped
-from estimator.physics.kernel.line import Line, is_elastic
+from estimator.physics.kernel.line import Line, is_bristled, is_elastic
 from estimator.physics.kernel.linear import is_linear
 from estimator.physics.kernel.makes import for_its_make
 from estimator.physics.kernel.sensing import entry, reading, shown
-from estimator.physics.kernel.state_vector import State
+from estimator.physics.kernel.state_vector import BRISTLES, State
 from estimator.physics.layout import slot
 from estimator.signals.record import FloatArray, IntArray
 
@@ -87,6 +88,7 @@ def advance(
     x = State(
         start[0], start[1], start[2], start[3], start[4], start[5], start[6], start[7], start[8], start[9], start[10]
     )
+    bristled, bristles = is_bristled(one_of_them), start[BRISTLES]
     now = conditions(line.masses, start_s + first * sample_time_s, h, 0.0, load[first], sign_width, p)
     for k in range(first, torque_lanes.shape[0]):
         out[k] = entry(x, output)
@@ -99,7 +101,13 @@ def advance(
             if varying:
                 middle, place = angle[k] + turn * (j + 0.5) * length, k + j * length
                 now = conditions(line.masses, start_s + place * sample_time_s, h, middle, load[k], sign_width, p)
-            x = stepped(line, now, torque[k], 0.0, x, p, h)
+            felt = now
+            if bristled:
+                bristles = bent(bristles, x.speed, now, p, 0.5 * h)
+                felt = rubbed(now, bristles)
+            x = stepped(line, felt, torque[k], 0.0, x, p, h)
+            if bristled:
+                bristles = bent(bristles, x.speed, now, p, 0.5 * h)
 
 
 @compiled

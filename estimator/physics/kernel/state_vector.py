@@ -7,10 +7,11 @@ from typing import NamedTuple
 ANGLE, SPEED, TWIST, LOAD_SPEED = 0, 1, 2, 3
 """Mechanical states that can be an output; see ``State``."""
 
-STATES = 15
-"""Length of the state array: ``State``, the lagged torque and its rise [Nm], the filtered reading and its [rad/s]."""
+STATES = 16
+"""Length of the state array: ``State``, the lagged torque and its rise [Nm], the filtered reading and its [rad/s], and
+the torque of the bristles of dry friction at the motor [Nm]."""
 
-LAGGED, LAG_RISE, FILTERED, FILTER_RISE = 11, 12, 13, 14
+LAGGED, LAG_RISE, FILTERED, FILTER_RISE, BRISTLES = 11, 12, 13, 14, 15
 
 
 class State(NamedTuple):

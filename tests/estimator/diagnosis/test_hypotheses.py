@@ -20,7 +20,7 @@ from estimator.physics.simulate import Start, grid_for, simulate
 from estimator.physics.starts import begun, close
 from estimator.physics.unknowns import Release, effect_unknowns
 from estimator.signals.record import OutputKind
-from tests.estimator.diagnosis.planted import SIGMA, quiet, rubbing
+from tests.estimator.diagnosis.planted import SIGMA, drive_torque, quiet, rubbing
 from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, linear_record, model, random_steps, record
 from tests.estimator.physics.cracking import AT_S, CRACK, LAST_S, SOUND, cracking, the_other_way_round
 
@@ -310,6 +310,27 @@ class TestLocalMinima:
         assert EFFECTS[name].derived(fitted, {"k": found.value("", "k")})["frequency_hz"] == pytest.approx(
             true_hz, rel=0.05
         )
+
+    @pytest.mark.parametrize("presliding_rad", [0.0, 2e-3])
+    def test_friction_bends_before_it_slides_where_that_is_seen(self, presliding_rad: float) -> None:
+        name, line, records = "stribeck_friction", model(TWO_MASS), []
+        values = {"excess_nm": 18.0, "coulomb_nm": 10.0, "stribeck_rad_s": 1.5}
+        true = flat_values(TWO_MASS, {name: values | {"presliding_rad": presliding_rad}})
+        for seed in (3, 4):
+            silent = record(drive_torque(seed), np.zeros(1500), name=f"run_{seed}")
+            output = simulate(grid_for(line, [silent]), silent, true, Start(5.0, 0.0, 2.0))
+            records.append(replace(silent, output=output + SIGMA * np.random.default_rng(seed).standard_normal(1500)))
+        bench, effects = Bench(line, records, everything(records)), frozenset({name})
+        rigid = bench.fit(effects, bench.fit(NOTHING))
+        found = bench.fit_retold(effects, name)
+        if presliding_rad == 0.0:
+            assert found is rigid
+            return
+        assert rigid.rms > 1.2 * SIGMA
+        assert found.rms == pytest.approx(SIGMA, rel=0.05)
+        for key in values:
+            assert found.value(name, key) == pytest.approx(values[key], rel=0.05)
+        assert found.value(name, "presliding_rad") == pytest.approx(presliding_rad, rel=0.1)
 
     def test_fewer_effects_start_from_where_more_ended_too(self) -> None:
         records = rubbing(lambda speed: FRICTION_NM)

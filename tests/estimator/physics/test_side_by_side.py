@@ -57,6 +57,7 @@ BESIDE_A_SHAFT: dict[str, Effects] = {
 EVERYWHERE: dict[str, Effects] = {
     "drag": QUADRATIC,
     "Stribeck": {"stribeck_friction": {"coulomb_nm": 5.0, "excess_nm": 8.0, "stribeck_rad_s": 3.0}},
+    "drag and bristles": QUADRATIC | {"coulomb_friction_motor": {"friction_nm": 9.0, "presliding_rad": 1e-3}},
     "drag and dry friction": QUADRATIC | {"coulomb_friction_motor": {"friction_nm": 9.0}},
     "drag in steps": QUADRATIC | {"speed_quantisation": {"step_rad_s": 0.5}},
     "drag and a payload": QUADRATIC | {"inertia_change": {"change_kg_m2": 3.0, "from_s": 1.0, "to_s": 2.5}},

@@ -29,6 +29,12 @@ EFFECTS: dict[str, dict[str, float]] = {
     "transport_delay": {"delay_s": 0.023},
     "coulomb_friction_motor": {"friction_nm": 20.0},
     "stribeck_friction": {"excess_nm": 15.0, "coulomb_nm": 10.0, "stribeck_rad_s": 0.5},
+    "stribeck_friction/bristles": {
+        "excess_nm": 15.0,
+        "coulomb_nm": 10.0,
+        "stribeck_rad_s": 0.5,
+        "presliding_rad": 2e-3,
+    },
     "quadratic_friction": {"quadratic_nm_s2": 2.0},
     "generator_coupled": {"inertia_kg_m2": 1.5, "from_s": 0.5, "to_s": 1.503},
     "backlash": {"gap_rad": 0.02, "contact_rad": 1e-3},
