@@ -52,17 +52,23 @@ def without_idle(result: FitResult, iterations: int = ITERATIONS) -> FitResult:
 
 def _is_at_an_end(result: FitResult, index: int) -> bool:
     """Tell whether all that events do in a recording, they do so near to an end of it that it could be none."""
-    record, names = result.problem.records[index], {u.effect for u in result.problem.local[index].own}
-    acting = [moments_of(result, name)[index] for name in names if EFFECTS[name].event]
+    record = result.problem.records[index]
     return all(
-        to_s - from_s < EDGE_S and not (inside(record, from_s) and inside(record, to_s)) for from_s, to_s in acting
+        to_s - from_s < EDGE_S and not (inside(record, from_s) and inside(record, to_s))
+        for from_s, to_s in _acting(result, index)
     )
 
 
+def _acting(result: FitResult, index: int) -> list[tuple[float, float]]:
+    """Return from when to when each event acts in a recording [s since its start]."""
+    names = {u.effect for u in result.problem.local[index].own}
+    return [moments_of(result, name)[index] for name in names if EFFECTS[name].event]
+
+
 def _silenced(result: FitResult, index: int) -> tuple[Problem, FloatArray] | None:
-    """Return the problem with one recording's events held empty, and the unknowns for it; None where it has none."""
+    """Return the problem with one recording's events held empty, and the unknowns for it; None where they are."""
     basis = result.problem.local[index]
-    if not any(EFFECTS[u.effect].event and u.low < u.high for u in basis.own):
+    if all(to_s == from_s for from_s, to_s in _acting(result, index)):
         return None
     began = {u.effect: u.low for u in basis.own if u.name == "from_s"}
     held = tuple(

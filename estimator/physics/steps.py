@@ -6,6 +6,7 @@ motion. A fit ends in either; people expect the first.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -50,12 +51,15 @@ def inside(record: Record, moment_s: float) -> bool:
     return first + EDGE_S <= moment_s <= last - EDGE_S
 
 
+def _comes_and_goes(record: Record, moments: Moments) -> bool:
+    return all(inside(record, moment_s) for moment_s in moments)
+
+
 def _turned(result: FitResult, model: DrivelineModel, name: str, step: Step) -> FitResult:
     found = list(zip(result.problem.records, moments_of(result, name), strict=True))
-    begins = sum(to_s > from_s and inside(record, from_s) for record, (from_s, to_s) in found)
-    ends = sum(to_s > from_s and inside(record, to_s) for record, (from_s, to_s) in found)
-    both = any(inside(record, from_s) and inside(record, to_s) for record, (from_s, to_s) in found)
-    if both or begins >= ends:
+    once = [(record, times) for record, times in found if times[1] > times[0] and not _comes_and_goes(record, times)]
+    begins, ends = (sum(inside(record, times[which]) for record, times in once) for which in (0, 1))
+    if begins >= ends:
         return result
     shared = {(s.effect, s.name): row for row, s in enumerate(result.problem.shared)}
     nominal, size = shared["", step.of(model)], next(row for (effect, _), row in shared.items() if effect == name)
@@ -66,22 +70,39 @@ def _turned(result: FitResult, model: DrivelineModel, name: str, step: Step) -> 
         x[row] = value / unknown.scale
         if not unknown.low <= x[row] <= unknown.high:
             return result
+    came_and_went = any(_comes_and_goes(record, moments) for record, moments in found)
+    tries = [
+        _told(result, name, found, x, from_the_start)
+        for from_the_start in ((False, True) if came_and_went else (False,))
+    ]
+    best = min(tries, key=lambda told: told.squares)
+    return best if best.squares <= SAME * result.squares else result
+
+
+def _told(
+    result: FitResult, name: str, found: Sequence[tuple[Record, Moments]], x: FloatArray, from_the_start: bool
+) -> FitResult:
+    """Fit from an event where it did not act before, and from the shared unknowns ``x`` for it."""
     turned = [
-        _complement(result.problem.local[i], result.local_of(i), name, record, moments)
+        _complement(result.problem.local[i], result.local_of(i), name, record, moments, from_the_start)
         for i, (record, moments) in enumerate(found)
     ]
     problem = replace(result.problem, local=tuple(basis for basis, _ in turned))
-    again = fit(problem, np.concatenate([x, *(local for _, local in turned)]))
-    return again if again.squares <= SAME * result.squares else result
+    return fit(problem, np.concatenate([x, *(local for _, local in turned)]))
 
 
 def _complement(
-    basis: LocalBasis, local: FloatArray, name: str, record: Record, moments: Moments
+    basis: LocalBasis, local: FloatArray, name: str, record: Record, moments: Moments, from_the_start: bool
 ) -> tuple[LocalBasis, FloatArray]:
-    """Return a recording's basis and unknowns with an event where it did not act before."""
+    """Return a recording's basis and unknowns with an event where it did not act before.
+
+    One that comes and goes leaves no single stretch. It is taken for badly sought: acting from where it ended, or from
+    the start on as if there were none, with a beginning that may move.
+    """
     first, last = (float(end) for end in record.since_start_s[[0, -1]])
     from_s, to_s = moments
-    if to_s <= from_s:
+    sought = _comes_and_goes(record, moments)
+    if to_s <= from_s or (sought and from_the_start):
         times = {"from_s": first, "to_s": last}
     elif inside(record, to_s):
         times = {"from_s": to_s, "to_s": last}
@@ -95,5 +116,7 @@ def _complement(
             at = local[row] = times[unknown.name]
             near = EDGE_S if inside(record, at) else 0.0
             unknown = replace(unknown, start=at, low=at - near, high=at + near)
+            if sought and unknown.name == "from_s":
+                unknown = replace(unknown, low=first, high=last)
         own.append(unknown)
     return replace(basis, own=tuple(own)), local

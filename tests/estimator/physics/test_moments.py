@@ -115,12 +115,12 @@ class TestWithoutIdle:
         torque, start = random_steps(SAMPLES, seed, mean_nm=90.0), Start(5.0, 0.0, 20.0)
         return linear_record(ONE_MASS, torque, start, sigma=SIGMA, seed=seed, name=f"run_{seed}", extra_load_nm=load)
 
-    def fitted(self, *started_s: tuple[float, float]) -> FitResult:
+    def fitted(self, *started_s: tuple[float, float], near_s: float = 0.5) -> FitResult:
         """Fit with moments that may move by half a second, as after a scan."""
         records = [self.driven(1, (2.0, 5.0)), self.driven(2, None)]
         own = [
             tuple(
-                replace(u, start=start, low=max(u.low, start - 0.5), high=min(u.high, start + 0.5))
+                replace(u, start=start, low=max(u.low, start - near_s), high=min(u.high, start + near_s))
                 for u, start in zip(own_unknowns(["brake_drag"], rec), at, strict=True)
             )
             for rec, at in zip(records, started_s, strict=True)
@@ -139,6 +139,10 @@ class TestWithoutIdle:
         without = without_idle(result)
         assert self.lasts_s(without) == [pytest.approx(3.0, abs=0.05), 0.0]
         assert without.rms == pytest.approx(SIGMA, rel=0.05)
+
+    def test_one_that_is_held_all_along_is_taken_out_as_well(self) -> None:
+        held = self.fitted((2.0, 5.0), (0.0, 8.99), near_s=0.0)
+        assert self.lasts_s(without_idle(held)) == [pytest.approx(3.0), 0.0]
 
     def test_one_of_no_weight_is_taken_out(self) -> None:
         without = without_idle(self.fitted((2.2, 4.8), (3.0, 3.05)))

@@ -9,6 +9,7 @@ import pytest
 
 from estimator.physics.effect import Step
 from estimator.physics.fit import fit, make_problem
+from estimator.physics.polish import polished
 from estimator.physics.steps import from_their_moment, inside, moments_of
 from estimator.physics.unknowns import effect_unknowns, nominal_unknowns
 from estimator.signals.record import Record
@@ -47,6 +48,15 @@ class TestFromTheirMoment:
     def test_told_from_its_moment_it_stays(self, records: list[Record]) -> None:
         told = from_their_moment(the_other_way_round(SOUND, records, [(0.0, AT_S), (0.0, 0.0)]), SOUND)
         assert from_their_moment(told, SOUND) is told
+
+    @pytest.mark.parametrize("found_s", [(7.0, 7.3), (0.7, 3.0)], ids=["an instant", "all but its beginning"])
+    def test_one_found_to_come_and_go_is_sought_again_from_the_other_side(self, found_s: tuple[float, float]) -> None:
+        records = [cracking(1, AT_S, LAST_S), cracking(2, 5.0, LAST_S), cracking(3, 3.0, LAST_S)]
+        told = from_their_moment(the_other_way_round(SOUND, records, [(0.0, AT_S), (0.0, 5.0), found_s]), SOUND)
+        assert told.value(CRACK, "change") < 0.0
+        told = polished(told)
+        assert moments_of(told, CRACK)[2] == pytest.approx((3.0, LAST_S), abs=0.02)
+        assert told.rms == pytest.approx(SIGMA, rel=0.05)
 
     def test_a_nominal_value_trusted_exactly_decides(self) -> None:
         """Where the nominal shaft is the soft one, it was stiffer before."""
