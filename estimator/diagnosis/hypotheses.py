@@ -10,7 +10,7 @@ import numpy as np
 from estimator.diagnosis.evidence import VERY_STRONG, gain
 from estimator.diagnosis.screening import Screen, promising
 from estimator.physics.catalogue import EFFECTS
-from estimator.physics.effect import Untestable
+from estimator.physics.effect import Start, Untestable
 from estimator.physics.fit import FitResult, Problem, fit, make_problem, not_fitted
 from estimator.physics.model import DrivelineModel, Motion
 from estimator.physics.moments import without_idle
@@ -121,7 +121,7 @@ class Bench:
         fits = []
         for other in entry.retold(self.model, self.records, values, had.values_of("")):
             warm = _placed(_forgetting(had, name), other.line)
-            starts = released(name, self.model, self.records, [other.start])
+            starts = self._retold_from(name, other.start)
             (heat,) = begun(self._problems(effects, warm, starts), warm, STEPS_OF_RETOLD)
             if heat.squares <= HOPELESS * had.squares:
                 fits.append(polished(converge(heat)))
@@ -130,6 +130,13 @@ class Bench:
         if _is_told_better(had, best):
             self._remember(effects, best)
         return self.fit(effects)
+
+    def _retold_from(self, name: str, start: Start) -> list[Release]:
+        """Return an effect's parameters that all recordings share from one start; each keeps what it has of its own."""
+        return [
+            replace(release, own=((),) * len(self.records))
+            for release in released(name, self.model, self.records, [start])
+        ]
 
     def left_without(self, effects: Effects, rival: str, had: FitResult) -> FitResult:
         """Return what is left of a fit without one of its effects, the others where it has brought them."""
@@ -269,7 +276,7 @@ def _is_told_better(had: FitResult, other: FitResult) -> bool:
 
 
 def _forgetting(result: FitResult, name: str) -> FitResult:
-    """Return a fit as if an effect without parameters of a recording's own had not been released in it."""
+    """Return a fit as if the parameters of an effect that all recordings share had not been released in it."""
     keep = [shared.effect != name for shared in result.problem.shared]
     shared = tuple(each for each, kept in zip(result.problem.shared, keep, strict=True) if kept)
     left = [*keep, *[True] * (result.x.size - len(keep))]

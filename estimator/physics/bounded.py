@@ -58,7 +58,7 @@ def _pivoted(triangle: FloatArray, target: FloatArray, low: FloatArray, high: Fl
         x = np.where(down, low, np.where(up, high, 0.0))
         free = ~(down | up)
         if free.any():
-            x[free] = np.linalg.solve(curvature[np.ix_(free, free)], slope[free] - curvature[free] @ x)
+            x[free] = np.linalg.lstsq(triangle[:, free], target - triangle[:, ~free] @ x[~free])[0]  # two may be alike
         pull = slope - curvature @ x  # where the error would fall
         inward = (down & (pull > 0.0)) | (up & (pull < 0.0))
         below, above = free & (x < low), free & (x > high)

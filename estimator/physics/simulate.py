@@ -399,6 +399,7 @@ PERIODIC = np.array(
 
 def initial_state(start: Start, torque_nm: float, angle_rad: float, p: FloatArray) -> FloatArray:
     """Return the kernel's state at the start: what is not unknown follows from the rest as if it were steady."""
+    carried_rad_s = start.load_speed_rad_s if p[slots.J_L] > 0.0 else start.speed_rad_s
     return np.array(
         [
             *state_vector.State(
@@ -418,7 +419,8 @@ def initial_state(start: Start, torque_nm: float, angle_rad: float, p: FloatArra
             -p[slots.LAGGED_BEFORE],
             sensing.reading(start.speed_rad_s, angle_rad, p) + p[slots.FILTERED_BEFORE],
             -p[slots.FILTERED_BEFORE],
-            bristles.slid(start.speed_rad_s, p),
+            bristles.slid(start.speed_rad_s, bristles.sliding(start.speed_rad_s, p)),
+            bristles.slid(carried_rad_s, float(p[slots.COULOMB_LOAD])),
         ]
     )
 

@@ -10,7 +10,7 @@ from estimator.physics.catalogue import BUILT_IN
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult, start_of
 from estimator.physics.kernel import slots, state_vector
-from estimator.physics.kernel.line import is_bristled
+from estimator.physics.kernel.line import is_bristled_at_load, is_bristled_at_motor
 from estimator.physics.layout import slot
 from estimator.physics.model import Structure, natural_frequencies_rad_s
 from estimator.physics.motion import speed_scale, torque_scale
@@ -143,8 +143,10 @@ def active_states(structure: Structure, p: FloatArray, kind: OutputKind) -> tupl
         states.append(state_vector.FILTERED)
     if p[slots.FILTER_SHAPE] > 0.0:
         states.append(state_vector.FILTER_RISE)
-    if is_bristled(p):
-        states.append(state_vector.BRISTLES)
+    if is_bristled_at_motor(p):
+        states.append(state_vector.BRISTLES_MOTOR)
+    if is_bristled_at_load(p):
+        states.append(state_vector.BRISTLES_LOAD)
     return tuple(states)
 
 
@@ -156,5 +158,6 @@ def _scales(result: FitResult, states: tuple[int, ...]) -> FloatArray:
     names = state_vector.State._fields
     sizes = dict.fromkeys(range(state_vector.STATES), speed)
     sizes |= {names.index(name): twist for name in ("twist", "branch_twist", "middle_twist")}
-    sizes |= {names.index("loading"): 1.0, state_vector.ANGLE: 1.0, state_vector.BRISTLES: torque}
+    sizes |= {names.index("loading"): 1.0, state_vector.ANGLE: 1.0}
+    sizes |= dict.fromkeys((state_vector.BRISTLES_MOTOR, state_vector.BRISTLES_LOAD), torque)
     return np.array([sizes[state] for state in states])

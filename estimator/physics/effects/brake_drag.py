@@ -4,20 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from estimator.physics.effect import EVERY_LINE, MOMENTS, Effect, EffectParameter, Element, Start
+from estimator.physics.effect import EVERY_LINE, MOMENTS, Effect, EffectParameter, Element, Held, Retelling, Start
+from estimator.physics.effects import coulomb_friction_load
+from estimator.physics.effects.coulomb_friction_load import PRESLIDING
 from estimator.physics.model import DrivelineModel, Motion, unit
-from estimator.physics.motion import torque_scale
+from estimator.physics.motion import reverses
 from estimator.signals.record import Record
 
 
 def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
-    """Return a twentieth of the torque in use."""
-    return (0.05 * torque_scale(records),)
+    """Return a twentieth of the torque in use, and a usual presliding."""
+    return coulomb_friction_load.scales(model, records)
 
 
 def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
-    """Return one start: its moments are found by a scan."""
-    return [(0.5,)]
+    """Return one start: its moments are found by a scan. Presliding waits for them."""
+    return [(0.5, Held(0.0))]
+
+
+def retold(
+    model: DrivelineModel, records: Sequence[Record], values: Mapping[str, float], line: Mapping[str, float]
+) -> list[Retelling]:
+    """Return the brake that was found, bending before it slides, or sticking, where a recording could show that."""
+    if not any(reverses(record) for record in records):
+        return []
+    return coulomb_friction_load.bending("brake_nm", model, records, values)
 
 
 def sentence(values: Mapping[str, float], motion: Motion) -> str:
@@ -29,11 +40,14 @@ EFFECT = Effect(
     name="brake_drag",
     element=Element.LOAD,
     title="dragging brake",
-    law="T_b = T_B sign(w_L) from t_1 to t_2 of a recording",
-    source="residual drag of friction brakes: Breuer, Bill, Brake Technology Handbook, SAE 2008",
+    law="T_b = T_B sign(w_L) from t_1 to t_2 of a recording; with presliding "
+    "dT_b/dt = (T_B / x_b) (w_L - |w_L| T_b / T_B)",
+    source="residual drag of friction brakes: Breuer, Bill, Brake Technology Handbook, SAE 2008; presliding: Dahl, "
+    "AIAA J. 14(12), 1976",
     excited_by="driving, with stretches with and without",
     parameters=(
         EffectParameter("brake_nm", "torque", 0.0, 0.0, 60.0, "braking torque T_B"),
+        PRESLIDING,
         *MOMENTS,
     ),
     structures=EVERY_LINE,
@@ -44,5 +58,6 @@ EFFECT = Effect(
     permanent="coulomb_friction_load",
     scales=scales,
     starts=starts,
+    retold=retold,
     sentence=sentence,
 )

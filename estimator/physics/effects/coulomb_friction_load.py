@@ -4,21 +4,44 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from estimator.physics.effect import WITH_SHAFT, Effect, EffectParameter, Element, Start, Untestable
+from estimator.physics.effect import WITH_SHAFT, Effect, EffectParameter, Element, Held, Retelling, Start, Untestable
 from estimator.physics.effects import coulomb_friction_motor
 from estimator.physics.model import DrivelineModel, Motion, unit
-from estimator.physics.motion import torque_scale
 from estimator.signals.record import Record
+
+STICKING = 0.02
+"""Presliding of a contact that sticks, in the scale of one that bends."""
+
+PRESLIDING = EffectParameter(
+    "presliding_rad", "angle", 0.0, 0.5 * STICKING, 10.0, "deflection at which it breaks away: x_b", True
+)
 
 
 def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
-    """Return a twentieth of the torque in use."""
-    return (0.05 * torque_scale(records),)
+    """Return a twentieth of the torque in use, and the presliding of a motor: both have bearings and seals."""
+    return coulomb_friction_motor.scales(model, records)
 
 
 def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
-    """Return one start: the problem is convex in the friction torque."""
-    return [(0.5,)]
+    """Return one start: the problem is convex in the friction torque, without presliding, which waits for it."""
+    return [(0.5, Held(0.0))]
+
+
+def retold(
+    model: DrivelineModel, records: Sequence[Record], values: Mapping[str, float], line: Mapping[str, float]
+) -> list[Retelling]:
+    """Return the friction that was found, bending before it slides, or sticking: less than a heavy load shows."""
+    return bending("friction_nm", model, records, values)
+
+
+def bending(
+    size: str, model: DrivelineModel, records: Sequence[Record], values: Mapping[str, float]
+) -> list[Retelling]:
+    """Return the same of dry friction at the load whose torque is the parameter ``size``."""
+    if values["presliding_rad"] > 0.0:
+        return []
+    friction, _ = scales(model, records)
+    return [Retelling((values[size] / friction, presliding), {}) for presliding in (1.0, STICKING)]
 
 
 def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
@@ -35,10 +58,10 @@ EFFECT = Effect(
     name="coulomb_friction_load",
     element=Element.LOAD,
     title="dry friction at the load",
-    law="T_f = T_c sign(w_L)",
-    source="Armstrong-Hélouvry, Dupont, Canudas de Wit: Automatica 30(7), 1994",
+    law="T_f = T_c sign(w_L); with presliding dT_f/dt = (T_c / x_b) (w_L - |w_L| T_f / T_c)",
+    source="Armstrong-Hélouvry, Dupont, Canudas de Wit: Automatica 30(7), 1994; presliding: Dahl, AIAA J. 14(12), 1976",
     excited_by="speed that changes sign: reversal",
-    parameters=(EffectParameter("friction_nm", "torque", 0.0, 0.0, 40.0, "friction torque T_c"),),
+    parameters=(EffectParameter("friction_nm", "torque", 0.0, 0.0, 40.0, "friction torque T_c"), PRESLIDING),
     structures=WITH_SHAFT,
     resembles=("coulomb_friction_motor", "stribeck_friction", "brake_drag"),
     equivalent=(),
@@ -46,5 +69,6 @@ EFFECT = Effect(
     scales=scales,
     starts=starts,
     testable=testable,
+    retold=retold,
     sentence=sentence,
 )

@@ -1,4 +1,4 @@
-"""Dry friction at the motor whose bristles bend before they slide.
+"""Dry friction whose bristles bend before they slide, at the motor and at the load.
 
 A contact under friction is a spring until it breaks away; sliding, it follows the Stribeck curve ``g``, behind by a
 distance and not by a time::
@@ -7,16 +7,18 @@ distance and not by a time::
 
 with the deflection ``x_b`` at breakaway (Dahl, AIAA J. 14(12), 1976; with g, Canudas de Wit, Olsson, Åström and
 Lischinsky, IEEE Trans. Automat. Contr. 40(3), 1995). At a constant speed it has an exact solution. It is taken for half
-a sub-step before the line moves under this torque, and for half a one behind (Strang's splitting, of second order).
+a sub-step before the line moves under this torque, and for half a one behind (Strang's splitting, of second order). At
+the load ``g`` is constant, but a brake's is there for a while only: bristles hold no more than it is at the moment.
 """
 
 from __future__ import annotations
 
-from estimator.abreast import choose, like
+from estimator.abreast import choose, like, some
 from estimator.compiled import inlined
 from estimator.physics.kernel import slots
 from estimator.physics.kernel.conditions import with_friction
-from estimator.physics.kernel.state_vector import Conditions
+from estimator.physics.kernel.line import Line, is_bristled_at_load, is_bristled_at_motor
+from estimator.physics.kernel.state_vector import Bristles, Conditions, State
 from estimator.physics.laws import LEAST, fading
 from estimator.signals.record import FloatArray
 
@@ -36,27 +38,60 @@ def sliding(speed: float, p: FloatArray) -> float:
 
 
 @inlined
-def slid(speed: float, p: FloatArray) -> float:
-    """Return the torque against a motion that has gone on for long [Nm]."""
-    limit = sliding(speed, p)
+def slid(speed: float, limit: float) -> float:
+    """Return the torque against a motion that has gone on for long under a friction [Nm]."""
     return choose(speed > 0.0, limit, choose(speed < 0.0, -limit, 0.0))
 
 
 @inlined
-def stiffness(now: Conditions, p: FloatArray) -> float:
-    """Return the bristles' stiffness [Nm/rad], which is none that the step can't follow."""
-    stiff: float = breakaway(p) / max(p[slots.COULOMB_PRESLIDING], p[slots.STRIBECK_PRESLIDING])
-    return min(stiff, now.fastest * now.fastest / now.inverse_motor)
+def followed(torque: float, speed: float, limit: float, stiffness: float, time_s: float) -> float:
+    """Return the torque of bristles of a stiffness [Nm/rad] after a time at constant speed [Nm]."""
+    left = fading(abs(speed) * stiffness * time_s / max(limit, LEAST))
+    return slid(speed, limit) * (1.0 - left) + torque * left
 
 
 @inlined
-def bent(torque: float, speed: float, now: Conditions, p: FloatArray, time_s: float) -> float:
-    """Return the bristles' torque after a time at constant speed [Nm]."""
-    left = fading(abs(speed) * stiffness(now, p) * time_s / max(sliding(speed, p), LEAST))
-    return slid(speed, p) * (1.0 - left) + torque * left
+def at_motor(torque: float, x: State, now: Conditions, p: FloatArray, time_s: float) -> float:
+    """Return the torque of the motor's bristles after a time at the speed of a state [Nm].
+
+    Their stiffness is none that the step can't follow.
+    """
+    stiff = breakaway(p) / max(p[slots.COULOMB_PRESLIDING], p[slots.STRIBECK_PRESLIDING])
+    stiff = min(stiff, now.fastest * now.fastest / now.inverse_motor)
+    return followed(torque, x.speed, sliding(x.speed, p), stiff, time_s)
 
 
 @inlined
-def rubbed(now: Conditions, torque: float) -> Conditions:
-    """Return the conditions with the bristles' torque [Nm] in place of the other laws of dry friction at the motor."""
-    return with_friction(now, now.torque - torque, now.load, like(0.0, now.dry_motor), now.dry_load)
+def at_load(line: Line, torque: float, x: State, now: Conditions, p: FloatArray, time_s: float) -> float:
+    """Return the same of the load's, or of its wheels'."""
+    speed, inverse_inertia = x.load_speed, now.inverse_load
+    if line.masses == 1:
+        speed, inverse_inertia = x.speed, now.inverse_motor
+    elif line.extended and some(p[slots.SLIP] > 0.0):
+        inverse_inertia = now.tyre.inverse_wheel
+    limit = now.dry_load
+    stiff = limit / max(p[slots.COULOMB_LOAD_PRESLIDING], p[slots.BRAKE_PRESLIDING])
+    stiff = min(stiff, now.fastest * now.fastest / inverse_inertia)
+    return followed(min(max(torque, -limit), limit), speed, limit, stiff, time_s)
+
+
+@inlined
+def bent(line: Line, held: Bristles, x: State, now: Conditions, p: FloatArray, time_s: float) -> Bristles:
+    """Return what the bristles hold after a time at the speeds of a state."""
+    motor, load = held.motor, held.load
+    if is_bristled_at_motor(p):
+        motor = at_motor(motor, x, now, p, time_s)
+    if is_bristled_at_load(p):
+        load = at_load(line, load, x, now, p, time_s)
+    return Bristles(motor, load)
+
+
+@inlined
+def rubbed(now: Conditions, held: Bristles, p: FloatArray) -> Conditions:
+    """Return the conditions with what bristles hold in place of the other laws of dry friction where they are."""
+    torque, dry_motor, dry_load, rubbing = now.torque, now.dry_motor, now.dry_load, now.rubbing
+    if is_bristled_at_motor(p):
+        torque, dry_motor = torque - held.motor, like(0.0, dry_motor)
+    if is_bristled_at_load(p):
+        rubbing, dry_load = held.load, like(0.0, dry_load)
+    return with_friction(now, torque, now.load, dry_motor, dry_load, rubbing)

@@ -104,6 +104,7 @@ def conditions(
     return Conditions(
         ripple,
         load,
+        like(0.0, load),
         torque_factor,
         cardan,
         shaft_factor,
@@ -149,11 +150,14 @@ def tyre(inertia: float, fastest: float, p: FloatArray) -> Tyre:
 
 
 @inlined
-def with_friction(now: Conditions, torque: float, load: float, dry_motor: float, dry_load: float) -> Conditions:
-    """Return the conditions with other torques and other dry friction [Nm] at the motor and the load."""
+def with_friction(
+    now: Conditions, torque: float, load: float, dry_motor: float, dry_load: float, rubbing: float
+) -> Conditions:
+    """Return the conditions with other torques and other friction [Nm] at the motor and the load."""
     return Conditions(
         torque,
         load,
+        rubbing,
         now.torque_factor,
         now.shaft_extra,
         now.shaft_factor,
@@ -179,7 +183,7 @@ def with_friction(now: Conditions, torque: float, load: float, dry_motor: float,
 @inlined
 def with_torques(now: Conditions, torque: float, load: float) -> Conditions:
     """Return the conditions with other torques [Nm] at the motor and the load."""
-    return with_friction(now, torque, load, now.dry_motor, now.dry_load)
+    return with_friction(now, torque, load, now.dry_motor, now.dry_load, now.rubbing)
 
 
 @inlined

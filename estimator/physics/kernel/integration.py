@@ -28,11 +28,13 @@ from estimator.physics.kernel.linear import WORTHWHILE_SAMPLES, Answers, answers
 from estimator.physics.kernel.makes import for_its_make
 from estimator.physics.kernel.sensing import entry, reading, shown, smoothed
 from estimator.physics.kernel.state_vector import (
-    BRISTLES,
+    BRISTLES_LOAD,
+    BRISTLES_MOTOR,
     FILTER_RISE,
     FILTERED,
     LAG_RISE,
     LAGGED,
+    Bristles,
     Conditions,
     State,
 )
@@ -85,18 +87,18 @@ def rubbed_on(
     torque: float,
     rise: float,
     x: State,
-    bristles: float,
+    bristles: Bristles,
     p: FloatArray,
     h: float,
-) -> tuple[State, float]:
-    """Return the state that follows on ``x`` and the torque of the bristles, where there are any [Nm]."""
+) -> tuple[State, Bristles]:
+    """Return the state that follows on ``x``, and the bristles', where there are any."""
     bristled, felt = is_bristled(p), now
     if bristled:
-        bristles = bent(bristles, x.speed, now, p, 0.5 * h)
-        felt = rubbed(now, bristles)
+        bristles = bent(line, bristles, x, now, p, 0.5 * h)
+        felt = rubbed(now, bristles, p)
     after = led_on(line, summing, to, felt, torque, rise, x, p, h)
     if bristled:
-        bristles = bent(bristles, after.speed, now, p, 0.5 * h)
+        bristles = bent(line, bristles, after, now, p, 0.5 * h)
     return after, bristles
 
 
@@ -135,7 +137,7 @@ def integrate_made(
     x = unpacked(state)
     lagged, lag_rise = state[LAGGED], state[LAG_RISE]
     filtered, filter_rise = state[FILTERED], state[FILTER_RISE]
-    bristles = state[BRISTLES]
+    bristles = Bristles(state[BRISTLES_MOTOR], state[BRISTLES_LOAD])
     now = conditions(line.masses, start_s + first * sample_time_s, h, 0.0, 0.0, sign_width, p)
     to, read = answers(line, now, p, h, 0), False
     for k in range(first, n):
@@ -176,7 +178,7 @@ def integrate_made(
         state[i] = last
     state[LAGGED], state[LAG_RISE] = lagged, lag_rise
     state[FILTERED], state[FILTER_RISE] = filtered, filter_rise
-    state[BRISTLES] = bristles
+    state[BRISTLES_MOTOR], state[BRISTLES_LOAD] = bristles.motor, bristles.load
 
 
 @compiled

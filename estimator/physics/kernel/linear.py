@@ -19,7 +19,8 @@ from estimator.physics.catalogue import BUILT_IN
 from estimator.physics.kernel import slots
 from estimator.physics.kernel.conditions import with_friction, with_torques
 from estimator.physics.kernel.contact import stepped
-from estimator.physics.kernel.line import Line, is_bristled
+from estimator.physics.kernel.line import Line, is_bristled, is_bristled_at_motor
+from estimator.physics.kernel.rates import dry_at_load
 from estimator.physics.kernel.runge_kutta import moved, runge_kutta
 from estimator.physics.kernel.state_vector import Conditions, State
 from estimator.physics.laws import BEYOND, dry_friction
@@ -92,7 +93,7 @@ def is_linear(line: Line, p: FloatArray) -> bool:
 
     Bristles leave it linear at any speed: what they hold is a torque like another.
     """
-    if not (line.elastic and (is_bristled(p) or p[slots.STRIBECK] == p[slots.STRIBECK_COULOMB] == 0.0)):
+    if not (line.elastic and (is_bristled_at_motor(p) or p[slots.STRIBECK] == p[slots.STRIBECK_COULOMB] == 0.0)):
         return False
     for i in range(BENDING.size):
         if p[BENDING[i]] != NULLS[i]:
@@ -125,7 +126,7 @@ def is_beyond(begun: float, ended: float, limit: float) -> bool:
 @compiled
 def answers(line: Line, now: Conditions, p: FloatArray, h: float, steps: int) -> Answers:
     """Return what ``steps`` sub-steps of ``h`` [s] make of each unit of a state and a torque, without dry friction."""
-    now = with_friction(now, 0.0, 0.0, 0.0, 0.0)
+    now = with_friction(now, 0.0, 0.0, 0.0, 0.0, 0.0)
     pulled = with_torques(now, 0.0, 1.0)
     return Answers(
         after(line, now, 0.0, 0.0, State(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), p, h, steps),
@@ -179,7 +180,7 @@ def answered(line: Line, to: Answers, now: Conditions, torque: float, rise: floa
     torque += now.torque
     if now.dry_motor != 0.0:
         torque -= dry_friction(x.speed, p[slots.COULOMB], now.width_motor)
-    load = now.load + dry_friction(carried, now.dry_load, now.width_load)
+    load = now.load + dry_at_load(carried, now)
     after = State(0.0, 0.0, 0.0, 0.0, x.loading, x.vehicle_speed, 0.0, 0.0, 0.0, 0.0, x.traction)
     after = moved(line, after, to.torque, torque)
     after = moved(line, after, to.load, load)

@@ -133,10 +133,15 @@ def branch_rate(twist: float, rate: float, now: Conditions, p: FloatArray) -> fl
 
 
 @inlined
+def dry_at_load(wheel: float, now: Conditions) -> float:
+    """Return the dry friction at the load, or at its wheels [Nm], at their speed; that of bristles included."""
+    return dry_friction(wheel, now.dry_load, now.width_load) + now.rubbing
+
+
+@inlined
 def load_drag(wheel: float, vehicle: float, now: Conditions, p: FloatArray) -> float:
     """Return what slows the load down [Nm]: dry friction at the wheel, viscous and air drag at the vehicle."""
-    dry = dry_friction(wheel, now.dry_load, now.width_load)
-    return dry + now.viscous_load * vehicle + aerodynamic_drag.law(vehicle, p[slots.AERO])
+    return dry_at_load(wheel, now) + now.viscous_load * vehicle + aerodynamic_drag.law(vehicle, p[slots.AERO])
 
 
 @inlined
@@ -160,6 +165,6 @@ def load_rates(line: Line, pull: float, now: Conditions, x: State, p: FloatArray
         inverse_wheel, inverse_vehicle = now.inverse_load / share, now.inverse_load / (1.0 - share)
         traction = slope * slide
     traction = tyre_slip.gripped(traction, p[slots.GRIP], tyre.inverse_grip)
-    dry = dry_friction(wheel, now.dry_load, now.width_load)
+    dry = dry_at_load(wheel, now)
     drag = load_drag(wheel, vehicle, now, p) - dry
     return (pull - dry - traction) * inverse_wheel, (traction - drag - now.load) * inverse_vehicle, rate

@@ -20,7 +20,7 @@ from estimator.physics.kernel.line import Line, is_bristled, is_elastic
 from estimator.physics.kernel.linear import is_linear
 from estimator.physics.kernel.makes import for_its_make
 from estimator.physics.kernel.sensing import entry, reading, shown
-from estimator.physics.kernel.state_vector import BRISTLES, State
+from estimator.physics.kernel.state_vector import BRISTLES_LOAD, BRISTLES_MOTOR, Bristles, State
 from estimator.physics.layout import slot
 from estimator.signals.record import FloatArray, IntArray
 
@@ -88,7 +88,7 @@ def advance(
     x = State(
         start[0], start[1], start[2], start[3], start[4], start[5], start[6], start[7], start[8], start[9], start[10]
     )
-    bristled, bristles = is_bristled(one_of_them), start[BRISTLES]
+    bristled, bristles = is_bristled(one_of_them), Bristles(start[BRISTLES_MOTOR], start[BRISTLES_LOAD])
     now = conditions(line.masses, start_s + first * sample_time_s, h, 0.0, load[first], sign_width, p)
     for k in range(first, torque_lanes.shape[0]):
         out[k] = entry(x, output)
@@ -103,11 +103,11 @@ def advance(
                 now = conditions(line.masses, start_s + place * sample_time_s, h, middle, load[k], sign_width, p)
             felt = now
             if bristled:
-                bristles = bent(bristles, x.speed, now, p, 0.5 * h)
-                felt = rubbed(now, bristles)
+                bristles = bent(line, bristles, x, now, p, 0.5 * h)
+                felt = rubbed(now, bristles, p)
             x = stepped(line, felt, torque[k], 0.0, x, p, h)
             if bristled:
-                bristles = bent(bristles, x.speed, now, p, 0.5 * h)
+                bristles = bent(line, bristles, x, now, p, 0.5 * h)
 
 
 @compiled

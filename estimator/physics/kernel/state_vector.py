@@ -7,11 +7,11 @@ from typing import NamedTuple
 ANGLE, SPEED, TWIST, LOAD_SPEED = 0, 1, 2, 3
 """Mechanical states that can be an output; see ``State``."""
 
-STATES = 16
+STATES = 17
 """Length of the state array: ``State``, the lagged torque and its rise [Nm], the filtered reading and its [rad/s], and
-the torque of the bristles of dry friction at the motor [Nm]."""
+``Bristles``."""
 
-LAGGED, LAG_RISE, FILTERED, FILTER_RISE, BRISTLES = 11, 12, 13, 14, 15
+LAGGED, LAG_RISE, FILTERED, FILTER_RISE, BRISTLES_MOTOR, BRISTLES_LOAD = 11, 12, 13, 14, 15, 16
 
 
 class State(NamedTuple):
@@ -48,6 +48,13 @@ class State(NamedTuple):
     traction: float
 
 
+class Bristles(NamedTuple):
+    """Torques that the bent bristles of dry friction hold at the motor and at the load [Nm]."""
+
+    motor: float
+    load: float
+
+
 class Tyre(NamedTuple):
     """What the law of a tyre takes from its parameters; inverses, because a division takes as long as a law.
 
@@ -75,12 +82,14 @@ class Tyre(NamedTuple):
 class Conditions(NamedTuple):
     """What holds during one sub-step: torques [Nm], inertias, stiffness, friction, widths of a sign change [rad/s].
 
-    And what the step can follow: the fastest decay [1/s] and, as an inverse [1/rad], the shortest twist over which
-    friction inside the shaft yields.
+    ``rubbing`` is the torque of the bristles at the load, or at the wheels of a tyre that slips [Nm]. And what the step
+    can follow: the fastest decay [1/s] and, as an inverse [1/rad], the shortest twist over which friction inside the
+    shaft yields.
     """
 
     torque: float
     load: float
+    rubbing: float
     torque_factor: float
     shaft_extra: float
     shaft_factor: float

@@ -18,6 +18,7 @@ from estimator.physics.layout import flat_values
 from estimator.physics.model import Motion, Structure
 from estimator.physics.simulate import Start, grid_for, simulate
 from estimator.physics.starts import begun, close
+from estimator.physics.steps import moments_of
 from estimator.physics.unknowns import Release, effect_unknowns
 from estimator.signals.record import OutputKind
 from tests.estimator.diagnosis.planted import SIGMA, drive_torque, quiet, rubbing
@@ -331,6 +332,29 @@ class TestLocalMinima:
         for key in values:
             assert found.value(name, key) == pytest.approx(values[key], rel=0.05)
         assert found.value(name, "presliding_rad") == pytest.approx(presliding_rad, rel=0.1)
+
+    @pytest.mark.parametrize("presliding_rad", [0.0, 1e-5, 1e-3])
+    def test_a_brake_sticks_where_that_is_seen(self, presliding_rad: float) -> None:
+        """Told another way it keeps the moments that were found."""
+        name, line, records = "brake_drag", model(TWO_MASS), []
+        own = {"from_s": 3.0, "to_s": 12.0}
+        true = flat_values(TWO_MASS, {name: {"brake_nm": 25.0, "presliding_rad": presliding_rad} | own})
+        for seed in (3, 4):
+            silent = record(drive_torque(seed), np.zeros(1500), name=f"run_{seed}")
+            output = simulate(grid_for(line, [silent]), silent, true, Start(5.0, 0.0, 2.0))
+            records.append(replace(silent, output=output + SIGMA * np.random.default_rng(seed).standard_normal(1500)))
+        bench, effects = Bench(line, records, everything(records)), frozenset({name})
+        rounded = bench.fit(effects, bench.fit(NOTHING))
+        found = bench.fit_retold(effects, name)
+        assert found.rms == pytest.approx(SIGMA, rel=0.05)
+        assert found.value(name, "brake_nm") == pytest.approx(25.0, rel=0.02)
+        if presliding_rad == 0.0:
+            return
+        assert rounded.rms > 1.1 * SIGMA
+        for from_s, to_s in moments_of(found, name):
+            assert (from_s, to_s) == pytest.approx((own["from_s"], own["to_s"]), abs=0.05)
+        if presliding_rad == 1e-3:
+            assert found.value(name, "presliding_rad") == pytest.approx(presliding_rad, rel=0.2)
 
     def test_fewer_effects_start_from_where_more_ended_too(self) -> None:
         records = rubbing(lambda speed: FRICTION_NM)

@@ -61,3 +61,12 @@ def test_unknowns_without_bounds_come_first_the_rest_in_order() -> None:
     high = np.array([1.0, np.inf, 3.0, 1.0, np.inf])
     assert unbounded_first(low, high, np.ones(5, dtype=bool)).tolist() == [1, 4, 0, 2, 3]
     assert unbounded_first(low, high, np.array([True, False, True, True, True])).tolist() == [4, 0, 2, 3]
+
+
+def test_unknowns_that_do_the_same_share_what_is_to_be_done() -> None:
+    """Two columns alike but for rounding: their normal equations have no solution, the least has many."""
+    triangle = np.array([[1.0, 1.0, 0.5], [0.0, 1e-17, 0.0], [0.0, 0.0, 1.0]])
+    target, high = np.array([1.5, 0.0, 4.0]), np.array([0.9, 0.9, 2.0])
+    x = least_inside(triangle, target, -high, high)
+    assert np.all(np.abs(x) <= high)
+    np.testing.assert_allclose([x[0] + x[1], x[2]], [0.5, 2.0], atol=1e-9)

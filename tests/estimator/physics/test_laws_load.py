@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from estimator.physics.kernel.state_vector import LOAD_SPEED
 from estimator.physics.layout import flat_values
-from estimator.physics.simulate import Grid, Start, simulate
+from estimator.physics.simulate import Grid, Start, grid_for, simulate
 from estimator.signals.record import FloatArray
 from tests.estimator.physics import reference
 from tests.estimator.physics.bench import SAMPLE_TIME_S, TWO_MASS, model
@@ -28,6 +30,8 @@ from tests.estimator.physics.law_bench import (
 )
 from tests.estimator.physics.reference import Held, lasting
 
+BRAKED_S = (0.5037, 1.7012)
+
 
 def sign(speed: float) -> float:
     """The sign of a speed as the kernel rounds it."""
@@ -37,6 +41,50 @@ def sign(speed: float) -> float:
 def test_dry_friction_at_the_load_is_against_the_loads_motion() -> None:
     line = two_mass(drag=lambda t, w: 30.0 * sign(w))
     assert_law({"coulomb_friction_load": {"friction_nm": 30.0}}, solved(line))
+
+
+def against_bristles(held_nm: Callable[[float], float], presliding_rad: float) -> FloatArray:
+    """Solve a load held by bristles, one more state: dT/dt = s (w - |w| T / T_c), s = T_c / x_b.
+
+    They are told by their deflection: T = T_c z / x_b, dz/dt = w - |w| z / x_b. A brake begins with straight ones.
+    """
+
+    def rhs(t: float, x: FloatArray, torque: float) -> FloatArray:
+        w, deflection = x[reference.LOAD_SPEED], x[4]
+        line = two_mass(drag=lambda t, w: held_nm(t) * deflection / presliding_rad)
+        bending = w - abs(w) * deflection / presliding_rad if held_nm(t) > 0.0 else 0.0
+        return np.append(line(t, x[:4], torque), bending)
+
+    torque = Held.of(TORQUE, SAMPLE_TIME_S)
+    start = np.append(start_vector(), presliding_rad if held_nm(0.0) > 0.0 else 0.0)
+    return reference.solve(rhs, start, torque, TIME_S, BRAKED_S)[:, reference.SPEED]
+
+
+def test_dry_friction_at_the_load_bends_before_it_slides() -> None:
+    effects = {"coulomb_friction_load": {"friction_nm": 30.0, "presliding_rad": 0.02}}
+    expected = against_bristles(lambda t: 30.0, 0.02)
+    assert_law(effects, expected, tolerance=3e-4)
+    rigid = kernel_output({"coulomb_friction_load": {"friction_nm": 30.0}}, measured())
+    assert np.max(np.abs(rigid - expected)) > 2e-3 * np.ptp(expected)
+
+
+def test_a_brake_bends_before_it_slides_and_lets_go() -> None:
+    from_s, to_s = BRAKED_S
+    brake = {"brake_nm": 60.0, "presliding_rad": 0.004, "from_s": from_s, "to_s": to_s}
+    assert_law({"brake_drag": brake}, against_bristles(lasting(60.0, from_s, to_s), 0.004), tolerance=1e-3)
+
+
+def test_a_load_that_sticks_stands_still() -> None:
+    """A torque below that of breaking away bends the bristles, and no more."""
+    line, pushed = model(TWO_MASS), np.full(400, 20.0)
+    stuck = flat_values(TWO_MASS, {"coulomb_friction_load": {"friction_nm": 60.0, "presliding_rad": 1e-5}})
+    rec, grid = measured(np.ones(400), pushed), grid_for(line, [measured()])
+    at_rest = Start(load_torque_nm=12.0, angle_rad=0.0, speed_rad_s=0.0)
+    speed = simulate(grid, rec, stuck, at_rest, output=LOAD_SPEED)
+    assert np.max(np.abs(speed)) < 1e-2
+    assert np.max(np.abs(speed[-50:])) < 1e-3
+    rounded = simulate(grid, rec, flat_values(TWO_MASS, {"coulomb_friction_load": {"friction_nm": 60.0}}), at_rest)
+    assert np.all(rounded[-50:] > 1e-3)
 
 
 def test_air_drag_grows_with_the_square_of_the_loads_speed() -> None:

@@ -41,6 +41,8 @@ EFFECTS: dict[str, Mapping[str, Mapping[str, float]]] = {
     "mode beside": {"extra_torsional_mode": {"inertia_kg_m2": 0.3, "frequency_hz": 12.0, "damping_ratio": 0.05}},
     "dry friction": {"coulomb_friction_motor": {"friction_nm": 20.0}, "coulomb_friction_load": {"friction_nm": 9.0}},
     "bristles": {"stribeck_friction": BRISTLES, "coulomb_friction_load": {"friction_nm": 9.0}},
+    "bristles at the load": {"coulomb_friction_load": {"friction_nm": 9.0, "presliding_rad": 1e-3}},
+    "a brake that sticks": {"brake_drag": {"brake_nm": 30.0, "presliding_rad": 1e-4, "from_s": 0.5, "to_s": 1.503}},
     "a while": {"stiffness_change": {"change": -0.3, "from_s": 1.0, "to_s": 2.503}},
     "a brake": {"brake_drag": {"brake_nm": 30.0, "from_s": 0.5, "to_s": 1.503}},
     "a ripple": {"torque_ripple": {"amplitude_nm": 2.0, "order": 6.0}},
@@ -49,7 +51,7 @@ WITHOUT_BRISTLES = {("stribeck_friction", "excess_nm"), ("stribeck_friction", "c
 """What bends the line unless friction is told by bristles."""
 
 LINES = {"one mass": ONE_MASS, "two masses": TWO_MASS, "three masses": THREE_MASS}
-OF_ONE_MASS = ("nothing", "delay", "lag", "filter", "drift", "a brake", "a ripple")
+OF_ONE_MASS = ("nothing", "delay", "lag", "filter", "drift", "a brake", "a brake that sticks", "a ripple")
 
 
 def line_with(values: Mapping[str, float], effects: Mapping[str, Mapping[str, float]]) -> DrivelineModel:

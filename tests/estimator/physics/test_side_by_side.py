@@ -45,6 +45,11 @@ BESIDE_A_SHAFT: dict[str, Effects] = {
             "grip_nm": 300.0,
         }
     },
+    "tyre that rolls, brake that sticks": {
+        "tyre_slip": {"slip_per_nm": 1e-4, "wheel_share": 0.1, "creep_rad_s": 5.0, "relaxation_rad": 1.0},
+        "brake_drag": {"brake_nm": 30.0, "presliding_rad": 1e-4, "from_s": 0.5, "to_s": 1.5},
+    },
+    "slider and a load that sticks": SLIDER | {"coulomb_friction_load": {"friction_nm": 9.0, "presliding_rad": 1e-4}},
     "gap": {"backlash": {"gap_rad": 0.01, "contact_rad": 0.0005, "pull": 0.3}},
     "gap with hard faces": {"backlash": {"gap_rad": 0.01, "contact_rad": 0.0, "pull": 0.0}},
     "hardening": {"stiffness_nonlinearity": {"hardening_per_rad2": 200.0, "shape": 1.2}},
@@ -58,6 +63,8 @@ EVERYWHERE: dict[str, Effects] = {
     "drag": QUADRATIC,
     "Stribeck": {"stribeck_friction": {"coulomb_nm": 5.0, "excess_nm": 8.0, "stribeck_rad_s": 3.0}},
     "drag and bristles": QUADRATIC | {"coulomb_friction_motor": {"friction_nm": 9.0, "presliding_rad": 1e-3}},
+    "drag and a brake that sticks": QUADRATIC
+    | {"brake_drag": {"brake_nm": 30.0, "presliding_rad": 1e-4, "from_s": 1.0, "to_s": 2.5}},
     "drag and dry friction": QUADRATIC | {"coulomb_friction_motor": {"friction_nm": 9.0}},
     "drag in steps": QUADRATIC | {"speed_quantisation": {"step_rad_s": 0.5}},
     "drag and a payload": QUADRATIC | {"inertia_change": {"change_kg_m2": 3.0, "from_s": 1.0, "to_s": 2.5}},

@@ -43,6 +43,8 @@ EFFECTS: dict[str, dict[str, float]] = {
     "shaft_hysteresis": {"friction_nm": 20.0, "yield_rad": 3e-3},
     "extra_torsional_mode": {"inertia_kg_m2": 0.3, "frequency_hz": 12.0, "damping_ratio": 0.05},
     "coulomb_friction_load": {"friction_nm": 20.0},
+    "coulomb_friction_load/bristles": {"friction_nm": 20.0, "presliding_rad": 2e-3},
+    "brake_drag/bristles": {"brake_nm": 30.0, "presliding_rad": 2e-3, "from_s": 0.5, "to_s": 1.503},
     "aerodynamic_drag": {"drag_nm_s2": 5.0},
     "brake_drag": {"brake_nm": 30.0, "from_s": 0.5, "to_s": 1.503},
     "tyre_slip": {"slip_per_nm": 1e-3, "wheel_share": 0.1, "creep_rad_s": 2.0},
