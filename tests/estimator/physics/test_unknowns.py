@@ -69,7 +69,7 @@ def test_moments_and_phases_are_every_recordings_own() -> None:
     first = linear_record(TWO_MASS, random_steps(500, seed=1), CRUISE)
     second = replace(linear_record(TWO_MASS, random_steps(300, seed=2), CRUISE), began_s=-7.0)
     (brake,) = effect_unknowns("brake_drag", line, [first, second])
-    assert [s.name for s in brake.shared] == ["brake_nm"]
+    assert [s.name for s in brake.shared] == ["brake_nm", "presliding_rad"]
     spans = [[(s.name, s.low, s.high) for s in own] for own in brake.own]
     assert spans[0] == [("from_s", 0.0, pytest.approx(5.0)), ("to_s", 0.0, pytest.approx(5.0))]
     assert spans[1] == [("from_s", 7.0, pytest.approx(10.0)), ("to_s", 7.0, pytest.approx(10.0))]
