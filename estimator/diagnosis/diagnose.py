@@ -220,6 +220,8 @@ def _band(judgement: Judgement, explained: FitResult | None, retuned: FitResult,
 
 def _element(selection: Selection, judgement: Judgement, effects: Sequence[FoundEffect]) -> Element | None:
     """Return where the mismatch is: at the strongest effect, or where the best law without a name acts."""
+    if judgement.strays:
+        return judgement.strays[0].element
     if judgement.verdict is Verdict.EXPLAINED or judgement.unnamed is None:
         strongest = max(effects, key=lambda effect: effect.evidence.delta_bic, default=None)
         return None if strongest is None else strongest.element

@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from estimator.diagnosis.acquisition import Finding
+from estimator.diagnosis.beyond import Stray, in_words
 from estimator.diagnosis.convergence import unconverged
-from estimator.diagnosis.evidence import VERY_STRONG, Gain, delta_bic_with, gain, noise_level, price
+from estimator.diagnosis.evidence import VERY_STRONG, Gain, delta_bic_with, gain, information, noise_level, price
 from estimator.diagnosis.hypotheses import flexible
 from estimator.diagnosis.phrases import PLACE_NAMES, kind_in_words
 from estimator.diagnosis.result import Verdict
@@ -65,6 +66,8 @@ class Judgement:
         Why chosen effects are not believed; empty where they are, or where there are none.
     unconverged : tuple of str
         What there is to say of fits that did not converge.
+    strays : tuple of Stray
+        Nominal parameters that alone, beyond what they are trusted to, would explain the mismatch to the noise.
     """
 
     verdict: Verdict
@@ -72,6 +75,7 @@ class Judgement:
     remaining: UnnamedLaw | None
     objection: str = ""
     unconverged: tuple[str, ...] = ()
+    strays: tuple[Stray, ...] = ()
 
 
 def judge(selection: Selection, floor: float, findings: Sequence[Finding] = ()) -> Judgement:
@@ -84,11 +88,39 @@ def judge(selection: Selection, floor: float, findings: Sequence[Finding] = ()) 
         shaken = any(finding.name == "sample_jitter" for finding in findings)
         standing = (_above_floor(selection, floor) and not shaken) or unnamed is not None
         clean = Verdict.EXPLAINED if findings else Verdict.NO_MISMATCH
-        return Judgement(Verdict.UNEXPLAINED if standing else clean, unnamed, None, "", unconverged(selection))
+        strays = _strays(selection, floor) if standing else ()
+        return Judgement(Verdict.UNEXPLAINED if standing else clean, unnamed, None, "", unconverged(selection), strays)
     remaining = selection.remaining
     objection = _objection(selection, floor, unnamed, remaining)
     verdict = Verdict.UNEXPLAINED if objection else Verdict.EXPLAINED
-    return Judgement(verdict, unnamed, remaining, objection, unconverged(selection))
+    strays = _strays(selection, floor) if objection else ()
+    return Judgement(verdict, unnamed, remaining, objection, unconverged(selection), strays)
+
+
+def _strays(selection: Selection, floor: float) -> tuple[Stray, ...]:
+    """Return the nominal parameters that explain the mismatch to the noise where they are not held back."""
+    if selection.beyond is None:
+        return ()
+    result = selection.beyond.result
+    return selection.beyond.strays if result.rms <= VISIBLE * noise_level(result, floor) else ()
+
+
+def _says_more_than_the_line(selection: Selection) -> bool:
+    """Tell whether what was chosen explains clearly more than the nominal line does beyond its tolerances."""
+    if selection.beyond is None:
+        return True
+    line = selection.beyond.result
+    n = gain(selection.retuned, min(line, selection.result, key=lambda fit: fit.squares)).n_effective
+    return information(line, selection.result, n) >= VERY_STRONG
+
+
+def _bent_together(selection: Selection) -> str:
+    """Say where more effects that bend were chosen than can be told there; "" nowhere.
+
+    A load profile, a brake and a payload follow, between them, whatever happens to a load.
+    """
+    elements = [EFFECTS[name].element for name in flexible(selection.chosen)]
+    return next((PLACE_NAMES[each] for each in elements if elements.count(each) > BELIEVED_TOGETHER), "")
 
 
 def _above_floor(selection: Selection, floor: float) -> bool:
@@ -187,6 +219,10 @@ def _objection(selection: Selection, floor: float, unnamed: UnnamedLaw | None, r
     for name, trial in sorted(selection.accepted.items()):
         if trial.failed is not None:  # it passed beside fewer, or before its last fit
             return f"{EFFECTS[name].title} does not pass in the last fit: {trial.failed}"
+    if selection.beyond is not None and not _says_more_than_the_line(selection):
+        return f"the nominal line itself would leave as little as {named}, with {in_words(selection.beyond.strays)}"
+    if place := _bent_together(selection):
+        return f"{named} would follow whatever happens at the {place}"
     profiles = [name for name in selection.chosen if EFFECTS[name].profile]
     alone = bool(profiles) and len(selection.chosen) == 1
     if leaves := _leaves_too_much(selection, floor, alone):

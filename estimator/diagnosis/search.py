@@ -108,7 +108,8 @@ def _searched(
     weight = Weight(floor, least_ratio)
     selector = Selector(Jury(bench, examiner, names, weight), progress)
     selection = selector.run()
-    doubted = judge(selection, floor, chain.findings).verdict is Verdict.UNEXPLAINED
+    judgement = judge(selection, floor, chain.findings)
+    doubted = judgement.verdict is Verdict.UNEXPLAINED and not judgement.strays
     if doubted or selector.may_imitate(selection):
         selection = selector.by_other_ways(selection)
     return Search(chain, bench, examiner, floor, selection, untestable)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from estimator.diagnosis.beyond import in_words
 from estimator.diagnosis.judgement import Judgement
 from estimator.diagnosis.phrases import PLACE_NAMES, law_in_words
 from estimator.diagnosis.result import Fit, FoundEffect, UntestableEffect, Verdict
@@ -50,6 +51,13 @@ def _explained(judgement: Judgement, effects: Sequence[FoundEffect], fit: Fit) -
 
 
 def _unexplained(judgement: Judgement, effects: Sequence[FoundEffect], fit: Fit) -> str:
+    left = f"{fit.retuned:.3g} {fit.unit} against a noise floor of {fit.noise_floor:.3g} {fit.unit}"
+    if judgement.strays:
+        return (
+            f"Inside its tolerances the nominal model leaves {left}, but no physics need be missing: the same line "
+            f"explains the recordings to the noise with {in_words(judgement.strays)}. Check the data sheet, or widen "
+            "the tolerance where it is a guess, and diagnose again."
+        )
     where = (
         f" It looks most like {law_in_words(judgement.unnamed.terms)} at the {PLACE_NAMES[judgement.unnamed.element]}."
         if judgement.unnamed is not None
@@ -58,7 +66,7 @@ def _unexplained(judgement: Judgement, effects: Sequence[FoundEffect], fit: Fit)
     why = f" {judgement.objection[0].upper()}{judgement.objection[1:]}." if judgement.objection else ""
     return (
         f"There is a mismatch that no entry of the catalogue explains: the re-tuned nominal model leaves "
-        f"{fit.retuned:.3g} {fit.unit} against a noise floor of {fit.noise_floor:.3g} {fit.unit}.{where}{why}"
+        f"{left}.{where}{why}"
     )
 
 

@@ -11,7 +11,7 @@ from estimator.physics.kernel import integration, sensing, state_vector
 from estimator.physics.layout import flat, slot
 from estimator.physics.model import DrivelineModel
 from estimator.physics.simulate import MASSES, Start, initial_state, substeps_for
-from estimator.physics.torque_path import shaft_torque
+from estimator.physics.torque_path import shaft_torque_from
 
 SIGN_WIDTH_RAD_S = 0.02
 """Dry friction of a simulated rig changes sign within this speed; its noise is larger."""
@@ -49,6 +49,7 @@ class Stepper:
         self._substeps = FINER * substeps_for(model.values(), period_s)
         history = int(np.ceil(self._p[slot(transport_delay.EFFECT.name, "delay_s")] / period_s)) + 2
         self._steps = 0
+        self._warmth = 0.0
         self._torque = np.zeros(history)
         self._load = np.full(history, load_torque_nm)
         self._angle = np.zeros(history)
@@ -73,7 +74,8 @@ class Stepper:
         """Let the torque of each input [Nm] act for one period."""
         now = np.array([self._steps * self._period_s])
         self._torque[:-1] = self._torque[1:]
-        self._torque[-1] = shaft_torque(np.array([torque_nm]), now, self._p)[0]
+        on_shaft, self._warmth = shaft_torque_from(np.array([torque_nm]), now, self._period_s, self._p, self._warmth)
+        self._torque[-1] = on_shaft[0]
         self._angle[-1] = self._read_angle()
         self._angle[-2] = self._angle[-1] - self._state[state_vector.SPEED] * self._period_s  # it goes straight on
         last = self._torque.size - 1

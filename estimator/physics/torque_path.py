@@ -6,6 +6,7 @@ import functools
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.signal import lfilter
 
 from estimator.physics.effects import torque_saturation
 from estimator.physics.layout import slot
@@ -19,7 +20,8 @@ _SHARPNESS = slot("torque_saturation", "sharpness")
 _LIMIT_SUM = slot("torque_saturation", "limit_sum_nm")
 _DEPTH = slot("torque_derating", "depth")
 _DERATING_TIME = slot("torque_derating", "time_constant_s")
-_PATH = np.array([_GAIN_M1, _GAIN_M2, _LIMIT_M1, _LIMIT_M2, _SHARPNESS, _LIMIT_SUM, _DEPTH, _DERATING_TIME])
+_HEATED = slot("torque_derating", "heating_nm")
+_PATH = np.array([_GAIN_M1, _GAIN_M2, _LIMIT_M1, _LIMIT_M2, _SHARPNESS, _LIMIT_SUM, _DEPTH, _DERATING_TIME, _HEATED])
 """Where all stands that ``shaft_torque`` depends on."""
 
 
@@ -39,8 +41,31 @@ def limited(torque: FloatArray, limit: float, sharpness: float) -> FloatArray:
     return np.asarray(np.copysign(limit * size, torque))
 
 
+def warmth(torque: FloatArray, since_start_s: FloatArray, period_s: float, p: FloatArray, begun: float) -> FloatArray:
+    """Return how warm the windings are when each row begins and behind the last, 1 with the full loss; shape (N + 1,).
+
+    By time alone, or, where they are heated, by the torque's own losses: ``tau dh/dt + h = (T / T_n)^2``, held over
+    each period; ``begun`` is the first row's then.
+    """
+    if p[_HEATED] <= 0.0:
+        rows_and_end = np.append(since_start_s, since_start_s[-1] + period_s)
+        return np.asarray(-np.expm1(-rows_and_end / p[_DERATING_TIME]))
+    kept = float(np.exp(-period_s / p[_DERATING_TIME]))
+    heat = (1.0 - kept) * (torque / p[_HEATED]) ** 2
+    warm, _ = lfilter([1.0], [1.0, -kept], heat, zi=[kept * begun])
+    return np.concatenate([[begun], warm])
+
+
 def shaft_torque(torque_nm: FloatArray, since_start_s: FloatArray, p: FloatArray) -> FloatArray:
-    """Return the torque on the motor shaft, shape (N,) [Nm].
+    """Return the torque on the motor shaft, shape (N,) [Nm], of a recording; see ``shaft_torque_from``."""
+    period_s = float(since_start_s[1] - since_start_s[0]) if since_start_s.size > 1 else 0.0
+    return shaft_torque_from(torque_nm, since_start_s, period_s, p, 0.0)[0]
+
+
+def shaft_torque_from(
+    torque_nm: FloatArray, since_start_s: FloatArray, period_s: float, p: FloatArray, begun: float
+) -> tuple[FloatArray, float]:
+    """Return the torque on the motor shaft, shape (N,) [Nm], and how warm the windings are behind it.
 
     Parameters
     ----------
@@ -48,8 +73,12 @@ def shaft_torque(torque_nm: FloatArray, since_start_s: FloatArray, p: FloatArray
         Reading of each input; gains other than 1 apply to the first two.
     since_start_s : ndarray, shape (N,)
         Time since the recording began [s].
+    period_s : float
+        For which each row's torque acts [s].
     p : ndarray, shape (layout.SIZE,)
         Parameters of the superset model.
+    begun : float
+        How warm the windings are at the first row, as ``warmth`` has it.
     """
     gains = np.array([p[_GAIN_M1], p[_GAIN_M2]])
     if (gains != 1.0).any():
@@ -61,9 +90,10 @@ def shaft_torque(torque_nm: FloatArray, since_start_s: FloatArray, p: FloatArray
         columns = [limited(torque, limit, p[_SHARPNESS]) for torque, limit in zip(torque_nm.T, limits, strict=False)]
         torque_nm = np.column_stack([*columns, torque_nm[:, limits.size :]])
     total: FloatArray = limited(functools.reduce(np.add, torque_nm.T), p[_LIMIT_SUM], p[_SHARPNESS])
-    if p[_DEPTH] != 0.0:
-        total = total * (1.0 + p[_DEPTH] * np.expm1(-since_start_s / p[_DERATING_TIME]))
-    return total
+    if p[_DEPTH] == 0.0:
+        return total, 0.0
+    warm = warmth(total, since_start_s, period_s, p, begun)
+    return total * (1.0 - p[_DEPTH] * warm[:-1]), float(warm[-1])
 
 
 def shaft_torques(torque_nm: FloatArray, since_start_s: FloatArray, parameters: Sequence[FloatArray]) -> FloatArray:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from estimator.diagnosis.beyond import LineBeyond
 from estimator.diagnosis.evidence import VERY_STRONG
 from estimator.diagnosis.hypotheses import Effects
 from estimator.diagnosis.selection.jury import SIGNIFICANT
@@ -35,6 +36,8 @@ class Selection:
         The best law without a name for what the re-tuned nominal leaves, where it counts.
     remaining : UnnamedLaw or None
         The best one for what the chosen effects leave, where it counts.
+    beyond : LineBeyond or None
+        The nominal line beyond its tolerances, where these hold it back.
     """
 
     retuned: FitResult
@@ -46,6 +49,7 @@ class Selection:
     lookalikes: Mapping[str, tuple[str, ...]]
     unnamed: UnnamedLaw | None
     remaining: UnnamedLaw | None
+    beyond: LineBeyond | None = None
 
 
 def counting_law(result: FitResult) -> UnnamedLaw | None:

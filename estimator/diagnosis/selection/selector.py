@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+from estimator.diagnosis.beyond import line_beyond
 from estimator.diagnosis.evidence import VERY_STRONG, gain, information
 from estimator.diagnosis.hypotheses import NOTHING, Effects, Progress, flexible
 from estimator.diagnosis.lookalikes import lookalikes
@@ -119,6 +120,7 @@ class Selector:
             alike,
             unnamed=unnamed,
             remaining=remaining[0] if remaining else None,
+            beyond=line_beyond(retuned),
         )
 
     def _grown(self, path: _Path, retuned: FitResult) -> _Path:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from estimator.diagnosis.beyond import LineBeyond
 from estimator.diagnosis.hypotheses import NOTHING, Effects
 from estimator.diagnosis.selection import Selection
 from estimator.diagnosis.trial import Trial
@@ -20,6 +21,7 @@ def outcome(
     dismissed: Mapping[str, float] | None = None,
     unnamed: UnnamedLaw | None = None,
     remaining: UnnamedLaw | None = None,
+    beyond: LineBeyond | None = None,
 ) -> Selection:
     """Build a selection; every trial given is of a chosen effect."""
     tried = trials or {}
@@ -33,4 +35,5 @@ def outcome(
         lookalikes={},
         unnamed=unnamed,
         remaining=remaining,
+        beyond=beyond,
     )

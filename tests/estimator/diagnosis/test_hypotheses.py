@@ -356,6 +356,27 @@ class TestLocalMinima:
         if presliding_rad == 1e-3:
             assert found.value(name, "presliding_rad") == pytest.approx(presliding_rad, rel=0.2)
 
+    @pytest.mark.parametrize("heating_nm", [0.0, 90.0])
+    def test_a_torque_derates_by_its_own_heat_where_that_is_seen(self, heating_nm: float) -> None:
+        """Two recordings of other torques lose other shares of them."""
+        name, line, records = "torque_derating", model(TWO_MASS), []
+        true = flat_values(TWO_MASS, {name: {"depth": 0.2, "time_constant_s": 6.0, "heating_nm": heating_nm}})
+        for seed, size in ((3, 1.0), (4, 0.5)):
+            silent = record(size * drive_torque(seed), np.zeros(1500), name=f"run_{seed}")
+            output = simulate(grid_for(line, [silent]), silent, true, Start(5.0, 0.0, 2.0))
+            records.append(replace(silent, output=output + SIGMA * np.random.default_rng(seed).standard_normal(1500)))
+        bench, effects = Bench(line, records, everything(records)), frozenset({name})
+        by_time = bench.fit(effects, bench.fit(NOTHING))
+        found = bench.fit_retold(effects, name)
+        assert found.rms == pytest.approx(SIGMA, rel=0.05)
+        if heating_nm == 0.0:
+            assert found is by_time
+            return
+        assert by_time.rms > 1.2 * SIGMA
+        told = found.values_of(name)
+        assert told["time_constant_s"] == pytest.approx(6.0, rel=0.1)
+        assert told["depth"] / told["heating_nm"] ** 2 == pytest.approx(0.2 / heating_nm**2, rel=0.05)
+
     def test_fewer_effects_start_from_where_more_ended_too(self) -> None:
         records = rubbing(lambda speed: FRICTION_NM)
         bench = Bench(model(ONE_MASS), records, everything(records))

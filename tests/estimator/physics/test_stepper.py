@@ -24,6 +24,7 @@ def effect_of(case: str) -> str:
 EFFECTS: dict[str, dict[str, float]] = {
     "inverter_gain_mismatch": {"gain_m1": 1.2},
     "torque_derating": {"depth": 0.4, "time_constant_s": 0.8},
+    "torque_derating/heated": {"depth": 0.4, "time_constant_s": 0.8, "heating_nm": 60.0},
     "torque_saturation": {"limit_sum_nm": 80.0},
     "actuator_lag": {"time_constant_s": 0.04},
     "transport_delay": {"delay_s": 0.023},
