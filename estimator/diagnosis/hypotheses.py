@@ -18,7 +18,7 @@ from estimator.physics.polish import polished
 from estimator.physics.simulate import Grid
 from estimator.physics.starts import HEAT, begun, best_fit, close, converge, warm_start
 from estimator.physics.steps import from_their_moment
-from estimator.physics.unknowns import Release, nominal_unknowns, own_unknowns, released
+from estimator.physics.unknowns import Release, Shared, nominal_unknowns, own_unknowns, released
 from estimator.signals.record import BoolArray, Record
 
 STEPS_OF_RETOLD = 5
@@ -240,6 +240,8 @@ class Bench:
             if warm is None:
                 raise ValueError("a set of effects is fitted from a fit without them, came none")
             releases = [look.release for look in promising(Screen(warm, self.model).looks(new[0]))]
+        if new and warm is not None:
+            releases = [_inheriting(new[0], release, warm) for release in releases]
         return [
             self._problem(
                 effects,
@@ -273,6 +275,26 @@ def _is_told_better(had: FitResult, other: FitResult) -> bool:
     if other.free_count > had.free_count:
         return gain(had, other).delta_bic >= VERY_STRONG
     return gain(other, had).delta_bic <= 0.0
+
+
+def _inheriting(name: str, release: Release, warm: FitResult) -> Release:
+    """Return a start of a general law that keeps what a fit of its special case has found out by another telling.
+
+    Friction that was seen to bend before it slides does so with a Stribeck range, too: begun without, such a fit is far
+    behind the special case and would be given up.
+    """
+    found = {
+        key: value for special in EFFECTS[name].contains for key, value in warm.values_of(special).items() if value
+    }
+    limits = {parameter.name: (parameter.low, parameter.high) for parameter in EFFECTS[name].parameters}
+
+    def inherited(unknown: Shared) -> Shared:
+        if unknown.low < unknown.high or unknown.name not in found:
+            return unknown
+        low, high = limits[unknown.name]
+        return replace(unknown, low=low, high=high, start=min(max(found[unknown.name] / unknown.scale, low), high))
+
+    return replace(release, shared=tuple(inherited(unknown) for unknown in release.shared))
 
 
 def _forgetting(result: FitResult, name: str) -> FitResult:

@@ -194,5 +194,5 @@ def carried(inside: float, loading: float, stiffness: float, preload: float, p: 
     """Return the torque of spring and slider, less the preload [Nm]."""
     if p[slots.SLIDER_INSIDE] > 0.0:
         stiffness = max(stiffness - float(p[slots.SLIDER_INSIDE] * p[slots.SLIDER] / p[slots.YIELD]), 0.0)
-    factor = stiffness_nonlinearity.factor(inside, p[slots.HARDENING], p[slots.SHAPE])
-    return stiffness * inside * factor + float(p[slots.SLIDER]) * loading - preload
+    law = p[slots.HARDENING], p[slots.SHAPE], p[slots.STAGE], p[slots.STAGE_FROM]
+    return stiffness * stiffness_nonlinearity.loaded_twist(inside, *law) + float(p[slots.SLIDER]) * loading - preload

@@ -146,8 +146,11 @@ class Selector:
         """Return a path with a law in the place of what bends beside others, where one explains the rest better.
 
         From where that has brought the others, too: an event whose moments are off leaves a law nothing to explain.
+        Where a law without a name does, what bends is left out.
         """
         for name in sorted(flexible(path.chosen)) if len(path.chosen) > 1 else ():
+            if name not in path.chosen:
+                continue
             rest = path.chosen - {name}
             current = self.jury.bench.fit_less(rest, path.current)
             trials = self._rounds.try_all(rest, current, flexible(frozenset(EFFECTS)))
@@ -155,6 +158,9 @@ class Selector:
             best = self.jury.best(trials, current, retuned)
             if best is not None:
                 path = self._better(path, self._with(_Path(rest, current, path.accepted), best, retuned), retuned)
+            law = self._law(current) if name in path.chosen and len(path.chosen) > 1 else None
+            if law is not None and VISIBLE * law.rms <= path.current.rms:
+                path = _Path(rest, current, path.accepted)
         return path
 
     def _with(self, path: _Path, best: Trial, retuned: FitResult) -> _Path:

@@ -34,9 +34,10 @@ class Line(NamedTuple):
 @inlined
 def is_elastic(p: FloatArray) -> bool:
     """Tell whether the first shaft is a spring and a damper, and no law beside them."""
-    bent = p[slots.GAP] > 0.0 or p[slots.HARDENING] != 0.0 or p[slots.SLIDER] != 0.0 or p[slots.SLIDER_INSIDE] > 0.0
+    bent = p[slots.GAP] > 0.0 or p[slots.HARDENING] != 0.0 or p[slots.STAGE] != 0.0
+    sliding = p[slots.SLIDER] != 0.0 or p[slots.SLIDER_INSIDE] > 0.0
     jointed = p[slots.CARDAN] != 0.0 or p[slots.CARDAN_ANGLE] != 0.0 or p[slots.CARDAN_SHARE] != 0.0
-    return not (bent or jointed)
+    return not (bent or sliding or jointed)
 
 
 @inlined

@@ -47,7 +47,8 @@ def shaft_torque(twist: float, rate: float, loading: float, p: FloatArray, stiff
     if not closed:
         loaded = beyond_gap(twist, p[slots.GAP])
         damping *= backlash.damping_share(loaded, p[slots.CONTACT])
-    elastic = stiffness * loaded * stiffness_nonlinearity.factor(loaded, p[slots.HARDENING], p[slots.SHAPE])
+    law = p[slots.HARDENING], p[slots.SHAPE], p[slots.STAGE], p[slots.STAGE_FROM]
+    elastic = stiffness * stiffness_nonlinearity.loaded_twist(loaded, *law)
     torque = float(elastic) + damping + float(p[slots.SLIDER]) * loading
     return torque if closed else backlash.pressed(torque, loaded, p[slots.PULL])
 

@@ -356,6 +356,24 @@ class TestLocalMinima:
         if presliding_rad == 1e-3:
             assert found.value(name, "presliding_rad") == pytest.approx(presliding_rad, rel=0.2)
 
+    @pytest.mark.parametrize("share", [0.25, -0.2])
+    def test_a_shaft_of_two_stages_is_told_as_one(self, share: float) -> None:
+        name, line, records = "stiffness_nonlinearity", model(TWO_MASS), []
+        stages = {"hardening_per_rad2": 0.0, "stage_share": share, "stage_rad": 0.03}
+        true = flat_values(TWO_MASS, {name: stages})
+        for seed in (3, 4):
+            silent = record(drive_torque(seed), np.zeros(1500), name=f"run_{seed}")
+            output = simulate(grid_for(line, [silent]), silent, true, Start(5.0, 0.0, 2.0))
+            records.append(replace(silent, output=output + SIGMA * np.random.default_rng(seed).standard_normal(1500)))
+        bench, effects = Bench(line, records, everything(records)), frozenset({name})
+        smooth = bench.fit(effects, bench.fit(NOTHING))
+        found = bench.fit_retold(effects, name)
+        assert smooth.rms > 1.2 * SIGMA
+        assert found.rms == pytest.approx(SIGMA, rel=0.05)
+        assert found.value(name, "hardening_per_rad2") == 0.0
+        for key in ("stage_share", "stage_rad"):
+            assert found.value(name, key) == pytest.approx(stages[key], rel=0.05)
+
     @pytest.mark.parametrize("heating_nm", [0.0, 90.0])
     def test_a_torque_derates_by_its_own_heat_where_that_is_seen(self, heating_nm: float) -> None:
         """Two recordings of other torques lose other shares of them."""

@@ -52,6 +52,17 @@ def test_the_stiffness_changes_with_the_twist(hardening: float, shape: float) ->
     assert_law(effects, solved(two_mass(shaft=shaft)))
 
 
+@pytest.mark.parametrize("share", [0.5, -0.4])
+def test_a_second_stage_is_loaded_from_a_twist_on(share: float) -> None:
+    begins = 0.01
+
+    def shaft(t: float, twist: float, rate: float) -> float:
+        return float(K * (twist + share * np.sign(twist) * max(abs(twist) - begins, 0.0)) + C * rate)
+
+    stages = {"hardening_per_rad2": 0.0, "stage_share": share, "stage_rad": begins}
+    assert_law({"stiffness_nonlinearity": stages}, solved(two_mass(shaft=shaft)))
+
+
 @pytest.mark.parametrize(("from_s", "to_s"), [(0.5, 1.6), (0.5037, 1.7012), (0.9, 9.0)])
 def test_a_crack_takes_stiffness_from_a_moment_on(from_s: float, to_s: float) -> None:
     lost = lasting(-0.3, from_s, to_s)

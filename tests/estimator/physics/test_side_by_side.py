@@ -53,6 +53,7 @@ BESIDE_A_SHAFT: dict[str, Effects] = {
     "gap": {"backlash": {"gap_rad": 0.01, "contact_rad": 0.0005, "pull": 0.3}},
     "gap with hard faces": {"backlash": {"gap_rad": 0.01, "contact_rad": 0.0, "pull": 0.0}},
     "hardening": {"stiffness_nonlinearity": {"hardening_per_rad2": 200.0, "shape": 1.2}},
+    "two stages": {"stiffness_nonlinearity": {"hardening_per_rad2": 0.0, "stage_share": 0.4, "stage_rad": 0.004}},
     "softening": {"stiffness_nonlinearity": {"hardening_per_rad2": -200.0, "shape": 0.5}},
     "cardan": {"cardan_second_order": {"amplitude_nm": 3.0}},
     "slider, then a crack": SLIDER | {"stiffness_change": {"change": -0.3, "from_s": 1.0, "to_s": 2.503}},

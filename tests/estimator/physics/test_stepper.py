@@ -40,6 +40,7 @@ EFFECTS: dict[str, dict[str, float]] = {
     "generator_coupled": {"inertia_kg_m2": 1.5, "from_s": 0.5, "to_s": 1.503},
     "backlash": {"gap_rad": 0.02, "contact_rad": 1e-3},
     "stiffness_nonlinearity": {"hardening_per_rad2": 100.0, "shape": 1.0},
+    "stiffness_nonlinearity/stages": {"hardening_per_rad2": 0.0, "stage_share": 0.4, "stage_rad": 0.004},
     "stiffness_change": {"change": -0.3, "from_s": 0.5, "to_s": 1.503},
     "shaft_hysteresis": {"friction_nm": 20.0, "yield_rad": 3e-3},
     "extra_torsional_mode": {"inertia_kg_m2": 0.3, "frequency_hz": 12.0, "damping_ratio": 0.05},
