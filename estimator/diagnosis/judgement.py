@@ -18,6 +18,7 @@ from estimator.diagnosis.trial import scan_choices
 from estimator.diagnosis.unnamed import UnnamedLaw
 from estimator.diagnosis.weight import VISIBLE, least_share, reads_speed, share_removed
 from estimator.physics.catalogue import EFFECTS
+from estimator.physics.fit import FitResult
 
 MOST_VISIBLE = 0.9
 """Share of the mismatch's power that an explanation must take away where what it leaves is seen above the noise."""
@@ -105,11 +106,8 @@ def _strays(selection: Selection, floor: float) -> tuple[Stray, ...]:
     return selection.beyond.strays if result.rms <= VISIBLE * noise_level(result, floor) else ()
 
 
-def _says_more_than_the_line(selection: Selection) -> bool:
-    """Tell whether what was chosen explains clearly more than the nominal line does beyond its tolerances."""
-    if selection.beyond is None:
-        return True
-    line = selection.beyond.result
+def _says_more(selection: Selection, line: FitResult) -> bool:
+    """Tell whether what was chosen explains clearly more than a fit of the nominal line beyond its tolerances."""
     n = gain(selection.retuned, min(line, selection.result, key=lambda fit: fit.squares)).n_effective
     return information(line, selection.result, n) >= VERY_STRONG
 
@@ -219,7 +217,7 @@ def _objection(selection: Selection, floor: float, unnamed: UnnamedLaw | None, r
     for name, trial in sorted(selection.accepted.items()):
         if trial.failed is not None:  # it passed beside fewer, or before its last fit
             return f"{EFFECTS[name].title} does not pass in the last fit: {trial.failed}"
-    if selection.beyond is not None and not _says_more_than_the_line(selection):
+    if selection.beyond is not None and not _says_more(selection, selection.beyond.result):
         return f"the nominal line itself would leave as little as {named}, with {in_words(selection.beyond.strays)}"
     if place := _bent_together(selection):
         return f"{named} would follow whatever happens at the {place}"
