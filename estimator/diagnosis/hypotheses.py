@@ -37,6 +37,9 @@ WORTH_ANOTHER_FIT = 0.1
 """Share of the squared error that a look from a fit must promise for an effect to be fitted once more: those that found
 another minimum promised half of it, those that came back to where they were a fiftieth."""
 
+MOST_BENDING = 2
+"""Effects that bend to imitate others, at one element, that can be told beside each other."""
+
 MUCH_BYTES = 2**24
 """Room of a derivative that is rather found again than kept: a round of the search has a dozen of them."""
 
@@ -52,6 +55,17 @@ def with_effect(effects: Effects, name: str) -> Effects:
 def flexible(names: Effects) -> Effects:
     """Return the effects whose course or moments every recording has of its own: they bend to imitate others."""
     return frozenset(name for name in names if EFFECTS[name].profile or EFFECTS[name].event)
+
+
+def crowding(chosen: Effects) -> Effects:
+    """Return the effects that bend of which there are as many at their element as can be told.
+
+    A load profile, a brake and a payload follow, between them, whatever happens to a load.
+    """
+    places = [EFFECTS[name].element for name in flexible(chosen)]
+    return frozenset(
+        name for name in flexible(frozenset(EFFECTS)) if places.count(EFFECTS[name].element) >= MOST_BENDING
+    )
 
 
 @dataclass

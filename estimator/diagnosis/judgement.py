@@ -10,7 +10,7 @@ from estimator.diagnosis.acquisition import Finding
 from estimator.diagnosis.beyond import Stray, in_words
 from estimator.diagnosis.convergence import unconverged
 from estimator.diagnosis.evidence import VERY_STRONG, Gain, delta_bic_with, gain, information, noise_level, price
-from estimator.diagnosis.hypotheses import flexible
+from estimator.diagnosis.hypotheses import crowding, flexible
 from estimator.diagnosis.phrases import PLACE_NAMES, kind_in_words
 from estimator.diagnosis.result import Verdict
 from estimator.diagnosis.selection import Selection
@@ -112,15 +112,6 @@ def _says_more(selection: Selection, line: FitResult) -> bool:
     return information(line, selection.result, n) >= VERY_STRONG
 
 
-def _bent_together(selection: Selection) -> str:
-    """Say where more effects that bend were chosen than can be told there; "" nowhere.
-
-    A load profile, a brake and a payload follow, between them, whatever happens to a load.
-    """
-    elements = [EFFECTS[name].element for name in flexible(selection.chosen)]
-    return next((PLACE_NAMES[each] for each in elements if elements.count(each) > BELIEVED_TOGETHER), "")
-
-
 def _above_floor(selection: Selection, floor: float) -> bool:
     return reads_speed(selection.retuned) and selection.retuned.rms > ABOVE_FLOOR * floor
 
@@ -195,8 +186,12 @@ def _is_another_law(selection: Selection, floor: float, unnamed: UnnamedLaw) -> 
 
 
 def _bends(selection: Selection, floor: float, profile_alone: bool) -> bool:
-    """Tell whether what bends is among the chosen and leaves more than a detail: an edge in what should be smooth."""
-    flexibly = profile_alone or (bool(flexible(selection.chosen)) and _is_seen(selection, floor))
+    """Tell whether what bends is among the chosen and leaves more than a detail: an edge in what should be smooth.
+
+    A profile alone, or two that bend at one place, follow so much that what they leave need not be seen.
+    """
+    much = profile_alone or bool(crowding(selection.chosen))
+    flexibly = much or (bool(flexible(selection.chosen)) and _is_seen(selection, floor))
     return flexibly and not _leaves_a_detail(selection, floor)
 
 
@@ -219,8 +214,6 @@ def _objection(selection: Selection, floor: float, unnamed: UnnamedLaw | None, r
             return f"{EFFECTS[name].title} does not pass in the last fit: {trial.failed}"
     if selection.beyond is not None and not _says_more(selection, selection.beyond.result):
         return f"the nominal line itself would leave as little as {named}, with {in_words(selection.beyond.strays)}"
-    if place := _bent_together(selection):
-        return f"{named} would follow whatever happens at the {place}"
     profiles = [name for name in selection.chosen if EFFECTS[name].profile]
     alone = bool(profiles) and len(selection.chosen) == 1
     if leaves := _leaves_too_much(selection, floor, alone):

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from estimator.diagnosis.beyond import line_beyond
 from estimator.diagnosis.evidence import VERY_STRONG, gain, information
-from estimator.diagnosis.hypotheses import NOTHING, Effects, Progress, flexible
+from estimator.diagnosis.hypotheses import NOTHING, Effects, Progress, crowding, flexible
 from estimator.diagnosis.lookalikes import lookalikes
 from estimator.diagnosis.selection.jury import Jury, generalises
 from estimator.diagnosis.selection.outcome import Selection, counting_law
@@ -131,7 +131,8 @@ class Selector:
         for _ in range(MOST_EFFECTS - len(path.chosen)):
             if path.chosen and not self._has_rest(path.current, retuned):
                 break
-            trials = self._rounds.try_all(path.chosen, path.current, least=self._least_promise(path, retuned))
+            least = self._least_promise(path, retuned)
+            trials = self._rounds.try_all(path.chosen, path.current, crowding(path.chosen), least)
             best = self.jury.best(trials, path.current, retuned)
             self._rounds.let_go(path.current if best is None else best.result)
             if best is None:

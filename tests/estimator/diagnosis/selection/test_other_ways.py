@@ -61,7 +61,7 @@ def test_a_profile_that_imitated_them_is_left_out(select: Selector, found: Selec
 
 
 def test_what_bends_beside_others_gives_way_to_a_law(select: Selector, found: Selection) -> None:
-    """A road in the place of dry friction. Where that has no name here, a law without one shows what the road is not."""
+    """A road in the place of dry friction. Where that has no name here, a law without one shows what it is not."""
     late_and_road = frozenset({"road_grade", "transport_delay"})
     delayed = select.jury.bench.fit(frozenset({"transport_delay"}), found.retuned)
     bent = _Path(late_and_road, select.jury.bench.fit(late_and_road, delayed), {})

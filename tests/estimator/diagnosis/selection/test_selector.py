@@ -148,7 +148,7 @@ class TestSeveralEffects:
         """Half of it where two leave too much: of a mismatch of 1, 25 % of the power or 9 %; the noise holds 1 %."""
         select, asked = Selector(jury(quiet(values=ONE_MASS, samples=600), floor=0.1), silent), []
 
-        def nothing_fitted(chosen: Effects, current: FitResult, *, least: float) -> dict[str, Trial]:
+        def nothing_fitted(chosen: Effects, current: FitResult, without: Effects, least: float) -> dict[str, Trial]:
             asked.append(least)
             return {}
 
