@@ -130,8 +130,9 @@ def test_another_way_begins_with_what_leaves_least_and_what_is_far_behind_is_not
 ) -> None:
     rounds, fit, finished = select._rounds, select.jury.bench.fit, list[Effects]()
 
-    def noted(effects: Effects, warm: FitResult) -> FitResult:
-        finished.append(effects)
+    def noted(effects: Effects, warm: FitResult | None = None) -> FitResult:
+        if warm is not None:
+            finished.append(effects)
         return fit(effects, warm)
 
     monkeypatch.setattr(select.jury.bench, "fit", noted)
