@@ -18,6 +18,7 @@ from estimator.diagnosis.trial import scan_choices
 from estimator.diagnosis.unnamed import UnnamedLaw
 from estimator.diagnosis.weight import VISIBLE, least_share, reads_speed, share_removed
 from estimator.physics.catalogue import EFFECTS
+from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
 
 MOST_VISIBLE = 0.9
@@ -185,6 +186,12 @@ def _is_another_law(selection: Selection, floor: float, unnamed: UnnamedLaw) -> 
     return _is_seen(selection, floor) and left < FAR_BETTER * (after**2 - level**2)
 
 
+def _is_a_course(unnamed: UnnamedLaw, selection: Selection) -> bool:
+    """Tell whether a law at the load begins with a course that one recording has of its own: a profile in other words."""
+    own = tuple(f" in {record.name}" for record in selection.result.problem.records)
+    return unnamed.element is Element.LOAD and unnamed.terms[0][0].endswith(own)
+
+
 def _bends(selection: Selection, floor: float, profile_alone: bool) -> bool:
     """Tell whether what bends is among the chosen and leaves more than a detail: an edge in what should be smooth.
 
@@ -225,7 +232,8 @@ def _objection(selection: Selection, floor: float, unnamed: UnnamedLaw | None, r
         return ""
     named_or_alike = {*selection.chosen, *(twin for twins in selection.lookalikes.values() for twin in twins)}
     elements = {EFFECTS[name].element for name in named_or_alike}
-    elsewhere = bool(profiles) or unnamed.element not in elements or len(selection.chosen) > BELIEVED_TOGETHER
+    another = bool(profiles) and not _is_a_course(unnamed, selection)
+    elsewhere = another or unnamed.element not in elements or len(selection.chosen) > BELIEVED_TOGETHER
     if _is_simpler(unnamed, selection) and (elsewhere or _is_another_law(selection, floor, unnamed)):
         law = kind_in_words(unnamed.terms[0][0])
         return f"{law} at the {PLACE_NAMES[unnamed.element]} would explain it with less than {named}"

@@ -124,6 +124,7 @@ EFFECT = Effect(
     resembles=("extra_torsional_mode",),
     equivalent=(),
     contains=(),
+    loosens=frozenset({"k", "c"}),  # a carcass is a spring behind the shaft, and the tread damps its oscillation
     scales=scales,
     starts=starts,
     implausible=implausible,

@@ -219,6 +219,24 @@ class TestHowMuchMayBeLeft:
         found = outcome(before, ROAD, correlated)
         assert (judge(replace(found, unnamed=rival), 0.1).objection == "") is believed
 
+    @pytest.mark.parametrize(
+        ("element", "term", "believed"),
+        [
+            (Element.LOAD, "sign(w_L)", False),
+            (Element.LOAD, "a slow course of the load in {}", True),  # the profile itself, in a few words
+            (Element.MOTOR, "dw_M/dt from 2.0 s on in {}", False),
+        ],
+    )
+    def test_a_profile_in_other_words_is_no_rival_of_a_profile(
+        self, element: Element, term: str, believed: bool
+    ) -> None:
+        before, road = of_rms(1.0, 2), of_rms(0.1, 6)
+        named = gain(before, road)
+        cheap = named.n_effective * 2.0 * math.log(1.0 / 0.0999) - math.log(named.n_effective)
+        name = road.problem.records[0].name
+        law = UnnamedLaw(element, ((term.format(name), 1.0), ("w_L", 0.1)), replace(named, delta_bic=cheap), 0.0999)
+        assert (judge(replace(outcome(before, ROAD, road), unnamed=law), 0.1).objection == "") is believed
+
     @pytest.mark.parametrize(("share", "left"), [(0.6, ""), (0.8, "64% of the mismatch")])
     def test_of_a_position_half(self, share: float, left: str) -> None:
         """0.6^2 = 36 % and 0.8^2 = 64 % are left; how near to the noise is not asked."""
