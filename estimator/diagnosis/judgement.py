@@ -187,7 +187,7 @@ def _is_another_law(selection: Selection, floor: float, unnamed: UnnamedLaw) -> 
 
 
 def _is_a_course(unnamed: UnnamedLaw, selection: Selection) -> bool:
-    """Tell whether a law at the load begins with a course that one recording has of its own: a profile in other words."""
+    """Tell whether a law at the load begins with a course of one recording alone: it is a profile in other words."""
     own = tuple(f" in {record.name}" for record in selection.result.problem.records)
     return unnamed.element is Element.LOAD and unnamed.terms[0][0].endswith(own)
 
