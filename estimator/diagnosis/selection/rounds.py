@@ -67,7 +67,8 @@ class Rounds:
         self._report("finishing the best of them", 0.7)
         laws = {name: result for name, result in rough.items() if not flexible(frozenset({name}))}
         near = {*_near_the_best(rough, current, WORTH_GOING_ON), *_near_the_best(laws, current, WORTH_GOING_ON)}
-        further = [name for name in rough if name in near]
+        lost = {name for name, result in rough.items() if result.squares > current.squares}  # it holds that fit's, too
+        further = [name for name in rough if name in near | lost]
         if len(further) > 1:
             fits = concurrently(lambda name: self.jury.bench.go_on(with_effect(chosen, name)), further)
             rough |= dict(zip(further, fits, strict=True))
