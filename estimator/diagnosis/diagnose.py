@@ -105,7 +105,8 @@ def _diagnose(
     final = selection.result if believed else selection.retuned
     seen = None
     if judgement.verdict is not Verdict.NO_MISMATCH:
-        seen = discrepancy(selection.retuned, final, noise_level(selection.result, floor), line.motion)
+        level = noise_level(selection.result, floor)
+        seen = discrepancy(selection.retuned, final, level, line.motion, begun=selection.hunts)
         judgement = _located(judgement, seen)
     before = _raw_fit(chain, line, final)
     retuned = _raw_fit(chain, line, selection.retuned)

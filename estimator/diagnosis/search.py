@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 from estimator.diagnosis.assemble import rms_of
 from estimator.diagnosis.chain import Chain
-from estimator.diagnosis.evidence import noise_level
 from estimator.diagnosis.holdout import Examiner
 from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects, Progress, everything, open_hypotheses
 from estimator.diagnosis.judgement import judge
@@ -24,10 +23,11 @@ from estimator.signals.record import Record
 FINER = 2
 """Steps of the integration in place of one where these have a part in an explanation."""
 
-STEPS_IN_NOISE = 0.2
-"""RMS by which finer steps may change the free run of an explanation, over the noise. True ones change by a tenth of it
-at most, most by a hundredth; a tyre that was none, so stiff that the steps' own error drew the shape of the mismatch,
-changed by all of it."""
+STEPS_IN_REST = 0.2
+"""RMS by which finer steps may change the free run of an explanation, over what it leaves of the error. True ones
+change by a tenth of it at most, most by a hundredth; a tyre that was none, so stiff that the steps' own error drew the
+shape of the mismatch, changed by all of it. What leaves far more than its steps change is not for finer ones to
+mend."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,19 +49,19 @@ def search(chain: Chain, model: DrivelineModel, unseen: Sequence[Record], progre
     """
     grid = grid_for(model, chain.records)
     found = _search(chain, model, unseen, progress, grid)
-    if is_made_by_steps(found.selection.result, found.floor):
+    if is_made_by_steps(found.selection.result):
         found = _search(chain, model, unseen, progress, _finer(grid))
     return found
 
 
-def is_made_by_steps(result: FitResult, floor: float) -> bool:
+def is_made_by_steps(result: FitResult) -> bool:
     """Tell whether the free run of a fit would be another on finer steps."""
     problem = replace(result.problem, grid=_finer(result.problem.grid))
     changes = [
         (finer - output)[rows]
         for finer, output, rows in zip(outputs_at(problem, result.x), result.outputs, problem.use, strict=True)
     ]
-    return rms_of(changes) > STEPS_IN_NOISE * noise_level(result, floor)
+    return rms_of(changes) > STEPS_IN_REST * result.rms
 
 
 def _finer(grid: Grid) -> Grid:

@@ -14,7 +14,6 @@ from estimator.errors import BadModel
 from estimator.physics import joint, own_law, own_law_run
 from estimator.physics.kernel import bristles, integration, many, sensing, side_by_side, slots, state_vector
 from estimator.physics.kernel.conditions import branch_frequency, branch_inertia
-from estimator.physics.kernel.line import is_within
 from estimator.physics.model import DrivelineModel, Structure, natural_frequencies_rad_s
 from estimator.physics.motion import reverses, speed_scale
 from estimator.physics.parallel import concurrently
@@ -396,10 +395,14 @@ PERIODIC = np.array(
 )
 """Amplitudes of the laws that are periodic in the motor's angle."""
 
+PRESLIDING = np.array(
+    [slots.COULOMB_PRESLIDING, slots.STRIBECK_PRESLIDING, slots.COULOMB_LOAD_PRESLIDING, slots.BRAKE_PRESLIDING]
+)
+"""Deflections to which dry friction bends before it slides."""
+
 
 def initial_state(start: Start, torque_nm: float, angle_rad: float, p: FloatArray) -> FloatArray:
     """Return the kernel's state at the start: what is not unknown follows from the rest as if it were steady."""
-    carried_rad_s = start.load_speed_rad_s if p[slots.J_L] > 0.0 else start.speed_rad_s
     return np.array(
         [
             *state_vector.State(
@@ -419,15 +422,25 @@ def initial_state(start: Start, torque_nm: float, angle_rad: float, p: FloatArra
             -p[slots.LAGGED_BEFORE],
             sensing.reading(start.speed_rad_s, angle_rad, p) + p[slots.FILTERED_BEFORE],
             -p[slots.FILTERED_BEFORE],
-            bristles.slid(start.speed_rad_s, bristles.sliding(start.speed_rad_s, p)),
-            bristles.slid(carried_rad_s, float(p[slots.COULOMB_LOAD])),
+            *_held_by_bristles(start, p),
         ]
+    )
+
+
+def _held_by_bristles(start: Start, p: FloatArray) -> tuple[float, float]:
+    """Return what bristles at motor and load hold [Nm] of friction that has slid for long; 0 where none bend."""
+    if not p[PRESLIDING].any():  # compiled code takes its time to be called from here
+        return 0.0, 0.0
+    carried_rad_s = start.load_speed_rad_s if p[slots.J_L] > 0.0 else start.speed_rad_s
+    return (
+        bristles.slid(start.speed_rad_s, bristles.sliding(start.speed_rad_s, p)),
+        bristles.slid(carried_rad_s, float(p[slots.COULOMB_LOAD])),
     )
 
 
 def _twist_beside_shaft(twist_rad: float, p: FloatArray) -> float:
     """Return the twist of another spring of the line [rad] that carries what the shaft does; 0 where there is none."""
-    if not is_within(p):
+    if p[slots.BETWEEN] <= 0.0 and p[slots.BEHIND] <= 0.0:
         return 0.0
     return float(p[slots.K] * twist_rad / (branch_inertia(p) * branch_frequency(p) ** 2))
 

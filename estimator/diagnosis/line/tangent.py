@@ -54,11 +54,41 @@ class Tangent:
         """Return the output's answer to torques on the motor and against the load from rest; all of shape (B,)."""
         return respond(self.phi, self.gamma, self.c, self.d, motor_nm, load_nm, np.zeros(len(self.states)))
 
+    def answers(self, motor: float, load: float, torques_nm: FloatArray) -> FloatArray:
+        """Return the output's answers to torques from rest, each at the motor and at the load in two shares; (q, B)."""
+        found = np.empty_like(torques_nm)
+        respond_each(self.phi, self.gamma, self.c, self.d, motor, load, torques_nm, found)
+        return found
+
     def free(self, blocks: int) -> FloatArray:
         """Return the output's answer to each initial state of its size in use, shape (n, blocks)."""
         nothing = np.zeros(blocks)
         starts = np.diag(self.scale)
         return np.array([respond(self.phi, self.gamma, self.c, self.d, nothing, nothing, x) for x in starts])
+
+
+@compiled
+def respond_each(
+    phi: FloatArray,
+    gamma: FloatArray,
+    c: FloatArray,
+    d: FloatArray,
+    motor: float,
+    load: float,
+    torques_nm: FloatArray,
+    found: FloatArray,
+) -> None:
+    """Do what ``respond`` does for every row of torques (q, B), from rest, into a row of ``found``."""
+    rest = np.zeros(phi.shape[1])
+    for i in range(torques_nm.shape[0]):
+        torque_nm = torques_nm[i]
+        acting = np.flatnonzero(torque_nm)
+        found[i] = 0.0
+        if acting.size > 0:
+            begin = acting[0]  # at rest before
+            rows = slice(begin, None) if phi.shape[0] > 1 else slice(None)
+            given = (phi[rows], gamma[rows], c[rows], d[rows])
+            found[i, begin:] = respond(*given, motor * torque_nm[begin:], load * torque_nm[begin:], rest)
 
 
 @compiled

@@ -12,7 +12,7 @@ An effect earns its place when
 from __future__ import annotations
 
 from estimator.diagnosis.selection.jury import Jury
-from estimator.diagnosis.selection.outcome import Selection, counting_law
+from estimator.diagnosis.selection.outcome import Selection, survey
 from estimator.diagnosis.selection.selector import Selector
 
-__all__ = ["Jury", "Selection", "Selector", "counting_law"]
+__all__ = ["Jury", "Selection", "Selector", "survey"]

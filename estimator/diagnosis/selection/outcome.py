@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from estimator.diagnosis.beyond import LineBeyond
 from estimator.diagnosis.evidence import VERY_STRONG
 from estimator.diagnosis.hypotheses import Effects
+from estimator.diagnosis.noise import noise_floor
 from estimator.diagnosis.selection.jury import SIGNIFICANT
 from estimator.diagnosis.trial import Trial
-from estimator.diagnosis.unnamed import UnnamedLaw, best_unnamed
+from estimator.diagnosis.unnamed import Hunt, UnnamedLaw, best_of, hunts_of, judged, scene
 from estimator.diagnosis.weight import VISIBLE
 from estimator.physics.fit import FitResult
 
@@ -38,6 +39,8 @@ class Selection:
         The best one for what the chosen effects leave, where it counts.
     beyond : LineBeyond or None
         The nominal line beyond its tolerances, where these hold it back.
+    hunts : sequence of Hunt
+        The first look for laws without a name in what the re-tuned nominal leaves: to locate it goes on from there.
     """
 
     retuned: FitResult
@@ -50,11 +53,32 @@ class Selection:
     unnamed: UnnamedLaw | None
     remaining: UnnamedLaw | None
     beyond: LineBeyond | None = None
+    hunts: Sequence[Hunt] = ()
 
 
-def counting_law(result: FitResult) -> UnnamedLaw | None:
-    """Return the law without a name that best explains what a fit leaves, if it is beyond chance and visible."""
-    law = best_unnamed(result)
+@dataclass(frozen=True, slots=True)
+class Survey:
+    """A first look for laws without a name in what a fit leaves.
+
+    Attributes
+    ----------
+    law : UnnamedLaw or None
+        The best one, if it is beyond chance and visible.
+    """
+
+    hunts: Sequence[Hunt]
+    law: UnnamedLaw | None
+
+
+def survey(result: FitResult) -> Survey:
+    """Look for laws without a name in what a fit leaves."""
+    view = scene(result, noise_floor(result.problem.records))
+    hunts = hunts_of(view)
+    return Survey(hunts, _counting(best_of(judged(view, hunts)), result))
+
+
+def _counting(law: UnnamedLaw | None, result: FitResult) -> UnnamedLaw | None:
+    """Return a law if it is beyond chance and visible."""
     if law is None or law.gain.delta_bic < VERY_STRONG or law.gain.p_value > SIGNIFICANT:
         return None
     return law if result.rms >= VISIBLE * law.rms else None

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from estimator.diagnosis.beyond import line_beyond
 from estimator.diagnosis.evidence import VERY_STRONG, gain, information
-from estimator.diagnosis.hypotheses import NOTHING, Effects, Progress, crowding, flexible
+from estimator.diagnosis.hypotheses import NOTHING, Effects, Progress, crowding, effects_of, flexible
 from estimator.diagnosis.lookalikes import lookalikes
 from estimator.diagnosis.selection.jury import Jury, generalises
-from estimator.diagnosis.selection.outcome import Selection, counting_law
+from estimator.diagnosis.selection.outcome import Selection, survey
 from estimator.diagnosis.selection.rounds import Rounds
 from estimator.diagnosis.trial import Trial
-from estimator.diagnosis.unnamed import UnnamedLaw
+from estimator.diagnosis.unnamed import Hunt, UnnamedLaw
 from estimator.diagnosis.weight import VISIBLE
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult
@@ -52,6 +52,7 @@ class Selector:
         self._progress = progress
         self._rounds = Rounds(jury, progress)
         self._laws: dict[int, tuple[FitResult, UnnamedLaw | None]] = {}
+        self._hunts: Sequence[Hunt] = ()
 
     def run(self) -> Selection:
         """Add effects while one earns its place; then drop those that the others made superfluous."""
@@ -121,6 +122,7 @@ class Selector:
             unnamed=unnamed,
             remaining=remaining[0] if remaining else None,
             beyond=line_beyond(retuned),
+            hunts=self._hunts,
         )
 
     def _grown(self, path: _Path, retuned: FitResult) -> _Path:
@@ -147,10 +149,15 @@ class Selector:
         """Return a path with a law in the place of what bends beside others, where one explains the rest better.
 
         From where that has brought the others, too: an event whose moments are off leaves a law nothing to explain.
-        Where a law without a name does, what bends is left out.
+        Where a law without a name does, what bends is left out. Where all of them leave too much to be named, another
+        way is worth more.
         """
-        for name in sorted(flexible(path.chosen)) if len(path.chosen) > 1 else ():
-            if name not in path.chosen:
+        for name in sorted(flexible(path.chosen)):
+            if (
+                name not in path.chosen
+                or len(path.chosen) == 1
+                or not self.jury.weight.may_stand(path.current, retuned)
+            ):
                 continue
             rest = path.chosen - {name}
             current = self.jury.bench.fit_less(rest, path.current)
@@ -220,7 +227,10 @@ class Selector:
         """Return the law without a name that counts for what a fit leaves; each fit is searched once."""
         known = self._laws.get(id(result))
         if known is None:
-            known = self._laws[id(result)] = (result, counting_law(result))
+            found = survey(result)
+            known = self._laws[id(result)] = (result, found.law)
+            if not effects_of(result):  # of all fits the one that is looked at again
+                self._hunts = found.hunts
         return known[1]
 
     def _is_near(self, result: FitResult) -> bool:

@@ -3,13 +3,14 @@
 from estimator.diagnosis.unnamed.hunt import Hunt
 from estimator.diagnosis.unnamed.look_again import without_law
 from estimator.diagnosis.unnamed.scene import Scene, scene
-from estimator.diagnosis.unnamed.search import ROUNDS, UnnamedLaw, best_unnamed, hunts_of, judged, unnamed_laws
+from estimator.diagnosis.unnamed.search import ROUNDS, UnnamedLaw, best_of, best_unnamed, hunts_of, judged, unnamed_laws
 
 __all__ = [
     "ROUNDS",
     "Hunt",
     "Scene",
     "UnnamedLaw",
+    "best_of",
     "best_unnamed",
     "hunts_of",
     "judged",

@@ -17,49 +17,72 @@ from estimator.diagnosis.line import DRIVES, FORCES, PLACES, Line, Place
 from estimator.diagnosis.unnamed.forms import Columns, Form, forms
 from estimator.diagnosis.unnamed.scene import Scene
 from estimator.physics.effect import Element
-from estimator.signals.record import FloatArray
+from estimator.signals.record import FloatArray, IntArray
+
+BATCH = 2**20
+"""Values of functions of time that are built and answered at once: enough for compiled code, and no more room."""
 
 
 @dataclass(frozen=True, slots=True)
-class Candidate:
-    """A law without a name: q functions with a coefficient each, and the output's answers to them.
+class Pool:
+    """Laws without a name at one element: functions with a coefficient each, and the output's answers to them.
 
     Attributes
     ----------
-    law : str
-        The function, as text.
-    answers : ndarray, shape (rows, q)
+    laws : tuple of str
+        The laws, as text.
+    group : ndarray of int, shape (width,)
+        To which law each function belongs, in order.
+    answers : ndarray, shape (width, rows)
         Change of the output per unit of each coefficient, over the blocks in use of all recordings.
     """
 
-    element: Element
-    law: str
+    laws: tuple[str, ...]
+    group: IntArray
     answers: FloatArray
 
+    def of(self, laws: Sequence[int]) -> FloatArray:
+        """Return the answers to some of the laws, in their order, shape (rows, q)."""
+        rows = [np.flatnonzero(self.group == law) for law in laws]
+        found: FloatArray = self.answers[np.concatenate([np.zeros(0, dtype=int), *rows])].T
+        return found
 
-def candidates(view: Scene, element: Element, tried: Sequence[Form] | None = None) -> list[Candidate]:
+
+def candidates(view: Scene, element: Element, tried: Sequence[Form] | None = None) -> Pool:
     """Return laws without a name at one element, all by default, with the output's answers to them."""
-    return [
-        Candidate(element, form.law, answers(view, element, form.build(view.motions(element))))
-        for form in (forms(view, element) if tried is None else tried)
-    ]
+    tried = forms(view, element) if tried is None else tried
+    motions = view.motions(element)
+    widths, parts, some = [], list[FloatArray](), list[Sequence[Columns]]()
+    room = BATCH
+    for form in tried:
+        some.append(form.build(motions))
+        widths.append(some[-1][0].shape[1])
+        room -= sum(columns.size for columns in some[-1])
+        if room <= 0:
+            parts.append(answers(view, element, some))
+            some, room = [], BATCH
+    parts.append(answers(view, element, some))
+    return Pool(tuple(form.law for form in tried), np.repeat(np.arange(len(widths)), widths), np.vstack(parts))
 
 
-def answers(view: Scene, element: Element, columns: Sequence[Columns]) -> FloatArray:
-    """Return the output's answers to functions of time at an element, shape (rows, q), blocks in use only."""
-    return np.concatenate(
-        [_answers_of(line, element, each)[line.rows] for line, each in zip(view.cut, columns, strict=True)]
-    )
+def answers(view: Scene, element: Element, laws: Sequence[Sequence[Columns]]) -> FloatArray:
+    """Return the output's answers to functions of time at an element, shape (width, rows), blocks in use only.
+
+    ``laws`` are any number of laws: of each its functions of time in every recording.
+    """
+    if not laws:
+        return np.zeros((0, sum(int(line.rows.sum()) for line in view.cut)))
+    found = []
+    for i, line in enumerate(view.cut):
+        torques = np.concatenate([columns[i].T for columns in laws])
+        found.append(_answers_of(line, element, torques)[:, line.rows])
+    return np.hstack(found)
 
 
-def _answers_of(line: Line, element: Element, columns: Columns) -> FloatArray:
+def _answers_of(line: Line, element: Element, functions: FloatArray) -> FloatArray:
+    """Return the output's answers to functions of time in one recording, a row each."""
     if PLACES[element] is Place.SENSOR:
-        return columns
+        return functions
     motor, load = FORCES[PLACES[element]]
     sign = DRIVES[element]
-    found = np.zeros_like(columns)
-    for i, column in enumerate(columns.T):
-        if column.any():
-            forced = np.ascontiguousarray(sign * column)
-            found[:, i] = line.tangent.answer(motor * forced, load * forced)
-    return found
+    return line.tangent.answers(sign * motor, sign * load, functions)

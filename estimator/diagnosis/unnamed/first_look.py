@@ -54,7 +54,7 @@ def first_along_motion(view: Scene, plain: Ground, element: Element) -> Hunt:
         place = PARAMETER_LAWS.get(unknown.name) if not unknown.effect else None
         if place is not None:
             columns = [place[1](m)[:, np.newaxis] for m in along.motions(element)]
-            jacobian[:, j] = unknown.scale * answers(along, place[0], columns)[:, 0]
+            jacobian[:, j] = unknown.scale * answers(along, place[0], [columns])[0]
     ground = Ground(cut, jacobian, plain.raw, view.result.pinned)
     return _from(along, element, ground)
 
@@ -69,7 +69,7 @@ def _from(view: Scene, element: Element, ground: Ground) -> Hunt:
     weights = [np.zeros(line.size) for line in view.cut]
     start = Hunt(element, view, ground, len(tried), chosen, path, weights, NO_LAW, 0.0, [], False)
     terms = worthwhile(start)
-    coefficients, left = path.solved(ground, terms, RIDGE)
+    coefficients, left = path.solved(terms, RIDGE)
     law = cost(start, terms, terms_of(start, terms, coefficients))
     hunt = replace(start, law=law, mean_square=float(left @ left) / left.size, errors=ground.split(left))
     return _without_strays(hunt) if element is Element.ACQUISITION else hunt

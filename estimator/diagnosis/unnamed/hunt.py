@@ -90,14 +90,14 @@ class Hunt:
 def worthwhile(hunt: Hunt) -> int:
     """Return how many terms of a path are worth their coefficients and take no more force than the line has."""
     path, ground = hunt.path, hunt.ground
-    _, left = path.solved(ground, len(path.chosen), RIDGE)
+    _, left = path.solved(len(path.chosen), RIDGE)
     n = effective_samples(ground.split(left))
     best, terms = 0.0, 0
     for count in range(1, len(path.chosen) + 1):
         gained = cost(hunt, count).information(path.squares[0], path.squares[count], n)
         if gained <= best:
             continue
-        coefficients, _ = path.solved(ground, count, RIDGE)
+        coefficients = path.weighed(count, RIDGE)
         if rms(weights_of(hunt, count, coefficients)) <= MOST_FORCE * _in_use(hunt):
             best, terms = gained, count
     return terms

@@ -6,13 +6,12 @@ Pati, Rezaiifar, Krishnaprasad, Asilomar 1993, on the Gram matrix of all answers
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.diagnosis.unnamed.candidates import Candidate
+from estimator.diagnosis.unnamed.candidates import Pool
 from estimator.diagnosis.unnamed.ground import Ground
 from estimator.signals.correlation import effective_samples
 from estimator.signals.record import FloatArray
@@ -44,41 +43,54 @@ class Path:
         Sum of squares left after 0, 1, 2 ... groups, and how many coefficients those have.
     chosen : list of int
         Groups, in order.
-    columns : ndarray, shape (rows, q)
-        Their answers.
+    columns, rest : ndarray, shape (rows, q)
+        Their answers, and what re-tuning leaves of these.
     term : ndarray of int, shape (q,)
         Which choice, from 0, each column belongs to.
     alone : ndarray, shape (groups,)
         How much of the error's power each group explains by itself.
+    error : ndarray, shape (rows,)
+        What re-tuning leaves of the error.
+    triangle : ndarray, shape (q, q)
+    target : ndarray, shape (q,)
+        Factors of ``rest``, and the error along its orthonormal basis: of the first columns they are the first of each.
     """
 
     squares: list[float]
     coefficients: list[int]
     chosen: list[int]
     columns: FloatArray
+    rest: FloatArray
     term: Indices
     alone: FloatArray
+    error: FloatArray
+    triangle: FloatArray
+    target: FloatArray
 
-    def solved(self, ground: Ground, terms: int, ridge: float) -> tuple[FloatArray, FloatArray]:
+    def solved(self, terms: int, ridge: float) -> tuple[FloatArray, FloatArray]:
         """Return the coefficients of the first terms, and what they leave of the error, shape (rows,)."""
-        columns = ground.rest(self.columns[:, self.term < terms])
-        if columns.shape[1] == 0:
-            return np.zeros(0), ground.error
-        coefficients: FloatArray = np.linalg.lstsq(columns, ground.error, rcond=ridge)[0].astype(np.float64)
-        return coefficients, ground.error - columns @ coefficients
+        coefficients = self.weighed(terms, ridge)
+        return coefficients, self.error - self.rest[:, : coefficients.size] @ coefficients
+
+    def weighed(self, terms: int, ridge: float) -> FloatArray:
+        """Return the coefficients of the first terms."""
+        q = int(np.count_nonzero(self.term < terms))
+        if q == 0:
+            return np.zeros(0)
+        return np.linalg.lstsq(self.triangle[:q, :q], self.target[:q], rcond=ridge)[0].astype(np.float64)
 
 
-def pursue(pool: Sequence[Candidate], ground: Ground) -> Path:
+def pursue(pool: Pool, ground: Ground) -> Path:
     """Choose groups of candidates while they are worth their coefficients."""
-    group = np.repeat(np.arange(len(pool)), [candidate.answers.shape[1] for candidate in pool])
+    group, count = pool.group, len(pool.laws)
     scale, full, full_match = _products(pool, ground)
     gram, match = full, full_match
     squares, counts, chosen = [float(ground.error @ ground.error)], [0], list[int]()
-    alone, _ = _gains(gram, match, group, len(pool))
+    alone, _ = _gains(gram, match, group, count)
     left = ground.error
     for _ in range(MOST_TERMS):
         n = effective_samples(ground.split(left))
-        gains, ranks = _gains(gram, match, group, len(pool))
+        gains, ranks = _gains(gram, match, group, count)
         gains[chosen] = 0.0
         remaining = np.maximum(squares[-1] - gains, np.finfo(float).tiny * max(squares[0], 1.0))
         worth = np.where(gains > 0.0, n * np.log(squares[-1] / remaining) - ranks * math.log(n), -np.inf)
@@ -87,8 +99,7 @@ def pursue(pool: Sequence[Candidate], ground: Ground) -> Path:
             break
         members = np.flatnonzero(np.isin(group, [*chosen, best]))
         weights = np.linalg.lstsq(full[np.ix_(members, members)], full_match[members], rcond=TOO_ALIKE)[0]
-        answers = np.hstack([pool[each].answers for each in sorted([*chosen, best])])
-        left = ground.error - ground.rest(answers @ (scale[members] * weights))
+        left = ground.error - ground.rest((scale[members] * weights) @ pool.answers[members])
         after = float(left @ left)  # what the sweeps promise is off by all their rounding
         if n * math.log(squares[-1] / after) <= ranks[best] * math.log(n):
             break
@@ -96,34 +107,32 @@ def pursue(pool: Sequence[Candidate], ground: Ground) -> Path:
         squares.append(after)
         counts.append(counts[-1] + int(ranks[best]))
         gram, match = _swept(gram, match, np.flatnonzero(group == best))
-    columns = [pool[each].answers for each in chosen]
-    term = np.repeat(np.arange(len(chosen)), [each.shape[1] for each in columns])
-    return Path(squares, counts, chosen, np.hstack([np.empty((left.size, 0)), *columns]), term, alone)
+    columns = pool.of(chosen)
+    term = np.repeat(np.arange(len(chosen)), [int(np.count_nonzero(group == each)) for each in chosen])
+    rest = ground.rest(columns)
+    basis, triangle = np.linalg.qr(rest)
+    return Path(squares, counts, chosen, columns, rest, term, alone, ground.error, triangle, basis.T @ ground.error)
 
 
-def _products(pool: Sequence[Candidate], ground: Ground) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _products(pool: Pool, ground: Ground) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the scales that make what re-tuning leaves of the answers of unit norm, its Gram matrix and its match.
 
-    Rows are taken in chunks: the answers of a long recording fill the memory once, and not once more for every step.
+    Rows are taken in chunks: the answers of a long recording fill the memory once, and not once more for what is left.
     """
-    chunks = [slice(first, first + CHUNK) for first in range(0, ground.error.size, CHUNK)]
-    seen = sum(ground.basis[rows].T @ _stacked(pool, rows) for rows in chunks)
-    width = sum(candidate.answers.shape[1] for candidate in pool)
+    seen = pool.answers @ ground.basis
+    width = pool.group.size
     before, gram, match = np.zeros(width), np.zeros((width, width)), np.zeros(width)
-    for rows in chunks:
-        raw = _stacked(pool, rows)
-        rest = raw - ground.basis[rows] @ seen
-        before += np.einsum("ij,ij->j", raw, raw)
-        gram += rest.T @ rest
-        match += rest.T @ ground.error[rows]
+    for first in range(0, ground.error.size, CHUNK):
+        rows = slice(first, first + CHUNK)
+        raw = pool.answers[:, rows]
+        rest = raw - seen @ ground.basis[rows].T
+        before += np.einsum("ij,ij->i", raw, raw)
+        gram += rest @ rest.T
+        match += rest @ ground.error[rows]
     after = np.diag(gram)
     alive = after > ALIKE * np.maximum(before, np.finfo(float).tiny)
     scale = np.where(alive, 1.0 / np.sqrt(np.where(alive, after, 1.0)), 0.0)
     return scale, gram * np.outer(scale, scale), match * scale
-
-
-def _stacked(pool: Sequence[Candidate], rows: slice) -> FloatArray:
-    return np.hstack([candidate.answers[rows] for candidate in pool])
 
 
 def _gains(gram: FloatArray, match: FloatArray, group: Indices, count: int) -> tuple[FloatArray, FloatArray]:

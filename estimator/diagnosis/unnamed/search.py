@@ -18,7 +18,7 @@ from estimator.diagnosis.evidence import SMALLEST_P, Gain
 from estimator.diagnosis.line import PLACES, Place
 from estimator.diagnosis.noise import noise_floor
 from estimator.diagnosis.unnamed.first_look import first, first_along_motion
-from estimator.diagnosis.unnamed.ground import Ground, ground_of
+from estimator.diagnosis.unnamed.ground import ground_of
 from estimator.diagnosis.unnamed.hunt import Hunt
 from estimator.diagnosis.unnamed.look_again import again
 from estimator.diagnosis.unnamed.pursuit import MOST_COEFFICIENTS
@@ -50,7 +50,12 @@ class UnnamedLaw:
 
 def best_unnamed(result: FitResult, rounds: int = 1) -> UnnamedLaw | None:
     """Return the law without a name that gains most over a fit; None where no candidate gains anything."""
-    found = [law for law in unnamed_laws(result, rounds) if law.gain.delta_bic > 0]
+    return best_of(unnamed_laws(result, rounds))
+
+
+def best_of(laws: Sequence[UnnamedLaw]) -> UnnamedLaw | None:
+    """Return the law that gains most, of those that gain anything."""
+    found = [law for law in laws if law.gain.delta_bic > 0]
     return max(found, key=lambda law: law.gain.delta_bic, default=None)
 
 
@@ -62,11 +67,7 @@ def unnamed_laws(result: FitResult, rounds: int = 1) -> list[UnnamedLaw]:
     rounds : int
         1 looks from the fit alone: enough to tell whether anything is left. ``ROUNDS`` tells where.
     """
-    return laws_of(scene(result, noise_floor(result.problem.records)), rounds)
-
-
-def laws_of(view: Scene, rounds: int = 1) -> list[UnnamedLaw]:
-    """Return the best law of each element, given the inputs that explain the error at each place."""
+    view = scene(result, noise_floor(result.problem.records))
     return judged(view, hunts_of(view, rounds))
 
 
@@ -78,11 +79,14 @@ def judged(view: Scene, hunts: Sequence[Hunt]) -> list[UnnamedLaw]:
     return [_law(hunt, n, before / best.ground.error.size) for hunt in hunts]
 
 
-def hunts_of(view: Scene, rounds: int = 1) -> list[Hunt]:
-    """Look for a law at every element, and again where it is among the best."""
-    ground = ground_of(view)
-    look = partial(first if rounds == 1 else _tried, view, ground)
-    hunts = concurrently(look, elements(view.result))
+def hunts_of(view: Scene, rounds: int = 1, begun: Sequence[Hunt] = ()) -> list[Hunt]:
+    """Look for a law at every element, and again where it is among the best.
+
+    ``begun`` is what a first round has found in the same fit, where there was one.
+    """
+    hunts = list(begun) or concurrently(partial(first, view, ground_of(view)), elements(view.result))
+    if rounds > 1:
+        hunts = concurrently(partial(_tried, view), hunts)
     for _ in range(rounds - 2):
         least = min(hunt.mean_square for hunt in hunts)
         near = [i for i, h in enumerate(hunts) if not h.stuck and h.mean_square <= IN_REACH**2 * least]
@@ -91,11 +95,11 @@ def hunts_of(view: Scene, rounds: int = 1) -> list[Hunt]:
     return hunts
 
 
-def _tried(view: Scene, ground: Ground, element: Element) -> Hunt:
-    """Look from the fit alone, and along the motion of an unknown input; return what simulates better."""
-    starts = [first(view, ground, element)]
-    if PLACES[element] is not Place.SENSOR:
-        starts.append(first_along_motion(view, ground, element))
+def _tried(view: Scene, begun: Hunt) -> Hunt:
+    """Look again from the fit alone, and along the motion of an unknown input; return what simulates better."""
+    starts = [begun]
+    if PLACES[begun.element] is not Place.SENSOR:
+        starts.append(first_along_motion(view, begun.ground, begun.element))
     return min((again(start) for start in starts), key=lambda hunt: (hunt.stuck, hunt.mean_square))
 
 

@@ -27,6 +27,7 @@ def discrepancy(
     floor: float,
     motion: model.Motion = model.Motion.ROTATION,
     rounds: int | None = None,
+    begun: Sequence[Hunt] = (),
 ) -> Discrepancy:
     """Look at what a re-tuned model lacks, with the effects found or, where there are none, with laws without a name.
 
@@ -42,6 +43,8 @@ def discrepancy(
         Rotation or translation, for the units.
     rounds : int, optional
         Rounds of the search for laws without a name; by default all (``ROUNDS``) where nothing is named, else one.
+    begun : sequence of Hunt, optional
+        What the first of them has found in ``retuned``, where there was one.
 
     Returns
     -------
@@ -50,7 +53,7 @@ def discrepancy(
     cut = lines(retuned)
     view = Scene(retuned, cut, explain_all(retuned, cut, floor))
     named = effects_added(retuned, final)
-    hunts = hunts_of(view, rounds or (1 if named else ROUNDS))
+    hunts = hunts_of(view, rounds or (1 if named else ROUNDS), begun)
     laws = sorted(judged(view, hunts), key=lambda law: -law.gain.delta_bic)
     best = laws[0] if laws and laws[0].gain.delta_bic > 0.0 else None
     if named:

@@ -7,7 +7,7 @@ import numpy as np
 from estimator.abreast import LANES
 from estimator.compiled import compiled
 from estimator.physics.kernel.integration import integrate, with_mode
-from estimator.physics.kernel.side_by_side import go_side_by_side, integrate_side_by_side
+from estimator.physics.kernel.side_by_side import go_side_by_side, integrate_side_by_side, kin_together, leading_kin
 from estimator.signals.record import FloatArray, IntArray
 
 
@@ -32,14 +32,15 @@ def integrate_each(
     """Do what ``integrate`` does for every row of ``torque``, ``load``, ``p``, ``state``, ``out`` and ``slopes``.
 
     Row i is as row 0 before sample ``alike[i]`` and is simulated from about there on; ``alike[0]`` is the number of
-    samples. Rows that can be go side by side, and leave their states as they were.
+    samples. Rows that are kin go side by side where they can, and leave their states as they were.
     """
     given = (sample_time_s, substeps, sign_width)
     apart = not np.any(alike[1:])
-    order = np.argsort(alike) if apart else 1 + np.argsort(alike[1:])
+    order = kin_together(p) if apart else 1 + np.argsort(alike[1:])
     reached, i = 0, 0
     while i < order.size:
         rows = order[i : i + LANES]
+        rows = rows[: leading_kin(p, rows)]
         together = slopes.shape[2] == 0 and go_side_by_side(masses, p, rows)
         if not together:
             rows = rows[:1]

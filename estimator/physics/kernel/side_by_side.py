@@ -40,16 +40,37 @@ def go_side_by_side(masses: int, p: FloatArray, rows: IntArray) -> bool:
         return False
     if is_linear(Line(masses, masses == 1 or is_elastic(first), False, False), first):
         return False
-    return are_kin(p, rows)
+    return leading_kin(p, rows) == rows.size
 
 
 @inlined
-def are_kin(p: FloatArray, rows: IntArray) -> bool:
-    """Tell whether some of the lines, a row of parameters each, are alike but for the size of their parameters."""
-    for row in rows[1:]:
-        for i in MAKING:
-            if (p[row, i] == 0.0) != (p[rows[0], i] == 0.0):
-                return False
+def leading_kin(p: FloatArray, rows: IntArray) -> int:
+    """Return how many of the lines, a row of parameters each, are kin of the first before one is not."""
+    count = 1
+    while count < rows.size and are_kin(p[rows[0]], p[rows[count]]):
+        count += 1
+    return count
+
+
+@inlined
+def kin_together(p: FloatArray) -> IntArray:
+    """Return the rows of some lines in an order that has those that are kin follow each other."""
+    order, placed = np.empty(p.shape[0], dtype=np.int64), np.zeros(p.shape[0], dtype=np.bool_)
+    count = 0
+    for first in range(p.shape[0]):
+        for row in range(first, p.shape[0]):
+            if not placed[row] and are_kin(p[first], p[row]):
+                order[count], placed[row] = row, True
+                count += 1
+    return order
+
+
+@inlined
+def are_kin(p: FloatArray, other: FloatArray) -> bool:
+    """Tell whether two lines are alike but for the size of their parameters."""
+    for i in MAKING:
+        if (p[i] == 0.0) != (other[i] == 0.0):
+            return False
     return True
 
 

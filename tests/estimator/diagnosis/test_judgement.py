@@ -16,7 +16,7 @@ from estimator.diagnosis.judgement import ABOVE_FLOOR, MOST_VISIBLE, NEAR_FLOOR,
 from estimator.diagnosis.noise import unpredictable
 from estimator.diagnosis.phrases import kind_in_words
 from estimator.diagnosis.result import Verdict
-from estimator.diagnosis.selection import Selection, counting_law
+from estimator.diagnosis.selection import Selection, survey
 from estimator.diagnosis.trial import Trial
 from estimator.diagnosis.unnamed import UnnamedLaw, best_unnamed
 from estimator.diagnosis.weight import MOST, VISIBLE
@@ -41,8 +41,8 @@ def selection(records: Sequence[Record], chosen: Effects = NOTHING, line: Drivel
     bench = Bench(line or model(ONE_MASS), records, everything(records))
     retuned = bench.fit(NOTHING)
     result = bench.fit(chosen, retuned)
-    remaining = counting_law(result) if chosen else None
-    return outcome(retuned, chosen, result, unnamed=counting_law(retuned), remaining=remaining)
+    remaining = survey(result).law if chosen else None
+    return outcome(retuned, chosen, result, unnamed=survey(retuned).law, remaining=remaining)
 
 
 def sensor_error(coefficient: float) -> list[Record]:

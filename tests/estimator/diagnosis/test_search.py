@@ -10,7 +10,6 @@ import pytest
 from estimator.diagnosis import search as search_module
 from estimator.diagnosis.chain import Chain, read_through
 from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects, everything
-from estimator.diagnosis.noise import noise_floor
 from estimator.diagnosis.search import FINER, Search, is_made_by_steps, search
 from estimator.diagnosis.weight import VISIBLE
 from estimator.physics.simulate import grid_for
@@ -66,9 +65,9 @@ def test_off_time_a_friction_that_is_seen_is_named() -> None:
 
 def test_what_steps_too_coarse_draw_is_seen_on_finer_ones() -> None:
     records, line = quiet(), model(TWO_MASS)
-    grid, floor = grid_for(line, records), noise_floor(records)
+    grid = grid_for(line, records)
     drawn = [
-        is_made_by_steps(Bench(line, records, everything(records), replace(grid, substeps=steps)).fit(NOTHING), floor)
+        is_made_by_steps(Bench(line, records, everything(records), replace(grid, substeps=steps)).fit(NOTHING))
         for steps in (1, grid.substeps)
     ]
     assert drawn == [True, False]
@@ -79,7 +78,7 @@ def test_where_steps_have_a_part_in_an_explanation_the_search_begins_anew_on_fin
 ) -> None:
     records = rubbing(lambda speed: 1.5)
     usual = searched(records).selection.result.problem.grid
-    monkeypatch.setattr(search_module, "is_made_by_steps", lambda result, floor: result.problem.grid == usual)
+    monkeypatch.setattr(search_module, "is_made_by_steps", lambda result: result.problem.grid == usual)
     found = searched(records)
     assert found.selection.retuned.problem.grid == replace(usual, substeps=FINER * usual.substeps)
     assert found.selection.chosen == FRICTION

@@ -60,6 +60,17 @@ def test_a_line_with_a_gap_answers_as_its_simulation_does(at_load: bool) -> None
     assert np.max(np.abs(line.answer(motor, load) - nudged)) < 0.02 * np.ptp(nudged)
 
 
+@pytest.mark.parametrize("effects", [None, {"backlash": {"gap_rad": 0.01, "contact_rad": 0.001}}])
+def test_many_answers_at_once_are_those_to_each_alone(effects: dict[str, dict[str, float]] | None) -> None:
+    line = tangent(result_of(effects), 0, 1)
+    late = np.where(np.arange(SAMPLES) >= 700, walk(6), 0.0)
+    torques = np.array([walk(5), late, np.zeros(SAMPLES)])
+    expected = [line.answer(-each, 0.5 * each) for each in torques]
+    found = line.answers(-1.0, 0.5, torques)
+    np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12 * np.abs(expected).max())
+    assert not found[1, :700].any()
+
+
 def test_blocks_of_samples_are_their_average() -> None:
     result = result_of()
     fine, coarse = tangent(result, 0, 1), tangent(result, 0, 5)

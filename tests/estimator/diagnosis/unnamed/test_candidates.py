@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 
 from estimator.diagnosis.line.motion import motion_of
-from estimator.diagnosis.unnamed.candidates import Candidate, candidates
+from estimator.diagnosis.unnamed.candidates import candidates
 from estimator.diagnosis.unnamed.forms import STEP_EVERY_S
 from estimator.diagnosis.unnamed.scene import Scene, elements, scene
 from estimator.physics.effect import Element
@@ -45,8 +46,21 @@ def view(result: FitResult) -> Scene:
     return scene(result, SIGMA)
 
 
+class Candidate(NamedTuple):
+    """A law of one element, with the output's answers to it, shape (rows, q)."""
+
+    element: Element
+    law: str
+    answers: FloatArray
+
+
+def at(view: Scene, element: Element) -> list[Candidate]:
+    pool = candidates(view, element)
+    return [Candidate(element, law, pool.of([i])) for i, law in enumerate(pool.laws)]
+
+
 def everywhere(view: Scene) -> list[Candidate]:
-    return [candidate for element in elements(view.result) for candidate in candidates(view, element)]
+    return [candidate for element in elements(view.result) for candidate in at(view, element)]
 
 
 @pytest.fixture(scope="module")
@@ -154,7 +168,7 @@ def test_what_sets_in_at_a_moment_does_so_in_one_recording_and_names_it(pool: li
 def test_every_input_but_the_last_may_count_more_than_its_reading() -> None:
     shares = np.column_stack([0.3 * drive_torque(1), 0.7 * drive_torque(1) + 20.0, np.full(1500, -20.0)])
     rec = replace(linear_record(TWO_MASS, drive_torque(1), START), torque_nm=shares)
-    pool = candidates(scene(fit(make_problem(model(TWO_MASS), [rec], ())), SIGMA), Element.TORQUE_PATH)
+    pool = at(scene(fit(make_problem(model(TWO_MASS), [rec], ())), SIGMA), Element.TORQUE_PATH)
     assert [c.law for c in pool if c.law in ("T_1", "T_2", "T_3")] == ["T_1", "T_2"]
     expected = response(shares[:, 1], np.zeros(1500))
     answer = first(pick(pool, Element.TORQUE_PATH, "T_2"))
@@ -183,7 +197,7 @@ def test_a_position_has_no_error_of_the_speed_reading() -> None:
 def test_a_law_that_is_zero_throughout_has_no_answer() -> None:
     """The line stands still but for the noise of nothing: no speed, no friction."""
     rec = linear_record(TWO_MASS, np.zeros(400), REST)
-    pool = candidates(scene(fit(make_problem(model(TWO_MASS), [rec], ())), SIGMA), Element.TORQUE_PATH)
+    pool = at(scene(fit(make_problem(model(TWO_MASS), [rec], ())), SIGMA), Element.TORQUE_PATH)
     assert not pick(pool, Element.TORQUE_PATH, "T |T|").answers.any()
 
 
@@ -198,6 +212,6 @@ def test_a_profile_of_the_fit_goes_on_in_the_answers() -> None:
     assert followed.rms < 0.02 * nominal_fit(hill).rms
     moved = motion_of(followed, 0)
     assert np.max(np.abs(moved.speed - hill[0].output)) < 0.01 * np.ptp(hill[0].output)
-    step = pick(candidates(scene(followed, SIGMA), Element.LOAD), Element.LOAD, "a load step at 5.0 s in run_1")
+    step = pick(at(scene(followed, SIGMA), Element.LOAD), Element.LOAD, "a load step at 5.0 s in run_1")
     expected = response(np.zeros(1500), np.where(np.arange(1500) >= 500, 1.0, 0.0))
     assert np.max(np.abs(first(step) - expected)) < 1e-2 * np.ptp(expected)

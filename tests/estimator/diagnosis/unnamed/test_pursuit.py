@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from estimator.diagnosis.unnamed.candidates import Candidate, candidates
+from estimator.diagnosis.unnamed.candidates import Pool, candidates
 from estimator.diagnosis.unnamed.ground import Ground, ground_of
 from estimator.diagnosis.unnamed.pursuit import pursue
 from estimator.diagnosis.unnamed.scene import scene
 from estimator.physics.effect import Element
+from estimator.signals.record import FloatArray
 from tests.estimator.diagnosis.planted import SIGMA, nominal_fit, quiet
+
+
+def pool_of(answers: Sequence[FloatArray]) -> Pool:
+    """Laws with these answers, shape (rows, q) each."""
+    group = np.repeat(np.arange(len(answers)), [each.shape[1] for each in answers])
+    return Pool(tuple(f"law {i}" for i in range(len(answers))), group, np.hstack(answers).T)
 
 
 def test_what_re_tuning_explains_is_not_a_law() -> None:
@@ -20,9 +28,9 @@ def test_what_re_tuning_explains_is_not_a_law() -> None:
     result = nominal_fit(quiet((1,)))
     view = scene(result, SIGMA)
     ground = ground_of(view)
-    pool = {c.law: c for c in candidates(view, Element.LOAD)}
-    (inertia,) = (c.answers for law, c in pool.items() if law.startswith("dw_L/dt from 1.0 s"))
-    drag = pool["w_L |w_L|"].answers
+    pool = candidates(view, Element.LOAD)
+    (inertia,) = (pool.of([i]) for i, law in enumerate(pool.laws) if law.startswith("dw_L/dt from 1.0 s"))
+    drag = pool.of([pool.laws.index("w_L |w_L|")])
     assert np.linalg.norm(ground.rest(inertia)) < 0.3 * np.linalg.norm(inertia)
     assert np.linalg.norm(ground.rest(drag)) > 0.05 * np.linalg.norm(drag)
     free = ground.jacobian[:, ~result.pinned]
@@ -32,7 +40,7 @@ def test_what_re_tuning_explains_is_not_a_law() -> None:
 def test_a_column_of_the_jacobian_is_nothing_at_all() -> None:
     result = nominal_fit(quiet((1,)))
     ground = ground_of(scene(result, SIGMA))
-    path = pursue([Candidate(Element.MOTOR, "a parameter", ground.jacobian[:, [2]].copy())], ground)
+    path = pursue(pool_of([ground.jacobian[:, [2]]]), ground)
     assert path.chosen == []
     assert path.alone.tolist() == [0.0]
 
@@ -44,15 +52,15 @@ def test_a_group_is_worth_its_coefficients_and_not_more() -> None:
     plain = ground_of(scene(result, SIGMA))
     rows = plain.error.size
     signal = rng.standard_normal((rows, 2))
-    noise = [Candidate(Element.MOTOR, f"noise {i}", rng.standard_normal((rows, 1))) for i in range(20)]
-    planted = Candidate(Element.MOTOR, "planted", np.column_stack([signal, signal[:, 0] - signal[:, 1]]))
+    noise = [rng.standard_normal((rows, 1)) for _ in range(20)]
+    planted = np.column_stack([signal, signal[:, 0] - signal[:, 1]])
     error = signal @ np.array([0.1, -0.05]) + 0.02 * rng.standard_normal(rows)
     ground = Ground(scene(result, SIGMA).cut, plain.jacobian, error, result.pinned)
-    path = pursue([*noise[:10], planted, *noise[10:]], ground)
+    path = pursue(pool_of([*noise[:10], planted, *noise[10:]]), ground)
     assert path.chosen == [10]
     assert path.coefficients == [0, 2]
-    coefficients, left = path.solved(ground, 1, 1e-9)
-    np.testing.assert_allclose(planted.answers @ coefficients, signal @ [0.1, -0.05], atol=0.005)
+    coefficients, left = path.solved(1, 1e-9)
+    np.testing.assert_allclose(planted @ coefficients, signal @ [0.1, -0.05], atol=0.005)
     assert left @ left == pytest.approx(path.squares[1], rel=1e-6)
     assert left.std() == pytest.approx(0.02, rel=0.1)
 
@@ -69,7 +77,7 @@ def test_what_is_left_is_computed_and_not_promised(monkeypatch: pytest.MonkeyPat
     """As if the sweeps' rounding promised all of the error to a column that has nothing to do with it."""
     rng = np.random.default_rng(5)
     ground = ground_of(scene(nominal_fit(quiet((1,))), SIGMA))
-    pool = [Candidate(Element.MOTOR, "noise", rng.standard_normal((ground.error.size, 1)))]
+    pool = pool_of([rng.standard_normal((ground.error.size, 1))])
     whole = float(ground.error @ ground.error)
     monkeypatch.setattr("estimator.diagnosis.unnamed.pursuit._gains", lambda *_: (np.array([whole]), np.array([1.0])))
     path = pursue(pool, ground)
