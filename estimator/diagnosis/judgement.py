@@ -16,7 +16,7 @@ from estimator.diagnosis.result import Verdict
 from estimator.diagnosis.selection import Selection
 from estimator.diagnosis.trial import scan_choices
 from estimator.diagnosis.unnamed import UnnamedLaw
-from estimator.diagnosis.weight import VISIBLE, least_share, reads_speed, share_removed
+from estimator.diagnosis.weight import BELIEVED_TOGETHER, VISIBLE, least_share, reads_speed, share_removed
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
@@ -44,10 +44,6 @@ pure sine, and a harmonic of a fifth of the amplitude has a twenty-fifth of the 
 FAR_BETTER = 0.5
 """Share of what an explanation leaves above the noise that a simpler law at the same place leaves at most, where that
 law is another."""
-
-BELIEVED_TOGETHER = 2
-"""Effects that may be a simpler law at the place of one of them in other words. More of them put together what is one
-thing at one place."""
 
 ABOVE_FLOOR = 1.25
 """A re-tuned nominal model whose error is above the floor by this factor does not explain a speed recording: the

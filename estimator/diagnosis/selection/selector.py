@@ -11,6 +11,7 @@ from estimator.diagnosis.hypotheses import NOTHING, Effects, Progress, crowding,
 from estimator.diagnosis.lookalikes import lookalikes
 from estimator.diagnosis.selection.jury import Jury, generalises
 from estimator.diagnosis.selection.outcome import Selection, survey
+from estimator.diagnosis.selection.outdone import outdone
 from estimator.diagnosis.selection.rounds import Rounds
 from estimator.diagnosis.trial import Trial
 from estimator.diagnosis.unnamed import Hunt, UnnamedLaw
@@ -93,6 +94,7 @@ class Selector:
             if flexible(way.chosen) or not self._has_rest(way.current, retuned):
                 return way
             without |= flexible(frozenset(EFFECTS))
+        without |= self._outdone(way.chosen, retuned)
         trials = self._rounds.try_all(way.chosen, way.current, without, 0.5 * self._rest(way.current))
         best = self.jury.best(trials, way.current, retuned)
         return way if best is None else self._with(way, best, retuned)
@@ -134,7 +136,8 @@ class Selector:
             if path.chosen and not self._has_rest(path.current, retuned):
                 break
             least = self._least_promise(path, retuned)
-            trials = self._rounds.try_all(path.chosen, path.current, crowding(path.chosen), least)
+            without = crowding(path.chosen) | self._outdone(path.chosen, retuned)
+            trials = self._rounds.try_all(path.chosen, path.current, without, least)
             best = self.jury.best(trials, path.current, retuned)
             self._rounds.let_go(path.current if best is None else best.result)
             if best is None:
@@ -161,7 +164,7 @@ class Selector:
                 continue
             rest = path.chosen - {name}
             current = self.jury.bench.fit_less(rest, path.current)
-            trials = self._rounds.try_all(rest, current, flexible(frozenset(EFFECTS)))
+            trials = self._rounds.try_all(rest, current, flexible(frozenset(EFFECTS)) | self._outdone(rest, retuned))
             trials |= self._rounds.try_in_place(name, path.current, list(trials), rest, current)
             best = self.jury.best(trials, current, retuned)
             if best is not None:
@@ -232,6 +235,12 @@ class Selector:
             if not effects_of(result):  # of all fits the one that is looked at again
                 self._hunts = found.hunts
         return known[1]
+
+    def _outdone(self, chosen: Effects, retuned: FitResult) -> Effects:
+        """Return effects that could not be believed beside those chosen; beside none any may be."""
+        if not chosen:
+            return NOTHING
+        return outdone(self._law(retuned), retuned, self.jury.weight.level(retuned), chosen, self.jury.names)
 
     def _is_near(self, result: FitResult) -> bool:
         return result.rms <= NEAR_NOISE * self.jury.weight.level(result)

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.physics.kernel.side_by_side import go_side_by_side
+from estimator.physics.kernel.side_by_side import go_side_by_side, kin_together, leading_kin
 from estimator.physics.layout import flat, slot
 from estimator.physics.model import DrivelineModel, EffectValue, Parameter, Structure
 from estimator.physics.simulate import Case, Grid, Start, simulate_each, simulate_records
@@ -103,6 +103,24 @@ def test_side_by_side_is_one_by_one(values: Mapping[str, float], effects: Effect
     together = simulate_each(grid, rec, cases)
     alone = np.array([simulate_each(grid, rec, [case])[0] for case in cases])
     assert_same_to_rounding(together, alone)
+
+
+def test_lines_of_several_makes_in_any_order_are_each_as_alone() -> None:
+    """Sliders, gaps, waves and linear ones: each is done beside its kin, wherever these stand."""
+    makes = [BESIDE_A_SHAFT["slider"], BESIDE_A_SHAFT["gap"], EVERYWHERE["ripple"], {}]
+    grid, rec = Grid(Structure.TWO_MASS, SUBSTEPS, 0.02), record(random_steps(400, seed=7), np.ones(400))
+    cases = [case for effects in makes for case in cases_of(flat(line_with(TWO_MASS, effects)), 400)]
+    mixed = [cases[i] for i in np.random.default_rng(6).permutation(len(cases))]
+    together = simulate_each(grid, rec, mixed)
+    alone = np.array([simulate_each(grid, rec, [case])[0] for case in mixed])
+    assert_same_to_rounding(together, alone)
+
+
+def test_kin_follow_each_other() -> None:
+    p = np.array([flat(line_with(TWO_MASS, effects)) for effects in (SLIDER, {}, SLIDER, QUADRATIC, {}, SLIDER)])
+    order = kin_together(p)
+    assert order.tolist() == [0, 2, 5, 1, 4, 3]
+    assert [leading_kin(p, order[i:]) for i in (0, 3, 5)] == [3, 2, 1]
 
 
 @pytest.mark.parametrize("place", ["between_kg_m2", "behind_kg_m2"])
