@@ -23,15 +23,14 @@ from estimator.diagnosis.screening import Screen
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
-from estimator.physics.layout import flat_values
 from estimator.physics.model import Motion, Structure
-from estimator.physics.simulate import Start, grid_for, simulate
+from estimator.physics.simulate import Start
 from estimator.physics.starts import begun, close
-from estimator.physics.steps import moments_of
 from estimator.physics.unknowns import Release, effect_unknowns
 from estimator.signals.record import OutputKind
-from tests.estimator.diagnosis.planted import SIGMA, drive_torque, quiet, rubbing
-from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, linear_record, model, random_steps, record
+from tests.estimator.diagnosis.one_effect import SHAKES, bench_with
+from tests.estimator.diagnosis.planted import SIGMA, quiet, rubbing
+from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, linear_record, model, random_steps
 from tests.estimator.physics.cracking import AT_S, CRACK, LAST_S, SOUND, cracking, the_other_way_round
 
 COULOMB = frozenset({"coulomb_friction_motor"})
@@ -246,14 +245,7 @@ class TestLocalMinima:
             "damping_ratio": 0.045,
             "line_share": line_share,
         }
-        nominal, records = model(TWO_MASS), []
-        for seed in (3, 4):
-            silent = record(random_steps(1500, seed, hold=3), np.zeros(1500), name=f"run_{seed}")
-            flat = flat_values(TWO_MASS, {"extra_torsional_mode": values})
-            output = simulate(grid_for(nominal, [silent]), silent, flat, Start(5.0, 0.0, 2.0))
-            noise = SIGMA * np.random.default_rng(seed).standard_normal(output.size)
-            records.append(replace(silent, output=output + noise))
-        return Bench(nominal, records, everything(records))
+        return bench_with("extra_torsional_mode", values, SHAKES)
 
     @pytest.mark.parametrize(("inertia", "frequency_hz", "line_share"), [(0.1, 11.0, 0.72), (0.1, 20.0, 0.76)])
     def test_the_rest_of_an_effect_shows_once_its_spring_is_fitted(
@@ -309,114 +301,6 @@ class TestLocalMinima:
         assert bench.fit_widely(self.MODE, name) is known
         heat = begun(bench._problems(self.MODE, before, releases), before)
         assert tried == [[releases[i] for i in sorted(close(heat)[1:])]]
-
-    def test_a_mode_near_half_the_sampling_rate_is_told_between_motor_and_shaft(self) -> None:
-        """A branch beside the line comes near, but with a damping and an inertia that no mode has."""
-        name, values = "extra_torsional_mode", {"between_kg_m2": 0.2, "line_share": 0.7, "damping_ratio": 0.02}
-        nominal, records = model(TWO_MASS), []
-        for seed in (3, 4):
-            silent = record(random_steps(1500, seed, hold=3), np.zeros(1500), name=f"run_{seed}")
-            flat = flat_values(TWO_MASS, {name: values})
-            output = simulate(grid_for(nominal, [silent]), silent, flat, Start(5.0, 0.0, 2.0))
-            noise = SIGMA * np.random.default_rng(seed).standard_normal(output.size)
-            records.append(replace(silent, output=output + noise))
-        bench = Bench(nominal, records, everything(records))
-        before = bench.fit(NOTHING)
-        beside = bench.fit(self.MODE, before)
-        found = bench.fit_retold(self.MODE, name)
-        assert bench.fit_retold(self.MODE, name) is found is bench.fit(self.MODE)
-        assert found.rms == pytest.approx(SIGMA, rel=0.05)
-        assert found.squares < beside.squares
-        for key in ("between_kg_m2", "line_share"):  # so little damping is hardly seen
-            assert found.value(name, key) == pytest.approx(values[key], rel=0.1)
-        true_hz = np.sqrt(TWO_MASS["k"] * 0.7 / 0.3 / 0.2) / (2.0 * np.pi)
-        fitted = {key: found.value(name, key) for key in values}
-        assert EFFECTS[name].derived(fitted, {"k": found.value("", "k")})["frequency_hz"] == pytest.approx(
-            true_hz, rel=0.05
-        )
-
-    @pytest.mark.parametrize("presliding_rad", [0.0, 2e-3])
-    def test_friction_bends_before_it_slides_where_that_is_seen(self, presliding_rad: float) -> None:
-        name, line, records = "stribeck_friction", model(TWO_MASS), []
-        values = {"excess_nm": 18.0, "coulomb_nm": 10.0, "stribeck_rad_s": 1.5}
-        true = flat_values(TWO_MASS, {name: values | {"presliding_rad": presliding_rad}})
-        for seed in (3, 4):
-            silent = record(drive_torque(seed), np.zeros(1500), name=f"run_{seed}")
-            output = simulate(grid_for(line, [silent]), silent, true, Start(5.0, 0.0, 2.0))
-            records.append(replace(silent, output=output + SIGMA * np.random.default_rng(seed).standard_normal(1500)))
-        bench, effects = Bench(line, records, everything(records)), frozenset({name})
-        rigid = bench.fit(effects, bench.fit(NOTHING))
-        found = bench.fit_retold(effects, name)
-        if presliding_rad == 0.0:
-            assert found is rigid
-            return
-        assert rigid.rms > 1.2 * SIGMA
-        assert found.rms == pytest.approx(SIGMA, rel=0.05)
-        for key in values:
-            assert found.value(name, key) == pytest.approx(values[key], rel=0.05)
-        assert found.value(name, "presliding_rad") == pytest.approx(presliding_rad, rel=0.1)
-
-    @pytest.mark.parametrize("presliding_rad", [0.0, 1e-5, 1e-3])
-    def test_a_brake_sticks_where_that_is_seen(self, presliding_rad: float) -> None:
-        """Told another way it keeps the moments that were found."""
-        name, line, records = "brake_drag", model(TWO_MASS), []
-        own = {"from_s": 3.0, "to_s": 12.0}
-        true = flat_values(TWO_MASS, {name: {"brake_nm": 25.0, "presliding_rad": presliding_rad} | own})
-        for seed in (3, 4):
-            silent = record(drive_torque(seed), np.zeros(1500), name=f"run_{seed}")
-            output = simulate(grid_for(line, [silent]), silent, true, Start(5.0, 0.0, 2.0))
-            records.append(replace(silent, output=output + SIGMA * np.random.default_rng(seed).standard_normal(1500)))
-        bench, effects = Bench(line, records, everything(records)), frozenset({name})
-        rounded = bench.fit(effects, bench.fit(NOTHING))
-        found = bench.fit_retold(effects, name)
-        assert found.rms == pytest.approx(SIGMA, rel=0.05)
-        assert found.value(name, "brake_nm") == pytest.approx(25.0, rel=0.02)
-        if presliding_rad == 0.0:
-            return
-        assert rounded.rms > 1.1 * SIGMA
-        for from_s, to_s in moments_of(found, name):
-            assert (from_s, to_s) == pytest.approx((own["from_s"], own["to_s"]), abs=0.05)
-        if presliding_rad == 1e-3:
-            assert found.value(name, "presliding_rad") == pytest.approx(presliding_rad, rel=0.2)
-
-    @pytest.mark.parametrize("share", [0.25, -0.2])
-    def test_a_shaft_of_two_stages_is_told_as_one(self, share: float) -> None:
-        name, line, records = "stiffness_nonlinearity", model(TWO_MASS), []
-        stages = {"hardening_per_rad2": 0.0, "stage_share": share, "stage_rad": 0.03}
-        true = flat_values(TWO_MASS, {name: stages})
-        for seed in (3, 4):
-            silent = record(drive_torque(seed), np.zeros(1500), name=f"run_{seed}")
-            output = simulate(grid_for(line, [silent]), silent, true, Start(5.0, 0.0, 2.0))
-            records.append(replace(silent, output=output + SIGMA * np.random.default_rng(seed).standard_normal(1500)))
-        bench, effects = Bench(line, records, everything(records)), frozenset({name})
-        smooth = bench.fit(effects, bench.fit(NOTHING))
-        found = bench.fit_retold(effects, name)
-        assert smooth.rms > 1.2 * SIGMA
-        assert found.rms == pytest.approx(SIGMA, rel=0.05)
-        assert found.value(name, "hardening_per_rad2") == 0.0
-        for key in ("stage_share", "stage_rad"):
-            assert found.value(name, key) == pytest.approx(stages[key], rel=0.05)
-
-    @pytest.mark.parametrize("heating_nm", [0.0, 90.0])
-    def test_a_torque_derates_by_its_own_heat_where_that_is_seen(self, heating_nm: float) -> None:
-        """Two recordings of other torques lose other shares of them."""
-        name, line, records = "torque_derating", model(TWO_MASS), []
-        true = flat_values(TWO_MASS, {name: {"depth": 0.2, "time_constant_s": 6.0, "heating_nm": heating_nm}})
-        for seed, size in ((3, 1.0), (4, 0.5)):
-            silent = record(size * drive_torque(seed), np.zeros(1500), name=f"run_{seed}")
-            output = simulate(grid_for(line, [silent]), silent, true, Start(5.0, 0.0, 2.0))
-            records.append(replace(silent, output=output + SIGMA * np.random.default_rng(seed).standard_normal(1500)))
-        bench, effects = Bench(line, records, everything(records)), frozenset({name})
-        by_time = bench.fit(effects, bench.fit(NOTHING))
-        found = bench.fit_retold(effects, name)
-        assert found.rms == pytest.approx(SIGMA, rel=0.05)
-        if heating_nm == 0.0:
-            assert found is by_time
-            return
-        assert by_time.rms > 1.2 * SIGMA
-        told = found.values_of(name)
-        assert told["time_constant_s"] == pytest.approx(6.0, rel=0.1)
-        assert told["depth"] / told["heating_nm"] ** 2 == pytest.approx(0.2 / heating_nm**2, rel=0.05)
 
     def test_fewer_effects_start_from_where_more_ended_too(self) -> None:
         records = rubbing(lambda speed: FRICTION_NM)

@@ -1,0 +1,30 @@
+"""Two noisy recordings of a line of two masses with one effect, to be fitted from the line without it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from estimator.diagnosis.hypotheses import Bench, everything
+from estimator.physics.layout import flat_values
+from estimator.physics.simulate import Start, grid_for, simulate
+from estimator.signals.record import FloatArray
+from tests.estimator.diagnosis.planted import SIGMA, drive_torque
+from tests.estimator.physics.bench import TWO_MASS, model, random_steps, record
+
+SEEDS = (3, 4)
+DRIVES = tuple(drive_torque(seed) for seed in SEEDS)
+SHAKES = tuple(random_steps(1500, seed, hold=3) for seed in SEEDS)
+
+
+def bench_with(name: str, values: Mapping[str, float], torques_nm: Sequence[FloatArray] = DRIVES) -> Bench:
+    """Simulate the line under two torques, with an effect of these parameters."""
+    line, true, records = model(TWO_MASS), flat_values(TWO_MASS, {name: values}), []
+    for seed, torque_nm in zip(SEEDS, torques_nm, strict=True):
+        silent = record(torque_nm, np.zeros(torque_nm.size), name=f"run_{seed}")
+        output = simulate(grid_for(line, [silent]), silent, true, Start(5.0, 0.0, 2.0))
+        noise = SIGMA * np.random.default_rng(seed).standard_normal(output.size)
+        records.append(replace(silent, output=output + noise))
+    return Bench(line, records, everything(records))
