@@ -12,10 +12,10 @@ from estimator.diagnosis.screening import Screen, promising
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Start, Untestable
 from estimator.physics.fit import FitResult, Problem, fit, make_problem, not_fitted
+from estimator.physics.grid import Grid
 from estimator.physics.model import DrivelineModel, Motion
 from estimator.physics.moments import without_idle
 from estimator.physics.polish import polished
-from estimator.physics.simulate import Grid
 from estimator.physics.starts import HEAT, begun, best_fit, close, converge, warm_start
 from estimator.physics.steps import from_their_moment
 from estimator.physics.unknowns import Release, Shared, nominal_unknowns, own_unknowns, released

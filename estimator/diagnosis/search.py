@@ -16,8 +16,8 @@ from estimator.diagnosis.selection import Jury, Selection, Selector
 from estimator.diagnosis.weight import VISIBLE, Weight
 from estimator.physics.effect import Untestable
 from estimator.physics.fit import FitResult, outputs_at
+from estimator.physics.grid import Grid, grid_for
 from estimator.physics.model import DrivelineModel
-from estimator.physics.simulate import Grid, grid_for
 from estimator.signals.record import Record
 
 FINER = 2

@@ -14,11 +14,13 @@ import numpy as np
 
 from estimator.abreast import LANES
 from estimator.physics.effect import MOMENTS
+from estimator.physics.grid import Grid, grid_for
 from estimator.physics.layout import flat
 from estimator.physics.least_squares import Solution, minimise
 from estimator.physics.model import DrivelineModel
 from estimator.physics.parallel import WORKERS, concurrently
-from estimator.physics.simulate import Case, Grid, Start, grid_for, simulate_each, simulate_records
+from estimator.physics.simulate import Case, simulate_each, simulate_records
+from estimator.physics.start import Start
 from estimator.physics.unknowns import LocalBasis, Shared, local_basis, own_unknowns
 from estimator.signals.record import BoolArray, FloatArray, IntArray, Record
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -12,31 +11,13 @@ import numpy as np
 from estimator.abreast import LANES
 from estimator.errors import BadModel
 from estimator.physics import joint, own_law, own_law_run
-from estimator.physics.kernel import bristles, integration, many, sensing, side_by_side, slots, state_vector
-from estimator.physics.kernel.conditions import branch_frequency, branch_inertia
-from estimator.physics.model import DrivelineModel, Structure, natural_frequencies_rad_s
-from estimator.physics.motion import reverses, speed_scale
+from estimator.physics.grid import Grid
+from estimator.physics.kernel import integration, many, side_by_side, slots, state_vector
+from estimator.physics.model import Structure
 from estimator.physics.parallel import concurrently
+from estimator.physics.start import Start, initial_state
 from estimator.physics.torque_path import shaft_torques
 from estimator.signals.record import FloatArray, IntArray, Location, OutputKind, Record
-
-RADIANS_PER_STEP = 0.2
-"""Integration step in radians of the line's natural frequency, or its fastest decay. Fourth order would allow more; a
-torque that steps within a step of the integration, as one delayed by a part of a period does, would not."""
-
-FASTEST_IN_NYQUIST = 30.0
-"""Fastest mode that is simulated, in multiples of the Nyquist frequency of the sample time.
-
-A line that stiff differs from a rigid one by 1 / 30^2, a thousandth, at the highest frequency a recording holds:
-simulating a faster mode takes ever more integration steps and changes nothing that can be seen.
-"""
-
-SIGN_WIDTH = 0.01
-"""Dry friction changes sign within this share of the top speed of recordings that pass through standstill.
-
-Real contacts give way a little before they slip; and a sharper edge makes the error a jagged function of the
-parameters: on a real drive fits from different starts then ended up to 10 % apart in friction, with this width not.
-"""
 
 MASSES = {Structure.ONE_MASS: 1, Structure.TWO_MASS: 2, Structure.THREE_MASS: 3}
 """How many inertias the kernel has for a structure."""
@@ -46,80 +27,6 @@ _OUTPUT_STATE = {
     (OutputKind.SPEED, Location.LOAD): state_vector.LOAD_SPEED,
     (OutputKind.POSITION, Location.MOTOR): state_vector.ANGLE,
 }
-
-
-@dataclass(frozen=True, slots=True)
-class Grid:
-    """How a model is integrated on a set of recordings: sub-steps per period and width of a sign change."""
-
-    structure: Structure
-    substeps: int
-    sign_width: float
-
-
-@dataclass(frozen=True, slots=True)
-class Start:
-    """What is unknown in every recording: constant load torque [Nm] and initial state [rad, rad/s].
-
-    Of a joint also the preload behind its gap [Nm].
-    """
-
-    load_torque_nm: float
-    angle_rad: float
-    speed_rad_s: float
-    twist_rad: float = 0.0
-    load_speed_rad_s: float = 0.0
-    middle_twist_rad: float = 0.0
-    middle_speed_rad_s: float = 0.0
-    preload_nm: float = 0.0
-
-
-def substeps_for(values: Mapping[str, float], period_s: float) -> int:
-    """Return the integration steps per period that the line's natural frequency, or its fastest decay, needs.
-
-    Raises
-    ------
-    BadModel
-        Where that is beyond `FASTEST_IN_NYQUIST`.
-    """
-    if "J_M" not in values:
-        return 1
-    motor = (values["b_M"] + values.get("c", 0.0)) / values["J_M"]
-    load = (values["b_L"] + values["c"]) / values["J_L"] if "k" in values else 0.0
-    fastest = max(float(natural_frequencies_rad_s(values)[-1]), motor + load)
-    if fastest * period_s > FASTEST_IN_NYQUIST * math.pi:
-        raise BadModel(_too_fast(values, fastest, period_s))
-    return max(1, math.ceil(fastest * period_s / RADIANS_PER_STEP))
-
-
-def _too_fast(values: Mapping[str, float], fastest_rad_s: float, period_s: float) -> str:
-    """Say which mode is too fast, and for which parameters to look: the largest part of it and what it acts on."""
-    if natural_frequencies_rad_s(values)[-1] == fastest_rad_s:
-        mode, law = "natural frequency", "k"
-    else:
-        parts = {"b_M": values["b_M"] / values["J_M"]}
-        if "k" in values:
-            parts |= {"b_L": values["b_L"] / values["J_L"], "c": values["c"] / min(values["J_M"], values["J_L"])}
-        mode, law = "fastest decay", max(parts, key=parts.__getitem__)
-    both = [name for name in ("J_M", "J_L") if name in values]
-    inertia = {"b_M": "J_M", "b_L": "J_L"}.get(law) or min(both, key=values.__getitem__)
-    return (
-        f"parameters.{law} = {values[law]:g} with parameters.{inertia} = {values[inertia]:g}: the line's {mode} is "
-        f"{fastest_rad_s / (2.0 * math.pi):.4g} Hz, expected at most {0.5 * FASTEST_IN_NYQUIST / period_s:.4g} Hz at "
-        f"a sample time of {period_s:g} s ({FASTEST_IN_NYQUIST:g} times what it can show). Check both values and "
-        "their units; a line that is rigid is structure = 'one_mass'."
-    )
-
-
-def grid_for(model: DrivelineModel, records: Sequence[Record]) -> Grid:
-    """Choose the integration grid for a model on a set of recordings of one sampling period."""
-    substeps = substeps_for(model.values(), records[0].sample_time_s)
-    return Grid(model.structure, substeps, SIGN_WIDTH * _slow_scale(records))
-
-
-def _slow_scale(records: Sequence[Record]) -> float:
-    """Return the top speed of the recordings that reverse, or of all where none does [rad/s]."""
-    return speed_scale([record for record in records if reverses(record)] or records)
 
 
 def output_state(record: Record, structure: Structure) -> int:
@@ -394,55 +301,6 @@ PERIODIC = np.array(
     ]
 )
 """Amplitudes of the laws that are periodic in the motor's angle."""
-
-PRESLIDING = np.array(
-    [slots.COULOMB_PRESLIDING, slots.STRIBECK_PRESLIDING, slots.COULOMB_LOAD_PRESLIDING, slots.BRAKE_PRESLIDING]
-)
-"""Deflections to which dry friction bends before it slides."""
-
-
-def initial_state(start: Start, torque_nm: float, angle_rad: float, p: FloatArray) -> FloatArray:
-    """Return the kernel's state at the start: what is not unknown follows from the rest as if it were steady."""
-    return np.array(
-        [
-            *state_vector.State(
-                angle=start.angle_rad,
-                speed=start.speed_rad_s,
-                twist=start.twist_rad,
-                load_speed=start.load_speed_rad_s,
-                loading=0.0,
-                vehicle_speed=start.load_speed_rad_s,
-                branch_twist=_twist_beside_shaft(start.twist_rad, p),
-                branch_speed=start.load_speed_rad_s if p[slots.BEHIND] > 0.0 else start.speed_rad_s,
-                middle_twist=start.middle_twist_rad,
-                middle_speed=start.middle_speed_rad_s,
-                traction=start.load_torque_nm,
-            ),
-            torque_nm + p[slots.LAGGED_BEFORE],
-            -p[slots.LAGGED_BEFORE],
-            sensing.reading(start.speed_rad_s, angle_rad, p) + p[slots.FILTERED_BEFORE],
-            -p[slots.FILTERED_BEFORE],
-            *_held_by_bristles(start, p),
-        ]
-    )
-
-
-def _held_by_bristles(start: Start, p: FloatArray) -> tuple[float, float]:
-    """Return what bristles at motor and load hold [Nm] of friction that has slid for long; 0 where none bend."""
-    if not p[PRESLIDING].any():  # compiled code takes its time to be called from here
-        return 0.0, 0.0
-    carried_rad_s = start.load_speed_rad_s if p[slots.J_L] > 0.0 else start.speed_rad_s
-    return (
-        bristles.slid(start.speed_rad_s, bristles.sliding(start.speed_rad_s, p)),
-        bristles.slid(carried_rad_s, float(p[slots.COULOMB_LOAD])),
-    )
-
-
-def _twist_beside_shaft(twist_rad: float, p: FloatArray) -> float:
-    """Return the twist of another spring of the line [rad] that carries what the shaft does; 0 where there is none."""
-    if p[slots.BETWEEN] <= 0.0 and p[slots.BEHIND] <= 0.0:
-        return 0.0
-    return float(p[slots.K] * twist_rad / (branch_inertia(p) * branch_frequency(p) ** 2))
 
 
 def motor_angle(record: Record) -> FloatArray:

@@ -7,10 +7,12 @@ import numpy as np
 from estimator.errors import BadModel
 from estimator.physics import own_law
 from estimator.physics.effects import transport_delay
+from estimator.physics.grid import substeps_for
 from estimator.physics.kernel import integration, sensing, state_vector
 from estimator.physics.layout import flat, slot
 from estimator.physics.model import DrivelineModel
-from estimator.physics.simulate import MASSES, Start, initial_state, substeps_for
+from estimator.physics.simulate import MASSES
+from estimator.physics.start import Start, initial_state
 from estimator.physics.torque_path import shaft_torque_from
 
 SIGN_WIDTH_RAD_S = 0.02

@@ -17,7 +17,8 @@ from estimator.physics.effects import road_grade
 from estimator.physics.layout import slot
 from estimator.physics.model import DrivelineModel, Structure, natural_frequencies_rad_s
 from estimator.physics.motion import measured_speed, speed_scale, torque_scale
-from estimator.physics.simulate import Start, motor_angle
+from estimator.physics.simulate import motor_angle
+from estimator.physics.start import Start
 from estimator.signals.record import FloatArray, OutputKind, Record
 
 

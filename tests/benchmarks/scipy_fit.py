@@ -22,7 +22,7 @@ from estimator.physics.fit import Problem, bounds, local_part, parameters, resid
 from estimator.physics.layout import slot
 from estimator.physics.least_squares import CONVERGED
 from estimator.physics.model import Structure
-from estimator.physics.simulate import Start
+from estimator.physics.start import Start
 from estimator.signals.record import FloatArray, Record
 
 METHOD: Final = "RK45"

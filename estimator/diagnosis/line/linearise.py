@@ -14,7 +14,8 @@ from estimator.physics.kernel.line import is_bristled_at_load, is_bristled_at_mo
 from estimator.physics.layout import slot
 from estimator.physics.model import Structure, natural_frequencies_rad_s
 from estimator.physics.motion import speed_scale, torque_scale
-from estimator.physics.simulate import MASSES, initial_state, motor_angle, output_state
+from estimator.physics.simulate import MASSES, motor_angle, output_state
+from estimator.physics.start import initial_state
 from estimator.physics.torque_path import shaft_torque
 from estimator.signals.record import FloatArray, OutputKind, Record
 

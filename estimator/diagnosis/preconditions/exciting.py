@@ -12,8 +12,8 @@ from scipy.signal import detrend
 from estimator.diagnosis.noise import noise_floor
 from estimator.diagnosis.preconditions.driven import driven
 from estimator.errors import NotExciting
+from estimator.physics.grid import Grid, grid_for
 from estimator.physics.model import DrivelineModel, natural_frequencies_rad_s
-from estimator.physics.simulate import Grid, grid_for
 from estimator.signals.record import FloatArray, Record
 
 FEWEST_SAMPLES = 200

@@ -24,9 +24,9 @@ from scipy.ndimage import uniform_filter1d
 from scipy.signal import detrend
 
 from estimator.diagnosis.preconditions.driven import driven
+from estimator.physics.grid import Grid
 from estimator.physics.model import DrivelineModel, natural_frequencies_rad_s
 from estimator.physics.motion import measured_speed
-from estimator.physics.simulate import Grid
 from estimator.signals.record import FloatArray, Record
 
 BELOW, ABOVE = (0.1, 0.6), (1.6, math.inf)

@@ -13,8 +13,8 @@ from dataclasses import replace
 from estimator.diagnosis.preconditions.factors import known_factors
 from estimator.diagnosis.preconditions.inertia import Inertia, fitted_inertia
 from estimator.errors import BadModel, Implausible
+from estimator.physics.grid import grid_for
 from estimator.physics.model import DrivelineModel, Motion, parameter_unit
-from estimator.physics.simulate import grid_for
 from estimator.signals.record import OutputKind, Record
 
 BEYOND = 2.5

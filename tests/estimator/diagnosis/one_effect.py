@@ -8,8 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from estimator.diagnosis.hypotheses import Bench, everything
+from estimator.physics.grid import grid_for
 from estimator.physics.layout import flat_values
-from estimator.physics.simulate import Start, grid_for, simulate
+from estimator.physics.simulate import simulate
+from estimator.physics.start import Start
 from estimator.signals.record import FloatArray
 from tests.estimator.diagnosis.planted import SIGMA, drive_torque
 from tests.estimator.physics.bench import TWO_MASS, model, random_steps, record

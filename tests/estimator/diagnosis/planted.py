@@ -12,7 +12,7 @@ import numpy as np
 
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult, fit, make_problem
-from estimator.physics.simulate import Start
+from estimator.physics.start import Start
 from estimator.physics.unknowns import nominal_unknowns
 from estimator.signals.record import FloatArray, Record
 from tests.estimator.physics.bench import (

@@ -8,9 +8,9 @@ import numpy as np
 from scipy.signal import lfilter
 
 from estimator.physics.fit import FitResult, Problem
+from estimator.physics.grid import Grid
 from estimator.physics.layout import NOMINAL, SIZE
 from estimator.physics.model import Structure
-from estimator.physics.simulate import Grid
 from estimator.physics.unknowns import LocalBasis, Shared
 from estimator.signals.record import FloatArray
 from tests.estimator.physics.bench import record

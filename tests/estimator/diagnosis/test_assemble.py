@@ -28,7 +28,7 @@ from estimator.physics.catalogue import effect_problems
 from estimator.physics.effect import Element
 from estimator.physics.free_run import free_run
 from estimator.physics.model import EffectValue, Motion
-from estimator.physics.simulate import Start
+from estimator.physics.start import Start
 from estimator.physics.unknowns import Shared
 from estimator.signals.correlation import effective_samples
 from estimator.signals.record import FloatArray, Record

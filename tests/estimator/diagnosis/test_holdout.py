@@ -11,7 +11,7 @@ from estimator.diagnosis.holdout import BLOCK_S, EVERY_S, Examiner, blocks, fore
 from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects, everything
 from estimator.physics.effects.road_grade import KNOT_SPACING_S
 from estimator.physics.fit import FitResult, fit
-from estimator.physics.simulate import Start
+from estimator.physics.start import Start
 from estimator.physics.unknowns import Shared
 from estimator.signals.record import Record
 from tests.estimator.diagnosis.planted import SIGMA, drive_torque, quiet, rubbing

@@ -24,7 +24,7 @@ from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
 from estimator.physics.model import Motion, Structure
-from estimator.physics.simulate import Start
+from estimator.physics.start import Start
 from estimator.physics.starts import begun, close
 from estimator.physics.unknowns import Release, effect_unknowns
 from estimator.signals.record import OutputKind

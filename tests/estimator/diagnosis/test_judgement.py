@@ -24,7 +24,7 @@ from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
 from estimator.physics.model import DrivelineModel
-from estimator.physics.simulate import Start
+from estimator.physics.start import Start
 from estimator.signals.record import OutputKind, Record
 from tests.estimator.diagnosis.outcome import outcome
 from tests.estimator.diagnosis.planted import SIGMA, TIGHT, drive_torque, quiet, recordings, rubbing

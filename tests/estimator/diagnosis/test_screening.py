@@ -14,7 +14,7 @@ from estimator.diagnosis.screening import Look, Screen, promising
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
 from estimator.physics.model import DrivelineModel
-from estimator.physics.simulate import Start
+from estimator.physics.start import Start
 from estimator.physics.unknowns import Release, Shared
 from estimator.signals.record import Record
 from tests.estimator.diagnosis.planted import SIGMA, TIGHT, disturbed, drive_torque, quiet, rubbing

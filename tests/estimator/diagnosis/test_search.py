@@ -12,7 +12,7 @@ from estimator.diagnosis.chain import Chain, read_through
 from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects, everything
 from estimator.diagnosis.search import FINER, Search, is_made_by_steps, search
 from estimator.diagnosis.weight import VISIBLE
-from estimator.physics.simulate import grid_for
+from estimator.physics.grid import grid_for
 from estimator.signals.record import Record
 from tests.estimator.diagnosis.planted import quiet, rubbing
 from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, model

@@ -10,8 +10,10 @@ import pytest
 from estimator.diagnosis.hypotheses import NOTHING, Bench, everything
 from estimator.diagnosis.preconditions.thinned import LONGEST_S, factor_for, thinned
 from estimator.diagnosis.stretches import MOST_SAMPLES
+from estimator.physics.grid import grid_for
 from estimator.physics.layout import flat
-from estimator.physics.simulate import Start, grid_for, simulate
+from estimator.physics.simulate import simulate
+from estimator.physics.start import Start
 from tests.estimator.physics.bench import TWO_MASS, model, random_steps, record
 
 LINE = model(TWO_MASS)

@@ -10,7 +10,7 @@ from estimator.diagnosis.hypotheses import NOTHING, Bench, everything
 from estimator.diagnosis.intervals import covariance, interval
 from estimator.diagnosis.trial import Trial, null_inside, pressed_parameters, ranks
 from estimator.physics.fit import FitResult
-from estimator.physics.simulate import Start
+from estimator.physics.start import Start
 from tests.estimator.diagnosis.planted import Friction, rubbing
 from tests.estimator.diagnosis.regression import of_rms
 from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, linear_record, model, random_steps

@@ -7,9 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from estimator.physics.fit import FitResult, fit, make_problem
+from estimator.physics.grid import grid_for
 from estimator.physics.layout import flat, slot
 from estimator.physics.model import DrivelineModel
-from estimator.physics.simulate import Start, grid_for, simulate
+from estimator.physics.simulate import simulate
+from estimator.physics.start import Start
 from estimator.physics.unknowns import Shared, effect_unknowns, nominal_unknowns
 from estimator.signals.record import Record
 from tests.estimator.physics.bench import TWO_MASS, model, random_steps, record

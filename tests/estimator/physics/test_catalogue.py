@@ -13,9 +13,11 @@ import pytest
 
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Effect, Element, Held
+from estimator.physics.grid import grid_for
 from estimator.physics.layout import flat, flat_values
 from estimator.physics.model import Motion, Structure
-from estimator.physics.simulate import Start, grid_for, simulate
+from estimator.physics.simulate import simulate
+from estimator.physics.start import Start
 from estimator.signals.record import FloatArray, Record
 from tests.estimator.physics.bench import TWO_MASS, assert_same_to_rounding, linear_record, model, random_steps
 

@@ -23,7 +23,7 @@ from estimator.physics.fit import (
     start_vector,
 )
 from estimator.physics.layout import flat
-from estimator.physics.simulate import Start
+from estimator.physics.start import Start
 from estimator.physics.unknowns import Shared, nominal_unknowns
 from estimator.signals.record import Location, OutputKind, Record
 from tests.estimator.physics.bench import (

@@ -12,6 +12,7 @@ from scipy.integrate import solve_ivp
 from estimator.errors import BadModel, BadShape
 from estimator.physics import joint, place_in_gap
 from estimator.physics.fit import fit, make_problem
+from estimator.physics.grid import grid_for
 from estimator.physics.kernel import state_vector
 from estimator.physics.laws import beyond_gap
 from estimator.physics.layout import flat_values
@@ -24,7 +25,8 @@ from estimator.physics.model import (
     parameter_unit,
 )
 from estimator.physics.polish import polished
-from estimator.physics.simulate import Start, grid_for, motor_angle, output_state, simulate
+from estimator.physics.simulate import motor_angle, output_state, simulate
+from estimator.physics.start import Start
 from estimator.physics.unknowns import nominal_unknowns
 from estimator.signals.record import FloatArray, OutputKind, Record
 

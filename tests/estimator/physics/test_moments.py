@@ -14,11 +14,13 @@ import pytest
 
 from estimator.physics import fit as fit_module
 from estimator.physics.fit import FitResult, fit, make_problem
+from estimator.physics.grid import grid_for
 from estimator.physics.layout import flat, slot
 from estimator.physics.least_squares import Solution, minimise
 from estimator.physics.moments import OFFSETS_S, without_idle
 from estimator.physics.polish import polished
-from estimator.physics.simulate import Start, grid_for, simulate
+from estimator.physics.simulate import simulate
+from estimator.physics.start import Start
 from estimator.physics.unknowns import Shared, own_unknowns
 from estimator.signals.record import FloatArray, Record
 from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, linear_record, model, random_steps, record

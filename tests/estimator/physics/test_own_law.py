@@ -13,10 +13,12 @@ from estimator.errors import BadModel
 from estimator.physics import own_law
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
+from estimator.physics.grid import Grid
 from estimator.physics.layout import SIZE, flat_values, slot
 from estimator.physics.model import Structure
 from estimator.physics.own_law import TRIAL, OwnLaw, OwnParameter
-from estimator.physics.simulate import Grid, Start, simulate
+from estimator.physics.simulate import simulate
+from estimator.physics.start import Start
 from estimator.physics.stepper import Stepper
 from estimator.signals.record import FloatArray
 from tests.estimator.physics import bench

@@ -8,7 +8,7 @@ import pytest
 from estimator.physics.fit import FitResult, fit, make_problem
 from estimator.physics.model import DrivelineModel, Parameter, Structure
 from estimator.physics.rates import rates
-from estimator.physics.simulate import Start
+from estimator.physics.start import Start
 from estimator.physics.unknowns import nominal_unknowns
 from estimator.signals.record import FloatArray, OutputKind, Record
 from tests.estimator.physics.bench import ONE_MASS, SAMPLE_TIME_S, linear_record, model, random_steps

@@ -9,7 +9,7 @@ import pytest
 
 from estimator.physics.fit import fit, local_part, make_problem, parameters, start_of
 from estimator.physics.layout import slot
-from estimator.physics.simulate import Start
+from estimator.physics.start import Start
 from estimator.physics.starts import best_fit, warm_start
 from estimator.physics.unknowns import effect_unknowns, nominal_unknowns
 from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, linear_record, model, random_steps

@@ -8,8 +8,10 @@ from scipy.linalg import expm
 
 from estimator.physics.effects import transport_delay
 from estimator.physics.effects.actuator_lag import step
+from estimator.physics.grid import Grid
 from estimator.physics.layout import flat
-from estimator.physics.simulate import Grid, Start, simulate
+from estimator.physics.simulate import simulate
+from estimator.physics.start import Start
 from estimator.signals.record import FloatArray
 from tests.estimator.physics.bench import SAMPLE_TIME_S, model, random_steps, record
 

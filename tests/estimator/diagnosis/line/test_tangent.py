@@ -12,7 +12,7 @@ from estimator.diagnosis.line.linearise import tangent
 from estimator.diagnosis.line.motion import simulated
 from estimator.physics.fit import FitResult, fit, make_problem
 from estimator.physics.model import EffectValue
-from estimator.physics.simulate import Start
+from estimator.physics.start import Start
 from estimator.signals.record import FloatArray
 from tests.estimator.diagnosis.planted import drive_torque
 from tests.estimator.physics.bench import SPEED, TWO_MASS, exact_states, linear_record, model

@@ -15,7 +15,7 @@ from estimator.diagnosis.selection import Selector
 from estimator.diagnosis.selection.jury import Jury
 from estimator.diagnosis.selection.rounds import Rounds
 from estimator.diagnosis.weight import Weight
-from estimator.physics.simulate import Start
+from estimator.physics.start import Start
 from estimator.signals.record import Record
 from tests.estimator.diagnosis.planted import SIGMA, drive_torque, rubbing_speed
 from tests.estimator.physics.bench import ONE_MASS, linear_record, model, random_steps, record

@@ -12,7 +12,7 @@ from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects
 from estimator.diagnosis.screening import Look, Screen
 from estimator.diagnosis.selection.rounds import WORTH_FINISHING, WORTH_GOING_ON
 from estimator.physics.fit import FitResult
-from estimator.physics.simulate import Start
+from estimator.physics.start import Start
 from estimator.physics.unknowns import Release
 from tests.estimator.diagnosis.planted import SIGMA, drive_torque, quiet, rubbing, rubbing_speed
 from tests.estimator.diagnosis.selection.mass import COULOMB, STRIBECK, rounds

@@ -9,7 +9,7 @@ import pytest
 
 from estimator.diagnosis.unnamed.search import ROUNDS, best_unnamed, unnamed_laws
 from estimator.physics.effect import Element
-from estimator.physics.simulate import Start
+from estimator.physics.start import Start
 from tests.estimator.diagnosis.planted import SIGMA, Law, nominal_fit, quiet, recordings
 from tests.estimator.physics.bench import TWO_MASS, linear_record
 
