@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimator.diagnosis.intervals import covariance
+from estimator.diagnosis.result import Stray
 from estimator.diagnosis.trial import pressed_parameters
-from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult, fit
 
 FREELY = 3.0
@@ -22,37 +22,6 @@ the integration's steps, chosen for the nominal line, would not follow."""
 
 CLEARLY = 3.0
 """Standard errors by which a value must lie beyond what it is trusted to."""
-
-_AT: dict[str, Element] = {
-    "J_M": Element.MOTOR,
-    "b_M": Element.MOTOR,
-    "J_L": Element.LOAD,
-    "b_L": Element.LOAD,
-}
-"""Where a nominal parameter is; the others are a shaft's, or of what is between two."""
-
-
-@dataclass(frozen=True, slots=True)
-class Stray:
-    """A nominal parameter that explains more outside of its tolerance.
-
-    Attributes
-    ----------
-    name : str
-    ratio : float
-        Its value there over the nominal one.
-    tolerance : float
-        Share of the nominal value that it is trusted to.
-    """
-
-    name: str
-    ratio: float
-    tolerance: float
-
-    @property
-    def element(self) -> Element:
-        """Where it is in the chain."""
-        return _AT.get(self.name, Element.SHAFT)
 
 
 @dataclass(frozen=True, slots=True)

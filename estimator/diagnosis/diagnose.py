@@ -131,6 +131,7 @@ def _diagnose(
         traces=_traces(chain, selection, line, unseen.records, believed),
         warnings=judgement.unconverged,
         discrepancy=seen,
+        strays=judgement.strays,
     )
 
 

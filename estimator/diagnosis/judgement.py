@@ -7,12 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from estimator.diagnosis.acquisition import Finding
-from estimator.diagnosis.beyond import Stray, in_words
+from estimator.diagnosis.beyond import in_words
 from estimator.diagnosis.convergence import unconverged
 from estimator.diagnosis.evidence import VERY_STRONG, Gain, delta_bic_with, gain, information, noise_level, price
 from estimator.diagnosis.hypotheses import crowding, flexible
 from estimator.diagnosis.phrases import PLACE_NAMES, kind_in_words
-from estimator.diagnosis.result import Verdict
+from estimator.diagnosis.result import Stray, Verdict
 from estimator.diagnosis.selection import Selection
 from estimator.diagnosis.trial import scan_choices
 from estimator.diagnosis.unnamed import UnnamedLaw

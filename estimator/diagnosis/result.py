@@ -305,12 +305,45 @@ class Discrepancy:
     pictures: tuple[LawPicture, ...]
 
 
+_AT: dict[str, Element] = {
+    "J_M": Element.MOTOR,
+    "b_M": Element.MOTOR,
+    "J_L": Element.LOAD,
+    "b_L": Element.LOAD,
+}
+"""Where a nominal parameter is; the others are a shaft's, or of what is between two."""
+
+
+@dataclass(frozen=True, slots=True)
+class Stray:
+    """A nominal parameter that explains more outside of its tolerance.
+
+    Attributes
+    ----------
+    name : str
+    ratio : float
+        Its value there over the nominal one.
+    tolerance : float
+        Share of the nominal value that it is trusted to.
+    """
+
+    name: str
+    ratio: float
+    tolerance: float
+
+    @property
+    def element(self) -> Element:
+        """Where it is in the chain."""
+        return _AT.get(self.name, Element.SHAFT)
+
+
 @dataclass(frozen=True, slots=True)
 class Diagnosis:
     """The whole answer.
 
     ``unnamed`` is given where there is a mismatch that no effect explains; ``load_torque`` is the constant load torque
-    of each recording, by name; ``discrepancy`` is what the report draws of the mismatch.
+    of each recording, by name; ``discrepancy`` is what the report draws of the mismatch; ``strays`` are nominal values
+    that alone, beyond what they are trusted to, would explain it to the noise.
     """
 
     verdict: Verdict
@@ -328,3 +361,4 @@ class Diagnosis:
     traces: tuple[Trace, ...]
     warnings: tuple[str, ...] = ()
     discrepancy: Discrepancy | None = None
+    strays: tuple[Stray, ...] = ()

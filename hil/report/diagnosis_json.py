@@ -2,7 +2,8 @@
 
 Keys beyond the contract: ``warnings``, ``load_torque`` per recording, ``unnamed`` (the law without a name where nothing
 explains the mismatch), ``profiles`` in an effect that was found as a course over time, and ``discrepancy``: the best
-law without a name at each element, the likelihood of each place, and the tests over frequency.
+law without a name at each element, the likelihood of each place, and the tests over frequency; ``strays``: nominal
+values that alone would explain the mismatch, beyond what they are trusted to.
 """
 
 from __future__ import annotations
@@ -59,6 +60,10 @@ def diagnosis_json(diagnosis: Diagnosis) -> Json:
         "timing_s": {name: json_number(value) for name, value in diagnosis.timing_s.items()},
         "warnings": list(diagnosis.warnings),
         "discrepancy": None if diagnosis.discrepancy is None else _discrepancy(diagnosis.discrepancy),
+        "strays": [
+            {"parameter": stray.name, "ratio": json_number(stray.ratio), "tolerance": json_number(stray.tolerance)}
+            for stray in diagnosis.strays
+        ],
     }
 
 

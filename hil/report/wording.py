@@ -88,6 +88,8 @@ def headline(diagnosis: Diagnosis) -> str:
         return "Nothing is missing: the nominal model, re-tuned, explains the recordings"
     if found:
         return f"Missing in the model: {listed(found)}, and more that no entry of the catalogue explains"
+    if diagnosis.strays:
+        return f"Further from nominal than trusted: {listed([stray.name for stray in diagnosis.strays])}"
     return "Something is missing that no entry of the catalogue explains"
 
 

@@ -9,7 +9,7 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from estimator.diagnosis.result import Diagnosis, Mismatch, Trace, UnnamedLaw, Verdict
+from estimator.diagnosis.result import Diagnosis, Mismatch, Stray, Trace, UnnamedLaw, Verdict
 from estimator.physics.effect import Element
 from hil.report.diagnosis_html import MOST_DRAWN, diagnosis_page
 from hil.report.interval_bar import interval_bar
@@ -104,6 +104,15 @@ def test_the_page_fetches_nothing_and_holds_plotly_once(diagnosis: Diagnosis) ->
 
 def test_the_same_diagnosis_makes_the_same_page(diagnosis: Diagnosis) -> None:
     assert diagnosis_page(diagnosis) == diagnosis_page(diagnosis)
+
+
+def test_a_nominal_value_that_is_off_is_the_headline(diagnosis: Diagnosis) -> None:
+    """It is no missing physics, and no name is needed for it."""
+    strays = (Stray("J_L", 1.11, 0.04), Stray("k", 1.07, 0.04))
+    off = replace(diagnosis, verdict=Verdict.UNEXPLAINED, effects=(), strays=strays)
+    text = read(diagnosis_page(off)).text
+    assert "Further from nominal than trusted: J_L and k" in text
+    assert "Something is missing" not in text
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from estimator.diagnosis.result import Diagnosis, Mismatch, UnnamedLaw, Verdict
+from estimator.diagnosis.result import Diagnosis, Mismatch, Stray, UnnamedLaw, Verdict
 from estimator.physics.effect import Element
 from hil.report.diagnosis_json import diagnosis_json, diagnosis_text
 from hil.report.numbers import json_number
@@ -39,6 +39,7 @@ def test_the_text_is_strict_json_of_the_contract(diagnosis: Diagnosis) -> None:
         "timing_s",
         "warnings",
         "discrepancy",
+        "strays",
     ]
     assert content["schema"] == "hil.diagnosis/1"
     assert content["verdict"] == "explained"
@@ -154,3 +155,9 @@ def test_what_the_pictures_rest_on_is_written(diagnosis: Diagnosis) -> None:
 
 def test_without_a_discrepancy_the_key_is_null(diagnosis: Diagnosis) -> None:
     assert diagnosis_json(replace(diagnosis, discrepancy=None))["discrepancy"] is None
+
+
+def test_nominal_values_that_are_off_are_told_by_how_much(diagnosis: Diagnosis) -> None:
+    assert diagnosis_json(diagnosis)["strays"] == []
+    off = replace(diagnosis, strays=(Stray("J_L", 1.11, 0.04),))
+    assert diagnosis_json(off)["strays"] == [{"parameter": "J_L", "ratio": 1.11, "tolerance": 0.04}]

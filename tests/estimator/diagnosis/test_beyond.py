@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 
 import pytest
 
-from estimator.diagnosis.beyond import FREELY, LineBeyond, Stray, in_words, line_beyond
+from estimator.diagnosis.beyond import FREELY, LineBeyond, in_words, line_beyond
 from estimator.diagnosis.diagnose import diagnose
 from estimator.diagnosis.hypotheses import NOTHING, Bench, everything
 from estimator.diagnosis.judgement import judge
-from estimator.diagnosis.result import Diagnosis, Verdict
+from estimator.diagnosis.result import Diagnosis, Stray, Verdict
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
 from estimator.physics.model import DrivelineModel
@@ -105,6 +105,7 @@ class TestTheVerdict:
 
 def test_a_wrong_stiffness_is_no_missing_physics_and_is_told_as_one() -> None:
     found: Diagnosis = diagnose(quiet(), off_by({"k": 1.3}, 0.05))
+    assert [stray.name for stray in found.strays] == ["k"]
     assert (found.verdict, found.effects) == (Verdict.UNEXPLAINED, ())
     assert found.mismatch.element is Element.SHAFT
     assert "no physics need be missing" in found.statement

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from estimator.diagnosis.evidence import Gain
@@ -14,7 +16,8 @@ from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
 from tests.estimator.diagnosis.planted import nominal_fit, quiet
-from tests.estimator.physics.bench import TWO_MASS
+from tests.estimator.diagnosis.selection.mass import selector
+from tests.estimator.physics.bench import ONE_MASS, TWO_MASS
 
 NAMES = tuple(name for name, entry in EFFECTS.items() if not entry.recognised)
 N = 9000.0
@@ -73,3 +76,16 @@ def test_without_a_law_nothing_is_ruled_out(retuned: FitResult) -> None:
 def test_an_effect_is_wherever_its_look_alikes_are() -> None:
     assert places("tyre_slip") == {EFFECTS["tyre_slip"].element, EFFECTS["extra_torsional_mode"].element}
     assert {Element.TORQUE_PATH, Element.SPEED_SENSOR} <= places("transport_delay")
+
+
+def test_a_search_fits_no_three_where_one_law_says_it_all() -> None:
+    """A reading that is off by its square: no entry of the catalogue, and each of several takes a part of it."""
+    sound = quiet((1, 2), ONE_MASS, 1200)
+    records = [replace(rec, output=rec.output + 0.01 * rec.output * np.abs(rec.output)) for rec in sound]
+    select = selector(records)
+    found = select.run()
+    fitted = {len(effects) for effects in select.jury.bench._rough}
+    assert found.unnamed is not None
+    assert found.unnamed.terms[0][0] == "w |w|"
+    assert fitted == {1, 2}
+    assert found.result.rms > 1.2 * found.unnamed.rms
