@@ -43,16 +43,17 @@ def stepped(line: Line, now: Conditions, torque: float, rise: float, x: State, p
         return runge_kutta(line, now, torque, rise, x, p, h)
     closed = every(p[slots.GAP] <= 0.0)
     parts, done, length = 1, 0, like(h, x.speed)
-    rest = length
+    rest, share = length, like(1.0, x.speed)
     while done < parts:
-        along = rise * ((done + 0.5) / parts - 0.5)
-        ahead = runge_kutta(line, now, torque + along, rise / parts, x, p, length)
+        along = rise * ((done + 0.5) * share - 0.5)
+        ahead = runge_kutta(line, now, torque + along, rise * share, x, p, length)
         if parts == 1 and not closed:
             begun, ended = x.twist + now.joint_angle, ahead.twist + now.joint_angle
             meeting = met(begun, ended, p[slots.GAP], p[slots.CONTACT])
             if some(meeting):
                 parts = PARTS
                 length, rest = choose(meeting, h / PARTS, h), choose(meeting, h / PARTS, 0.0)
+                share = choose(meeting, 1.0 / PARTS, 1.0)
                 continue
         x, done, length = ahead, done + 1, rest
     return x

@@ -12,7 +12,6 @@ import math
 from typing import Any
 
 from estimator.compiled import brief, compiled, inlined
-from estimator.physics.effects import actuator_lag, transport_delay
 from estimator.physics.kernel import slots
 from estimator.physics.kernel.bristles import bent, rubbed
 from estimator.physics.kernel.conditions import (
@@ -23,6 +22,7 @@ from estimator.physics.kernel.conditions import (
     is_waving,
     with_torques,
 )
+from estimator.physics.kernel.feed import begun_feed, fed, is_late
 from estimator.physics.kernel.line import Line, is_bristled, is_within
 from estimator.physics.kernel.linear import WORTHWHILE_SAMPLES, Answers, answers, has_dry_friction, is_linear, led_on
 from estimator.physics.kernel.makes import for_its_make
@@ -124,15 +124,13 @@ def integrate_made(
     substeps = with_mode(substeps, sample_time_s, p)
     h = sample_time_s / substeps
     length = 1.0 / substeps
-    delay, begun = p[slots.DELAY] / sample_time_s, start_s / sample_time_s
-    before_all = torque[0] + p[slots.DELAYED_BEFORE]
+    feed = begun_feed(torque, start_s / sample_time_s, sample_time_s, p)
     waving, filtering = is_waving(p), p[slots.FILTER] > 0.0
-    late = p[slots.DELAY] != 0.0 or p[slots.DRIFT] != 0.0
     steep = slopes.shape[1] > 0
     slope = slope_before(first, slopes)
     n = min(torque.shape[0], out.shape[0])
     linear = torque.shape[0] >= WORTHWHILE_SAMPLES and is_linear(line, p)
-    whole = not (late or filtering or steep or p[slots.LAG] > 0.0 or has_dry_friction(p))
+    whole = not (is_late(p) or filtering or steep or has_dry_friction(p))
     leap = substeps if whole else 1
     x = unpacked(state)
     lagged, lag_rise = state[LAGGED], state[LAG_RISE]
@@ -154,17 +152,10 @@ def integrate_made(
             to = answers(line, now, p, h, leap)
         read = summing
         for j in range(0, substeps, leap if summing else 1):
-            place = k + j * length
             if varying:
-                middle = angle[k] + turn * (j + 0.5) * length
+                middle, place = angle[k] + turn * (j + 0.5) * length, k + j * length
                 now = conditions(line.masses, start_s + place * sample_time_s, h, middle, load[k], sign_width, p)
-            supplied, rise = torque[k], 0.0
-            if late:
-                source = place + (place + begun) * p[slots.DRIFT] - delay
-                supplied, rise = transport_delay.delayed(torque, before_all, source, length)
-            mean, rise, lagged, lag_rise = actuator_lag.step(
-                supplied, rise, lagged, lag_rise, p[slots.LAG], p[slots.LAG_SHAPE], h
-            )
+            mean, rise, lagged, lag_rise = fed(torque, feed, k, j * length, length, lagged, lag_rise, p, h)
             before = x
             x, bristles = rubbed_on(line, summing, to, now, mean, rise, before, bristles, p, h)
             slope = (entry(x, output) - entry(before, output)) / h

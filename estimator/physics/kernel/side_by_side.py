@@ -1,8 +1,8 @@
 """Up to eight simulations side by side, as a Jacobian takes them: one instruction for all.
 
-The laws are those of one simulation (``rates``), compiled for numbers abreast. A line whose torque or output is
-delayed, filtered or differentiated takes its simulations one by one, and so does a linear one: it adds up what it
-knows.
+The laws are those of one simulation (``rates``), compiled for numbers abreast. What torque comes through a delay or a
+lag does not depend on the motion, and is worked out before. A line whose output is filtered or differentiated takes its
+simulations one by one, and so does a linear one: it adds up what it knows.
 """
 
 from __future__ import annotations
@@ -16,11 +16,12 @@ from estimator.physics.kernel import slots
 from estimator.physics.kernel.bristles import bent, rubbed
 from estimator.physics.kernel.conditions import conditions, is_changing, is_waving, with_torques
 from estimator.physics.kernel.contact import stepped
+from estimator.physics.kernel.feed import begun_feed, fed, is_late
 from estimator.physics.kernel.line import Line, is_bristled, is_elastic
 from estimator.physics.kernel.linear import is_linear
 from estimator.physics.kernel.makes import for_its_make
 from estimator.physics.kernel.sensing import entry, reading, shown
-from estimator.physics.kernel.state_vector import BRISTLES_LOAD, BRISTLES_MOTOR, Bristles, State
+from estimator.physics.kernel.state_vector import BRISTLES_LOAD, BRISTLES_MOTOR, LAG_RISE, LAGGED, Bristles, State
 from estimator.physics.layout import slot
 from estimator.signals.record import FloatArray, IntArray
 
@@ -34,9 +35,7 @@ MAKING = np.array(
 def go_side_by_side(masses: int, p: FloatArray, rows: IntArray) -> bool:
     """Tell whether some of the lines, a row of parameters each, are simulated side by side."""
     first = p[rows[0]]
-    on_time = first[slots.DELAY] == 0.0 and first[slots.DRIFT] == 0.0
-    at_once = first[slots.LAG] == 0.0 and first[slots.FILTER] == 0.0
-    if rows.size == 1 or not (IS_COMPILED and on_time and at_once):
+    if rows.size == 1 or not IS_COMPILED or first[slots.FILTER] != 0.0:
         return False
     if is_linear(Line(masses, masses == 1 or is_elastic(first), False, False), first):
         return False
@@ -84,6 +83,37 @@ def in_lanes(values: FloatArray, rows: IntArray) -> FloatArray:
 
 
 @inlined
+def supplied_lanes(
+    sample_time_s: float,
+    substeps: int,
+    first: int,
+    start_s: float,
+    rows: IntArray,
+    torque: FloatArray,
+    p: FloatArray,
+    state: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Return mean and rise of the torques on the shaft as columns, a row per sub-step from sample ``first`` on.
+
+    One per sample, and no rise, where nothing is late.
+    """
+    samples = torque.shape[1]
+    if not is_late(p[rows[0]]):
+        return in_lanes(torque, rows), np.zeros((samples, LANES))
+    h, length = sample_time_s / substeps, 1.0 / substeps
+    mean, rise = np.zeros((samples * substeps, LANES)), np.zeros((samples * substeps, LANES))
+    for lane in range(LANES):
+        row = rows[lane if lane < rows.size else 0]
+        feed = begun_feed(torque[row], start_s / sample_time_s, sample_time_s, p[row])
+        lagged, lag_rise = state[row, LAGGED], state[row, LAG_RISE]
+        for k in range(first, samples):
+            for j in range(substeps):
+                given = fed(torque[row], feed, k, j * length, length, lagged, lag_rise, p[row], h)
+                mean[k * substeps + j, lane], rise[k * substeps + j, lane], lagged, lag_rise = given
+    return mean, rise
+
+
+@inlined
 def advance(
     line: Line,
     sample_time_s: float,
@@ -92,6 +122,7 @@ def advance(
     first: int,
     start_s: float,
     torque_lanes: FloatArray,
+    rise_lanes: FloatArray,
     load_lanes: FloatArray,
     angle: FloatArray,
     one_of_them: FloatArray,
@@ -101,17 +132,19 @@ def advance(
     out_lanes: FloatArray,
 ) -> None:
     """Simulate lines of one make; ``one_of_them`` is the parameters of one."""
-    torque, load, p = abreast(torque_lanes), abreast(load_lanes), abreast(p_lanes)
+    torque, rise, load, p = abreast(torque_lanes), abreast(rise_lanes), abreast(load_lanes), abreast(p_lanes)
     start, out = abreast(state_lanes), abreast(out_lanes)
     h = sample_time_s / substeps
     length = 1.0 / substeps
     waving = is_waving(one_of_them)
+    samples = load_lanes.shape[0]
+    parts = torque_lanes.shape[0] // samples
     x = State(
         start[0], start[1], start[2], start[3], start[4], start[5], start[6], start[7], start[8], start[9], start[10]
     )
     bristled, bristles = is_bristled(one_of_them), Bristles(start[BRISTLES_MOTOR], start[BRISTLES_LOAD])
     now = conditions(line.masses, start_s + first * sample_time_s, h, 0.0, load[first], sign_width, p)
-    for k in range(first, torque_lanes.shape[0]):
+    for k in range(first, samples):
         out[k] = entry(x, output)
         turn = angle[k + 1] - angle[k] if k + 1 < angle.shape[0] else angle[k] - angle[k - 1]
         time_s = start_s + k * sample_time_s
@@ -126,7 +159,8 @@ def advance(
             if bristled:
                 bristles = bent(line, bristles, x, now, p, 0.5 * h)
                 felt = rubbed(now, bristles, p)
-            x = stepped(line, felt, torque[k], 0.0, x, p, h)
+            part = k * parts + min(j, parts - 1)
+            x = stepped(line, felt, torque[part], rise[part], x, p, h)
             if bristled:
                 bristles = bent(line, bristles, x, now, p, 0.5 * h)
 
@@ -159,7 +193,8 @@ def integrate_side_by_side(
         As there, a row each: (K, N), (K, N), (K, layout.SIZE), (K, STATES), (K, N).
     """
     values = np.empty((torque.shape[1], LANES))
-    given = (sample_time_s, substeps, sign_width, first, start_s, in_lanes(torque, rows), in_lanes(load, rows), angle)
+    mean, rise = supplied_lanes(sample_time_s, substeps, first, start_s, rows, torque, p, state)
+    given = (sample_time_s, substeps, sign_width, first, start_s, mean, rise, in_lanes(load, rows), angle)
     them = (in_lanes(p, rows), in_lanes(state, rows))
     for_its_make(masses, advance, p[rows[0]], *given, p[rows[0]], *them, output, values)
     for lane in range(rows.size):

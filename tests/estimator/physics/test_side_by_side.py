@@ -53,6 +53,10 @@ BESIDE_A_SHAFT: dict[str, Effects] = {
     },
     "slider and a load that sticks": SLIDER | {"coulomb_friction_load": {"friction_nm": 9.0, "presliding_rad": 1e-4}},
     "gap": {"backlash": {"gap_rad": 0.01, "contact_rad": 0.0005, "pull": 0.3}},
+    "gap behind a delay": {"backlash": {"gap_rad": 0.01, "contact_rad": 0.0005, "pull": 0.3}}
+    | {"transport_delay": {"delay_s": 0.013}},
+    "gap behind a lag": {"backlash": {"gap_rad": 0.01, "contact_rad": 0.0005, "pull": 0.3}}
+    | {"actuator_lag": {"time_constant_s": 0.03, "shape": 0.2}},
     "gap with hard faces": {"backlash": {"gap_rad": 0.01, "contact_rad": 0.0, "pull": 0.0}},
     "hardening": {"stiffness_nonlinearity": {"hardening_per_rad2": 200.0, "shape": 1.2}},
     "two stages": {"stiffness_nonlinearity": {"hardening_per_rad2": 0.0, "stage_share": 0.4, "stage_rad": 0.004}},
@@ -72,6 +76,7 @@ EVERYWHERE: dict[str, Effects] = {
     "drag in steps": QUADRATIC | {"speed_quantisation": {"step_rad_s": 0.5}},
     "drag and a payload": QUADRATIC | {"inertia_change": {"change_kg_m2": 3.0, "from_s": 1.0, "to_s": 2.5}},
     "warming": {"warming_friction": {"cold_nm_s": 2.0, "time_constant_s": 1.5}},
+    "drag and another clock": QUADRATIC | {"clock_drift": {"rate": 1e-3}, "transport_delay": {"delay_s": 0.004}},
     "ripple": {"torque_ripple": {"amplitude_nm": 3.0, "order": 6.0}},
 }
 LINES = [
@@ -168,21 +173,15 @@ def test_recordings_of_different_lengths_side_by_side() -> None:
         assert_same_to_rounding(output, simulate_each(grid, rec, [case])[0])
 
 
-def test_what_is_delayed_or_linear_or_another_make_goes_alone() -> None:
+def test_what_is_filtered_or_linear_or_another_make_goes_alone() -> None:
     rows = np.arange(3)
     bent = np.array([flat(model(TWO_MASS, effects=SLIDER))] * 3)
     assert go_side_by_side(2, bent, rows)
     assert not go_side_by_side(2, bent, rows[:1])
     assert not go_side_by_side(2, np.array([flat(model(TWO_MASS))] * 3), rows)
-    for effect, parameter in (
-        ("transport_delay", "delay_s"),
-        ("clock_drift", "rate"),
-        ("actuator_lag", "time_constant_s"),
-        ("speed_filter", "time_constant_s"),
-    ):
-        late = bent.copy()
-        late[:, slot(effect, parameter)] = 0.01
-        assert not go_side_by_side(2, late, rows)
+    filtered = bent.copy()
+    filtered[:, slot("speed_filter", "time_constant_s")] = 0.01
+    assert not go_side_by_side(2, filtered, rows)
     other = bent.copy()
     other[2, slot("backlash", "gap_rad")] = 0.01
     assert not go_side_by_side(2, other, rows)
