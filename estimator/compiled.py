@@ -51,8 +51,8 @@ def compiled(function: Function) -> Function:
 def inlined(function: Function) -> Function:
     """Compile a function into whatever calls it: what is constant there is worked out once, and no call is left.
 
-    Of an array that is handed over, references are still counted, two atomic operations per array and call. A loop that
-    is done in 100 ns hands over a record instead, and parts of a record, which own nothing
+    Of an array that is handed over, references are still counted, two atomic operations per array and call. A loop
+    hands over what owns nothing: arrays that are lent (``estimator.abreast.lent``), or parts of a record
     (``estimator.identification.online.memory``).
     """
     return cast(Function, numba.njit(cache=True, nogil=True, error_model="numpy", forceinline=True)(function))

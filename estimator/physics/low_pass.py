@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from estimator.compiled import compiled
 from estimator.physics.effect import EffectParameter, Start
@@ -30,15 +31,37 @@ EQUAL_POLES = 1e-6
 """Half the distance of two poles, times the step, below which they are one."""
 
 
-@compiled
-def faded(value: float, rise: float, turns: float, shape: float) -> tuple[float, float]:
-    """Return what is left of a filter's output, and of its rate times ``tau``, after ``turns`` of ``tau`` (exact).
+class LowPass(NamedTuple):
+    """A low-pass over steps of one length: what is left, behind a step, of its output and of its rate times ``tau``.
 
-    There is no input. Of first order (no shape) the output alone decides.
+    Attributes
+    ----------
+    time_constant, shape : float
+        ``tau`` [s] and ``s``.
+    turns : float
+        Length of a step in ``tau``.
+    output_of_output, output_of_rise, rise_of_output, rise_of_rise : float
+        What is left of a unit of each in each, without an input.
     """
-    if shape <= 0.0:
-        value *= math.exp(-turns)
-        return value, -value
+
+    time_constant: float
+    shape: float
+    turns: float
+    output_of_output: float
+    output_of_rise: float
+    rise_of_output: float
+    rise_of_rise: float
+
+
+@compiled
+def low_pass(time_constant: float, shape: float, step_s: float) -> LowPass:
+    """Return a low-pass over steps of this length (exact); one without a time constant leaves nothing."""
+    if time_constant <= 0.0:
+        return LowPass(0.0, shape, math.inf, 0.0, 0.0, 0.0, 0.0)
+    turns = step_s / time_constant
+    if shape <= 0.0:  # of first order the output alone decides
+        left = math.exp(-turns)
+        return LowPass(time_constant, 0.0, turns, left, 0.0, -left, 0.0)
     root = math.sqrt(abs(1.0 - 4.0 * shape))
     middle, spread = -0.5 * turns / shape, 0.5 * turns / shape * root
     if shape < 0.25:
@@ -47,8 +70,16 @@ def faded(value: float, rise: float, turns: float, shape: float) -> tuple[float,
     else:
         even, odd = math.exp(middle) * math.cos(spread), math.exp(middle) * math.sin(spread)
     odd = odd / spread if spread > EQUAL_POLES else math.exp(middle)
-    left = even * value + odd * (turns * rise - middle * value)
-    return left, even * rise + odd * (middle * rise - turns * value / shape)
+    return LowPass(
+        time_constant, shape, turns, even - odd * middle, odd * turns, -odd * turns / shape, even + odd * middle
+    )
+
+
+@compiled
+def faded(value: float, rise: float, low: LowPass) -> tuple[float, float]:
+    """Return what is left of a filter's output, and of its rate times ``tau``, behind a step without an input."""
+    left = low.output_of_output * value + low.output_of_rise * rise
+    return left, low.rise_of_output * value + low.rise_of_rise * rise
 
 
 def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:

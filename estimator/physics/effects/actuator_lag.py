@@ -16,20 +16,19 @@ FASTEST_S = 1e-9
 
 @compiled
 def step(
-    torque: float, rise: float, lagged: float, lag_rise: float, time_constant: float, shape: float, step_s: float
+    torque: float, rise: float, lagged: float, lag_rise: float, lag: low_pass.LowPass
 ) -> tuple[float, float, float, float]:
     """Return the lagged torque over a step of constant input as a straight line, and its value and rise at the end.
 
     The line has the mean and the first moment of the decay, exactly: mean and rise from end to end [Nm]. Without a lag
     the input's own rise is passed on; behind one it counts no more. The rise at the end is the rate times ``tau``.
     """
-    if time_constant < FASTEST_S:
+    if lag.time_constant < FASTEST_S:
         return torque, rise, torque, 0.0
-    turns = step_s / time_constant
-    value = lagged - torque
+    turns, shape, value = lag.turns, lag.shape, lagged - torque
     if shape <= 0.0:
         lag_rise = -value
-    left, left_rise = low_pass.faded(value, lag_rise, turns, shape)
+    left, left_rise = low_pass.faded(value, lag_rise, lag)
     fallen = value - left + shape * (lag_rise - left_rise)
     mean = fallen / turns
     moment = (fallen - shape * (value - left) - turns * (left + shape * left_rise)) / (turns * turns)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
+from estimator.abreast import some
 from estimator.compiled import compiled
 from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start
 from estimator.physics.model import DrivelineModel, Motion
@@ -24,9 +25,9 @@ def error(angle: float, once: float, once_phase: float, twice: float, twice_phas
 def slope(angle: float, once: float, once_phase: float, twice: float, twice_phase: float) -> float:
     """Return the read angle's derivative by the true one: 1 for a resolver without error."""
     value = 1.0
-    if once != 0.0:
+    if some(once != 0.0):
         value += once * math.cos(angle + once_phase)
-    if twice != 0.0:
+    if some(twice != 0.0):
         value += 2.0 * twice * math.cos(2.0 * angle + twice_phase)
     return value
 

@@ -14,11 +14,11 @@ from estimator.signals.record import OutputKind
 
 @compiled
 def step(
-    before: float, after: float, filtered: float, rise: float, time_constant: float, shape: float, step_s: float
+    before: float, after: float, filtered: float, rise: float, low: low_pass.LowPass, step_s: float
 ) -> tuple[float, float]:
     """Return the filtered value and its rate times ``tau`` behind an input straight from ``before`` to ``after``."""
-    behind = (after - before) / step_s * time_constant  # as a ramp is followed
-    value, rise = low_pass.faded(filtered - before + behind, rise - behind, step_s / time_constant, shape)
+    behind = (after - before) / step_s * low.time_constant  # as a ramp is followed
+    value, rise = low_pass.faded(filtered - before + behind, rise - behind, low)
     return after - behind + value, rise + behind
 
 

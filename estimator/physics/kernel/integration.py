@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from estimator.abreast import lent
 from estimator.compiled import brief, compiled, inlined
 from estimator.physics.kernel import slots
 from estimator.physics.kernel.bristles import bent, rubbed
@@ -38,6 +39,7 @@ from estimator.physics.kernel.state_vector import (
     Conditions,
     State,
 )
+from estimator.physics.low_pass import low_pass
 from estimator.signals.record import FloatArray
 
 RADIANS_PER_STEP_OF_MODE = 0.6
@@ -124,7 +126,8 @@ def integrate_made(
     substeps = with_mode(substeps, sample_time_s, p)
     h = sample_time_s / substeps
     length = 1.0 / substeps
-    feed = begun_feed(torque, start_s / sample_time_s, sample_time_s, p)
+    feed = begun_feed(torque, start_s / sample_time_s, sample_time_s, p, h)
+    low = low_pass(p[slots.FILTER], p[slots.FILTER_SHAPE], h)
     waving, filtering = is_waving(p), p[slots.FILTER] > 0.0
     steep = slopes.shape[1] > 0
     slope = slope_before(first, slopes)
@@ -155,13 +158,13 @@ def integrate_made(
             if varying:
                 middle, place = angle[k] + turn * (j + 0.5) * length, k + j * length
                 now = conditions(line.masses, start_s + place * sample_time_s, h, middle, load[k], sign_width, p)
-            mean, rise, lagged, lag_rise = fed(torque, feed, k, j * length, length, lagged, lag_rise, p, h)
+            mean, rise, lagged, lag_rise = fed(torque, feed, k, j * length, length, lagged, lag_rise, p)
             before = x
             x, bristles = rubbed_on(line, summing, to, now, mean, rise, before, bristles, p, h)
             slope = (entry(x, output) - entry(before, output)) / h
             if filtering:
                 turned, turns = angle[k] + turn * j * length, angle[k] + turn * (j + 1) * length
-                filtered, filter_rise = smoothed(before, x, output, turned, turns, filtered, filter_rise, p, h)
+                filtered, filter_rise = smoothed(before, x, output, turned, turns, filtered, filter_rise, low, p, h)
             if steep and j == 0:
                 slopes[1, k] = slope
     leave_slope(n, slope, slopes)
@@ -226,8 +229,8 @@ def integrate(
         Where it has room: slope of the output just before and just after each sample [unit of the output / s]. That
         before ``first`` is taken from it, and where it is longer that before the next sample is left in it.
     """
-    given = (sample_time_s, substeps, sign_width, first, start_s, torque, load, angle, p)
-    for_its_make(masses, integrate_made, p, *given, state, output, sensor, out, slopes)
+    given = (sample_time_s, substeps, sign_width, first, start_s, lent(torque), lent(load), lent(angle), lent(p))
+    for_its_make(masses, integrate_made, lent(p), *given, lent(state), output, sensor, lent(out), lent(slopes))
 
 
 @brief

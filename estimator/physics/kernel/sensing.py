@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 
+from estimator.abreast import every
 from estimator.compiled import inlined
 from estimator.physics.effects import resolver_error, speed_filter
 from estimator.physics.kernel import slots
 from estimator.physics.kernel.line import is_within
 from estimator.physics.kernel.state_vector import LOAD_SPEED, SPEED, TWIST, State
+from estimator.physics.low_pass import LowPass
 from estimator.signals.record import FloatArray
 
 
@@ -41,7 +43,7 @@ def read_angle(angle: float, p: FloatArray) -> float:
 def reading(speed: float, angle: float, p: FloatArray) -> float:
     """Return the speed that the resolver gives [rad/s] where it gives an angle [rad]: a recording knows no other."""
     once, twice = p[slots.RESOLVER_ONCE], p[slots.RESOLVER_TWICE]
-    if once == 0.0 and twice == 0.0:
+    if every(once == 0.0) and every(twice == 0.0):
         return speed
     phases = p[slots.RESOLVER_ONCE_PHASE], p[slots.RESOLVER_TWICE_PHASE]
     true = resolver_error.true_angle(angle, once, phases[0], twice, phases[1])
@@ -57,6 +59,7 @@ def smoothed(
     angle_after: float,
     filtered: float,
     rise: float,
+    low: LowPass,
     p: FloatArray,
     h: float,
 ) -> tuple[float, float]:
@@ -67,7 +70,7 @@ def smoothed(
     begin, end = entry(before, output), entry(after, output)
     bow = travelled(after, output, p) / h - travelled(before, output, p) / h - 0.5 * (begin + end)
     read, ends = reading(begin + bow, angle_before, p), reading(end + bow, angle_after, p)
-    return speed_filter.step(read, ends, filtered, rise, p[slots.FILTER], p[slots.FILTER_SHAPE], h)
+    return speed_filter.step(read, ends, filtered, rise, low, h)
 
 
 @inlined

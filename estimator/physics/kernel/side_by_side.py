@@ -1,15 +1,15 @@
 """Up to eight simulations side by side, as a Jacobian takes them: one instruction for all.
 
 The laws are those of one simulation (``rates``), compiled for numbers abreast. What torque comes through a delay or a
-lag does not depend on the motion, and is worked out before. A line whose output is filtered or differentiated takes its
-simulations one by one, and so does a linear one: it adds up what it knows.
+lag does not depend on the motion, and is worked out before. A line whose output is differentiated takes its simulations
+one by one, and so does a linear one: it adds up what it knows.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from estimator.abreast import LANES, abreast
+from estimator.abreast import LANES, abreast, lent
 from estimator.compiled import IS_COMPILED, compiled, inlined
 from estimator.physics.catalogue import BUILT_IN
 from estimator.physics.kernel import slots
@@ -20,9 +20,19 @@ from estimator.physics.kernel.feed import begun_feed, fed, is_late
 from estimator.physics.kernel.line import Line, is_bristled, is_elastic
 from estimator.physics.kernel.linear import is_linear
 from estimator.physics.kernel.makes import for_its_make
-from estimator.physics.kernel.sensing import entry, reading, shown
-from estimator.physics.kernel.state_vector import BRISTLES_LOAD, BRISTLES_MOTOR, LAG_RISE, LAGGED, Bristles, State
+from estimator.physics.kernel.sensing import entry, reading, shown, smoothed
+from estimator.physics.kernel.state_vector import (
+    BRISTLES_LOAD,
+    BRISTLES_MOTOR,
+    FILTER_RISE,
+    FILTERED,
+    LAG_RISE,
+    LAGGED,
+    Bristles,
+    State,
+)
 from estimator.physics.layout import slot
+from estimator.physics.low_pass import LowPass, low_pass
 from estimator.signals.record import FloatArray, IntArray
 
 MAKING = np.array(
@@ -30,12 +40,15 @@ MAKING = np.array(
 )
 """Where it is written what a line is made of; phases and moments, which are a recording's own, say when."""
 
+FEEDING = np.array([slots.DELAY, slots.DELAYED_BEFORE, slots.DRIFT, slots.LAG, slots.LAG_SHAPE])
+"""What a torque's way to the shaft depends on."""
+
 
 @compiled
 def go_side_by_side(masses: int, p: FloatArray, rows: IntArray) -> bool:
     """Tell whether some of the lines, a row of parameters each, are simulated side by side."""
     first = p[rows[0]]
-    if rows.size == 1 or not IS_COMPILED or first[slots.FILTER] != 0.0:
+    if rows.size == 1 or not IS_COMPILED:
         return False
     if is_linear(Line(masses, masses == 1 or is_elastic(first), False, False), first):
         return False
@@ -104,13 +117,38 @@ def supplied_lanes(
     mean, rise = np.zeros((samples * substeps, LANES)), np.zeros((samples * substeps, LANES))
     for lane in range(LANES):
         row = rows[lane if lane < rows.size else 0]
-        feed = begun_feed(torque[row], start_s / sample_time_s, sample_time_s, p[row])
+        if lane > 0 and are_fed_alike(rows[0], row, torque, p, state):
+            mean[:, lane], rise[:, lane] = mean[:, 0], rise[:, 0]
+            continue
+        feed = begun_feed(torque[row], start_s / sample_time_s, sample_time_s, p[row], h)
         lagged, lag_rise = state[row, LAGGED], state[row, LAG_RISE]
         for k in range(first, samples):
             for j in range(substeps):
-                given = fed(torque[row], feed, k, j * length, length, lagged, lag_rise, p[row], h)
+                given = fed(torque[row], feed, k, j * length, length, lagged, lag_rise, p[row])
                 mean[k * substeps + j, lane], rise[k * substeps + j, lane], lagged, lag_rise = given
     return mean, rise
+
+
+@inlined
+def are_fed_alike(row: int, other: int, torque: FloatArray, p: FloatArray, state: FloatArray) -> bool:
+    """Tell whether the torque of two rows reaches the shaft alike: of most columns of a Jacobian it does."""
+    for i in FEEDING:
+        if p[row, i] != p[other, i]:
+            return False
+    if state[row, LAGGED] != state[other, LAGGED] or state[row, LAG_RISE] != state[other, LAG_RISE]:
+        return False
+    return bool(np.all(torque[row] == torque[other]))
+
+
+@inlined
+def low_passes(rows: IntArray, p: FloatArray, h: float) -> FloatArray:
+    """Return the filters of some rows over steps of ``h`` [s] as columns, shape (fields of a `LowPass`, LANES)."""
+    columns = np.empty((7, LANES))
+    for lane in range(LANES):
+        row = rows[lane if lane < rows.size else 0]
+        for i, value in enumerate(low_pass(p[row, slots.FILTER], p[row, slots.FILTER_SHAPE], h)):
+            columns[i, lane] = value
+    return columns
 
 
 @inlined
@@ -128,12 +166,14 @@ def advance(
     one_of_them: FloatArray,
     p_lanes: FloatArray,
     state_lanes: FloatArray,
+    low_lanes: FloatArray,
     output: int,
+    filtering: bool,
     out_lanes: FloatArray,
 ) -> None:
     """Simulate lines of one make; ``one_of_them`` is the parameters of one."""
     torque, rise, load, p = abreast(torque_lanes), abreast(rise_lanes), abreast(load_lanes), abreast(p_lanes)
-    start, out = abreast(state_lanes), abreast(out_lanes)
+    start, out, filters = abreast(state_lanes), abreast(out_lanes), abreast(low_lanes)
     h = sample_time_s / substeps
     length = 1.0 / substeps
     waving = is_waving(one_of_them)
@@ -143,9 +183,11 @@ def advance(
         start[0], start[1], start[2], start[3], start[4], start[5], start[6], start[7], start[8], start[9], start[10]
     )
     bristled, bristles = is_bristled(one_of_them), Bristles(start[BRISTLES_MOTOR], start[BRISTLES_LOAD])
+    low = LowPass(filters[0], filters[1], filters[2], filters[3], filters[4], filters[5], filters[6])
+    filtered, filter_rise = start[FILTERED], start[FILTER_RISE]
     now = conditions(line.masses, start_s + first * sample_time_s, h, 0.0, load[first], sign_width, p)
     for k in range(first, samples):
-        out[k] = entry(x, output)
+        out[k] = filtered if filtering else entry(x, output)
         turn = angle[k + 1] - angle[k] if k + 1 < angle.shape[0] else angle[k] - angle[k - 1]
         time_s = start_s + k * sample_time_s
         varying = waving or is_changing(time_s - sample_time_s, time_s + sample_time_s, p)
@@ -159,10 +201,13 @@ def advance(
             if bristled:
                 bristles = bent(line, bristles, x, now, p, 0.5 * h)
                 felt = rubbed(now, bristles, p)
-            part = k * parts + min(j, parts - 1)
+            part, before = k * parts + min(j, parts - 1), x
             x = stepped(line, felt, torque[part], rise[part], x, p, h)
             if bristled:
                 bristles = bent(line, bristles, x, now, p, 0.5 * h)
+            if filtering:
+                turned, turns = angle[k] + turn * j * length, angle[k] + turn * (j + 1) * length
+                filtered, filter_rise = smoothed(before, x, output, turned, turns, filtered, filter_rise, low, p, h)
 
 
 @compiled
@@ -192,13 +237,17 @@ def integrate_side_by_side(
     torque, load, p, state, out
         As there, a row each: (K, N), (K, N), (K, layout.SIZE), (K, STATES), (K, N).
     """
+    rows, torque, load, angle = lent(rows), lent(torque), lent(load), lent(angle)
+    p, state, out = lent(p), lent(state), lent(out)
     values = np.empty((torque.shape[1], LANES))
     mean, rise = supplied_lanes(sample_time_s, substeps, first, start_s, rows, torque, p, state)
     given = (sample_time_s, substeps, sign_width, first, start_s, mean, rise, in_lanes(load, rows), angle)
-    them = (in_lanes(p, rows), in_lanes(state, rows))
-    for_its_make(masses, advance, p[rows[0]], *given, p[rows[0]], *them, output, values)
+    filtering = sensor and p[rows[0], slots.FILTER] > 0.0
+    them = (in_lanes(p, rows), in_lanes(state, rows), low_passes(rows, p, sample_time_s / substeps))
+    for_its_make(masses, advance, p[rows[0]], *given, p[rows[0]], *them, output, filtering, values)
     for lane in range(rows.size):
         own = p[rows[lane]]
         for k in range(first, torque.shape[1]):
             value = values[k, lane]
-            out[rows[lane], k] = shown(reading(value, angle[k], own), value, own) if sensor else value
+            read = value if filtering else reading(value, angle[k], own)
+            out[rows[lane], k] = shown(read, value, own) if sensor else value

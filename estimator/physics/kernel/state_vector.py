@@ -7,6 +7,9 @@ from typing import NamedTuple
 ANGLE, SPEED, TWIST, LOAD_SPEED = 0, 1, 2, 3
 """Mechanical states that can be an output; see ``State``."""
 
+VEHICLE_SPEED, BRANCH_TWIST, BRANCH_SPEED, MIDDLE_TWIST, MIDDLE_SPEED, TRACTION = 5, 6, 7, 8, 9, 10
+"""Further ones."""
+
 STATES = 17
 """Length of the state array: ``State``, the lagged torque and its rise [Nm], the filtered reading and its [rad/s], and
 ``Bristles``."""

@@ -10,6 +10,7 @@ from estimator.physics.effects import transport_delay
 from estimator.physics.effects.actuator_lag import step
 from estimator.physics.grid import Grid
 from estimator.physics.layout import flat
+from estimator.physics.low_pass import low_pass
 from estimator.physics.simulate import simulate
 from estimator.physics.start import Start
 from estimator.signals.record import FloatArray
@@ -82,7 +83,7 @@ def test_no_sub_step_reads_beyond_the_last_sample() -> None:
 def test_a_lagged_step_is_the_exponential(length_s: float) -> None:
     tau = 0.03
     decay = np.exp(-length_s / tau)
-    mean, rise, end, slowed = step(40.0, 0.0, 10.0, 0.0, tau, 0.0, length_s)
+    mean, rise, end, slowed = step(40.0, 0.0, 10.0, 0.0, low_pass(tau, 0.0, length_s))
     place = (np.arange(20_000) + 0.5) / 20_000
     torque = 40.0 - 30.0 * np.exp(-place * length_s / tau)
     assert rise == pytest.approx(12.0 * float(np.mean(torque * (place - 0.5))), rel=1e-4)
@@ -95,7 +96,7 @@ def test_a_lagged_step_is_the_exponential(length_s: float) -> None:
 @pytest.mark.parametrize("length_s", [0.001, 0.02, 5.0])
 def test_a_lagged_step_of_second_order_is_the_matrix_exponential(shape: float, length_s: float) -> None:
     tau, torque, lagged, rising = 0.03, 40.0, 10.0, 25.0
-    mean, rise, end, risen = step(torque, 0.0, lagged, rising, tau, shape, length_s)
+    mean, rise, end, risen = step(torque, 0.0, lagged, rising, low_pass(tau, shape, length_s))
     place = (np.arange(2000) + 0.5) / 2000
     law = np.array([[0.0, 1.0], [-1.0 / shape, -1.0 / shape]]) * length_s / tau
     off = expm(place[:, None, None] * law) @ [lagged - torque, rising]
