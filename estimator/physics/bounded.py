@@ -1,4 +1,4 @@
-"""The least of a quadratic inside bounds, from its triangular factor.
+"""The least of a quadratic inside bounds.
 
 Most fits here end inside, and most unknowns have no bounds: those follow from the others. What is bounded is put on its
 bounds and taken off them by block principal pivoting (Portugal, Judice and Vicente, Mathematics of Computation 63,
@@ -9,9 +9,9 @@ then ``scipy.optimize.lsq_linear`` (Stark and Parker, Computational Statistics 1
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import solve_triangular
 from scipy.optimize import lsq_linear
 
+from estimator.compiled import compiled
 from estimator.signals.record import BoolArray, FloatArray, IntArray
 
 TINY = 1e-12
@@ -37,35 +37,83 @@ def least_inside(triangle: FloatArray, target: FloatArray, low: FloatArray, high
     low, high : ndarray, shape (U,)
         ``low <= 0 <= high``, -inf and inf where there is no bound.
     """
-    x: FloatArray = solve_triangular(triangle, target)
-    if not np.any((x < low) | (x > high)):
-        return x
     free = int(_bounded(low, high).argmax())
-    rest = slice(free, None)
-    bounded = (triangle[rest, rest], target[rest], low[rest], high[rest])
-    inside = _pivoted(*bounded)
-    x[rest] = _one_by_one(*bounded) if inside is None else inside
-    if free:
-        x[:free] = solve_triangular(triangle[:free, :free], target[:free] - triangle[:free, rest] @ x[rest])
+    x, ended = _least(np.ascontiguousarray(triangle), target, low, high, free, EXCHANGES)
+    if not ended:
+        rest = slice(free, None)
+        x[rest] = _one_by_one(triangle[rest, rest], target[rest], low[rest], high[rest])
+        x[:free] = substituted(triangle[:free, :free], target[:free] - triangle[:free, rest] @ x[rest])
     return x
 
 
-def _pivoted(triangle: FloatArray, target: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray | None:
-    """Return the least by block principal pivoting; None where it does not come to an end."""
+def least_of_quadratic(curvature: FloatArray, gradient: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+    """Return the least of ``x' curvature x / 2 + gradient' x`` with ``low <= x <= high``, shape (U,).
+
+    ``curvature``, shape (U, U), is positive definite; unknowns without bounds come first, as in ``least_inside``.
+    """
+    return least_inside(*_factored(curvature, gradient), low, high)
+
+
+@compiled
+def _factored(curvature: FloatArray, gradient: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return triangle and target of a quadratic: its least is that of ``|triangle @ x - target|``."""
+    lower = np.linalg.cholesky(curvature)
+    target = np.empty_like(gradient)
+    for i in range(target.size):
+        left = -gradient[i]
+        for j in range(i):
+            left -= lower[i, j] * target[j]
+        target[i] = left / lower[i, i]
+    return np.ascontiguousarray(lower.T), target
+
+
+@compiled
+def _least(
+    triangle: FloatArray, target: FloatArray, low: FloatArray, high: FloatArray, free: int, exchanges: int
+) -> tuple[FloatArray, bool]:
+    """Return the least and whether pivoting came to an end, of unknowns of which the first ``free`` have no bounds."""
+    x = substituted(triangle, target)
+    if not np.any((x < low) | (x > high)):
+        return x, True
+    rest = np.ascontiguousarray(triangle[free:, free:])
+    x[free:], ended = _pivoted(rest, target[free:], low[free:], high[free:], exchanges)
+    across = np.ascontiguousarray(triangle[:free, free:])
+    x[:free] = substituted(triangle[:free, :free], target[:free] - across @ x[free:])
+    return x, ended
+
+
+@compiled
+def substituted(triangle: FloatArray, target: FloatArray) -> FloatArray:
+    """Return x with ``triangle @ x = target``, of an upper triangle."""
+    x = np.empty_like(target)
+    for i in range(x.size - 1, -1, -1):
+        left = target[i]
+        for j in range(i + 1, x.size):
+            left -= triangle[i, j] * x[j]
+        x[i] = left / triangle[i, i]
+    return x
+
+
+@compiled
+def _pivoted(
+    triangle: FloatArray, target: FloatArray, low: FloatArray, high: FloatArray, exchanges: int
+) -> tuple[FloatArray, bool]:
+    """Return the least by block principal pivoting, and whether that came to an end."""
     curvature, slope = triangle.T @ triangle, triangle.T @ target
-    down, up = np.zeros_like(low, dtype=bool), np.zeros_like(low, dtype=bool)
-    for _ in range(EXCHANGES):
-        x = np.where(down, low, np.where(up, high, 0.0))
+    down, up, x = np.zeros(low.size, np.bool_), np.zeros(low.size, np.bool_), np.zeros(low.size)
+    for _ in range(exchanges):
         free = ~(down | up)
-        if free.any():
-            x[free] = np.linalg.lstsq(triangle[:, free], target - triangle[:, ~free] @ x[~free])[0]  # two may be alike
+        x = np.where(down, low, np.where(up, high, 0.0))
+        which = np.flatnonzero(free)
+        if which.size > 0:
+            x[which] = np.linalg.lstsq(triangle[:, which], target - triangle @ x)[0]  # two may be alike
         pull = slope - curvature @ x  # where the error would fall
         inward = (down & (pull > 0.0)) | (up & (pull < 0.0))
         below, above = free & (x < low), free & (x > high)
-        if not (inward | below | above).any():
-            return x
+        if not np.any(inward | below | above):
+            return x, True
         down, up = (down & ~inward) | below, (up & ~inward) | above
-    return None
+    return x, False
 
 
 def _one_by_one(triangle: FloatArray, target: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:

@@ -235,7 +235,7 @@ def _case(basis: LocalBasis, p: FloatArray, local: FloatArray) -> Case:
 def _within_reason(out: FloatArray, record: Record) -> FloatArray:
     """Return outputs (..., N) of a recording, far away where the simulation runs away."""
     worst = BAD * (float(np.abs(record.output[record.okay]).max()) or 1.0)
-    if np.abs(out).max() <= worst:  # False where it is no number
+    if -worst <= out.min() and out.max() <= worst:  # False where it is no number
         return out
     return np.clip(np.nan_to_num(out, nan=worst), -worst, worst)
 
@@ -264,7 +264,7 @@ def jacobian_at(problem: Problem, x: FloatArray, outputs: Sequence[FloatArray]) 
     columns = [_moving(problem, low < high, i) for i in range(len(problem.records))]
     parts = [(i, part) for i, mine in enumerate(columns) for part in np.array_split(mine, _parts(mine.size))]
     rows = np.cumsum([0, *(int(use.sum()) for use in problem.use)])
-    jacobian = np.zeros((rows[-1], x.size))
+    jacobian = np.zeros((x.size, rows[-1])).T  # filled column by column
 
     def fill(work: tuple[int, IntArray]) -> None:
         i, mine = work
@@ -282,14 +282,29 @@ def _parts(columns: int) -> int:
 def changes(problem: Problem, x: FloatArray, index: int, columns: IntArray, output: FloatArray) -> FloatArray:
     """Return the derivative of one recording's errors by some of the scaled unknowns, shape (R_i, columns.size)."""
     _, high = bounds(problem)
-    steps = np.where(x + STEP <= high, STEP, -STEP)
-    points = []
-    for j in columns:
-        moved = x.copy()
-        moved[j] += steps[j]
-        points.append((parameters(problem, moved), local_part(problem, moved, index)))
-    change = (simulated_each(problem, points, index) - output)[:, problem.use[index]]
-    return np.asarray((change / steps[columns, None]).T)
+    steps = np.where(x + STEP <= high, STEP, -STEP)[columns]
+    cases = _moved_cases(problem, x, index, columns, steps)
+    moved = _within_reason(simulate_each(problem.grid, problem.records[index], cases), problem.records[index])
+    change = (moved - output)[:, problem.use[index]]
+    change /= steps[:, np.newaxis]
+    return np.asarray(change.T)
+
+
+def _moved_cases(problem: Problem, x: FloatArray, index: int, columns: IntArray, steps: FloatArray) -> list[Case]:
+    """Return the simulations of one recording with some of the scaled unknowns moved, each by its step."""
+    basis, p, mine = problem.local[index], parameters(problem, x), own_part(problem, index)
+    case = _case(basis, p, x[mine])
+    cases = []
+    for j, step in zip(columns.tolist(), steps.tolist(), strict=True):
+        if j < len(problem.shared):
+            unknown, moved_p = problem.shared[j], case.p.copy()
+            moved_p[unknown.slot] = unknown.scale * (x[j] + step)
+            cases.append(replace(case, p=moved_p))
+        else:
+            local = x[mine].copy()
+            local[j - mine.start] += step
+            cases.append(_case(basis, p, local))
+    return cases
 
 
 def _moving(problem: Problem, free: BoolArray, index: int) -> IntArray:

@@ -15,9 +15,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import linalg
 
-from estimator.physics.bounded import least_inside, unbounded_first
+from estimator.physics.bounded import least_of_quadratic, unbounded_first
 from estimator.signals.correlation import effective_samples
 from estimator.signals.record import FloatArray
 
@@ -145,9 +144,9 @@ def _step(
     free = unbounded_first(low, high, low < high)
     diagonal = np.diag(curvature)
     damped = curvature + np.diag(damping * np.maximum(diagonal, 1e-12 * diagonal.max()))
-    factor = linalg.cholesky(damped[np.ix_(free, free)])  # upper triangular
-    target = -linalg.solve_triangular(factor, gradient[free], trans="T")
-    step = np.zeros_like(x)
     down, up = low[free] - x[free], high[free] - x[free]
-    step[free] = least_inside(factor, target, np.minimum(down, 0.0), np.maximum(up, 0.0))
+    step = np.zeros_like(x)
+    step[free] = least_of_quadratic(
+        damped[np.ix_(free, free)], gradient[free], np.minimum(down, 0.0), np.maximum(up, 0.0)
+    )
     return step

@@ -15,7 +15,7 @@ from estimator.physics.grid import Grid
 from estimator.physics.kernel import integration, many, side_by_side, slots, state_vector
 from estimator.physics.model import Structure
 from estimator.physics.parallel import concurrently
-from estimator.physics.start import Start, initial_state
+from estimator.physics.start import Start, initial_states
 from estimator.physics.torque_path import shaft_torques
 from estimator.signals.record import FloatArray, IntArray, Location, OutputKind, Record
 
@@ -229,9 +229,8 @@ def _inputs(record: Record, cases: Sequence[Case]) -> _Inputs:
         row[:] = case.start.load_torque_nm
         if case.extra_load_nm is not None:
             row += case.extra_load_nm
-    firsts = torque[:, 0].tolist()
-    state = np.array([initial_state(case.start, first, 0.0, case.p) for case, first in zip(cases, firsts, strict=True)])
-    return _Inputs(np.array(parameters), torque, load, state)
+    p = np.array(parameters)
+    return _Inputs(p, torque, load, initial_states([case.start for case in cases], torque[:, 0].copy(), 0.0, p))
 
 
 def _angle(record: Record, p: FloatArray) -> FloatArray:

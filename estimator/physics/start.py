@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from estimator.compiled import compiled
 from estimator.physics.kernel import bristles, sensing, slots, state_vector
 from estimator.physics.kernel.conditions import branch_frequency, branch_inertia
+from estimator.physics.kernel.line import is_bristled, is_within
 from estimator.signals.record import FloatArray
-
-PRESLIDING = np.array(
-    [slots.COULOMB_PRESLIDING, slots.STRIBECK_PRESLIDING, slots.COULOMB_LOAD_PRESLIDING, slots.BRAKE_PRESLIDING]
-)
-"""Deflections to which dry friction bends before it slides."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,43 +33,42 @@ class Start:
 
 def initial_state(start: Start, torque_nm: float, angle_rad: float, p: FloatArray) -> FloatArray:
     """Return the kernel's state at the start: what is not unknown follows from the rest as if it were steady."""
-    return np.array(
-        [
-            *state_vector.State(
-                angle=start.angle_rad,
-                speed=start.speed_rad_s,
-                twist=start.twist_rad,
-                load_speed=start.load_speed_rad_s,
-                loading=0.0,
-                vehicle_speed=start.load_speed_rad_s,
-                branch_twist=_twist_beside_shaft(start.twist_rad, p),
-                branch_speed=start.load_speed_rad_s if p[slots.BEHIND] > 0.0 else start.speed_rad_s,
-                middle_twist=start.middle_twist_rad,
-                middle_speed=start.middle_speed_rad_s,
-                traction=start.load_torque_nm,
-            ),
-            torque_nm + p[slots.LAGGED_BEFORE],
-            -p[slots.LAGGED_BEFORE],
-            sensing.reading(start.speed_rad_s, angle_rad, p) + p[slots.FILTERED_BEFORE],
-            -p[slots.FILTERED_BEFORE],
-            *_held_by_bristles(start, p),
-        ]
-    )
+    only: FloatArray = initial_states([start], np.array([torque_nm]), angle_rad, p[np.newaxis])[0]
+    return only
 
 
-def _held_by_bristles(start: Start, p: FloatArray) -> tuple[float, float]:
-    """Return what bristles at motor and load hold [Nm] of friction that has slid for long; 0 where none bend."""
-    if not p[PRESLIDING].any():  # compiled code takes its time to be called from here
-        return 0.0, 0.0
-    carried_rad_s = start.load_speed_rad_s if p[slots.J_L] > 0.0 else start.speed_rad_s
-    return (
-        bristles.slid(start.speed_rad_s, bristles.sliding(start.speed_rad_s, p)),
-        bristles.slid(carried_rad_s, float(p[slots.COULOMB_LOAD])),
-    )
+def initial_states(starts: Sequence[Start], torque_nm: FloatArray, angle_rad: float, p: FloatArray) -> FloatArray:
+    """Return ``initial_state`` of K simulations with these torques, (K,), and parameters, (K, layout.SIZE)."""
+    states = np.zeros((len(starts), state_vector.STATES))
+    for row, start in zip(states, starts, strict=True):
+        row[state_vector.ANGLE] = start.angle_rad
+        row[state_vector.SPEED] = start.speed_rad_s
+        row[state_vector.TWIST] = start.twist_rad
+        row[state_vector.LOAD_SPEED] = start.load_speed_rad_s
+        row[state_vector.MIDDLE_TWIST] = start.middle_twist_rad
+        row[state_vector.MIDDLE_SPEED] = start.middle_speed_rad_s
+        row[state_vector.TRACTION] = start.load_torque_nm
+    _follow(states, torque_nm, angle_rad, p)
+    return states
 
 
-def _twist_beside_shaft(twist_rad: float, p: FloatArray) -> float:
-    """Return the twist of another spring of the line [rad] that carries what the shaft does; 0 where there is none."""
-    if p[slots.BETWEEN] <= 0.0 and p[slots.BEHIND] <= 0.0:
-        return 0.0
-    return float(p[slots.K] * twist_rad / (branch_inertia(p) * branch_frequency(p) ** 2))
+@compiled
+def _follow(states: FloatArray, torque_nm: FloatArray, angle_rad: float, p: FloatArray) -> None:
+    """Fill in what follows from the rest, a row per simulation."""
+    for row in range(states.shape[0]):
+        x, q = states[row], p[row]
+        speed, carried = x[state_vector.SPEED], x[state_vector.LOAD_SPEED]
+        x[state_vector.VEHICLE_SPEED] = carried
+        x[state_vector.BRANCH_SPEED] = carried if q[slots.BEHIND] > 0.0 else speed
+        if is_within(q):  # another spring of the line carries what the shaft does
+            x[state_vector.BRANCH_TWIST] = (
+                q[slots.K] * x[state_vector.TWIST] / (branch_inertia(q) * branch_frequency(q) ** 2)
+            )
+        x[state_vector.LAGGED] = torque_nm[row] + q[slots.LAGGED_BEFORE]
+        x[state_vector.LAG_RISE] = -q[slots.LAGGED_BEFORE]
+        x[state_vector.FILTERED] = sensing.reading(speed, angle_rad, q) + q[slots.FILTERED_BEFORE]
+        x[state_vector.FILTER_RISE] = -q[slots.FILTERED_BEFORE]
+        if is_bristled(q):  # of friction that has slid for long
+            x[state_vector.BRISTLES_MOTOR] = bristles.slid(speed, bristles.sliding(speed, q))
+            loaded = carried if q[slots.J_L] > 0.0 else speed
+            x[state_vector.BRISTLES_LOAD] = bristles.slid(loaded, q[slots.COULOMB_LOAD])

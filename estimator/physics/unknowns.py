@@ -160,7 +160,8 @@ class LocalBasis:
 
     def _bounds(self, of_own: Sequence[float], free: float) -> FloatArray:
         bounds = np.full(self.guess.size, free)
-        bounds[list(self.held)] = self.guess[list(self.held)]
+        if self.held:
+            bounds[list(self.held)] = self.guess[list(self.held)]
         bounds[self.own_rows] = of_own
         return bounds
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.optimize import lsq_linear
 
 from estimator.diagnosis.line import block_mean_of, lines, simulated
 from estimator.diagnosis.unnamed.candidates import answers, candidates
@@ -19,6 +18,7 @@ from estimator.diagnosis.unnamed.ground import Ground
 from estimator.diagnosis.unnamed.hunt import NO_LAW, RIDGE, Found, Hunt, cost, terms_of, weights_of, worthwhile
 from estimator.diagnosis.unnamed.pursuit import pursue
 from estimator.diagnosis.unnamed.scene import Scene
+from estimator.physics.bounded import least_inside, unbounded_first
 from estimator.physics.fit import STEP, FitResult, bounds, own_part, residual_at
 from estimator.physics.parallel import concurrently
 from estimator.signals.record import FloatArray
@@ -113,10 +113,13 @@ def _solution(hunt: Hunt, terms: int) -> tuple[FloatArray, FloatArray]:
     columns = path.columns[:, path.term < terms]
     design = np.hstack([ground.jacobian, columns])
     scale = np.maximum(np.linalg.norm(design, axis=0), np.finfo(float).tiny)
-    q, r = np.linalg.qr(np.vstack([design / scale, RIDGE * np.eye(scale.size)]))
     low, high = bounds(result.problem)
     free, open_edge = np.full(columns.shape[1], np.inf), 1e-12  # an unknown at its bound has no room but must have some
     lower = np.concatenate([np.minimum(low - result.x, -open_edge), -free]) * scale
     upper = np.concatenate([np.maximum(high - result.x, open_edge), free]) * scale
-    solved = lsq_linear(r, q[: ground.raw.size].T @ ground.raw, (lower, upper)).x / scale
+    order = unbounded_first(lower, upper, np.ones(scale.size, dtype=bool))
+    q, r = np.linalg.qr(np.vstack([(design / scale)[:, order], RIDGE * np.eye(scale.size)]))
+    solved = np.empty(scale.size)
+    solved[order] = least_inside(r, q[: ground.raw.size].T @ ground.raw, lower[order], upper[order])
+    solved /= scale
     return solved[: result.x.size], solved[result.x.size :]

@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import lsq_linear
 
 from estimator.physics import bounded
-from estimator.physics.bounded import least_inside, unbounded_first
+from estimator.physics.bounded import least_inside, least_of_quadratic, unbounded_first
 
 UNKNOWNS = 8
 NO_BOUND = np.full(UNKNOWNS, np.inf)
@@ -47,6 +47,20 @@ def test_where_the_free_least_lies_inside_it_is_that() -> None:
     triangle, target = np.triu(rng.standard_normal((4, 4))) + 3.0 * np.eye(4), rng.standard_normal(4)
     x = least_inside(triangle, target, np.full(4, -9.0), np.full(4, 9.0))
     np.testing.assert_allclose(triangle @ x, target, atol=1e-12)
+
+
+@pytest.mark.parametrize("rng", range(5), indirect=True)
+@pytest.mark.parametrize("count", [0, 3, UNKNOWNS])
+def test_of_a_quadratic_it_is_that_of_its_factor(rng: np.random.Generator, count: int) -> None:
+    matrix, gradient = rng.standard_normal((30, UNKNOWNS)), 20.0 * rng.standard_normal(UNKNOWNS)
+    high = NO_BOUND.copy()
+    high[UNKNOWNS - count :] = 0.1
+    x = least_of_quadratic(matrix.T @ matrix, gradient, -high, high)
+    target = np.linalg.lstsq(matrix.T, -gradient, rcond=None)[
+        0
+    ]  # |matrix x - target|^2 is the quadratic and a constant
+    theirs = lsq_linear(matrix, target, (-high, high), method="bvls", tol=1e-14)
+    np.testing.assert_allclose(x, theirs.x, atol=1e-9)
 
 
 def test_a_bound_of_no_room_holds_its_unknown() -> None:
