@@ -233,4 +233,9 @@ def _objection(selection: Selection, floor: float, unnamed: UnnamedLaw | None, r
     if _is_simpler(unnamed, selection) and (elsewhere or _is_another_law(selection, floor, unnamed)):
         law = kind_in_words(unnamed.terms[0][0])
         return f"{law} at the {PLACE_NAMES[unnamed.element]} would explain it with less than {named}"
+    if remaining is not None and remaining.element is unnamed.element and remaining.element not in elements:
+        law = kind_in_words(remaining.terms[0][0])
+        return (
+            f"{named} would leave {law} at the {PLACE_NAMES[remaining.element]}, where the mismatch itself has its law"
+        )
     return ""

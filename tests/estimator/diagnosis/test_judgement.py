@@ -322,6 +322,27 @@ class TestChosen:
         judged = judge(replace(found, unnamed=law, dismissed=dismissed), 0.1)
         assert (judged.objection == "") is believed
 
+    @pytest.mark.parametrize(
+        ("mismatch", "rest", "believed"),
+        [
+            (Element.SHAFT, Element.SHAFT, False),
+            (Element.SHAFT, Element.TORQUE_PATH, True),  # something small beside it
+            (Element.TORQUE_PATH, Element.SHAFT, True),
+            (Element.LOAD, Element.LOAD, True),  # it is there: a detail of how its law is written
+        ],
+    )
+    def test_one_elsewhere_that_leaves_the_law_of_the_mismatch_where_that_was_does_not(
+        self, mismatch: Element, rest: Element, believed: bool
+    ) -> None:
+        """A shaft that stiffens with speed, told by a tyre nearly to the noise: the shaft's law still counts."""
+        before, after = of_rms(1.0, 2), of_rms(0.103, 6)
+        law = UnnamedLaw(mismatch, (("twist |w_M|", 1.0),), gain(before, of_rms(0.2, 9)), 0.2)
+        left = UnnamedLaw(rest, (("twist |w_M|", 1.0),), gain(after, of_rms(0.098, 9)), 0.098)
+        found = outcome(before, frozenset({"tyre_slip"}), after, unnamed=law, remaining=left)
+        objection = judge(found, 0.1).objection
+        assert (objection == "") is believed
+        assert believed or objection.endswith("twist |w_M| at the shaft, where the mismatch itself has its law")
+
     def test_one_whose_look_alike_is_where_the_simple_law_is_is_believed(self) -> None:
         """From torque and speed alone the two are one; the law is at the other's element."""
         found = self.nearly(selection(sensor_error(0.05), CUBIC, model(TWO_MASS, TIGHT)))
