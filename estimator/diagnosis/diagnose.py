@@ -98,7 +98,7 @@ def _diagnose(
     line = mechanical(model)
     chain, unseen = read_through(records), read_through(holdout)
     found = search(chain, line, unseen.records, progress)
-    chain, examiner, selection, floor = found.chain, found.examiner, found.selection, found.floor
+    chain, examiner, selection, floor = found.chain, found.jury.examiner, found.selection, found.jury.weight.floor
     progress("weighing the verdict", 0.9)
     judgement = judge(selection, floor, chain.findings)
     believed = judgement.verdict is Verdict.EXPLAINED

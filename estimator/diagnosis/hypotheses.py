@@ -107,6 +107,15 @@ class Bench:
             self._remember(effects, result)
         return self._fits[effects]
 
+    def on(self, grid: Grid) -> Bench:
+        """Return the same model and recordings on another grid, without any fits."""
+        return Bench(self.model, self.records, self.use, grid)
+
+    def go_on_from(self, other: FitResult) -> FitResult:
+        """Take a fit that was made on another grid to its end on this one."""
+        problem = replace(other.problem, grid=self.grid or other.problem.grid)
+        return self._better(effects_of(other), polished(fit(problem, other.x)))
+
     def fit_again(self, effects: Effects, name: str) -> FitResult:
         """Look for the rest of an effect once what it loosens is loose, and return the better of both fits.
 

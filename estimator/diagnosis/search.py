@@ -9,7 +9,7 @@ from estimator.diagnosis.assemble import rms_of
 from estimator.diagnosis.chain import Chain
 from estimator.diagnosis.holdout import Examiner
 from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects, Progress, everything, open_hypotheses
-from estimator.diagnosis.judgement import judge
+from estimator.diagnosis.judgement import Judgement, judge
 from estimator.diagnosis.noise import noise_floor
 from estimator.diagnosis.result import Verdict
 from estimator.diagnosis.selection import Jury, Selection, Selector
@@ -35,23 +35,38 @@ class Search:
     """A selection, what it was made with, and what the recordings can't tell."""
 
     chain: Chain
-    bench: Bench
-    examiner: Examiner
-    floor: float
+    jury: Jury
     selection: Selection
     untestable: Mapping[str, Untestable]
+
+    @property
+    def judgement(self) -> Judgement:
+        """The verdict, and what it rests on."""
+        return judge(self.selection, self.jury.weight.floor, self.chain.findings)
 
 
 def search(chain: Chain, model: DrivelineModel, unseen: Sequence[Record], progress: Progress) -> Search:
     """Look for what is missing.
 
-    The search begins anew, on finer steps, where those of the integration are part of what explains the recordings.
+    Where the steps of the integration are part of what explains the recordings, what is chosen is fitted on finer ones,
+    and where it leaves more there, or would no longer be the verdict, the search begins anew on them.
     """
     grid = grid_for(model, chain.records)
     found = _search(chain, model, unseen, progress, grid)
     if is_made_by_steps(found.selection.result):
-        found = _search(chain, model, unseen, progress, _finer(grid))
+        finer = _finer(grid)
+        found = _moved(found, progress, finer) or _search(chain, model, unseen, progress, finer)
     return found
+
+
+def _moved(found: Search, progress: Progress, grid: Grid) -> Search | None:
+    """Return what was found as it is on another grid; None where it does not hold there."""
+    jury = replace(found.jury, bench=found.jury.bench.on(grid))
+    selection = Selector(jury, progress).taken_over(found.selection) if found.selection.chosen else None
+    if selection is None:
+        return None
+    moved = replace(found, jury=jury, selection=selection)
+    return moved if moved.judgement.verdict is found.judgement.verdict else None
 
 
 def is_made_by_steps(result: FitResult) -> bool:
@@ -103,13 +118,12 @@ def _searched(
 ) -> Search:
     bench = Bench(model, chain.records, everything(chain.records), grid)
     examiner = Examiner(model, chain.records, unseen)
-    floor = noise_floor(chain.records)
     names, untestable = open_hypotheses(model, chain.records)
-    weight = Weight(floor, least_ratio)
-    selector = Selector(Jury(bench, examiner, names, weight), progress)
-    selection = selector.run()
-    judgement = judge(selection, floor, chain.findings)
-    doubted = judgement.verdict is Verdict.UNEXPLAINED and not judgement.strays
-    if doubted or selector.may_imitate(selection):
-        selection = selector.by_other_ways(selection)
-    return Search(chain, bench, examiner, floor, selection, untestable)
+    weight = Weight(noise_floor(chain.records), least_ratio)
+    jury = Jury(bench, examiner, names, weight)
+    selector = Selector(jury, progress)
+    found = Search(chain, jury, selector.run(), untestable)
+    doubted = found.judgement.verdict is Verdict.UNEXPLAINED and not found.judgement.strays
+    if doubted or selector.may_imitate(found.selection):
+        found = replace(found, selection=selector.by_other_ways(found.selection))
+    return found

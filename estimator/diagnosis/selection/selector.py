@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from estimator.diagnosis.beyond import line_beyond
@@ -10,11 +10,11 @@ from estimator.diagnosis.evidence import VERY_STRONG, gain, information
 from estimator.diagnosis.hypotheses import NOTHING, Effects, Progress, crowding, effects_of, flexible
 from estimator.diagnosis.lookalikes import lookalikes
 from estimator.diagnosis.selection.jury import Jury, generalises
-from estimator.diagnosis.selection.outcome import Selection, survey
+from estimator.diagnosis.selection.outcome import Selection, Survey, survey
 from estimator.diagnosis.selection.outdone import outdone
 from estimator.diagnosis.selection.rounds import Rounds
 from estimator.diagnosis.trial import Trial
-from estimator.diagnosis.unnamed import Hunt, UnnamedLaw
+from estimator.diagnosis.unnamed import UnnamedLaw
 from estimator.diagnosis.weight import VISIBLE
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult
@@ -52,13 +52,21 @@ class Selector:
         self.jury = jury
         self._progress = progress
         self._rounds = Rounds(jury, progress)
-        self._laws: dict[int, tuple[FitResult, UnnamedLaw | None]] = {}
-        self._hunts: Sequence[Hunt] = ()
+        self._surveys: dict[int, tuple[FitResult, Survey]] = {}
 
     def run(self) -> Selection:
         """Add effects while one earns its place; then drop those that the others made superfluous."""
         retuned = self._to_its_end(NOTHING)
         return self._concluded(self._grown(_Path(NOTHING, retuned, {}), retuned), retuned)
+
+    def taken_over(self, found: Selection) -> Selection | None:
+        """Return a selection made on other steps of the integration, gone on with on these; None if it leaves more."""
+        result = self.jury.bench.go_on_from(found.result)
+        if result.rms > VISIBLE * found.result.rms:
+            return None
+        self._rounds.trials, self._rounds.dismissed = dict(found.trials), dict(found.dismissed)
+        retuned = self._to_its_end(NOTHING)
+        return self._concluded(self._grown(_Path(found.chosen, result, found.accepted), retuned), retuned)
 
     def may_imitate(self, selection: Selection) -> bool:
         """Tell whether a choice came near the noise by bending: some law still finds something in what it leaves."""
@@ -112,7 +120,7 @@ class Selector:
         named = chosen if self.jury.weight.may_stand(current, retuned) else NOTHING
         alike = {name: lookalikes(name, chosen, current, self.jury.bench, self.jury.names) for name in named}
         self._progress("looking for laws without a name", 0.9)
-        unnamed, *remaining = concurrently(self._law, [retuned, current] if chosen else [retuned])
+        first, *remaining = concurrently(self._survey, [retuned, current] if chosen else [retuned])
         return Selection(
             retuned,
             chosen,
@@ -121,10 +129,10 @@ class Selector:
             self._rounds.trials,
             self._rounds.dismissed,
             alike,
-            unnamed=unnamed,
-            remaining=remaining[0] if remaining else None,
+            unnamed=first.law,
+            remaining=remaining[0].law if remaining else None,
             beyond=line_beyond(retuned),
-            hunts=self._hunts,
+            hunts=first.hunts,
         )
 
     def _grown(self, path: _Path, retuned: FitResult) -> _Path:
@@ -227,13 +235,19 @@ class Selector:
         return chosen, current
 
     def _law(self, result: FitResult) -> UnnamedLaw | None:
-        """Return the law without a name that counts for what a fit leaves; each fit is searched once."""
-        known = self._laws.get(id(result))
+        """Return the law without a name that counts for what a fit leaves."""
+        return self._survey(result).law
+
+    def _survey(self, result: FitResult) -> Survey:
+        """Look for laws without a name in what a fit leaves; each fit is searched once.
+
+        Only what the re-tuned nominal leaves is looked at again: of other fits the hunts are let go.
+        """
+        known = self._surveys.get(id(result))
         if known is None:
             found = survey(result)
-            known = self._laws[id(result)] = (result, found.law)
-            if not effects_of(result):  # of all fits the one that is looked at again
-                self._hunts = found.hunts
+            kept = found if not effects_of(result) else replace(found, hunts=())
+            known = self._surveys[id(result)] = (result, kept)
         return known[1]
 
     def _outdone(self, chosen: Effects, retuned: FitResult) -> Effects:

@@ -73,12 +73,18 @@ def test_what_steps_too_coarse_draw_is_seen_on_finer_ones() -> None:
     assert drawn == [True, False]
 
 
-def test_where_steps_have_a_part_in_an_explanation_the_search_begins_anew_on_finer_ones(
-    monkeypatch: pytest.MonkeyPatch,
+@pytest.mark.parametrize("holds", [True, False])
+def test_where_steps_have_a_part_in_an_explanation_it_is_sought_on_finer_ones(
+    holds: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    records = rubbing(lambda speed: 1.5)
+    """From where it ended; anew, every effect looked at again, where it leaves more there."""
+    records, said = rubbing(lambda speed: 1.5), list[str]()
     usual = searched(records).selection.result.problem.grid
     monkeypatch.setattr(search_module, "is_made_by_steps", lambda result: result.problem.grid == usual)
-    found = searched(records)
+    if not holds:
+        monkeypatch.setattr(Bench, "go_on_from", lambda bench, other: bench.fit(NOTHING))
+    found = search(read_through(records), model(ONE_MASS), (), lambda what, share: said.append(what))
     assert found.selection.retuned.problem.grid == replace(usual, substeps=FINER * usual.substeps)
     assert found.selection.chosen == FRICTION
+    assert found.selection.trials.keys() >= FRICTION
+    assert said.count("looking at every effect") == (1 if holds else 2)
