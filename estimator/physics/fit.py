@@ -27,6 +27,10 @@ from estimator.signals.record import BoolArray, FloatArray, IntArray, Record
 STEP = 1e-5
 """Finite-difference step in scaled unknowns: the simulation is smooth to about 1e-10 of its size."""
 
+ROUNDING = 1e-13
+"""Change of the output, over its size, that is none: simulations side by side round otherwise than one by itself, and
+an unknown that does nothing, such as the phase of an amplitude that is 0, has a column of zeros."""
+
 ITERATIONS = 50
 """Jacobians at most; a fit that needs more is not converged."""
 
@@ -286,6 +290,8 @@ def changes(problem: Problem, x: FloatArray, index: int, columns: IntArray, outp
     cases = _moved_cases(problem, x, index, columns, steps)
     moved = _within_reason(simulate_each(problem.grid, problem.records[index], cases), problem.records[index])
     change = (moved - output)[:, problem.use[index]]
+    largest = np.maximum(change.max(axis=1, initial=0.0), -change.min(axis=1, initial=0.0))
+    change[largest <= ROUNDING * np.abs(output).max()] = 0.0
     change /= steps[:, np.newaxis]
     return np.asarray(change.T)
 

@@ -134,6 +134,17 @@ class TestJacobian:
         np.testing.assert_allclose(column, here - back, atol=decay * largest)
         assert np.max(np.abs(column - (ahead - here))) > 0.01 * largest > 2.0 * decay * largest
 
+    def test_the_rounding_of_another_way_to_simulate_is_no_derivative(self) -> None:
+        """How fast a derating comes changes nothing while it has no depth."""
+        rec = linear_record(ONE_MASS, random_steps(300, 8), Start(0.0, 0.0, 0.0))
+        when = (Shared("torque_derating", "time_constant_s", 100.0, 0.1, 10.0, 1.0),)
+        problem = make_problem(model(ONE_MASS), [rec], when)
+        x = start_vector(problem)
+        (output,) = outputs_at(problem, x)
+        jacobian = jacobian_at(problem, x, [np.nextafter(output, np.inf)])
+        assert not jacobian[:, 0].any()
+        assert jacobian[:, 1:].any(axis=0).all()
+
     def test_a_local_unknown_moves_its_own_recording_alone(self) -> None:
         problem = nominal_problem(recordings(samples=300))
         x = start_vector(problem)
