@@ -22,7 +22,8 @@ from estimator.physics.unknowns import Release, Shared, nominal_unknowns, own_un
 from estimator.signals.record import BoolArray, Record
 
 STEPS_OF_RETOLD = 5
-"""Jacobians that another way to write a law gets before it is given up: it starts from what was no fit of it."""
+"""Jacobians that an effect fitted once more, or written another way, gets before it is given up: it starts from what
+was no fit of it."""
 
 HOPELESS = 2.0
 """Squared error after them, over that of the law as it was, beyond which it is."""
@@ -88,6 +89,7 @@ class Bench:
     _rough: dict[Effects, FitResult] = field(default_factory=dict)
     _looked_again: set[tuple[Effects, str]] = field(default_factory=set)
     _retold: set[tuple[Effects, str]] = field(default_factory=set)
+    _lessened: set[tuple[Effects, bytes]] = field(default_factory=set)
     _tried: dict[Effects, list[Release]] = field(default_factory=dict)
 
     def fit(self, effects: Effects, warm: FitResult | None = None, releases: Sequence[Release] = ()) -> FitResult:
@@ -128,7 +130,10 @@ class Bench:
         looks = promising(Screen(had, self.model).looks(name, EFFECTS[name].loosened_by))
         if looks[0].promise < WORTH_ANOTHER_FIT * had.squares:
             return had
-        return self._better(effects, self._fit(effects, _forgetting(had, name), [look.release for look in looks]))
+        warm = _forgetting(had, name)
+        heat = begun(self._problems(effects, warm, [look.release for look in looks]), warm, STEPS_OF_RETOLD)
+        best = heat[close(heat)[0]]
+        return had if _is_hopeless(best, had) else self._better(effects, polished(converge(best)))
 
     def fit_retold(self, effects: Effects, name: str) -> FitResult:
         """Fit an effect's law written other ways from where it ended, and return what explains best, per unknown.
@@ -146,7 +151,7 @@ class Bench:
             warm = _placed(_forgetting(had, name), other.line)
             starts = self._retold_from(name, other.start)
             (heat,) = begun(self._problems(effects, warm, starts), warm, STEPS_OF_RETOLD)
-            if heat.squares <= HOPELESS * had.squares:
+            if not _is_hopeless(heat, had):
                 fits.append(polished(converge(heat)))
         plausible = [fit for fit in fits if not entry.implausible(self.model, self.records, fit.values_of(name))]
         best = min(plausible, key=lambda fit: fit.squares, default=had)
@@ -191,9 +196,13 @@ class Bench:
     def fit_less(self, effects: Effects, larger: FitResult) -> FitResult:
         """Fit fewer effects from where a fit with more ended, too, and return the better of both.
 
-        What was found beside another effect may be out of reach from where these began by themselves.
+        What was found beside another effect may be out of reach from where these began by themselves. Each larger fit
+        is begun from once.
         """
-        self._better(effects, self._fit(effects, larger, ()))
+        place = (effects, larger.x.tobytes())
+        if place not in self._lessened:
+            self._lessened.add(place)
+            self._better(effects, self._fit(effects, larger, ()))
         return self.fit(effects)
 
     def _better(self, effects: Effects, result: FitResult) -> FitResult:
@@ -291,6 +300,11 @@ class Bench:
         """Return the nominal parameters, and what the model's own effects leave to every recording."""
         own = tuple(own_unknowns(self.model.effects, record) for record in self.records)
         return Release(nominal_unknowns(self.model), own)
+
+
+def _is_hopeless(begun_anew: FitResult, had: FitResult) -> bool:
+    """Tell whether a law that was begun anew, or another way, is too far behind for its fit to be gone on with."""
+    return begun_anew.squares > HOPELESS * had.squares
 
 
 def _is_told_better(had: FitResult, other: FitResult) -> bool:

@@ -15,7 +15,7 @@ from estimator.diagnosis.phrases import PLACE_NAMES, kind_in_words
 from estimator.diagnosis.result import Stray, Verdict
 from estimator.diagnosis.selection import Selection
 from estimator.diagnosis.trial import scan_choices
-from estimator.diagnosis.unnamed import UnnamedLaw
+from estimator.diagnosis.unnamed import LINEAR, UnnamedLaw
 from estimator.diagnosis.weight import BELIEVED_TOGETHER, VISIBLE, least_share, reads_speed, share_removed
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
@@ -174,12 +174,18 @@ def _gain_of_names(selection: Selection) -> Gain:
 
 
 def _is_another_law(selection: Selection, floor: float, unnamed: UnnamedLaw) -> bool:
-    """Tell whether a law at the same place leaves so much less that it can't be the named one in other words."""
-    if any(EFFECTS[name].phases for name in selection.chosen):  # a wave and its harmonics are sought one by one
+    """Tell whether a law at the same place leaves so much less that it can't be the named one in other words.
+
+    A linear system is none that is not linear in other words, however little that leaves, if a law of it is left.
+    """
+    entries = [EFFECTS[name] for name in selection.chosen]
+    if any(entry.phases for entry in entries):  # a wave and its harmonics are sought one by one
         return False
     after, level = selection.result.rms, noise_level(selection.result, floor)
     left = max(unnamed.rms**2 - level**2, 0.0)
-    return _is_seen(selection, floor) and left < FAR_BETTER * (after**2 - level**2)
+    linear = all(term in LINEAR for term, _ in unnamed.terms) and not any(entry.linear for entry in entries)
+    seen = _is_seen(selection, floor) or (linear and after >= VISIBLE * level and selection.remaining is not None)
+    return seen and left < FAR_BETTER * (after**2 - level**2)
 
 
 def _is_a_course(unnamed: UnnamedLaw, selection: Selection) -> bool:
@@ -199,13 +205,15 @@ def _bends(selection: Selection, floor: float, profile_alone: bool) -> bool:
 
 
 def _is_filtered(selection: Selection, floor: float) -> bool:
-    """Tell whether several linear systems do not reach the noise together.
+    """Tell whether several linear systems, or one of the line itself, do not reach the noise.
 
-    A mode and a filter follow any other linear system, one of fractional order among them, as far as their orders go.
-    And where they are what was left out there is no other way to write them that leaves a detail.
+    A mode and a filter follow any other linear system, one of fractional order or a shaft that relaxes among them, as
+    far as their orders go. And where they are what was left out there is no other way to write them that leaves a
+    detail; but a lag or a filter alone, whose maker may have given it another order.
     """
-    several = len(selection.chosen) > 1 and all(EFFECTS[name].linear for name in selection.chosen)
-    return several and _is_seen(selection, floor)
+    entries = [EFFECTS[name] for name in selection.chosen]
+    able = len(entries) > 1 or entries[0].element is Element.SHAFT
+    return able and all(entry.linear for entry in entries) and _is_seen(selection, floor)
 
 
 def _objection(selection: Selection, floor: float, unnamed: UnnamedLaw | None, remaining: UnnamedLaw | None) -> str:

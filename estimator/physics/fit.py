@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimator.abreast import LANES
+from estimator.physics.differences import differences
 from estimator.physics.effect import MOMENTS
 from estimator.physics.grid import Grid, grid_for
 from estimator.physics.layout import flat
@@ -238,10 +239,15 @@ def _case(basis: LocalBasis, p: FloatArray, local: FloatArray) -> Case:
 
 def _within_reason(out: FloatArray, record: Record) -> FloatArray:
     """Return outputs (..., N) of a recording, far away where the simulation runs away."""
-    worst = BAD * (float(np.abs(record.output[record.okay]).max()) or 1.0)
+    worst = _far_away(record)
     if -worst <= out.min() and out.max() <= worst:  # False where it is no number
         return out
     return np.clip(np.nan_to_num(out, nan=worst), -worst, worst)
+
+
+def _far_away(record: Record) -> float:
+    """Return the size of an output that counts for one that has run away."""
+    return BAD * (float(np.abs(record.output[record.okay]).max()) or 1.0)
 
 
 def not_fitted(problem: Problem, x: FloatArray) -> FitResult:
@@ -287,13 +293,10 @@ def changes(problem: Problem, x: FloatArray, index: int, columns: IntArray, outp
     """Return the derivative of one recording's errors by some of the scaled unknowns, shape (R_i, columns.size)."""
     _, high = bounds(problem)
     steps = np.where(x + STEP <= high, STEP, -STEP)[columns]
-    cases = _moved_cases(problem, x, index, columns, steps)
-    moved = _within_reason(simulate_each(problem.grid, problem.records[index], cases), problem.records[index])
-    change = (moved - output)[:, problem.use[index]]
-    largest = np.maximum(change.max(axis=1, initial=0.0), -change.min(axis=1, initial=0.0))
-    change[largest <= ROUNDING * np.abs(output).max()] = 0.0
-    change /= steps[:, np.newaxis]
-    return np.asarray(change.T)
+    record, cases = problem.records[index], _moved_cases(problem, x, index, columns, steps)
+    moved = simulate_each(problem.grid, record, cases)
+    least = ROUNDING * float(np.abs(output).max())
+    return differences(moved, output, problem.use[index], steps, _far_away(record), least).T
 
 
 def _moved_cases(problem: Problem, x: FloatArray, index: int, columns: IntArray, steps: FloatArray) -> list[Case]:

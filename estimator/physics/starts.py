@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
 from estimator.physics.fit import ITERATIONS, FitResult, Problem, fit, start_vector
+from estimator.physics.parallel import concurrently
 from estimator.signals.record import FloatArray, IntArray
 
 HEAT = 3
@@ -26,13 +28,13 @@ def best_fit(problems: Sequence[Problem], warm: FitResult | None = None, iterati
     if len(problems) == 1:
         return _begun(problems[0], warm, iterations)
     heat = begun(problems, warm, min(HEAT, iterations))
-    finals = [converge(heat[i], iterations) for i in close(heat)]
+    finals = concurrently(partial(converge, iterations=iterations), [heat[i] for i in close(heat)])
     return min(finals, key=lambda result: result.squares)
 
 
 def begun(problems: Sequence[Problem], warm: FitResult | None = None, iterations: int = HEAT) -> list[FitResult]:
     """Fit a few steps from each of several starts."""
-    return [_begun(problem, warm, iterations) for problem in problems]
+    return concurrently(partial(_begun, warm=warm, iterations=iterations), problems)
 
 
 def close(heat: Sequence[FitResult]) -> list[int]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from estimator.diagnosis.beyond import LineBeyond
 from estimator.diagnosis.evidence import VERY_STRONG
@@ -11,7 +11,7 @@ from estimator.diagnosis.hypotheses import Effects
 from estimator.diagnosis.noise import noise_floor
 from estimator.diagnosis.selection.jury import SIGNIFICANT
 from estimator.diagnosis.trial import Trial
-from estimator.diagnosis.unnamed import Hunt, UnnamedLaw, best_of, hunts_of, judged, scene
+from estimator.diagnosis.unnamed import ROUNDS, Hunt, UnnamedLaw, best_of, hunts_of, judged, scene
 from estimator.diagnosis.weight import VISIBLE
 from estimator.physics.fit import FitResult
 
@@ -40,7 +40,8 @@ class Selection:
     beyond : LineBeyond or None
         The nominal line beyond its tolerances, where these hold it back.
     hunts : sequence of Hunt
-        The first look for laws without a name in what the re-tuned nominal leaves: to locate it goes on from there.
+        The search for laws without a name in what the re-tuned nominal leaves, as far as it went: to locate goes on
+        from there.
     """
 
     retuned: FitResult
@@ -75,6 +76,13 @@ def survey(result: FitResult) -> Survey:
     view = scene(result, noise_floor(result.problem.records))
     hunts = hunts_of(view)
     return Survey(hunts, _counting(best_of(judged(view, hunts)), result))
+
+
+def located(selection: Selection) -> tuple[Selection, UnnamedLaw | None]:
+    """Return a selection with the search for laws without a name gone to its end, and the best of them."""
+    view = scene(selection.retuned, noise_floor(selection.retuned.problem.records))
+    hunts = hunts_of(view, ROUNDS, selection.hunts)
+    return replace(selection, hunts=hunts), best_of(judged(view, hunts))
 
 
 def _counting(law: UnnamedLaw | None, result: FitResult) -> UnnamedLaw | None:

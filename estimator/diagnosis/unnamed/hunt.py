@@ -72,6 +72,8 @@ class Hunt:
         That error, per recording.
     stuck : bool
         True where no step made the simulation better.
+    rounds : int
+        How many the search at all elements has behind it.
     """
 
     element: Element
@@ -85,6 +87,7 @@ class Hunt:
     mean_square: float
     errors: list[FloatArray]
     stuck: bool
+    rounds: int = 1
 
 
 def worthwhile(hunt: Hunt) -> int:

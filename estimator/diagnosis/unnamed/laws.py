@@ -166,6 +166,9 @@ LAWS: Mapping[Element, Mapping[str, Law]] = {
     Element.ACQUISITION: {"t dw/dt": lambda m: since_start(m) * rate(m.speed, m)},
 }
 
+LINEAR = frozenset(name for laws in LAWS.values() for name in laws if "behind" in name or "relaxation" in name)
+"""Laws that are linear systems, of the torque, the twist or the speed."""
+
 FREE: Mapping[Element, Mapping[str, Law]] = {
     Element.TORQUE_PATH: {"T": lambda m: m.torque},
     Element.MOTOR: {"w_M": lambda m: m.speed},

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 from scipy import stats
@@ -82,17 +82,18 @@ def judged(view: Scene, hunts: Sequence[Hunt]) -> list[UnnamedLaw]:
 def hunts_of(view: Scene, rounds: int = 1, begun: Sequence[Hunt] = ()) -> list[Hunt]:
     """Look for a law at every element, and again where it is among the best.
 
-    ``begun`` is what a first round has found in the same fit, where there was one.
+    ``begun`` is what earlier rounds have found in the same fit, where there were any.
     """
     hunts = list(begun) or concurrently(partial(first, view, ground_of(view)), elements(view.result))
-    if rounds > 1:
+    behind = max(hunt.rounds for hunt in hunts)
+    if behind < 2 <= rounds:
         hunts = concurrently(partial(_tried, view), hunts)
-    for _ in range(rounds - 2):
+    for _ in range(max(behind, 2), rounds):
         least = min(hunt.mean_square for hunt in hunts)
         near = [i for i, h in enumerate(hunts) if not h.stuck and h.mean_square <= IN_REACH**2 * least]
         for i, moved in zip(near, concurrently(again, [hunts[i] for i in near]), strict=True):
             hunts[i] = moved
-    return hunts
+    return [replace(hunt, rounds=max(rounds, behind)) for hunt in hunts]
 
 
 def _tried(view: Scene, begun: Hunt) -> Hunt:

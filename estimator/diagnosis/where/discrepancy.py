@@ -44,7 +44,7 @@ def discrepancy(
     rounds : int, optional
         Rounds of the search for laws without a name; by default all (``ROUNDS``) where nothing is named, else one.
     begun : sequence of Hunt, optional
-        What the first of them has found in ``retuned``, where there was one.
+        What the first of them have found in ``retuned``, where there were any.
 
     Returns
     -------

@@ -192,11 +192,13 @@ class TestHowMuchMayBeLeft:
                 0.117,
                 False,
             ),  # seen: a detail of 0.005 % all the same
-            (frozenset({"extra_torsional_mode"}), 0.117, True),
+            (frozenset({"extra_torsional_mode"}), 0.117, False),  # a shaft that relaxes
+            (frozenset({"extra_torsional_mode"}), 0.114, True),
+            (frozenset({"actuator_lag"}), 0.117, True),  # of another order
             (frozenset({"extra_torsional_mode"}) | COULOMB, 0.117, True),  # another way to write the friction
         ],
     )
-    def test_several_linear_systems_may_leave_no_law_that_is_seen(
+    def test_several_linear_systems_and_one_of_the_line_may_leave_no_law_that_is_seen(
         self, chosen: Effects, after: float, believed: bool
     ) -> None:
         before = of_rms(9.0, 2)
@@ -383,6 +385,25 @@ class TestChosen:
         assert judged.verdict is verdict
         wave = replace(found, unnamed=rival, chosen=frozenset({"cardan_second_order"}))
         assert judge(wave, level).verdict is Verdict.EXPLAINED
+
+    @pytest.mark.parametrize(
+        ("term", "leaves_a_law", "believed"),
+        [
+            ("a relaxation of the twist in 0.04 s", True, False),
+            ("a relaxation of the twist in 0.04 s", False, True),
+            ("a slider that yields at 0.1 of the twist", True, True),  # hysteresis in other words
+        ],
+    )
+    def test_hardly_seen_a_linear_law_is_another_where_the_rest_has_a_law(
+        self, term: str, leaves_a_law: bool, believed: bool
+    ) -> None:
+        """A shaft that relaxes, told as one with hysteresis: 1.143 times the noise, and a relaxation is left."""
+        before, after, best = of_rms(0.3, 2), of_rms(0.1143, 3), of_rms(0.1, 4)
+        law = UnnamedLaw(Element.SHAFT, ((term, 1.0),), gain(before, best), 0.1)
+        rest = UnnamedLaw(Element.SHAFT, (("a relaxation of the twist in 0.02 s", 1.0),), gain(after, best), 0.1)
+        found = outcome(before, frozenset({"shaft_hysteresis"}), after, unnamed=law)
+        judged = judge(replace(found, remaining=rest if leaves_a_law else None), 0.1)
+        assert (judged.objection == "") is believed
 
     def test_what_it_leaves_is_told(self) -> None:
         """Friction of a motor that also misreads: named, and the rest is given as a law."""

@@ -254,7 +254,7 @@ def test_a_start_at_the_optimum_costs_one_jacobian() -> None:
     errors = np.random.default_rng(2).standard_normal(50)
     mean = np.array([errors.mean()])
     ours = minimise(lambda x: x[0] - errors, jacobian, mean, np.array([-9.0]), np.array([9.0]))
-    np.testing.assert_array_equal(ours.x, mean)
+    np.testing.assert_allclose(ours.x, mean, rtol=1e-12)  # sums round one way on one processor, another on the next
     assert (len(calls), ours.converged) == (1, True)
 
 

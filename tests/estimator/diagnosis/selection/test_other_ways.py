@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import pytest
 
 from estimator.diagnosis.chain import read_through
+from estimator.diagnosis.evidence import Gain
 from estimator.diagnosis.hypotheses import NOTHING, Effects
 from estimator.diagnosis.search import search
 from estimator.diagnosis.selection import Selection, Selector
+from estimator.diagnosis.selection import selector as selector_module
+from estimator.diagnosis.selection.outcome import located
 from estimator.diagnosis.selection.selector import OTHER_WAYS, _Path
 from estimator.diagnosis.trial import Trial
+from estimator.diagnosis.unnamed import ROUNDS, UnnamedLaw
+from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
 from tests.estimator.diagnosis.planted import quiet, rubbing
 from tests.estimator.diagnosis.selection.mass import COULOMB, LINE, coulomb, late, selector, silent
@@ -33,9 +39,10 @@ def searched() -> tuple[Selector, Selection]:
 
 @pytest.fixture
 def select(searched: tuple[Selector, Selection], monkeypatch: pytest.MonkeyPatch) -> Selector:
-    """With the fits of the search alone: what a test finds a hair better is no other's."""
+    """With the fits of the search alone, what a test finds a hair better is no other's; and as if no way were gone."""
     bench = searched[0].jury.bench
     monkeypatch.setattr(bench, "_fits", dict(bench._fits))
+    monkeypatch.setattr(searched[0], "_begun_with", set())
     return searched[0]
 
 
@@ -125,6 +132,24 @@ def test_two_are_looked_at_once(select: Selector, found: Selection, monkeypatch:
     assert asked == [frozenset(names[:i]) - {"road_grade"} for i in range(len(names))]
 
 
+@pytest.mark.parametrize("bends", [False, True])
+def test_the_way_that_was_gone_is_gone_again_only_without_what_bends(
+    bends: bool, select: Selector, found: Selection, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun = list[str]()
+
+    def completed(first: Trial, retuned: FitResult, without: Effects) -> _Path:
+        begun.append(first.name)
+        return _Path(NOTHING, retuned, {})
+
+    monkeypatch.setattr(select, "_begun_with", {COULOMB})
+    monkeypatch.setattr(select, "_completed", completed)
+    monkeypatch.setattr(select, "_is_near", lambda _: False)
+    select.by_other_ways(replace(found, chosen=frozenset({"road_grade"})) if bends else nothing_of(found))
+    assert (COULOMB in begun) is bends
+    assert set(begun) - {COULOMB}
+
+
 def test_another_way_begins_with_what_leaves_least_and_what_is_far_behind_is_not_finished(
     select: Selector, found: Selection, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -145,7 +170,35 @@ def test_another_way_begins_with_what_leaves_least_and_what_is_far_behind_is_not
 
 
 def test_what_is_better_stays(select: Selector, found: Selection) -> None:
-    assert select.by_other_ways(found) is found
+    assert select.by_other_ways(found).result is found.result
+
+
+@pytest.mark.parametrize(
+    ("left", "bends", "gone"), [(1.16, False, True), (1.14, False, False), (1.14, True, True), (math.inf, False, True)]
+)
+def test_where_one_law_without_a_name_explains_all_no_other_way_is_gone(
+    left: float, bends: bool, gone: bool, select: Selector, found: Selection, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """But for one that imitated: a profile came near the noise, and laws may do in its place."""
+    doubted = replace(found, chosen=frozenset({"road_grade"})) if bends else nothing_of(found)
+    level, law = select.jury.weight.level(doubted.result), None
+    if math.isfinite(left):
+        law = UnnamedLaw(Element.MOTOR, (("w_M^3", 1.0),), Gain(1e3, 1e-9, 1e3), left * level)
+    monkeypatch.setattr(selector_module, "located", lambda selection: (selection, law))
+    asked = list[Effects]()
+    monkeypatch.setattr(select._rounds, "finished_first", lambda retuned, without, most: asked.append(without) or [])
+    assert select.by_other_ways(doubted) is doubted
+    assert bool(asked) is gone
+
+
+def test_the_search_for_its_law_is_not_made_twice(found: Selection, monkeypatch: pytest.MonkeyPatch) -> None:
+    twice, law = located(located(found)[0])
+    once, same = located(found)
+    assert [hunt.rounds for hunt in once.hunts] == [ROUNDS] * len(once.hunts)
+    assert law == same
+    monkeypatch.setattr("estimator.diagnosis.unnamed.search.again", None)
+    assert located(once)[1] == law
+    assert [hunt.law for hunt in twice.hunts] == [hunt.law for hunt in once.hunts]
 
 
 def test_a_way_from_nothing_must_end_near_the_noise() -> None:
@@ -158,7 +211,13 @@ def test_a_way_from_nothing_must_end_near_the_noise() -> None:
 
 def test_doubt_is_what_another_way_is_looked_for_in(monkeypatch: pytest.MonkeyPatch) -> None:
     run = Selector.run
-    monkeypatch.setattr(Selector, "run", lambda self: nothing_of(run(self)))
+
+    def forgotten(select: Selector) -> Selection:
+        found = nothing_of(run(select))
+        select._begun_with.clear()
+        return found
+
+    monkeypatch.setattr(Selector, "run", forgotten)
     assert search(read_through(late(rubbing(coulomb), 3)), LINE, (), silent).selection.chosen == BOTH
 
 
