@@ -107,11 +107,15 @@ class Selector:
             if first.name not in gone:
                 path = self._better(path, self._completed(first, retuned, without), retuned)
             without |= NOTHING if EFFECTS[first.name].profile else {first.name}
-            if path is not old and self._is_near(path.current) and not flexible(path.chosen):
+            if path is not old and self._is_near(path.current) and not self._imitates(path):
                 break
         if path is old:
             return selection
         return self._concluded(self._stiffened(self._grown(path, retuned), retuned), retuned)
+
+    def _imitates(self, path: _Path) -> bool:
+        """Tell whether some law still finds something in what a path leaves that bends."""
+        return bool(flexible(path.chosen)) and self._law(path.current) is not None
 
     def _completed(self, first: Trial, retuned: FitResult, without: Effects) -> _Path:
         """Return the way that begins with an effect, and ends there or with one that completes the explanation.

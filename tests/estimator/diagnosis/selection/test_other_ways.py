@@ -150,6 +150,33 @@ def test_the_way_that_was_gone_is_gone_again_only_without_what_bends(
     assert set(begun) - {COULOMB}
 
 
+@pytest.mark.parametrize(
+    ("bends", "leaves_a_law", "goes_on"), [(False, True, False), (True, False, False), (True, True, True)]
+)
+def test_after_a_way_that_ended_near_the_noise_others_are_gone_only_where_it_may_imitate(
+    bends: bool,
+    leaves_a_law: bool,
+    goes_on: bool,
+    select: Selector,
+    found: Selection,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    begun = list[str]()
+
+    def completed(first: Trial, retuned: FitResult, without: Effects) -> _Path:
+        begun.append(first.name)
+        return _Path(BOTH, found.result, found.accepted)
+
+    law = UnnamedLaw(Element.LOAD, (("w_L^3", 1.0),), Gain(1e3, 1e-9, 1e3), 0.0) if leaves_a_law else None
+    monkeypatch.setattr(select, "_completed", completed)
+    monkeypatch.setattr(select, "_law", lambda result: law)
+    monkeypatch.setattr(selector_module, "flexible", lambda names: names if bends and names == BOTH else NOTHING)
+    monkeypatch.setattr(select, "_grown", lambda path, retuned: path)
+    monkeypatch.setattr(select, "_stiffened", lambda path, retuned: path)
+    assert select.by_other_ways(nothing_of(found)).chosen == BOTH
+    assert (len(begun) > 1) is goes_on
+
+
 def test_another_way_begins_with_what_leaves_least_and_what_is_far_behind_is_not_finished(
     select: Selector, found: Selection, monkeypatch: pytest.MonkeyPatch
 ) -> None:
