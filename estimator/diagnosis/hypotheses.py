@@ -21,7 +21,7 @@ from estimator.physics.steps import from_their_moment
 from estimator.physics.unknowns import Release, Shared, nominal_unknowns, own_unknowns, released
 from estimator.signals.record import BoolArray, Record
 
-STEPS_OF_RETOLD = 5
+STEPS_ANEW = 5
 """Jacobians that an effect fitted once more, or written another way, gets before it is given up: it starts from what
 was no fit of it."""
 
@@ -131,7 +131,7 @@ class Bench:
         if looks[0].promise < WORTH_ANOTHER_FIT * had.squares:
             return had
         warm = _forgetting(had, name)
-        heat = begun(self._problems(effects, warm, [look.release for look in looks]), warm, STEPS_OF_RETOLD)
+        heat = begun(self._problems(effects, warm, [look.release for look in looks]), warm, STEPS_ANEW)
         best = heat[close(heat)[0]]
         return had if _is_hopeless(best, had) else self._better(effects, polished(converge(best)))
 
@@ -150,7 +150,7 @@ class Bench:
         for other in entry.retold(self.model, self.records, values, had.values_of("")):
             warm = _placed(_forgetting(had, name), other.line)
             starts = self._retold_from(name, other.start)
-            (heat,) = begun(self._problems(effects, warm, starts), warm, STEPS_OF_RETOLD)
+            (heat,) = begun(self._problems(effects, warm, starts), warm, STEPS_ANEW)
             if not _is_hopeless(heat, had):
                 fits.append(polished(converge(heat)))
         plausible = [fit for fit in fits if not entry.implausible(self.model, self.records, fit.values_of(name))]

@@ -15,8 +15,8 @@ from estimator.diagnosis.phrases import PLACE_NAMES, kind_in_words
 from estimator.diagnosis.result import Stray, Verdict
 from estimator.diagnosis.selection import Selection
 from estimator.diagnosis.trial import scan_choices
-from estimator.diagnosis.unnamed import LINEAR, UnnamedLaw
-from estimator.diagnosis.weight import BELIEVED_TOGETHER, VISIBLE, least_share, reads_speed, share_removed
+from estimator.diagnosis.unnamed import LAGS, UnnamedLaw
+from estimator.diagnosis.weight import BELIEVED_TOGETHER, SEEN, VISIBLE, least_share, reads_speed, share_removed
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
@@ -30,7 +30,7 @@ NEAR_FLOOR = 1.5
 NEAR_FLOOR_DETAIL = 2.5
 """The same where that is next to nothing of the mismatch."""
 
-NEAR_FLOOR_PROFILE = 1.15
+NEAR_FLOOR_PROFILE = SEEN
 """The same for a profile over time, which follows whatever is slow: what it leaves is something else."""
 
 DETAIL = 0.005
@@ -133,7 +133,7 @@ def _leaves_too_much(selection: Selection, floor: float, profile_alone: bool) ->
         most = NEAR_FLOOR if bends else NEAR_FLOOR_DETAIL
     else:
         most = NEAR_FLOOR_PROFILE if profile_alone else NEAR_FLOOR
-    seen = after > NEAR_FLOOR_PROFILE * level
+    seen = after > SEEN * level
     if share < (MOST_VISIBLE if seen else least) or after > most * level:
         return f"{1.0 - share:.0%} of the mismatch, {after / level:.2g} times the noise"
     return ""
@@ -147,7 +147,7 @@ def _leaves_a_detail(selection: Selection, floor: float) -> bool:
 
 def _is_seen(selection: Selection, floor: float) -> bool:
     """Tell whether what an explanation leaves is seen above the noise."""
-    return selection.result.rms > NEAR_FLOOR_PROFILE * noise_level(selection.result, floor)
+    return selection.result.rms > SEEN * noise_level(selection.result, floor)
 
 
 def _is_simpler(unnamed: UnnamedLaw, selection: Selection) -> bool:
@@ -176,15 +176,15 @@ def _gain_of_names(selection: Selection) -> Gain:
 def _is_another_law(selection: Selection, floor: float, unnamed: UnnamedLaw) -> bool:
     """Tell whether a law at the same place leaves so much less that it can't be the named one in other words.
 
-    A linear system is none that is not linear in other words, however little that leaves, if a law of it is left.
+    A law of lags alone is none in other words that is not linear, however little that leaves, if a law is left.
     """
     entries = [EFFECTS[name] for name in selection.chosen]
     if any(entry.phases for entry in entries):  # a wave and its harmonics are sought one by one
         return False
     after, level = selection.result.rms, noise_level(selection.result, floor)
     left = max(unnamed.rms**2 - level**2, 0.0)
-    linear = all(term in LINEAR for term, _ in unnamed.terms) and not any(entry.linear for entry in entries)
-    seen = _is_seen(selection, floor) or (linear and after >= VISIBLE * level and selection.remaining is not None)
+    lags = all(term in LAGS for term, _ in unnamed.terms) and not any(entry.linear for entry in entries)
+    seen = _is_seen(selection, floor) or (lags and after >= VISIBLE * level and selection.remaining is not None)
     return seen and left < FAR_BETTER * (after**2 - level**2)
 
 

@@ -30,6 +30,10 @@ MOST_OF_POSITION = 0.5
 
 VISIBLE = 1.05
 
+SEEN = 1.15
+"""Error over the noise above which what is left is seen, whatever it is: the estimate of the noise errs by some per
+cent."""
+
 BELIEVED_TOGETHER = 2
 """Effects that may be a simpler law at the place of one of them in other words. More of them put together what is one
 thing at one place."""

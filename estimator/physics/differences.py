@@ -12,18 +12,20 @@ from estimator.signals.record import BoolArray, FloatArray
 def differences(
     moved: FloatArray, output: FloatArray, use: BoolArray, steps: FloatArray, limit: float, least: float
 ) -> FloatArray:
-    """Return the derivatives of the samples that count, shape (K, R).
+    """Return the derivatives of the samples that count, shape (K, R) [unit of the output].
 
     Parameters
     ----------
     moved, output : ndarray, shape (K, N) and (N,)
-        Simulations with unknown k moved by ``steps[k]``, and without.
+        Simulations with unknown k moved by ``steps[k]``, and without [unit of the output].
     use : ndarray of bool, shape (N,)
         Which R samples count.
+    steps : ndarray, shape (K,)
+        In scaled unknowns, without unit.
     limit : float
-        Size of a simulation beyond which it has run away; it is taken to stay there.
+        Size of a simulation beyond which it has run away; it is taken to stay there [unit of the output].
     least : float
-        Largest change that is none: of rounding alone.
+        Largest change that is none: of rounding alone [unit of the output].
     """
     found = np.empty((moved.shape[0], int(np.sum(use))))
     for k in range(moved.shape[0]):

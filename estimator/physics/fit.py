@@ -246,7 +246,7 @@ def _within_reason(out: FloatArray, record: Record) -> FloatArray:
 
 
 def _far_away(record: Record) -> float:
-    """Return the size of an output that counts for one that has run away."""
+    """Return the size of an output that counts for one that has run away [unit of the output]."""
     return BAD * (float(np.abs(record.output[record.okay]).max()) or 1.0)
 
 

@@ -79,10 +79,10 @@ def survey(result: FitResult) -> Survey:
 
 
 def located(selection: Selection) -> tuple[Selection, UnnamedLaw | None]:
-    """Return a selection with the search for laws without a name gone to its end, and the best of them."""
+    """Return a selection with the search for laws without a name gone to its end, and the best of them if it counts."""
     view = scene(selection.retuned, noise_floor(selection.retuned.problem.records))
     hunts = hunts_of(view, ROUNDS, selection.hunts)
-    return replace(selection, hunts=hunts), best_of(judged(view, hunts))
+    return replace(selection, hunts=hunts), _counting(best_of(judged(view, hunts)), selection.retuned)
 
 
 def _counting(law: UnnamedLaw | None, result: FitResult) -> UnnamedLaw | None:

@@ -15,7 +15,7 @@ from estimator.diagnosis.selection.outdone import outdone
 from estimator.diagnosis.selection.rounds import Rounds
 from estimator.diagnosis.trial import Trial
 from estimator.diagnosis.unnamed import UnnamedLaw
-from estimator.diagnosis.weight import VISIBLE
+from estimator.diagnosis.weight import SEEN, VISIBLE
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult
 from estimator.physics.parallel import concurrently
@@ -31,11 +31,6 @@ effects that were there, the second promised a third or more (seventy sealed pai
 
 PATIENCE = 4
 """How many times its iterations a fit may take on which a verdict is built."""
-
-ALONE = 1.15
-"""Error over the noise that a law without a name leaves at most where it is all there is. Of what is outside the
-catalogue 26 of 28 such laws left 1.06 times the noise or less, of two effects in doubt six left 1.37 or more (docs/
-campaign.md, sets 775 to 778)."""
 
 OTHER_WAYS = 3
 """Effects that another way begins with, those that by themselves leave least."""
@@ -58,7 +53,7 @@ class Selector:
         self._progress = progress
         self._rounds = Rounds(jury, progress)
         self._surveys: dict[int, tuple[FitResult, Survey]] = {}
-        self._begun_with: set[str] = set()
+        self._gone: set[str] = set()  # effects that a way has begun with
 
     def run(self) -> Selection:
         """Add effects while one earns its place; then drop those that the others made superfluous."""
@@ -83,8 +78,7 @@ class Selector:
 
     def may_imitate(self, selection: Selection) -> bool:
         """Tell whether a choice came near the noise by bending: some law still finds something in what it leaves."""
-        bends = bool(flexible(selection.chosen)) and self._is_near(selection.result)
-        return bends and selection.remaining is not None
+        return self._has_bent(selection.chosen, selection.result) and selection.remaining is not None
 
     def by_other_ways(self, selection: Selection) -> Selection:
         """Return the best of a selection that is in doubt and of those that begin with other effects.
@@ -96,26 +90,27 @@ class Selector:
         hides that. Where one law without a name explains all by itself there are not two.
         """
         retuned = selection.retuned
-        if not (flexible(selection.chosen) and self._is_near(selection.result)):
+        if not self._has_bent(selection.chosen, selection.result):
             selection, law = located(selection)
-            if law is not None and law.rms <= ALONE * self.jury.weight.level(selection.result):
+            if law is not None and law.rms <= SEEN * self.jury.weight.level(selection.result):
                 return selection
         old = path = _Path(selection.chosen, selection.result, selection.accepted)
         without = flexible(path.chosen) if self._is_near(path.current) else NOTHING
-        gone = NOTHING if flexible(path.chosen) else frozenset(self._begun_with)
+        gone = NOTHING if flexible(path.chosen) else frozenset(self._gone)
         for first in self._rounds.finished_first(retuned, without, OTHER_WAYS):
             if first.name not in gone:
                 path = self._better(path, self._completed(first, retuned, without), retuned)
             without |= NOTHING if EFFECTS[first.name].profile else {first.name}
-            if path is not old and self._is_near(path.current) and not self._imitates(path):
-                break
+            if path is not old and self._is_near(path.current):
+                if not flexible(path.chosen) or self._law(path.current) is None:
+                    break
         if path is old:
             return selection
         return self._concluded(self._stiffened(self._grown(path, retuned), retuned), retuned)
 
-    def _imitates(self, path: _Path) -> bool:
-        """Tell whether some law still finds something in what a path leaves that bends."""
-        return bool(flexible(path.chosen)) and self._law(path.current) is not None
+    def _has_bent(self, chosen: Effects, result: FitResult) -> bool:
+        """Tell whether what bends is among effects that came near the noise."""
+        return bool(flexible(chosen)) and self._is_near(result)
 
     def _completed(self, first: Trial, retuned: FitResult, without: Effects) -> _Path:
         """Return the way that begins with an effect, and ends there or with one that completes the explanation.
@@ -175,7 +170,7 @@ class Selector:
             if best is None:
                 break
             if not path.chosen:
-                self._begun_with.add(best.name)
+                self._gone.add(best.name)
             path = self._with(path, best, retuned)
             if len(path.chosen) == 1 and self._has_rest(path.current, retuned):  # before another is named for the rest
                 (alone,) = path.chosen

@@ -1,13 +1,13 @@
 """Laws without a name: at each element the best sparse sum of functions, the rival that every name must beat."""
 
 from estimator.diagnosis.unnamed.hunt import Hunt
-from estimator.diagnosis.unnamed.laws import LINEAR
+from estimator.diagnosis.unnamed.laws import LAGS
 from estimator.diagnosis.unnamed.look_again import without_law
 from estimator.diagnosis.unnamed.scene import Scene, scene
 from estimator.diagnosis.unnamed.search import ROUNDS, UnnamedLaw, best_of, best_unnamed, hunts_of, judged, unnamed_laws
 
 __all__ = [
-    "LINEAR",
+    "LAGS",
     "ROUNDS",
     "Hunt",
     "Scene",

@@ -6,7 +6,7 @@ A name is a formula, which takes a coefficient, or a phrase, which begins with a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -64,6 +64,20 @@ def _with(function: Callable[[FloatArray, Motion, float], FloatArray], signal: L
     return lambda m: function(signal(m), m, time_s)
 
 
+def _lags(phrase: str, signal: Law, times_s: Sequence[float]) -> dict[str, Law]:
+    """Return how far lags of first order are behind a signal; ``phrase`` goes on with the time."""
+    return {f"{phrase} {time_s:g} s": _with(behind, signal, time_s) for time_s in times_s}
+
+
+SHAFT_TORQUE_LAGS = _lags("the shaft torque behind by", _twist, (0.01, 0.03, 0.1))
+RELAXATIONS = _lags("a relaxation of the twist in", _twist, (0.005, 0.01, 0.02, 0.04, 0.1, 0.3))
+TORQUE_LAGS = _lags("the torque behind by", _torque, (0.005, 0.02, 0.06, 0.2))
+READING_LAGS = _lags("the speed reading behind by", _speed, (0.005, 0.02, 0.06, 0.2))
+
+LAGS = frozenset({*SHAFT_TORQUE_LAGS, *RELAXATIONS, *TORQUE_LAGS, *READING_LAGS})
+"""Laws that are linear systems with a time of their own."""
+
+
 def _drag_laws(name: str, speed: Law) -> dict[str, Law]:
     """Return what may brake a mass, as functions of its speed and of time."""
     laws: dict[str, Law] = {
@@ -82,9 +96,7 @@ def _drag_laws(name: str, speed: Law) -> dict[str, Law]:
 
 MOTOR_LAWS: Mapping[str, Law] = _drag_laws("w_M", lambda m: m.speed)
 
-LOAD_LAWS: Mapping[str, Law] = _drag_laws("w_L", lambda m: m.load_speed) | {
-    f"the shaft torque behind by {time_s:g} s": _with(behind, lambda m: m.twist, time_s) for time_s in (0.01, 0.03, 0.1)
-}
+LOAD_LAWS: Mapping[str, Law] = _drag_laws("w_L", lambda m: m.load_speed) | SHAFT_TORQUE_LAGS
 
 
 def _shaft_laws() -> dict[str, Law]:
@@ -106,9 +118,7 @@ def _shaft_laws() -> dict[str, Law]:
         laws[f"the twist held inside {share:g} of its range"] = _of(inside, _twist, share)
         laws[f"a slider that yields at {share:g} of the twist"] = _of(slide, _twist, share)
         laws[f"twist / (1 + (w_M / {share:g} top)^2)"] = _with(at_low_speed, _twist, share)
-    for time_s in (0.005, 0.01, 0.02, 0.04, 0.1, 0.3):
-        laws[f"a relaxation of the twist in {time_s:g} s"] = _with(behind, _twist, time_s)
-    return laws
+    return laws | RELAXATIONS
 
 
 SHAFT_LAWS: Mapping[str, Law] = _shaft_laws()
@@ -130,8 +140,7 @@ def _torque_laws() -> dict[str, Law]:
         laws[f"the torque held inside {share:g} of its range"] = _of(inside, _torque, share)
     for share in (0.5, 0.65, 0.8, 0.9):
         laws[f"the torque beyond {share:g} of its range"] = _of(beyond, _torque, share)
-    for time_s in (0.005, 0.02, 0.06, 0.2):
-        laws[f"the torque behind by {time_s:g} s"] = _with(behind, _torque, time_s)
+    laws |= TORQUE_LAGS
     for time_s in (3.0, 10.0, 30.0):
         laws[f"T (1 - exp(-t / {time_s:g} s))"] = _with(rising, _torque, time_s)
     return laws
@@ -150,9 +159,7 @@ def _reading_laws() -> dict[str, Law]:
         "sign(w)": lambda m: sign(m.speed),
         "T": lambda m: m.torque,
     }
-    for time_s in (0.005, 0.02, 0.06, 0.2):
-        laws[f"the speed reading behind by {time_s:g} s"] = _with(behind, _speed, time_s)
-    return laws
+    return laws | READING_LAGS
 
 
 READING_LAWS: Mapping[str, Law] = _reading_laws()
@@ -165,9 +172,6 @@ LAWS: Mapping[Element, Mapping[str, Law]] = {
     Element.SPEED_SENSOR: READING_LAWS,
     Element.ACQUISITION: {"t dw/dt": lambda m: since_start(m) * rate(m.speed, m)},
 }
-
-LINEAR = frozenset(name for laws in LAWS.values() for name in laws if "behind" in name or "relaxation" in name)
-"""Laws that are linear systems, of the torque, the twist or the speed."""
 
 FREE: Mapping[Element, Mapping[str, Law]] = {
     Element.TORQUE_PATH: {"T": lambda m: m.torque},

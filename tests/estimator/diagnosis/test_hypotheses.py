@@ -263,14 +263,24 @@ class TestLocalMinima:
         bench = self.with_mode(0.1, 20.0, 0.76)
         bench.fit(self.MODE, bench.fit(NOTHING))
         again = bench.fit_again(self.MODE, "extra_torsional_mode")
-        monkeypatch.setattr(bench, "_fit", None)
+        monkeypatch.setattr(hypotheses, "begun", None)
         assert bench.fit_again(self.MODE, "extra_torsional_mode") is again
 
     def test_where_a_look_promises_next_to_nothing_nothing_is_fitted(self, monkeypatch: pytest.MonkeyPatch) -> None:
         bench = self.with_mode(0.2, 13.0, 0.76)
         first = bench.fit(self.MODE, bench.fit(NOTHING))
-        monkeypatch.setattr(bench, "_fit", None)
+        monkeypatch.setattr(hypotheses, "begun", None)
         assert bench.fit_again(self.MODE, "extra_torsional_mode") is first
+
+    @pytest.mark.parametrize("hopeless", [0.0, hypotheses.HOPELESS])
+    def test_a_fit_begun_once_more_that_is_far_behind_is_not_gone_on_with(
+        self, hopeless: float, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        bench = self.with_mode(0.1, 20.0, 0.76)
+        first = bench.fit(self.MODE, bench.fit(NOTHING))
+        monkeypatch.setattr(hypotheses, "HOPELESS", hopeless)
+        again = bench.fit_again(self.MODE, "extra_torsional_mode")
+        assert (again is first) is (hopeless == 0.0)
 
     def test_a_better_fit_stays(self) -> None:
         bench = self.with_mode(0.2, 13.0, 0.76)
@@ -308,7 +318,11 @@ class TestLocalMinima:
         right = bench.fit(COULOMB, bench.fit(NOTHING))
         larger = bench.fit(COULOMB | {"actuator_lag"}, right)
         bench._fits[COULOMB] = replace(right, residual=5.0 * right.residual)  # as if it had ended elsewhere
-        assert bench.fit_less(COULOMB, larger).squares == pytest.approx(right.squares, rel=1e-4)
+        again = bench.fit_less(COULOMB, larger)
+        assert again.squares == pytest.approx(right.squares, rel=1e-4)
+        bench._fits[COULOMB] = worse = replace(right, residual=5.0 * right.residual)
+        assert bench.fit_less(COULOMB, larger) is worse  # that fit has been begun from
+        assert bench.fit_less(COULOMB, replace(larger, x=larger.x + 1e-6)) is not worse
 
     def test_what_fewer_effects_had_found_better_stays(self, bench: Bench) -> None:
         right = bench.fit(COULOMB, bench.fit(NOTHING))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares, lsq_linear
 
-from estimator.physics.least_squares import CONVERGED, Solution, minimise
+from estimator.physics.least_squares import CONVERGED, Solution, _carried_on, minimise
 from estimator.signals.correlation import effective_samples
 from estimator.signals.record import FloatArray
 from tests.estimator.diagnosis.regression import autoregressive
@@ -121,6 +121,17 @@ def test_rosenbrocks_valley_is_followed_to_its_end() -> None:
     ours = minimise(residual, jacobian, np.array([-1.2, 1.0]), np.full(2, -5.0), np.full(2, 5.0))
     np.testing.assert_allclose(ours.x, [1.0, 1.0], atol=1e-6)
     assert ours.converged
+
+
+def test_a_derivative_carried_on_tells_the_last_step_and_its_curvature_is_its_own() -> None:
+    """Broyden's update: the step's change exactly, what is across it as before."""
+    rng = np.random.default_rng(3)
+    old, change, step = rng.standard_normal((40, 4)), rng.standard_normal(40), rng.standard_normal(4)
+    new, curvature = _carried_on(old, old.T @ old, change, step)
+    across = np.linalg.svd(step[np.newaxis])[2][1:].T
+    np.testing.assert_allclose(new @ step, change, rtol=1e-10, atol=1e-12)
+    np.testing.assert_allclose(new @ across, old @ across, rtol=1e-10, atol=1e-12)
+    np.testing.assert_allclose(curvature, new.T @ new, rtol=1e-10, atol=1e-12)
 
 
 def test_near_the_end_the_derivative_is_carried_on() -> None:

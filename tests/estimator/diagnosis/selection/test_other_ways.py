@@ -42,7 +42,7 @@ def select(searched: tuple[Selector, Selection], monkeypatch: pytest.MonkeyPatch
     """With the fits of the search alone, what a test finds a hair better is no other's; and as if no way were gone."""
     bench = searched[0].jury.bench
     monkeypatch.setattr(bench, "_fits", dict(bench._fits))
-    monkeypatch.setattr(searched[0], "_begun_with", set())
+    monkeypatch.setattr(searched[0], "_gone", set())
     return searched[0]
 
 
@@ -142,7 +142,7 @@ def test_the_way_that_was_gone_is_gone_again_only_without_what_bends(
         begun.append(first.name)
         return _Path(NOTHING, retuned, {})
 
-    monkeypatch.setattr(select, "_begun_with", {COULOMB})
+    monkeypatch.setattr(select, "_gone", {COULOMB})
     monkeypatch.setattr(select, "_completed", completed)
     monkeypatch.setattr(select, "_is_near", lambda _: False)
     select.by_other_ways(replace(found, chosen=frozenset({"road_grade"})) if bends else nothing_of(found))
@@ -219,13 +219,29 @@ def test_where_one_law_without_a_name_explains_all_no_other_way_is_gone(
 
 
 def test_the_search_for_its_law_is_not_made_twice(found: Selection, monkeypatch: pytest.MonkeyPatch) -> None:
-    twice, law = located(located(found)[0])
-    once, same = located(found)
-    assert [hunt.rounds for hunt in once.hunts] == [ROUNDS] * len(once.hunts)
-    assert law == same
+    once, law = located(found)
+    assert law is not None
+    assert {hunt.rounds for hunt in once.hunts} == {ROUNDS}
     monkeypatch.setattr("estimator.diagnosis.unnamed.search.again", None)
     assert located(once)[1] == law
-    assert [hunt.law for hunt in twice.hunts] == [hunt.law for hunt in once.hunts]
+    with pytest.raises(TypeError, match="not callable"):
+        located(found)
+
+
+def test_no_law_that_chance_would_find_explains_all() -> None:
+    """Of an error that is noise already any law leaves no more than the noise."""
+    select = selector(quiet(values=ONE_MASS))
+    assert located(select.run())[1] is None
+
+
+def test_on_other_steps_what_the_rest_makes_superfluous_is_dropped(found: Selection) -> None:
+    select = selector(late(rubbing(coulomb), 3))
+    bench, more = select.jury.bench, BOTH | {"quadratic_friction"}
+    result = bench.fit_by_steps(more)
+    had = dict.fromkeys(more, next(iter(found.accepted.values())))
+    moved = selector(late(rubbing(coulomb), 3)).taken_over(replace(found, chosen=more, result=result, accepted=had))
+    assert moved is not None
+    assert moved.chosen == BOTH
 
 
 def test_a_way_from_nothing_must_end_near_the_noise() -> None:
@@ -241,7 +257,7 @@ def test_doubt_is_what_another_way_is_looked_for_in(monkeypatch: pytest.MonkeyPa
 
     def forgotten(select: Selector) -> Selection:
         found = nothing_of(run(select))
-        select._begun_with.clear()
+        select._gone.clear()
         return found
 
     monkeypatch.setattr(Selector, "run", forgotten)
