@@ -96,11 +96,13 @@ class InverterNode:
         """Take what another controller adds to the torque reference, past CANopen [Nm]; it holds until the next."""
         self._device.added_nm = torque_nm
 
-    def step(self, true_speed_rad_s: float, period_s: float) -> None:
-        """Take one SYNC: put the RPDOs received since the last into effect, sample speed and torque.
+    def step(self, t_ns: int, true_speed_rad_s: float, period_s: float) -> None:
+        """Take one SYNC: look for the host, put the RPDOs received since the last into effect, sample speed and torque.
 
         Parameters
         ----------
+        t_ns
+            When the SYNC came, by the wall clock [ns].
         true_speed_rad_s
             Motor speed now [rad/s].
         period_s
@@ -108,7 +110,8 @@ class InverterNode:
         """
         with self._lock:
             self._syncs += 1
-            self._host.pass_simulated_time(period_s)
+            self._host.take_sync(period_s)
+            self.look_for_host(t_ns)
             self._meet_faults()
             pending, self._pending = self._pending, {}
             for cob_id, data in pending.items():

@@ -114,8 +114,7 @@ class SimulatedRig:
             if node is not None:
                 node.add_torque(added_nm)
         for node in self._nodes:
-            node.look_for_host(t_ns)
-            node.step(speed_rad_s, self._period_s)
+            node.step(t_ns, speed_rad_s, self._period_s)
         for node in self._nodes:
             node.send_feedback()
         self._plant.advance(self.torque_nm, self._period_s)

@@ -70,6 +70,15 @@ def test_in_simulated_time_the_syncs_count_and_not_the_clock() -> None:
             rig.m1.raise_if_faulted()
 
 
+def test_between_two_syncs_no_simulated_time_passes() -> None:
+    """Its own heartbeat, by which it looks for its host too, goes by the wall clock: every 10 ms."""
+    with driven() as rig:
+        for _ in range(10):
+            rig.cycle()
+        time.sleep(0.1)
+        assert rig.rig.torque_nm[0] == pytest.approx(120.0)
+
+
 def test_a_command_that_comes_again_ends_the_emergency_and_gives_no_torque() -> None:
     with driven() as rig:
         for _ in range(15):
