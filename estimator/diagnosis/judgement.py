@@ -16,7 +16,15 @@ from estimator.diagnosis.result import Stray, Verdict
 from estimator.diagnosis.selection import Selection
 from estimator.diagnosis.trial import scan_choices
 from estimator.diagnosis.unnamed import LAGS, UnnamedLaw
-from estimator.diagnosis.weight import BELIEVED_TOGETHER, SEEN, VISIBLE, least_share, reads_speed, share_removed
+from estimator.diagnosis.weight import (
+    BELIEVED_TOGETHER,
+    SEEN,
+    VISIBLE,
+    least_share,
+    leaves_a_detail,
+    reads_speed,
+    share_removed,
+)
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
@@ -32,10 +40,6 @@ NEAR_FLOOR_DETAIL = 2.5
 
 NEAR_FLOOR_PROFILE = SEEN
 """The same for a profile over time, which follows whatever is slow: what it leaves is something else."""
-
-DETAIL = 0.005
-"""Share of the mismatch's power that an explanation may leave above the noise beyond that: next to a mismatch of many
-times the noise it is a detail of the road or the line, or of how a law is written, whatever it is."""
 
 HARMONICS = 0.05
 """Share of the mismatch's power that a wave over an angle may leave, however far above the noise: no machine's is a
@@ -128,7 +132,7 @@ def _leaves_too_much(selection: Selection, floor: float, profile_alone: bool) ->
         return f"{1.0 - share:.0%} of the mismatch" if share < least else ""
     if all(EFFECTS[name].phases for name in selection.chosen) and share >= 1.0 - HARMONICS:
         return ""
-    if _leaves_a_detail(selection, floor):
+    if leaves_a_detail(selection.retuned, selection.result, floor):
         bends = any(EFFECTS[name].profile for name in selection.chosen)
         most = NEAR_FLOOR if bends else NEAR_FLOOR_DETAIL
     else:
@@ -137,12 +141,6 @@ def _leaves_too_much(selection: Selection, floor: float, profile_alone: bool) ->
     if share < (MOST_VISIBLE if seen else least) or after > most * level:
         return f"{1.0 - share:.0%} of the mismatch, {after / level:.2g} times the noise"
     return ""
-
-
-def _leaves_a_detail(selection: Selection, floor: float) -> bool:
-    """Tell whether what an explanation leaves above the noise is next to nothing of the mismatch."""
-    before, after = selection.retuned.rms, selection.result.rms
-    return after**2 - min(floor, after) ** 2 <= DETAIL * (before**2 - min(floor, before) ** 2)
 
 
 def _is_seen(selection: Selection, floor: float) -> bool:
@@ -201,7 +199,7 @@ def _bends(selection: Selection, floor: float, profile_alone: bool) -> bool:
     """
     much = profile_alone or bool(crowding(selection.chosen))
     flexibly = much or (bool(flexible(selection.chosen)) and _is_seen(selection, floor))
-    return flexibly and not _leaves_a_detail(selection, floor)
+    return flexibly and not leaves_a_detail(selection.retuned, selection.result, floor)
 
 
 def _is_filtered(selection: Selection, floor: float) -> bool:

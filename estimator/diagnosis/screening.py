@@ -190,15 +190,12 @@ class Screen:
         """Return the amplitudes all recordings share, the phases of each, and the promise."""
         parts: dict[str, list[tuple[float, float]]] = {}
         phases: list[dict[str, float]] = []
-        raws = []
         for i, mine in enumerate(found):
-            raw = self._spread(np.concatenate([wave.answers for wave in mine]), i)
-            answers = self._projector.rest(raw)
-            raws.append(raw)
-            coefficients = -np.linalg.lstsq(answers.T, self._projector.error, rcond=None)[0].reshape(-1, 2)
+            gram, match = self._projector.products(np.concatenate([wave.answers for wave in mine]), self._rows_of(i))
+            coefficients = -np.linalg.lstsq(gram, match, rcond=None)[0].reshape(-1, 2)
             phases.append({})
             for wave, (along, across), power in zip(
-                mine, coefficients, (answers**2).sum(axis=1).reshape(-1, 2).sum(axis=1), strict=True
+                mine, coefficients, np.diag(gram).reshape(-1, 2).sum(axis=1), strict=True
             ):
                 parts.setdefault(wave.amplitude, []).append((float(np.hypot(along, across)), float(power)))
                 phases[i][wave.phase] = float(np.arctan2(across, along))
@@ -207,10 +204,11 @@ class Screen:
             for name, each in parts.items()
         }
         change = np.zeros_like(self._projector.error)
-        for mine, answers, angles in zip(found, raws, phases, strict=True):
-            for wave, (at_zero, at_quarter) in zip(mine, answers.reshape(-1, 2, change.size), strict=True):
+        for i, (mine, angles) in enumerate(zip(found, phases, strict=True)):
+            for wave in mine:
                 angle = angles[wave.phase]
-                change += amplitudes[wave.amplitude] * (np.cos(angle) * at_zero + np.sin(angle) * at_quarter)
+                turned = np.cos(angle) * wave.answers[0] + np.sin(angle) * wave.answers[1]
+                change[self._rows_of(i)] += amplitudes[wave.amplitude] * turned
         return amplitudes, phases, self._projector.promise(change, 0.0, 1.0)[1]
 
     def _events(self, entry: Effect, releases: Sequence[Release]) -> list[Look]:
@@ -224,7 +222,7 @@ class Screen:
             for i, own in enumerate(release.own)
         ]
         scans = [
-            scanned(*self._projector.products(grid.answers, slice(*self._rows[i : i + 2])), entry.lasting)
+            scanned(*self._projector.products(grid.answers, self._rows_of(i)), entry.lasting)
             for i, grid in enumerate(grids)
         ]
         tried = [value for value in SIZES * size.scale * abs(size.start) if self._may_be(size, value)]
@@ -243,11 +241,13 @@ class Screen:
             for unknowns, grid, stretch in zip(release.own, grids, stretches, strict=True)
         )
         found = Release((replace(size, start=best / size.scale), *release.shared[1:]), own)
-        change = sum(
-            self._spread((grid.answers[stretch.last] - grid.answers[stretch.first])[None, :], i)[0]
-            for i, (grid, stretch) in enumerate(zip(grids, stretches, strict=True))
+        change = np.hstack(
+            [
+                grid.answers[stretch.last] - grid.answers[stretch.first]
+                for grid, stretch in zip(grids, stretches, strict=True)
+            ]
         )
-        return Look(found, self._projector.promise(best * np.asarray(change), 0.0, LARGEST_SCALING)[1])
+        return Look(found, self._projector.promise(best * change, 0.0, LARGEST_SCALING)[1])
 
     @staticmethod
     def _may_be(size: Shared, value: float) -> bool:
@@ -268,11 +268,9 @@ class Screen:
     def _output(self, index: int) -> FloatArray:
         return self._result.outputs[index][self._result.problem.use[index]]
 
-    def _spread(self, answers: FloatArray, index: int) -> FloatArray:
-        """Place one recording's answers, shape (K, R_i), among the samples of all, shape (K, R)."""
-        full = np.zeros((answers.shape[0], self._rows[-1]))
-        full[:, self._rows[index] : self._rows[index + 1]] = answers
-        return full
+    def _rows_of(self, index: int) -> slice:
+        """Return where the samples of one recording that count stand among those of all."""
+        return slice(self._rows[index], self._rows[index + 1])
 
 
 def _filled(p: FloatArray, shared: tuple[Shared, ...]) -> FloatArray:

@@ -34,6 +34,10 @@ SEEN = 1.15
 """Error over the noise above which what is left is seen, whatever it is: the estimate of the noise errs by some per
 cent."""
 
+DETAIL = 0.005
+"""Share of the mismatch's power, above the noise, that is a detail of the road or the line, or of how a law is written,
+whatever it is: next to a mismatch of many times the noise it may be seen, and is not asked after."""
+
 BELIEVED_TOGETHER = 2
 """Effects that may be a simpler law at the place of one of them in other words. More of them put together what is one
 thing at one place."""
@@ -98,6 +102,11 @@ def share_removed(before: FitResult, after: FitResult, level: float) -> float:
     """Return the share of the mismatch's power, above the noise, that a fit takes away; 1 where none stands."""
     standing = before.rms**2 - min(level, after.rms) ** 2
     return (before.rms**2 - after.rms**2) / standing if standing > 0.0 else 1.0
+
+
+def leaves_a_detail(before: FitResult, after: FitResult, floor: float) -> bool:
+    """Tell whether what a fit leaves above the noise is next to nothing of the mismatch."""
+    return after.rms**2 - min(floor, after.rms) ** 2 <= DETAIL * (before.rms**2 - min(floor, before.rms) ** 2)
 
 
 def reads_speed(result: FitResult) -> bool:

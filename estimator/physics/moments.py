@@ -17,7 +17,7 @@ from estimator.signals.record import FloatArray, Record
 
 OFFSETS_S = np.array([0.01, 0.02, 0.04, 0.08, 0.15, 0.3, 0.6, 1.2, 2.4])
 OFFSETS_S = np.concatenate([-OFFSETS_S[::-1], OFFSETS_S])
-"""Where else the error is looked at, around the moment a fit ended at."""
+"""Where else the error is looked at, around the moment a fit ended at; and at the recording's own end, however far."""
 
 REACH_S = 0.5
 """How far a fit may go on from a moment that was moved: beyond it others match."""
@@ -105,12 +105,14 @@ def _moved_in(result: FitResult, index: int) -> FloatArray | None:
     misfit = _Misfit(result, index)
     began = best = float(misfit.squares([local])[0])
     least = WORTH_MOVING * result.squares / result.residual.size
-    first, last = result.problem.records[index].since_start_s[[0, -1]]
+    first, last = (float(each) for each in result.problem.records[index].since_start_s[[0, -1]])
     for begin, end in ends:
         may_move = [row for row in (begin, end) if basis.low[row] < basis.high[row]]
+        own_end = {begin: first, end: last}
         moves = [[row] for row in may_move] + ([may_move] if len(may_move) > 1 else [])
         for _ in range(MOVES):
             tried = [_shifted(local, rows, offset) for rows in moves for offset in OFFSETS_S]
+            tried += [_shifted(local, [row], own_end[row] - local[row]) for row in may_move]
             tried = [local, *(x for x in tried if first <= x[begin] < x[end] <= max(last, local[end]))]
             squares = misfit.squares(tried)
             if squares.min() >= best:

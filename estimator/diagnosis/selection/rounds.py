@@ -25,6 +25,14 @@ WORTH_GOING_ON, WORTH_FINISHING = 0.5, 0.8
 """Share of the best fit's gain below which a rival's fit stays as it is, after the first few steps and a few more. What
 bends gains in fewer steps: at first, laws are held against the best of them, too."""
 
+TOO_LATE = 16.0
+"""Squared error over the best fit's beyond which not even what sets others free is finished: the best is chosen first.
+"""
+
+FAR_BEHIND = 1.5
+"""Error over that of the effect that by itself leaves least beyond which no other way begins with one: those that found
+what was hidden began within a hundredth of it (seven of five hundred sealed cases)."""
+
 
 @dataclass
 class Rounds:
@@ -74,7 +82,8 @@ class Rounds:
             rough |= dict(zip(further, fits, strict=True))
             further = _near_the_best(rough, current, WORTH_FINISHING)
         pressed = pressed_parameters(current)
-        freed = [name for name in rough if EFFECTS[name].loosens & pressed]
+        most = TOO_LATE * min((result.squares for result in rough.values()), default=0.0)
+        freed = [name for name, fit in rough.items() if EFFECTS[name].loosens & pressed and fit.squares <= most]
 
         def finished(name: str) -> Trial:
             effects, result = with_effect(chosen, name), rough[name]
@@ -170,7 +179,8 @@ class Rounds:
     def finished_first(self, retuned: FitResult, without: Effects, most: int) -> list[Trial]:
         """Return effects of the first round that leave least, each fitted to its end, the one that leaves least first.
 
-        Some are left out, and a general law where its special case is among them; ``most`` is how many are wanted.
+        Some are left out, and a general law where its special case is among them, and what is far behind the best;
+        ``most`` is how many are wanted.
         """
         alone = {trial.name: trial for trial in self.trials.values() if len(trial.effects) == 1}
         able = [t for t in alone.values() if t.name not in without and not alone.keys() & set(EFFECTS[t.name].contains)]
@@ -186,7 +196,9 @@ class Rounds:
         self._report("finishing all of them", 0.0)
         trials = concurrently(finished, able)
         self.trials |= {trial.name: trial for trial in trials}
-        return sorted(trials, key=lambda trial: trial.result.squares)[:most]
+        least = min((trial.result.rms for trial in trials), default=0.0)
+        near = [trial for trial in trials if trial.result.rms <= FAR_BEHIND * least]
+        return sorted(near, key=lambda trial: trial.result.squares)[:most]
 
     def let_go(self, kept: FitResult) -> None:
         """Let the derivatives of what lost a round go."""

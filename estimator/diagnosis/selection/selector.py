@@ -15,7 +15,7 @@ from estimator.diagnosis.selection.outdone import outdone
 from estimator.diagnosis.selection.rounds import Rounds
 from estimator.diagnosis.trial import Trial
 from estimator.diagnosis.unnamed import UnnamedLaw
-from estimator.diagnosis.weight import SEEN, VISIBLE
+from estimator.diagnosis.weight import SEEN, VISIBLE, leaves_a_detail, reads_speed
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult
 from estimator.physics.parallel import concurrently
@@ -28,6 +28,10 @@ NEAR_NOISE = 1.5
 PART_OF_REST = 0.25
 """Share of what still stands above the noise that a first look must promise for a further effect to be fitted: of two
 effects that were there, the second promised a third or more (seventy sealed pairs); beside what only imitates, less."""
+
+PART_IN_PLACE = 0.2
+"""Share of what an effect that bends explains beside others that a first look at a law must promise for it to be tried
+in its place: those that took its place promised a third of it or more (six hundred sealed cases)."""
 
 PATIENCE = 4
 """How many times its iterations a fit may take on which a verdict is built."""
@@ -54,6 +58,7 @@ class Selector:
         self._rounds = Rounds(jury, progress)
         self._surveys: dict[int, tuple[FitResult, Survey]] = {}
         self._gone: set[str] = set()  # effects that a way has begun with
+        self._put_off: _Path | None = None  # two that get a third only if no other way ends better
 
     def run(self) -> Selection:
         """Add effects while one earns its place; then drop those that the others made superfluous."""
@@ -87,7 +92,8 @@ class Selector:
         leaves, and pays for itself out of an error that stays correlated. And a load profile, or an event whose
         moments are sought, bends to imitate two at once: where it came near the noise, the ways go without it.
         Two are looked at once, from the one that by itself leaves less: what the other adds shows there. A profile
-        hides that. Where one law without a name explains all by itself there are not two.
+        hides that. Where one law without a name explains all by itself there are not two. A way that does not end near
+        the noise of a speed would be doubted as well.
         """
         retuned = selection.retuned
         if not self._has_bent(selection.chosen, selection.result):
@@ -99,14 +105,20 @@ class Selector:
         gone = NOTHING if flexible(path.chosen) else frozenset(self._gone)
         for first in self._rounds.finished_first(retuned, without, OTHER_WAYS):
             if first.name not in gone:
-                path = self._better(path, self._completed(first, retuned, without), retuned)
+                way = self._completed(first, retuned, without)
+                if self._is_near(way.current) or not reads_speed(way.current):
+                    path = self._better(path, way, retuned)
             without |= NOTHING if EFFECTS[first.name].profile else {first.name}
             if path is not old and self._is_near(path.current):
                 if not flexible(path.chosen) or self._law(path.current) is None:
                     break
-        if path is old:
+        if path is not old:
+            return self._concluded(self._stiffened(self._grown(path, retuned), retuned), retuned)
+        two = self._put_off
+        three = two if two is None else self._grown(two, retuned, far=True)
+        if three is None or three is two:
             return selection
-        return self._concluded(self._stiffened(self._grown(path, retuned), retuned), retuned)
+        return self._concluded(self._stiffened(three, retuned), retuned)
 
     def _has_bent(self, chosen: Effects, result: FitResult) -> bool:
         """Tell whether what bends is among effects that came near the noise."""
@@ -154,13 +166,17 @@ class Selector:
             hunts=first.hunts,
         )
 
-    def _grown(self, path: _Path, retuned: FitResult) -> _Path:
+    def _grown(self, path: _Path, retuned: FitResult, far: bool = False) -> _Path:
         """Add effects to a path while one earns its place.
 
-        A further round of fits is only made where some law, named or not, still has something to explain.
+        A further round of fits is only made where some law, named or not, still has something to explain. Two that are
+        far from explaining it get a third only where ``far`` is True: other ways to begin are gone first.
         """
         for _ in range(MOST_EFFECTS - len(path.chosen)):
             if path.chosen and not self._has_rest(path.current, retuned):
+                break
+            if len(path.chosen) > 1 and not far and self._is_far(path.current, retuned):
+                self._put_off = path
                 break
             least = self._least_promise(path, retuned)
             without = crowding(path.chosen) | self._outdone(path.chosen, retuned)
@@ -193,7 +209,10 @@ class Selector:
                 continue
             rest = path.chosen - {name}
             current = self.jury.bench.fit_less(rest, path.current)
-            trials = self._rounds.try_all(rest, current, flexible(frozenset(EFFECTS)) | self._outdone(rest, retuned))
+            without = flexible(frozenset(EFFECTS)) | self._outdone(rest, retuned)
+            trials = self._rounds.try_all(
+                rest, current, without, PART_IN_PLACE * (current.squares - path.current.squares)
+            )
             trials |= self._rounds.try_in_place(name, path.current, list(trials), rest, current)
             best = self.jury.best(trials, current, retuned)
             if best is not None:
@@ -280,18 +299,31 @@ class Selector:
     def _is_near(self, result: FitResult) -> bool:
         return result.rms <= NEAR_NOISE * self.jury.weight.level(result)
 
+    def _is_far(self, result: FitResult, retuned: FitResult) -> bool:
+        """Tell whether a fit of a speed leaves much more than the noise, and more than a detail of the mismatch."""
+        if self._is_near(result) or not reads_speed(result):
+            return False
+        return not leaves_a_detail(retuned, result, self.jury.weight.floor)
+
     def _least_promise(self, path: _Path, retuned: FitResult) -> float:
         """Return by how much an effect must promise to lower the squared error of a path to be fitted.
 
         Where two leave too much to stand, a third must promise to complete them: what imitates takes a little each
-        time. Beside a profile a first look promises too little: it has taken up part of what is another's. So may any
-        law where next to nothing is left.
+        time. Where they may stand, to come near the noise, or half the way. Beside a profile a first look promises too
+        little: it has taken up part of what is another's. So may any law where next to nothing is left.
         """
-        if len(path.chosen) > 1 and not self.jury.weight.may_stand(path.current, retuned):
-            return 0.5 * self._rest(path.current)
+        rest = self._rest(path.current)
+        stands = self.jury.weight.may_stand(path.current, retuned)
+        if len(path.chosen) > 1 and not stands:
+            return 0.5 * rest
         if not path.chosen or self._is_near(path.current) or any(EFFECTS[name].profile for name in path.chosen):
             return 0.0
-        return PART_OF_REST * self._rest(path.current)
+        if len(path.chosen) > 1 and reads_speed(path.current):
+            near = NEAR_NOISE * self.jury.weight.level(path.current)
+            return max(
+                PART_OF_REST * rest, min(0.5 * rest, path.current.squares - near**2 * path.current.residual.size)
+            )
+        return PART_OF_REST * rest
 
     def _rest(self, result: FitResult) -> float:
         """Return the squared error that a fit leaves above the noise."""

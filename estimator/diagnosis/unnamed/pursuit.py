@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from estimator.diagnosis.unnamed.candidates import Pool
 from estimator.diagnosis.unnamed.ground import Ground
+from estimator.physics.parallel import WORKERS, concurrently
 from estimator.signals.correlation import effective_samples
-from estimator.signals.record import FloatArray
+from estimator.signals.record import FloatArray, IntArray
 
 MOST_TERMS = 9
 """Three load steps per recording in a set of three, or as many terms of another kind."""
@@ -24,7 +25,7 @@ MOST_COEFFICIENTS = 45
 ALIKE = 1e-6
 """A candidate that re-tuning reproduces to this share of its power can't be told from it."""
 
-CHUNK = 4096
+CHUNK = 2048
 """Rows that are worked on at a time."""
 
 TOO_ALIKE = 1e-8
@@ -120,19 +121,29 @@ def _products(pool: Pool, ground: Ground) -> tuple[FloatArray, FloatArray, Float
     Rows are taken in chunks: the answers of a long recording fill the memory once, and not once more for what is left.
     """
     seen = pool.answers @ ground.basis
+    halves = np.array_split(np.arange(0, ground.error.size, CHUNK), WORKERS)
+    parts = concurrently(lambda firsts: _summed(pool, ground, seen, firsts), halves)
+    before, gram, match = (np.sum(each, axis=0) for each in zip(*parts, strict=True))
+    after = np.diag(gram)
+    alive = after > ALIKE * np.maximum(before, np.finfo(float).tiny)
+    scale = np.where(alive, 1.0 / np.sqrt(np.where(alive, after, 1.0)), 0.0)
+    return scale, gram * np.outer(scale, scale), match * scale
+
+
+def _summed(
+    pool: Pool, ground: Ground, seen: FloatArray, firsts: IntArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the power of the answers, and the Gram matrix and the match of what is left of them, over some chunks."""
     width = pool.group.size
     before, gram, match = np.zeros(width), np.zeros((width, width)), np.zeros(width)
-    for first in range(0, ground.error.size, CHUNK):
+    for first in firsts.tolist():
         rows = slice(first, first + CHUNK)
         raw = pool.answers[:, rows]
         rest = raw - seen @ ground.basis[rows].T
         before += np.einsum("ij,ij->i", raw, raw)
         gram += rest @ rest.T
         match += rest @ ground.error[rows]
-    after = np.diag(gram)
-    alive = after > ALIKE * np.maximum(before, np.finfo(float).tiny)
-    scale = np.where(alive, 1.0 / np.sqrt(np.where(alive, after, 1.0)), 0.0)
-    return scale, gram * np.outer(scale, scale), match * scale
+    return before, gram, match
 
 
 def _gains(gram: FloatArray, match: FloatArray, group: Indices, count: int) -> tuple[FloatArray, FloatArray]:

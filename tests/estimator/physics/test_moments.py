@@ -33,10 +33,14 @@ LINE = model(TWO_MASS, tolerance=0.0, effects={"stiffness_change": {"change": -0
 
 @pytest.fixture(scope="module")
 def cracked() -> Record:
+    return cracked_between(FROM_S, TO_S)
+
+
+def cracked_between(from_s: float, to_s: float) -> Record:
     torque = random_steps(SAMPLES, 1, mean_nm=30.0)
     blank = record(torque, np.ones(SAMPLES))
     p = flat(LINE)
-    p[slot("stiffness_change", "from_s")], p[slot("stiffness_change", "to_s")] = FROM_S, TO_S
+    p[slot("stiffness_change", "from_s")], p[slot("stiffness_change", "to_s")] = from_s, to_s
     clean = simulate(grid_for(LINE, [blank]), blank, p, Start(10.0, 0.0, 20.0, 0.005, 20.0))
     return record(torque, clean + SIGMA * np.random.default_rng(1).standard_normal(SAMPLES))
 
@@ -65,6 +69,17 @@ def test_a_fit_that_is_stuck_nearby_comes_out(cracked: Record, off_s: float) -> 
     assert stuck.rms > 2.0 * SIGMA
     result = polished(stuck)
     assert moments_of(result) == pytest.approx([FROM_S, TO_S], abs=0.005)
+    assert result.rms == pytest.approx(SIGMA, rel=0.05)
+
+
+@pytest.mark.parametrize(("from_s", "to_s"), [(3.0, SAMPLES / 100.0), (0.0, 6.0)])
+def test_what_lasts_to_the_end_of_the_recording_is_found_however_far_that_is(from_s: float, to_s: float) -> None:
+    rec = cracked_between(from_s, to_s)
+    inner = max(from_s, 4.0), min(to_s, 5.0)
+    stuck = ended(rec, *inner)
+    assert max(abs(found - true) for found, true in zip(moments_of(stuck), (from_s, to_s), strict=True)) > OFFSETS_S[-1]
+    result = polished(stuck)
+    assert moments_of(result) == pytest.approx([from_s, to_s], abs=0.05)
     assert result.rms == pytest.approx(SIGMA, rel=0.05)
 
 

@@ -14,7 +14,7 @@ from estimator.diagnosis.search import search
 from estimator.diagnosis.selection import Selection, Selector
 from estimator.diagnosis.selection import selector as selector_module
 from estimator.diagnosis.selection.outcome import located
-from estimator.diagnosis.selection.selector import OTHER_WAYS, _Path
+from estimator.diagnosis.selection.selector import OTHER_WAYS, PART_IN_PLACE, _Path
 from estimator.diagnosis.trial import Trial
 from estimator.diagnosis.unnamed import ROUNDS, UnnamedLaw
 from estimator.physics.effect import Element
@@ -100,6 +100,24 @@ def test_the_law_may_begin_where_what_bends_has_brought_the_others(
     stiff = select._stiffened(bent, found.retuned)
     assert stiff.chosen == BOTH
     assert stiff.current.rms == pytest.approx(right.rms, rel=1e-3)
+
+
+def test_a_law_must_promise_a_fair_part_of_what_it_is_to_explain_in_its_place(
+    select: Selector, found: Selection, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    late_and_road, bench = frozenset({"road_grade", "transport_delay"}), select.jury.bench
+    delayed = bench.fit(frozenset({"transport_delay"}), found.retuned)
+    bent = _Path(late_and_road, bench.fit(late_and_road, delayed), {})
+    asked = []
+
+    def nothing_fitted(chosen: Effects, current: FitResult, without: Effects, least: float) -> dict[str, Trial]:
+        asked.append(least / (current.squares - bent.current.squares))
+        return {}
+
+    monkeypatch.setattr(select._rounds, "try_all", nothing_fitted)
+    monkeypatch.setattr(select, "_law", lambda _: None)
+    assert select._stiffened(bent, found.retuned) is bent
+    assert asked == pytest.approx([PART_IN_PLACE])
 
 
 def test_a_way_is_completed_however_near_to_the_noise_it_ends(
@@ -250,6 +268,20 @@ def test_a_way_from_nothing_must_end_near_the_noise() -> None:
     found = select.run()
     other = select.by_other_ways(nothing_of(found))
     assert other.chosen == NOTHING
+
+
+@pytest.mark.parametrize(("times_noise", "taken"), [(1.0, True), (2.0, False)])
+def test_any_way_must_where_a_speed_is_read(
+    select: Selector, found: Selection, monkeypatch: pytest.MonkeyPatch, times_noise: float, taken: bool
+) -> None:
+    """However much better it is than what was chosen."""
+    alone = frozenset({"actuator_lag"})
+    poorer = replace(found, chosen=alone, result=select.jury.bench.fit(alone, found.retuned), accepted={})
+    way = _Path(BOTH, replace(found.result, residual=times_noise * found.result.residual), found.accepted)
+    assert way.current.squares < 0.5 * poorer.result.squares
+    monkeypatch.setattr(select, "_completed", lambda *_: way)
+    monkeypatch.setattr(select, "_stands", lambda _: True)
+    assert select.by_other_ways(poorer).chosen == (BOTH if taken else alone)
 
 
 def test_doubt_is_what_another_way_is_looked_for_in(monkeypatch: pytest.MonkeyPatch) -> None:

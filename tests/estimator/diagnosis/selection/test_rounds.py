@@ -104,6 +104,49 @@ def test_a_law_is_not_left_behind_for_what_bends(monkeypatch: pytest.MonkeyPatch
     assert set(further) == {"road_grade", COULOMB}
 
 
+@pytest.mark.parametrize(("left", "finished"), [(0.7, True), (0.9, False)])
+def test_what_lets_a_pressed_parameter_go_is_finished_unless_the_best_leaves_next_to_nothing(
+    monkeypatch: pytest.MonkeyPatch, left: float, finished: bool
+) -> None:
+    """It shows itself late; but beside what leaves a fifth of the error it would have to show very late."""
+    tried = rounds(rubbing(lambda speed: 30.0 * np.sign(speed)), [COULOMB, "extra_torsional_mode"])
+    current, again, real = tried.jury.bench.fit(NOTHING), [], Bench.rough_fit
+    begun: dict[Effects, FitResult] = {}
+
+    def rough_fit(bench: Bench, effects: Effects, *given: object) -> FitResult:
+        part = {COULOMB: 0.2, "extra_torsional_mode": left}[next(iter(effects))]
+        begun[effects] = replace(real(bench, effects, *given), residual=part * current.residual)
+        return begun[effects]
+
+    def looked_again(bench: Bench, effects: Effects, name: str) -> FitResult:
+        again.append(name)
+        return bench.fit(effects)
+
+    monkeypatch.setattr("estimator.diagnosis.selection.rounds.pressed_parameters", lambda _: frozenset({"c"}))
+    monkeypatch.setattr(Bench, "rough_fit", rough_fit)
+    monkeypatch.setattr(Bench, "go_on", lambda _, effects: begun[effects])
+    monkeypatch.setattr(Bench, "fit_again", looked_again)
+    monkeypatch.setattr(Bench, "fit_retold", lambda bench, effects, _: bench.fit(effects))
+    tried.try_all(NOTHING, current)
+    assert again == (["extra_torsional_mode"] if finished else [])
+
+
+def test_no_other_way_begins_far_behind_the_best(monkeypatch: pytest.MonkeyPatch) -> None:
+    tried = rounds(rubbing(lambda speed: 30.0 * np.sign(speed)), [COULOMB, "quadratic_friction", "road_grade"])
+    bench = tried.jury.bench
+    current = bench.fit(NOTHING)
+    left = {"road_grade": 0.4, COULOMB: 0.59, "quadratic_friction": 0.61}
+
+    def fit(effects: Effects, warm: FitResult | None = None) -> FitResult:
+        return replace(current, residual=left[next(iter(effects))] * current.residual)
+
+    tried.trials = {name: tried.jury.trial(name, frozenset({name}), current, fit(frozenset({name}))) for name in left}
+    monkeypatch.setattr(bench, "fit", fit)
+    monkeypatch.setattr(bench, "fit_retold", lambda effects, name: fit(effects))
+    firsts = tried.finished_first(current, NOTHING, 3)
+    assert [first.name for first in firsts] == ["road_grade", COULOMB]
+
+
 def test_a_look_alike_of_the_best_is_tried_in_its_place() -> None:
     """A lag whose fit beside friction has ended elsewhere, and a delay that stands near the place of the lag."""
     records = []
