@@ -49,13 +49,14 @@ def search(chain: Chain, model: DrivelineModel, unseen: Sequence[Record], progre
     """Look for what is missing.
 
     Where the steps of the integration are part of what explains the recordings, what is chosen is fitted on finer ones,
-    and where it leaves more there, or would no longer be the verdict, the search begins anew on them.
+    and where it leaves more there, or is not believed on either, the search begins anew on them.
     """
     grid = grid_for(model, chain.records)
     found = _search(chain, model, unseen, progress, grid)
     if is_made_by_steps(found.selection.result):
         finer = _finer(grid)
-        found = _moved(found, progress, finer) or _search(chain, model, unseen, progress, finer)
+        moved = _moved(found, progress, finer) if found.judgement.verdict is Verdict.EXPLAINED else None
+        found = moved or _search(chain, model, unseen, progress, finer, last=True)
     return found
 
 
@@ -83,8 +84,10 @@ def _finer(grid: Grid) -> Grid:
     return replace(grid, substeps=FINER * grid.substeps)
 
 
-def _search(chain: Chain, model: DrivelineModel, unseen: Sequence[Record], progress: Progress, grid: Grid) -> Search:
-    """Look for what is missing, on one grid.
+def _search(
+    chain: Chain, model: DrivelineModel, unseen: Sequence[Record], progress: Progress, grid: Grid, last: bool = False
+) -> Search:
+    """Look for what is missing, on one grid; ``last`` where none is gone to from there.
 
     Torques that were not read are estimated from the nominal fit first. Where effects are found, they are estimated
     again with these, and the search begins anew: a torque estimated with physics missing hides the rest. It begins
@@ -92,12 +95,12 @@ def _search(chain: Chain, model: DrivelineModel, unseen: Sequence[Record], progr
     errors grow with the acceleration, and every test takes them for noise of one size.
     """
     least_ratio = VISIBLE if chain.torque_is_unknown else 1.0
-    found = _searched(_repaired(chain, model, NOTHING, grid), model, unseen, progress, grid, least_ratio)
+    found = _searched(_repaired(chain, model, NOTHING, grid), model, unseen, progress, grid, least_ratio, last)
     if chain.torque_is_unknown and found.selection.chosen:
         again = _repaired(chain, model, found.selection.chosen, grid)
-        found = _searched(again, model, unseen, progress, grid, least_ratio)
+        found = _searched(again, model, unseen, progress, grid, least_ratio, last)
     steady = found.chain.with_jitter_in(found.selection.result)
-    return found if steady is found.chain else _searched(steady, model, unseen, progress, grid, VISIBLE)
+    return found if steady is found.chain else _searched(steady, model, unseen, progress, grid, VISIBLE, last)
 
 
 def _repaired(chain: Chain, model: DrivelineModel, effects: Effects, grid: Grid) -> Chain:
@@ -115,7 +118,9 @@ def _searched(
     progress: Progress,
     grid: Grid,
     least_ratio: float,
+    last: bool,
 ) -> Search:
+    """Search once; other ways are not gone from what the steps have a part in, where finer ones come anyway."""
     bench = Bench(model, chain.records, everything(chain.records), grid)
     examiner = Examiner(model, chain.records, unseen)
     names, untestable = open_hypotheses(model, chain.records)
@@ -124,6 +129,6 @@ def _searched(
     selector = Selector(jury, progress)
     found = Search(chain, jury, selector.run(), untestable)
     doubted = found.judgement.verdict is Verdict.UNEXPLAINED and not found.judgement.strays
-    if doubted or selector.may_imitate(found.selection):
+    if (doubted or selector.may_imitate(found.selection)) and (last or not is_made_by_steps(found.selection.result)):
         found = replace(found, selection=selector.by_other_ways(found.selection))
     return found

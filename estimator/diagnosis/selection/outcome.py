@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from estimator.diagnosis.beyond import LineBeyond
 from estimator.diagnosis.evidence import VERY_STRONG
@@ -59,7 +59,7 @@ class Selection:
 
 @dataclass(frozen=True, slots=True)
 class Survey:
-    """A first look for laws without a name in what a fit leaves.
+    """A search for laws without a name in what a fit leaves: a first look, or `located`.
 
     Attributes
     ----------
@@ -78,11 +78,11 @@ def survey(result: FitResult) -> Survey:
     return Survey(hunts, _counting(best_of(judged(view, hunts)), result))
 
 
-def located(selection: Selection) -> tuple[Selection, UnnamedLaw | None]:
-    """Return a selection with the search for laws without a name gone to its end, and the best of them if it counts."""
-    view = scene(selection.retuned, noise_floor(selection.retuned.problem.records))
-    hunts = hunts_of(view, ROUNDS, selection.hunts)
-    return replace(selection, hunts=hunts), _counting(best_of(judged(view, hunts)), selection.retuned)
+def located(result: FitResult, begun: Survey) -> Survey:
+    """Return a survey of what a fit leaves with its search gone to the end: what simulates best, and where."""
+    view = scene(result, noise_floor(result.problem.records))
+    hunts = hunts_of(view, ROUNDS, begun.hunts)
+    return Survey(hunts, _counting(best_of(judged(view, hunts)), result))
 
 
 def _counting(law: UnnamedLaw | None, result: FitResult) -> UnnamedLaw | None:

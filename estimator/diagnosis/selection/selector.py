@@ -57,6 +57,7 @@ class Selector:
         self._progress = progress
         self._rounds = Rounds(jury, progress)
         self._surveys: dict[int, tuple[FitResult, Survey]] = {}
+        self._located: Survey | None = None  # that of what the re-tuned nominal leaves, once it was wanted
         self._gone: set[str] = set()  # effects that a way has begun with
         self._put_off: _Path | None = None  # two that get a third only if no other way ends better
 
@@ -97,8 +98,9 @@ class Selector:
         """
         retuned = selection.retuned
         if not self._has_bent(selection.chosen, selection.result):
-            selection, law = located(selection)
-            if law is not None and law.rms <= SEEN * self.jury.weight.level(selection.result):
+            whole = self._whole(retuned)
+            selection = replace(selection, hunts=whole.hunts)
+            if whole.law is not None and whole.law.rms <= SEEN * self.jury.weight.level(selection.result):
                 return selection
         old = path = _Path(selection.chosen, selection.result, selection.accepted)
         without = flexible(path.chosen) if self._is_near(path.current) else NOTHING
@@ -134,7 +136,7 @@ class Selector:
             if flexible(way.chosen) or not self._has_rest(way.current, retuned):
                 return way
             without |= flexible(frozenset(EFFECTS))
-        without |= self._outdone(way.chosen, retuned)
+        without |= self._outdone(way, retuned)
         trials = self._rounds.try_all(way.chosen, way.current, without, 0.5 * self._rest(way.current))
         best = self.jury.best(trials, way.current, retuned)
         return way if best is None else self._with(way, best, retuned)
@@ -163,7 +165,7 @@ class Selector:
             unnamed=first.law,
             remaining=remaining[0].law if remaining else None,
             beyond=line_beyond(retuned),
-            hunts=first.hunts,
+            hunts=first.hunts if self._located is None else self._located.hunts,
         )
 
     def _grown(self, path: _Path, retuned: FitResult, far: bool = False) -> _Path:
@@ -179,7 +181,7 @@ class Selector:
                 self._put_off = path
                 break
             least = self._least_promise(path, retuned)
-            without = crowding(path.chosen) | self._outdone(path.chosen, retuned)
+            without = crowding(path.chosen) | self._outdone(path, retuned)
             trials = self._rounds.try_all(path.chosen, path.current, without, least)
             best = self.jury.best(trials, path.current, retuned)
             self._rounds.let_go(path.current if best is None else best.result)
@@ -209,7 +211,7 @@ class Selector:
                 continue
             rest = path.chosen - {name}
             current = self.jury.bench.fit_less(rest, path.current)
-            without = flexible(frozenset(EFFECTS)) | self._outdone(rest, retuned)
+            without = flexible(frozenset(EFFECTS)) | self._outdone(replace(path, chosen=rest), retuned)
             trials = self._rounds.try_all(
                 rest, current, without, PART_IN_PLACE * (current.squares - path.current.squares)
             )
@@ -290,11 +292,23 @@ class Selector:
             known = self._surveys[id(result)] = (result, kept)
         return known[1]
 
-    def _outdone(self, chosen: Effects, retuned: FitResult) -> Effects:
-        """Return effects that could not be believed beside those chosen; beside none any may be."""
-        if not chosen:
+    def _whole(self, retuned: FitResult) -> Survey:
+        """Search to the end for one law that explains all that the re-tuned nominal leaves; once."""
+        if self._located is None:
+            self._located = located(retuned, self._survey(retuned))
+        return self._located
+
+    def _outdone(self, path: _Path, retuned: FitResult) -> Effects:
+        """Return effects that could not be believed beside those of a path; beside none any may be.
+
+        A first look for a law tells, but before a third effect is added to two that leave what is seen: then a law is
+        looked for to the end, which takes no longer than a round of such fits.
+        """
+        if not path.chosen:
             return NOTHING
-        return outdone(self._law(retuned), retuned, self.jury.weight.level(retuned), chosen, self.jury.names)
+        seen = path.current.rms > SEEN * self.jury.weight.level(path.current)
+        law = self._whole(retuned).law if seen and len(path.chosen) > 1 else self._law(retuned)
+        return outdone(law, retuned, self.jury.weight.level(retuned), path.chosen, self.jury.names)
 
     def _is_near(self, result: FitResult) -> bool:
         return result.rms <= NEAR_NOISE * self.jury.weight.level(result)

@@ -28,8 +28,14 @@ from estimator.physics.fit import FitResult
 from estimator.physics.parallel import concurrently
 from estimator.signals.correlation import effective_samples
 
-ROUNDS = 5
-"""Rounds that locate: the first promises, the others try what it promised."""
+ROUNDS = 20
+"""Rounds that locate, at most: the first promises, the others try what it promised."""
+
+LEAST_ROUNDS = 5
+WORTH_A_ROUND = 0.005
+"""Rounds that are made in any case, and the share of the squared error that a further one must have taken away at some
+element for the next: where the line's own parameters are far off, as beside a shaft that relaxes, law and line come to
+each other in many steps."""
 
 IN_REACH = 3.0
 """Elements whose law leaves more than this many times the RMS of the best are not looked at again."""
@@ -65,7 +71,7 @@ def unnamed_laws(result: FitResult, rounds: int = 1) -> list[UnnamedLaw]:
     Parameters
     ----------
     rounds : int
-        1 looks from the fit alone: enough to tell whether anything is left. ``ROUNDS`` tells where.
+        1 looks from the fit alone: enough to tell whether anything is left. ``ROUNDS``, as many as help, tells where.
     """
     view = scene(result, noise_floor(result.problem.records))
     return judged(view, hunts_of(view, rounds))
@@ -88,11 +94,15 @@ def hunts_of(view: Scene, rounds: int = 1, begun: Sequence[Hunt] = ()) -> list[H
     behind = max(hunt.rounds for hunt in hunts)
     if behind < 2 <= rounds:
         hunts = concurrently(partial(_tried, view), hunts)
-    for _ in range(max(behind, 2), rounds):
+    for done in range(max(behind, 2), rounds):
         least = min(hunt.mean_square for hunt in hunts)
         near = [i for i, h in enumerate(hunts) if not h.stuck and h.mean_square <= IN_REACH**2 * least]
+        before = [hunts[i].mean_square for i in near]
         for i, moved in zip(near, concurrently(again, [hunts[i] for i in near]), strict=True):
             hunts[i] = moved
+        falls = [1.0 - hunts[i].mean_square / had for i, had in zip(near, before, strict=True)]
+        if done + 1 >= LEAST_ROUNDS and max(falls, default=0.0) < WORTH_A_ROUND:
+            break
     return [replace(hunt, rounds=max(rounds, behind)) for hunt in hunts]
 
 

@@ -11,8 +11,9 @@ from estimator.diagnosis import search as search_module
 from estimator.diagnosis.chain import Chain, read_through
 from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects, everything
 from estimator.diagnosis.search import FINER, Search, is_made_by_steps, search
+from estimator.diagnosis.selection import Selection, Selector
 from estimator.diagnosis.weight import VISIBLE
-from estimator.physics.grid import grid_for
+from estimator.physics.grid import Grid, grid_for
 from estimator.signals.record import Record
 from tests.estimator.diagnosis.planted import quiet, rubbing
 from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, model
@@ -88,3 +89,26 @@ def test_where_steps_have_a_part_in_an_explanation_it_is_sought_on_finer_ones(
     assert found.selection.chosen == FRICTION
     assert found.selection.trials.keys() >= FRICTION
     assert said.count("looking at every effect") == (1 if holds else 2)
+
+
+def test_other_ways_are_gone_on_the_finer_steps_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the steps have a part in what is doubted, the search begins anew on finer ones anyway."""
+    records, gone = rubbing(lambda speed: 1.5), list[Grid]()
+    usual = searched(records).selection.result.problem.grid
+    run, finer = Selector.run, replace(usual, substeps=FINER * usual.substeps)
+
+    def forgotten(select: Selector) -> Selection:
+        found = run(select)
+        return replace(found, chosen=NOTHING, result=found.retuned, accepted={})
+
+    def noted(select: Selector, selection: Selection) -> Selection:
+        gone.append(selection.retuned.problem.grid)
+        return selection
+
+    monkeypatch.setattr(Selector, "run", forgotten)
+    monkeypatch.setattr(Selector, "by_other_ways", noted)
+    for by_steps, grids in ((True, [finer]), (False, [usual])):
+        monkeypatch.setattr(search_module, "is_made_by_steps", lambda result, by_steps=by_steps: by_steps)
+        search(read_through(records), model(ONE_MASS), (), lambda what, share: None)
+        assert gone == grids
+        gone.clear()

@@ -13,7 +13,7 @@ from estimator.diagnosis.hypotheses import NOTHING, Effects
 from estimator.diagnosis.search import search
 from estimator.diagnosis.selection import Selection, Selector
 from estimator.diagnosis.selection import selector as selector_module
-from estimator.diagnosis.selection.outcome import located
+from estimator.diagnosis.selection.outcome import Survey, located, survey
 from estimator.diagnosis.selection.selector import OTHER_WAYS, PART_IN_PLACE, _Path
 from estimator.diagnosis.trial import Trial
 from estimator.diagnosis.unnamed import ROUNDS, UnnamedLaw
@@ -229,27 +229,45 @@ def test_where_one_law_without_a_name_explains_all_no_other_way_is_gone(
     level, law = select.jury.weight.level(doubted.result), None
     if math.isfinite(left):
         law = UnnamedLaw(Element.MOTOR, (("w_M^3", 1.0),), Gain(1e3, 1e-9, 1e3), left * level)
-    monkeypatch.setattr(selector_module, "located", lambda selection: (selection, law))
+    monkeypatch.setattr(select, "_located", None)
+    monkeypatch.setattr(selector_module, "located", lambda *_: Survey(found.hunts, law))
     asked = list[Effects]()
     monkeypatch.setattr(select._rounds, "finished_first", lambda retuned, without, most: asked.append(without) or [])
-    assert select.by_other_ways(doubted) is doubted
+    assert select.by_other_ways(doubted).chosen == doubted.chosen
     assert bool(asked) is gone
 
 
-def test_the_search_for_its_law_is_not_made_twice(found: Selection, monkeypatch: pytest.MonkeyPatch) -> None:
-    once, law = located(found)
-    assert law is not None
+def test_the_search_for_its_law_goes_on_from_the_first_look_and_is_made_once(
+    found: Selection, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first = survey(found.retuned)
+    once = located(found.retuned, first)
+    assert once.law is not None
     assert {hunt.rounds for hunt in once.hunts} == {ROUNDS}
     monkeypatch.setattr("estimator.diagnosis.unnamed.search.again", None)
-    assert located(once)[1] == law
+    assert located(found.retuned, once).law == once.law
     with pytest.raises(TypeError, match="not callable"):
-        located(found)
+        located(found.retuned, first)
 
 
 def test_no_law_that_chance_would_find_explains_all() -> None:
     """Of an error that is noise already any law leaves no more than the noise."""
-    select = selector(quiet(values=ONE_MASS))
-    assert located(select.run())[1] is None
+    retuned = selector(quiet(values=ONE_MASS)).run().retuned
+    assert located(retuned, survey(retuned)).law is None
+
+
+def test_before_a_third_effect_a_law_is_looked_for_to_the_end(
+    select: Selector, found: Selection, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where two leave what is seen."""
+    whole = UnnamedLaw(Element.MOTOR, (("w_M^3", 1.0),), Gain(1e3, 1e-9, 1e3), found.result.rms)
+    monkeypatch.setattr(select, "_law", lambda _: None)
+    monkeypatch.setattr(select, "_located", Survey(found.hunts, whole))
+    monkeypatch.setattr(selector_module, "outdone", lambda law, *_: law)
+    assert select._outdone(_Path(BOTH, found.retuned, {}), found.retuned) is whole
+    assert select._outdone(_Path(BOTH, found.result, {}), found.retuned) is None
+    assert select._outdone(_Path(frozenset({COULOMB}), found.retuned, {}), found.retuned) is None
+    assert select._outdone(_Path(NOTHING, found.retuned, {}), found.retuned) == NOTHING
 
 
 def test_on_other_steps_what_the_rest_makes_superfluous_is_dropped(found: Selection) -> None:
