@@ -7,7 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.unnamed.search import ROUNDS, best_unnamed, unnamed_laws
+from estimator.diagnosis.unnamed.hunt import Hunt
+from estimator.diagnosis.unnamed.scene import scene
+from estimator.diagnosis.unnamed.search import LEAST_ROUNDS, ROUNDS, best_unnamed, hunts_of, unnamed_laws
 from estimator.physics.effect import Element
 from estimator.physics.start import Start
 from tests.estimator.diagnosis.planted import SIGMA, Law, nominal_fit, quiet, recordings
@@ -118,6 +120,37 @@ def test_a_large_mismatch_is_located_by_simulating_with_the_law_found() -> None:
     others = [law.rms for law in laws if law.element is not Element.SHAFT]
     assert best.rms < 0.5 * result.rms
     assert best.rms < 0.7 * min(others)
+
+
+@pytest.mark.parametrize(
+    ("falls", "rounds"),
+    [
+        ((0.0,) * ROUNDS, LEAST_ROUNDS),
+        ((0.0, 0.0, 0.1, 0.1, 0.1, 0.001, 0.1), 8),
+        ((0.01,) * ROUNDS, ROUNDS),
+    ],
+    ids=["a few in any case", "while one helps", "not for ever"],
+)
+def test_a_law_is_looked_for_again_for_as_long_as_that_helps(
+    monkeypatch: pytest.MonkeyPatch, falls: tuple[float, ...], rounds: int
+) -> None:
+    """At any element in reach, be it the best or not; the first two looks are from the fit alone."""
+    view = scene(nominal_fit(quiet((1,))), SIGMA)
+    first = [
+        replace(hunt, rounds=2, mean_square=SIGMA**2 * (1 + i), stuck=i > 1) for i, hunt in enumerate(hunts_of(view))
+    ]
+    looks: list[Element] = []
+
+    def again(hunt: Hunt) -> Hunt:
+        looks.append(hunt.element)
+        fall = falls[looks.count(hunt.element) - 1] if hunt.element is first[1].element else 0.0
+        return replace(hunt, mean_square=(1.0 - fall) * hunt.mean_square)
+
+    monkeypatch.setattr("estimator.diagnosis.unnamed.search.again", again)
+    found = hunts_of(view, ROUNDS, first)
+    assert looks.count(first[1].element) == rounds - 2
+    assert set(looks) == {hunt.element for hunt in first[:2]}
+    assert {hunt.rounds for hunt in found} == {ROUNDS}
 
 
 def test_single_readings_that_are_off_are_the_acquisitions() -> None:
