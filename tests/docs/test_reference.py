@@ -13,6 +13,7 @@ from drivers.inverter.drive_settings import OPTION_CODES
 from drivers.plc.map_needs import USED
 from estimator.diagnosis import evidence, holdout, judgement, noise, weight
 from estimator.diagnosis.selection import jury, rounds, selector
+from estimator.diagnosis.unnamed import search
 from estimator.diagnosis.where import locate
 from estimator.physics import own_law
 from hil.cli.main import ExitStatus
@@ -113,6 +114,11 @@ def test_the_thresholds_of_a_verdict_are_those_of_the_code() -> None:
     assert f"{judgement.NEAR_FLOOR_PROFILE:g} times for a load profile alone" in page
     assert selector.OTHER_WAYS == 3
     assert "each of the three that leave least begins a way" in page
+    assert f"no more than {rounds.FAR_BEHIND:g} times the error of the best" in page
+    assert selector.PART_IN_PLACE == 0.2
+    assert "every law that promises a fifth of what it explains is tried in its place" in page
+    assert (search.ROUNDS, search.WORTH_A_ROUND) == (20, 0.005)
+    assert "up to twenty times, for as long as that takes half a per cent off the squared error" in page
     assert f"ends within {selector.NEAR_NOISE:g} times the noise" in page
     assert (rounds.WORTH_FITTING, rounds.WORTH_GOING_ON, rounds.WORTH_FINISHING) == (0.2, 0.5, 0.8)
     assert "less than a fifth of the best one's part" in page
