@@ -31,7 +31,7 @@ effects that were there, the second promised a third or more (seventy sealed pai
 
 PART_IN_PLACE = 0.2
 """Share of what an effect that bends explains beside others that a first look at a law must promise for it to be tried
-in its place: those that took its place promised a third of it or more (six hundred sealed cases)."""
+in its place: those that took its place promised a third of it or more (five hundred sealed cases)."""
 
 PATIENCE = 4
 """How many times its iterations a fit may take on which a verdict is built."""

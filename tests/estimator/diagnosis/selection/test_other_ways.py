@@ -67,11 +67,16 @@ def test_a_profile_that_imitated_them_is_left_out(select: Selector, found: Selec
     assert select.by_other_ways(imitated).chosen == BOTH
 
 
+def bent_by_a_road(select: Selector, found: Selection) -> _Path:
+    """A road in the place of the dry friction beside the delay."""
+    late_and_road, bench = frozenset({"road_grade", "transport_delay"}), select.jury.bench
+    delayed = bench.fit(frozenset({"transport_delay"}), found.retuned)
+    return _Path(late_and_road, bench.fit(late_and_road, delayed), {})
+
+
 def test_what_bends_beside_others_gives_way_to_a_law(select: Selector, found: Selection) -> None:
     """A road in the place of dry friction. Where that has no name here, a law without one shows what it is not."""
-    late_and_road = frozenset({"road_grade", "transport_delay"})
-    delayed = select.jury.bench.fit(frozenset({"transport_delay"}), found.retuned)
-    bent = _Path(late_and_road, select.jury.bench.fit(late_and_road, delayed), {})
+    bent = bent_by_a_road(select, found)
     stiff = select._stiffened(bent, found.retuned)
     assert stiff.chosen == BOTH
     assert stiff.current.rms < bent.current.rms
@@ -89,9 +94,7 @@ def test_the_law_may_begin_where_what_bends_has_brought_the_others(
     select: Selector, found: Selection, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The delay that friction's own fit has left a long way off stands right beside the road."""
-    late_and_road, bench = frozenset({"road_grade", "transport_delay"}), select.jury.bench
-    delayed = bench.fit(frozenset({"transport_delay"}), found.retuned)
-    bent = _Path(late_and_road, bench.fit(late_and_road, delayed), {})
+    bench, bent = select.jury.bench, bent_by_a_road(select, found)
     right = bench.fit(BOTH)
     elsewhere = replace(right, residual=10.0 * right.residual)
     poor = replace(found.accepted[COULOMB], name=COULOMB, effects=BOTH, result=elsewhere, failed="explains nothing")
@@ -105,9 +108,7 @@ def test_the_law_may_begin_where_what_bends_has_brought_the_others(
 def test_a_law_must_promise_a_fair_part_of_what_it_is_to_explain_in_its_place(
     select: Selector, found: Selection, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    late_and_road, bench = frozenset({"road_grade", "transport_delay"}), select.jury.bench
-    delayed = bench.fit(frozenset({"transport_delay"}), found.retuned)
-    bent = _Path(late_and_road, bench.fit(late_and_road, delayed), {})
+    bent = bent_by_a_road(select, found)
     asked = []
 
     def nothing_fitted(chosen: Effects, current: FitResult, without: Effects, least: float) -> dict[str, Trial]:
