@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -15,11 +16,12 @@ from estimator.physics.fit import FitResult, Problem, fit, make_problem, not_fit
 from estimator.physics.grid import Grid
 from estimator.physics.model import DrivelineModel, Motion
 from estimator.physics.moments import without_idle
+from estimator.physics.parallel import concurrently
 from estimator.physics.polish import polished
 from estimator.physics.starts import HEAT, begun, best_fit, close, converge, warm_start
 from estimator.physics.steps import from_their_moment
 from estimator.physics.unknowns import Release, Shared, nominal_unknowns, own_unknowns, released
-from estimator.signals.record import BoolArray, Record
+from estimator.signals.record import BoolArray, FloatArray, Record
 
 STEPS_ANEW = 5
 """Jacobians that an effect fitted once more, or written another way, gets before it is given up: it starts from what
@@ -33,6 +35,9 @@ NOTHING: Effects = frozenset()
 
 FURTHER = 8
 """Jacobians that a rough fit gets before it is compared once more."""
+
+MOST_NEARBY = 4
+"""Times that a fit is begun once more from around where it ended."""
 
 WORTH_ANOTHER_FIT = 0.1
 """Share of the squared error that a look from a fit must promise for an effect to be fitted once more: those that found
@@ -155,9 +160,9 @@ class Bench:
                 fits.append(polished(converge(heat)))
         plausible = [fit for fit in fits if not entry.implausible(self.model, self.records, fit.values_of(name))]
         best = min(plausible, key=lambda fit: fit.squares, default=had)
-        if _is_told_better(had, best):
+        if best is not had and _is_told_better(had, best):
             self._remember(effects, best)
-        return self.fit(effects)
+        return self._fits[effects]
 
     def _retold_from(self, name: str, start: Start) -> list[Release]:
         """Return an effect's parameters that all recordings share from one start; each keeps what it has of its own."""
@@ -192,6 +197,22 @@ class Bench:
         if not releases:
             return self._fits[effects]
         return self._better(effects, self._fit(effects, before, releases))
+
+    def fit_nearby(self, effects: Effects) -> FitResult:
+        """Fit once more from around where a fit ended, where its error has many small minima, while that helps much.
+
+        What such a minimum leaves looks like an event here and there.
+        """
+        result = self._fits[effects]
+        for _ in range(MOST_NEARBY):
+            better = _begun_nearby(result)
+            if not better:
+                break
+            best = min(concurrently(converge, better), key=lambda fit: fit.squares)
+            had, result = result, self._better(effects, polished(best))
+            if result.squares > (1.0 - WORTH_ANOTHER_FIT) * had.squares:
+                break
+        return result
 
     def fit_less(self, effects: Effects, larger: FitResult) -> FitResult:
         """Fit fewer effects from where a fit with more ended, too, and return the better of both.
@@ -341,6 +362,26 @@ def _forgetting(result: FitResult, name: str) -> FitResult:
     left = [*keep, *[True] * (result.x.size - len(keep))]
     problem = replace(result.problem, shared=shared)
     return replace(result, problem=problem, x=result.x[left], derivative=None)  # which was found with the effect
+
+
+def _begun_nearby(result: FitResult) -> list[FitResult]:
+    """Fit a few steps from around where a fit ended, and return what is better by then."""
+    starts = [start for name in sorted(effects_of(result)) for start in _starts_nearby(result, name)]
+    heat = concurrently(partial(fit, result.problem, iterations=STEPS_ANEW), starts)
+    return [each for each in heat if each.squares < result.squares]
+
+
+def _starts_nearby(result: FitResult, name: str) -> list[FloatArray]:
+    """Return scaled unknowns, shape (U,) each, around where a fit with an effect ended; none where all are held."""
+    starts = []
+    for values in EFFECTS[name].nearby:
+        x = result.x.copy()
+        for i, shared in enumerate(result.problem.shared):
+            if shared.effect == name and shared.name in values and shared.low < shared.high:
+                x[i] = min(max(values[shared.name], shared.low), shared.high)
+        if not np.array_equal(x, result.x):
+            starts.append(x)
+    return starts
 
 
 def _placed(result: FitResult, line: Mapping[str, float]) -> FitResult:

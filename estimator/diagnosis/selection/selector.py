@@ -98,9 +98,8 @@ class Selector:
         """
         retuned = selection.retuned
         if not self._has_bent(selection.chosen, selection.result):
-            whole = self._whole(retuned)
-            selection = replace(selection, hunts=whole.hunts)
-            if whole.law is not None and whole.law.rms <= SEEN * self.jury.weight.level(selection.result):
+            selection = replace(selection, hunts=self._whole(retuned).hunts)
+            if self._is_one_law(retuned, selection.result):
                 return selection
         old = path = _Path(selection.chosen, selection.result, selection.accepted)
         without = flexible(path.chosen) if self._is_near(path.current) else NOTHING
@@ -190,10 +189,15 @@ class Selector:
             if not path.chosen:
                 self._gone.add(best.name)
             path = self._with(path, best, retuned)
-            if len(path.chosen) == 1 and self._has_rest(path.current, retuned):  # before another is named for the rest
-                (alone,) = path.chosen
-                path = replace(path, current=self.jury.bench.fit_widely(path.chosen, alone))
+            if self._has_rest(path.current, retuned):  # before another is named for the rest
+                path = replace(path, current=self._fitted_widely(path.chosen))
         return path
+
+    def _fitted_widely(self, chosen: Effects) -> FitResult:
+        """Return the best fit of effects from further starts: of one alone, those that promised little; then nearby."""
+        for alone in chosen if len(chosen) == 1 else ():
+            self.jury.bench.fit_widely(chosen, alone)
+        return self.jury.bench.fit_nearby(chosen)
 
     def _stiffened(self, path: _Path, retuned: FitResult) -> _Path:
         """Return a path with a law in the place of what bends beside others, where one explains the rest better.
@@ -298,6 +302,17 @@ class Selector:
             self._located = located(retuned, self._survey(retuned))
         return self._located
 
+    def _is_one_law(self, retuned: FitResult, result: FitResult) -> bool:
+        """Tell whether one law without a name explains all that the re-tuned nominal leaves, to the noise of a fit."""
+        law = self._whole(retuned).law
+        return law is not None and law.rms <= SEEN * self.jury.weight.level(result)
+
+    def _may_be_one_law(self, path: _Path, retuned: FitResult) -> bool:
+        """Tell whether a first look, which is quick, brings one near the noise, and nearer than a path."""
+        law = self._law(retuned)
+        near = NEAR_NOISE * self.jury.weight.level(path.current)
+        return law is not None and law.rms <= min(near, path.current.rms)
+
     def _outdone(self, path: _Path, retuned: FitResult) -> Effects:
         """Return effects that could not be believed beside those of a path; beside none any may be.
 
@@ -323,12 +338,15 @@ class Selector:
         """Return by how much an effect must promise to lower the squared error of a path to be fitted.
 
         Where two leave too much to stand, a third must promise to complete them: what imitates takes a little each
-        time. Where they may stand, to come near the noise, or half the way. Beside a profile a first look promises too
-        little: it has taken up part of what is another's. So may any law where next to nothing is left.
+        time. So must a second where one law without a name would do for both. Where they may stand, to come near the
+        noise, or half the way. Beside a profile a first look promises too little: it has taken up part of what is
+        another's. So may any law where next to nothing is left.
         """
         rest = self._rest(path.current)
         stands = self.jury.weight.may_stand(path.current, retuned)
         if len(path.chosen) > 1 and not stands:
+            return 0.5 * rest
+        if path.chosen and self._may_be_one_law(path, retuned) and self._is_one_law(retuned, path.current):
             return 0.5 * rest
         if not path.chosen or self._is_near(path.current) or any(EFFECTS[name].profile for name in path.chosen):
             return 0.0

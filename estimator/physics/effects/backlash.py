@@ -46,8 +46,12 @@ def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
     """
     contact: float | Held = Held(0.0) if model.structure is Structure.JOINT else 1.0
     pull: float | Held = Held(0.0) if model.structure is Structure.JOINT else 0.5
-    return [(0.1, contact, pull), (0.4, contact, pull), (1.2, contact, pull)]
+    return [(size, contact, pull) for size in (0.1, 0.4, 1.2, 3.6)]
 
+
+SOFTER = tuple({"contact_rad": depth, "pull": pull} for depth in (2.0, 3.0) for pull in (0.5, 1.0))
+"""From where a gap is fitted once more. The error has a small minimum for every way in which the faces may bounce at
+their touches; deeper contacts round them off."""
 
 CONTACT_PER_GAP = 0.05
 """Depth of contact of a simulated joint that was given none: faces of steel are rounded by far less than their gap."""
@@ -97,4 +101,5 @@ EFFECT = Effect(
     testable=testable,
     sentence=sentence,
     completed=completed,
+    nearby=SOFTER,
 )

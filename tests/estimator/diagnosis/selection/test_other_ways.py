@@ -271,6 +271,36 @@ def test_before_a_third_effect_a_law_is_looked_for_to_the_end(
     assert select._outdone(_Path(NOTHING, found.retuned, {}), found.retuned) == NOTHING
 
 
+@pytest.mark.parametrize(
+    ("first_look", "whole", "asked"),
+    [(1.4, 1.1, True), (1.4, 1.2, False), (1.6, 1.1, False), (None, 1.1, False), (1.4, None, False)],
+)
+def test_where_one_law_without_a_name_would_do_a_second_effect_must_promise_to_complete(
+    first_look: float | None,
+    whole: float | None,
+    asked: bool,
+    select: Selector,
+    found: Selection,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It is looked for to its end where a first look brings it near the noise."""
+    one = _Path(frozenset({COULOMB}), select.jury.bench.fit(frozenset({COULOMB})), {})
+    level = select.jury.weight.level(one.current)
+
+    def law(times_noise: float | None) -> UnnamedLaw | None:
+        if times_noise is None:
+            return None
+        return UnnamedLaw(Element.MOTOR, (("w_M^3", 1.0),), Gain(1e3, 1e-9, 1e3), times_noise * level)
+
+    monkeypatch.setattr(select, "_law", lambda _: law(first_look))
+    monkeypatch.setattr(select, "_located", Survey(found.hunts, law(whole)))
+    half = 0.5 * select._rest(one.current)
+    assert (select._least_promise(one, found.retuned) == half) is asked
+    nearer = replace(one, current=replace(found.result, residual=1.3 * found.result.residual))
+    assert select._least_promise(nearer, found.retuned) == 0.0  # the path is nearer to the noise than a first look
+    assert select._least_promise(replace(one, chosen=NOTHING), found.retuned) == 0.0
+
+
 def test_on_other_steps_what_the_rest_makes_superfluous_is_dropped(found: Selection) -> None:
     select = selector(late(rubbing(coulomb), 3))
     bench, more = select.jury.bench, BOTH | {"quadratic_friction"}

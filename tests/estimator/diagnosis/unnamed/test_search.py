@@ -134,7 +134,7 @@ def test_a_large_mismatch_is_located_by_simulating_with_the_law_found() -> None:
 def test_a_law_is_looked_for_again_for_as_long_as_that_helps(
     monkeypatch: pytest.MonkeyPatch, falls: tuple[float, ...], rounds: int
 ) -> None:
-    """At any element in reach, be it the best or not; the first two looks are from the fit alone."""
+    """At any element in reach, be it the best or not, and at that alone; the first two looks are from the fit alone."""
     view = scene(nominal_fit(quiet((1,))), SIGMA)
     first = [
         replace(hunt, rounds=2, mean_square=SIGMA**2 * (1 + i), stuck=i > 1) for i, hunt in enumerate(hunts_of(view))
@@ -149,6 +149,7 @@ def test_a_law_is_looked_for_again_for_as_long_as_that_helps(
     monkeypatch.setattr("estimator.diagnosis.unnamed.search.again", again)
     found = hunts_of(view, ROUNDS, first)
     assert looks.count(first[1].element) == rounds - 2
+    assert looks.count(first[0].element) == LEAST_ROUNDS - 2
     assert set(looks) == {hunt.element for hunt in first[:2]}
     assert {hunt.rounds for hunt in found} == {ROUNDS}
 

@@ -1,0 +1,83 @@
+"""A gap whose fit ends in one of the many small minima of its error is fitted once more from softer contacts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimator.diagnosis import hypotheses
+from estimator.diagnosis.hypotheses import NOTHING, Bench
+from estimator.physics.catalogue import EFFECTS
+from estimator.physics.fit import FitResult, Problem
+from estimator.signals.record import FloatArray
+from tests.estimator.diagnosis.one_effect import bench_with
+from tests.estimator.diagnosis.planted import SIGMA
+
+GAP = frozenset({"backlash"})
+WIDE = {"gap_rad": 0.06, "contact_rad": 6e-3, "pull": 0.3}
+
+
+def test_a_gap_caught_at_one_way_to_bounce_comes_out_of_it() -> None:
+    bench = bench_with("backlash", WIDE)
+    caught = bench.fit(GAP, bench.fit(NOTHING))
+    assert caught.rms > 3.0 * SIGMA
+    found = bench.fit_nearby(GAP)
+    assert found is bench.fit(GAP)
+    assert found.rms == pytest.approx(SIGMA, rel=0.03)
+    assert found.value("backlash", "gap_rad") == pytest.approx(WIDE["gap_rad"], rel=0.002)
+    assert abs(caught.value("backlash", "gap_rad") / WIDE["gap_rad"] - 1.0) > 0.002
+
+
+def test_what_is_at_the_noise_stays() -> None:
+    bench = bench_with("backlash", WIDE | {"gap_rad": 0.01, "contact_rad": 1e-3})
+    right = bench.fit(GAP, bench.fit(NOTHING))
+    assert right.rms == pytest.approx(SIGMA, rel=0.03)
+    assert bench.fit_nearby(GAP).squares == pytest.approx(right.squares, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("falls", "times"), [((), 1), ((0.05,), 1), ((0.3, 0.05), 2), ((0.3,) * 9, hypotheses.MOST_NEARBY)]
+)
+def test_it_is_done_for_as_long_as_it_helps_much(
+    falls: tuple[float, ...], times: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench = bench_with("backlash", WIDE)
+    bench.fit(GAP, bench.fit(NOTHING))
+    begun: list[float] = []
+
+    def fitted(_problem: Problem, _x: FloatArray, iterations: int) -> FitResult:
+        """Each fit from a round's starts takes the same share off what that round began with."""
+        had = bench.fit(GAP)
+        begun.append(had.squares)
+        fall = dict(enumerate(falls)).get(len(set(begun)) - 1, -0.1)
+        return replace(had, residual=np.sqrt(1.0 - fall) * had.residual, converged=True)
+
+    monkeypatch.setattr(hypotheses, "fit", fitted)
+    monkeypatch.setattr(hypotheses, "polished", lambda result: result)
+    bench.fit_nearby(GAP)
+    assert len(set(begun)) == times
+    assert len(begun) == times * len(EFFECTS["backlash"].nearby)
+
+
+@pytest.mark.parametrize("name", ["coulomb_friction_motor", "backlash"])
+def test_without_another_start_a_fit_is_what_it_was(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where its effect names none, and where what it names is held, as a bench holds a joint's contact."""
+    bench, effects = bench_with(name, {"friction_nm": 8.0} if name != "backlash" else WIDE), frozenset({name})
+    known = bench.fit(effects, bench.fit(NOTHING))
+    held = [
+        replace(each, low=each.start, high=each.start) if each.name in WIDE else each for each in known.problem.shared
+    ]
+    known = replace(known, problem=replace(known.problem, shared=tuple(held)))
+    monkeypatch.setitem(bench._fits, effects, known)
+    monkeypatch.setattr(hypotheses, "fit", lambda *_: pytest.fail("fitted once more"))
+    assert bench.fit_nearby(effects) is known
+
+
+def test_a_fit_that_its_limit_ended_is_not_gone_on_with_for_another_way_to_write_it() -> None:
+    """A gap is written one way: what has none is as it was, and goes on only where it is chosen."""
+    bench: Bench = bench_with("backlash", WIDE | {"gap_rad": 0.01, "contact_rad": 1e-3})
+    ended = replace(bench.fit(GAP, bench.fit(NOTHING)), converged=False)
+    bench._fits[GAP] = ended
+    assert bench.fit_retold(GAP, "backlash") is ended
