@@ -85,15 +85,15 @@ def diagnose(
     Implausible
         Where torque, output or time is off by a factor or in sign.
     """
+    began = time.perf_counter()
     with threadpool_limits(1, user_api="blas"):  # on tall, thin matrices more threads only wait for each other
         ready = prepare(records, model, holdout)
-        return ready.finished(_diagnose(ready.records, model, ready.holdout, progress))
+        return ready.finished(_diagnose(ready.records, model, ready.holdout, progress, began))
 
 
 def _diagnose(
-    records: Sequence[Record], model: DrivelineModel, holdout: Sequence[Record], progress: Progress
+    records: Sequence[Record], model: DrivelineModel, holdout: Sequence[Record], progress: Progress, began: float
 ) -> Diagnosis:
-    began = time.perf_counter()
     progress("fitting the nominal model", 0.0)
     line = mechanical(model)
     chain, unseen = read_through(records), read_through(holdout)

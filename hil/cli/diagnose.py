@@ -10,6 +10,8 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperCommand
 
+from hil.cli.importing import lasting_imports
+
 HOLDOUT = "--holdout"
 
 Progress = Callable[[str, float], None]
@@ -56,17 +58,18 @@ def diagnose(
 
     Writes DIR/diagnosis.json, DIR/augmented.toml and DIR/report.html.
     """
-    from rich.console import Console
+    with lasting_imports():
+        from rich.console import Console
 
-    from estimator.diagnosis.diagnose import diagnose as diagnose_records
-    from hil.config.model_file import read_model_for_recordings, write_model
-    from hil.recording import read_records
-    from hil.report.diagnosis_html import diagnosis_page
-    from hil.report.diagnosis_json import diagnosis_text
-    from hil.report.diagnosis_text import diagnosis_summary
-    from hil.report.outputs import publish, require_folder
-    from hil.store import attach_to_runs
-    from hil.store.entry import DIAGNOSIS, MODEL
+        from estimator.diagnosis.diagnose import diagnose as diagnose_records
+        from hil.config.model_file import read_model_for_recordings, write_model
+        from hil.recording import read_records
+        from hil.report.diagnosis_html import diagnosis_page
+        from hil.report.diagnosis_json import diagnosis_text
+        from hil.report.diagnosis_text import diagnosis_summary
+        from hil.report.outputs import publish, require_folder
+        from hil.store import attach_to_runs
+        from hil.store.entry import DIAGNOSIS, MODEL
 
     require_folder(out)
     file = read_model_for_recordings(model)

@@ -10,9 +10,12 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
+from functools import cache
+from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
+import plotly.io
 import scipy.signal
 from plotly.offline import get_plotlyjs
 from plotly.subplots import make_subplots
@@ -36,6 +39,8 @@ class Style(Enum):
     SECOND_INPUT = (GREEN, 1.2, "dash")
     THIRD_INPUT = (PURPLE, 1.2, "dot")
 
+
+plotly.io.templates.default = "none"  # copied into every figure at each change of it; `figure_html` gives it once
 
 INPUT_STYLES = (Style.FIRST_INPUT, Style.SECOND_INPUT, Style.THIRD_INPUT)
 
@@ -199,6 +204,13 @@ def _scatter(line: Line, x: FloatArray, y: FloatArray, *, first: bool) -> go.Sca
     )
 
 
+@cache
+def _template() -> dict[str, Any]:
+    """Return plotly's look without a background, as it stands in a figure."""
+    look: dict[str, Any] = plotly.io.templates["plotly_white"].to_plotly_json()
+    return look
+
+
 def figure_html(figure: go.Figure, name: str, height_px: int, top_px: int = TOP_PX, hover: str = "x unified") -> str:
     """Return a figure as a piece of HTML with the page's look; ``name`` is unique in the page.
 
@@ -206,14 +218,15 @@ def figure_html(figure: go.Figure, name: str, height_px: int, top_px: int = TOP_
     """
     inside_px = height_px - top_px - LEGEND_PX + TOP_PX
     figure.update_layout(
-        template="plotly_white",
         height=height_px,
         margin={"l": 64, "r": 12, "t": top_px, "b": LEGEND_PX - TOP_PX},
         legend={"orientation": "h", "yanchor": "top", "y": -AXIS_TITLE_PX / inside_px, "x": 0},
         hovermode=hover,
         font={"family": "system-ui, sans-serif", "size": 13},
     )
-    text = json.dumps({**figure.to_plotly_json(), "config": CONFIG}, cls=PlotlyJSONEncoder, separators=(",", ":"))
+    drawn = figure.to_plotly_json()
+    drawn["layout"]["template"] = _template()
+    text = json.dumps({**drawn, "config": CONFIG}, cls=PlotlyJSONEncoder, separators=(",", ":"))
     data = text.replace("<", "\\u003c")  # no text of a figure can end the script element it stands in
     return (
         f'<figure class="plot"><div class="plotly-graph-div" id="{name}" data-figure="{name}-data" tabindex="0" '

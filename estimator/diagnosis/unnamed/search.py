@@ -33,8 +33,8 @@ ROUNDS = 20
 
 LEAST_ROUNDS = 5
 WORTH_A_ROUND = 0.005
-"""Rounds that are made in any case, and the share of the squared error that a further one must have taken away at some
-element for the next: where the line's own parameters are far off, as beside a shaft that relaxes, law and line come to
+"""Rounds that are made in any case, and the share of the squared error that a further one must have taken away at an
+element for its next: where the line's own parameters are far off, as beside a shaft that relaxes, law and line come to
 each other in many steps."""
 
 IN_REACH = 3.0
@@ -94,15 +94,15 @@ def hunts_of(view: Scene, rounds: int = 1, begun: Sequence[Hunt] = ()) -> list[H
     behind = max(hunt.rounds for hunt in hunts)
     if behind < 2 <= rounds:
         hunts = concurrently(partial(_tried, view), hunts)
+    at_rest = set[int]()
     for done in range(max(behind, 2), rounds):
         least = min(hunt.mean_square for hunt in hunts)
         near = [i for i, h in enumerate(hunts) if not h.stuck and h.mean_square <= IN_REACH**2 * least]
-        before = [hunts[i].mean_square for i in near]
-        for i, moved in zip(near, concurrently(again, [hunts[i] for i in near]), strict=True):
-            hunts[i] = moved
-        falls = [1.0 - hunts[i].mean_square / had for i, had in zip(near, before, strict=True)]
-        if done + 1 >= LEAST_ROUNDS and max(falls, default=0.0) < WORTH_A_ROUND:
-            break
+        further = [i for i in near if i not in at_rest]
+        for i, moved in zip(further, concurrently(again, [hunts[i] for i in further]), strict=True):
+            had, hunts[i] = hunts[i].mean_square, moved
+            if done + 1 >= LEAST_ROUNDS and moved.mean_square > (1.0 - WORTH_A_ROUND) * had:
+                at_rest.add(i)
     return [replace(hunt, rounds=max(rounds, behind)) for hunt in hunts]
 
 

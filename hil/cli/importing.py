@@ -1,0 +1,24 @@
+"""Imports of a command that needs most of the program."""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+
+@contextmanager
+def lasting_imports() -> Iterator[None]:
+    """Import without the garbage collector, and leave what was imported out of its later rounds.
+
+    Modules are made of hundreds of thousands of objects that stay: while they are made, and at every round after,
+    it looks through them in vain. That is a tenth of the time of such imports.
+    """
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+        gc.freeze()
+    finally:
+        if was_enabled:
+            gc.enable()
