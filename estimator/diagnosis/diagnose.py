@@ -18,10 +18,11 @@ from estimator.diagnosis.assemble import (
     retuned_parameters,
     rms_of,
 )
+from estimator.diagnosis.bench import Bench
 from estimator.diagnosis.chain import Chain, mechanical, read_through
 from estimator.diagnosis.evidence import Gain, gain, information, noise_level, residuals_by_record
 from estimator.diagnosis.holdout import Examiner, foreign_outputs
-from estimator.diagnosis.hypotheses import NOTHING, Bench, Progress, effects_of, everything
+from estimator.diagnosis.hypotheses import NOTHING, Progress, effects_of, everything
 from estimator.diagnosis.judgement import Judgement, judge
 from estimator.diagnosis.preconditions import prepare
 from estimator.diagnosis.result import (

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from estimator.diagnosis.bench import Bench
 from estimator.diagnosis.evidence import VERY_STRONG, gain, information
-from estimator.diagnosis.hypotheses import Bench, Effects, with_effect
+from estimator.diagnosis.hypotheses import Effects, with_effect
 from estimator.diagnosis.screening import Screen, promising
 from estimator.diagnosis.weight import PART_BESIDE
 from estimator.physics.catalogue import EFFECTS

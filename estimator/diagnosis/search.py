@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from estimator.diagnosis.assemble import rms_of
+from estimator.diagnosis.bench import Bench
 from estimator.diagnosis.chain import Chain
 from estimator.diagnosis.holdout import Examiner
-from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects, Progress, everything, open_hypotheses
+from estimator.diagnosis.hypotheses import NOTHING, Effects, Progress, everything, open_hypotheses
 from estimator.diagnosis.judgement import Judgement, judge
 from estimator.diagnosis.noise import noise_floor
 from estimator.diagnosis.result import Verdict

@@ -30,6 +30,9 @@ MOST_OF_POSITION = 0.5
 
 VISIBLE = 1.05
 
+NEAR_NOISE = 1.5
+"""Error over the noise that an explanation may leave: another way to write the same law leaves that much."""
+
 SEEN = 1.15
 """Error over the noise above which what is left is seen, whatever it is: the estimate of the noise errs by some per
 cent."""

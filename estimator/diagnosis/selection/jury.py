@@ -6,9 +6,10 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from estimator.diagnosis.bench import Bench
 from estimator.diagnosis.evidence import VERY_STRONG, Gain, gain
 from estimator.diagnosis.holdout import Examiner, HoldOut
-from estimator.diagnosis.hypotheses import Bench, Effects, effects_of
+from estimator.diagnosis.hypotheses import Effects, effects_of
 from estimator.diagnosis.intervals import Z95, chance_of_coherent, reported_covariance
 from estimator.diagnosis.trial import Trial, has_edge, healed_in, null_inside, ranks, scan_choices
 from estimator.diagnosis.weight import VISIBLE, Weight, earns_detail

@@ -7,23 +7,20 @@ from dataclasses import dataclass, replace
 
 from estimator.diagnosis.beyond import line_beyond
 from estimator.diagnosis.evidence import VERY_STRONG, gain, information
-from estimator.diagnosis.hypotheses import NOTHING, Effects, Progress, crowding, effects_of, flexible
+from estimator.diagnosis.hypotheses import NOTHING, Effects, Progress, crowding, flexible
 from estimator.diagnosis.lookalikes import lookalikes
 from estimator.diagnosis.selection.jury import Jury, generalises
-from estimator.diagnosis.selection.outcome import Selection, Survey, located, survey
+from estimator.diagnosis.selection.outcome import Selection
 from estimator.diagnosis.selection.outdone import outdone
 from estimator.diagnosis.selection.rounds import Rounds
+from estimator.diagnosis.selection.surveys import Surveys
 from estimator.diagnosis.trial import Trial
-from estimator.diagnosis.unnamed import UnnamedLaw
-from estimator.diagnosis.weight import SEEN, VISIBLE, leaves_a_detail, reads_speed
+from estimator.diagnosis.weight import NEAR_NOISE, SEEN, VISIBLE, leaves_a_detail, reads_speed
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult
 from estimator.physics.parallel import concurrently
 
 MOST_EFFECTS = 4
-
-NEAR_NOISE = 1.5
-"""Error over the noise that an explanation may leave: another way to write the same law leaves that much."""
 
 PART_OF_REST = 0.25
 """Share of what still stands above the noise that a first look must promise for a further effect to be fitted: of two
@@ -56,8 +53,7 @@ class Selector:
         self.jury = jury
         self._progress = progress
         self._rounds = Rounds(jury, progress)
-        self._surveys: dict[int, tuple[FitResult, Survey]] = {}
-        self._located: Survey | None = None  # that of what the re-tuned nominal leaves, once it was wanted
+        self._surveys = Surveys(jury.weight)
         self._gone: set[str] = set()  # effects that a way has begun with
         self._put_off: _Path | None = None  # two that get a third only if no other way ends better
 
@@ -98,8 +94,8 @@ class Selector:
         """
         retuned = selection.retuned
         if not self._has_bent(selection.chosen, selection.result):
-            selection = replace(selection, hunts=self._whole(retuned).hunts)
-            if self._is_one_law(retuned, selection.result):
+            selection = replace(selection, hunts=self._surveys.whole(retuned).hunts)
+            if self._surveys.is_one_law(retuned, selection.result):
                 return selection
         old = path = _Path(selection.chosen, selection.result, selection.accepted)
         without = flexible(path.chosen) if self._is_near(path.current) else NOTHING
@@ -111,7 +107,7 @@ class Selector:
                     path = self._better(path, way, retuned)
             without |= NOTHING if EFFECTS[first.name].profile else {first.name}
             if path is not old and self._is_near(path.current):
-                if not flexible(path.chosen) or self._law(path.current) is None:
+                if not flexible(path.chosen) or self._surveys.law(path.current) is None:
                     break
         if path is not old:
             return self._concluded(self._stiffened(self._grown(path, retuned), retuned), retuned)
@@ -152,7 +148,7 @@ class Selector:
         named = chosen if self.jury.weight.may_stand(current, retuned) else NOTHING
         alike = {name: lookalikes(name, chosen, current, self.jury.bench, self.jury.names) for name in named}
         self._progress("looking for laws without a name", 0.9)
-        first, *remaining = concurrently(self._survey, [retuned, current] if chosen else [retuned])
+        first, *remaining = concurrently(self._surveys.of, [retuned, current] if chosen else [retuned])
         return Selection(
             retuned,
             chosen,
@@ -164,7 +160,7 @@ class Selector:
             unnamed=first.law,
             remaining=remaining[0].law if remaining else None,
             beyond=line_beyond(retuned),
-            hunts=first.hunts if self._located is None else self._located.hunts,
+            hunts=self._surveys.furthest(retuned).hunts,
         )
 
     def _grown(self, path: _Path, retuned: FitResult, far: bool = False) -> _Path:
@@ -223,7 +219,7 @@ class Selector:
             best = self.jury.best(trials, current, retuned)
             if best is not None:
                 path = self._better(path, self._with(_Path(rest, current, path.accepted), best, retuned), retuned)
-            law = self._law(current) if name in path.chosen and len(path.chosen) > 1 else None
+            law = self._surveys.law(current) if name in path.chosen and len(path.chosen) > 1 else None
             if law is not None and VISIBLE * law.rms <= path.current.rms:
                 path = _Path(rest, current, path.accepted)
         return path
@@ -280,39 +276,6 @@ class Selector:
                     return chosen - {name} | {special}, simpler
         return chosen, current
 
-    def _law(self, result: FitResult) -> UnnamedLaw | None:
-        """Return the law without a name that counts for what a fit leaves."""
-        return self._survey(result).law
-
-    def _survey(self, result: FitResult) -> Survey:
-        """Look for laws without a name in what a fit leaves; each fit is searched once.
-
-        Only what the re-tuned nominal leaves is looked at again: of other fits the hunts are let go.
-        """
-        known = self._surveys.get(id(result))
-        if known is None:
-            found = survey(result)
-            kept = found if not effects_of(result) else replace(found, hunts=())
-            known = self._surveys[id(result)] = (result, kept)
-        return known[1]
-
-    def _whole(self, retuned: FitResult) -> Survey:
-        """Search to the end for one law that explains all that the re-tuned nominal leaves; once."""
-        if self._located is None:
-            self._located = located(retuned, self._survey(retuned))
-        return self._located
-
-    def _is_one_law(self, retuned: FitResult, result: FitResult) -> bool:
-        """Tell whether one law without a name explains all that the re-tuned nominal leaves, to the noise of a fit."""
-        law = self._whole(retuned).law
-        return law is not None and law.rms <= SEEN * self.jury.weight.level(result)
-
-    def _may_be_one_law(self, path: _Path, retuned: FitResult) -> bool:
-        """Tell whether a first look, which is quick, brings one near the noise, and nearer than a path."""
-        law = self._law(retuned)
-        near = NEAR_NOISE * self.jury.weight.level(path.current)
-        return law is not None and law.rms <= min(near, path.current.rms)
-
     def _outdone(self, path: _Path, retuned: FitResult) -> Effects:
         """Return effects that could not be believed beside those of a path; beside none any may be.
 
@@ -322,7 +285,7 @@ class Selector:
         if not path.chosen:
             return NOTHING
         seen = path.current.rms > SEEN * self.jury.weight.level(path.current)
-        law = self._whole(retuned).law if seen and len(path.chosen) > 1 else self._law(retuned)
+        law = self._surveys.whole(retuned).law if seen and len(path.chosen) > 1 else self._surveys.law(retuned)
         return outdone(law, retuned, self.jury.weight.level(retuned), path.chosen, self.jury.names)
 
     def _is_near(self, result: FitResult) -> bool:
@@ -346,7 +309,11 @@ class Selector:
         stands = self.jury.weight.may_stand(path.current, retuned)
         if len(path.chosen) > 1 and not stands:
             return 0.5 * rest
-        if path.chosen and self._may_be_one_law(path, retuned) and self._is_one_law(retuned, path.current):
+        if (
+            path.chosen
+            and self._surveys.may_be_one_law(retuned, path.current)
+            and self._surveys.is_one_law(retuned, path.current)
+        ):
             return 0.5 * rest
         if not path.chosen or self._is_near(path.current) or any(EFFECTS[name].profile for name in path.chosen):
             return 0.0
@@ -368,4 +335,4 @@ class Selector:
         """
         if not self.jury.weight.leaves_room(current, retuned):
             return False
-        return current.rms >= VISIBLE * self.jury.weight.level(current) or self._law(current) is not None
+        return current.rms >= VISIBLE * self.jury.weight.level(current) or self._surveys.law(current) is not None

@@ -18,8 +18,9 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from estimator.diagnosis.assemble import augmented_model
+from estimator.diagnosis.bench import Bench
 from estimator.diagnosis.chain import mechanical
-from estimator.diagnosis.hypotheses import NOTHING, Bench, everything
+from estimator.diagnosis.hypotheses import NOTHING, everything
 from estimator.diagnosis.preconditions import prepare
 from estimator.signals.record import FloatArray, Record
 from hil.config.model_file import ModelFile, read_model, read_model_for_recordings, write_model

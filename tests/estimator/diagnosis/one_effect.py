@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimator.diagnosis.hypotheses import Bench, everything
+from estimator.diagnosis.bench import Bench
+from estimator.diagnosis.hypotheses import everything
 from estimator.physics.grid import grid_for
 from estimator.physics.layout import flat_values
 from estimator.physics.simulate import simulate

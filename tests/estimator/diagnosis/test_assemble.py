@@ -17,9 +17,10 @@ from estimator.diagnosis.assemble import (
     load_torques,
     retuned_parameters,
 )
+from estimator.diagnosis.bench import Bench
 from estimator.diagnosis.chain import Chain
 from estimator.diagnosis.holdout import Examiner
-from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects, everything
+from estimator.diagnosis.hypotheses import NOTHING, Effects, everything
 from estimator.diagnosis.intervals import Z95, interval, interval_both_ways, reported_covariance
 from estimator.diagnosis.result import FoundEffect
 from estimator.diagnosis.selection import Jury, Selection, Selector

@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 
 import pytest
 
+from estimator.diagnosis.bench import Bench
 from estimator.diagnosis.beyond import FREELY, LineBeyond, in_words, line_beyond
 from estimator.diagnosis.diagnose import diagnose
-from estimator.diagnosis.hypotheses import NOTHING, Bench, everything
+from estimator.diagnosis.hypotheses import NOTHING, everything
 from estimator.diagnosis.judgement import judge
 from estimator.diagnosis.result import Diagnosis, Stray, Verdict
 from estimator.physics.effect import Element

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis.assemble import rms_of
+from estimator.diagnosis.bench import Bench
 from estimator.diagnosis.chain import Chain, mechanical, read_through, replay
-from estimator.diagnosis.hypotheses import NOTHING, Bench, everything
+from estimator.diagnosis.hypotheses import NOTHING, everything
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult
 from estimator.physics.free_run import free_run

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import pytest
 
+from estimator.diagnosis.bench import Bench
 from estimator.diagnosis.convergence import unconverged
-from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects, everything
+from estimator.diagnosis.hypotheses import NOTHING, Effects, everything
 from estimator.diagnosis.judgement import judge
 from estimator.diagnosis.result import Fit, Verdict
 from estimator.diagnosis.selection import Selection

@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.hypotheses import NOTHING, Bench, everything
+from estimator.diagnosis.bench import Bench
+from estimator.diagnosis.hypotheses import NOTHING, everything
 from estimator.diagnosis.screening import Screen, promising
 from estimator.physics.grid import grid_for
 from estimator.physics.layout import flat_values

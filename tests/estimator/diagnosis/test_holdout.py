@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from estimator.diagnosis.bench import Bench
 from estimator.diagnosis.holdout import BLOCK_S, EVERY_S, Examiner, blocks, foreign_outputs
-from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects, everything
+from estimator.diagnosis.hypotheses import NOTHING, Effects, everything
 from estimator.physics.effects.road_grade import KNOT_SPACING_S
 from estimator.physics.fit import FitResult, fit
 from estimator.physics.start import Start

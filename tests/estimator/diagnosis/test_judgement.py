@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis.acquisition import Finding
+from estimator.diagnosis.bench import Bench
 from estimator.diagnosis.evidence import VERY_STRONG, gain, residuals_by_record
-from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects, everything
+from estimator.diagnosis.hypotheses import NOTHING, Effects, everything
 from estimator.diagnosis.judgement import ABOVE_FLOOR, MOST_VISIBLE, NEAR_FLOOR, NEAR_FLOOR_PROFILE, judge
 from estimator.diagnosis.noise import unpredictable
 from estimator.diagnosis.phrases import kind_in_words

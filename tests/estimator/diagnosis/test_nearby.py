@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis import hypotheses
-from estimator.diagnosis.hypotheses import NOTHING, Bench
+from estimator.diagnosis import bench as bench_module
+from estimator.diagnosis.bench import Bench
+from estimator.diagnosis.hypotheses import NOTHING
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult, Problem
 from estimator.signals.record import FloatArray
@@ -38,7 +39,7 @@ def test_what_is_at_the_noise_stays() -> None:
 
 
 @pytest.mark.parametrize(
-    ("falls", "times"), [((), 1), ((0.05,), 1), ((0.3, 0.05), 2), ((0.3,) * 9, hypotheses.MOST_NEARBY)]
+    ("falls", "times"), [((), 1), ((0.05,), 1), ((0.3, 0.05), 2), ((0.3,) * 9, bench_module.MOST_NEARBY)]
 )
 def test_it_is_done_for_as_long_as_it_helps_much(
     falls: tuple[float, ...], times: int, monkeypatch: pytest.MonkeyPatch
@@ -54,8 +55,8 @@ def test_it_is_done_for_as_long_as_it_helps_much(
         fall = dict(enumerate(falls)).get(len(set(begun)) - 1, -0.1)
         return replace(had, residual=np.sqrt(1.0 - fall) * had.residual, converged=True)
 
-    monkeypatch.setattr(hypotheses, "fit", fitted)
-    monkeypatch.setattr(hypotheses, "polished", lambda result: result)
+    monkeypatch.setattr(bench_module, "fit", fitted)
+    monkeypatch.setattr(bench_module, "polished", lambda result: result)
     bench.fit_nearby(GAP)
     assert len(set(begun)) == times
     assert len(begun) == times * len(EFFECTS["backlash"].nearby)
@@ -71,7 +72,7 @@ def test_without_another_start_a_fit_is_what_it_was(name: str, monkeypatch: pyte
     ]
     known = replace(known, problem=replace(known.problem, shared=tuple(held)))
     monkeypatch.setitem(bench._fits, effects, known)
-    monkeypatch.setattr(hypotheses, "fit", lambda *_: pytest.fail("fitted once more"))
+    monkeypatch.setattr(bench_module, "fit", lambda *_: pytest.fail("fitted once more"))
     assert bench.fit_nearby(effects) is known
 
 

@@ -9,7 +9,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from estimator.diagnosis.hypotheses import NOTHING, Bench, everything
+from estimator.diagnosis.bench import Bench
+from estimator.diagnosis.hypotheses import NOTHING, everything
 from estimator.diagnosis.screening import Look, Screen, promising
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis import search as search_module
+from estimator.diagnosis.bench import Bench
 from estimator.diagnosis.chain import Chain, read_through
-from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects, everything
+from estimator.diagnosis.hypotheses import NOTHING, Effects, everything
 from estimator.diagnosis.search import FINER, Search, is_made_by_steps, search
 from estimator.diagnosis.selection import Selection, Selector
 from estimator.diagnosis.weight import VISIBLE

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.hypotheses import NOTHING, Bench, everything
+from estimator.diagnosis.bench import Bench
+from estimator.diagnosis.hypotheses import NOTHING, everything
 from estimator.diagnosis.preconditions.thinned import LONGEST_S, factor_for, thinned
 from estimator.diagnosis.stretches import MOST_SAMPLES
 from estimator.physics.grid import grid_for

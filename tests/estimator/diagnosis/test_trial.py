@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from estimator.diagnosis.bench import Bench
 from estimator.diagnosis.evidence import gain, information
-from estimator.diagnosis.hypotheses import NOTHING, Bench, everything
+from estimator.diagnosis.hypotheses import NOTHING, everything
 from estimator.diagnosis.intervals import covariance, interval
 from estimator.diagnosis.trial import Trial, null_inside, pressed_parameters, ranks
 from estimator.physics.fit import FitResult

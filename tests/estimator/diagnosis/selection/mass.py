@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 from scipy.signal import lfilter
 
+from estimator.diagnosis.bench import Bench
 from estimator.diagnosis.holdout import Examiner
-from estimator.diagnosis.hypotheses import Bench, everything, open_hypotheses
+from estimator.diagnosis.hypotheses import everything, open_hypotheses
 from estimator.diagnosis.noise import noise_floor
 from estimator.diagnosis.selection import Selector
 from estimator.diagnosis.selection.jury import Jury

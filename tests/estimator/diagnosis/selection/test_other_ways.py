@@ -116,7 +116,7 @@ def test_a_law_must_promise_a_fair_part_of_what_it_is_to_explain_in_its_place(
         return {}
 
     monkeypatch.setattr(select._rounds, "try_all", nothing_fitted)
-    monkeypatch.setattr(select, "_law", lambda _: None)
+    monkeypatch.setattr(select._surveys, "law", lambda _: None)
     assert select._stiffened(bent, found.retuned) is bent
     assert asked == pytest.approx([PART_IN_PLACE])
 
@@ -188,7 +188,7 @@ def test_after_a_way_that_ended_near_the_noise_others_are_gone_only_where_it_may
 
     law = UnnamedLaw(Element.LOAD, (("w_L^3", 1.0),), Gain(1e3, 1e-9, 1e3), 0.0) if leaves_a_law else None
     monkeypatch.setattr(select, "_completed", completed)
-    monkeypatch.setattr(select, "_law", lambda result: law)
+    monkeypatch.setattr(select._surveys, "law", lambda result: law)
     monkeypatch.setattr(selector_module, "flexible", lambda names: names if bends and names == BOTH else NOTHING)
     monkeypatch.setattr(select, "_grown", lambda path, retuned: path)
     monkeypatch.setattr(select, "_stiffened", lambda path, retuned: path)
@@ -230,8 +230,8 @@ def test_where_one_law_without_a_name_explains_all_no_other_way_is_gone(
     level, law = select.jury.weight.level(doubted.result), None
     if math.isfinite(left):
         law = UnnamedLaw(Element.MOTOR, (("w_M^3", 1.0),), Gain(1e3, 1e-9, 1e3), left * level)
-    monkeypatch.setattr(select, "_located", None)
-    monkeypatch.setattr(selector_module, "located", lambda *_: Survey(found.hunts, law))
+    monkeypatch.setattr(select._surveys, "_located", None)
+    monkeypatch.setattr("estimator.diagnosis.selection.surveys.located", lambda *_: Survey(found.hunts, law))
     asked = list[Effects]()
     monkeypatch.setattr(select._rounds, "finished_first", lambda retuned, without, most: asked.append(without) or [])
     assert select.by_other_ways(doubted).chosen == doubted.chosen
@@ -262,8 +262,8 @@ def test_before_a_third_effect_a_law_is_looked_for_to_the_end(
 ) -> None:
     """Where two leave what is seen."""
     whole = UnnamedLaw(Element.MOTOR, (("w_M^3", 1.0),), Gain(1e3, 1e-9, 1e3), found.result.rms)
-    monkeypatch.setattr(select, "_law", lambda _: None)
-    monkeypatch.setattr(select, "_located", Survey(found.hunts, whole))
+    monkeypatch.setattr(select._surveys, "law", lambda _: None)
+    monkeypatch.setattr(select._surveys, "_located", Survey(found.hunts, whole))
     monkeypatch.setattr(selector_module, "outdone", lambda law, *_: law)
     assert select._outdone(_Path(BOTH, found.retuned, {}), found.retuned) is whole
     assert select._outdone(_Path(BOTH, found.result, {}), found.retuned) is None
@@ -292,8 +292,8 @@ def test_where_one_law_without_a_name_would_do_a_second_effect_must_promise_to_c
             return None
         return UnnamedLaw(Element.MOTOR, (("w_M^3", 1.0),), Gain(1e3, 1e-9, 1e3), times_noise * level)
 
-    monkeypatch.setattr(select, "_law", lambda _: law(first_look))
-    monkeypatch.setattr(select, "_located", Survey(found.hunts, law(whole)))
+    monkeypatch.setattr(select._surveys, "law", lambda _: law(first_look))
+    monkeypatch.setattr(select._surveys, "_located", Survey(found.hunts, law(whole)))
     half = 0.5 * select._rest(one.current)
     assert (select._least_promise(one, found.retuned) == half) is asked
     nearer = replace(one, current=replace(found.result, residual=1.3 * found.result.residual))

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from estimator.diagnosis.hypotheses import NOTHING, Bench, Effects
+from estimator.diagnosis.bench import Bench
+from estimator.diagnosis.hypotheses import NOTHING, Effects
 from estimator.diagnosis.screening import Look, Screen
 from estimator.diagnosis.selection.rounds import WORTH_FINISHING, WORTH_GOING_ON
 from estimator.physics.fit import FitResult

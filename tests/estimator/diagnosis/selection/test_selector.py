@@ -157,7 +157,7 @@ class TestSeveralEffects:
         monkeypatch.setattr(select._rounds, "try_all", nothing_fitted)
         monkeypatch.setattr(select, "_has_rest", lambda *_: True)
         monkeypatch.setattr(select, "_outdone", lambda *_: NOTHING)
-        monkeypatch.setattr(select, "_may_be_one_law", lambda *_: False)
+        monkeypatch.setattr(select._surveys, "may_be_one_law", lambda *_: False)
         path = _Path(frozenset(chosen), of_rms(left, 4), {})
         assert select._grown(path, of_rms(1.0, 2), far=True) is path
         assert asked == pytest.approx([part * 2000 * (left**2 - 0.1**2)])

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.hypotheses import NOTHING, Bench, everything
+from estimator.diagnosis.bench import Bench
+from estimator.diagnosis.hypotheses import NOTHING, everything
 from estimator.diagnosis.unnamed import ROUNDS, hunts_of, scene
 from estimator.diagnosis.where.discrepancy import discrepancy, effects_added, without_effect
 from estimator.physics.effect import Element
