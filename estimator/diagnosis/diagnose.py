@@ -43,6 +43,7 @@ from estimator.diagnosis.selection import Selection
 from estimator.diagnosis.unnamed import UnnamedLaw as Nameless
 from estimator.diagnosis.where import discrepancy, locate
 from estimator.diagnosis.wording import rejection, statement
+from estimator.first_use import COMPILING, is_first_use
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult, fit, make_problem
 from estimator.physics.model import DrivelineModel, unit
@@ -87,9 +88,16 @@ def diagnose(
         Where torque, output or time is off by a factor or in sign.
     """
     began = time.perf_counter()
+    if is_first_use():
+        progress = _compiling(progress)
     with threadpool_limits(1, user_api="blas"):  # on tall, thin matrices more threads only wait for each other
         ready = prepare(records, model, holdout)
         return ready.finished(_diagnose(ready.records, model, ready.holdout, progress, began))
+
+
+def _compiling(progress: Progress) -> Progress:
+    """Say at every stage what most of its time goes to."""
+    return lambda message, share: progress(f"{message} ({COMPILING})", share)
 
 
 def _diagnose(
