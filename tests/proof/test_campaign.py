@@ -13,7 +13,7 @@ from hil.proof.campaign import case as campaign_case
 from hil.proof.campaign import run as campaign
 from hil.proof.campaign.case import Answer, run_case
 from hil.proof.campaign.kinds import kind
-from hil.proof.campaign.matrix import confusion_svg
+from hil.proof.campaign.matrix import confusion_of, confusion_svg
 from hil.proof.campaign.report import markdown, summary
 from hil.proof.campaign.statistics import Rate, columns, confusion, coverage
 from hil.proof.command import CommandFailed, run_hil
@@ -216,6 +216,16 @@ def test_the_picture_has_a_cell_for_each_pair_and_its_counts():
     blue, red = [c[2] > c[0] for c in colours], [c[0] > c[2] for c in colours]
     assert blue == [True, False, False, False, True, False]  # backlash named; no mismatch where nothing was hidden
     assert red == [False, False, True, False, False, False]  # no name for a backlash
+
+
+def test_a_look_alike_that_was_declared_is_right():
+    rows = [
+        _row("coulomb_friction_motor", "quadratic_friction", outcome="alike"),
+        _row("backlash", "stiffness_nonlinearity", outcome="wrong", success=False),
+    ]
+    tree = ET.fromstring(confusion_of(rows))
+    filled = [_rgb(cell.get("fill")) for cell in tree.iter("{http://www.w3.org/2000/svg}rect") if cell.get("stroke")]
+    assert [c[2] > c[0] for c in filled if c[0] != c[2]] == [True, False]
 
 
 def _rgb(colour):

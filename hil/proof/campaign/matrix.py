@@ -3,14 +3,26 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from html import escape
 
-from hil.proof.campaign.statistics import columns
+from hil.proof.campaign.kinds import kind
+from hil.proof.campaign.score import right_columns
+from hil.proof.campaign.statistics import Row, by_kind, columns, confusion, strongest_name
 
 CELL_PX, LEFT_PX, TOP_PX, RIGHT_PX, BOTTOM_PX = 22, 190, 170, 90, 8
 RIGHT, WRONG = (31, 119, 180), (214, 39, 40)
 """Colours of right answers and of all others, at full count."""
+
+
+def confusion_of(rows: Sequence[Row]) -> str:
+    """Draw the confusion matrix of scored cases.
+
+    A column is right where it is what was planted or a look-alike of it, by the catalogue or as a case declared.
+    """
+    matrix, groups = confusion(rows), by_kind(rows)
+    declared = {planted: {strongest_name(row) for row in groups[planted] if row["success"]} for planted in matrix}
+    return confusion_svg(matrix, {planted: right_columns(kind(planted)) | declared[planted] for planted in matrix})
 
 
 def confusion_svg(matrix: Mapping[str, Counter[str]], right: Mapping[str, Collection[str]]) -> str:

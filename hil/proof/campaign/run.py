@@ -19,11 +19,11 @@ from typing import Any
 from hil.errors import RecordingError, UsageError
 from hil.proof.campaign.band import score_band
 from hil.proof.campaign.case import run_case
-from hil.proof.campaign.kinds import ALL, Group, Kind, kind, parse_kinds, parse_seeds
-from hil.proof.campaign.matrix import confusion_svg
+from hil.proof.campaign.kinds import ALL, Group, Kind, parse_kinds, parse_seeds
+from hil.proof.campaign.matrix import confusion_of
 from hil.proof.campaign.report import markdown, summary
-from hil.proof.campaign.score import right_columns, score
-from hil.proof.campaign.statistics import Row, confusion
+from hil.proof.campaign.score import score
+from hil.proof.campaign.statistics import Row
 from hil.proof.options import add_work_options, parse_work
 
 RESULTS = "results.jsonl"
@@ -97,9 +97,7 @@ def write_summary(rows: Sequence[Row], out: Path) -> None:
     rows = sorted(rows, key=lambda row: (order.get(row["kind"], len(order)), row["kind"], row["seed"]))
     (out / "summary.json").write_text(json.dumps(summary(rows), indent=1) + "\n", encoding="utf-8")
     (out / "summary.md").write_text(markdown(rows), encoding="utf-8")
-    matrix = confusion(rows)
-    right = {planted: right_columns(kind(planted)) for planted in matrix}
-    (out / "confusion.svg").write_text(confusion_svg(matrix, right), encoding="utf-8")
+    (out / "confusion.svg").write_text(confusion_of(rows), encoding="utf-8")
 
 
 def _told(row: Row, done: int, total: int) -> str:

@@ -9,11 +9,10 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from hil.proof.campaign.kinds import Group, kind
-from hil.proof.campaign.matrix import confusion_svg
+from hil.proof.campaign.kinds import Group
+from hil.proof.campaign.matrix import confusion_of
 from hil.proof.campaign.report import TITLES, WANTED, summary
-from hil.proof.campaign.score import right_columns
-from hil.proof.campaign.statistics import Rate, Row, banded, confusion, coverage, quantiles, share
+from hil.proof.campaign.statistics import Rate, Row, banded, coverage, quantiles, share
 from hil.proof.prove.scoreboard_cases import cases_table
 from hil.proof.prove.scoreboard_real import real_section
 from hil.proof.prove.scoreboard_wire import wire_section
@@ -86,7 +85,7 @@ def scoreboard_page(board: Board) -> str:
         html.section("Misses", cases_table(misses) if misses else html.paragraph("None.")),
         *([wire_section(board.wire, WIRE)] if board.wire else []),
         *([real_section(board.real, REAL)] if board.real else []),
-        html.section("What was named", f'<div class="wide">{_matrix(rows)}</div>'),
+        html.section("What was named", f'<div class="wide">{confusion_of(rows)}</div>'),
         html.section("Every case", cases_table(rows)),
     ]
     return html.page("Scoreboard", sections, FOOTER, plots=False)
@@ -126,11 +125,6 @@ def _groups(rows: Sequence[Row]) -> str:
                 (TITLES[group], WANTED[group], f"{rate.hits} of {rate.trials}", _percent(rate), _interval(rate))
             )
     return html.table(("hidden", "wanted", "cases", "rate", "interval"), lines, numbers=(2, 3))
-
-
-def _matrix(rows: Sequence[Row]) -> str:
-    matrix = confusion(rows)
-    return confusion_svg(matrix, {planted: right_columns(kind(planted)) for planted in matrix})
 
 
 def _rate(rows: Sequence[Row], outcomes: Sequence[str]) -> Rate:
