@@ -166,8 +166,8 @@ class Run:
         """
         motion, state = np.zeros((3, torque.size - first + 1)), np.empty_like(begin)
         trajectory(
-            self.masses, self.step_s, self.sign_width, first, self.time_s[0], torque, load, self.angle[: torque.size],
-            self.p, begin, state, motion,
+            self.masses, self.step_s, 1, self.sign_width, first, self.time_s[0], torque, load,
+            self.angle[: torque.size], self.p, begin, state, False, motion,
         )  # fmt: skip
         return motion, state
 
@@ -198,6 +198,7 @@ class Run:
 def trajectory(
     masses: int,
     step_s: float,
+    substeps: int,
     sign_width: float,
     first: int,
     start_s: float,
@@ -207,16 +208,19 @@ def trajectory(
     p: FloatArray,
     begin: FloatArray,
     state: FloatArray,
+    sensor: bool,
     motion: FloatArray,
 ) -> None:
-    """Fill ``motion``, shape (3, S - first + 1), with motor speed, load speed and twist, and the state behind them."""
+    """Fill ``motion``, shape (3, S - first + 1), with motor speed, load speed and twist, and the state behind them.
+
+    ``substeps`` and ``sensor``, 1 and False, come from outside: for constants the whole kernel would be compiled anew.
+    """
     out, slopes = np.empty(torque.shape[0]), np.zeros((2, 0))
+    given, driven = (step_s, substeps, sign_width, first, start_s), (torque, load, angle, p, state)
     for row in range(1 if masses == 1 else 3):
         output = state_vector.SPEED if row == 0 else (state_vector.LOAD_SPEED if row == 1 else state_vector.TWIST)
         state[:] = begin
-        integration.integrate(
-            masses, step_s, 1, sign_width, first, start_s, torque, load, angle, p, state, output, False, out, slopes
-        )
+        integration.integrate(masses, *given, *driven, output, sensor, out, slopes)
         motion[row, :-1] = out[first:]
         motion[row, -1] = state[output]
     if masses == 1:

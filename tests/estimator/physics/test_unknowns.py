@@ -38,8 +38,8 @@ def test_what_is_trusted_exactly_or_is_zero_is_no_unknown() -> None:
 def test_an_effect_has_unknowns_once_per_start() -> None:
     rec = linear_record(TWO_MASS, random_steps(500, seed=1), CRUISE)
     ladder = effect_unknowns("backlash", model(TWO_MASS), [rec])
-    assert len(ladder) == 3
-    assert len({release.shared[0].start for release in ladder}) == 3
+    assert len(ladder) == 4
+    assert len({release.shared[0].start for release in ladder}) == 4
     for release in ladder:
         shared = release.shared
         assert release.own == ((),)
