@@ -91,6 +91,7 @@ def diagnose(
     if is_first_use():
         progress = _compiling(progress)
     with threadpool_limits(1, user_api="blas"):  # on tall, thin matrices more threads only wait for each other
+        progress("checking the recordings", 0.0)
         ready = prepare(records, model, holdout)
         return ready.finished(_diagnose(ready.records, model, ready.holdout, progress, began))
 

@@ -124,4 +124,4 @@ def test_the_diagnosis_refuses_before_it_fits() -> None:
     called = []
     with pytest.raises(NotExciting, match="Record longer"):
         diagnose([drive(samples=100)], LINE, progress=lambda message, share: called.append(message))
-    assert called == []
+    assert called == ["checking the recordings"]
