@@ -37,8 +37,9 @@ MOST_NEARBY = 4
 """Times that a fit is begun once more from around where it ended."""
 
 WORTH_ANOTHER_FIT = 0.1
-"""Share of the squared error that a look from a fit must promise for an effect to be fitted once more: those that found
-another minimum promised half of it, those that came back to where they were a fiftieth."""
+"""Share of the squared error that a look from a fit must promise for an effect to be fitted once more (those that found
+another minimum promised half of it, those that came back to where they were a fiftieth), and that a fit from around
+another must have taken away for the next."""
 
 MUCH_BYTES = 2**24
 """Room of a derivative that is rather found again than kept: a round of the search has a dozen of them."""
@@ -65,6 +66,7 @@ class Bench:
     _looked_again: set[tuple[Effects, str]] = field(default_factory=set)
     _retold: set[tuple[Effects, str]] = field(default_factory=set)
     _lessened: set[tuple[Effects, bytes]] = field(default_factory=set)
+    _looked_around: set[tuple[Effects, bytes]] = field(default_factory=set)
     _tried: dict[Effects, list[Release]] = field(default_factory=dict)
 
     def fit(self, effects: Effects, warm: FitResult | None = None, releases: Sequence[Release] = ()) -> FitResult:
@@ -171,10 +173,14 @@ class Bench:
     def fit_nearby(self, effects: Effects) -> FitResult:
         """Fit once more from around where a fit ended, where its error has many small minima, while that helps much.
 
-        What such a minimum leaves looks like an event here and there.
+        What such a minimum leaves looks like an event here and there. Each fit is begun around once.
         """
         result = self._fits[effects]
         for _ in range(MOST_NEARBY):
+            place = (effects, result.x.tobytes())
+            if place in self._looked_around:
+                break
+            self._looked_around.add(place)
             better = _begun_nearby(result)
             if not better:
                 break

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperCommand
 
-from hil.cli.importing import lasting_imports
+from hil.cli.importing import without_collecting
 
 HOLDOUT = "--holdout"
 
@@ -58,7 +58,7 @@ def diagnose(
 
     Writes DIR/diagnosis.json, DIR/augmented.toml and DIR/report.html.
     """
-    with lasting_imports():
+    with without_collecting():
         from rich.console import Console
 
         from estimator.diagnosis.diagnose import diagnose as diagnose_records

@@ -6,7 +6,7 @@ import gc
 
 import pytest
 
-from hil.cli.importing import lasting_imports
+from hil.cli.importing import without_collecting
 
 
 @pytest.mark.parametrize("enabled", [True, False])
@@ -14,7 +14,7 @@ from hil.cli.importing import lasting_imports
 def test_the_collector_is_as_it_was(enabled: bool, fails: bool) -> None:
     (gc.enable if enabled else gc.disable)()
     try:
-        with pytest.raises(ImportError) if fails else lasting_imports(), lasting_imports():
+        with pytest.raises(ImportError) if fails else without_collecting(), without_collecting():
             assert not gc.isenabled()
             if fails:
                 raise ImportError

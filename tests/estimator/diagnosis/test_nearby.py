@@ -31,6 +31,23 @@ def test_a_gap_caught_at_one_way_to_bounce_comes_out_of_it() -> None:
     assert abs(caught.value("backlash", "gap_rad") / WIDE["gap_rad"] - 1.0) > 0.002
 
 
+def test_a_wide_gap_is_found_from_a_start_of_its_own() -> None:
+    """From the narrower starts alone it ended at six times the noise."""
+    bench = bench_with("backlash", WIDE | {"gap_rad": 0.05, "contact_rad": 5e-3})
+    assert bench.fit(GAP, bench.fit(NOTHING)).rms == pytest.approx(SIGMA, rel=0.03)
+
+
+def test_a_fit_is_begun_around_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Several ways lead past the same fit."""
+    bench = bench_with("backlash", WIDE | {"gap_rad": 0.01, "contact_rad": 1e-3})
+    bench.fit(GAP, bench.fit(NOTHING))
+    found = bench.fit_nearby(GAP)
+    again = bench.fit_nearby(GAP)  # what gained too little for another round was not begun around yet
+    monkeypatch.setattr(bench_module, "fit", lambda *_: pytest.fail("begun once more"))
+    assert bench.fit_nearby(GAP) is again
+    assert again.squares <= found.squares
+
+
 def test_what_is_at_the_noise_stays() -> None:
     bench = bench_with("backlash", WIDE | {"gap_rad": 0.01, "contact_rad": 1e-3})
     right = bench.fit(GAP, bench.fit(NOTHING))
@@ -53,7 +70,7 @@ def test_it_is_done_for_as_long_as_it_helps_much(
         had = bench.fit(GAP)
         begun.append(had.squares)
         fall = dict(enumerate(falls)).get(len(set(begun)) - 1, -0.1)
-        return replace(had, residual=np.sqrt(1.0 - fall) * had.residual, converged=True)
+        return replace(had, x=np.nextafter(had.x, np.inf), residual=np.sqrt(1.0 - fall) * had.residual, converged=True)
 
     monkeypatch.setattr(bench_module, "fit", fitted)
     monkeypatch.setattr(bench_module, "polished", lambda result: result)
