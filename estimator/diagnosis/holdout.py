@@ -17,6 +17,7 @@ from estimator.diagnosis.hypotheses import Effects
 from estimator.physics.fit import FitResult, fit
 from estimator.physics.free_run import simulate_foreign
 from estimator.physics.model import DrivelineModel
+from estimator.physics.parallel import concurrently
 from estimator.signals.record import BoolArray, FloatArray, Record
 
 BLOCK_S, EVERY_S = 0.6, 2.0
@@ -63,7 +64,7 @@ class Examiner:
 
     def compare(self, before: FitResult, smaller: Effects, after: FitResult, larger: Effects) -> HoldOut:
         """Compare two hypotheses on unseen samples; ``before`` and ``after`` are their fits of everything."""
-        squares = [self._squares(fit, effects) for fit, effects in ((before, smaller), (after, larger))]
+        squares = concurrently(lambda each: self._squares(*each), [(before, smaller), (after, larger)])
         counts = np.array([np.sum(block) for record in self._judged for block in _single_blocks(record)])
         fall = squares[0] - squares[1]
         spread = float(np.std(fall) * np.sqrt(fall.size) / squares[0].sum())

@@ -12,6 +12,7 @@ from estimator.diagnosis.line.linearise import block_length, tangent
 from estimator.diagnosis.line.motion import NO_FORCE, Force, Motion, between, motion_in_blocks, states_of
 from estimator.diagnosis.line.tangent import Tangent
 from estimator.physics.fit import FitResult
+from estimator.physics.parallel import concurrently
 from estimator.signals.record import BoolArray, FloatArray, Record
 
 MOST_ROWS = 20_000
@@ -83,7 +84,7 @@ def lines(result: FitResult, forces: Sequence[Force] | None = None) -> tuple[Lin
     length = block_length(result)
     count = len(result.problem.records)
     every = [NO_FORCE] * count if forces is None else forces
-    return tuple(_line(result, i, length, force) for i, force in enumerate(every))
+    return tuple(concurrently(lambda i: _line(result, i, length, every[i]), range(count)))
 
 
 def _line(result: FitResult, index: int, length: int, force: Force) -> Line:

@@ -259,8 +259,9 @@ class Selector:
         return True
 
     def _drop_superfluous(self, chosen: Effects, current: FitResult, retuned: FitResult) -> tuple[Effects, FitResult]:
-        for name in sorted(chosen) if len(chosen) > 1 else ():
-            without = self.jury.bench.fit_less(chosen - {name}, current)
+        names = sorted(chosen) if len(chosen) > 1 else []
+        fewer = concurrently(lambda name: self.jury.bench.fit_less(chosen - {name}, current), names)
+        for name, without in zip(names, fewer, strict=True):
             gained = gain(without, current)
             if gained.delta_bic < VERY_STRONG or not self.jury.weight.counts(name, chosen, current, without, retuned):
                 return self._drop_superfluous(chosen - {name}, without, retuned)

@@ -17,6 +17,7 @@ from estimator.diagnosis.line import DRIVES, FORCES, PLACES, Line, Place
 from estimator.diagnosis.unnamed.forms import Columns, Form, forms
 from estimator.diagnosis.unnamed.scene import Scene
 from estimator.physics.effect import Element
+from estimator.physics.parallel import concurrently
 from estimator.signals.record import FloatArray, IntArray
 
 BATCH = 2**20
@@ -72,11 +73,12 @@ def answers(view: Scene, element: Element, laws: Sequence[Sequence[Columns]]) ->
     """
     if not laws:
         return np.zeros((0, sum(int(line.rows.sum()) for line in view.cut)))
-    found = []
-    for i, line in enumerate(view.cut):
-        torques = np.concatenate([columns[i].T for columns in laws])
-        found.append(_answers_of(line, element, torques)[:, line.rows])
-    return np.hstack(found)
+
+    def part(i: int) -> FloatArray:
+        line = view.cut[i]
+        return _answers_of(line, element, np.concatenate([columns[i].T for columns in laws]))[:, line.rows]
+
+    return np.hstack(concurrently(part, range(len(view.cut))))
 
 
 def _answers_of(line: Line, element: Element, functions: FloatArray) -> FloatArray:

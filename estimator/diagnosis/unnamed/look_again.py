@@ -16,7 +16,7 @@ from estimator.diagnosis.unnamed.candidates import answers, candidates
 from estimator.diagnosis.unnamed.extra import Extra, extra_of
 from estimator.diagnosis.unnamed.ground import Ground
 from estimator.diagnosis.unnamed.hunt import NO_LAW, RIDGE, Found, Hunt, cost, terms_of, weights_of, worthwhile
-from estimator.diagnosis.unnamed.pursuit import pursue
+from estimator.diagnosis.unnamed.pursuit import factored, pursue
 from estimator.diagnosis.unnamed.scene import Scene
 from estimator.physics.bounded import least_inside, unbounded_first
 from estimator.physics.fit import STEP, FitResult, bounds, own_part, residual_at
@@ -118,8 +118,9 @@ def _solution(hunt: Hunt, terms: int) -> tuple[FloatArray, FloatArray]:
     lower = np.concatenate([np.minimum(low - result.x, -open_edge), -free]) * scale
     upper = np.concatenate([np.maximum(high - result.x, open_edge), free]) * scale
     order = unbounded_first(lower, upper, np.ones(scale.size, dtype=bool))
-    q, r = np.linalg.qr(np.vstack([(design / scale)[:, order], RIDGE * np.eye(scale.size)]))
+    target = np.concatenate([ground.raw, np.zeros(scale.size)])
+    r, along = factored(np.vstack([(design / scale)[:, order], RIDGE * np.eye(scale.size)]), target)
     solved = np.empty(scale.size)
-    solved[order] = least_inside(r, q[: ground.raw.size].T @ ground.raw, lower[order], upper[order])
+    solved[order] = least_inside(r, along, lower[order], upper[order])
     solved /= scale
     return solved[: result.x.size], solved[result.x.size :]

@@ -111,8 +111,17 @@ def pursue(pool: Pool, ground: Ground) -> Path:
     columns = pool.of(chosen)
     term = np.repeat(np.arange(len(chosen)), [int(np.count_nonzero(group == each)) for each in chosen])
     rest = ground.rest(columns)
-    basis, triangle = np.linalg.qr(rest)
-    return Path(squares, counts, chosen, columns, rest, term, alone, ground.error, triangle, basis.T @ ground.error)
+    return Path(squares, counts, chosen, columns, rest, term, alone, ground.error, *factored(rest, ground.error))
+
+
+def factored(columns: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the triangular factor of columns, shape (q, q), and a target along their orthonormal basis, shape (q,).
+
+    The target is factored with them, as one column more: the basis itself, which takes as long again, is not needed.
+    """
+    q = columns.shape[1]
+    triangle = np.asarray(np.linalg.qr(np.column_stack([columns, target]), mode="r"))
+    return triangle[:q, :q], np.ascontiguousarray(triangle[:q, q])
 
 
 def _products(pool: Pool, ground: Ground) -> tuple[FloatArray, FloatArray, FloatArray]:

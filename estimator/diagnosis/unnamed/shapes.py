@@ -7,6 +7,7 @@ from scipy.signal import lfilter
 
 from estimator.diagnosis.line import Motion
 from estimator.signals.record import FloatArray
+from estimator.signals.slider import carried
 
 ROUNDED = 0.02
 """A sign function changes over this share of its argument's range."""
@@ -42,13 +43,8 @@ def beyond(values: FloatArray, share: float) -> FloatArray:
 
 def slide(values: FloatArray, share: float) -> FloatArray:
     """Return what a slider carries that yields after a share of a signal's range (Prandtl)."""
-    width = share * top_of(values)
-    carried = np.empty_like(values)
-    carried[0] = load = 0.0
-    for k, step in enumerate(np.diff(values), start=1):
-        load = min(max(load + step, -width), width)
-        carried[k] = load
-    return carried
+    load: FloatArray = carried(values, share * top_of(values))
+    return load
 
 
 def peaked(speed: FloatArray, share: float) -> FloatArray:
