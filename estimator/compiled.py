@@ -58,6 +58,15 @@ def inlined(function: Function) -> Function:
     return cast(Function, numba.njit(cache=True, nogil=True, error_model="numpy", forceinline=True)(function))
 
 
+def woven(function: Function) -> Function:
+    """Compile a function as a part of each compiled one that calls it, and never by itself.
+
+    What calls a kernel takes the kernel's whole code in and works on it anew, for as long as a quarter of the kernel
+    itself took. Where several small functions stand in between, they are woven into one.
+    """
+    return cast(Function, numba.njit(nogil=True, error_model="numpy", inline="always")(function))
+
+
 def brief(function: Function) -> Function:
     """Compile a function that is over in microseconds and is called all the time: it keeps the interpreter lock.
 

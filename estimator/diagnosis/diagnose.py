@@ -21,6 +21,7 @@ from estimator.diagnosis.assemble import (
 from estimator.diagnosis.bench import Bench
 from estimator.diagnosis.chain import Chain, mechanical, read_through
 from estimator.diagnosis.evidence import Gain, gain, information, noise_level, residuals_by_record
+from estimator.diagnosis.first_use import COMPILING, compile_kernels, is_first_use
 from estimator.diagnosis.holdout import Examiner, foreign_outputs
 from estimator.diagnosis.hypotheses import NOTHING, Progress, effects_of, everything
 from estimator.diagnosis.judgement import Judgement, judge
@@ -43,7 +44,6 @@ from estimator.diagnosis.selection import Selection
 from estimator.diagnosis.unnamed import UnnamedLaw as Nameless
 from estimator.diagnosis.where import discrepancy, locate
 from estimator.diagnosis.wording import rejection, statement
-from estimator.first_use import COMPILING, is_first_use
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult, fit, make_problem
 from estimator.physics.model import DrivelineModel, unit
@@ -61,6 +61,8 @@ def diagnose(
     progress: Progress = _silent,
 ) -> Diagnosis:
     """Find out whether physics is missing from a model, where, which, and how large it is.
+
+    The first call on a machine compiles the simulation, in two processes, and keeps it on disk.
 
     Parameters
     ----------
@@ -90,6 +92,8 @@ def diagnose(
     began = time.perf_counter()
     if is_first_use():
         progress = _compiling(progress)
+        progress("preparing", 0.0)
+        compile_kernels()
     with threadpool_limits(1, user_api="blas"):  # on tall, thin matrices more threads only wait for each other
         progress("checking the recordings", 0.0)
         ready = prepare(records, model, holdout)

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.compiled import compiled
+from estimator.compiled import compiled, woven
 from estimator.physics.kernel import integration
 from estimator.signals.record import FloatArray
 
@@ -89,7 +89,7 @@ def linearise(
     return phi, gamma, c, d
 
 
-@compiled
+@woven
 def by_states(
     setting: Setting,
     nudges: Nudges,
@@ -111,7 +111,7 @@ def by_states(
             phi[j, i] = (moved[nudges.states[j]] - state[nudges.states[j]]) / nudges.steps[i]
 
 
-@compiled
+@woven
 def by_torques(
     setting: Setting,
     nudges: Nudges,
@@ -134,7 +134,7 @@ def by_torques(
             gamma[j, i] = (moved[nudges.states[j]] - rest[nudges.states[j]]) / nudges.step_nm
 
 
-@compiled
+@woven
 def run_block(setting: Setting, first: int, torques: Torques, p: FloatArray, state: FloatArray) -> float:
     """Simulate a block from ``state``, leave there its last state, and return its mean output."""
     torque, load = torques
