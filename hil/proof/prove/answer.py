@@ -56,12 +56,16 @@ def answer(folder: Path, jobs: int, progress: Progress, limit_s: float = LIMIT_S
 
 
 def _answered(folder: Path, cases: Mapping[str, Shown]) -> dict[str, Any]:
-    """Return the answers there are from an earlier run, to just these cases."""
+    """Return the answers from an earlier run, to just these cases, that are still in their folders."""
     if not (folder / VERDICTS_LIST).exists():
         return {}
     listed = read_list(folder / VERDICTS_LIST, "remove the folder verdicts to begin anew")
     known = {name: digest_of(dict(shown.files)) for name, shown in cases.items()}
-    return {name: entry for name, entry in listed.items() if entry["case"] == known.get(name)}
+    return {
+        name: entry
+        for name, entry in listed.items()
+        if entry["case"] == known.get(name) and (folder / VERDICTS / name).is_dir()
+    }
 
 
 def _answer_one(folder: Path, name: str, shown: Shown, limit_s: float) -> dict[str, Any]:

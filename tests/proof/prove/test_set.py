@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -165,6 +166,15 @@ def test_answering_goes_on_where_it_was_interrupted(proof: Path, tool: Tool) -> 
     tool.seen.clear()
     answer(proof, 1, silent)
     assert tool.seen == []
+
+
+def test_an_answer_whose_folder_was_removed_is_given_anew(proof: Path, tool: Tool) -> None:
+    answer(proof, 1, silent)
+    shutil.rmtree(proof / VERDICTS / "case_002")
+    tool.seen.clear()
+    answer(proof, 1, silent)
+    assert len(tool.seen) == 1
+    assert len(judge_set(proof, KEY, 1, silent)) == COUNT
 
 
 def test_a_command_that_fails_is_a_miss_and_no_crash(proof: Path, tool: Tool) -> None:
