@@ -91,7 +91,7 @@ def diagnose(
     """
     began = time.perf_counter()
     if is_first_use():
-        progress = _compiling(progress)
+        progress = _telling(progress)
         progress("preparing", 0.0)
         compile_kernels()
     with threadpool_limits(1, user_api="blas"):  # on tall, thin matrices more threads only wait for each other
@@ -100,7 +100,7 @@ def diagnose(
         return ready.finished(_diagnose(ready.records, model, ready.holdout, progress, began))
 
 
-def _compiling(progress: Progress) -> Progress:
+def _telling(progress: Progress) -> Progress:
     """Say at every stage what most of its time goes to."""
     return lambda message, share: progress(f"{message} ({COMPILING})", share)
 

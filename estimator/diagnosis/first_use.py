@@ -51,10 +51,13 @@ def is_first_use() -> bool:
 
 
 def compile_kernels() -> None:
-    """Compile the largest kernels in two processes and keep them on disk; what fails there is compiled when called."""
-    for here, there in IN_PAIRS if sys.executable else ():
-        with _compiling_elsewhere(there.__name__):
-            here.compile(SIGNATURES[here])
+    """Compile the largest kernels in two processes and keep them on disk; what fails there is compiled when called.
+
+    Not in this one: a compiler that is interrupted ends in an error of its own.
+    """
+    for one, other in IN_PAIRS if sys.executable else ():
+        with _compiling(one.__name__), _compiling(other.__name__):
+            pass
 
 
 def compile_one(name: str) -> None:
@@ -65,12 +68,12 @@ def compile_one(name: str) -> None:
 
 
 @contextmanager
-def _compiling_elsewhere(name: str) -> Iterator[None]:
+def _compiling(name: str) -> Iterator[None]:
     """Compile a kernel in a process of its own meanwhile, and wait for it; whoever is interrupted ends it."""
     program = f"from estimator.diagnosis.first_use import compile_one; compile_one({name!r})"
-    with subprocess.Popen([sys.executable, "-c", program], stderr=subprocess.DEVNULL) as other:
+    with subprocess.Popen([sys.executable, "-c", program], stderr=subprocess.DEVNULL) as process:
         try:
             yield
-            other.wait()
+            process.wait()
         finally:
-            other.kill()
+            process.kill()
