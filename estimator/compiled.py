@@ -61,8 +61,8 @@ def inlined(function: Function) -> Function:
 def woven(function: Function) -> Function:
     """Compile a function as a part of each compiled one that calls it, and never by itself.
 
-    What calls a kernel takes the kernel's whole code in and works on it anew, for as long as a quarter of the kernel
-    itself took. Where several small functions stand in between, they are woven into one.
+    What calls a kernel takes the kernel's whole code in and works on it anew. Where several small functions stand in
+    between, each would; they are woven into one.
     """
     return cast(Function, numba.njit(nogil=True, error_model="numpy", inline="always")(function))
 
