@@ -38,7 +38,7 @@ def least_inside(triangle: FloatArray, target: FloatArray, low: FloatArray, high
         ``low <= 0 <= high``, -inf and inf where there is no bound.
     """
     free = int(_bounded(low, high).argmax())
-    x, ended = _least(np.ascontiguousarray(triangle), target, low, high, free, EXCHANGES)
+    x, ended = least(np.ascontiguousarray(triangle), target, low, high, free, EXCHANGES)
     if not ended:
         rest = slice(free, None)
         x[rest] = _one_by_one(triangle[rest, rest], target[rest], low[rest], high[rest])
@@ -68,7 +68,7 @@ def _factored(curvature: FloatArray, gradient: FloatArray) -> tuple[FloatArray, 
 
 
 @compiled
-def _least(
+def least(
     triangle: FloatArray, target: FloatArray, low: FloatArray, high: FloatArray, free: int, exchanges: int
 ) -> tuple[FloatArray, bool]:
     """Return the least and whether pivoting came to an end, of unknowns of which the first ``free`` have no bounds."""

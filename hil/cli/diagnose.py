@@ -11,6 +11,7 @@ import typer
 from typer.core import TyperCommand
 
 from hil.cli.importing import without_collecting
+from hil.cli.silence import is_silent
 
 HOLDOUT = "--holdout"
 
@@ -99,16 +100,31 @@ def diagnose(
         typer.echo(f"report: {out / 'report.html'}")
 
 
+def _why_minutes() -> Progress:
+    """Return what says once that a stage compiles, unless nothing is to be said."""
+    from estimator.diagnosis.first_use import COMPILING
+
+    told = is_silent()
+
+    def show(stage: str, share: float) -> None:
+        nonlocal told
+        if COMPILING in stage and not told:
+            typer.echo(stage, err=True)
+            told = True
+
+    return show
+
+
 @contextmanager
 def progress_bar() -> Iterator[Progress]:
-    """Show stage and share done on standard error, where that is a terminal."""
+    """Show stage and share done on standard error, where that is a terminal; else only why it takes minutes, once."""
     from rich.console import Console
     from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
     from rich.progress import Progress as Bar
 
     console = Console(stderr=True)
     if not console.is_terminal:
-        yield lambda stage, share: None
+        yield _why_minutes()
         return
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
     with Bar(*columns, console=console, transient=True) as bar:

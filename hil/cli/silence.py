@@ -10,6 +10,11 @@ NO_TERMINAL = "TTY_COMPATIBLE"
 """By this variable, at 0, the console library takes no stream for a terminal: it draws no progress."""
 
 
+def is_silent() -> bool:
+    """Tell whether nothing is to be printed but errors."""
+    return os.environ.get(NO_TERMINAL) == "0"
+
+
 @contextmanager
 def silence(wanted: bool) -> Iterator[None]:
     """Print nothing on standard output, and draw nothing, for the time of the block; do nothing if not wanted."""

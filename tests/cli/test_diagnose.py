@@ -8,8 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from estimator.diagnosis.first_use import COMPILING
 from hil.cli.diagnose import app, progress_bar
 from hil.cli.main import run
+from hil.cli.silence import silence
 from hil.config.model_file import read_model
 from tests.cli import bench
 
@@ -93,6 +95,16 @@ def test_no_progress_is_shown_where_nobody_looks(capsys: pytest.CaptureFixture[s
         progress("fitting", 0.5)
     captured = capsys.readouterr()
     assert (captured.out, captured.err) == ("", "")
+
+
+@pytest.mark.parametrize("quiet", [False, True])
+def test_that_it_compiles_is_said_once_to_a_log_too(quiet: bool, capsys: pytest.CaptureFixture[str]) -> None:
+    with silence(quiet), progress_bar() as progress:
+        for stage in ("preparing", "fitting"):
+            progress(f"{stage} ({COMPILING})", 0.5)
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err == ("" if quiet else f"preparing ({COMPILING})\n")
 
 
 def test_progress_is_shown_on_a_terminal(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
