@@ -23,9 +23,10 @@ from estimator.diagnosis.selection import Selection
 from estimator.diagnosis.trial import Trial
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effects import road_grade
-from estimator.physics.fit import FitResult, local_part
+from estimator.physics.fit import FitResult
 from estimator.physics.layout import slot
 from estimator.physics.model import DrivelineModel, EffectValue, parameter_unit, unit
+from estimator.physics.problem import local_part
 from estimator.physics.steps import moments_of
 from estimator.physics.unknowns import LOAD_TORQUE
 from estimator.signals.record import FloatArray

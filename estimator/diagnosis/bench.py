@@ -12,12 +12,13 @@ from estimator.diagnosis.inherit import forgetting, inheriting, kept, placed, st
 from estimator.diagnosis.screening import Screen, promising
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Start
-from estimator.physics.fit import FitResult, Problem, fit, make_problem, not_fitted
+from estimator.physics.fit import FitResult, fit, not_fitted
 from estimator.physics.grid import Grid
 from estimator.physics.model import DrivelineModel
 from estimator.physics.moments import without_idle
 from estimator.physics.parallel import concurrently
 from estimator.physics.polish import polished
+from estimator.physics.problem import Problem, make_problem
 from estimator.physics.starts import HEAT, begun, best_fit, close, converge, warm_start
 from estimator.physics.steps import from_their_moment
 from estimator.physics.unknowns import Release, nominal_unknowns, own_unknowns, released

@@ -20,9 +20,10 @@ from estimator.diagnosis.acquisition import (
 )
 from estimator.diagnosis.segments import tiles
 from estimator.physics.catalogue import EFFECTS
-from estimator.physics.fit import FitResult, start_of
+from estimator.physics.fit import FitResult
 from estimator.physics.free_run import FreeRun, free_run
 from estimator.physics.model import DrivelineModel
+from estimator.physics.problem import start_of
 from estimator.physics.rates import rates
 from estimator.physics.simulate import simulate
 from estimator.signals.record import BoolArray, FloatArray, Record

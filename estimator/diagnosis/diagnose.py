@@ -45,8 +45,9 @@ from estimator.diagnosis.unnamed import UnnamedLaw as Nameless
 from estimator.diagnosis.where import discrepancy, locate
 from estimator.diagnosis.wording import rejection, statement
 from estimator.physics.effect import Element
-from estimator.physics.fit import FitResult, fit, make_problem
+from estimator.physics.fit import FitResult, fit
 from estimator.physics.model import DrivelineModel, unit
+from estimator.physics.problem import make_problem
 from estimator.signals.record import FloatArray, OutputKind, Record
 
 

@@ -32,7 +32,7 @@ _GRID = (int64, float64, int64, float64)
 _fields: Any = types.NamedTuple
 _SETTING = _fields((*_GRID, _ROW, int64, boolean, _ROW, _ROWS), Setting)
 _NUDGES = _fields((_INDICES, _ROW, float64), Nudges)
-_EACH = (_ROWS, _ROWS, _ROW, _ROWS, _ROWS, int64, boolean, _ROWS)
+_EACH = (_ROWS, _ROWS, _INDICES, _INDICES, _ROW, _ROWS, _ROWS, int64, boolean, _ROWS)
 _CHAIN = _fields((_STACK, _ROWS, _ROWS, _ROW, float64, float64), Chain)
 _FILTERED = _fields((_ROWS, _STACK, _ROWS, _ROW, _ROW), Filtered)
 

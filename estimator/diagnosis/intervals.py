@@ -12,7 +12,8 @@ from estimator.diagnosis.evidence import residuals_by_record
 from estimator.diagnosis.noise import unpredictable
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
-from estimator.physics.fit import STEP, FitResult
+from estimator.physics.fit import FitResult
+from estimator.physics.jacobian import STEP
 from estimator.physics.model import parameter_dimension
 from estimator.physics.unknowns import Shared
 from estimator.signals.correlation import correlation_length

@@ -16,9 +16,10 @@ from estimator.diagnosis.result import Verdict
 from estimator.diagnosis.selection import Jury, Selection, Selector
 from estimator.diagnosis.weight import VISIBLE, Weight
 from estimator.physics.effect import Untestable
-from estimator.physics.fit import FitResult, outputs_at
+from estimator.physics.fit import FitResult
 from estimator.physics.grid import Grid, grid_for
 from estimator.physics.model import DrivelineModel
+from estimator.physics.problem import outputs_at
 from estimator.signals.record import Record
 
 FINER = 2

@@ -5,38 +5,53 @@ from __future__ import annotations
 import numpy as np
 
 from estimator.compiled import compiled
-from estimator.signals.record import BoolArray, FloatArray
+from estimator.signals.record import BoolArray, FloatArray, IntArray
 
 
 @compiled
-def differences(
-    moved: FloatArray, output: FloatArray, use: BoolArray, steps: FloatArray, limit: float, least: float
-) -> FloatArray:
-    """Return the derivatives of the samples that count, shape (K, R) [unit of the output].
+def fill_differences(
+    moved: FloatArray,
+    of: IntArray,
+    outputs: FloatArray,
+    use: BoolArray,
+    steps: FloatArray,
+    limits: FloatArray,
+    least: FloatArray,
+    columns: IntArray,
+    firsts: IntArray,
+    found: FloatArray,
+) -> None:
+    """Fill in the derivatives of the samples that count.
 
     Parameters
     ----------
-    moved, output : ndarray, shape (K, N) and (N,)
-        Simulations with unknown k moved by ``steps[k]``, and without [unit of the output].
-    use : ndarray of bool, shape (N,)
-        Which R samples count.
+    moved : ndarray, shape (K, N)
+        Simulations with one unknown moved each [unit of the output].
+    of : ndarray of int, shape (K,)
+        Which recording each is of.
+    outputs, use : ndarray, shape (I, N)
+        Of every recording the simulation without [unit of the output], and which samples count.
     steps : ndarray, shape (K,)
-        In scaled unknowns, without unit.
-    limit : float
-        Size of a simulation beyond which it has run away; it is taken to stay there [unit of the output].
-    least : float
-        Largest change that is none: of rounding alone [unit of the output].
+        By how much it is moved, in scaled unknowns, without unit.
+    limits, least : ndarray, shape (I,)
+        Size of a simulation beyond which it has run away, and is taken to stay there; largest change that is none, but
+        of rounding alone [unit of the output].
+    columns : ndarray of int, shape (K,)
+        Which unknown is moved.
+    firsts : ndarray of int, shape (I,)
+        Where the samples of each recording begin among all that count.
+    found : ndarray, shape (U, R)
+        A row per unknown.
     """
-    found = np.empty((moved.shape[0], int(np.sum(use))))
-    for k in range(moved.shape[0]):
-        row, largest = 0, 0.0
-        for i in range(output.size):
-            if use[i]:
-                value = limit if np.isnan(moved[k, i]) else min(max(moved[k, i], -limit), limit)
-                change = value - output[i]
-                found[k, row] = change / steps[k]
+    for k in range(of.size):
+        i = of[k]
+        row, largest = firsts[i], 0.0
+        for n in range(outputs.shape[1]):
+            if use[i, n]:
+                value = limits[i] if np.isnan(moved[k, n]) else min(max(moved[k, n], -limits[i]), limits[i])
+                change = value - outputs[i, n]
+                found[columns[k], row] = change / steps[k]
                 largest = max(largest, abs(change))
                 row += 1
-        if largest <= least:
-            found[k] = 0.0
-    return found
+        if largest <= least[i]:
+            found[columns[k], firsts[i] : row] = 0.0

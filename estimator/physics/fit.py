@@ -1,65 +1,31 @@
-"""Fit of the free-run simulation: least squares over shared parameters and each recording's own unknowns.
-
-The error is ``simulated - measured`` over the unmasked samples of all recordings. A local unknown moves its own
-recording only, so one simulation of every recording gives a column of the Jacobian for all of them at once.
-"""
+"""Fit of the free-run simulation: least squares over shared parameters and each recording's own unknowns."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimator.abreast import LANES
-from estimator.physics.differences import differences
 from estimator.physics.effect import MOMENTS
-from estimator.physics.grid import Grid, grid_for
-from estimator.physics.layout import flat
+from estimator.physics.jacobian import jacobian_at
 from estimator.physics.least_squares import Solution, minimise
-from estimator.physics.model import DrivelineModel
-from estimator.physics.parallel import WORKERS, concurrently
-from estimator.physics.simulate import Case, simulate_each, simulate_records
-from estimator.physics.start import Start
-from estimator.physics.unknowns import LocalBasis, Shared, local_basis, own_unknowns
-from estimator.signals.record import BoolArray, FloatArray, IntArray, Record
-
-STEP = 1e-5
-"""Finite-difference step in scaled unknowns: the simulation is smooth to about 1e-10 of its size."""
-
-ROUNDING = 1e-13
-"""Change of the output, over its size, that is none: simulations side by side round otherwise than one by itself, and
-an unknown that does nothing, such as the phase of an amplitude that is 0, has a column of zeros."""
+from estimator.physics.problem import (
+    Problem,
+    bounds,
+    local_part,
+    outputs_at,
+    parameters,
+    residual_at,
+    start_vector,
+)
+from estimator.physics.problem import make_problem as make_problem  # where users have always found it
+from estimator.signals.record import BoolArray, FloatArray
 
 ITERATIONS = 50
 """Jacobians at most; a fit that needs more is not converged."""
 
-BAD = 1e3
-"""A simulation that runs away counts as this many times the largest output."""
-
 MOMENT_NAMES = frozenset(moment.name for moment in MOMENTS)
 """Names of an event's own unknowns: the error over them has a kink at every sample's edge."""
-
-
-@dataclass(frozen=True, slots=True)
-class Problem:
-    """What is fitted to what.
-
-    Attributes
-    ----------
-    p : ndarray, shape (layout.SIZE,)
-        Parameter vector; unknowns overwrite their slots.
-    use : tuple of ndarray of bool
-        Per recording, which samples count.
-    """
-
-    grid: Grid
-    records: tuple[Record, ...]
-    p: FloatArray
-    shared: tuple[Shared, ...]
-    local: tuple[LocalBasis, ...]
-    use: tuple[BoolArray, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,181 +113,10 @@ class FitResult:
         return local_part(self.problem, self.x, index)
 
 
-def make_problem(
-    model: DrivelineModel,
-    records: Sequence[Record],
-    shared: Sequence[Shared],
-    *,
-    own: Sequence[tuple[Shared, ...]] | None = None,
-    profile: bool = False,
-    use: Sequence[BoolArray] | None = None,
-    grid: Grid | None = None,
-) -> Problem:
-    """Set up a fit of ``shared`` and every recording's own unknowns, from a model's values and effects.
-
-    ``own`` holds the own parameters of effects for each recording; by default those of the model's effects.
-    """
-    if own is None:
-        own = [own_unknowns(model.effects, record) for record in records]
-    effects = frozenset(model.effects) | {unknown.effect for unknown in shared}
-    return Problem(
-        grid or grid_for(model, records),
-        tuple(records),
-        flat(model),
-        tuple(shared),
-        tuple(local_basis(model, record, profile, mine, effects) for record, mine in zip(records, own, strict=True)),
-        tuple(record.okay for record in records) if use is None else tuple(use),
-    )
-
-
-def parameters(problem: Problem, x: FloatArray) -> FloatArray:
-    """Return the kernel's parameter vector for scaled unknowns ``x``."""
-    p = problem.p.copy()
-    for value, unknown in zip(x, problem.shared, strict=False):
-        p[unknown.slot] = unknown.scale * value
-    return p
-
-
-def local_part(problem: Problem, x: FloatArray, index: int) -> FloatArray:
-    """Return the scaled unknowns of one recording."""
-    return x[own_part(problem, index)]
-
-
-def own_part(problem: Problem, index: int) -> slice:
-    """Return where the unknowns of one recording stand among all."""
-    first = len(problem.shared) + sum(basis.guess.size for basis in problem.local[:index])
-    return slice(first, first + problem.local[index].guess.size)
-
-
-def bounds(problem: Problem) -> tuple[FloatArray, FloatArray]:
-    """Return lower and upper bounds of the scaled unknowns."""
-    low = np.concatenate([np.array([s.low for s in problem.shared]), *(basis.low for basis in problem.local)])
-    high = np.concatenate([np.array([s.high for s in problem.shared]), *(basis.high for basis in problem.local)])
-    return low, high
-
-
-def start_vector(problem: Problem) -> FloatArray:
-    """Return where a fit starts without better knowledge."""
-    return np.concatenate([np.array([s.start for s in problem.shared]), *(b.guess for b in problem.local)])
-
-
-def outputs_at(problem: Problem, x: FloatArray) -> tuple[FloatArray, ...]:
-    """Simulate every recording at scaled unknowns ``x``."""
-    p = parameters(problem, x)
-    cases = [_case(basis, p, local_part(problem, x, i)) for i, basis in enumerate(problem.local)]
-    outputs = simulate_records(problem.grid, problem.records, cases)
-    return tuple(_within_reason(out, record) for out, record in zip(outputs, problem.records, strict=True))
-
-
-def start_of(problem: Problem, x: FloatArray, index: int) -> Start:
-    """Return load torque and initial state of one recording."""
-    return problem.local[index].start(local_part(problem, x, index))
-
-
-def simulated_each(
-    problem: Problem,
-    points: Sequence[tuple[FloatArray, FloatArray]],
-    index: int,
-    alike_s: FloatArray | None = None,
-) -> FloatArray:
-    """Return the outputs of one recording for parameter vectors and the recording's own unknowns, shape (K, N).
-
-    ``alike_s``, shape (K,), tells up to when each is as the first one (``simulate.simulate_each``).
-    """
-    record, basis = problem.records[index], problem.local[index]
-    cases = [_case(basis, p, local) for p, local in points]
-    return _within_reason(simulate_each(problem.grid, record, cases, alike_s=alike_s), record)
-
-
-def _case(basis: LocalBasis, p: FloatArray, local: FloatArray) -> Case:
-    return Case(basis.parameters(p, local), basis.start(local), basis.extra_load(local))
-
-
-def _within_reason(out: FloatArray, record: Record) -> FloatArray:
-    """Return outputs (..., N) of a recording, far away where the simulation runs away."""
-    worst = _far_away(record)
-    if -worst <= out.min() and out.max() <= worst:  # False where it is no number
-        return out
-    return np.clip(np.nan_to_num(out, nan=worst), -worst, worst)
-
-
-def _far_away(record: Record) -> float:
-    """Return the size of an output that counts for one that has run away [unit of the output]."""
-    return BAD * (float(np.abs(record.output[record.okay]).max()) or 1.0)
-
-
 def not_fitted(problem: Problem, x: FloatArray) -> FitResult:
     """Return the free run at scaled unknowns ``x`` as a fit that has not begun."""
     outputs = outputs_at(problem, x)
     return FitResult(problem, x, outputs, residual_at(problem, outputs), None, False)
-
-
-def _stack(problem: Problem, arrays: Sequence[FloatArray]) -> FloatArray:
-    return np.concatenate([array[use] for array, use in zip(arrays, problem.use, strict=True)])
-
-
-def residual_at(problem: Problem, outputs: Sequence[FloatArray]) -> FloatArray:
-    """Return the errors of the samples that count, shape (R,)."""
-    return _stack(problem, [out - record.output for out, record in zip(outputs, problem.records, strict=True)])
-
-
-def jacobian_at(problem: Problem, x: FloatArray, outputs: Sequence[FloatArray]) -> FloatArray:
-    """Return the derivative of the errors by the scaled unknowns, shape (R, U), by differences inside the bounds.
-
-    It is 0 by what can't change.
-    """
-    low, high = bounds(problem)
-    columns = [_moving(problem, low < high, i) for i in range(len(problem.records))]
-    parts = [(i, part) for i, mine in enumerate(columns) for part in np.array_split(mine, _parts(mine.size))]
-    rows = np.cumsum([0, *(int(use.sum()) for use in problem.use)])
-    jacobian = np.zeros((x.size, rows[-1])).T  # filled column by column
-
-    def fill(work: tuple[int, IntArray]) -> None:
-        i, mine = work
-        jacobian[rows[i] : rows[i + 1], mine] = changes(problem, x, i, mine, outputs[i])
-
-    concurrently(fill, [work for work in parts if work[1].size])
-    return jacobian
-
-
-def _parts(columns: int) -> int:
-    """Return into how many parts so many columns are cut: enough for both cores, none wider than the lanes."""
-    return max(WORKERS, math.ceil(columns / LANES))
-
-
-def changes(problem: Problem, x: FloatArray, index: int, columns: IntArray, output: FloatArray) -> FloatArray:
-    """Return the derivative of one recording's errors by some of the scaled unknowns, shape (R_i, columns.size)."""
-    _, high = bounds(problem)
-    steps = np.where(x + STEP <= high, STEP, -STEP)[columns]
-    record, cases = problem.records[index], _moved_cases(problem, x, index, columns, steps)
-    moved = simulate_each(problem.grid, record, cases)
-    least = ROUNDING * float(np.abs(output).max())
-    return differences(moved, output, problem.use[index], steps, _far_away(record), least).T
-
-
-def _moved_cases(problem: Problem, x: FloatArray, index: int, columns: IntArray, steps: FloatArray) -> list[Case]:
-    """Return the simulations of one recording with some of the scaled unknowns moved, each by its step."""
-    basis, p, mine = problem.local[index], parameters(problem, x), own_part(problem, index)
-    case = _case(basis, p, x[mine])
-    cases = []
-    for j, step in zip(columns.tolist(), steps.tolist(), strict=True):
-        if j < len(problem.shared):
-            unknown, moved_p = problem.shared[j], case.p.copy()
-            moved_p[unknown.slot] = unknown.scale * (x[j] + step)
-            cases.append(replace(case, p=moved_p))
-        else:
-            local = x[mine].copy()
-            local[j - mine.start] += step
-            cases.append(_case(basis, p, local))
-    return cases
-
-
-def _moving(problem: Problem, free: BoolArray, index: int) -> IntArray:
-    """Return which of the free unknowns move one recording: those of all, and its own."""
-    moving = free.copy()
-    moving[len(problem.shared) :] = False
-    moving[own_part(problem, index)] = free[own_part(problem, index)]
-    return np.flatnonzero(moving)
 
 
 def _moments(problem: Problem) -> BoolArray:

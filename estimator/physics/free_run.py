@@ -8,13 +8,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimator.physics.catalogue import EFFECTS
-from estimator.physics.fit import FitResult, Problem, fit, make_problem, start_of, start_vector
+from estimator.physics.fit import FitResult, fit
 from estimator.physics.grid import Grid
+from estimator.physics.inputs import Case
 from estimator.physics.layout import slot
 from estimator.physics.model import DrivelineModel
 from estimator.physics.own_scan import cells, scan, waves
+from estimator.physics.problem import Problem, make_problem, start_of, start_vector
 from estimator.physics.projector import Projector
-from estimator.physics.simulate import Case, simulate_each
+from estimator.physics.simulate import simulate_each
 from estimator.physics.start import Start
 from estimator.physics.unknowns import own_unknowns
 from estimator.signals.record import BoolArray, FloatArray, Record

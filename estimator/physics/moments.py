@@ -9,8 +9,10 @@ from dataclasses import replace
 import numpy as np
 
 from estimator.physics.catalogue import EFFECTS
-from estimator.physics.fit import ITERATIONS, FitResult, Problem, changes, fit, own_part, simulated_each
+from estimator.physics.fit import ITERATIONS, FitResult, fit
+from estimator.physics.jacobian import changes
 from estimator.physics.parallel import concurrently
+from estimator.physics.problem import Problem, own_part, simulated_each
 from estimator.physics.steps import EDGE_S, inside, moments_of
 from estimator.physics.unknowns import LocalBasis
 from estimator.signals.record import FloatArray, Record
@@ -161,7 +163,7 @@ class _Misfit:
         self._problem, self._p, self._index = result.problem, result.p, index
         first = own_part(result.problem, index).start
         columns = np.arange(first, first + result.problem.local[index].own_rows.start)
-        self._taken_up = np.linalg.qr(changes(result.problem, result.x, index, columns, result.outputs[index]))[0]
+        self._taken_up = np.linalg.qr(changes(result.problem, result.x, index, columns, result.outputs))[0]
 
     def squares(self, tried: Sequence[FloatArray]) -> FloatArray:
         """Return the squared error for each of several vectors that differ in moments, shape (K,)."""

@@ -6,12 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from estimator.signals.once import once
 from estimator.signals.record import FloatArray, OutputKind, Record
 
 SPEED_WINDOW_S = 0.02
 """Positions are differentiated over this window, so that encoder steps do not pass for speed."""
 
 
+@once
 def measured_speed(record: Record) -> FloatArray:
     """Return the speed of a recording: measured, or the slope of the position; shape (N,), NaN where masked.
 
@@ -28,17 +30,27 @@ def measured_speed(record: Record) -> FloatArray:
 
 def speed_scale(records: Sequence[Record]) -> float:
     """Return the largest typical speed of the recordings: the 99th percentile of its size."""
-    return max(_typical(measured_speed(record)) for record in records)
+    return max(_typical_speed(record) for record in records)
 
 
 def torque_scale(records: Sequence[Record]) -> float:
     """Return the largest typical torque of the recordings: the 99th percentile of its size."""
-    return max(_typical(record.total_torque_nm) for record in records)
+    return max(_typical_torque(record) for record in records)
 
 
 def longest_s(records: Sequence[Record]) -> float:
     """Return the length of the longest recording [s]."""
     return max(float(record.time_s[-1] - record.time_s[0]) for record in records)
+
+
+@once
+def _typical_speed(record: Record) -> float:
+    return _typical(measured_speed(record))
+
+
+@once
+def _typical_torque(record: Record) -> float:
+    return _typical(record.total_torque_nm)
 
 
 def _typical(signal: FloatArray) -> float:

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from estimator.physics.fit import FitResult, Problem, own_part, simulated_each
+from estimator.physics.fit import FitResult
 from estimator.physics.kernel import slots
 from estimator.physics.laws import beyond_gap
 from estimator.physics.model import Structure
 from estimator.physics.parallel import concurrently
+from estimator.physics.problem import Problem, own_part, simulated_each
 from estimator.physics.unknowns import PRELOAD, TWIST
 from estimator.signals.record import FloatArray
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from estimator.physics.bounded import least_inside, unbounded_first
-from estimator.physics.fit import FitResult, bounds
+from estimator.physics.fit import FitResult
+from estimator.physics.problem import bounds
 from estimator.signals.record import FloatArray
 
 

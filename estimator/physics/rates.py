@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimator.physics.fit import FitResult, outputs_at
+from estimator.physics.fit import FitResult
 from estimator.physics.model import Structure
+from estimator.physics.problem import outputs_at
 from estimator.signals.record import FloatArray
 
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -12,11 +10,12 @@ from estimator.abreast import LANES
 from estimator.errors import BadModel
 from estimator.physics import joint, own_law, own_law_run
 from estimator.physics.grid import Grid
+from estimator.physics.inputs import Case, inputs_of, load_of
 from estimator.physics.kernel import integration, many, side_by_side, slots, state_vector
 from estimator.physics.model import Structure
 from estimator.physics.parallel import concurrently
-from estimator.physics.start import Start, initial_states
-from estimator.physics.torque_path import shaft_torques
+from estimator.physics.start import Start
+from estimator.signals.once import once
 from estimator.signals.record import FloatArray, IntArray, Location, OutputKind, Record
 
 MASSES = {Structure.ONE_MASS: 1, Structure.TWO_MASS: 2, Structure.THREE_MASS: 3}
@@ -52,23 +51,6 @@ def output_state(record: Record, structure: Structure) -> int:
             f"{structure.value}. Expected speed at the motor, position at the motor, or (two_mass) speed at the load."
         )
     return index
-
-
-@dataclass(frozen=True, slots=True)
-class Case:
-    """One simulation of a recording.
-
-    Attributes
-    ----------
-    p : ndarray, shape (layout.SIZE,)
-        Parameters of the superset model, the recording's own among them.
-    extra_load_nm : ndarray, shape (N,), optional
-        Load torque over time, beside the constant one.
-    """
-
-    p: FloatArray
-    start: Start
-    extra_load_nm: FloatArray | None = None
 
 
 def simulate(
@@ -121,7 +103,7 @@ def simulate_each(
         return np.array([_joint_output(record, imposed, case, wanted) for case in cases])
     if any(own_law.active(case.p) for case in cases):
         return np.array([_under_laws(grid, record, case, wanted, output is None) for case in cases])
-    given = _inputs(record, cases)
+    given = inputs_of([record], [0] * len(cases), cases)
     shape = (len(cases), record.time_s.size)
     slopes = np.zeros((shape[0], 2, shape[1] if output is None and record.offset_s is not None else 0))
     out = np.empty(shape)
@@ -133,6 +115,8 @@ def simulate_each(
         record.since_start_s[0],
         given.torque,
         given.load,
+        given.fed_by,
+        given.loaded_by,
         _angle(record, given.p),
         given.p,
         given.state,
@@ -147,50 +131,59 @@ def simulate_each(
 
 def simulate_records(grid: Grid, records: Sequence[Record], cases: Sequence[Case]) -> list[FloatArray]:
     """Simulate several recordings, a case of each: side by side where they can be, else on both cores."""
-    if _go_side_by_side(grid, records, cases):
-        return _simulated_side_by_side(grid, records, cases)
+    if 1 < len(records) <= LANES and go_together(grid, records, [case.p for case in cases]):
+        together = simulate_together(grid, records, range(len(records)), cases)
+        return [row[: record.time_s.size] for row, record in zip(together, records, strict=True)]
     return concurrently(lambda i: simulate_each(grid, records[i], [cases[i]])[0], range(len(records)))
 
 
-def _go_side_by_side(grid: Grid, records: Sequence[Record], cases: Sequence[Case]) -> bool:
-    """Tell whether several recordings can be simulated as if they were one."""
-    if grid.structure is Structure.JOINT or len(records) > LANES or any(own_law.active(case.p) for case in cases):
+def go_together(grid: Grid, records: Sequence[Record], lines: Sequence[FloatArray]) -> bool:
+    """Tell whether several recordings can be simulated as if they were one, a line (layout.SIZE,) each."""
+    if grid.structure is Structure.JOINT or any(own_law.active(p) for p in lines):
         return False
-    p = np.array([case.p for case in cases])
+    p = np.array(lines)
     made = {(record.kind, record.location, record.sample_time_s, record.since_start_s[0]) for record in records}
     on_time = all(record.offset_s is None for record in records)
     if len(made) > 1 or not on_time or p[:, PERIODIC].any():
         return False
-    return side_by_side.go_side_by_side(MASSES[grid.structure], p, np.arange(len(cases)))
+    return side_by_side.go_side_by_side(MASSES[grid.structure], p, np.arange(len(lines)))
 
 
-def _simulated_side_by_side(grid: Grid, records: Sequence[Record], cases: Sequence[Case]) -> list[FloatArray]:
-    """Simulate several recordings as if they were one; the shorter ones go on under the torques they ended with."""
-    wanted, sizes = output_state(records[0], grid.structure), [record.time_s.size for record in records]
-    inputs = [_inputs(record, [case]) for record, case in zip(records, cases, strict=True)]
-    torque, load = np.empty((2, len(records), max(sizes)))
-    for i, (given, size) in enumerate(zip(inputs, sizes, strict=True)):
-        torque[i, :size], torque[i, size:] = given.torque[0], given.torque[0, -1]
-        load[i, :size], load[i, size:] = given.load[0], given.load[0, -1]
-    out = np.empty_like(torque)
+def simulate_together(grid: Grid, records: Sequence[Record], of: Sequence[int], cases: Sequence[Case]) -> FloatArray:
+    """Simulate cases of several recordings as if these were one (``go_together``).
+
+    Parameters
+    ----------
+    of : sequence of int
+        Which of the recordings each case is of.
+
+    Returns
+    -------
+    ndarray, shape (len(cases), N)
+        As long as the longest recording; shorter ones go on under the torques they ended with.
+    """
+    wanted, given = output_state(records[0], grid.structure), inputs_of(records, of, cases)
+    out = np.empty((len(cases), given.torque.shape[1]))
     many.integrate_each(
         MASSES[grid.structure],
         records[0].sample_time_s,
         grid.substeps,
         grid.sign_width,
         records[0].since_start_s[0],
-        torque,
-        load,
-        np.zeros(max(sizes)),
-        np.concatenate([given.p for given in inputs]),
-        np.concatenate([given.state for given in inputs]),
+        given.torque,
+        given.load,
+        given.fed_by,
+        given.loaded_by,
+        np.zeros(out.shape[1]),
+        given.p,
+        given.state,
         wanted,
         wanted != state_vector.ANGLE,
         out,
-        np.zeros((len(records), 2, 0)),
-        np.zeros(len(records), dtype=np.int64),
+        np.zeros((len(cases), 2, 0)),
+        np.zeros(len(cases), dtype=np.int64),
     )
-    return [row[:size] for row, size in zip(out, sizes, strict=True)]
+    return out
 
 
 def _samples_alike(record: Record, count: int, alike_s: FloatArray | None) -> IntArray:
@@ -200,37 +193,6 @@ def _samples_alike(record: Record, count: int, alike_s: FloatArray | None) -> In
         alike[:] = np.searchsorted(record.since_start_s, alike_s - record.sample_time_s)
     alike[0] = record.time_s.size
     return alike
-
-
-class _Inputs(NamedTuple):
-    """What drives a line in each of K simulations.
-
-    Attributes
-    ----------
-    p : ndarray, shape (K, layout.SIZE)
-        Parameters.
-    torque, load : ndarray, shape (K, N)
-        Torque on its shaft and load torque [Nm].
-    state : ndarray, shape (K, STATES)
-        The kernel's start state, which a simulation overwrites.
-    """
-
-    p: FloatArray
-    torque: FloatArray
-    load: FloatArray
-    state: FloatArray
-
-
-def _inputs(record: Record, cases: Sequence[Case]) -> _Inputs:
-    parameters = [case.p for case in cases]
-    torque = shaft_torques(record.torque_nm, record.since_start_s, parameters)
-    load = np.empty_like(torque)
-    for row, case in zip(load, cases, strict=True):
-        row[:] = case.start.load_torque_nm
-        if case.extra_load_nm is not None:
-            row += case.extra_load_nm
-    p = np.array(parameters)
-    return _Inputs(p, torque, load, initial_states([case.start for case in cases], torque[:, 0].copy(), 0.0, p))
 
 
 def _angle(record: Record, p: FloatArray) -> FloatArray:
@@ -249,14 +211,13 @@ def _sampled_off_time(out: FloatArray, slopes: FloatArray, offset_s: FloatArray 
 
 
 def _joint_output(record: Record, imposed: joint.Imposed, case: Case, output: int) -> FloatArray:
-    load = case.start.load_torque_nm + (0.0 if case.extra_load_nm is None else case.extra_load_nm)
-    load = np.broadcast_to(load, record.output.shape)
-    return joint.simulate(record, imposed, case.p, load, case.start.twist_rad, case.start.preload_nm, output)
+    start, load = case.start, load_of(case, record)
+    return joint.simulate(record, imposed, case.p, load, start.twist_rad, start.preload_nm, output)
 
 
 def _under_laws(grid: Grid, record: Record, case: Case, output: int, recorded: bool) -> FloatArray:
     """Simulate with laws of a user's own: their torques are held over an integration step, which is a sample then."""
-    laws, given = own_law.active(case.p), _inputs(record, [case])
+    laws, given = own_law.active(case.p), inputs_of([record], [0], [case])
     torque, load, state = given.torque[0], given.load[0], given.state[0]
     angle, masses = _angle(record, given.p), MASSES[grid.structure]
     run = own_law_run.Run.of(masses, grid.substeps, grid.sign_width, record, torque, load, angle, case.p).under(
@@ -302,6 +263,7 @@ PERIODIC = np.array(
 """Amplitudes of the laws that are periodic in the motor's angle."""
 
 
+@once
 def motor_angle(record: Record) -> FloatArray:
     """Return the motor angle by the record's own output, from 0 at its start; shape (N,) [rad].
 

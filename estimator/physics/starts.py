@@ -7,8 +7,9 @@ from functools import partial
 
 import numpy as np
 
-from estimator.physics.fit import ITERATIONS, FitResult, Problem, fit, start_vector
+from estimator.physics.fit import ITERATIONS, FitResult, fit
 from estimator.physics.parallel import concurrently
+from estimator.physics.problem import Problem, start_vector
 from estimator.signals.record import FloatArray, IntArray
 
 HEAT = 3

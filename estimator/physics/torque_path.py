@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
 
 import numpy as np
 from scipy.signal import lfilter
 
 from estimator.physics.effects import torque_saturation
 from estimator.physics.layout import slot
-from estimator.signals.record import FloatArray
+from estimator.signals.once import once
+from estimator.signals.record import FloatArray, Record
 
 _GAIN_M1 = slot("inverter_gain_mismatch", "gain_m1")
 _GAIN_M2 = slot("inverter_gain_mismatch", "gain_m2")
@@ -96,9 +96,34 @@ def shaft_torque_from(
     return total * (1.0 - p[_DEPTH] * warm[:-1]), float(warm[-1])
 
 
-def shaft_torques(torque_nm: FloatArray, since_start_s: FloatArray, parameters: Sequence[FloatArray]) -> FloatArray:
-    """Return ``shaft_torque`` for each of K parameter vectors, shape (K, N): most are alike in what acts on it."""
-    keys = [p[_PATH].tobytes() for p in parameters]
-    distinct = dict(zip(keys, parameters, strict=True))
-    torques = {key: shaft_torque(torque_nm, since_start_s, p) for key, p in distinct.items()}
-    return np.array([torques[key] for key in keys])
+class _Kept:
+    """What the last torques of a recording were worked out from, and these: most simulations ask for one of them."""
+
+    def __init__(self) -> None:
+        self.torques: tuple[tuple[bytes, FloatArray], ...] = ()
+
+
+MOST_KEPT = 2
+"""Torques that are kept: that of a fit, and one with something moved."""
+
+
+@once
+def _kept(record: Record) -> _Kept:
+    return _Kept()
+
+
+def recorded_shaft_torque(record: Record, p: FloatArray) -> FloatArray:
+    """Return ``shaft_torque`` of a recording, which nobody may write to."""
+    kept, key = _kept(record), path_of(p)
+    for known, torque in kept.torques:
+        if known == key:
+            return torque
+    torque = shaft_torque(record.torque_nm, record.since_start_s, p)
+    kept.torques = ((key, torque), *kept.torques)[:MOST_KEPT]
+    return torque
+
+
+def path_of(p: FloatArray) -> bytes:
+    """Return what the torque on the shaft depends on: of most lines it is the same."""
+    path: FloatArray = p[_PATH]
+    return path.tobytes()

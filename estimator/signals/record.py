@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.errors import BadShape
+from estimator.signals.once import once
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -30,9 +31,9 @@ class Location(Enum):
     LOAD = "load"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class Record:
-    """A recording on a uniform time base, reflected to the motor shaft.
+    """A recording on a uniform time base, reflected to the motor shaft; equal to itself alone.
 
     Attributes
     ----------
@@ -123,6 +124,7 @@ class Record:
         return np.broadcast_to(by_row, self.torque_nm.shape)
 
     @property
+    @once
     def since_start_s(self) -> FloatArray:
         """Time since the recording began, shape (N,) [s]."""
         began = self.time_s[0] if self.began_s is None else self.began_s
@@ -130,6 +132,7 @@ class Record:
         return since
 
     @property
+    @once
     def total_torque_nm(self) -> FloatArray:
         """Sum of the torque inputs, T_tot = T_M1 + T_M2 in the paper; shape (N,) [Nm]."""
         total: FloatArray = self.torque_nm.sum(axis=1)

@@ -14,9 +14,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from estimator.physics.fit import FitResult, Problem, fit, make_problem, start_of, start_vector
+from estimator.physics.fit import FitResult, fit
 from estimator.physics.layout import slot
 from estimator.physics.model import Structure
+from estimator.physics.problem import Problem, make_problem, start_of, start_vector
 from estimator.physics.simulate import simulate
 from estimator.physics.unknowns import nominal_unknowns
 from estimator.signals.record import FloatArray

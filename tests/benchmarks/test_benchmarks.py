@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from estimator.physics.fit import Problem, fit
+from estimator.physics.fit import fit
+from estimator.physics.problem import Problem
 from tests.benchmarks.cases import NOTHING, make
 from tests.benchmarks.fit import agreement, compare_simulations, problem_of
 from tests.benchmarks.memory import read_case, write_case

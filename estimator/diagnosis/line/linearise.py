@@ -8,12 +8,13 @@ from estimator.diagnosis.line.differences import Nudges, Setting, linearise
 from estimator.diagnosis.line.tangent import Tangent
 from estimator.physics.catalogue import BUILT_IN
 from estimator.physics.effect import Element
-from estimator.physics.fit import FitResult, start_of
+from estimator.physics.fit import FitResult
 from estimator.physics.kernel import slots, state_vector
 from estimator.physics.kernel.line import is_bristled_at_load, is_bristled_at_motor
 from estimator.physics.layout import slot
 from estimator.physics.model import Structure, natural_frequencies_rad_s
 from estimator.physics.motion import speed_scale, torque_scale
+from estimator.physics.problem import start_of
 from estimator.physics.simulate import MASSES, motor_angle, output_state
 from estimator.physics.start import initial_state
 from estimator.physics.torque_path import shaft_torque

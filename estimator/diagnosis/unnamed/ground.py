@@ -8,7 +8,7 @@ import numpy as np
 
 from estimator.diagnosis.line import Line, block_mean_of
 from estimator.diagnosis.unnamed.scene import Scene
-from estimator.physics.fit import jacobian_at
+from estimator.physics.jacobian import jacobian_at
 from estimator.signals.record import BoolArray, FloatArray
 
 

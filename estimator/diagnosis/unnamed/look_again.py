@@ -19,8 +19,10 @@ from estimator.diagnosis.unnamed.hunt import NO_LAW, RIDGE, Found, Hunt, cost, t
 from estimator.diagnosis.unnamed.pursuit import factored, pursue
 from estimator.diagnosis.unnamed.scene import Scene
 from estimator.physics.bounded import least_inside, unbounded_first
-from estimator.physics.fit import STEP, FitResult, bounds, own_part, residual_at
+from estimator.physics.fit import FitResult
+from estimator.physics.jacobian import STEP
 from estimator.physics.parallel import concurrently
+from estimator.physics.problem import bounds, own_part, residual_at
 from estimator.signals.record import FloatArray
 
 STEPS = (1.0, 0.5, 0.2, 0.05)

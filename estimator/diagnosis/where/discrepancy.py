@@ -18,7 +18,8 @@ from estimator.diagnosis.where.responses import responses
 from estimator.diagnosis.where.spectrum import error_spectrum
 from estimator.physics import model
 from estimator.physics.catalogue import EFFECTS
-from estimator.physics.fit import FitResult, outputs_at
+from estimator.physics.fit import FitResult
+from estimator.physics.problem import outputs_at
 
 
 def discrepancy(

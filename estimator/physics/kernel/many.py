@@ -20,6 +20,8 @@ def integrate_each(
     start_s: float,
     torque: FloatArray,
     load: FloatArray,
+    fed_by: IntArray,
+    loaded_by: IntArray,
     angle: FloatArray,
     p: FloatArray,
     state: FloatArray,
@@ -29,10 +31,11 @@ def integrate_each(
     slopes: FloatArray,
     alike: IntArray,
 ) -> None:
-    """Do what ``integrate`` does for every row of ``torque``, ``load``, ``p``, ``state``, ``out`` and ``slopes``.
+    """Do what ``integrate`` does for every row of ``p``, ``state``, ``out`` and ``slopes``.
 
-    Row i is as row 0 before sample ``alike[i]`` and is simulated from about there on; ``alike[0]`` is the number of
-    samples. Rows that are kin go side by side where they can, and leave their states as they were.
+    Row i is driven by the rows ``fed_by[i]`` of ``torque`` and ``loaded_by[i]`` of ``load``. It is as row 0 before
+    sample ``alike[i]`` and is simulated from about there on; ``alike[0]`` is the number of samples. Rows that are kin
+    go side by side where they can, and leave their states as they were.
     """
     given = (sample_time_s, substeps, sign_width)
     apart = not np.any(alike[1:])
@@ -47,7 +50,7 @@ def integrate_each(
         i += rows.size
         common = 0 if apart else alike[rows[0]]
         if common > reached:
-            known = (torque[0], load[0], angle, p[0], state[0])
+            known = (torque[fed_by[0]], load[loaded_by[0]], angle, p[0], state[0])
             integrate(masses, *given, reached, start_s, *known, output, sensor, out[0, :common], slopes[0])
             reached = common
         if reached > 0:
@@ -59,14 +62,14 @@ def integrate_each(
             finest = substeps
             for row in rows:
                 finest = max(finest, with_mode(substeps, sample_time_s, p[row]))
-            them = (torque, load, angle, p, state)
+            them = (torque, load, fed_by, loaded_by, angle, p, state)
             integrate_side_by_side(
                 masses, sample_time_s, finest, sign_width, reached, start_s, rows, *them, output, sensor, out
             )
         else:
             row = rows[0]
-            it = (torque[row], load[row], angle, p[row], state[row])
+            it = (torque[fed_by[row]], load[loaded_by[row]], angle, p[row], state[row])
             integrate(masses, *given, reached, start_s, *it, output, sensor, out[row], slopes[row])
     if not apart:
-        rest = (torque[0], load[0], angle, p[0], state[0])
+        rest = (torque[fed_by[0]], load[loaded_by[0]], angle, p[0], state[0])
         integrate(masses, *given, reached, start_s, *rest, output, sensor, out[0], slopes[0])

@@ -103,6 +103,7 @@ def supplied_lanes(
     start_s: float,
     rows: IntArray,
     torque: FloatArray,
+    fed_by: IntArray,
     p: FloatArray,
     state: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
@@ -112,32 +113,32 @@ def supplied_lanes(
     """
     samples = torque.shape[1]
     if not is_late(p[rows[0]]):
-        return in_lanes(torque, rows), np.zeros((samples, LANES))
+        return in_lanes(torque, fed_by[rows]), np.zeros((samples, LANES))
     h, length = sample_time_s / substeps, 1.0 / substeps
     mean, rise = np.zeros((samples * substeps, LANES)), np.zeros((samples * substeps, LANES))
     for lane in range(LANES):
         row = rows[lane if lane < rows.size else 0]
-        if lane > 0 and are_fed_alike(rows[0], row, torque, p, state):
+        if lane > 0 and are_fed_alike(rows[0], row, fed_by, p, state):
             mean[:, lane], rise[:, lane] = mean[:, 0], rise[:, 0]
             continue
-        feed = begun_feed(torque[row], start_s / sample_time_s, sample_time_s, p[row], h)
+        given = torque[fed_by[row]]
+        feed = begun_feed(given, start_s / sample_time_s, sample_time_s, p[row], h)
         lagged, lag_rise = state[row, LAGGED], state[row, LAG_RISE]
         for k in range(first, samples):
             for j in range(substeps):
-                given = fed(torque[row], feed, k, j * length, length, lagged, lag_rise, p[row])
-                mean[k * substeps + j, lane], rise[k * substeps + j, lane], lagged, lag_rise = given
+                means, rises, lagged, lag_rise = fed(given, feed, k, j * length, length, lagged, lag_rise, p[row])
+                mean[k * substeps + j, lane], rise[k * substeps + j, lane] = means, rises
     return mean, rise
 
 
 @inlined
-def are_fed_alike(row: int, other: int, torque: FloatArray, p: FloatArray, state: FloatArray) -> bool:
+def are_fed_alike(row: int, other: int, fed_by: IntArray, p: FloatArray, state: FloatArray) -> bool:
     """Tell whether the torque of two rows reaches the shaft alike: of most columns of a Jacobian it does."""
     for i in FEEDING:
         if p[row, i] != p[other, i]:
             return False
-    if state[row, LAGGED] != state[other, LAGGED] or state[row, LAG_RISE] != state[other, LAG_RISE]:
-        return False
-    return bool(np.all(torque[row] == torque[other]))
+    alike = state[row, LAGGED] == state[other, LAGGED] and state[row, LAG_RISE] == state[other, LAG_RISE]
+    return bool(alike and fed_by[row] == fed_by[other])
 
 
 @inlined
@@ -221,6 +222,8 @@ def integrate_side_by_side(
     rows: IntArray,
     torque: FloatArray,
     load: FloatArray,
+    fed_by: IntArray,
+    loaded_by: IntArray,
     angle: FloatArray,
     p: FloatArray,
     state: FloatArray,
@@ -233,15 +236,21 @@ def integrate_side_by_side(
     Parameters
     ----------
     rows : ndarray of int
-        Which of the following.
-    torque, load, p, state, out
-        As there, a row each: (K, N), (K, N), (K, layout.SIZE), (K, STATES), (K, N).
+        Which of the K.
+    torque, load : ndarray, shape (T, N) and (L, N)
+        As there, each that drives any of them.
+    fed_by, loaded_by : ndarray of int, shape (K,)
+        Which of these drives each.
+    p, state, out
+        As there, a row each: (K, layout.SIZE), (K, STATES), (K, N).
     """
     rows, torque, load, angle = lent(rows), lent(torque), lent(load), lent(angle)
+    fed_by, loaded_by = lent(fed_by), lent(loaded_by)
     p, state, out = lent(p), lent(state), lent(out)
     values = np.empty((torque.shape[1], LANES))
-    mean, rise = supplied_lanes(sample_time_s, substeps, first, start_s, rows, torque, p, state)
-    given = (sample_time_s, substeps, sign_width, first, start_s, mean, rise, in_lanes(load, rows), angle)
+    mean, rise = supplied_lanes(sample_time_s, substeps, first, start_s, rows, torque, fed_by, p, state)
+    loads = in_lanes(load, loaded_by[rows])
+    given = (sample_time_s, substeps, sign_width, first, start_s, mean, rise, loads, angle)
     filtering = sensor and p[rows[0], slots.FILTER] > 0.0
     them = (in_lanes(p, rows), in_lanes(state, rows), low_passes(rows, p, sample_time_s / substeps))
     for_its_make(masses, advance, p[rows[0]], *given, p[rows[0]], *them, output, filtering, values)

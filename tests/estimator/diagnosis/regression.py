@@ -7,10 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.signal import lfilter
 
-from estimator.physics.fit import FitResult, Problem
+from estimator.physics.fit import FitResult
 from estimator.physics.grid import Grid
 from estimator.physics.layout import NOMINAL, SIZE
 from estimator.physics.model import Structure
+from estimator.physics.problem import Problem
 from estimator.physics.unknowns import LocalBasis, Shared
 from estimator.signals.record import FloatArray
 from tests.estimator.physics.bench import record

@@ -8,12 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.physics.fit import (
+from estimator.physics.fit import fit
+from estimator.physics.jacobian import jacobian_at
+from estimator.physics.layout import flat
+from estimator.physics.problem import (
     BAD,
     Problem,
     bounds,
-    fit,
-    jacobian_at,
     local_part,
     make_problem,
     outputs_at,
@@ -22,7 +23,6 @@ from estimator.physics.fit import (
     start_of,
     start_vector,
 )
-from estimator.physics.layout import flat
 from estimator.physics.start import Start
 from estimator.physics.unknowns import Shared, nominal_unknowns
 from estimator.signals.record import Location, OutputKind, Record

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from estimator.errors import BadModel
-from estimator.physics.fit import fit, make_problem
+from estimator.physics.fit import fit
 from estimator.physics.free_run import free_run
 from estimator.physics.grid import grid_for
 from estimator.physics.layout import flat
+from estimator.physics.problem import make_problem
 from estimator.physics.simulate import simulate
 from estimator.physics.start import Start
 from estimator.signals.record import Location, OutputKind

@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 
 from estimator.errors import BadModel, BadShape
 from estimator.physics import joint, place_in_gap
-from estimator.physics.fit import fit, make_problem
+from estimator.physics.fit import fit
 from estimator.physics.grid import grid_for
 from estimator.physics.kernel import state_vector
 from estimator.physics.laws import beyond_gap
@@ -25,6 +25,7 @@ from estimator.physics.model import (
     parameter_unit,
 )
 from estimator.physics.polish import polished
+from estimator.physics.problem import make_problem
 from estimator.physics.simulate import motor_angle, output_state, simulate
 from estimator.physics.start import Start
 from estimator.physics.unknowns import nominal_unknowns

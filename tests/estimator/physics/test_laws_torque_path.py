@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from estimator.physics.layout import flat_values
-from estimator.physics.torque_path import limited, shaft_torque, shaft_torque_from, shaft_torques
-from estimator.signals.record import FloatArray
+from estimator.physics.torque_path import limited, recorded_shaft_torque, shaft_torque, shaft_torque_from
+from estimator.signals.record import FloatArray, Record
 from tests.estimator.physics import reference
 from tests.estimator.physics.bench import SAMPLE_TIME_S, TWO_MASS, random_steps
 from tests.estimator.physics.law_bench import (
@@ -52,8 +52,8 @@ def test_gains_beyond_two_inputs_stay_at_one() -> None:
     np.testing.assert_allclose(supplied(BOTH[:, :1], inverter_gain_mismatch={"gain_m1": 2.0}), 2.0 * BOTH[:, 0])
 
 
-def test_several_parameter_vectors_at_once_are_those_one_by_one() -> None:
-    """Of those alike in what acts on the torque, too."""
+def test_what_is_kept_of_a_recording_is_that_of_the_same_parameters() -> None:
+    """Asked for again in another order, of those alike in what acts on the torque, too."""
     each = [
         flat_values(TWO_MASS | {"k": stiffness}, effects)
         for stiffness in (TWO_MASS["k"], 2.0 * TWO_MASS["k"])
@@ -66,7 +66,10 @@ def test_several_parameter_vectors_at_once_are_those_one_by_one() -> None:
             {"torque_derating": {"depth": -0.2, "time_constant_s": 2.0}},
         )
     ]
-    np.testing.assert_array_equal(shaft_torques(BOTH, TIME_S, each), [shaft_torque(BOTH, TIME_S, p) for p in each])
+    run = Record("run", TIME_S[1] - TIME_S[0], TIME_S, BOTH, np.zeros_like(TIME_S), np.ones(TIME_S.size, dtype=bool))
+    found = [recorded_shaft_torque(run, p) for p in [*each, *each[::-1], *each]]
+    np.testing.assert_array_equal(found, [shaft_torque(BOTH, TIME_S, p) for p in [*each, *each[::-1], *each]])
+    assert recorded_shaft_torque(run, each[-1]) is found[-1]
 
 
 def knee(torque_nm: FloatArray, limit_nm: float, sharpness: float) -> FloatArray:

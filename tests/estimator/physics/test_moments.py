@@ -13,12 +13,13 @@ import numpy as np
 import pytest
 
 from estimator.physics import fit as fit_module
-from estimator.physics.fit import FitResult, fit, make_problem
+from estimator.physics.fit import FitResult, fit
 from estimator.physics.grid import grid_for
 from estimator.physics.layout import flat, slot
 from estimator.physics.least_squares import Solution, minimise
 from estimator.physics.moments import OFFSETS_S, without_idle
 from estimator.physics.polish import polished
+from estimator.physics.problem import make_problem
 from estimator.physics.simulate import simulate
 from estimator.physics.start import Start
 from estimator.physics.unknowns import Shared, own_unknowns

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from estimator.physics.fit import FitResult, fit, make_problem
+from estimator.physics.fit import FitResult, fit
 from estimator.physics.model import DrivelineModel, Parameter, Structure
+from estimator.physics.problem import make_problem
 from estimator.physics.rates import rates
 from estimator.physics.start import Start
 from estimator.physics.unknowns import nominal_unknowns

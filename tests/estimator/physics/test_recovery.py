@@ -13,10 +13,11 @@ import pytest
 
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Held
-from estimator.physics.fit import FitResult, fit, make_problem, start_vector
+from estimator.physics.fit import FitResult, fit
 from estimator.physics.grid import Grid, grid_for
 from estimator.physics.layout import flat_values
 from estimator.physics.model import Parameter
+from estimator.physics.problem import make_problem, start_vector
 from estimator.physics.simulate import simulate
 from estimator.physics.start import Start
 from estimator.physics.unknowns import Release, Shared, effect_unknowns, nominal_unknowns

@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.physics.fit import fit, local_part, make_problem, parameters, start_of
+from estimator.physics.fit import fit
 from estimator.physics.layout import slot
+from estimator.physics.problem import local_part, make_problem, parameters, start_of
 from estimator.physics.start import Start
 from estimator.physics.starts import best_fit, warm_start
 from estimator.physics.unknowns import effect_unknowns, nominal_unknowns

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from estimator.physics.effect import Step
-from estimator.physics.fit import fit, make_problem
+from estimator.physics.fit import fit
 from estimator.physics.polish import polished
+from estimator.physics.problem import make_problem
 from estimator.physics.steps import from_their_moment, inside, moments_of
 from estimator.physics.unknowns import effect_unknowns, nominal_unknowns
 from estimator.signals.record import Record

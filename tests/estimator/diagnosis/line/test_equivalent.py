@@ -11,7 +11,8 @@ from estimator.diagnosis.line.blocks import lines
 from estimator.diagnosis.line.equivalent import explain, explain_all
 from estimator.diagnosis.line.places import Place, places
 from estimator.physics.effect import Element
-from estimator.physics.fit import FitResult, fit, make_problem
+from estimator.physics.fit import FitResult, fit
+from estimator.physics.problem import make_problem
 from estimator.physics.start import Start
 from estimator.signals.record import FloatArray
 from tests.estimator.diagnosis.planted import SIGMA, Moved, drive_torque, recordings

@@ -10,8 +10,9 @@ import pytest
 from estimator.diagnosis.line.averages import block_mean
 from estimator.diagnosis.line.linearise import tangent
 from estimator.diagnosis.line.motion import simulated
-from estimator.physics.fit import FitResult, fit, make_problem
+from estimator.physics.fit import FitResult, fit
 from estimator.physics.model import EffectValue
+from estimator.physics.problem import make_problem
 from estimator.physics.start import Start
 from estimator.signals.record import FloatArray
 from tests.estimator.diagnosis.planted import drive_torque

@@ -12,8 +12,9 @@ from estimator.diagnosis.hypotheses import NOTHING, everything
 from estimator.diagnosis.unnamed import ROUNDS, hunts_of, scene
 from estimator.diagnosis.where.discrepancy import discrepancy, effects_added, without_effect
 from estimator.physics.effect import Element
-from estimator.physics.fit import FitResult, outputs_at
+from estimator.physics.fit import FitResult
 from estimator.physics.model import Motion
+from estimator.physics.problem import outputs_at
 from tests.estimator.diagnosis.planted import SIGMA, nominal_fit, recordings, rubbing
 from tests.estimator.physics.bench import ONE_MASS, model
 

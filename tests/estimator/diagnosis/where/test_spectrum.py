@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis.where.spectrum import error_spectrum
-from estimator.physics.fit import fit, make_problem
+from estimator.physics.fit import fit
+from estimator.physics.problem import make_problem
 from tests.estimator.diagnosis.planted import SIGMA, nominal_fit, quiet
 from tests.estimator.physics.bench import TWO_MASS, model
 

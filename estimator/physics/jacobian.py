@@ -1,0 +1,171 @@
+"""The Jacobian of a free run by differences: a simulation with each unknown moved.
+
+A local unknown moves its own recording only. Recordings that can be simulated as if they were one fill the lanes of
+the kernel together: each has some dozen unknowns, which leave lanes empty where it goes alone.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from estimator.abreast import LANES
+from estimator.physics.differences import fill_differences
+from estimator.physics.inputs import Case
+from estimator.physics.parallel import WORKERS, concurrently
+from estimator.physics.problem import Problem, bounds, case_of, far_away, local_part, own_part, parameters
+from estimator.physics.simulate import go_together, simulate_each, simulate_together
+from estimator.physics.unknowns import Shared
+from estimator.signals.record import BoolArray, FloatArray, IntArray
+
+STEP = 1e-5
+"""Finite-difference step in scaled unknowns: the simulation is smooth to about 1e-10 of its size."""
+
+ROUNDING = 1e-13
+"""Change of the output, over its size, that is none: simulations side by side round otherwise than one by itself, and
+an unknown that does nothing, such as the phase of an amplitude that is 0, has a column of zeros."""
+
+LENGTHS_DIFFER = 1.1
+"""Length of the longest recording over the mean of all from which they go each by itself: the others would go on to
+its end."""
+
+ROOM = 2**20
+"""Values of simulations that are made at a time, where they are more than fill the lanes."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Moved:
+    """K simulations with one unknown moved each.
+
+    Attributes
+    ----------
+    of, columns : ndarray of int, shape (K,)
+        Which recording each is of, and which unknown is moved.
+    """
+
+    of: IntArray
+    columns: IntArray
+
+    def part(self, rows: slice) -> _Moved:
+        """Return some of them."""
+        return _Moved(self.of[rows], self.columns[rows])
+
+
+def jacobian_at(problem: Problem, x: FloatArray, outputs: Sequence[FloatArray]) -> FloatArray:
+    """Return the derivative of the errors by the scaled unknowns, shape (R, U), by differences inside the bounds.
+
+    It is 0 by what can't change.
+    """
+    low, high = bounds(problem)
+    moving = [np.flatnonzero(_moves(problem, low < high, i)) for i in range(len(problem.records))]
+    around = _Around(problem, x, outputs)
+    parts = _together(problem, moving) if around.is_one else _apart(moving)
+    found = np.zeros((x.size, around.firsts[-1]))
+    concurrently(lambda part: around.fill(part, found), parts)
+    return found.T
+
+
+def changes(
+    problem: Problem, x: FloatArray, index: int, columns: IntArray, outputs: Sequence[FloatArray]
+) -> FloatArray:
+    """Return the derivative of one recording's errors by some of the scaled unknowns, shape (R_i, columns.size)."""
+    around = _Around(problem, x, outputs)
+    found = np.zeros((x.size, around.firsts[-1]))
+    around.fill(_Moved(np.full(columns.size, index), columns), found)
+    return found[columns, around.firsts[index] : around.firsts[index + 1]].T
+
+
+def _moves(problem: Problem, free: BoolArray, index: int) -> BoolArray:
+    """Tell which of the free unknowns move one recording: those of all, and its own; shape (U,)."""
+    moves = np.zeros_like(free)
+    for mine in (slice(0, len(problem.shared)), own_part(problem, index)):
+        moves[mine] = free[mine]
+    return moves
+
+
+def _apart(moving: Sequence[IntArray]) -> list[_Moved]:
+    """Return parts of one recording each: enough for both cores, none wider than the lanes."""
+    return [
+        _Moved(np.full(some.size, i), some)
+        for i, mine in enumerate(moving)
+        for some in np.array_split(mine, max(WORKERS, math.ceil(mine.size / LANES)))
+        if some.size
+    ]
+
+
+def _together(problem: Problem, moving: Sequence[IntArray]) -> list[_Moved]:
+    """Return parts across recordings, one for each core, that fill the lanes; the same unknown of all is next to it."""
+    of = np.repeat(np.arange(len(moving)), [mine.size for mine in moving])
+    columns = np.concatenate(moving)
+    own = columns >= len(problem.shared)
+    place = columns - np.where(own, [own_part(problem, i).start for i in of.tolist()], 0)
+    order = np.lexsort((of, place, own))
+    everything = _Moved(of[order], columns[order])
+    longest = max(record.time_s.size for record in problem.records)
+    lanes = min(math.ceil(of.size / (WORKERS * LANES)), max(ROOM // (LANES * longest), 1))
+    width = LANES * lanes
+    return [everything.part(slice(first, first + width)) for first in range(0, of.size, width)]
+
+
+class _Around:
+    """The free runs around a point: each differs from the one there by one unknown."""
+
+    def __init__(self, problem: Problem, x: FloatArray, outputs: Sequence[FloatArray]) -> None:
+        self._problem, self._x = problem, x
+        _, high = bounds(problem)
+        self._steps = np.where(x + STEP <= high, STEP, -STEP)
+        p = parameters(problem, x)
+        self._cases = [case_of(basis, p, local_part(problem, x, i)) for i, basis in enumerate(problem.local)]
+        shape = (len(outputs), max(output.size for output in outputs))
+        self._outputs, self._use = np.zeros(shape), np.zeros(shape, dtype=bool)
+        for i, (output, use) in enumerate(zip(outputs, problem.use, strict=True)):
+            self._outputs[i, : output.size], self._use[i, : use.size] = output, use
+        self._limits = np.array([far_away(record) for record in problem.records])
+        self.firsts = np.concatenate([[0], np.cumsum(self._use.sum(axis=1))])
+
+    @property
+    def is_one(self) -> bool:
+        """Whether the recordings are simulated as if they were one."""
+        records, lines = self._problem.records, [case.p for case in self._cases]
+        sizes = [record.time_s.size for record in records]
+        if len(records) == 1 or max(sizes) * len(sizes) > LENGTHS_DIFFER * sum(sizes):
+            return False
+        return go_together(self._problem.grid, records, lines)
+
+    def fill(self, moved: _Moved, found: FloatArray) -> None:
+        """Fill in derivatives: a row of all samples that count for each unknown, shape (U, R)."""
+        grid, records = self._problem.grid, self._problem.records
+        of, columns, steps = moved.of, moved.columns, self._steps[moved.columns]
+        cases = [self._case(i, j) for i, j in zip(of.tolist(), columns.tolist(), strict=True)]
+        if (of == of[0]).all():
+            out = simulate_each(grid, records[of[0]], cases)
+        else:
+            out = simulate_together(grid, records, of.tolist(), cases)
+        least = ROUNDING * np.abs(self._outputs).max(axis=1)
+        fill_differences(out, of, self._outputs, self._use, steps, self._limits, least, columns, self.firsts, found)
+
+    def _case(self, index: int, column: int) -> Case:
+        """Return the simulation of a recording with one of the scaled unknowns moved by its step."""
+        problem, case, basis = self._problem, self._cases[index], self._problem.local[index]
+        moved = float(self._x[column] + self._steps[column])
+        own = column - own_part(problem, index).start
+        if column < len(problem.shared):
+            return _with(case, problem.shared[column], moved)
+        if own < basis.own_rows.start:
+            local = local_part(problem, self._x, index).copy()
+            local[own] = moved
+            return replace(case, start=basis.start(local))
+        if own < basis.own_rows.stop:
+            return _with(case, basis.own[own - basis.own_rows.start], moved)
+        more_nm = self._steps[column] * basis.scale[own] * basis.profile[own - basis.profile_rows.start]
+        return replace(case, extra_load_nm=more_nm if case.extra_load_nm is None else case.extra_load_nm + more_nm)
+
+
+def _with(case: Case, unknown: Shared, x: float) -> Case:
+    """Return a simulation with another value of one parameter, scaled."""
+    p = case.p.copy()
+    p[unknown.slot] = unknown.scale * x
+    return replace(case, p=p)

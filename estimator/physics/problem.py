@@ -1,0 +1,159 @@
+"""A fit's problem: which unknowns, of which recordings, and the free run they give.
+
+The error is ``simulated - measured`` over the unmasked samples of all recordings. Some unknowns all recordings share,
+others are a recording's own and move it alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimator.physics.grid import Grid, grid_for
+from estimator.physics.inputs import Case
+from estimator.physics.layout import flat
+from estimator.physics.model import DrivelineModel
+from estimator.physics.simulate import simulate_each, simulate_records
+from estimator.physics.start import Start
+from estimator.physics.unknowns import LocalBasis, Shared, local_basis, own_unknowns
+from estimator.signals.once import once
+from estimator.signals.record import BoolArray, FloatArray, Record
+
+BAD = 1e3
+"""A simulation that runs away counts as this many times the largest output."""
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """What is fitted to what.
+
+    Attributes
+    ----------
+    p : ndarray, shape (layout.SIZE,)
+        Parameter vector; unknowns overwrite their slots.
+    use : tuple of ndarray of bool
+        Per recording, which samples count.
+    """
+
+    grid: Grid
+    records: tuple[Record, ...]
+    p: FloatArray
+    shared: tuple[Shared, ...]
+    local: tuple[LocalBasis, ...]
+    use: tuple[BoolArray, ...]
+
+
+def make_problem(
+    model: DrivelineModel,
+    records: Sequence[Record],
+    shared: Sequence[Shared],
+    *,
+    own: Sequence[tuple[Shared, ...]] | None = None,
+    profile: bool = False,
+    use: Sequence[BoolArray] | None = None,
+    grid: Grid | None = None,
+) -> Problem:
+    """Set up a fit of ``shared`` and every recording's own unknowns, from a model's values and effects.
+
+    ``own`` holds the own parameters of effects for each recording; by default those of the model's effects.
+    """
+    if own is None:
+        own = [own_unknowns(model.effects, record) for record in records]
+    effects = frozenset(model.effects) | {unknown.effect for unknown in shared}
+    return Problem(
+        grid or grid_for(model, records),
+        tuple(records),
+        flat(model),
+        tuple(shared),
+        tuple(local_basis(model, record, profile, mine, effects) for record, mine in zip(records, own, strict=True)),
+        tuple(record.okay for record in records) if use is None else tuple(use),
+    )
+
+
+def parameters(problem: Problem, x: FloatArray) -> FloatArray:
+    """Return the kernel's parameter vector for scaled unknowns ``x``."""
+    p = problem.p.copy()
+    for value, unknown in zip(x, problem.shared, strict=False):
+        p[unknown.slot] = unknown.scale * value
+    return p
+
+
+def local_part(problem: Problem, x: FloatArray, index: int) -> FloatArray:
+    """Return the scaled unknowns of one recording."""
+    return x[own_part(problem, index)]
+
+
+def own_part(problem: Problem, index: int) -> slice:
+    """Return where the unknowns of one recording stand among all."""
+    first = len(problem.shared) + sum(basis.guess.size for basis in problem.local[:index])
+    return slice(first, first + problem.local[index].guess.size)
+
+
+def bounds(problem: Problem) -> tuple[FloatArray, FloatArray]:
+    """Return lower and upper bounds of the scaled unknowns."""
+    low = np.concatenate([np.array([s.low for s in problem.shared]), *(basis.low for basis in problem.local)])
+    high = np.concatenate([np.array([s.high for s in problem.shared]), *(basis.high for basis in problem.local)])
+    return low, high
+
+
+def start_vector(problem: Problem) -> FloatArray:
+    """Return where a fit starts without better knowledge."""
+    return np.concatenate([np.array([s.start for s in problem.shared]), *(b.guess for b in problem.local)])
+
+
+def outputs_at(problem: Problem, x: FloatArray) -> tuple[FloatArray, ...]:
+    """Simulate every recording at scaled unknowns ``x``."""
+    p = parameters(problem, x)
+    cases = [case_of(basis, p, local_part(problem, x, i)) for i, basis in enumerate(problem.local)]
+    outputs = simulate_records(problem.grid, problem.records, cases)
+    return tuple(_within_reason(out, record) for out, record in zip(outputs, problem.records, strict=True))
+
+
+def start_of(problem: Problem, x: FloatArray, index: int) -> Start:
+    """Return load torque and initial state of one recording."""
+    return problem.local[index].start(local_part(problem, x, index))
+
+
+def simulated_each(
+    problem: Problem,
+    points: Sequence[tuple[FloatArray, FloatArray]],
+    index: int,
+    alike_s: FloatArray | None = None,
+) -> FloatArray:
+    """Return the outputs of one recording for parameter vectors and the recording's own unknowns, shape (K, N).
+
+    ``alike_s``, shape (K,), tells up to when each is as the first one (``simulate.simulate_each``).
+    """
+    record, basis = problem.records[index], problem.local[index]
+    cases = [case_of(basis, p, local) for p, local in points]
+    return _within_reason(simulate_each(problem.grid, record, cases, alike_s=alike_s), record)
+
+
+def case_of(basis: LocalBasis, p: FloatArray, local: FloatArray) -> Case:
+    """Return the simulation of a recording for a parameter vector and the recording's own unknowns."""
+    return Case(basis.parameters(p, local), basis.start(local), basis.extra_load(local))
+
+
+def _within_reason(out: FloatArray, record: Record) -> FloatArray:
+    """Return outputs (..., N) of a recording, far away where the simulation runs away."""
+    worst = far_away(record)
+    if -worst <= out.min() and out.max() <= worst:  # False where it is no number
+        return out
+    return np.clip(np.nan_to_num(out, nan=worst), -worst, worst)
+
+
+@once
+def far_away(record: Record) -> float:
+    """Return the size of an output that counts for one that has run away [unit of the output]."""
+    return BAD * (float(np.abs(record.output[record.okay]).max()) or 1.0)
+
+
+def _stack(problem: Problem, arrays: Sequence[FloatArray]) -> FloatArray:
+    return np.concatenate([array[use] for array, use in zip(arrays, problem.use, strict=True)])
+
+
+def residual_at(problem: Problem, outputs: Sequence[FloatArray]) -> FloatArray:
+    """Return the errors of the samples that count, shape (R,)."""
+    return _stack(problem, [out - record.output for out, record in zip(outputs, problem.records, strict=True)])
