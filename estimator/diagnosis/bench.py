@@ -4,19 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 
 from estimator.diagnosis.evidence import VERY_STRONG, gain
 from estimator.diagnosis.hypotheses import NOTHING, Effects, effects_of
-from estimator.diagnosis.inherit import forgetting, inheriting, kept, placed, starts_nearby
+from estimator.diagnosis.inherit import forgetting, inheriting, kept, placed
 from estimator.diagnosis.screening import Screen, promising
+from estimator.diagnosis.shooting import can_be_shot, shot
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Start
 from estimator.physics.fit import FitResult, fit, not_fitted
 from estimator.physics.grid import Grid
 from estimator.physics.model import DrivelineModel
 from estimator.physics.moments import without_idle
-from estimator.physics.parallel import concurrently
 from estimator.physics.polish import polished
 from estimator.physics.problem import Problem, make_problem
 from estimator.physics.starts import HEAT, begun, best_fit, close, converge, warm_start
@@ -34,13 +33,13 @@ HOPELESS = 2.0
 FURTHER = 8
 """Jacobians that a rough fit gets before it is compared once more."""
 
-MOST_NEARBY = 4
-"""Times that a fit is begun once more from around where it ended."""
+MOST_SHOTS = 3
+"""Times that a fit is begun anew in stretches."""
 
 WORTH_ANOTHER_FIT = 0.1
 """Share of the squared error that a look from a fit must promise for an effect to be fitted once more (those that found
-another minimum promised half of it, those that came back to where they were a fiftieth), and that a fit from around
-another must have taken away for the next."""
+another minimum promised half of it, those that came back to where they were a fiftieth), and that one in stretches
+must have taken away for the next."""
 
 MUCH_BYTES = 2**24
 """Room of a derivative that is rather found again than kept: a round of the search has a dozen of them."""
@@ -67,7 +66,7 @@ class Bench:
     _looked_again: set[tuple[Effects, str]] = field(default_factory=set)
     _retold: set[tuple[Effects, str]] = field(default_factory=set)
     _lessened: set[tuple[Effects, bytes]] = field(default_factory=set)
-    _looked_around: set[tuple[Effects, bytes]] = field(default_factory=set)
+    _shot: set[tuple[Effects, bytes]] = field(default_factory=set)
     _tried: dict[Effects, list[Release]] = field(default_factory=dict)
 
     def fit(self, effects: Effects, warm: FitResult | None = None, releases: Sequence[Release] = ()) -> FitResult:
@@ -171,22 +170,19 @@ class Bench:
             return self._fits[effects]
         return self._better(effects, self._fit(effects, before, releases))
 
-    def fit_nearby(self, effects: Effects) -> FitResult:
-        """Fit once more from around where a fit ended, where its error has many small minima, while that helps much.
+    def fit_in_stretches(self, effects: Effects) -> FitResult:
+        """Fit once more from where stretches lead, where the error has many small minima, while that helps much.
 
-        What such a minimum leaves looks like an event here and there. Each fit is begun around once.
+        What such a minimum leaves looks like an event here and there. Each fit is begun anew once.
         """
         result = self._fits[effects]
-        for _ in range(MOST_NEARBY):
+        bounces = any(EFFECTS[name].bounces for name in effects | set(self.model.effects))
+        for _ in range(MOST_SHOTS if bounces and can_be_shot(result) else 0):
             place = (effects, result.x.tobytes())
-            if place in self._looked_around:
+            if place in self._shot:
                 break
-            self._looked_around.add(place)
-            better = _begun_nearby(result)
-            if not better:
-                break
-            best = min(concurrently(converge, better), key=lambda fit: fit.squares)
-            had, result = result, self._better(effects, polished(best))
+            self._shot.add(place)
+            had, result = result, self._better(effects, polished(shot(result, self.model)))
             if result.squares > (1.0 - WORTH_ANOTHER_FIT) * had.squares:
                 break
         return result
@@ -310,13 +306,6 @@ def _is_told_better(had: FitResult, other: FitResult) -> bool:
     if other.free_count > had.free_count:
         return gain(had, other).delta_bic >= VERY_STRONG
     return gain(other, had).delta_bic <= 0.0
-
-
-def _begun_nearby(result: FitResult) -> list[FitResult]:
-    """Fit a few steps from around where a fit ended, and return what is better by then."""
-    starts = [start for name in sorted(effects_of(result)) for start in starts_nearby(result, name)]
-    heat = concurrently(partial(fit, result.problem, iterations=STEPS_ANEW), starts)
-    return [each for each in heat if each.squares < result.squares]
 
 
 def _without_much(result: FitResult) -> FitResult:

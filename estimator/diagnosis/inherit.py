@@ -5,12 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 
-import numpy as np
-
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult
 from estimator.physics.unknowns import Release, Shared
-from estimator.signals.record import FloatArray
 
 
 def kept(warm: FitResult, effects: Collection[str]) -> Release:
@@ -49,19 +46,6 @@ def forgetting(result: FitResult, name: str) -> FitResult:
     left = [*keep, *[True] * (result.x.size - len(keep))]
     problem = replace(result.problem, shared=shared)
     return replace(result, problem=problem, x=result.x[left], derivative=None)  # which was found with the effect
-
-
-def starts_nearby(result: FitResult, name: str) -> list[FloatArray]:
-    """Return scaled unknowns, shape (U,) each, around where a fit with an effect ended; none where all are held."""
-    starts = []
-    for values in EFFECTS[name].nearby:
-        x = result.x.copy()
-        for i, shared in enumerate(result.problem.shared):
-            if shared.effect == name and shared.name in values and shared.low < shared.high:
-                x[i] = min(max(values[shared.name], shared.low), shared.high)
-        if not np.array_equal(x, result.x):
-            starts.append(x)
-    return starts
 
 
 def placed(result: FitResult, line: Mapping[str, float]) -> FitResult:

@@ -282,9 +282,8 @@ class Effect:
     retold : callable
         Model, records and fitted values, of the effect and of the line, to where fits of other ways to write the law
         start.
-    nearby : tuple of mapping of str to float
-        Where its error has many small minima: from where else a fit starts once more, as parameters in units of their
-        scales; what is not named stays where the fit ended.
+    bounces : bool
+        True where the error over a long free run has many small minima: it is fitted in short stretches once more.
     derived : callable
         Parameter values, and the line's own, to those of parameters that are held but follow from the others.
     linear : bool
@@ -322,7 +321,7 @@ class Effect:
     rescaled: Callable[[Mapping[str, float]], Mapping[str, float]] = told_one_way
     completed: Callable[[Mapping[str, float]], Mapping[str, float]] = as_given
     retold: Retold = never_retold
-    nearby: tuple[Mapping[str, float], ...] = ()
+    bounces: bool = False
     derived: Callable[[Mapping[str, float], Mapping[str, float]], Mapping[str, float]] = nothing_derived
     linear: bool = False
     recognised: bool = False

@@ -17,7 +17,7 @@ from estimator.physics.differences import fill_differences
 from estimator.physics.inputs import Case
 from estimator.physics.parallel import WORKERS, concurrently
 from estimator.physics.problem import Problem, bounds, case_of, far_away, local_part, own_part, parameters
-from estimator.physics.simulate import go_together, simulate_each, simulate_together
+from estimator.physics.simulate import are_of_a_length, go_together, simulate_each, simulate_together
 from estimator.physics.unknowns import Shared
 from estimator.signals.record import BoolArray, FloatArray, IntArray
 
@@ -27,10 +27,6 @@ STEP = 1e-5
 ROUNDING = 1e-13
 """Change of the output, over its size, that is none: simulations side by side round otherwise than one by itself, and
 an unknown that does nothing, such as the phase of an amplitude that is 0, has a column of zeros."""
-
-LENGTHS_DIFFER = 1.1
-"""Length of the longest recording over the mean of all from which they go each by itself: the others would go on to
-its end."""
 
 ROOM = 2**20
 """Values of simulations that are made at a time, where they are more than fill the lanes."""
@@ -129,11 +125,11 @@ class _Around:
     @property
     def is_one(self) -> bool:
         """Whether the recordings are simulated as if they were one."""
-        records, lines = self._problem.records, [case.p for case in self._cases]
-        sizes = [record.time_s.size for record in records]
-        if len(records) == 1 or max(sizes) * len(sizes) > LENGTHS_DIFFER * sum(sizes):
+        problem, records = self._problem, self._problem.records
+        if len(records) == 1 or not are_of_a_length(records):
             return False
-        return go_together(self._problem.grid, records, lines)
+        moved = {unknown.slot for unknown in (*problem.shared, *(own for basis in problem.local for own in basis.own))}
+        return go_together(problem.grid, records, [case.p for case in self._cases], sorted(moved))
 
     def fill(self, moved: _Moved, found: FloatArray) -> None:
         """Fill in derivatives: a row of all samples that count for each unknown, shape (U, R)."""

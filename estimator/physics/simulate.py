@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -13,7 +14,7 @@ from estimator.physics.grid import Grid
 from estimator.physics.inputs import Case, inputs_of, load_of
 from estimator.physics.kernel import integration, many, side_by_side, slots, state_vector
 from estimator.physics.model import Structure
-from estimator.physics.parallel import concurrently
+from estimator.physics.parallel import WORKERS, concurrently
 from estimator.physics.start import Start
 from estimator.signals.once import once
 from estimator.signals.record import FloatArray, IntArray, Location, OutputKind, Record
@@ -26,6 +27,11 @@ _OUTPUT_STATE = {
     (OutputKind.SPEED, Location.LOAD): state_vector.LOAD_SPEED,
     (OutputKind.POSITION, Location.MOTOR): state_vector.ANGLE,
 }
+
+
+LENGTHS_DIFFER = 1.1
+"""Length of the longest recording over the mean of all from which they go each by itself: the others would go on to
+its end."""
 
 
 def output_state(record: Record, structure: Structure) -> int:
@@ -131,20 +137,42 @@ def simulate_each(
 
 def simulate_records(grid: Grid, records: Sequence[Record], cases: Sequence[Case]) -> list[FloatArray]:
     """Simulate several recordings, a case of each: side by side where they can be, else on both cores."""
-    if 1 < len(records) <= LANES and go_together(grid, records, [case.p for case in cases]):
-        together = simulate_together(grid, records, range(len(records)), cases)
-        return [row[: record.time_s.size] for row, record in zip(together, records, strict=True)]
-    return concurrently(lambda i: simulate_each(grid, records[i], [cases[i]])[0], range(len(records)))
+    count = len(records)
+    fill_lanes = 1 < count <= LANES or (count > LANES and are_of_a_length(records))
+    if not fill_lanes or not go_together(grid, records, [case.p for case in cases]):
+        return concurrently(lambda i: simulate_each(grid, records[i], [cases[i]])[0], range(count))
+    width = LANES * math.ceil(count / (WORKERS * LANES))
+    parts = [range(first, min(first + width, count)) for first in range(0, count, width)]
+    runs = concurrently(lambda part: simulate_together(grid, records, part, [cases[i] for i in part]), parts)
+    rows = (row for run in runs for row in run)
+    return [row[: record.time_s.size] for row, record in zip(rows, records, strict=True)]
 
 
-def go_together(grid: Grid, records: Sequence[Record], lines: Sequence[FloatArray]) -> bool:
-    """Tell whether several recordings can be simulated as if they were one, a line (layout.SIZE,) each."""
+def are_of_a_length(records: Sequence[Record]) -> bool:
+    """Tell whether recordings that are simulated as if they were one all end at about the same time."""
+    sizes = [record.time_s.size for record in records]
+    return max(sizes) * len(sizes) <= LENGTHS_DIFFER * sum(sizes)
+
+
+def go_together(grid: Grid, records: Sequence[Record], lines: Sequence[FloatArray], moved: Sequence[int] = ()) -> bool:
+    """Tell whether several recordings can be simulated as if they were one.
+
+    Parameters
+    ----------
+    lines : sequence of ndarray, shape (layout.SIZE,)
+        Parameters of each recording's line.
+    moved : sequence of int
+        Places of parameters that may also have other values.
+    """
     if grid.structure is Structure.JOINT or any(own_law.active(p) for p in lines):
         return False
     p = np.array(lines)
-    made = {(record.kind, record.location, record.sample_time_s, record.since_start_s[0]) for record in records}
+    acts = (p != 0.0).any(axis=0)
+    acts[list(moved)] = True
+    alike = len({(record.kind, record.location, record.sample_time_s) for record in records}) == 1
     on_time = all(record.offset_s is None for record in records)
-    if len(made) > 1 or not on_time or p[:, PERIODIC].any():
+    begin_alike = len({record.since_start_s[0] for record in records}) == 1
+    if not alike or not on_time or acts[PERIODIC].any() or not (begin_alike or not acts[TIMED].any()):
         return False
     return side_by_side.go_side_by_side(MASSES[grid.structure], p, np.arange(len(lines)))
 
@@ -247,6 +275,9 @@ def _under_laws(grid: Grid, record: Record, case: Case, output: int, recorded: b
     every = grid.substeps
     return _sampled_off_time(out[::every], slopes[:, ::every], record.offset_s)
 
+
+TIMED = np.array([slots.GENERATOR, slots.CRACK, slots.PAYLOAD, slots.BRAKE, slots.WARMING, slots.DRIFT])
+"""Sizes of the laws that depend on the time since a recording began."""
 
 PERIODIC = np.array(
     [

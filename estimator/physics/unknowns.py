@@ -186,6 +186,15 @@ class LocalBasis:
         state = () if i is None else (float(value) for value in values[i : self.own_rows.start])
         return Start(float(values[0]), angle, float(values[1]), *state)
 
+    def entered(self, x: FloatArray, start: Start) -> FloatArray:
+        """Return scaled unknowns ``x`` of a line in motion with another start state, shape (L,)."""
+        angle = (start.angle_rad,) if self.has_angle else ()
+        shafts = (start.twist_rad, start.load_speed_rad_s, start.middle_twist_rad, start.middle_speed_rad_s)
+        first = self.own_rows.start
+        entered = x.copy()
+        entered[:first] = (start.load_torque_nm, start.speed_rad_s, *angle, *shafts)[:first] / self.scale[:first]
+        return entered
+
     @property
     def twist_index(self) -> int | None:
         """Where the initial twist stands among the unknowns; None for one mass."""

@@ -12,7 +12,7 @@ from pydantic import BaseModel
 from drivers.inverter.drive_settings import OPTION_CODES
 from drivers.plc.map_needs import USED
 from estimator.diagnosis import bench as fits
-from estimator.diagnosis import evidence, holdout, judgement, noise, weight
+from estimator.diagnosis import evidence, holdout, judgement, noise, shooting, weight
 from estimator.diagnosis.selection import jury, rounds, selector
 from estimator.diagnosis.unnamed import search
 from estimator.diagnosis.where import locate
@@ -120,8 +120,9 @@ def test_the_thresholds_of_a_verdict_are_those_of_the_code() -> None:
     assert "every law that promises a fifth of what it explains is tried in its place" in page
     assert (search.ROUNDS, search.WORTH_A_ROUND) == (20, 0.005)
     assert "up to twenty times, at each element for as long as that takes half a per cent off the squared error" in page
-    assert (fits.MOST_NEARBY, fits.WORTH_ANOTHER_FIT) == (4, 0.1)
-    assert "up to four times, for as long as that takes a tenth off the squared error" in page
+    assert (fits.MOST_SHOTS, fits.WORTH_ANOTHER_FIT, shooting.PERIODS) == (3, 0.1, 8)
+    assert "in stretches of eight periods of the line's first mode" in page
+    assert "up to three times, for as long as that takes a tenth off the squared error" in page.replace("\n", " ")
     assert f"ends within {selector.NEAR_NOISE:g} times the noise" in page
     assert (rounds.WORTH_FITTING, rounds.WORTH_GOING_ON, rounds.WORTH_FINISHING) == (0.2, 0.5, 0.8)
     assert "less than a fifth of the best one's part" in page

@@ -11,6 +11,7 @@ from estimator.diagnosis.hypotheses import NOTHING, Effects, Progress, effects_o
 from estimator.diagnosis.screening import Look, Screen, promising
 from estimator.diagnosis.selection.jury import Jury
 from estimator.diagnosis.trial import Trial, pressed_parameters
+from estimator.diagnosis.weight import NEAR_NOISE
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult
 from estimator.physics.parallel import concurrently
@@ -88,7 +89,9 @@ class Rounds:
         def finished(name: str) -> Trial:
             effects, result = with_effect(chosen, name), rough[name]
             if name in further or (name in freed and not chosen):  # what sets others free shows itself late
-                self.jury.bench.fit(effects, current)
+                ended = self.jury.bench.fit(effects, current)
+                if EFFECTS[name].bounces and ended.rms > NEAR_NOISE * self.jury.weight.level(ended):
+                    self.jury.bench.fit_in_stretches(effects)
                 if name in freed:
                     self.jury.bench.fit_again(effects, name)
                 result = self.jury.bench.fit_retold(effects, name)

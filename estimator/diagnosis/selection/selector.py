@@ -190,10 +190,10 @@ class Selector:
         return path
 
     def _fitted_widely(self, chosen: Effects) -> FitResult:
-        """Return the best fit of effects from further starts: of one alone, those that promised little; then nearby."""
+        """Return the best fit of effects from further starts: of one alone, those that promised little; and anew."""
         for alone in chosen if len(chosen) == 1 else ():
             self.jury.bench.fit_widely(chosen, alone)
-        return self.jury.bench.fit_nearby(chosen)
+        return self.jury.bench.fit_in_stretches(chosen)
 
     def _stiffened(self, path: _Path, retuned: FitResult) -> _Path:
         """Return a path with a law in the place of what bends beside others, where one explains the rest better.

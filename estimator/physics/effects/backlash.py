@@ -49,10 +49,6 @@ def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
     return [(size, contact, pull) for size in (0.1, 0.4, 1.2, 3.6)]
 
 
-SOFTER = tuple({"contact_rad": depth, "pull": pull} for depth in (2.0, 3.0) for pull in (0.5, 1.0))
-"""From where a gap is fitted once more. The error has a small minimum for every way in which the faces may bounce at
-their touches; deeper contacts round them off."""
-
 CONTACT_PER_GAP = 0.05
 """Depth of contact of a simulated joint that was given none: faces of steel are rounded by far less than their gap."""
 
@@ -101,5 +97,5 @@ EFFECT = Effect(
     testable=testable,
     sentence=sentence,
     completed=completed,
-    nearby=SOFTER,
+    bounces=True,
 )
