@@ -50,14 +50,15 @@ class Search:
 def search(chain: Chain, model: DrivelineModel, unseen: Sequence[Record], progress: Progress) -> Search:
     """Look for what is missing.
 
-    Where the steps of the integration are part of what explains the recordings, what is chosen is fitted on finer ones,
-    and where it leaves more there, or is not believed on either, the search begins anew on them.
+    Where the steps of the integration are part of what explains the recordings, what is chosen is fitted on finer ones
+    and gone on with there. Where it leaves more on these, or is not believed on either, the search begins anew on them.
     """
     grid = grid_for(model, chain.records)
     found = _search(chain, model, unseen, progress, grid)
     if is_made_by_steps(found.selection.result):
         finer = _finer(grid)
-        moved = _moved(found, progress, finer) if found.judgement.verdict is Verdict.EXPLAINED else None
+        worth = found.selection.unfinished or found.judgement.verdict is Verdict.EXPLAINED
+        moved = _moved(found, progress, finer) if worth else None
         found = moved or _search(chain, model, unseen, progress, finer, last=True)
     return found
 
@@ -65,10 +66,13 @@ def search(chain: Chain, model: DrivelineModel, unseen: Sequence[Record], progre
 def _moved(found: Search, progress: Progress, grid: Grid) -> Search | None:
     """Return what was found as it is on another grid; None where it does not hold there."""
     jury = replace(found.jury, bench=found.jury.bench.on(grid))
-    selection = Selector(jury, progress).taken_over(found.selection) if found.selection.chosen else None
+    selector = Selector(jury, progress)
+    selection = selector.taken_over(found.selection) if found.selection.chosen else None
     if selection is None:
         return None
     moved = replace(found, jury=jury, selection=selection)
+    if found.selection.unfinished:
+        return _by_other_ways(moved, selector) if _is_in_doubt(moved, selector) else moved
     return moved if moved.judgement.verdict is found.judgement.verdict else None
 
 
@@ -128,9 +132,18 @@ def _searched(
     names, untestable = open_hypotheses(model, chain.records)
     weight = Weight(noise_floor(chain.records), least_ratio)
     jury = Jury(bench, examiner, names, weight)
-    selector = Selector(jury, progress)
+    selector = Selector(jury, progress) if last else Selector(jury, progress, is_made_by_steps)
     found = Search(chain, jury, selector.run(), untestable)
-    doubted = found.judgement.verdict is Verdict.UNEXPLAINED and not found.judgement.strays
-    if (doubted or selector.may_imitate(found.selection)) and (last or not is_made_by_steps(found.selection.result)):
-        found = replace(found, selection=selector.by_other_ways(found.selection))
+    if _is_in_doubt(found, selector) and (last or not is_made_by_steps(found.selection.result)):
+        return _by_other_ways(found, selector)
     return found
+
+
+def _is_in_doubt(found: Search, selector: Selector) -> bool:
+    """Tell whether other ways to begin are worth going: nothing is believed, or what is may only imitate."""
+    doubted = found.judgement.verdict is Verdict.UNEXPLAINED and not found.judgement.strays
+    return doubted or selector.may_imitate(found.selection)
+
+
+def _by_other_ways(found: Search, selector: Selector) -> Search:
+    return replace(found, selection=selector.by_other_ways(found.selection))

@@ -42,6 +42,8 @@ class Selection:
     hunts : sequence of Hunt
         The search for laws without a name in what the re-tuned nominal leaves, as far as it went: to locate goes on
         from there.
+    unfinished : bool
+        True where no further effect was tried: the steps of the integration have a part in what is left.
     """
 
     retuned: FitResult
@@ -55,6 +57,7 @@ class Selection:
     remaining: UnnamedLaw | None
     beyond: LineBeyond | None = None
     hunts: Sequence[Hunt] = ()
+    unfinished: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 from estimator.diagnosis.beyond import line_beyond
@@ -46,16 +46,28 @@ class _Path:
     accepted: Mapping[str, Trial]
 
 
-class Selector:
-    """Runs the selection before one jury."""
+def _by_no_steps(result: FitResult) -> bool:
+    return False
 
-    def __init__(self, jury: Jury, progress: Progress) -> None:
+
+class Selector:
+    """Runs the selection before one jury.
+
+    ``is_made_by_steps`` tells whether the steps of the integration have a part in what a fit leaves: nothing is added
+    to it then.
+    """
+
+    def __init__(
+        self, jury: Jury, progress: Progress, is_made_by_steps: Callable[[FitResult], bool] = _by_no_steps
+    ) -> None:
         self.jury = jury
+        self._is_made_by_steps = is_made_by_steps
         self._progress = progress
         self._rounds = Rounds(jury, progress)
         self._surveys = Surveys(jury.weight)
         self._gone: set[str] = set()  # effects that a way has begun with
         self._put_off: _Path | None = None  # two that get a third only if no other way ends better
+        self._unfinished = False  # steps have a part in what a path leaves
 
     def run(self) -> Selection:
         """Add effects while one earns its place; then drop those that the others made superfluous."""
@@ -73,6 +85,7 @@ class Selector:
         if result.rms > VISIBLE * found.result.rms:
             return None
         self._rounds.trials, self._rounds.dismissed = dict(found.trials), dict(found.dismissed)
+        self._gone |= found.chosen if len(found.chosen) == 1 else NOTHING
         retuned = self._to_its_end(NOTHING)
         chosen, current = self._drop_superfluous(found.chosen, result, retuned)
         accepted = {name: found.accepted[name] for name in chosen}
@@ -161,6 +174,7 @@ class Selector:
             remaining=remaining[0].law if remaining else None,
             beyond=line_beyond(retuned),
             hunts=self._surveys.furthest(retuned).hunts,
+            unfinished=self._unfinished,
         )
 
     def _grown(self, path: _Path, retuned: FitResult, far: bool = False) -> _Path:
@@ -187,6 +201,9 @@ class Selector:
             path = self._with(path, best, retuned)
             if self._has_rest(path.current, retuned):  # before another is named for the rest
                 path = replace(path, current=self._fitted_widely(path.chosen))
+                self._unfinished = self._is_made_by_steps(path.current)
+                if self._unfinished:
+                    break
         return path
 
     def _fitted_widely(self, chosen: Effects) -> FitResult:

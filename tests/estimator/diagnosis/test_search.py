@@ -13,7 +13,10 @@ from estimator.diagnosis.chain import Chain, read_through
 from estimator.diagnosis.hypotheses import NOTHING, Effects, everything
 from estimator.diagnosis.search import FINER, Search, is_made_by_steps, search
 from estimator.diagnosis.selection import Selection, Selector
+from estimator.diagnosis.selection.rounds import Rounds
+from estimator.diagnosis.trial import Trial
 from estimator.diagnosis.weight import VISIBLE
+from estimator.physics.fit import FitResult
 from estimator.physics.grid import Grid, grid_for
 from estimator.signals.record import Record
 from tests.estimator.diagnosis.planted import quiet, rubbing
@@ -90,6 +93,26 @@ def test_where_steps_have_a_part_in_an_explanation_it_is_sought_on_finer_ones(
     assert found.selection.chosen == FRICTION
     assert found.selection.trials.keys() >= FRICTION
     assert said.count("looking at every effect") == (1 if holds else 2)
+
+
+def test_where_steps_have_a_part_in_what_is_left_a_further_effect_is_sought_on_finer_ones(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """And not on the coarse ones before: what the first effect leaves there is not what it leaves."""
+    records, rounds = rubbing(lambda speed: 2.0 + 0.2 * speed**2, (1, 2, 3)), list[tuple[Effects, Grid]]()
+    usual = searched(records).selection.result.problem.grid
+    finer = replace(usual, substeps=FINER * usual.substeps)
+    try_all = Rounds.try_all
+
+    def noted(self: Rounds, chosen: Effects, current: FitResult, *rest: Effects | float) -> dict[str, Trial]:
+        rounds.append((chosen, current.problem.grid))
+        return try_all(self, chosen, current, *rest)
+
+    monkeypatch.setattr(Rounds, "try_all", noted)
+    monkeypatch.setattr(search_module, "is_made_by_steps", lambda result: result.problem.grid == usual)
+    found = searched(records)
+    assert found.selection.chosen > FRICTION
+    assert [(len(chosen), grid) for chosen, grid in rounds] == [(0, usual), (1, finer)]
 
 
 def test_other_ways_are_gone_on_the_finer_steps_alone(monkeypatch: pytest.MonkeyPatch) -> None:
