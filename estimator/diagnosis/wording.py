@@ -43,8 +43,9 @@ def _no_mismatch(judgement: Judgement, effects: Sequence[FoundEffect], fit: Fit)
 
 def _explained(judgement: Judgement, effects: Sequence[FoundEffect], fit: Fit) -> str:
     found = "; ".join(effect.statement for effect in effects)
+    this, it = ("this", "it") if len(effects) == 1 else ("these", "them")
     return (
-        f"The model leaves out {'this' if len(effects) == 1 else 'these'}: {found}. With it the free-run error falls "
+        f"The model leaves out {this}: {found}. With {it} the free-run error falls "
         f"from {fit.retuned:.3g} to {fit.augmented:.3g} {fit.unit}, on samples not used for the fit from "
         f"{fit.holdout_retuned:.3g} to {fit.holdout_augmented:.3g} {fit.unit}."
     )

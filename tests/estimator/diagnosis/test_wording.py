@@ -34,7 +34,7 @@ def test_nothing_missing_gives_error_and_floor() -> None:
 def test_an_explanation_gives_before_and_after_seen_and_unseen() -> None:
     judged = Judgement(Verdict.EXPLAINED, LAW, None)
     said = statement(judged, [effect("backlash", "the shaft has a backlash of 0.02 rad in total")], FIT, ())
-    assert "leaves out this: the shaft has a backlash of 0.02 rad in total." in said
+    assert "leaves out this: the shaft has a backlash of 0.02 rad in total. With it the free-run error falls" in said
     assert "from 0.432 to 0.0523 rad/s" in said
     assert "from 0.444 to 0.0555 rad/s" in said
     assert "remainder" not in said
@@ -42,7 +42,7 @@ def test_an_explanation_gives_before_and_after_seen_and_unseen() -> None:
 
 def test_two_effects_are_these() -> None:
     said = statement(Judgement(Verdict.EXPLAINED, None, None), [effect("a", "one"), effect("b", "two")], FIT, ())
-    assert "leaves out these: one; two." in said
+    assert "leaves out these: one; two. With them the free-run error falls" in said
 
 
 def test_a_remainder_is_given_as_a_law_at_its_place() -> None:
