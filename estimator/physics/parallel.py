@@ -28,6 +28,11 @@ def _pool() -> ThreadPoolExecutor:
     return ThreadPoolExecutor(DEEPEST, thread_name_prefix="driveline")
 
 
+def in_turn(function: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
+    """Do the same one after the other: each item has all the room, and both cores for what is shared out inside."""
+    return [function(item) for item in items]
+
+
 def concurrently(function: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
     """Return ``function`` of each item, in order; the first error ends the rest."""
     todo, results = deque(enumerate(items)), dict[int, Result]()

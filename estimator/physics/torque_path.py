@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 
 from estimator.physics.effects import torque_saturation
 from estimator.physics.layout import slot
-from estimator.signals.once import once
+from estimator.signals.once import MOST_BYTES, once
 from estimator.signals.record import FloatArray, Record
 
 _GAIN_M1 = slot("inverter_gain_mismatch", "gain_m1")
@@ -119,7 +119,8 @@ def recorded_shaft_torque(record: Record, p: FloatArray) -> FloatArray:
         if known == key:
             return torque
     torque = shaft_torque(record.torque_nm, record.since_start_s, p)
-    kept.torques = ((key, torque), *kept.torques)[:MOST_KEPT]
+    if torque.nbytes <= MOST_BYTES:
+        kept.torques = ((key, torque), *kept.torques)[:MOST_KEPT]
     return torque
 
 

@@ -7,12 +7,17 @@ from functools import wraps
 from typing import TypeVar
 from weakref import WeakKeyDictionary
 
+import numpy as np
+
 Object = TypeVar("Object")
 Result = TypeVar("Result")
 
+MOST_BYTES = 2**20
+"""Size of an array that is kept, at most: what is asked for again and again is of stretches, not of whole hours."""
+
 
 def once(function: Callable[[Object], Result]) -> Callable[[Object], Result]:
-    """Remember what a function returns for each object, as long as that lives.
+    """Remember what a function returns for each object, as long as that lives; arrays of more than ``MOST_BYTES`` not.
 
     Only for objects that are told apart by what they are and not by what they hold, and never change. What is returned
     is shared: nobody may write to it.
@@ -24,6 +29,9 @@ def once(function: Callable[[Object], Result]) -> Callable[[Object], Result]:
         try:
             return known[of]
         except KeyError:
-            return known.setdefault(of, function(of))
+            result = function(of)
+        if isinstance(result, np.ndarray) and result.nbytes > MOST_BYTES:
+            return result
+        return known.setdefault(of, result)
 
     return remembered

@@ -15,6 +15,7 @@ from estimator.diagnosis.selection.outdone import outdone
 from estimator.diagnosis.selection.rounds import Rounds
 from estimator.diagnosis.selection.surveys import Surveys
 from estimator.diagnosis.trial import Trial
+from estimator.diagnosis.unnamed import each_of
 from estimator.diagnosis.weight import NEAR_NOISE, SEEN, VISIBLE, leaves_a_detail, reads_speed
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult
@@ -161,7 +162,7 @@ class Selector:
         named = chosen if self.jury.weight.may_stand(current, retuned) else NOTHING
         alike = {name: lookalikes(name, chosen, current, self.jury.bench, self.jury.names) for name in named}
         self._progress("looking for laws without a name", 0.9)
-        first, *remaining = concurrently(self._surveys.of, [retuned, current] if chosen else [retuned])
+        first, *remaining = each_of(retuned, self._surveys.of, [retuned, current] if chosen else [retuned])
         return Selection(
             retuned,
             chosen,

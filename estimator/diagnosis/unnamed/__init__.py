@@ -4,7 +4,16 @@ from estimator.diagnosis.unnamed.hunt import Hunt
 from estimator.diagnosis.unnamed.laws import LAGS
 from estimator.diagnosis.unnamed.look_again import without_law
 from estimator.diagnosis.unnamed.scene import Scene, scene
-from estimator.diagnosis.unnamed.search import ROUNDS, UnnamedLaw, best_of, best_unnamed, hunts_of, judged, unnamed_laws
+from estimator.diagnosis.unnamed.search import (
+    ROUNDS,
+    UnnamedLaw,
+    best_of,
+    best_unnamed,
+    each_of,
+    hunts_of,
+    judged,
+    unnamed_laws,
+)
 
 __all__ = [
     "LAGS",
@@ -14,6 +23,7 @@ __all__ = [
     "UnnamedLaw",
     "best_of",
     "best_unnamed",
+    "each_of",
     "hunts_of",
     "judged",
     "scene",

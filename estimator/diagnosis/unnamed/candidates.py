@@ -20,7 +20,7 @@ from estimator.physics.effect import Element
 from estimator.physics.parallel import concurrently
 from estimator.signals.record import FloatArray, IntArray
 
-BATCH = 2**20
+BATCH = 2**18
 """Values of functions of time that are built and answered at once: enough for compiled code, and no more room."""
 
 
@@ -53,17 +53,24 @@ def candidates(view: Scene, element: Element, tried: Sequence[Form] | None = Non
     """Return laws without a name at one element, all by default, with the output's answers to them."""
     tried = forms(view, element) if tried is None else tried
     motions = view.motions(element)
-    widths, parts, some = [], list[FloatArray](), list[Sequence[Columns]]()
-    room = BATCH
+    widths, some = [], list[Sequence[Columns]]()
+    room, found = BATCH, answers(view, element, ())
     for form in tried:
         some.append(form.build(motions))
         widths.append(some[-1][0].shape[1])
         room -= sum(columns.size for columns in some[-1])
         if room <= 0:
-            parts.append(answers(view, element, some))
+            _append(found, answers(view, element, some))
             some, room = [], BATCH
-    parts.append(answers(view, element, some))
-    return Pool(tuple(form.law for form in tried), np.repeat(np.arange(len(widths)), widths), np.vstack(parts))
+    _append(found, answers(view, element, some))
+    return Pool(tuple(form.law for form in tried), np.repeat(np.arange(len(widths)), widths), found)
+
+
+def _append(rows: FloatArray, more: FloatArray) -> None:
+    """Append rows in place: those of a long recording take a quarter of a gigabyte, and are not to be there twice."""
+    had = rows.shape[0]
+    rows.resize((had + more.shape[0], rows.shape[1]), refcheck=False)
+    rows[had:] = more
 
 
 def answers(view: Scene, element: Element, laws: Sequence[Sequence[Columns]]) -> FloatArray:

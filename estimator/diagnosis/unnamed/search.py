@@ -8,9 +8,10 @@ of the rival that leaves least: how correlated a rival's error is must not decid
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import TypeVar
 
 from scipy import stats
 
@@ -25,8 +26,11 @@ from estimator.diagnosis.unnamed.pursuit import MOST_COEFFICIENTS
 from estimator.diagnosis.unnamed.scene import Scene, elements, scene
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
-from estimator.physics.parallel import concurrently
+from estimator.physics.parallel import concurrently, in_turn
 from estimator.signals.correlation import effective_samples
+
+Item = TypeVar("Item")
+Found = TypeVar("Found")
 
 ROUNDS = 20
 """Rounds that locate, at most: the first promises, the others try what it promised."""
@@ -36,6 +40,9 @@ WORTH_A_ROUND = 0.005
 """Rounds that are made in any case, and the share of the squared error that a further one must have taken away at an
 element for its next: where the line's own parameters are far off, as beside a shaft that relaxes, law and line come to
 each other in many steps."""
+
+MOST_AT_ONCE = 20_000
+"""Samples up to which several searches are made at a time: the answers to all functions take some 8 kB a sample."""
 
 IN_REACH = 3.0
 """Elements whose law leaves more than this many times the RMS of the best are not looked at again."""
@@ -77,6 +84,11 @@ def unnamed_laws(result: FitResult, rounds: int = 1) -> list[UnnamedLaw]:
     return judged(view, hunts_of(view, rounds))
 
 
+def each_of(result: FitResult, search: Callable[[Item], Found], items: Sequence[Item]) -> list[Found]:
+    """Search for laws in what a fit leaves in several ways: on both cores, or in turn where each takes much room."""
+    return (concurrently if result.residual.size <= MOST_AT_ONCE else in_turn)(search, items)
+
+
 def judged(view: Scene, hunts: Sequence[Hunt]) -> list[UnnamedLaw]:
     """Return what each hunt has found, weighed with one number of independent samples."""
     best = min(hunts, key=lambda hunt: hunt.mean_square)
@@ -90,10 +102,10 @@ def hunts_of(view: Scene, rounds: int = 1, begun: Sequence[Hunt] = ()) -> list[H
 
     ``begun`` is what earlier rounds have found in the same fit, where there were any.
     """
-    hunts = list(begun) or concurrently(partial(first, view, ground_of(view)), elements(view.result))
+    hunts = list(begun) or each_of(view.result, partial(first, view, ground_of(view)), elements(view.result))
     behind = max(hunt.rounds for hunt in hunts)
     if behind < 2 <= rounds:
-        hunts = concurrently(partial(_tried, view), hunts)
+        hunts = each_of(view.result, partial(_tried, view), hunts)
     at_rest = set[int]()
     for done in range(max(behind, 2), rounds):
         least = min(hunt.mean_square for hunt in hunts)

@@ -6,7 +6,7 @@ import gc
 
 import numpy as np
 
-from estimator.signals.once import once
+from estimator.signals.once import MOST_BYTES, once
 from estimator.signals.record import Record
 
 
@@ -33,6 +33,13 @@ def test_recordings_alike_are_not_taken_for_each_other() -> None:
     assert one.total_torque_nm is one.total_torque_nm
     assert one.total_torque_nm is not other.total_torque_nm
     np.testing.assert_allclose(one.since_start_s, 0.01 * np.arange(5), atol=1e-12)
+
+
+def test_an_hour_is_not_kept_a_second_time() -> None:
+    short, long = recording(MOST_BYTES // 8), recording(MOST_BYTES // 8 + 1)
+    assert short.total_torque_nm is short.total_torque_nm
+    assert long.total_torque_nm is not long.total_torque_nm
+    np.testing.assert_array_equal(long.total_torque_nm, 2.0)
 
 
 def test_it_is_forgotten_with_the_recording() -> None:
