@@ -55,12 +55,21 @@ def search(chain: Chain, model: DrivelineModel, unseen: Sequence[Record], progre
     """
     grid = grid_for(model, chain.records)
     found = _search(chain, model, unseen, progress, grid)
-    if is_made_by_steps(found.selection.result):
+    if _is_for_finer_steps(found.selection):
         finer = _finer(grid)
         worth = found.selection.unfinished or found.judgement.verdict is Verdict.EXPLAINED
         moved = _moved(found, progress, finer) if worth else None
-        found = moved or _search(chain, model, unseen, progress, finer, last=True)
+        if moved is None:
+            return _search(chain, model, unseen, progress, finer, last=True)
+        return (
+            _without_jitter(moved, model, unseen, progress, finer, last=True) if found.selection.unfinished else moved
+        )
     return found
+
+
+def _is_for_finer_steps(selection: Selection) -> bool:
+    """Tell whether steps have a part in what a selection leaves, or had in what it was not gone on from."""
+    return selection.unfinished or is_made_by_steps(selection.result)
 
 
 def _moved(found: Search, progress: Progress, grid: Grid) -> Search | None:
@@ -105,6 +114,15 @@ def _search(
     if chain.torque_is_unknown and found.selection.chosen:
         again = _repaired(chain, model, found.selection.chosen, grid)
         found = _searched(again, model, unseen, progress, grid, least_ratio, last)
+    if found.selection.unfinished:  # what another effect leaves is no jitter: that is looked for on finer steps
+        return found
+    return _without_jitter(found, model, unseen, progress, grid, last)
+
+
+def _without_jitter(
+    found: Search, model: DrivelineModel, unseen: Sequence[Record], progress: Progress, grid: Grid, last: bool
+) -> Search:
+    """Search once more, without what jitter adds in the mean, where the errors show any."""
     steady = found.chain.with_jitter_in(found.selection.result)
     return found if steady is found.chain else _searched(steady, model, unseen, progress, grid, VISIBLE, last)
 
@@ -134,7 +152,7 @@ def _searched(
     jury = Jury(bench, examiner, names, weight)
     selector = Selector(jury, progress) if last else Selector(jury, progress, is_made_by_steps)
     found = Search(chain, jury, selector.run(), untestable)
-    if _is_in_doubt(found, selector) and (last or not is_made_by_steps(found.selection.result)):
+    if _is_in_doubt(found, selector) and (last or not _is_for_finer_steps(found.selection)):
         return _by_other_ways(found, selector)
     return found
 

@@ -25,7 +25,8 @@ from estimator.physics.simulate import output_state, simulate_each
 from estimator.physics.start import Start
 
 PERIODS = 8
-"""Periods of the line's lowest mode that a stretch has: a bounce or two."""
+"""Periods of the line's lowest mode that a stretch has: the error is smooth over a few bounces, and each stretch must
+tell its own start."""
 
 LEAST_SAMPLES = 50
 """Samples that count of a stretch: a dozen for each unknown of its own."""
@@ -39,7 +40,17 @@ ITERATIONS = 20
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """Samples of one recording in a row, and the state that the line is in when they begin."""
+    """Samples of one recording in a row.
+
+    Attributes
+    ----------
+    index : int
+        Which recording.
+    rows : slice
+        Which of its samples.
+    start : Start
+        Load torque, and the state that the line is in when they begin [Nm, rad, rad/s].
+    """
 
     index: int
     rows: slice
@@ -62,7 +73,10 @@ def can_be_shot(result: FitResult) -> bool:
 
 
 def shot(result: FitResult, model: DrivelineModel) -> FitResult:
-    """Fit from where a fit in stretches ends, each begun in a state of its own (``can_be_shot``)."""
+    """Fit from where a fit in stretches ends, each begun in a state of its own; a fit that ``can_be_shot``.
+
+    Common unknowns and the state at the beginning are those of the stretches, the load torque is their median.
+    """
     parts = stretches(result, model)
     short = _fitted(result, parts)
     x = result.x.copy()

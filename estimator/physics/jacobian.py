@@ -17,7 +17,7 @@ from estimator.physics.differences import fill_differences
 from estimator.physics.inputs import Case
 from estimator.physics.parallel import WORKERS, concurrently
 from estimator.physics.problem import Problem, bounds, case_of, far_away, local_part, own_part, parameters
-from estimator.physics.simulate import are_of_a_length, go_together, simulate_each, simulate_together
+from estimator.physics.simulate import are_of_a_length, go_together, lanes_filled, simulate_each, simulate_together
 from estimator.physics.unknowns import Shared
 from estimator.signals.record import BoolArray, FloatArray, IntArray
 
@@ -101,9 +101,7 @@ def _together(problem: Problem, moving: Sequence[IntArray]) -> list[_Moved]:
     order = np.lexsort((of, place, own))
     everything = _Moved(of[order], columns[order])
     longest = max(record.time_s.size for record in problem.records)
-    lanes = min(math.ceil(of.size / (WORKERS * LANES)), max(ROOM // (LANES * longest), 1))
-    width = LANES * lanes
-    return [everything.part(slice(first, first + width)) for first in range(0, of.size, width)]
+    return [everything.part(rows) for rows in lanes_filled(of.size, max(ROOM // (LANES * longest), 1))]
 
 
 class _Around:

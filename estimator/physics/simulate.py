@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Sequence
 
 import numpy as np
@@ -141,11 +142,16 @@ def simulate_records(grid: Grid, records: Sequence[Record], cases: Sequence[Case
     fill_lanes = 1 < count <= LANES or (count > LANES and are_of_a_length(records))
     if not fill_lanes or not go_together(grid, records, [case.p for case in cases]):
         return concurrently(lambda i: simulate_each(grid, records[i], [cases[i]])[0], range(count))
-    width = LANES * math.ceil(count / (WORKERS * LANES))
-    parts = [range(first, min(first + width, count)) for first in range(0, count, width)]
+    parts = [range(count)[part] for part in lanes_filled(count)]
     runs = concurrently(lambda part: simulate_together(grid, records, part, [cases[i] for i in part]), parts)
     rows = (row for run in runs for row in run)
     return [row[: record.time_s.size] for row, record in zip(rows, records, strict=True)]
+
+
+def lanes_filled(count: int, most: int = sys.maxsize) -> list[slice]:
+    """Return so many simulations in parts, one for each core, that fill the lanes; more where ``most`` lanefuls fit."""
+    width = LANES * min(math.ceil(count / (WORKERS * LANES)), most)
+    return [slice(first, first + width) for first in range(0, count, width)]
 
 
 def are_of_a_length(records: Sequence[Record]) -> bool:

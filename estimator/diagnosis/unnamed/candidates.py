@@ -53,24 +53,17 @@ def candidates(view: Scene, element: Element, tried: Sequence[Form] | None = Non
     """Return laws without a name at one element, all by default, with the output's answers to them."""
     tried = forms(view, element) if tried is None else tried
     motions = view.motions(element)
-    widths, some = [], list[Sequence[Columns]]()
-    room, found = BATCH, answers(view, element, ())
+    widths, parts, some = [], list[FloatArray](), list[Sequence[Columns]]()
+    room = BATCH
     for form in tried:
         some.append(form.build(motions))
         widths.append(some[-1][0].shape[1])
         room -= sum(columns.size for columns in some[-1])
         if room <= 0:
-            _append(found, answers(view, element, some))
+            parts.append(answers(view, element, some))
             some, room = [], BATCH
-    _append(found, answers(view, element, some))
-    return Pool(tuple(form.law for form in tried), np.repeat(np.arange(len(widths)), widths), found)
-
-
-def _append(rows: FloatArray, more: FloatArray) -> None:
-    """Append rows in place: those of a long recording take a quarter of a gigabyte, and are not to be there twice."""
-    had = rows.shape[0]
-    rows.resize((had + more.shape[0], rows.shape[1]), refcheck=False)
-    rows[had:] = more
+    parts.append(answers(view, element, some))
+    return Pool(tuple(form.law for form in tried), np.repeat(np.arange(len(widths)), widths), np.vstack(parts))
 
 
 def answers(view: Scene, element: Element, laws: Sequence[Sequence[Columns]]) -> FloatArray:

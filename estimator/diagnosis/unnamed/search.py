@@ -42,7 +42,7 @@ element for its next: where the line's own parameters are far off, as beside a s
 each other in many steps."""
 
 MOST_AT_ONCE = 20_000
-"""Samples up to which several searches are made at a time: the answers to all functions take some 8 kB a sample."""
+"""Samples up to which several searches are made at a time: functions and answers take some 4 kB a sample each."""
 
 IN_REACH = 3.0
 """Elements whose law leaves more than this many times the RMS of the best are not looked at again."""

@@ -116,6 +116,22 @@ def test_where_steps_have_a_part_in_what_is_left_a_further_effect_is_sought_on_f
     assert {grid for _, grid in rounds[1:]} == {finer}
 
 
+def test_what_was_not_gone_on_from_for_its_steps_is_gone_on_from_on_finer_ones(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Even where the steps have no part any more in what is left once moments are settled."""
+    records, asked = rubbing(lambda speed: 2.0 + 0.2 * speed**2, (1, 2, 3)), list[Grid]()
+    usual = searched(records).selection.result.problem.grid
+
+    def at_first(result: FitResult) -> bool:
+        asked.append(result.problem.grid)
+        return len(asked) == 1
+
+    monkeypatch.setattr(search_module, "is_made_by_steps", at_first)
+    found = searched(records)
+    assert found.selection.chosen > FRICTION
+    assert found.selection.result.problem.grid == replace(usual, substeps=FINER * usual.substeps)
+    assert asked == [usual]
+
+
 def test_other_ways_are_gone_on_the_finer_steps_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where the steps have a part in what is doubted, the search begins anew on finer ones anyway."""
     records, gone = rubbing(lambda speed: 1.5), list[Grid]()
