@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from scipy.signal import welch
 
 from tests.benchmarks import buses
-from tests.benchmarks.buses.bus import METRES_PER_RAD, draw_bus
+from tests.benchmarks.buses.bus import METRES_PER_RAD, Bus, draw_bus
 from tests.benchmarks.buses.drive import CLEAN, COUNT_NM, PERIOD_S, World, drive, prbs
 from tests.benchmarks.buses.line import Line
 from tests.benchmarks.buses.road import FRONT_SHARE, GRAVITY_M_S2, PATCH_M, gusts, hills, surface
@@ -127,3 +127,27 @@ def test_the_truth_is_written_apart_from_the_product() -> None:
                 imported |= {name.name for name in node.names}
     product = {name for name in imported if name and name.split(".")[0] in {"estimator", "hil", "drivers"}}
     assert product == {"estimator.signals.record"}
+
+
+def test_the_driver_holds_the_speed_and_keeps_off_the_resonance() -> None:
+    """Of the loop that the driver closes: gain above 2 Hz well below 1, sensitivity below 2 at every frequency."""
+    omega = np.geomspace(0.01, 300.0, 2000)
+    for bus in map(draw_bus, range(100)):
+        loop = _driver(bus, omega) * _speed_of_torque(bus.line, omega)
+        assert np.abs(loop[omega > 4 * np.pi]).max() < 0.3
+        assert np.abs(1.0 / (1.0 + loop)).max() < 2.0
+
+
+def _driver(bus: Bus, omega: np.ndarray) -> np.ndarray:
+    s, driver = 1j * omega, bus.driver
+    lags = np.exp(-s * driver.reaction_s) / (1 + s * driver.pedal_s) / (1 + s * driver.reading_s)
+    proportional = driver.bandwidth_rad_s * (bus.line.J_M + bus.line.J_L)
+    return proportional * (1 + driver.bandwidth_rad_s / 10 / s) * lags
+
+
+def _speed_of_torque(line: Line, omega: np.ndarray) -> np.ndarray:
+    """Return the motor speed that a motor torque makes, from both balances by hand."""
+    s, (J_M, J_L, k, c, b_M, b_L) = 1j * omega, line.parameters.values()
+    shaft = c + k / s
+    load = shaft * (J_L * s + b_L) / (shaft + J_L * s + b_L)
+    return 1 / (J_M * s + b_M + load)

@@ -44,14 +44,17 @@ class Driver:
 
     Attributes
     ----------
+    reading_s
+        Time constant of the speedometer [s].
     reaction_s
-        From what the speedometer shows to the foot [s].
+        From what it shows to the foot [s].
     pedal_s
         Time constant of foot, pedal and torque ramp together [s].
     bandwidth_rad_s
         Crossover of the loop that the driver closes [rad/s].
     """
 
+    reading_s: float
     reaction_s: float
     pedal_s: float
     bandwidth_rad_s: float
@@ -107,7 +110,6 @@ def draw_bus(seed: int) -> Bus:
     rng = np.random.default_rng([37, seed])
     speed_rad_s = float(rng.uniform(65.0, 125.0))
     line = _draw_line(rng, speed_rad_s)
-    reaction_s = float(rng.uniform(0.3, 1.0))
     return Bus(
         seed=seed,
         line=line,
@@ -121,8 +123,15 @@ def draw_bus(seed: int) -> Bus:
             grade_nm=float(rng.uniform(10.0, 60.0)),
             gust_nm=float(rng.uniform(3.0, 15.0)),
         ),
-        driver=Driver(reaction_s, float(rng.uniform(0.15, 0.5)), float(rng.uniform(0.2, 0.4)) / reaction_s),
+        driver=_draw_driver(rng),
     )
+
+
+def _draw_driver(rng: np.random.Generator) -> Driver:
+    """Return a driver whose loop crosses over where its lags together take 11 to 23 degrees of phase."""
+    reading_s, reaction_s, pedal_s = (float(rng.uniform(*ends)) for ends in ((0.2, 0.5), (0.3, 1.0), (0.15, 0.5)))
+    bandwidth_rad_s = float(rng.uniform(0.2, 0.4)) / (reading_s + reaction_s + pedal_s)
+    return Driver(reading_s, reaction_s, pedal_s, bandwidth_rad_s)
 
 
 def _draw_line(rng: np.random.Generator, speed_rad_s: float) -> Line:

@@ -11,7 +11,8 @@ class Foot:
     """Proportional and integral action on the speed read a reaction time ago, through foot and pedal.
 
     The load alone, ``1 / J s`` with all inertia, is what the driver feels: the gain is crossover times inertia, and
-    the integral has a tenth of the crossover's speed.
+    the integral has a tenth of the crossover's speed. Two lags, of the reading and of the pedal, keep the foot off the
+    resonance, where the speed of the motor answers a torque much more than ``1 / J s`` says.
 
     Parameters
     ----------
@@ -27,15 +28,17 @@ class Foot:
         driver, inertia = bus.driver, bus.line.J_M + bus.line.J_L
         self._gain = driver.bandwidth_rad_s * inertia
         self._integral_gain = self._gain * driver.bandwidth_rad_s / 10.0 * period_s
-        self._share = period_s / (driver.pedal_s + period_s)
-        self._target = bus.speed_rad_s
+        self._reading_share = period_s / (driver.reading_s + period_s)
+        self._pedal_share = period_s / (driver.pedal_s + period_s)
+        self._target = self._shown = bus.speed_rad_s
         self._seen = deque([bus.speed_rad_s] * max(round(driver.reaction_s / period_s), 1))
         self._held_nm = self._pedal_nm = torque_nm
 
     def torque_nm(self, speed_rad_s: float) -> float:
         """Return the torque that is asked for after one more reading of the speed [Nm]."""
-        self._seen.append(speed_rad_s)
+        self._shown += self._reading_share * (speed_rad_s - self._shown)
+        self._seen.append(self._shown)
         short = self._target - self._seen.popleft()
         self._held_nm += self._integral_gain * short
-        self._pedal_nm += self._share * (self._held_nm + self._gain * short - self._pedal_nm)
+        self._pedal_nm += self._pedal_share * (self._held_nm + self._gain * short - self._pedal_nm)
         return self._pedal_nm
