@@ -81,7 +81,12 @@ def plcopen(
     profile: Profile = PROFILE,
     single: Single = False,
     tc6: Annotated[
-        Tc6, typer.Option("--tc6", help="Version of the format: 2.0 is what CODESYS and TwinCAT write themselves.")
+        Tc6,
+        typer.Option(
+            "--tc6",
+            metavar="VERSION",
+            help="Version of the format, 2.01 or 2.0; CODESYS and TwinCAT themselves write 2.0.",
+        ),
     ] = Tc6.V2_01,
 ) -> None:
     """Write the same as PLCopen XML, which CODESYS, TwinCAT and others import in one step.
