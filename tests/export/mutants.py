@@ -16,6 +16,8 @@ MUTANTS = (
     ("facE[j] := facE[j] * (before * weight)", "facE[j] := facE[j] * before * weight"),
     ("before := alpha", "before := lambda1Now"),
     ("scale := traceHeld / traceF", "scale := 1.0"),
+    ("(mirror > -1.0) AND (mirror < 1.0)", "(mirror > -1.0)"),
+    ("(mirror > -1.0) AND (mirror < 1.0)", "(mirror < 1.0)"),
     ("IF stable AND ADAPT_FILTER", "IF ADAPT_FILTER"),
     ("FOR i := 1 TO m / 2 DO", "FOR i := 1 TO (m - 1) / 2 DO"),
     ("torque := torqueM1 + torqueM2", "torque := torqueM1"),
