@@ -58,11 +58,16 @@ class Decimated:
     okay: BoolArray
 
 
+def low_pass_length(factor: float) -> float:
+    """Return how many taps the anti-aliasing filter of a factor above 1 has."""
+    return 2 * HALF_LENGTH * factor + 1
+
+
 def low_pass_taps(factor: int) -> FloatArray:
     """Return the taps of the anti-aliasing filter, shape (16 * factor + 1,), sum 1; one tap for factor 1."""
     if factor == 1:
         return np.ones(1)
-    taps: FloatArray = firwin(2 * HALF_LENGTH * factor + 1, EDGE / factor, window="hamming")
+    taps: FloatArray = firwin(round(low_pass_length(factor)), EDGE / factor, window="hamming")
     return taps
 
 
