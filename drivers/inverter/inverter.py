@@ -15,7 +15,7 @@ from drivers.canopen.can_link import CanLink
 from drivers.canopen.emcy import EMCY_COB_ID
 from drivers.canopen.heartbeat import HEARTBEAT_COB_ID, NMT_COB_ID, NmtCommand, NmtState, nmt_frame
 from drivers.canopen.node_monitor import NodeMonitor
-from drivers.canopen.pdo_map import PdoLayout, configuration_writes
+from drivers.canopen.pdo_map import COB_ID_NO_RTR, PdoLayout, configuration_writes
 from drivers.canopen.sdo import SdoChannel
 from drivers.canopen.sdo_node import SdoNode
 from drivers.datasheet.file import EdsFile
@@ -142,15 +142,15 @@ class Inverter:
                 f"{'; '.join(map(str, differences))}. Correct the rig file, or connect the drive it describes."
             )
         for layout in self._layouts:
-            for index, subindex, value in configuration_writes(layout):
-                self._sdo.download_confirmed(index, subindex, value)
+            self._write_layout(layout)
         self._link.produce_heartbeat(self.settings.heartbeat_ms / 1000.0)  # before the drive listens for it
         for setting in self._given:
             self._sdo.download_confirmed(setting.index, setting.subindex, setting.value)
         self._feedback.start_anew()
         self._monitor.forget_lost_host()
-        self._send_nmt(NmtCommand.START)
-        self._monitor.await_state(NmtState.OPERATIONAL, self.settings.state_timeout_s)
+        self._monitor.await_state(
+            NmtState.OPERATIONAL, self.settings.nmt_timeout_s, ask=lambda: self._send_nmt(NmtCommand.START)
+        )
         self._monitor.expect(NmtState.OPERATIONAL)
 
     def arm(self) -> None:
@@ -306,6 +306,12 @@ class Inverter:
     @property
     def _layouts(self) -> tuple[PdoLayout, PdoLayout]:
         return self._rpdo.layout, self._tpdo.layout
+
+    def _write_layout(self, layout: PdoLayout) -> None:
+        present = self._sdo.upload(layout.communication_index, 1)
+        for index, subindex, value in configuration_writes(layout, present):
+            is_cob_id = (index, subindex) == (layout.communication_index, 1)
+            self._sdo.download_confirmed(index, subindex, value, ignored=COB_ID_NO_RTR if is_cob_id else 0)
 
     def _subscribe_feedback(self) -> FeedbackReceiver:
         receiver = feedback_receiver(self._eds, self._tpdo, self._torque)

@@ -39,8 +39,10 @@ class InverterSettings:
         Torque slope of profile torque mode, object 0x6087; None for the drive's own [Nm/s].
     sdo_timeout_s
         Longest wait for an SDO answer [s].
+    mode_timeout_s
+        Longest wait for the mode of operation to be shown in 0x6061 [s].
     state_timeout_s
-        Longest wait for a change of mode, power state or NMT state [s].
+        Longest wait for a change of power state or NMT state [s].
     """
 
     name: str
@@ -56,6 +58,7 @@ class InverterSettings:
     option_codes: Mapping[int, int] = field(default_factory=dict)
     torque_slope_nm_per_s: float | None = None
     sdo_timeout_s: float = 0.5
+    mode_timeout_s: float = 2.0
     state_timeout_s: float = 2.0
 
     @property
@@ -66,6 +69,11 @@ class InverterSettings:
         real-time system; not above the 16 bits of object 0x1016.
         """
         return min(max(5 * self.heartbeat_ms, 500), 0xFFFF)
+
+    @property
+    def nmt_timeout_s(self) -> float:
+        """Longest wait for an NMT state: two heartbeats at least, for it is the heartbeat that reports it [s]."""
+        return max(self.state_timeout_s, 2.0 * self.heartbeat_ms / 1000.0)
 
     @property
     def where(self) -> str:

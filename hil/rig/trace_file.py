@@ -11,6 +11,7 @@ from typing import IO, Any
 import can
 from can.io.blf import BLFParseError
 
+from drivers.canopen.can_link import is_canopen
 from hil.errors import RecordingError
 from hil.rig.trace import require_trace_name
 
@@ -41,7 +42,7 @@ def read_frames(path: Path) -> Iterator[tuple[int, bytes, int]]:
     try:
         with _opened(path) as file, _READERS[path.suffix.lower()](file) as reader:
             for message in reader:
-                if not (message.is_error_frame or message.is_remote_frame or message.is_extended_id):
+                if is_canopen(message):
                     yield message.arbitration_id, bytes(message.data), round(message.timestamp * NS_PER_S)
     except _READING_ERRORS as error:
         raise RecordingError(
