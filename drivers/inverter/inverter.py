@@ -24,6 +24,7 @@ from drivers.inverter.check import Difference, configurable_differences, fixed_d
 from drivers.inverter.cia402 import Command
 from drivers.inverter.drive_settings import drive_settings
 from drivers.inverter.feedback import FeedbackReceiver, InverterFeedback
+from drivers.inverter.follow_watch import FollowWatch
 from drivers.inverter.frozen_feedback import FrozenFeedback
 from drivers.inverter.pdos import command_codec, feedback_codec, feedback_receiver
 from drivers.inverter.power_control import PowerControl
@@ -68,12 +69,18 @@ class Inverter:
         self._feedback = self._subscribe_feedback()
         self._monitor = self._subscribe_monitor()
         self._frozen = FrozenFeedback(self._where)
+        self._following = FollowWatch(settings)
         self._armed = False
 
     @property
     def latest(self) -> InverterFeedback | None:
         """The last feedback received; None before the first after `configure`."""
         return self._feedback.latest
+
+    @property
+    def follows(self) -> bool:
+        """Whether the drive has said, since `arm`, that it follows its target torque; True where it can't say."""
+        return self._following.follows(self.latest)
 
     def check(self) -> tuple[Difference, ...]:
         """Compare the device with rig file and EDS; reads objects, writes none.
@@ -168,6 +175,7 @@ class Inverter:
         self._power.select_mode()
         self._power.zero_targets()
         self._power.enable_operation()
+        self._following.start_anew()
         self._armed = True
 
     def command(self, torque: GuardedTorque) -> None:
@@ -290,8 +298,8 @@ class Inverter:
         Raises
         ------
         DeviceFault
-            If the drive has sent an EMCY, is in FAULT, has left NMT OPERATIONAL, or sends the same feedback again and
-            again while its command changes.
+            If the drive has sent an EMCY, is in FAULT, has left NMT OPERATIONAL, ignores its target torque, or sends
+            the same feedback again and again while its command changes.
         DeviceTimeout
             If its heartbeat is lost, or never came.
         BusDown, ProtocolViolation
@@ -300,8 +308,10 @@ class Inverter:
         self._link.raise_if_failed()
         self._monitor.raise_if_unwell(time.monotonic_ns())
         self._frozen.raise_if_frozen()
-        if self.latest is not None:
-            self._power.raise_if_fault(self.latest.state)
+        latest = self.latest
+        if latest is not None:
+            self._power.raise_if_fault(latest.state)
+        self._following.raise_if_ignored(latest)
 
     @property
     def _layouts(self) -> tuple[PdoLayout, PdoLayout]:

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from typing import TypeVar
 
-from drivers.canopen.emcy import cause_of
+from drivers.canopen.emcy_codes import cause_of
 from drivers.canopen.sdo import SdoChannel
 from drivers.errors import ConfigMismatch, DeviceFault, DeviceTimeout
 from drivers.inverter.cia402 import (

@@ -31,6 +31,8 @@ class InverterSettings:
         Identity expected in object 0x1018; None for the EDS's.
     heartbeat_ms
         Heartbeat period, of the drive and of the host [ms].
+    follow_bit
+        Whether the drive says in bit 12 of its statusword that it follows the target torque (mode 10 only).
     rpdo_deadline_ms
         Without an RPDO for so long the drive takes the host for dead [ms].
     option_codes
@@ -54,6 +56,7 @@ class InverterSettings:
     vendor_id: int | None = None
     product_code: int | None = None
     heartbeat_ms: int = 100
+    follow_bit: bool = True
     rpdo_deadline_ms: int = 200
     option_codes: Mapping[int, int] = field(default_factory=dict)
     torque_slope_nm_per_s: float | None = None

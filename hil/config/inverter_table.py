@@ -82,6 +82,7 @@ class InverterTable(Table):
     rpdo_deadline_ms: Annotated[int, Field(ge=2, le=65535)] = 200
     option_codes: OptionCodesTable = OptionCodesTable()
     torque_slope_nm_per_s: Positive | None = None
+    follow_bit: bool = True
     sdo_timeout_s: TimeOut = 0.5
     mode_timeout_s: TimeOut = 2.0
     state_timeout_s: TimeOut = 2.0

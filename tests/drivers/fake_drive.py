@@ -21,8 +21,7 @@ from drivers.inverter.pdos import command_codec, feedback_codec
 from drivers.scaling import IntegerType
 from tests.drivers.can_bench import M1, new_channel
 
-FOLLOWS = 1 << 12
-"""Statusword in cyclic synchronous torque: the drive follows the target torque."""
+FOLLOWS = StatusBit.FOLLOWS_TARGET
 
 VALUE_RANGE, NO_SUCH_OBJECT, DEVICE_STATE = 0x06090030, 0x06020000, 0x08000022
 
