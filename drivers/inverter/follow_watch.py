@@ -15,7 +15,7 @@ from drivers.inverter.feedback import InverterFeedback
 from drivers.inverter.settings import InverterSettings
 
 MOST_IGNORED: Final = 10
-"""So many TPDOs in a row without bit 12, from a drive that has followed, are no passing thing."""
+"""So many TPDOs in a row without bit 12 are no passing thing, once the drive has followed or is asked for a torque."""
 
 NS_PER_S: Final = 1_000_000_000
 
@@ -29,7 +29,7 @@ class FollowWatch:
         Its mode, its time-outs, and whether it has the bit.
     """
 
-    __slots__ = ("_followed", "_ignored", "_sequence", "_settings", "_since_ns", "_watches")
+    __slots__ = ("_asked", "_followed", "_ignored", "_sequence", "_settings", "_since_ns", "_watches")
 
     def __init__(self, settings: InverterSettings) -> None:
         self._settings = settings
@@ -42,10 +42,16 @@ class FollowWatch:
 
     def start_anew(self) -> None:
         """Forget what was seen: the drive has been armed."""
+        self._asked = False
         self._followed = False
         self._ignored = 0
         self._sequence = 0
         self._since_ns: int | None = None
+
+    def commanded(self, torque_raw: int) -> None:
+        """Take a command: the time a drive may take before it follows is one at zero torque."""
+        if torque_raw and not self._asked:
+            self._asked, self._ignored = True, 0
 
     def raise_if_ignored(self, latest: InverterFeedback | None) -> None:
         """Judge by the last feedback.
@@ -53,7 +59,8 @@ class FollowWatch:
         Raises
         ------
         DeviceFault
-            If a drive in operation does not begin to follow in its time for a change of state, or follows no more.
+            If a drive in operation does not begin to follow in its time for a change of state, or follows no more, or
+            does not follow a torque.
         """
         if not self._watches or latest is None or latest.sequence == self._sequence:
             return
@@ -73,6 +80,6 @@ class FollowWatch:
             )
 
     def _patience_is_over(self, for_ns: int) -> bool:
-        if self._followed:
+        if self._followed or self._asked:
             return self._ignored >= MOST_IGNORED
         return for_ns > self._settings.state_timeout_s * NS_PER_S

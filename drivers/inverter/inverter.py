@@ -195,6 +195,7 @@ class Inverter:
         base = self._torque.to_raw(torque.base_nm, self._where)
         prbs = self._torque.to_raw(torque.prbs_nm, self._where)
         self._frozen.commanded(base + prbs, self.latest)
+        self._following.commanded(base + prbs)
         self._send_rpdo(Command.ENABLE_OPERATION, base, prbs)
 
     def await_feedback(self, after_ns: int, timeout_s: float) -> InverterFeedback | None:

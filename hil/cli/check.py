@@ -121,11 +121,14 @@ def _register_table(finding: Finding) -> RichTable:
     from rich.table import Table
 
     table = Table(title=f"registers of {finding.device}", title_justify="left")
-    for column in ("register", "where", "value", "unit", ""):
+    for column in ("register", "where", "value", "unit"):
         table.add_column(column, justify="right" if column == "value" else "left", overflow="fold")
+    if any(each.problem is not None for each in finding.registers):
+        table.add_column("result")
     for each in finding.registers:
-        doubt = "" if each.problem is None else "not plausible" if each.value is not None else "not read"
-        table.add_row(each.name, f"{each.register.kind.value} {each.register.address}", each.shown, each.unit, doubt)
+        result = "" if each.problem is None else "not plausible" if each.value is not None else "not read"
+        row = (each.name, f"{each.register.kind.value} {each.register.address}", each.shown, each.unit, result)
+        table.add_row(*row[: len(table.columns)])
     return table
 
 

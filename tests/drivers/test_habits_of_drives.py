@@ -216,9 +216,9 @@ class IgnoresTarget(FakeDrive):
         return self.objects[0x606C, 0]
 
 
-def driven(inverter: Inverter, link: CanLink, cycles: int) -> None:
+def driven(inverter: Inverter, link: CanLink, cycles: int, torque_nm: float = 60.0) -> None:
     for n in range(cycles):
-        inverter.command(guarded(60.0 if n % 4 < 2 else -60.0))
+        inverter.command(guarded(torque_nm if n % 4 < 2 else -torque_nm))
         assert inverter.await_feedback(link.sync(), 5.0) is not None
         inverter.raise_if_faulted()
 
@@ -240,7 +240,7 @@ def test_drive_may_take_its_time_before_it_follows() -> None:
     with on_bus(FollowsLater, replace(M1, state_timeout_s=30.0)) as (_, inverter, link):
         inverter.configure()
         inverter.arm()
-        driven(inverter, link, 20)
+        driven(inverter, link, 20, torque_nm=0.0)
         assert not inverter.follows
         driven(inverter, link, 20)
         assert inverter.follows
@@ -252,8 +252,19 @@ def test_drive_that_never_follows_is_given_up_after_the_time_for_a_state() -> No
         inverter.configure()
         inverter.arm()
         with pytest.raises(DeviceFault, match="bit 12 is 0"):
-            driven(inverter, link, 1_000_000)
+            driven(inverter, link, 1_000_000, torque_nm=0.0)
         assert not inverter.follows
+
+
+def test_drive_that_never_follows_has_no_time_once_a_torque_is_asked_for() -> None:
+    with on_bus(IgnoresTarget, replace(M1, state_timeout_s=30.0)) as (drive, inverter, link):
+        drive.status_bits = IGNORED
+        inverter.configure()
+        inverter.arm()
+        driven(inverter, link, 3 * MOST_IGNORED, torque_nm=0.0)
+        driven(inverter, link, MOST_IGNORED - 1)
+        with pytest.raises(DeviceFault, match="the drive ignores the target torque"):
+            driven(inverter, link, 1)
 
 
 @pytest.mark.parametrize(
