@@ -27,6 +27,7 @@ from drivers.errors import ConfigMismatch
 from drivers.inverter.settings import InverterSettings
 
 SYNC_COB_ID_OBJECT: Final = 0x1005
+SYNC_COUNTER_OVERFLOW: Final = 0x1019
 
 ABORT_CONNECTION: Final = 0x6007
 
@@ -103,6 +104,7 @@ def drive_settings(eds: EdsFile, settings: InverterSettings, rpdo: PdoLayout) ->
     """
     listed = (
         *_sync(eds),
+        *_no_sync_counter(eds),
         *_no_node_guarding(eds),
         *_option_codes(eds, settings),
         *_torque_slope(eds, settings),
@@ -122,6 +124,12 @@ def drive_settings(eds: EdsFile, settings: InverterSettings, rpdo: PdoLayout) ->
 def _sync(eds: EdsFile) -> Iterator[DriveSetting]:
     if eds.has(SYNC_COB_ID_OBJECT):
         yield DriveSetting(SYNC_COB_ID_OBJECT, 0, "COB-ID SYNC", eds.default(SYNC_COB_ID_OBJECT), "EDS")
+
+
+def _no_sync_counter(eds: EdsFile) -> Iterator[DriveSetting]:
+    """Switch the SYNC counter off: the host sends none, and a drive that counts takes no other (CiA 301, 7.5.2.22)."""
+    if eds.has(SYNC_COUNTER_OVERFLOW):
+        yield DriveSetting(SYNC_COUNTER_OVERFLOW, 0, "SYNC counter overflow", 0, "this program")
 
 
 def _no_node_guarding(eds: EdsFile) -> Iterator[DriveSetting]:

@@ -15,7 +15,7 @@ from drivers.canopen.can_link import CanLink
 from drivers.canopen.emcy import EMCY_COB_ID
 from drivers.canopen.heartbeat import HEARTBEAT_COB_ID, NMT_COB_ID, NmtCommand, NmtState, nmt_frame
 from drivers.canopen.node_monitor import NodeMonitor
-from drivers.canopen.pdo_map import PdoLayout, configuration_writes
+from drivers.canopen.pdo_map import COB_ID_NO_RTR, PdoLayout, configuration_writes
 from drivers.canopen.sdo import SdoChannel
 from drivers.canopen.sdo_node import SdoNode
 from drivers.datasheet.file import EdsFile
@@ -24,6 +24,7 @@ from drivers.inverter.check import Difference, configurable_differences, fixed_d
 from drivers.inverter.cia402 import Command
 from drivers.inverter.drive_settings import drive_settings
 from drivers.inverter.feedback import FeedbackReceiver, InverterFeedback
+from drivers.inverter.follow_watch import FollowWatch
 from drivers.inverter.frozen_feedback import FrozenFeedback
 from drivers.inverter.pdos import command_codec, feedback_codec, feedback_receiver
 from drivers.inverter.power_control import PowerControl
@@ -68,12 +69,18 @@ class Inverter:
         self._feedback = self._subscribe_feedback()
         self._monitor = self._subscribe_monitor()
         self._frozen = FrozenFeedback(self._where)
+        self._following = FollowWatch(settings)
         self._armed = False
 
     @property
     def latest(self) -> InverterFeedback | None:
         """The last feedback received; None before the first after `configure`."""
         return self._feedback.latest
+
+    @property
+    def follows(self) -> bool:
+        """Whether the drive has said, since `arm`, that it follows its target torque; True where it can't say."""
+        return self._following.follows(self.latest)
 
     def check(self) -> tuple[Difference, ...]:
         """Compare the device with rig file and EDS; reads objects, writes none.
@@ -142,15 +149,15 @@ class Inverter:
                 f"{'; '.join(map(str, differences))}. Correct the rig file, or connect the drive it describes."
             )
         for layout in self._layouts:
-            for index, subindex, value in configuration_writes(layout):
-                self._sdo.download_confirmed(index, subindex, value)
+            self._write_layout(layout)
         self._link.produce_heartbeat(self.settings.heartbeat_ms / 1000.0)  # before the drive listens for it
         for setting in self._given:
             self._sdo.download_confirmed(setting.index, setting.subindex, setting.value)
         self._feedback.start_anew()
         self._monitor.forget_lost_host()
-        self._send_nmt(NmtCommand.START)
-        self._monitor.await_state(NmtState.OPERATIONAL, self.settings.state_timeout_s)
+        self._monitor.await_state(
+            NmtState.OPERATIONAL, self.settings.nmt_timeout_s, ask=lambda: self._send_nmt(NmtCommand.START)
+        )
         self._monitor.expect(NmtState.OPERATIONAL)
 
     def arm(self) -> None:
@@ -168,6 +175,7 @@ class Inverter:
         self._power.select_mode()
         self._power.zero_targets()
         self._power.enable_operation()
+        self._following.start_anew()
         self._armed = True
 
     def command(self, torque: GuardedTorque) -> None:
@@ -187,6 +195,7 @@ class Inverter:
         base = self._torque.to_raw(torque.base_nm, self._where)
         prbs = self._torque.to_raw(torque.prbs_nm, self._where)
         self._frozen.commanded(base + prbs, self.latest)
+        self._following.commanded(base + prbs)
         self._send_rpdo(Command.ENABLE_OPERATION, base, prbs)
 
     def await_feedback(self, after_ns: int, timeout_s: float) -> InverterFeedback | None:
@@ -290,8 +299,8 @@ class Inverter:
         Raises
         ------
         DeviceFault
-            If the drive has sent an EMCY, is in FAULT, has left NMT OPERATIONAL, or sends the same feedback again and
-            again while its command changes.
+            If the drive has sent an EMCY, is in FAULT, has left NMT OPERATIONAL, ignores its target torque, or sends
+            the same feedback again and again while its command changes.
         DeviceTimeout
             If its heartbeat is lost, or never came.
         BusDown, ProtocolViolation
@@ -300,12 +309,20 @@ class Inverter:
         self._link.raise_if_failed()
         self._monitor.raise_if_unwell(time.monotonic_ns())
         self._frozen.raise_if_frozen()
-        if self.latest is not None:
-            self._power.raise_if_fault(self.latest.state)
+        latest = self.latest
+        if latest is not None:
+            self._power.raise_if_fault(latest.state)
+        self._following.raise_if_ignored(latest)
 
     @property
     def _layouts(self) -> tuple[PdoLayout, PdoLayout]:
         return self._rpdo.layout, self._tpdo.layout
+
+    def _write_layout(self, layout: PdoLayout) -> None:
+        present = self._sdo.upload(layout.communication_index, 1)
+        for index, subindex, value in configuration_writes(layout, present):
+            is_cob_id = (index, subindex) == (layout.communication_index, 1)
+            self._sdo.download_confirmed(index, subindex, value, ignored=COB_ID_NO_RTR if is_cob_id else 0)
 
     def _subscribe_feedback(self) -> FeedbackReceiver:
         receiver = feedback_receiver(self._eds, self._tpdo, self._torque)

@@ -97,6 +97,10 @@ def inverter_settings(name: str, table: InverterTable) -> InverterSettings:
         rpdo_deadline_ms=table.rpdo_deadline_ms,
         option_codes=table.option_codes.by_object,
         torque_slope_nm_per_s=table.torque_slope_nm_per_s,
+        follow_bit=table.follow_bit,
+        sdo_timeout_s=table.sdo_timeout_s,
+        mode_timeout_s=table.mode_timeout_s,
+        state_timeout_s=table.state_timeout_s,
     )
 
 

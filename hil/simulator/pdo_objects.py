@@ -108,4 +108,4 @@ class PdoObjects:
             if self._eds.has(communication_base + n) and self._eds.has(mapping_base + n)
         )
         where = f"simulated node {self._eds.node_id}"
-        return tuple(self._eds.codec(layout, where) for layout in layouts if layout.valid)
+        return tuple(self._eds.codec(layout, where) for layout in layouts if layout.valid and not layout.extended)

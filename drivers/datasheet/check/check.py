@@ -9,6 +9,7 @@ from drivers.datasheet.check.carriers import carrier_parameters, check_carriers
 from drivers.datasheet.check.context import EdsContext, at_file
 from drivers.datasheet.check.entries import check_entries
 from drivers.datasheet.check.lists import check_lists
+from drivers.datasheet.check.modes import check_modes
 from drivers.datasheet.check.needs import USED, check_needs
 from drivers.datasheet.check.pdos import check_pdos
 from drivers.datasheet.check.sections import check_sections
@@ -17,7 +18,7 @@ from drivers.datasheet.finding import EdsFinding, Severity
 from drivers.datasheet.objects import read_objects
 from drivers.datasheet.text import ADVICE, EdsUnreadable, read_eds_text
 
-RULES = (check_sections, check_lists, check_entries, check_values, check_pdos, check_needs, check_carriers)
+RULES = (check_sections, check_lists, check_entries, check_values, check_pdos, check_needs, check_modes, check_carriers)
 
 
 @dataclass(frozen=True, slots=True)

@@ -103,7 +103,10 @@ def _need(context: EdsContext, need: Need) -> Iterator[EdsFinding]:
         yield at_key(Severity.ERROR, entry.section, "DataType", expected, "", "A drive with another can't be used.")
     elif entry.kind is not None and entry.kind.code != need.kind:
         expected = f"0x{need.kind:04X} ({need.kind.name}) for {name}"
-        yield at_key(Severity.WARNING, entry.section, "DataType", expected, "", "It is used as the EDS has it.")
+        same_numbers = not need.kind.signed and entry.kind.bits == 8 * need.kind.size_bytes
+        severity = Severity.WARNING if same_numbers else Severity.ERROR
+        advice = "It is used as the EDS has it." if same_numbers else "Its values would be read as others: correct it."
+        yield at_key(severity, entry.section, "DataType", expected, "", advice)
     wrong = "ro" if need.written else "wo"
     if entry.access == wrong or (need.written and entry.access == "const"):
         expected = f"{name} that can be {'written' if need.written else 'read'}"

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from drivers.canopen.pdo_map import (
+    COB_ID_EXTENDED,
     COB_ID_INVALID,
     MAX_PDO_BYTES,
     RPDO_COMMUNICATION,
@@ -19,9 +20,6 @@ from drivers.datasheet.finding import EdsFinding, Severity
 from drivers.datasheet.number import read_number
 from drivers.datasheet.objects import EdsEntry, EdsObject
 from drivers.datasheet.pdo import PDO_NUMBERS
-
-EXTENDED_FRAME = 1 << 29
-"""Bit of the COB-ID entry for a 29-bit identifier, which this program does not use."""
 
 RESERVED_COB_IDS = (
     range(0x000, 0x080),
@@ -88,13 +86,13 @@ def _pair(context: EdsContext, direction: _Direction, communication: int, mappin
 def _cob_id(context: EdsContext, communication: int) -> Iterator[EdsFinding]:
     entry = context.entry(communication, 1)
     value = None if entry is None else entry.default(SAMPLE_NODE_ID)
-    if entry is None or value is None or value & COB_ID_INVALID:
+    if entry is None or value is None:
         return
     severity = context.severity(communication)
-    if value & EXTENDED_FRAME:
+    if value & COB_ID_EXTENDED and (not value & COB_ID_INVALID or severity is Severity.ERROR):
         expected = "an identifier of 11 bits (bit 29 clear)"
         yield at_key(severity, entry.section, "DefaultValue", expected, "", "Give the PDO one.")
-    elif any(value & 0x7FF in taken for taken in RESERVED_COB_IDS):
+    elif not value & COB_ID_INVALID and any(value & 0x7FF in taken for taken in RESERVED_COB_IDS):
         expected = "an identifier a PDO may have, such as 0x181 to 0x57F (CiA 301)"
         found = f"0x{value & 0x7FF:03X} for node {SAMPLE_NODE_ID} from"
         yield at_key(severity, entry.section, "DefaultValue", expected, found, "Give the PDO another.")
