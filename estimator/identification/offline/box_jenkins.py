@@ -26,7 +26,6 @@ from estimator.identification.offline.noise_model import NoiseModel, fit_noise, 
 from estimator.identification.offline.problem import Problem
 from estimator.signals.record import FloatArray, Record
 
-
 MOST_STARTS = 2
 """Starts that are followed, those of the least innovations first: the next best is there for what the best misses."""
 
@@ -61,7 +60,8 @@ def fit_box_jenkins(record: Record, orders: Orders | None = None, memory: int | 
 def fit_of(problem: Problem, x: FloatArray, first: int) -> LinearFit:
     """Return the fit at the minimum of :func:`solved`, with the covariance of the joint estimate."""
     covariance, noise = _spread(problem, x)
-    return summarised(Method.BOX_JENKINS, problem, x, first, covariance, noise)
+    free = problem.with_free_response(x)  # a free run is judged by itself
+    return summarised(Method.BOX_JENKINS, problem, free, first, covariance, noise)
 
 
 def solved(record: Record, orders: Orders | None, memory: int | None = None) -> tuple[Problem, FloatArray, int]:

@@ -209,13 +209,17 @@ class Problem:
         x = np.zeros(self.n_plant + self.noise_order)
         x[: self.orders.na] = parameters_of(np.array(model.a))
         x[self.orders.na : self.orders.n_parameters] = model.b
-        return self._with_linear_part(x, self.orders.n_parameters)
+        return self.with_free_response(x)
 
     def start_at(self, poles: ComplexArray) -> FloatArray:
         """Return x with these poles, shape (na,), and the B and C that suit them best: both enter linearly."""
         x = np.zeros(self.n_plant + self.noise_order)
         x[: self.orders.na] = parameters_of(np.real(np.poly(poles))[1:])
         return self._with_linear_part(x, self.orders.na)
+
+    def with_free_response(self, x: FloatArray) -> FloatArray:
+        """Return x with the free response of least simulation error, whatever the noise."""
+        return self._with_linear_part(x.copy(), self.orders.n_parameters)
 
     def _with_linear_part(self, x: FloatArray, first: int) -> FloatArray:
         columns, okay = self.blocks.mean(self.gradient(x)[:, first:]), self.blocks.okay

@@ -47,17 +47,18 @@ def test_all_six_come_back_from_the_exact_model() -> None:
 
 
 def test_intervals_hold_the_truth_and_friction_is_left_open(fits: list[LinearFit]) -> None:
-    held = np.zeros(6)
+    held, is_open = np.zeros(6), 0
     for fit in fits:
         found = physical_parameters(fit.model, fit.covariance)
         held += [found.parameters[name].estimate.covers(true) for name, true in zip(NAMES, TRUTH, strict=True)]
-        assert {"b_M", "b_L"} <= set(found.undetermined)
+        is_open += len({"b_M", "b_L"} & set(found.undetermined))
         assert {"J_M", "J_L", "k"}.isdisjoint(found.undetermined)
         assert found.parameters["J_M"].estimate.value == pytest.approx(driveline.J_M, rel=0.01)
         assert found.parameters["k"].estimate.value == pytest.approx(driveline.K, rel=0.015)
         assert found.parameters["J_L"].estimate.value == pytest.approx(driveline.J_L, rel=0.25)
     # 3 of 6 or fewer at 95 % each: p = 0.002; the rates over many runs are in tests.benchmarks.identification
     assert held.min() >= 4
+    assert is_open >= 10  # of 12; each is taken for determined with a probability of 5 % where the truth is near 0
 
 
 def test_the_sum_of_dampings_is_sharp_where_each_is_open(fits: list[LinearFit]) -> None:

@@ -64,8 +64,8 @@ def test_its_spectrum_is_that_of_the_residual() -> None:
     assert np.abs(10 * np.log10(model / density))[5:-5].max() < 1.5
 
 
-def test_the_memory_is_half_a_second() -> None:
-    assert (reach(0.01), reach(0.02), reach(2.0)) == (50, 25, 1)
+def test_the_memory_is_a_second() -> None:
+    assert (reach(0.01), reach(0.02), reach(2.0)) == (100, 50, 1)
 
 
 def test_the_sandwich_is_the_scatter_of_least_squares_in_coloured_noise() -> None:
