@@ -63,18 +63,20 @@ def _identification(evidence: Evidence) -> list[str]:
     pieces += ["<h3>Resonance of each run</h3>", _resonances(runs), "<h3>Poles and zeros</h3>"]
     sets = [
         PoleSet(name, _roots(runs, how, "poles"), _roots(runs, how, "zeros"), colour)
-        for name, how, colour in (("batch models", "batch", BLUE), ("on line, last estimates", "online", VERMILION))
+        for name, how, colour in (("best off line", "best", BLUE), ("on line, last estimates", "online", VERMILION))
     ]
-    pieces.append(pole_figure("identification-poles", sets, runs[0]["batch"]["sample_time_s"]))
+    pieces.append(pole_figure("identification-poles", sets, runs[0]["online"]["sample_time_s"]))
     return pieces
 
 
 def _roots(runs: list[Evidence], how: str, which: str) -> np.ndarray:
-    return np.array([complex(*root) for run in runs for root in run[how][which]], dtype=np.complex128)
+    """Return the roots of all runs at the on-line model's period: a pole sampled k times as slowly is its k-th power."""
+    k = runs[0]["online"]["sample_time_s"] / runs[0][how]["sample_time_s"]
+    return np.array([complex(*root) ** k for run in runs for root in run[how][which]], dtype=np.complex128)
 
 
 def _responses(runs: list[Evidence]) -> str:
-    """Draw every batch model, over the estimate without a model of the first run, and the coherence below."""
+    """Draw every off-line model, over the estimate without a model of the first run, and the coherence below."""
     figure = make_subplots(rows=2, cols=1, shared_xaxes=True, vertical_spacing=0.05, row_heights=[0.7, 0.3])
     for number, run in enumerate(runs):
         look = {"color": series_colour(number), "width": 1.4}
@@ -102,7 +104,7 @@ def _responses(runs: list[Evidence]) -> str:
 def _resonances(runs: list[Evidence]) -> str:
     figure = make_subplots(rows=2, cols=1, shared_xaxes=True, vertical_spacing=0.08)
     names = [run["run"] for run in runs]
-    looks = (("off line", "batch", BLUE, "circle"), ("on line", "online", VERMILION, "diamond-open"))
+    looks = (("best off line", "best", BLUE, "circle"), ("on line", "online", VERMILION, "diamond-open"))
     for name, how, colour, symbol in looks:
         for row in (1, 2):
             values = [None if run[how]["resonance"] is None else run[how]["resonance"][row - 1] for run in runs]

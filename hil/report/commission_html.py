@@ -82,7 +82,7 @@ def _statements(state: State) -> Iterator[str]:
 
 def _tiles(state: State) -> Iterator[tuple[str, str, str]]:
     evidence = {name: record["evidence"] for name, record in state["steps"].items()}
-    resonances = [run["batch"]["resonance"] for run in evidence["identification"].get("runs", [])]
+    resonances = [run["best"]["resonance"] for run in evidence["identification"].get("runs", [])]
     known = [resonance for resonance in resonances if resonance is not None]
     if known:
         frequency, damping = (sum(values) / len(known) for values in zip(*known, strict=True))

@@ -53,7 +53,7 @@ def _do(job: Job) -> Outcome:
 
 def _mode(job: Job) -> Mode:
     """Return the resonance of the runs, or of the first look."""
-    found = [run["batch"]["resonance"] for run in job.evidence("identification").get("runs", [])]
+    found = [run["best"]["resonance"] for run in job.evidence("identification").get("runs", [])]
     known = [resonance for resonance in found if resonance is not None]
     if known:
         frequency, damping = np.median(np.array(known), axis=0)
