@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from hil.cli.filter_option import FilterOf, FilterRun, with_filter
+from hil.cli.trust_option import TrustLaws
 from hil.errors import UsageError
 
 if TYPE_CHECKING:
@@ -52,6 +53,7 @@ def replay(
     every: Annotated[
         bool, typer.Option("--all", help="Every cycle of a bus trace from the first SYNC, not only the measured part.")
     ] = False,
+    trust_laws: TrustLaws = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Play a recording through the on-line chain: the estimates and alarms of the run, to the bit; opens no bus.
@@ -74,7 +76,7 @@ def replay(
         course, result = _play_trace(recording, rig or Path(), out, every, settings, pace, filter_l)
     else:
         _require(recording, "a recording", {}, {"--rig": rig, "--out": out, "--all": every or None})
-        course, result = _play_recording(recording, model, settings, pace, filter_l)
+        course, result = _play_recording(recording, model, trust_laws, settings, pace, filter_l)
     took_s = time.perf_counter() - begun_s
     if estimate is not None:
         publish(estimate.absolute().parent, {estimate.name: course.write})
@@ -100,13 +102,13 @@ def _require(path: Path, what: str, needed: dict[str, object], senseless: dict[s
 
 
 def _play_recording(
-    path: Path, model: Path | None, settings: Settings, pace: Pace, filter_l: FloatArray | None
+    path: Path, model: Path | None, trust_laws: bool, settings: Settings, pace: Pace, filter_l: FloatArray | None
 ) -> tuple[Course, dict[str, Any]]:
     from hil.config.model_file import read_model_for_recordings
     from hil.recording import read_record
     from hil.rig.live_replay import play_record
 
-    signals = None if model is None else read_model_for_recordings(model).signals
+    signals = None if model is None else read_model_for_recordings(model, trust_laws).signals
     record = read_record(path, signals)
     course = play_record(record, settings, pace, _show(pace), filter_l)
     flagged = int((~record.okay).sum())

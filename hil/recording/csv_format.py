@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import csv
 import re
+from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -22,6 +23,7 @@ import pyarrow.compute
 import pyarrow.csv
 
 from hil.errors import RecordingError
+from hil.recording.bounds import require_columns
 from hil.recording.format_hints import FormatHints
 from hil.recording.kinds import Kind, as_text
 from hil.recording.sidecar import SCHEMA_KEY, TYPES_KEY, UNITS_KEY, Sidecar, read_sidecar, write_sidecar
@@ -52,6 +54,7 @@ def read(path: Path, hints: FormatHints) -> Table:
         With the line of the fault, if the file is not text in its encoding, has no row, a header with empty
         or repeated names, or a row with another number of cells.
     """
+    require_columns(path, _cells_of_first_line(path))
     content = _utf8(path, hints.encoding)
     if not content:
         return Table(path, {})  # refuses: nothing in it
@@ -105,6 +108,13 @@ def _utf8(path: Path, encoding: str) -> bytes:
     return lines.rstrip("\n").encode("utf-8")
 
 
+def _cells_of_first_line(path: Path) -> int:
+    """Count the cells of the first line without taking it apart: at least one for each delimiter is enough to refuse."""
+    with path.open("rb") as file:
+        line = file.readline(BLOCK_BYTES)
+    return 1 + max(line.count(delimiter.encode()) for delimiter in DELIMITERS) - line.count(b'"')
+
+
 def _split(line: str, delimiter: str) -> list[str]:
     """Cut one line into cells; none where it can't be cut (a cell beyond the module's 128 KiB)."""
     try:
@@ -120,7 +130,7 @@ def _column_names(path: Path, header: str, delimiter: str) -> list[str]:
         for number, name in enumerate(names, start=1)
         if not name
     ]
-    repeated = sorted({name for name in names if name and names.count(name) > 1})
+    repeated = sorted(name for name, count in Counter(names).items() if name and count > 1)
     problems += [f"line 1: column {name} comes twice, expected every name once" for name in repeated]
     if problems:
         raise RecordingError(path, *problems)

@@ -10,7 +10,7 @@ import pytest
 
 from hil.errors import RecordingError
 from hil.recording import RecordingWriter, columns, read_record, read_table
-from hil.recording.checksum import CHECKSUM, data_sha256
+from hil.recording.checksum import CHECKSUM, SAID, data_sha256, said_sha256
 from hil.recording.formats import FORMATS
 from hil.rig.sample import Sample, SampleFlag
 
@@ -63,7 +63,8 @@ def test_a_recording_carries_units_metadata_and_checksum(tmp_path: Path, suffix:
     with RecordingWriter(tmp_path / f"run{suffix}", {"schema": "hil.recording/1", "rig": "bench"}) as writer:
         writer.append(sample(1))
     table = read_table(tmp_path / f"run{suffix}")
-    assert dict(table.metadata) == {"schema": "hil.recording/1", "rig": "bench", CHECKSUM: data_sha256(table.columns)}
+    said = {"schema": "hil.recording/1", "rig": "bench", SAID: said_sha256(table)}
+    assert dict(table.metadata) == {**said, CHECKSUM: data_sha256(table.columns)}
     assert dict(table.units) == dict(columns.UNITS)
 
 
