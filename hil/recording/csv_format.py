@@ -54,7 +54,6 @@ def read(path: Path, hints: FormatHints) -> Table:
         With the line of the fault, if the file is not text in its encoding, has no row, a header with empty
         or repeated names, or a row with another number of cells.
     """
-    require_columns(path, _cells_of_first_line(path))
     content = _utf8(path, hints.encoding)
     if not content:
         return Table(path, {})  # refuses: nothing in it
@@ -108,13 +107,6 @@ def _utf8(path: Path, encoding: str) -> bytes:
     return lines.rstrip("\n").encode("utf-8")
 
 
-def _cells_of_first_line(path: Path) -> int:
-    """Count the cells of the first line without taking it apart: at least one for each delimiter is enough to refuse."""
-    with path.open("rb") as file:
-        line = file.readline(BLOCK_BYTES)
-    return 1 + max(line.count(delimiter.encode()) for delimiter in DELIMITERS) - line.count(b'"')
-
-
 def _split(line: str, delimiter: str) -> list[str]:
     """Cut one line into cells; none where it can't be cut (a cell beyond the module's 128 KiB)."""
     try:
@@ -125,6 +117,7 @@ def _split(line: str, delimiter: str) -> list[str]:
 
 def _column_names(path: Path, header: str, delimiter: str) -> list[str]:
     names = [name.strip() for name in _split(header, delimiter) or [""]]
+    require_columns(path, len(names))
     problems = [
         f"line 1: cell {number} of the header is empty, expected a column name"
         for number, name in enumerate(names, start=1)

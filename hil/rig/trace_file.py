@@ -2,26 +2,23 @@
 
 from __future__ import annotations
 
-import struct
-import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import IO, Any
 
 import can
-from can.io.blf import BLFParseError
 
 from hil.errors import RecordingError
+from hil.rig.blf_file import BoundedBlfReader
 from hil.rig.trace import require_trace_name
 
 NS_PER_S = 1_000_000_000
 
-_READING_ERRORS = (OSError, ValueError, IndexError, KeyError, EOFError, struct.error, zlib.error, BLFParseError)
-"""What python-can's readers raise for a file that is damaged or of another format."""
-
+LATEST_S = float(1 << 33)
+"""Times beyond are none of a clock [s]; in nanoseconds they would not fit into 64 bit."""
 
 _READERS: dict[str, Callable[..., Any]] = {
-    ".blf": can.BLFReader,
+    ".blf": BoundedBlfReader,
     ".log": can.CanutilsLogReader,
     ".asc": can.ASCReader,
 }
@@ -42,13 +39,21 @@ def read_frames(path: Path) -> Iterator[tuple[int, bytes, int]]:
         with _opened(path) as file, _READERS[path.suffix.lower()](file) as reader:
             for message in reader:
                 if not (message.is_error_frame or message.is_remote_frame or message.is_extended_id):
-                    yield message.arbitration_id, bytes(message.data), round(message.timestamp * NS_PER_S)
-    except _READING_ERRORS as error:
+                    yield message.arbitration_id, bytes(message.data), _time_ns(path, message.timestamp)
+    except RecordingError:
+        raise
+    except Exception as error:  # python-can's readers raise anything on a file that is damaged
         raise RecordingError(
             path,
             f"expected a bus trace in the format of its suffix, came: {error or type(error).__name__}. It is damaged, "
             "cut off, or of another format.",
         ) from error
+
+
+def _time_ns(path: Path, timestamp_s: float) -> int:
+    if not abs(timestamp_s) < LATEST_S:
+        raise RecordingError(path, f"expected frames with the time of a clock, came {timestamp_s:g} s. It is damaged.")
+    return round(timestamp_s * NS_PER_S)
 
 
 def _opened(path: Path) -> IO[Any]:

@@ -95,7 +95,7 @@ def _is_eds(key: str) -> bool:
 def _rig_name(text: str) -> str:
     try:
         name = tomllib.loads(text).get("name", "")
-    except tomllib.TOMLDecodeError:  # a recording made before rig files were checked, or by another program
+    except (ValueError, RecursionError):  # a recording made before rig files were checked, or by another program
         return ""
     return name if isinstance(name, str) else ""
 
