@@ -10,14 +10,24 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Final
 
 VARIABLE: Final = "PYTHONSAFEPATH"
+
+PACKAGES: Final = Path(__file__).resolve().parents[1]
+"""Where the packages of this program are."""
 
 
 def python(*arguments: str) -> list[str]:
     """Return the command line of a Python process with these arguments."""
     return [sys.executable, "-P", *arguments]
+
+
+def environment(**more: str) -> dict[str, str]:
+    """Return the environment of such a process: it finds this very program, installed or not."""
+    found = [str(PACKAGES), *filter(None, [os.environ.get("PYTHONPATH")])]
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(found), **more}
 
 
 @contextmanager

@@ -6,7 +6,7 @@ import subprocess
 from collections.abc import Sequence
 from pathlib import Path
 
-from hil.child import python
+from hil.child import environment, python
 
 
 class CommandFailed(Exception):
@@ -30,6 +30,7 @@ def run_hil(arguments: Sequence[str], folder: Path, limit_s: float) -> None:
         done = subprocess.run(
             python("-m", "hil", *arguments),
             cwd=folder,
+            env=environment(),
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
             text=True,

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import atexit
 import json
-import os
 import signal
 import subprocess
 import tempfile
@@ -19,7 +18,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final, Literal
 
-from hil.child import python
+from hil.child import environment, python
 from hil.errors import RecordingError
 from hil.recording.bounds import memory_bytes, processor_s
 from hil.recording.kinds import Column
@@ -57,7 +56,7 @@ class _Process:
         self._process: Any = subprocess.Popen(
             python("-m", PROCESS),
             cwd=self._folder.name,
-            env={**os.environ, **ENVIRONMENT},
+            env=environment(**ENVIRONMENT),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,

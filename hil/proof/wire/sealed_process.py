@@ -11,7 +11,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import IO, cast
 
-from hil.child import python
+from hil.child import environment, python
 from hil.errors import RunAborted
 from hil.proof.wire.sealed_rig import OPEN
 
@@ -117,6 +117,7 @@ def _start(arguments: tuple[str, ...], complaints: IO[bytes], folder: str) -> _P
     process = subprocess.Popen(
         python("-m", "hil.proof.wire.sealed_rig", *arguments),
         cwd=folder,
+        env=environment(),
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=complaints,
