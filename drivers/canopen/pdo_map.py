@@ -29,6 +29,9 @@ COB_ID_EXTENDED = 1 << 29
 
 MAX_PDO_BYTES = 8
 
+MAX_MAPPED = 64
+"""Objects a PDO can map, one bit each (CiA 301, 7.5.2.36)."""
+
 ReadObject = Callable[[int, int], int]
 """``read(index, subindex)``: the object's value, from wherever the caller has it."""
 
@@ -102,15 +105,27 @@ class PdoLayout:
 
 
 def read_layout(read: ReadObject, communication_index: int, mapping_index: int) -> PdoLayout:
-    """Read one PDO's layout through ``read``."""
+    """Read one PDO's layout through ``read``.
+
+    Raises
+    ------
+    ConfigMismatch
+        If it says that it maps more objects than a PDO can.
+    """
     cob_id = read(communication_index, 1)
+    count = read(mapping_index, 0)
+    if not 0 <= count <= MAX_MAPPED:
+        raise ConfigMismatch(
+            f"PDO mapping 0x{mapping_index:04X}:00: expected at most {MAX_MAPPED} objects (CiA 301), found {count}. "
+            "Correct the count."
+        )
     return PdoLayout(
         communication_index=communication_index,
         mapping_index=mapping_index,
         cob_id=cob_id & 0x7FF,
         valid=not cob_id & COB_ID_INVALID,
         transmission_type=read(communication_index, 2),
-        objects=tuple(MappedObject.from_entry(read(mapping_index, n + 1)) for n in range(read(mapping_index, 0))),
+        objects=tuple(MappedObject.from_entry(read(mapping_index, n + 1)) for n in range(count)),
         extended=bool(cob_id & COB_ID_EXTENDED),
         no_rtr=bool(cob_id & COB_ID_NO_RTR),
     )

@@ -10,13 +10,16 @@ import random
 import ssl
 import time
 from base64 import b64encode
+from http import HTTPStatus
 from http.client import HTTPConnection, HTTPException, HTTPSConnection
-from urllib.parse import urlsplit
+from urllib.parse import SplitResult, urlsplit
 
 import can
 from can_remote.client import DEFAULT_SSL_CONTEXT, RemoteBus, RemoteClientProtocol
 from can_remote.protocol import RemoteError
 from can_remote.websocket import WebSocket, WebsocketClosed, get_accept_key
+
+from drivers.canopen.bus_token import LOOPBACK, kept_token
 
 _SUBPROTOCOLS = ("can.binary+json.v1", "can.json.v1")
 _TIMEOUT_S = 3.0
@@ -40,12 +43,20 @@ class _BoundedWebSocket(WebSocket):  # type: ignore[misc]  # the library has no 
         )
         key = b64encode(random.randbytes(16)).decode()
         try:
-            self.protocol = _handshake(connection, address.path or "/", key, protocols, headers or {})
+            self.protocol = _handshake(connection, _path(address), key, protocols, headers or {})
         except BaseException:
             connection.close()
             raise
         self.socket = connection.sock
         self._ssl = secure
+
+
+def _path(address: SplitResult) -> str:
+    """Return the path to ask for: the URL's, or the token that this user's own server has kept for its port."""
+    if address.path.strip("/") or address.hostname not in LOOPBACK or address.port is None:
+        return address.path or "/"
+    token = kept_token(address.port)
+    return "/" if token is None else f"/{token}/"
 
 
 def _handshake(
@@ -62,6 +73,10 @@ def _handshake(
     connection.request("GET", path, headers={**headers, **upgrade})
     answer = connection.getresponse()
     chosen = answer.getheader("Sec-WebSocket-Protocol", "")
+    if answer.status == HTTPStatus.FORBIDDEN:
+        raise HTTPException(
+            "the server takes only hosts that name its token: give the whole URL that hil sim has printed"
+        )
     if answer.status != 101 or answer.getheader("Sec-WebSocket-Accept") != get_accept_key(key):
         raise HTTPException(f"the server answered with HTTP status {answer.status}, not with a WebSocket")
     if chosen not in protocols:
@@ -75,7 +90,8 @@ class BoundedRemoteBus(RemoteBus):  # type: ignore[misc]  # the library has no t
     Parameters
     ----------
     url
-        ``ws://host:port/`` or, with TLS, ``wss://host:port/``.
+        ``ws://host:port/TOKEN/`` or, with TLS, ``wss://host:port/TOKEN/``; without a token that of this user's own
+        server.
 
     Raises
     ------

@@ -13,13 +13,15 @@ from dataclasses import dataclass
 
 _NUMBER = re.compile(r"[+-]?(?:0x[0-9a-f]+|0[0-7]*|[1-9][0-9]*)", re.IGNORECASE)
 _OCTAL = re.compile(r"[+-]?0[0-9]+")
+_LONGEST = 100
+"""Characters of a number: those of 64 bit have at most 66."""
 _NODE_ID = "$NODEID"
 
 
 def read_number(text: str) -> int | None:
     """Read one number; None if it is none."""
     text = text.strip()
-    if not _NUMBER.fullmatch(text):
+    if len(text) > _LONGEST or not _NUMBER.fullmatch(text):
         return None
     return int(text, 8) if _OCTAL.fullmatch(text) else int(text, 0)
 
@@ -27,7 +29,7 @@ def read_number(text: str) -> int | None:
 def octal_matters(text: str) -> bool:
     """Whether a leading 0 makes the number another one than its digits say, or none at all (``09``)."""
     text = text.strip()
-    return bool(_OCTAL.fullmatch(text)) and read_number(text) != int(text)
+    return len(text) <= _LONGEST and bool(_OCTAL.fullmatch(text)) and read_number(text) != int(text)
 
 
 @dataclass(frozen=True, slots=True)

@@ -135,7 +135,7 @@ def load_register_map(path: Path) -> RegisterMap:
         data = tomllib.loads(path.read_text("utf-8"))
     except OSError as cause:
         raise RegisterMapError(path, f"the file | expected a readable file | came: {cause.strerror}") from cause
-    except ValueError as cause:  # tomllib's own error, and text that is not UTF-8
+    except (ValueError, RecursionError) as cause:  # tomllib's own error, and text that is not UTF-8
         raise RegisterMapError(path, f"the file | expected TOML in UTF-8 | came: {cause}") from cause
     try:
         map_ = RegisterMap.model_validate(data)

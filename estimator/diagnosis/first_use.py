@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -88,7 +89,11 @@ def _compiling(kernels: Sequence[Any]) -> Iterator[None]:
     """Compile kernels in a process of their own meanwhile, and wait for it; whoever is interrupted ends it."""
     names = [kernel.__name__ for kernel in kernels]
     program = f"from estimator.diagnosis.first_use import compile_named; compile_named(*{names!r})"
-    with subprocess.Popen([sys.executable, "-c", program], stderr=subprocess.DEVNULL) as process:
+    with (
+        tempfile.TemporaryDirectory(prefix="hil-compiling-") as folder,
+        # -P: else Python would look for modules in the working folder, which may hold anybody's
+        subprocess.Popen([sys.executable, "-P", "-c", program], cwd=folder, stderr=subprocess.DEVNULL) as process,
+    ):
         try:
             yield
             process.wait()

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from hil.cli.trust_option import TrustLaws
+
 app = typer.Typer(add_completion=False)
 
 
@@ -15,6 +17,7 @@ def compare(
     model: Annotated[Path, typer.Argument(metavar="MODEL", help="Model file, nominal or augmented.")],
     recordings: Annotated[list[Path], typer.Argument(metavar="REC", help="Recordings to compare with.")],
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Folder for compare.html and compare.json.")] = None,
+    trust_laws: TrustLaws = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the figures as JSON.")] = False,
 ) -> None:
     """Simulate each recording from its torques and say how far the output is off.
@@ -32,7 +35,7 @@ def compare(
 
     if out is not None:
         require_folder(out)
-    file = read_model_for_recordings(model)
+    file = read_model_for_recordings(model, trust_laws)
     records = read_records(recordings, file.signals, file.on_bench)
     comparisons = [compare_record(file.model, record) for record in records]
     text = comparison_text(comparisons)

@@ -12,6 +12,7 @@ from typer.core import TyperCommand
 
 from hil.cli.importing import without_collecting
 from hil.cli.silence import is_silent
+from hil.cli.trust_option import TrustLaws
 
 HOLDOUT = "--holdout"
 
@@ -53,6 +54,7 @@ def diagnose(
         list[Path] | None,
         typer.Option(HOLDOUT, metavar="REC...", help="Recordings kept back to judge the explanation on."),
     ] = None,
+    trust_laws: TrustLaws = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print diagnosis.json instead of the summary.")] = False,
 ) -> None:
     """Say where simulation and recordings differ, and which physics the model left out.
@@ -73,7 +75,7 @@ def diagnose(
         from hil.store.entry import DIAGNOSIS, MODEL
 
     require_folder(out)
-    file = read_model_for_recordings(model)
+    file = read_model_for_recordings(model, trust_laws)
     records = read_records([*recordings, *(holdout or ())], file.signals, file.on_bench)
     training, kept_back = records[: len(recordings)], records[len(recordings) :]
     with progress_bar() as progress:

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from hil.cli.trust_option import TrustLaws
+
 if TYPE_CHECKING:
     from estimator.identification.compare import Compared
     from estimator.identification.identify import Settings
@@ -48,6 +50,7 @@ def identify(
     estimator: list[str] = typer.Option(
         [], "--estimator", metavar="NAME", help="Another recursive estimator to compare on the same data; repeatable."
     ),
+    trust_laws: TrustLaws = False,
     as_json: bool = typer.Option(False, "--json", help="Print identification.json instead of the table."),
 ) -> None:
     """Identify the driveline from each recording: models, resonance, damping, physical parameters.
@@ -72,7 +75,7 @@ def identify(
     if sample_time is not None:
         settings = replace(settings, sample_time_s=sample_time, offline_sample_time_s=sample_time)
     entries = chosen_estimators(estimator)
-    file = None if model is None else read_model_for_recordings(model)
+    file = None if model is None else read_model_for_recordings(model, trust_laws)
     if model is not None and file is not None and file.on_bench:
         raise ModelFileError(
             model, "structure | expected a driveline, which torque moves | came 'joint': diagnose or simulate it"

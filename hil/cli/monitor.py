@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from hil.cli.trust_option import TrustLaws
 from hil.errors import RunAborted, UsageError
 
 if TYPE_CHECKING:
@@ -41,6 +42,7 @@ def monitor(
     channel: Annotated[
         str | None, typer.Option(metavar="NAME", help="Of a bus trace with --replay that has several: can0, 1.")
     ] = None,
+    trust_laws: TrustLaws = False,
     speed: Annotated[float, typer.Option(min=0.01, max=1000.0, help="Of --replay, in multiples of real time.")] = 1.0,
     page: Annotated[str, typer.Option(help="First page: overview, model, resonance, bus or log.")] = "overview",
     snapshot: Annotated[
@@ -60,7 +62,7 @@ def monitor(
         raise UsageError(f"--snapshot {snapshot}: expected an existing folder, there is no {snapshot.parent}")
     _require_page(page)
     typer.echo("hil monitor: starting", err=True)
-    opening = _open(rig, replay, out, model, bus, modbus, simulate, speed, channel)
+    opening = _open(rig, replay, out, model, bus, modbus, simulate, speed, channel, trust_laws)
     with opening.source:  # its process starts up while this one does
         view = _view(opening, out, page, None if snapshot is None else (snapshot, after))
         view.run(headless=snapshot is not None, size=None if snapshot is None else screen)
@@ -77,6 +79,7 @@ def _open(
     simulate: bool,
     speed: float,
     channel: str | None,
+    trust_laws: bool,
 ) -> Opening:
     from hil.config.rig_file import read_rig
     from hil.monitor.opening import open_recording, open_rig
@@ -86,11 +89,11 @@ def _open(
     if replay is not None:
         if simulate:
             raise UsageError("hil monitor: expected --replay or --simulate, came both")
-        opening = open_recording(replay, rig_file, speed, model, channel)
+        opening = open_recording(replay, rig_file, speed, model, trust_laws, channel)
     elif rig is None or rig_file is None:
         raise UsageError("hil monitor: expected RIG, a rig file to watch, or --replay REC; came neither")
     else:
-        opening = open_rig(rig, rig_file, out, simulate, model)
+        opening = open_rig(rig, rig_file, out, simulate, model, trust_laws)
     return opening
 
 

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from hil.cli.trust_option import TrustLaws
+
 if TYPE_CHECKING:
     from estimator.identification.identify import Settings
     from hil.figures.local_model import LocalModel
@@ -56,6 +58,7 @@ def paper(
     delay: Annotated[
         int, typer.Option(metavar="N", min=0, help="Total delay of the models in samples; the paper's d is 1.")
     ] = 1,
+    trust_laws: TrustLaws = False,
     as_json: Annotated[bool, typer.Option("--json", help=f"Print {DATA} instead of the table.")] = False,
 ) -> None:
     """Make the paper's Fig. 2, 4 and 5, in print quality and as an interactive page, with the truth drawn in.
@@ -73,7 +76,7 @@ def paper(
     require_matplotlib()
     settings = Settings(orders=Orders(nk=delay), offline_sample_time_s=PAPER_PERIOD_S)
     if recordings:
-        _publish(out, _recorded(recordings, model, settings), settings, as_json=as_json)
+        _publish(out, _recorded(recordings, model, trust_laws, settings), settings, as_json=as_json)
         return
     if model is not None:
         from hil.errors import UsageError
@@ -86,14 +89,14 @@ def paper(
         _publish(out, driven_models(driven, settings), settings, driven, seed, as_json=as_json)
 
 
-def _recorded(recordings: list[Path], model: Path | None, settings: Settings) -> list[LocalModel]:
+def _recorded(recordings: list[Path], model: Path | None, trust_laws: bool, settings: Settings) -> list[LocalModel]:
     from hil.config.model_file import read_model_for_recordings
     from hil.figures.experiments import recorded_models
     from hil.recording import read_records
     from hil.recording.timing_check import require_even_cycles
 
     require_even_cycles(recordings)
-    file = None if model is None else read_model_for_recordings(model)
+    file = None if model is None else read_model_for_recordings(model, trust_laws)
     records = read_records(recordings, None if file is None else file.signals)
     return recorded_models(records, settings, None if file is None else file.model)
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from hil.cli.filter_option import FilterOf, FilterRun, with_filter
+from hil.cli.trust_option import TrustLaws
 from hil.errors import UsageError
 
 if TYPE_CHECKING:
@@ -56,6 +57,7 @@ def replay(
     channel: Annotated[
         str | None, typer.Option(metavar="NAME", help="Channel of a bus trace that has several: can0, 1.")
     ] = None,
+    trust_laws: TrustLaws = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Play a recording through the on-line chain: the estimates and alarms of the run, to the bit; opens no bus.
@@ -81,7 +83,7 @@ def replay(
         _require(
             recording, "a recording", {}, {"--rig": rig, "--out": out, "--all": every or None, "--channel": channel}
         )
-        course, result = _play_recording(recording, model, settings, pace, filter_l)
+        course, result = _play_recording(recording, model, trust_laws, settings, pace, filter_l)
     took_s = time.perf_counter() - begun_s
     if estimate is not None:
         publish(estimate.absolute().parent, {estimate.name: course.write})
@@ -107,13 +109,13 @@ def _require(path: Path, what: str, needed: dict[str, object], senseless: dict[s
 
 
 def _play_recording(
-    path: Path, model: Path | None, settings: Settings, pace: Pace, filter_l: FloatArray | None
+    path: Path, model: Path | None, trust_laws: bool, settings: Settings, pace: Pace, filter_l: FloatArray | None
 ) -> tuple[Course, dict[str, Any]]:
     from hil.config.model_file import read_model_for_recordings
     from hil.recording import read_record
     from hil.rig.live_replay import play_record
 
-    signals = None if model is None else read_model_for_recordings(model).signals
+    signals = None if model is None else read_model_for_recordings(model, trust_laws).signals
     record = read_record(path, signals)
     course = play_record(record, settings, pace, _show(pace), filter_l)
     flagged = int((~record.okay).sum())

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.markup import escape
 
+from hil.cli.trust_option import TrustLaws
 from hil.rig.stop import StopRequest, stop_on_signals
 from hil.simulator.fault_spec import known_faults
 
@@ -59,6 +60,7 @@ def sim(
             "which stands still with the host. For hosts that keep the period.",
         ),
     ] = False,
+    trust_laws: TrustLaws = False,
     seed: Annotated[int | None, typer.Option(min=0, help="Of all that is random; else the rig file's.")] = None,
 ) -> None:
     """Serve two inverters, the PLC and the driveline to other programs on this machine.
@@ -74,7 +76,7 @@ def sim(
     rig_file = read_rig(rig)
     effects = [EffectSpec.parse(text) for text in effect or ()]
     server = RigServer(
-        plant=plant_for(rig_file, effects),
+        plant=plant_for(rig_file, effects, trust_laws),
         rig=rig_file,
         bus_url=rig_file.can.url if bus is None else bus,
         modbus=_modbus(rig_file, modbus),

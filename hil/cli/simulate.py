@@ -8,6 +8,8 @@ from typing import Annotated
 
 import typer
 
+from hil.cli.trust_option import TrustLaws
+
 app = typer.Typer(add_completion=False)
 
 
@@ -16,6 +18,7 @@ def simulate(
     model: Annotated[Path, typer.Option(metavar="MODEL", help="Model file, nominal or augmented.")],
     recording: Annotated[Path, typer.Option("--input", metavar="REC", help="Recording with the torques.")],
     out: Annotated[Path, typer.Option(metavar="CSV", help="Simulated output, one row per sample of REC.")],
+    trust_laws: TrustLaws = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Simulate the output from the measured torques, nothing fed back.
@@ -37,7 +40,7 @@ def simulate(
     if out.exists() and recording.exists() and out.samefile(recording):
         raise UsageError(f"--out {out}: expected another file than the recording itself. Choose another name.")
     require_folder(out.parent)
-    file = read_model_for_recordings(model)
+    file = read_model_for_recordings(model, trust_laws)
     record = read_record(recording, file.signals, file.on_bench)
     run = replay(file.model, record)
     column = simulated_column(record.kind, file.model.motion)

@@ -16,6 +16,8 @@ from typing import Any, Final
 from hil import __version__
 from hil.commission.record import Status, StepRecord, now_utc
 from hil.errors import UsageError
+from hil.inside import is_inside
+from hil.parse_json import parse_json
 
 SCHEMA: Final = "hil.commission/1"
 FILE_NAME: Final = "commission.json"
@@ -111,10 +113,10 @@ def load_state(folder: Path, names: Iterable[str]) -> State | None:
     if not path.exists():
         return None
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
+        document = parse_json(path.read_text(encoding="utf-8"))
         if document["schema"] != SCHEMA:
             raise ValueError(f"schema {document['schema']!r}")
-        steps = {name: _step(document["steps"].get(name)) for name in names}
+        steps = {name: _step(folder, document["steps"].get(name)) for name in names}
         return State(
             folder=folder,
             rig_name=document["rig_name"],
@@ -131,10 +133,13 @@ def load_state(folder: Path, names: Iterable[str]) -> State | None:
         ) from error
 
 
-def _step(document: Any) -> StepRecord:
+def _step(folder: Path, document: Any) -> StepRecord:
     if document is None:
         return StepRecord()
     record = StepRecord.from_json(document)
+    for run in record.runs:
+        if run.recording is not None and not is_inside(folder, folder / run.recording):
+            raise ValueError(f"run {run.name}: a recording outside {folder}: {run.recording}")
     if record.status is Status.RUNNING:  # the program was killed, or its machine went down
         record.end(Status.INTERRUPTED, "the program ended without a word: it was killed, or the machine went down")
     return record

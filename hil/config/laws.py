@@ -1,6 +1,8 @@
 """``[laws.NAME]`` of a model file and the entry points ``hil.laws``: a user's own laws, by their Python functions.
 
-Reading such a file runs the code it names, with the rights of whoever reads it.
+Using such a law runs the code it names, with the rights of whoever runs the command. A model file may be someone
+else's, so it is used only where that was asked for: ``--trust-laws``, or ``trust_laws=True``. Installed packages were
+asked for when they were installed.
 """
 
 from __future__ import annotations
@@ -47,15 +49,19 @@ class LawTable(Table):
     folder: Text = "."
 
 
-def install_laws(path: Path, tables: Mapping[str, LawTable]) -> None:
+def install_laws(path: Path, tables: Mapping[str, LawTable], trust_laws: bool) -> None:
     """Make the laws of a model file, and those of installed packages, the user's laws of this process.
 
     Raises
     ------
     ModelFileError
-        For every law whose function can't be found or used.
+        If the file's own are not trusted: then nothing of it was run, and the message says what would be. For every
+        law whose function can't be found or used.
     """
     laws, problems = [], []
+    if tables and not trust_laws:
+        problems += [_would_run(path, name, table) for name, table in tables.items()]
+        tables = {}
     for name, table in tables.items():
         try:
             laws.append(_law(path, name, table))
@@ -77,6 +83,14 @@ def moved(tables: Mapping[str, LawTable], path: Path) -> dict[str, LawTable]:
     }
 
 
+def _would_run(path: Path, name: str, table: LawTable) -> str:
+    folder = (path.parent / table.folder).resolve()
+    return (
+        f"laws.{name} | expected --trust-laws, for this law is Python code that runs with your rights | came none: it "
+        f"would run {table.function} of {folder}, or of an installed package. Read it before you trust it"
+    )
+
+
 def _law(path: Path, name: str, table: LawTable) -> OwnLaw:
     folder = (path.parent / table.folder).resolve()
     parameters = tuple(OwnParameter(key, p.unit, p.null, p.low, p.high, p.start) for key, p in table.parameters.items())
@@ -85,6 +99,8 @@ def _law(path: Path, name: str, table: LawTable) -> OwnLaw:
 
 def _function(name: str, text: str, folder: Path) -> Callable[..., object]:
     module_name, _, function_name = text.partition(":")
+    if not folder.is_dir():  # Python would look into an archive too, whatever it is called
+        raise BadModel(f"laws.{name}.folder | expected an existing folder | came {folder}")
     try:
         with _searched_first(folder):
             module = importlib.import_module(module_name)

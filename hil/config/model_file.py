@@ -97,13 +97,20 @@ class ModelFile:
         return self.model.structure is Structure.JOINT
 
 
-def read_model(path: Path | str) -> ModelFile:
+def read_model(path: Path | str, trust_laws: bool = False) -> ModelFile:
     """Read a model file; its own laws become those of this process, in place of any before (``own_law.install``).
+
+    Parameters
+    ----------
+    path
+        The file.
+    trust_laws
+        Whether the code that its ``[laws]`` name may run; a file without any needs no trust.
 
     Raises
     ------
     ModelFileError
-        With one line for every fault: the key, what was expected, what came.
+        With one line for every fault: the key, what was expected, what came; also if it has laws and is not trusted.
     """
     path = Path(path)
     content = read_toml(path, ModelFileError)
@@ -113,8 +120,12 @@ def read_model(path: Path | str) -> ModelFile:
         document = ModelDocument.model_validate(content)
     except ValidationError as error:
         problems += problem_lines(ModelDocument, error)
-    install_laws(path, {} if document is None else document.laws)
-    known = {} if document is not None else _table(content.get("laws"))
+    named = {} if document is None else document.laws
+    try:
+        install_laws(path, named, trust_laws)
+    except ModelFileError as error:
+        problems += error.problems
+    known = {} if document is not None and trust_laws else _table(content.get("laws"))
     try:
         model = _model(content, without=known)
     except BadModel as error:
@@ -124,7 +135,7 @@ def read_model(path: Path | str) -> ModelFile:
     return ModelFile(model, document.signals, moved(document.laws, path))
 
 
-def read_model_for_recordings(path: Path | str) -> ModelFile:
+def read_model_for_recordings(path: Path | str, trust_laws: bool = False) -> ModelFile:
     """Read a model file that recordings are to be held against.
 
     Raises
@@ -133,7 +144,7 @@ def read_model_for_recordings(path: Path | str) -> ModelFile:
         As `read_model`; also if the model is of a translation and would be held against the motor speed of a
         rig's own recording, or of a joint whose imposed motion is not named.
     """
-    file = read_model(path)
+    file = read_model(path, trust_laws)
     if file.on_bench:
         if file.signals is None or not file.signals.names_bench:
             raise ModelFileError(

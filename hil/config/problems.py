@@ -10,6 +10,7 @@ Rules across keys are model validators that call `refuse` with every fault they 
 
 from __future__ import annotations
 
+import errno
 import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
@@ -33,6 +34,9 @@ TOML_PLACE: Final = re.compile(r"^(?P<what>.*) \(at (?P<place>line \d+, column \
 
 BYTE_ORDER_MARK: Final = "\ufeff"
 """Some editors put it first; TOML 1.0 has no place for it, and a person can't see it."""
+
+LARGEST_BYTES: Final = 16 << 20
+"""A file that a person wrote has some kilobytes; a wrong one shall not fill the memory."""
 
 LONGEST_VALUE: Final = 80
 """Characters of a wrong value that a message shows."""
@@ -89,17 +93,54 @@ def read_toml(path: Path, error: type[FileProblem]) -> dict[str, Any]:
         Of the class given, if the file can't be read, is not UTF-8, or is not TOML; with the line.
     """
     try:
-        content = path.read_bytes()
+        content = _content(path)
     except OSError as cause:
         raise error(path, f"the file | expected a readable TOML file | came: {cause.strerror}") from cause
     try:
-        return tomllib.loads(content.decode("utf-8").removeprefix(BYTE_ORDER_MARK))
+        tables = tomllib.loads(content.decode("utf-8").removeprefix(BYTE_ORDER_MARK))
+        problems = list(_beyond_64_bit(tables))
     except UnicodeDecodeError as cause:
         line = content.count(b"\n", 0, cause.start) + 1
         byte = content[cause.start]
         raise error(path, f"line {line} | expected UTF-8 text | came byte 0x{byte:02x}: save as UTF-8") from cause
     except tomllib.TOMLDecodeError as cause:
         raise error(path, _toml_problem(str(cause))) from cause
+    except RecursionError:
+        raise error(path, "the file | expected tables | came some nested too deep") from None
+    except ValueError as cause:  # a whole number of thousands of digits
+        raise error(path, f"the file | expected whole numbers of 64 bit | came: {cause}") from cause
+    if problems:
+        raise error(path, *problems)
+    return tables
+
+
+def _content(path: Path) -> bytes:
+    """Read a file, no more of it than a person writes; a pipe or a device is none.
+
+    Raises
+    ------
+    OSError
+        If it can't be read.
+    """
+    if path.exists() and not path.is_file():
+        raise OSError(errno.EINVAL, "no file, but a folder, a pipe or a device")
+    with path.open("rb") as file:
+        content = file.read(LARGEST_BYTES + 1)
+    if len(content) > LARGEST_BYTES:
+        raise OSError(errno.EFBIG, f"more than {LARGEST_BYTES >> 20} MB")
+    return content
+
+
+def _beyond_64_bit(value: object, *keys: int | str) -> Iterator[str]:
+    """Name whole numbers that TOML does not have (TOML 1.0, Integer)."""
+    if isinstance(value, int) and not -(1 << 63) <= value < 1 << 63:
+        yield _line(keys, "a whole number of 64 bit", f"one of {value.bit_length()} bit")
+    elif isinstance(value, dict):
+        for key, entry in value.items():
+            yield from _beyond_64_bit(entry, *keys, key)
+    elif isinstance(value, list):
+        for number, entry in enumerate(value):
+            yield from _beyond_64_bit(entry, *keys, number)
 
 
 def validate(model: type[Model], data: Mapping[str, Any], path: Path, error: type[FileProblem]) -> Model:

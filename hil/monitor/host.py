@@ -56,12 +56,15 @@ class Job:
         Folder of the recordings.
     simulate
         Whether the rig is simulated, in this very process.
+    trust_laws
+        Whether the code of its model's own laws may run.
     """
 
     rig_path: Path
     rig: Rig
     out: Path
     simulate: bool = False
+    trust_laws: bool = False
 
 
 class SessionStop(StopRequest):
@@ -226,6 +229,7 @@ def _rig(job: Job) -> Iterator[Rig]:
     from hil.simulator.plant_factory import plant_for
     from hil.simulator.rig_server import IN_PROCESS, RigServer
 
-    server = RigServer(plant_for(job.rig, []), job.rig, f"{IN_PROCESS}monitor", Address("127.0.0.1", 0), real_time=True)
+    plant = plant_for(job.rig, [], job.trust_laws)
+    server = RigServer(plant, job.rig, f"{IN_PROCESS}monitor", Address("127.0.0.1", 0), real_time=True)
     with server:
         yield with_addresses(job.rig, server.bus_url, str(server.modbus))

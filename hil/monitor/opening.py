@@ -36,7 +36,9 @@ class Opening:
     choices: tuple[Choice, ...] = ()
 
 
-def open_rig(rig_path: Path, rig: Rig, out: Path, simulate: bool, model: Path | None) -> Opening:
+def open_rig(
+    rig_path: Path, rig: Rig, out: Path, simulate: bool, model: Path | None, trust_laws: bool = False
+) -> Opening:
     """Prepare to watch a rig; nothing is connected before the source is entered.
 
     Raises
@@ -50,13 +52,18 @@ def open_rig(rig_path: Path, rig: Rig, out: Path, simulate: bool, model: Path | 
         required_simulation(rig)
     require_folder(out)
     warm = WarmUp(rig.period_s)
-    state = LiveState(rig.name, rig.period_s, _shaft(model, rig), can_drive=True, is_ready=warm.is_done)
-    source = RigSource(Job(rig_path.absolute(), rig, out.absolute(), simulate))
-    return Opening(source, state, tuple(Choice(name, _summary(rig, name)) for name in rig.experiments))
+    state = LiveState(rig.name, rig.period_s, _shaft(model, rig, trust_laws), can_drive=True, is_ready=warm.is_done)
+    source = RigSource(Job(rig_path.absolute(), rig, out.absolute(), simulate, trust_laws))
+    return Opening(source, state, tuple(Choice(name, _summary(rig, name, trust_laws)) for name in rig.experiments))
 
 
 def open_recording(
-    path: Path, rig: Rig | None, speed: float, model: Path | None, channel: str | None = None
+    path: Path,
+    rig: Rig | None,
+    speed: float,
+    model: Path | None,
+    trust_laws: bool = False,
+    channel: str | None = None,
 ) -> Opening:
     """Prepare to play a recording, or a bus trace with the rig file it is of.
 
@@ -81,7 +88,7 @@ def open_recording(
         raise RecordingError(path, f"expected samples to play, came {len(samples)}. Record again.")
     period_s = float(np.median(np.diff([sample.time_s for sample in samples])))
     warm = WarmUp(period_s)
-    state = LiveState(path.name, period_s, _shaft(model, rig), can_drive=False, is_ready=warm.is_done)
+    state = LiveState(path.name, period_s, _shaft(model, rig, trust_laws), can_drive=False, is_ready=warm.is_done)
     return Opening(ReplaySource(path.name, samples, speed, measured), state)
 
 
@@ -95,10 +102,10 @@ def _always(sample: Sample) -> bool:
     return True
 
 
-def _shaft(model: Path | None, rig: Rig | None) -> Shaft | None:
+def _shaft(model: Path | None, rig: Rig | None, trust_laws: bool) -> Shaft | None:
     """Numbers of the shaft: of the model file, else of the simulation; None where there are none."""
     if model is not None:
-        shaft = Shaft.of_model(read_model(model).model, model.name)
+        shaft = Shaft.of_model(read_model(model, trust_laws).model, model.name)
         if shaft is None:
             raise UsageError(
                 f"{model}: expected structure 'two_mass' and motion 'rotation' for the twist, came another"
@@ -106,10 +113,10 @@ def _shaft(model: Path | None, rig: Rig | None) -> Shaft | None:
         return shaft
     if rig is None or rig.simulation is None:
         return None
-    return Shaft.of_model(simulation_model(rig.simulation), "[simulation]")
+    return Shaft.of_model(simulation_model(rig.simulation, trust_laws), "[simulation]")
 
 
-def _summary(rig: Rig, name: str) -> str:
+def _summary(rig: Rig, name: str, trust_laws: bool) -> str:
     """Tell what an experiment would command, and what to expect."""
     table = rig.experiments[name]
     lines = [
@@ -117,7 +124,7 @@ def _summary(rig: Rig, name: str) -> str:
         f"Base torque at most ±{table.torque_nm:g} Nm, PRBS ±{rig.prbs.amplitude_nm:g} Nm, both inverters together.",
     ]
     try:
-        prediction = dry_run(rig, name)
+        prediction = dry_run(rig, name, trust_laws)
     except (HilError, DriverError) as error:
         lines.append(f"Prediction: {error}")
     else:

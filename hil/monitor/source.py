@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from types import TracebackType
 from typing import Protocol, Self
 
+from hil.child import safe_path
 from hil.monitor.host import Job, serve
 from hil.monitor.messages import Ended, Order, Quit, Report
 
@@ -68,7 +69,8 @@ class RigSource:
         self._last_words: list[Report] = []
 
     def __enter__(self) -> Self:
-        self._process.start()
+        with safe_path():
+            self._process.start()
         self._far_end.close()  # or its process's end would not be seen here
         return self
 

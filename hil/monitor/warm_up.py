@@ -11,6 +11,7 @@ import os
 import threading
 
 from estimator.errors import EstimatorError
+from hil.child import safe_path
 from hil.rig.live import tracking_chain
 
 SAMPLES = 64
@@ -48,7 +49,8 @@ class WarmUp:
 
     def _run(self) -> None:
         process = multiprocessing.get_context("spawn").Process(target=_compile, args=(self._period_s,), daemon=True)
-        process.start()
+        with safe_path():
+            process.start()
         process.join()
         try:
             run_once(self._period_s)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import subprocess
-import sys
 from collections.abc import Sequence
 from pathlib import Path
+
+from hil.child import environment, python
 
 
 class CommandFailed(Exception):
@@ -27,8 +28,9 @@ def run_hil(arguments: Sequence[str], folder: Path, limit_s: float) -> None:
     """
     try:
         done = subprocess.run(
-            [sys.executable, "-m", "hil", *arguments],
+            python("-m", "hil", *arguments),
             cwd=folder,
+            env=environment(),
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
             text=True,

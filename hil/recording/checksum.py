@@ -7,6 +7,8 @@ number of cells; lengths are unsigned 64 bit little-endian. All NaN are one, 0x7
 NaN mean nothing here.
 
 The order of columns is left out, and units and metadata are: a unit can be put right without the data being others.
+These have a checksum of their own, `SAID`: names with the units of their columns, and keys with the metadata, each in
+order, as texts preceded by their lengths; the two checksums and ``schema``, which the formats set, are left out.
 """
 
 from __future__ import annotations
@@ -23,6 +25,13 @@ from hil.recording.table import Table
 
 CHECKSUM = "data_sha256"
 """Key of the metadata it is kept under."""
+
+SAID = "metadata_sha256"
+"""Key of the checksum of units and metadata."""
+
+CHECKSUMS = frozenset({CHECKSUM, SAID})
+
+_NOT_SAID = CHECKSUMS | {"schema"}
 
 RIG_TEXT, RIG_CHECKSUM = "rig_file", "rig_sha256"
 
@@ -42,16 +51,30 @@ def data_sha256(columns: Mapping[str, Column]) -> str:
     return digest.hexdigest()
 
 
+def said_sha256(table: Table) -> str:
+    """Return the checksum of units and metadata, hexadecimal."""
+    units = {name: unit for name, unit in table.units.items() if name in table.columns}
+    metadata = {key: value for key, value in table.metadata.items() if key not in _NOT_SAID}
+    digest = hashlib.sha256()
+    for entries in (units, metadata):
+        digest.update(_length(len(entries)))
+        for pair in sorted(entries.items()):
+            for text in pair:
+                digest.update(_counted(text))
+    return digest.hexdigest()
+
+
 def text_sha256(text: str) -> str:
     """Return the checksum of a text as UTF-8, hexadecimal."""
     return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
 
 
 def sealed(table: Table) -> Table:
-    """Return a table with its checksum among its metadata; one that says nothing of itself stays as it is."""
+    """Return a table with its checksums among its metadata; one that says nothing of itself stays as it is."""
     if not (table.metadata or table.units):
         return table
-    return replace(table, metadata={**table.metadata, CHECKSUM: data_sha256(table.columns)})
+    checksums = {CHECKSUM: data_sha256(table.columns), SAID: said_sha256(table)}
+    return replace(table, metadata={**table.metadata, **checksums})
 
 
 def require_whole(table: Table) -> None:
@@ -69,6 +92,12 @@ def require_whole(table: Table) -> None:
             f"expected the data it was written with, SHA-256 {said[CHECKSUM][:_SHOWN]}…, came {came[:_SHOWN]}…: "
             f"it is damaged, or was changed since. Take a copy that is whole; if you changed it yourself, remove "
             f"{CHECKSUM} from what it says of itself (of a CSV: move {table.path.name}.json away)."
+        )
+    if SAID in said and (came := said_sha256(table)) != said[SAID]:
+        problems.append(
+            f"expected the units and metadata it was written with, SHA-256 {said[SAID][:_SHOWN]}…, came "
+            f"{came[:_SHOWN]}…: what it says of itself is damaged, or was changed since. Take a copy that is whole; if "
+            f"you changed it yourself, remove {SAID} from it."
         )
     rig = said.get(RIG_TEXT, "")
     if RIG_CHECKSUM in said and (came := text_sha256(rig)) != said[RIG_CHECKSUM]:

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import csv
 import re
+from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -22,6 +23,7 @@ import pyarrow.compute
 import pyarrow.csv
 
 from hil.errors import RecordingError
+from hil.recording.bounds import require_columns
 from hil.recording.format_hints import FormatHints
 from hil.recording.kinds import Kind, as_text
 from hil.recording.sidecar import SCHEMA_KEY, TYPES_KEY, UNITS_KEY, Sidecar, read_sidecar, write_sidecar
@@ -115,12 +117,13 @@ def _split(line: str, delimiter: str) -> list[str]:
 
 def _column_names(path: Path, header: str, delimiter: str) -> list[str]:
     names = [name.strip() for name in _split(header, delimiter) or [""]]
+    require_columns(path, len(names))
     problems = [
         f"line 1: cell {number} of the header is empty, expected a column name"
         for number, name in enumerate(names, start=1)
         if not name
     ]
-    repeated = sorted({name for name in names if name and names.count(name) > 1})
+    repeated = sorted(name for name, count in Counter(names).items() if name and count > 1)
     problems += [f"line 1: column {name} comes twice, expected every name once" for name in repeated]
     if problems:
         raise RecordingError(path, *problems)

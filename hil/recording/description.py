@@ -17,6 +17,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from hil.errors import RecordingError
+from hil.parse_json import parse_json
 from hil.recording.kinds import Column, Kind
 from hil.recording.table import Table
 
@@ -54,7 +55,7 @@ def described_table(path: Path, text: str, column: Callable[[str, Kind], Column]
         If the description is damaged, or names a column that is not there.
     """
     try:
-        document = json.loads(text)
+        document = parse_json(text)
         entries = [(str(e["name"]), str(e["stored_as"]), e["unit"], Kind(e["kind"])) for e in document["columns"]]
         metadata = {str(key): str(value) for key, value in document["metadata"].items()}
     except (ValueError, KeyError, TypeError, AttributeError) as error:
@@ -83,7 +84,7 @@ def metadata_of(path: Path, text: str) -> dict[str, str]:
         If it is damaged.
     """
     try:
-        return {str(key): str(value) for key, value in json.loads(text)["metadata"].items()}
+        return {str(key): str(value) for key, value in parse_json(text)["metadata"].items()}
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise RecordingError(
             path, f"expected a description {SCHEMA} inside, came a damaged one ({error!r}). Take a copy that is whole."

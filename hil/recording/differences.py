@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hil.recording.checksum import CHECKSUM
+from hil.recording.checksum import CHECKSUMS
 from hil.recording.kinds import Column, Kind
 from hil.recording.table import Table
 
@@ -14,7 +14,7 @@ _SHOWN = 40
 def losses(before: Table, after: Table) -> list[str]:
     """Name what of `before` is not in `after`, one line each; empty where all of it is, bit for bit.
 
-    NaN equals NaN, whatever its payload. The checksum is no content of its own and is not compared.
+    NaN equals NaN, whatever its payload. Checksums are no content of their own and are not compared.
     """
     return [*_columns(before, after), *_units(before, after), *_metadata(before, after)]
 
@@ -68,5 +68,5 @@ def _metadata(before: Table, after: Table) -> list[str]:
     return [
         f"metadata {key}: changed" if key in after.metadata else f"metadata {key}: lost"
         for key, value in before.metadata.items()
-        if key != CHECKSUM and after.metadata.get(key) != value
+        if key not in CHECKSUMS and after.metadata.get(key) != value
     ]

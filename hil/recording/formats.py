@@ -12,6 +12,7 @@ from types import MappingProxyType
 
 from hil.errors import RecordingError
 from hil.recording import csv_format, hdf5_format, mat_format, mdf_format, parquet_format
+from hil.recording.apart import READER
 from hil.recording.checksum import require_whole
 from hil.recording.format_hints import FormatHints
 from hil.recording.sidecar import read_sidecar_metadata, sidecar_of
@@ -24,17 +25,19 @@ class Format:
 
     ``write`` is None for a format that is only read, ``metadata`` for one whose metadata come with the table alone.
     ``beside`` names the file that belongs to a recording in a format that has no place for all there is to say.
+    ``apart`` is True where a compiled library parses it: in a process of its own (`hil.recording.apart`).
     """
 
     read: Callable[[Path, FormatHints], Table]
     write: Callable[[Table, Path], None] | None
     metadata: Callable[[Path], Mapping[str, str]] | None = None
     beside: Callable[[Path], Path] | None = None
+    apart: bool = True
 
 
 FORMATS: Mapping[str, Format] = MappingProxyType(
     {
-        ".csv": Format(csv_format.read, csv_format.write, read_sidecar_metadata, sidecar_of),
+        ".csv": Format(csv_format.read, csv_format.write, read_sidecar_metadata, sidecar_of, apart=False),
         ".parquet": Format(parquet_format.read, parquet_format.write, parquet_format.read_metadata),
         ".mf4": Format(mdf_format.read, mdf_format.write, mdf_format.read_metadata),
         ".mdf": Format(mdf_format.read, None, mdf_format.read_metadata),
@@ -56,7 +59,7 @@ def read_table(path: Path | str, hints: FormatHints | None = None) -> Table:
     path = Path(path)
     known = _known(path)
     _require_readable(path)
-    table = known.read(path, hints or FormatHints())
+    table = READER.table(path) if known.apart else known.read(path, hints or FormatHints())
     require_whole(table)
     return table
 
@@ -71,10 +74,13 @@ def read_metadata(path: Path | str) -> Mapping[str, str]:
     """
     path = Path(path)
     known = _known(path)
-    if known.metadata is None:
-        return read_table(path).metadata
     _require_readable(path)
-    return known.metadata(path)
+    return READER.metadata(path) if known.apart else metadata_of(known, path)
+
+
+def metadata_of(known: Format, path: Path) -> Mapping[str, str]:
+    """Read what a recording of a format says of itself, in this process."""
+    return known.read(path, FormatHints()).metadata if known.metadata is None else known.metadata(path)
 
 
 def writer_for(path: Path, replace: bool = False) -> Callable[[Table, Path], None]:
@@ -107,6 +113,8 @@ def _known(path: Path) -> Format:
 
 def _require_readable(path: Path) -> None:
     try:
+        if path.exists() and not path.is_file():
+            raise RecordingError(path, "expected a file, came a folder, a pipe or a device. Name a recording.")
         with path.open("rb"):
             pass
     except OSError as error:

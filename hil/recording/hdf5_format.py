@@ -15,7 +15,7 @@ import numpy as np
 from hil.errors import RecordingError
 from hil.recording.description import SCHEMA, described_table, description_of, metadata_of
 from hil.recording.format_hints import FormatHints
-from hil.recording.hdf5_file import reading, write_whole
+from hil.recording.hdf5_file import reading, text_of, write_whole
 from hil.recording.kinds import Column, Kind, as_column, is_column
 from hil.recording.shared_length import columns_of_shared_length
 from hil.recording.table import Table
@@ -112,10 +112,13 @@ def _foreign(path: Path, file: File) -> Table:
     units: dict[str, str] = {}
     remarks: list[str] = []
 
-    def take(name: str, entry: Any) -> None:
+    def take(raw: str | bytes, entry: Any) -> None:
+        name = text_of(raw)
         if not hasattr(entry, "dtype"):
             return
-        fields = {f"{name}/{field}": entry[field] for field in entry.dtype.names or ()} if entry.ndim == 1 else {}
+        fields = (
+            {f"{name}/{text_of(field)}": entry[field] for field in entry.dtype.names or ()} if entry.ndim == 1 else {}
+        )
         found = fields or ({name: entry[()].ravel()} if entry.size > 1 and max(entry.shape) == entry.size else {})
         usable = {key: values for key, values in found.items() if is_column(values)}
         vectors.update({key: as_column(values) for key, values in usable.items()})
@@ -135,4 +138,4 @@ def _unit(dataset: Dataset) -> str:
 
 
 def _attributes(file: File) -> dict[str, str]:
-    return {name: str(value) for name, value in file.attrs.items() if np.ndim(value) == 0}
+    return {text_of(name): str(value) for name, value in file.attrs.items() if np.ndim(value) == 0}

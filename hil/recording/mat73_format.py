@@ -20,7 +20,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from hil.recording.description import described_table, description_of, metadata_of
-from hil.recording.hdf5_file import reading, write_whole
+from hil.recording.hdf5_file import reading, text_of, write_whole
 from hil.recording.kinds import Column, Kind, as_column, as_text
 from hil.recording.shared_length import columns_of_shared_length
 from hil.recording.table import Table
@@ -137,7 +137,7 @@ def _foreign(path: Path, file: File) -> Table:
     metadata = _foreign_metadata(file)
     other = [
         f"{name}: left out, it is no vector of numbers or texts"
-        for name in file
+        for name in map(text_of, file)
         if name != REFERENCES and name not in vectors and name not in metadata
     ]
     return Table(path, chosen, metadata=metadata, remarks=(*remarks, *other))
@@ -151,7 +151,9 @@ def _foreign_metadata(file: File) -> dict[str, str]:
 
 
 def _datasets(file: File) -> dict[str, Dataset]:
-    return {name: entry for name, entry in file.items() if hasattr(entry, "dtype") and entry.dtype.names is None}
+    return {
+        text_of(name): entry for name, entry in file.items() if hasattr(entry, "dtype") and entry.dtype.names is None
+    }
 
 
 def _is_vector(dataset: Dataset) -> bool:

@@ -5,7 +5,7 @@ The group is timed by ``time_s``, the master channel, where that can be one (fin
 people; its rig file is attached as ``rig.toml``; ``recording.json``, attached too, is what is read back
 (`hil.recording.description`), for MDF's texts are cut free of blanks and its names take no backslash.
 
-Versions 3 and 4 of other programs are read too, by `hil.recording.mdf_foreign`, in a process of their own.
+Versions 3 and 4 of other programs are read too, by `hil.recording.mdf_foreign`.
 """
 
 from __future__ import annotations
@@ -19,15 +19,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hil import __version__
-from hil.recording import columns, mdf_seal
+from hil.recording import columns
 from hil.recording.checksum import RIG_TEXT
 from hil.recording.description import description_of
 from hil.recording.format_hints import FormatHints
 from hil.recording.kinds import Column, Kind
-from hil.recording.mdf_apart import read_apart
-from hil.recording.mdf_file import opened, require_mdf
+from hil.recording.mdf_file import IDENTIFICATION_BYTES, opened, require_mdf
 from hil.recording.mdf_parse import DESCRIPTION, parse, parse_metadata
-from hil.recording.mdf_seal import is_as_written, seal
 from hil.recording.table import Table
 
 if TYPE_CHECKING:
@@ -52,24 +50,21 @@ def read(path: Path, hints: FormatHints) -> Table:
     RecordingError
         If the file is damaged, or holds no channel with a time.
     """
-    if not _is_as_written(path):
-        return read_apart(path)
+    _require_mdf(path)
     with opened(path) as mdf:
         return parse(path, mdf)
 
 
 def read_metadata(path: Path) -> Mapping[str, str]:
     """Read what an MDF recording says of itself."""
-    if not _is_as_written(path):
-        return read_apart(path).metadata
+    _require_mdf(path)
     with opened(path) as mdf:
         return parse_metadata(path, mdf)
 
 
-def _is_as_written(path: Path) -> bool:
-    content = path.read_bytes()
-    require_mdf(path, content)
-    return is_as_written(content)
+def _require_mdf(path: Path) -> None:
+    with path.open("rb") as file:
+        require_mdf(path, file.read(IDENTIFICATION_BYTES))
 
 
 def write(table: Table, path: Path) -> None:
@@ -93,7 +88,7 @@ def write(table: Table, path: Path) -> None:
         if rig := _said(table, RIG_TEXT):
             mdf.attach(rig.encode("utf-8"), RIG_NAME, comment="rig file of the run", mime="text/plain")
         mdf.save(content)
-    path.write_bytes(seal(content.getvalue()))
+    path.write_bytes(content.getvalue())
 
 
 def _channel_name(number: int, name: str) -> str:
@@ -139,7 +134,6 @@ def _describe(mdf: MDF, table: Table) -> None:
     except ValueError:  # it does not say when: the file is as old as the epoch, rather than as its conversion
         header.start_time = datetime.fromisoformat("1970-01-01T00:00:00+00:00")
     properties = header._common_properties  # noqa: SLF001 - asammdf has no other way to them
-    properties[mdf_seal.KEY] = mdf_seal.PLACEHOLDER
     for key, value in table.metadata.items():
         if len(value) <= LONGEST_PROPERTY and _plain(key + value):
             properties.setdefault(key, value)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -9,12 +10,17 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet
 
+from hil.errors import RecordingError
+from hil.recording.bounds import require_cells, require_columns
 from hil.recording.damaged import damaged
 from hil.recording.format_hints import FormatHints
 from hil.recording.kinds import Column, as_column, as_text
 from hil.recording.table import Table
 
 UNIT_KEY = b"unit"
+
+DAMAGED = (pa.ArrowException, OSError, UnicodeDecodeError)
+"""What pyarrow raises on a file that is cut or damaged; the last where a name or a text is no UTF-8."""
 
 FOREIGN_KEYS = frozenset({b"pandas", b"ARROW:schema"})
 """Metadata other programs put there for themselves."""
@@ -30,16 +36,36 @@ def read(path: Path, hints: FormatHints) -> Table:
     """
     try:
         with pa.parquet.ParquetFile(path, page_checksum_verification=True) as file:
+            _require_sizes(path, file.metadata)
             content = file.read()
-    except (pa.ArrowException, OSError) as error:
+            names = _names(path, content)
+    except DAMAGED as error:
         raise damaged(path, "a whole Parquet file", error) from error
     units = {
         f.name: f.metadata[UNIT_KEY].decode("utf-8", "replace")
         for f in content.schema
         if f.metadata and UNIT_KEY in f.metadata
     }
-    columns = {name: _column(content[name]) for name in content.column_names}
+    try:
+        columns = {name: _column(content.column(number)) for number, name in enumerate(names)}
+    except DAMAGED as error:
+        raise damaged(path, "a whole Parquet file", error) from error
     return Table(path, columns, units, _metadata(content.schema.metadata or {}))
+
+
+def _require_sizes(path: Path, metadata: pa.parquet.FileMetaData) -> None:
+    """Refuse a file that says it holds more than one of its size can."""
+    require_columns(path, metadata.num_columns)
+    require_cells(path, metadata.num_rows * metadata.num_columns)
+
+
+def _names(path: Path, content: pa.Table) -> list[str]:
+    names: list[str] = content.column_names
+    if repeated := sorted({name for name, count in Counter(names).items() if count > 1}):
+        raise RecordingError(
+            path, *(f"column {name} comes twice, expected every name once. Rename one." for name in repeated)
+        )
+    return names
 
 
 def read_metadata(path: Path) -> dict[str, str]:
@@ -52,7 +78,7 @@ def read_metadata(path: Path) -> dict[str, str]:
     """
     try:
         schema = pa.parquet.read_schema(path)
-    except (pa.ArrowException, OSError) as error:
+    except DAMAGED as error:
         raise damaged(path, "a whole Parquet file", error) from error
     return _metadata(schema.metadata or {})
 

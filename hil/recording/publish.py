@@ -13,7 +13,7 @@ from dataclasses import replace as changed
 from pathlib import Path
 
 from hil.errors import RecordingError
-from hil.recording.checksum import CHECKSUM, sealed
+from hil.recording.checksum import CHECKSUMS, sealed
 from hil.recording.differences import losses
 from hil.recording.format_hints import FormatHints
 from hil.recording.formats import FORMATS, Format, writer_for
@@ -85,7 +85,7 @@ def _write(
     if on_loss is None:
         raise RecordingError(path, *(f"{what}: {path.suffix} can't hold it. Choose another format." for what in lost))
     on_loss(lost)
-    plain = changed(kept, metadata={key: value for key, value in kept.metadata.items() if key != CHECKSUM})
+    plain = changed(kept, metadata={key: value for key, value in kept.metadata.items() if key not in CHECKSUMS})
     if still := losses(plain, written(plain)):
         raise RecordingError(path, *(f"expected it to stay as it was written, came: {what}" for what in still))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from hil.recording.checksum import CHECKSUM, RIG_CHECKSUM, RIG_TEXT
+from hil.recording.checksum import CHECKSUM, RIG_CHECKSUM, RIG_TEXT, SAID
 
 _SHOWN = 16
 """Digits of a checksum that are shown: enough to tell any two apart that a person will ever compare."""
@@ -24,7 +24,7 @@ def self_description(metadata: Mapping[str, str]) -> list[str]:
             lines.append(f"{key}: {len(value.splitlines())} lines{seal}")
         elif key == CHECKSUM:
             lines.append(f"{key}: {value[:_SHOWN]} (verified)")
-        elif key not in ("schema", RIG_CHECKSUM):
+        elif key not in ("schema", RIG_CHECKSUM, SAID):
             shown = value[:_SHOWN] if key.endswith("_sha256") else value
             is_short = len(shown) <= _SINGLE_LINE and "\n" not in shown
             lines.append(f"{key}: {shown}" if is_short else f"{key}: {len(value)} characters")

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from hil.errors import RecordingError
+from hil.parse_json import parse_json
 from hil.recording.kinds import Kind
 
 SCHEMA_KEY, SCHEMA = "schema", "hil.recording/1"
@@ -66,6 +67,15 @@ def write_sidecar(recording: Path, said: Sidecar) -> None:
         raise RecordingError(path, f"expected room for the description, came: {error.strerror or error}.") from error
 
 
+def is_sidecar(path: Path) -> bool:
+    """Whether a file is one of ours."""
+    try:
+        content = parse_json(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return False
+    return isinstance(content, dict) and content.get(SCHEMA_KEY) == SCHEMA
+
+
 def read_sidecar(recording: Path) -> Sidecar:
     """Read what a recording says of itself; empty where no file of ours is beside it.
 
@@ -78,7 +88,7 @@ def read_sidecar(recording: Path) -> Sidecar:
     if not path.is_file():
         return Sidecar()
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = parse_json(path.read_text(encoding="utf-8"))
         if not isinstance(content, dict) or content.get(SCHEMA_KEY) != SCHEMA:
             return Sidecar()
         types = {name: Kind(kind) for name, kind in _texts(content.get(TYPES_KEY)).items()}

@@ -11,6 +11,7 @@ whoever wrote the model file, and no fault of the acquisition that a diagnosis c
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -24,6 +25,12 @@ from hil.recording.formats import read_table
 from hil.recording.signals_config import MaskRange, SignalsConfig
 from hil.recording.table import FloatArray, Table
 from hil.recording.time_base import time_base
+
+SMALLEST, GREATEST = 1e-15, 1e15
+"""Between them is the largest value of any signal of a drive, in SI units; their squares and products are numbers."""
+
+SHORTEST_S, LONGEST_S = 1e-9, 1e6
+"""Between them is a sampling period."""
 
 FEWEST_SAMPLES = 10
 """A recording with fewer usable samples can't carry a constant load, an initial state and anything beside."""
@@ -71,6 +78,10 @@ def to_record(table: Table, signals: SignalsConfig) -> Record:
     torque_nm = np.column_stack([numbers[torque.column] * torque.scale for torque in torques])
     measured = numbers[output.column] * output.scale
     okay = trusted.all(axis=1) & np.isfinite(measured) & np.logical_and.reduce([~flagged, *masks.values()])
+    _require_sizes(
+        table, [*((torque.column, torque_nm[:, k]) for k, torque in enumerate(torques)), (output.column, measured)]
+    )
+    _require_period(table, period_s)
     _require_samples(table, okay)
     return Record(
         name=table.path.stem,
@@ -135,6 +146,29 @@ def _held(torque_nm: FloatArray, trusted: NDArray[np.bool_]) -> FloatArray:
     first = np.argmax(trusted, axis=0)
     held: FloatArray = np.take_along_axis(torque_nm, np.where(last < 0, first, last), axis=0)
     return held
+
+
+def _require_sizes(table: Table, signals: Iterable[tuple[str, FloatArray]]) -> None:
+    """Refuse signals that no drive has, whatever it is: what is computed from them would be no numbers."""
+    problems = []
+    for name, values in signals:
+        largest = float(np.nanmax(np.abs(values), initial=0.0))
+        if largest != 0.0 and not SMALLEST <= largest <= GREATEST:
+            problems.append(
+                f"column {name}: expected a signal in SI units, the largest value between {SMALLEST:g} and "
+                f"{GREATEST:g}, came {largest:g}. Check its unit, and its scale in [signals]"
+            )
+    if problems:
+        raise RecordingError(table.path, *problems)
+
+
+def _require_period(table: Table, period_s: float) -> None:
+    if not SHORTEST_S <= period_s <= LONGEST_S:
+        raise RecordingError(
+            table.path,
+            f"expected a sampling period between {SHORTEST_S:g} and {LONGEST_S:g} s, came {period_s:g} s. Check the "
+            "unit of its time, and its scale in [signals]",
+        )
 
 
 def _require_samples(table: Table, okay: NDArray[np.bool_]) -> None:

@@ -9,11 +9,11 @@ that a model would tell of the gaps. A diagnosis refuses nothing: the acquisitio
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable
 from pathlib import Path
 
 from hil.errors import RecordingError
+from hil.parse_json import parse_json
 from hil.recording.formats import read_metadata
 
 WORST_SHARE = 0.05
@@ -35,7 +35,7 @@ def require_even_cycles(paths: Iterable[Path]) -> None:
 
 def _require_even(path: Path, text: str) -> None:
     try:
-        timing = json.loads(text)
+        timing = parse_json(text)
         cycles, missed = int(timing["cycles"]), int(timing["missed"])
         late, unanswered = int(timing["late"]), int(timing["unanswered"])
     except (ValueError, TypeError, KeyError) as error:

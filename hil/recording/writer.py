@@ -13,6 +13,7 @@ Parquet could not do that itself: without its footer, written last, it can't be 
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
@@ -31,6 +32,24 @@ from hil.recording.table import Table
 from hil.rig.sample import Sample
 
 CSV = ".csv"
+
+LOGGER = logging.getLogger(__name__)
+
+HEADER = ",".join(columns.UNITS) + "\n"
+"""First line of a part file."""
+
+
+def hold(file: TextIO) -> bool:
+    """Hold a file for this process, and tell whether that could be; where the system can't, nobody can tell."""
+    try:
+        import fcntl
+    except ImportError:
+        return False
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True
 
 
 class RecordingWriter:
@@ -63,12 +82,11 @@ class RecordingWriter:
     def __enter__(self) -> Self:
         writer_for(self.path)
         try:
-            # Line-buffered: each row reaches the operating system when it is appended.
-            self._file = self.part_path.open("x", buffering=1, encoding="utf-8", newline="\n")
+            self._file = self._opened()
         except FileExistsError as error:
             raise RecordingError(
                 self.part_path,
-                "expected no such file, came one left by a run that was killed. "
+                "expected no such file, came one left by a run that was killed, or that goes on. "
                 "It is a recording up to that moment: rename it to keep it, or remove it.",
             ) from error
         except OSError as error:
@@ -76,8 +94,47 @@ class RecordingWriter:
                 self.path,
                 f"expected a place to write, came: {error.strerror}. Choose another folder, or mend this one.",
             ) from error
-        self._file.write(",".join(columns.UNITS) + "\n")
+        try:
+            self._file.write(HEADER)
+        except OSError as error:
+            self._give_up(self._file)
+            self._file = None
+            raise RecordingError(
+                self.path,
+                f"expected room for the recording, came: {error.strerror or error}. Make room, or choose another disk.",
+            ) from error
         return self
+
+    def _opened(self) -> TextIO:
+        """Open the part file, a new one or one that a run has left which was killed before its first sample.
+
+        Line-buffered: each row reaches the operating system when it is appended. It is held while the run goes on.
+
+        Raises
+        ------
+        FileExistsError
+            If there is one with samples, or one that another run holds.
+        """
+        try:
+            file = self.part_path.open("x", buffering=1, encoding="utf-8", newline="\n")
+        except FileExistsError:
+            file = self.part_path.open("r+", buffering=1, encoding="utf-8", newline="\n")
+            if not (hold(file) and HEADER.startswith(file.read(len(HEADER) + 1))):
+                file.close()
+                raise
+            file.seek(0)
+            file.truncate()
+            return file
+        hold(file)
+        return file
+
+    def _give_up(self, file: TextIO) -> None:
+        """Close a file that took nothing, and remove it."""
+        try:
+            file.close()
+        except OSError:  # it tries once more to write what did not fit
+            LOGGER.info("%s could not be written", self.part_path, exc_info=True)
+        self.part_path.unlink(missing_ok=True)
 
     @property
     def kept(self) -> Path | None:

@@ -70,7 +70,7 @@ def _identification(evidence: Evidence) -> list[str]:
 
 
 def _roots(runs: list[Evidence], how: str, which: str) -> np.ndarray:
-    """Return the roots of all runs at the on-line model's period: a pole sampled k times as slowly is its k-th power."""
+    """Return the roots of all runs at the on-line period: a pole sampled k times as slowly is its k-th power."""
     k = runs[0]["online"]["sample_time_s"] / runs[0][how]["sample_time_s"]
     return np.array([complex(*root) ** k for run in runs for root in run[how][which]], dtype=np.complex128)
 

@@ -71,8 +71,8 @@ class Prediction:
     speed_measured_rad_s: Range = field(default_factory=Range)
 
 
-def dry_run(rig: Rig, name: str) -> Prediction:
-    """Predict a run of one experiment of the rig file.
+def dry_run(rig: Rig, name: str, trust_laws: bool = False) -> Prediction:
+    """Predict a run of one experiment of the rig file; laws of its model's own run only where they are trusted.
 
     Raises
     ------
@@ -84,7 +84,7 @@ def dry_run(rig: Rig, name: str) -> Prediction:
         If the vehicle of the prediction does not come to the start speed.
     """
     plan = plan_run(rig, name)
-    prediction = Prediction(_rigid_vehicle(rig), rig.period_s)
+    prediction = Prediction(_rigid_vehicle(rig, trust_laws), rig.period_s)
     guard = TorqueGuard(rig.guard_limits)
     guard.enable()
     pacer = FreePacer(period_ns(rig.period_s))
@@ -103,10 +103,10 @@ def dry_run(rig: Rig, name: str) -> Prediction:
     return prediction
 
 
-def _rigid_vehicle(rig: Rig) -> RigidVehicle:
+def _rigid_vehicle(rig: Rig, trust_laws: bool) -> RigidVehicle:
     if rig.simulation is None:
         return RigidVehicle(rig.vehicle.inertia_kg_m2, 0.0, "[vehicle] inertia, resistance unknown")
-    values = simulation_model(rig.simulation).values()
+    values = simulation_model(rig.simulation, trust_laws).values()
     inertia_kg_m2 = sum(value for name, value in values.items() if name.startswith("J_"))
     friction_nm_s = sum(value for name, value in values.items() if name.startswith("b_"))
     return RigidVehicle(inertia_kg_m2, friction_nm_s, "[simulation] model, taken as rigid")

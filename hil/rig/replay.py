@@ -34,6 +34,9 @@ from hil.rig.trace_file import read_frames
 Frame = tuple[int, bytes, int]
 """Identifier, data and time [ns]."""
 
+MOST_MISSED = 100_000
+"""Cycles that may be missing in a trace: each becomes a flagged row."""
+
 LOOKED_AT = 1000
 """SYNC by which it is judged whether the run waited for a clock."""
 
@@ -184,7 +187,7 @@ def replay(path: Path, rig: Rig, whole: bool = False, channel: str | None = None
     every = _Reader(clock, m1, m2).samples(read_frames(path, channel))
     chosen = every if whole else _measured(path, every)
     try:
-        yield from _evenly(chosen, period)
+        yield from _evenly(path, chosen, period)
     except ProtocolViolation as error:
         raise RecordingError(path, f"{error} Or the rig file is not the one of this trace.") from error
 
@@ -213,13 +216,21 @@ def _measured(path: Path, samples: Iterable[Sample]) -> Iterator[Sample]:
         )
 
 
-def _evenly(samples: Iterable[Sample], period: int) -> Iterator[Sample]:
+def _evenly(path: Path, samples: Iterable[Sample], period: int) -> Iterator[Sample]:
     """Count time from the first sample, and put flagged ones where cycles are missing."""
     first: int | None = None
     last: Sample | None = None
+    missed = 0
     for sample in samples:
         first = sample.cycle if first is None else first
         if last is not None:
+            missed += sample.cycle - last.cycle - 1
+            if missed > MOST_MISSED:
+                raise RecordingError(
+                    path,
+                    f"expected one run, came one without SYNC for {missed * period / NS_PER_S:.0f} s in all. Cut the "
+                    "trace, or give the rig file whose period it has.",
+                )
             for missing in range(last.cycle + 1, sample.cycle):
                 age_ns = last.age_ns + (missing - last.cycle) * period
                 stand_in = replace(last, cycle=missing, age_ns=age_ns, flags=last.flags | SLEPT_THROUGH)

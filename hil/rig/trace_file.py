@@ -6,27 +6,25 @@ would be taken for those of one.
 
 from __future__ import annotations
 
-import struct
-import zlib
 from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import IO, Any
 
 import can
-from can.io.blf import BLFParseError
 
 from drivers.canopen.can_link import is_canopen
 from hil.errors import RecordingError
+from hil.rig.blf_file import BoundedBlfReader
 from hil.rig.trace import READABLE, is_trace
 
 NS_PER_S = 1_000_000_000
 
+LATEST_S = float(1 << 33)
+"""Times beyond are none of a clock [s]; in nanoseconds they would not fit into 64 bit."""
+
 COUNTED_FROM_1 = (".blf", ".asc")
 """Formats whose channels python-can counts from 0, and their files and every other program from 1."""
-
-_READING_ERRORS = (OSError, ValueError, IndexError, KeyError, EOFError, struct.error, zlib.error, BLFParseError)
-"""What python-can's readers raise for a file that is damaged or of another format."""
 
 
 class _TrcReader(can.TRCReader):
@@ -37,7 +35,7 @@ class _TrcReader(can.TRCReader):
 
 
 _READERS: dict[str, Callable[..., Any]] = {
-    ".blf": can.BLFReader,
+    ".blf": BoundedBlfReader,
     ".log": can.CanutilsLogReader,
     ".asc": can.ASCReader,
     ".trc": _TrcReader,
@@ -64,7 +62,7 @@ def read_frames(path: Path, channel: str | None = None) -> Iterator[tuple[int, b
         first = name if first is None else first
         if name == first:
             found = True
-            yield message.arbitration_id, bytes(message.data), round(message.timestamp * NS_PER_S)
+            yield message.arbitration_id, bytes(message.data), _time_ns(path, message.timestamp)
         elif channel is None:
             raise _which(path, "expected the traffic of one bus")
     if not found:
@@ -96,7 +94,9 @@ def _frames(path: Path) -> Iterator[tuple[str, can.Message]]:
                     yield _channel(message, suffix), message
     except NotImplementedError as error:
         raise RecordingError(path, f"expected a version of {suffix} that python-can reads, came: {error}") from error
-    except _READING_ERRORS as error:
+    except RecordingError:
+        raise
+    except Exception as error:  # python-can's readers raise anything on a file that is damaged
         raise RecordingError(
             path,
             f"expected a bus trace in the format of its suffix, came: {error or type(error).__name__}. It is damaged, "
@@ -107,6 +107,12 @@ def _frames(path: Path) -> Iterator[tuple[str, can.Message]]:
 def _channel(message: can.Message, suffix: str) -> str:
     channel = message.channel
     return str(channel + 1) if suffix in COUNTED_FROM_1 and isinstance(channel, int) else str(channel)
+
+
+def _time_ns(path: Path, timestamp_s: float) -> int:
+    if not abs(timestamp_s) < LATEST_S:
+        raise RecordingError(path, f"expected frames with the time of a clock, came {timestamp_s:g} s. It is damaged.")
+    return round(timestamp_s * NS_PER_S)
 
 
 def _opened(path: Path) -> IO[Any]:

@@ -1,24 +1,29 @@
-"""Serve a virtual CAN channel to other processes: python-can-remote's WebSocket server, made closable.
+"""Serve a virtual CAN channel to other processes: python-can-remote's WebSocket server, closed to strangers.
 
-The library's own server never ends the connections it holds: closing it would leave threads and sockets
-behind. Here each connection is remembered, cut when the bridge closes, and its thread waited for. A host that
-dies in the middle of a frame is no defect either: the library's thread would print a traceback and leave its
-end of the virtual bus open.
+The library serves whoever comes: a page in a browser, any path of the file system by HTTP, a frame of any length. Here
+a host must name the token of the URL (`drivers.canopen.bus_token`), a browser's request is refused whatever it names,
+nothing but the WebSocket is served, and every length is bounded. The library's own server never ends the connections
+it holds either: here each is remembered, cut when the bridge closes, and its thread waited for. A host that dies in
+the middle of a frame is no defect: the library's thread would print a traceback and leave its end of the bus open.
 """
 
 from __future__ import annotations
 
+import hmac
 import logging
 import socket
 import threading
 from contextlib import suppress
+from http import HTTPStatus
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Final, Self
 
+import can
 from can_remote import RemoteServer
 from can_remote.server import ClientRequestHandler, RemoteServerProtocol
-from can_remote.websocket import WebSocket, get_accept_key
+from can_remote.websocket import WebSocket, WebsocketClosed, get_accept_key
 
+from drivers.canopen.bus_token import forget_token, keep_token, new_token
 from drivers.errors import BusDown
 from hil.simulator.loopback import Address
 
@@ -27,13 +32,53 @@ LOGGER = logging.getLogger(__name__)
 POLL_S = 0.05
 """How often the accepting thread looks whether it should end [s]."""
 
+HANDSHAKE_S: Final = 5.0
+"""Time a host has for its HTTP request [s]."""
+
+MOST_HOSTS: Final = 16
+"""Connections at a time."""
+
+LONGEST_FRAME_BYTES: Final = 4096
+"""Of a WebSocket; a CAN frame in JSON has some 200."""
+
+MOST_PERIODIC: Final = 64
+SHORTEST_PERIOD_S: Final = 0.001
+"""Frames that a host may have sent again and again by the server, and how often."""
 
 BINARY, JSON = "can.binary+json.v1", "can.json.v1"
 """The library's two subprotocols; the first is the quick one."""
 
+MESSAGE_TOO_BIG, POLICY_VIOLATION = 1009, 1008
+"""Status codes of RFC 6455, 7.4.1."""
+
+
+class _BoundedWebSocket(WebSocket):  # type: ignore[misc]  # the library carries no types
+    """A server's end of a WebSocket that makes room for short frames only."""
+
+    def _read_exactly(self, n: int) -> bytearray:
+        if n > LONGEST_FRAME_BYTES:
+            raise WebsocketClosed(MESSAGE_TOO_BIG, f"a frame of {n} bytes, expected at most {LONGEST_FRAME_BYTES}")
+        read: bytearray = super()._read_exactly(n)
+        return read
+
 
 class _Connection(RemoteServerProtocol):  # type: ignore[misc]  # the library carries no types
-    """One host, whose end of the virtual bus is closed however its connection ends."""
+    """One host, whose end of the virtual bus is closed however its connection ends.
+
+    What a host asks of the bus is not heeded: it gets the served channel as it is.
+    """
+
+    def __init__(self, config: dict[str, Any], websocket: WebSocket) -> None:
+        super(RemoteServerProtocol, self).__init__(websocket)
+        request = self.recv(HANDSHAKE_S)
+        if not isinstance(request, dict) or request.get("type") != "bus_request":
+            raise WebsocketClosed(POLICY_VIOLATION, "expected a bus_request first")
+        self.config = config
+        self.bus = can.Bus(**config)
+        self.send_bus_response(self.bus.channel_info)
+        self.running = True
+        self._send_tasks: dict[int, Any] = {}
+        self._send_thread = threading.Thread(target=self._send_to_client, daemon=True)
 
     def _send_to_client(self) -> None:
         try:
@@ -43,19 +88,83 @@ class _Connection(RemoteServerProtocol):  # type: ignore[misc]  # the library ca
         finally:
             self.bus.shutdown()
 
+    def _receive_from_client(self) -> None:
+        while self.running:
+            try:
+                event = self.recv()
+            except WebsocketClosed as end:
+                LOGGER.info("connection ended: %s", end)
+                return
+            if isinstance(event, can.Message):
+                self.bus.send(_classic(event))
+            elif isinstance(event, dict) and event.get("type") == "periodic_start":
+                self._start(event["payload"])
+            elif isinstance(event, dict) and event.get("type") == "periodic_stop":
+                self._send_tasks.pop(event["payload"]).stop()
+
+    def _start(self, asked: dict[str, Any]) -> None:
+        message, period_s = _classic(can.Message(**asked["msg"])), float(asked["period"])
+        known = self._send_tasks.get(message.arbitration_id)
+        if known is not None:
+            known.modify_data(message)
+            return
+        if len(self._send_tasks) >= MOST_PERIODIC or not period_s >= SHORTEST_PERIOD_S:
+            raise ValueError(f"at most {MOST_PERIODIC} periodic frames, every {SHORTEST_PERIOD_S} s at most")
+        task = self.bus.send_periodic(message, period_s, asked.get("duration"))
+        self._send_tasks[message.arbitration_id] = task
+
+
+def _classic(message: can.Message) -> can.Message:
+    """Return a frame that a classic CAN bus can carry.
+
+    Raises
+    ------
+    ValueError
+        For any other: the devices behind it would meet what no wire delivers.
+    """
+    highest = 0x1FFFFFFF if message.is_extended_id else 0x7FF
+    if message.is_fd or message.is_error_frame or not 0 <= message.arbitration_id <= highest or len(message.data) > 8:
+        raise ValueError("expected a classic CAN frame of at most 8 bytes")
+    return message
+
 
 class _Handler(ClientRequestHandler):  # type: ignore[misc]  # the library carries no types
-    """Meets a host: upgrades its HTTP request to a WebSocket (RFC 6455, 4.2.2) and serves it."""
+    """Meets a host: upgrades its HTTP request to a WebSocket (RFC 6455, 4.2.2) and serves it; nothing else."""
+
+    timeout = HANDSHAKE_S
+
+    def do_GET(self) -> None:  # noqa: N802 - the name http.server calls
+        refusal = self._refusal()
+        if refusal is not None:
+            self.close_connection = True
+            self.send_error(refusal)
+            return
+        self.start_websocket()
+
+    def _refusal(self) -> HTTPStatus | None:
+        """Say why a request is none of a host's."""
+        if self.headers.get("Origin") is not None:  # a browser sends it, a host does not
+            return HTTPStatus.FORBIDDEN
+        if not hmac.compare_digest(self.path.strip("/").encode(), self.server.token.encode()):
+            return HTTPStatus.FORBIDDEN
+        if self.headers.get("Upgrade", "").lower() != "websocket" or "Sec-WebSocket-Key" not in self.headers:
+            return HTTPStatus.UPGRADE_REQUIRED
+        return None
 
     def start_websocket(self) -> None:
         protocol = BINARY if BINARY in self.headers.get("Sec-WebSocket-Protocol", "") else JSON
-        self.send_response(101)
+        self.send_response(HTTPStatus.SWITCHING_PROTOCOLS)
         self.send_header("Upgrade", "WebSocket")
         self.send_header("Connection", "Upgrade")
         self.send_header("Sec-WebSocket-Accept", get_accept_key(self.headers["Sec-WebSocket-Key"]))
         self.send_header("Sec-WebSocket-Protocol", protocol)
         self.end_headers()
-        _Connection(self.server.config, WebSocket(None, protocol, sock=self.request)).run()
+        self.request.settimeout(None)
+        self.close_connection = True
+        try:
+            _Connection(self.server.config, _BoundedWebSocket(None, protocol, sock=self.request)).run()
+        except WebsocketClosed as end:
+            LOGGER.info("connection ended: %s", end)
 
 
 class _ClosableServer(RemoteServer):  # type: ignore[misc]  # the library carries no types
@@ -66,8 +175,13 @@ class _ClosableServer(RemoteServer):  # type: ignore[misc]  # the library carrie
     def __init__(self, address: Address, channel: str) -> None:
         self._connections: set[socket.socket] = set()
         self._lock = threading.Lock()
+        self.token = new_token()
         super().__init__(address.host, address.port, interface="virtual", channel=channel)
         self.RequestHandlerClass = _Handler
+
+    def verify_request(self, request: socket.socket, client_address: Any) -> bool:
+        with self._lock:
+            return len(self._connections) < MOST_HOSTS
 
     def process_request(self, request: socket.socket, client_address: Any) -> None:
         with self._lock:
@@ -101,6 +215,11 @@ class CanBridge:
     channel
         Name of python-can's virtual channel in this process.
 
+    Attributes
+    ----------
+    url : str
+        With the token: who has it has the bus.
+
     Raises
     ------
     BusDown
@@ -117,9 +236,14 @@ class CanBridge:
         self._thread = threading.Thread(
             target=self._server.serve_forever, args=(POLL_S,), name="can-bridge", daemon=True
         )
-        self.url = f"ws://{Address(address.host, self._server.server_port)}/"
+        self.port = int(self._server.server_port)
+        self.url = f"ws://{Address(address.host, self.port)}/{self._server.token}/"
 
     def __enter__(self) -> Self:
+        try:
+            keep_token(self.port, self._server.token)
+        except OSError as error:  # whoever is told the whole URL needs no file
+            LOGGER.warning("the token of port %d can't be kept: %s", self.port, error)
         self._thread.start()
         return self
 
@@ -130,3 +254,4 @@ class CanBridge:
         self._thread.join()
         self._server.cut_connections()
         self._server.server_close()
+        forget_token(self.port, self._server.token)

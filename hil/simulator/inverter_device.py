@@ -37,8 +37,11 @@ from hil.simulator.stop_reactions import (
 )
 from hil.simulator.torque_limits import Heat
 
-VALUE_RANGE_EXCEEDED = 0x06090030
-"""SDO abort code."""
+VALUE_RANGE_EXCEEDED, VALUE_TOO_HIGH, VALUE_TOO_LOW = 0x06090030, 0x06090031, 0x06090032
+"""SDO abort codes."""
+
+TARGETS = (0x6071, 0x60B2)
+"""Target torque and torque offset: neither is taken beyond max torque 0x6072."""
 
 PARAMETERS: Final[Mapping[int, int]] = {0x6071: 0, 0x6072: 1000, 0x6087: 100_000, 0x60B2: 0, **STANDARD_CODES}
 """Objects that are held as written, with the value of a drive whose EDS lists no such object: target torque, max
@@ -110,6 +113,7 @@ class InverterDevice:
         self._torque = 0.0
         self._limited = False
         self._follows = False
+        self._refused: set[int] = set()
         self._sensors.clear()
         self._errors = ErrorList()
         self._meet_faults()
@@ -153,8 +157,19 @@ class InverterDevice:
             self._take_mode(value)
         elif index == 0x1003:
             self._errors.forget_history()
+        elif index in TARGETS:
+            self._take_target(index, value)
         elif index in self._parameters:
             self._parameters[index] = value
+
+    def _take_target(self, index: int, value: int) -> None:
+        """Take a target or offset torque, unless it is beyond max torque 0x6072: then the one before holds."""
+        maximum = self._parameters[0x6072]
+        if abs(value) > maximum:
+            self._refused.add(index)
+            raise ObjectRefused(VALUE_TOO_HIGH if value > 0 else VALUE_TOO_LOW)
+        self._refused.discard(index)
+        self._parameters[index] = value
 
     def step(self, true_speed_rad_s: float, period_s: float) -> None:
         """Take one SYNC: put the commands into effect, sample the readings.
@@ -330,7 +345,7 @@ class InverterDevice:
         bits = STATUSWORD_STATE_BITS[self.state] | _REMOTE
         if not self._dc_link.too_low:
             bits |= _VOLTAGE_ENABLED
-        if self._limited:
+        if self._limited or self._refused:
             bits |= _INTERNAL_LIMIT_ACTIVE
         if self._heat.derating:
             bits |= _WARNING

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from threading import RLock
 from typing import Any
@@ -267,7 +268,8 @@ class InverterNode:
             return
         for mapped, value in zip(rpdo.layout.objects, values, strict=True):
             if mapped.index not in self._server.ignored_writes:
-                self._device.write(mapped.index, value)
+                with suppress(ObjectRefused):  # a PDO has no answer; the device says it in its statusword, where it can
+                    self._device.write(mapped.index, value)
 
     def _on_sdo_request(self, data: bytes, t_ns: int) -> None:
         with self._lock:

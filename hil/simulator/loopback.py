@@ -1,7 +1,7 @@
 """Addresses a simulated rig may be served at: this machine's own, and no other.
 
-The CAN server has no authentication, and a simulated PLC certificates only where the rig file says so: neither may
-be reached from outside.
+The CAN server knows a token but no encryption, and a simulated PLC certificates only where the rig file says so:
+neither may be reached from outside.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ def _on_this_machine(address: Address, text: str) -> Address:
     if _is_loopback(address.host):
         return address
     raise UsageError(
-        f"address {text!r}: a simulated rig is served on this machine only, without authentication; expected "
+        f"address {text!r}: a simulated rig is served on this machine only, without encryption; expected "
         "a loopback address such as 127.0.0.1. To reach it from elsewhere, tunnel the port with SSH."
     )
 

@@ -24,6 +24,8 @@ _DOWNLOAD, _UPLOAD = 1, 2
 
 _ABORT = 0x80
 
+_REQUEST_BYTES = 8
+
 
 class ObjectServer(canopen.LocalNode):
     """The library's node, with the hooks it offers, but without its NMT slave.
@@ -62,7 +64,9 @@ class ObjectServer(canopen.LocalNode):
         network.unsubscribe(NMT_COB_ID, self.nmt.on_command)
 
     def answer(self, request: bytes, t_ns: int) -> None:
-        """Answer one SDO request."""
+        """Answer one SDO request; a shorter frame is none (CiA 301, 7.2.4.3) and is passed over."""
+        if len(request) < _REQUEST_BYTES:
+            return
         service, index = request[0] >> 5, int.from_bytes(request[1:3], "little")
         if service in (_DOWNLOAD, _UPLOAD) and index in self._missing:
             self._refuse(request, NO_SUCH_OBJECT)

@@ -17,7 +17,7 @@ from hil.simulator.rig_server import required_simulation
 from hil.simulator.simulation_model import EffectSpec, simulation_model
 
 
-def plant_for(rig: Rig, effects: Sequence[EffectSpec] = ()) -> Plant:
+def plant_for(rig: Rig, effects: Sequence[EffectSpec] = (), trust_laws: bool = False) -> Plant:
     """Build the driveline of a rig file.
 
     Parameters
@@ -26,6 +26,8 @@ def plant_for(rig: Rig, effects: Sequence[EffectSpec] = ()) -> Plant:
         The rig file, with a table ``[simulation]``.
     effects
         Effects put in on top of those of its model, or in place of one of the same name; each once.
+    trust_laws
+        Whether the code of its model's own laws may run.
 
     Raises
     ------
@@ -36,7 +38,7 @@ def plant_for(rig: Rig, effects: Sequence[EffectSpec] = ()) -> Plant:
         If an effect is none of the catalogue, lacks a parameter or has another, or the line has a mode too fast to
         simulate at the rig's period.
     """
-    model = simulation_model(required_simulation(rig))
+    model = simulation_model(required_simulation(rig), trust_laws)
     if model.motion is not Motion.ROTATION:
         raise UsageError(
             f"rig {rig.name!r}, simulation.model: expected motion = 'rotation', came {model.motion.value!r}: "

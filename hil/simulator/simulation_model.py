@@ -56,11 +56,11 @@ class EffectSpec:
         return cls(name.strip(), parameters)
 
 
-def simulation_model(table: SimulationTable) -> DrivelineModel:
-    """Model of the simulated driveline: the rig file's, or the default bus."""
+def simulation_model(table: SimulationTable, trust_laws: bool = False) -> DrivelineModel:
+    """Model of the simulated driveline: the rig file's, or the default bus; its own laws run only where trusted."""
     if table.model is None:
         return DEFAULT_BUS
-    file = read_model(table.model)
+    file = read_model(table.model, trust_laws)
     if file.on_bench:
         raise ModelFileError(table.model, "structure | expected a driveline for a rig to drive | came 'joint'")
     return file.model

@@ -12,7 +12,15 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from hil.errors import StoreError
-from hil.store.schema import MIGRATIONS, ForeignDatabase, NewerStore, bring_up_to_date, roll_back
+from hil.store.schema import (
+    MIGRATIONS,
+    ForeignDatabase,
+    NewerStore,
+    bring_up_to_date,
+    columns_of,
+    expected_columns,
+    roll_back,
+)
 
 BUSY_S = 20.0
 """How long a writer waits for another; the longest there is writes one run and its documents, some milliseconds."""
@@ -44,6 +52,7 @@ def open_database(path: Path) -> sqlite3.Connection:
         connection = sqlite3.connect(path, timeout=BUSY_S, isolation_level=None)
         try:
             connection.row_factory = sqlite3.Row
+            connection.text_factory = lambda raw: raw.decode("utf-8", "replace")  # SQLite does not check what it keeps
             connection.execute("PRAGMA journal_mode = WAL")
             connection.execute("PRAGMA synchronous = FULL")
             connection.execute("PRAGMA foreign_keys = ON")
@@ -59,6 +68,10 @@ def _require_whole(path: Path, connection: sqlite3.Connection) -> None:
     found = connection.execute("PRAGMA quick_check(1)").fetchone()[0]
     if found != "ok":
         raise _damaged(path, found)
+    there = columns_of(connection)
+    for table, columns in expected_columns().items():
+        if missing := columns - there.get(table, set()):
+            raise _damaged(path, f"table {table} has no column {', '.join(sorted(missing))}")
 
 
 @contextmanager
@@ -103,6 +116,8 @@ def told(path: Path) -> Iterator[None]:
         ) from error
     except sqlite3.Error as error:
         raise _in_words(path, error) from error
+    except UnicodeDecodeError as error:  # the module's, of a message of SQLite's that quotes what is damaged
+        raise _damaged(path, error) from error
 
 
 def _in_words(path: Path, error: sqlite3.Error) -> StoreError:

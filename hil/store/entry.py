@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from hil.parse_json import parse_json
 from hil.recording.checksum import text_sha256
 
 COMPLETE = "complete"
@@ -99,7 +99,7 @@ class Attachment:
     def as_json(self) -> Any:
         """Return the content of a JSON document; None for one that is none."""
         try:
-            return json.loads(self.document)
+            return parse_json(self.document)
         except ValueError:
             return None
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import os
+import re
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -83,7 +84,12 @@ def _zip(runs: Sequence[Run], path: Path) -> None:
                 archive.writestr(f"{home}/rig.toml", run.entry.rig_text)
             for number, attachment in enumerate(run.attachments, start=1):
                 name = f"{attachment.kind}.txt" if attachment.path is None else attachment.path.name
-                archive.writestr(f"{home}/attachments/{number}_{name}", attachment.document)
+                archive.writestr(f"{home}/attachments/{number}_{_plain(name)}", attachment.document)
+
+
+def _plain(name: str) -> str:
+    """Return a name that leads nowhere when someone unpacks the archive."""
+    return re.sub(r"[^\w.+-]", "_", name)
 
 
 def _recording_files(run: Run) -> list[Path]:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from hil.recording import columns
-from hil.recording.checksum import CHECKSUM, RIG_CHECKSUM, RIG_TEXT
+from hil.recording.checksum import CHECKSUM, CHECKSUMS, RIG_CHECKSUM, RIG_TEXT
 from hil.recording.description import OUTCOME
 from hil.recording.formats import read_table
 from hil.recording.table import Table
@@ -17,7 +17,7 @@ from hil.store.entry import COMPLETE, RunEntry
 from hil.store.run_store import RunStore
 
 EXPERIMENT, STARTED, VERSION = "experiment", "started_utc", "hil_version"
-OWN_KEYS = frozenset({RIG_TEXT, RIG_CHECKSUM, EXPERIMENT, STARTED, VERSION, CHECKSUM, OUTCOME, "schema"})
+OWN_KEYS = frozenset({RIG_TEXT, RIG_CHECKSUM, EXPERIMENT, STARTED, VERSION, *CHECKSUMS, OUTCOME, "schema"})
 """What has a place of its own in an entry; the rest is its settings."""
 
 
@@ -95,7 +95,7 @@ def _is_eds(key: str) -> bool:
 def _rig_name(text: str) -> str:
     try:
         name = tomllib.loads(text).get("name", "")
-    except tomllib.TOMLDecodeError:  # a recording made before rig files were checked, or by another program
+    except (ValueError, RecursionError):  # a recording made before rig files were checked, or by another program
         return ""
     return name if isinstance(name, str) else ""
 

@@ -4,12 +4,39 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from hil.errors import UsageError
-from hil.recording.formats import FORMATS
-from hil.store.results import ONLINE_SUFFIX
+from hil.errors import RecordingError, UsageError
+from hil.parse_json import parse_json
+from hil.recording.checksum import CHECKSUM
+from hil.recording.formats import FORMATS, read_metadata
+from hil.recording.sidecar import is_sidecar
+from hil.store.entry import RunEntry
+from hil.store.register import is_run
+from hil.store.results import ONLINE_SCHEMA, ONLINE_SUFFIX
 
 
-def remove_files(recording: Path) -> list[Path]:
+def require_own(entry: RunEntry) -> None:
+    """See that the file a run names is its recording: nothing else is deleted. One that is gone passes.
+
+    Raises
+    ------
+    UsageError
+        If it is something else, or can't be read.
+    """
+    path = entry.recording
+    if not path.exists():
+        return
+    try:
+        said = read_metadata(path)
+    except RecordingError as error:
+        raise UsageError(f"{error}\nNothing was deleted; delete the file yourself.") from error
+    if not is_run(said) or said.get(CHECKSUM, "") != entry.data_sha256:
+        raise UsageError(
+            f"{path}: expected the recording of this run, came another file. Nothing was deleted; delete it yourself, "
+            "or leave --with-recording out."
+        )
+
+
+def remove_files(entry: RunEntry) -> list[Path]:
     """Delete a recording and what was made with it: its sidecar and the course of its on-line estimate.
 
     Returns
@@ -20,13 +47,15 @@ def remove_files(recording: Path) -> list[Path]:
     Raises
     ------
     UsageError
-        If the system does not let it.
+        If it is not the run's recording, or the system does not let it.
     """
+    require_own(entry)
+    recording = entry.recording
     known = FORMATS.get(recording.suffix.lower())
     beside = [] if known is None or known.beside is None else [known.beside(recording)]
-    removed = []
     course = recording.with_name(f"{recording.stem}{ONLINE_SUFFIX}")
-    for path in (*beside, course, recording):
+    removed = []
+    for path in (*filter(is_sidecar, beside), *([course] if _is_course(course) else []), recording):
         try:
             path.unlink()
         except FileNotFoundError:
@@ -38,3 +67,11 @@ def remove_files(recording: Path) -> list[Path]:
             ) from error
         removed.append(path)
     return removed
+
+
+def _is_course(path: Path) -> bool:
+    try:
+        document = parse_json(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return False
+    return isinstance(document, dict) and document.get("schema") == ONLINE_SCHEMA

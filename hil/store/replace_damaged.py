@@ -5,18 +5,22 @@ from __future__ import annotations
 import contextlib
 import os
 import sqlite3
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
 from hil.errors import RecordingError
+from hil.inside import is_inside
 from hil.recording.formats import read_table
-from hil.store.connection import DamagedStore, open_database, transaction
+from hil.store.connection import DamagedStore, open_database, told, transaction
 from hil.store.entry import RunEntry
 from hil.store.register import entry_of
+from hil.store.row_faults import faults_of, mended
 from hil.store.rows import insert_run
 from hil.store.run_store import store_of
 from hil.store.salvage import TABLES, Row, Salvaged, salvage
+from hil.store.schema import columns_of
 
 PARTS = ("", "-wal", "-shm")
 """What SQLite keeps beside a database in WAL mode."""
@@ -42,10 +46,15 @@ def replace_if_damaged(folder: Path) -> Replaced | None:
     if not path.exists():
         return None
     try:
-        open_database(path).close()
+        database = open_database(path)
+        try:
+            with told(path):
+                rows = [dict(row) for row in database.execute("SELECT * FROM runs")]
+        finally:
+            database.close()
     except DamagedStore:
         return _replace(path)
-    return None
+    return _replace(path) if any(faults_of(folder, row) for row in rows) else None
 
 
 def _replace(path: Path) -> Replaced:
@@ -69,24 +78,41 @@ def _fill(path: Path, folder: Path, salvaged: Salvaged) -> tuple[str, ...]:
     database = open_database(path)
     try:
         with transaction(path, database):
+            known = columns_of(database)
             for table in TABLES:
-                for row in salvaged.tables[table]:
+                rows = [{name: row[name] for name in row if name in known[table]} for row in salvaged.tables[table]]
+                if table == "runs":
+                    _fill_runs(database, folder, rows, salvaged)
+                    continue
+                for row in rows:
                     if "run_id" in row and not _has(database, "runs", "id", row["run_id"]):
-                        lost_notes += [str(row["text"])] if table == "notes" else []
+                        lost_notes += [str(row.get("text", ""))] if table == "notes" else []
                     else:
                         _insert(database, table, row)
-                if table == "runs":
-                    _read_again(database, folder, salvaged)
         database.execute("PRAGMA wal_checkpoint(TRUNCATE)")
     finally:
         database.close()
     return tuple(lost_notes)
 
 
+def _fill_runs(database: sqlite3.Connection, folder: Path, rows: Sequence[Row], salvaged: Salvaged) -> None:
+    """Enter the runs: those whose row is whole, those that their recording still tells, and what is left of others."""
+    faults = [faults_of(folder, row) for row in rows]
+    for row, found in zip(rows, faults, strict=True):
+        if not found:
+            _insert(database, "runs", row)
+    _read_again(database, folder, salvaged)
+    for row, found in zip(rows, faults, strict=True):
+        if found and not _has(database, "runs", "id", row.get("id")):
+            _insert(database, "runs", mended(row, found))
+
+
 def _read_again(database: sqlite3.Connection, folder: Path, salvaged: Salvaged) -> None:
     """Enter the runs of which only the name is left, from their recordings, under their numbers."""
     for run_id, (recording, data_sha256) in salvaged.names.items():
-        if not _has(database, "runs", "id", run_id) and (entry := _entry(folder / recording, data_sha256)):
+        if _has(database, "runs", "id", run_id) or not is_inside(folder, folder / str(recording)):
+            continue
+        if entry := _entry(folder / recording, data_sha256):
             insert_run(database, entry, recording, datetime.now(UTC).isoformat(timespec="seconds"), run_id)
 
 
@@ -99,7 +125,7 @@ def _entry(recording: Path, data_sha256: str) -> RunEntry | None:
 
 
 def _insert(database: sqlite3.Connection, table: str, row: Row) -> None:
-    if table == "runs" and not _has(database, "rig_files", "sha256", row["rig_sha256"]):
+    if table == "runs" and not _has(database, "rig_files", "sha256", row.get("rig_sha256")):
         row = {**row, "rig_sha256": None}
     places = ", ".join("?" * len(row))
     database.execute(f"INSERT OR IGNORE INTO {table} ({', '.join(row)}) VALUES ({places})", tuple(row.values()))

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from hil.errors import HilError
+from hil.parse_json import parse_json
 from hil.store.entry import DIAGNOSIS, IDENTIFICATION, ONLINE, Attachment
 from hil.store.run_store import RunStore, store_of
 
-ONLINE_SUFFIX = ".online.json"
+ONLINE_SCHEMA, ONLINE_SUFFIX = "hil.online/1", ".online.json"
 """What the on-line estimate of a run is called, after the stem of its recording."""
 
 _FILES = {"diagnosis.json": DIAGNOSIS, "identification.json": IDENTIFICATION}
@@ -86,14 +86,14 @@ def _kind(path: Path, recording: Path) -> str:
 
 
 def _has(attachments: Sequence[Attachment], kind: str, path: Path) -> bool:
-    text = path.read_text(encoding="utf-8")
+    text = path.read_text(encoding="utf-8", errors="replace")
     return any(entry.kind == kind and entry.document == text for entry in attachments)
 
 
 def recordings_named(path: Path) -> frozenset[str]:
     """Return the recordings, by stem, that a diagnosis.json or identification.json speaks of."""
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
+        document = parse_json(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):  # not one of ours, or damaged: it names none
         return frozenset()
     return frozenset(_names(document if isinstance(document, dict) else {}))

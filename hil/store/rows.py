@@ -11,6 +11,7 @@ from typing import Any
 from hil.store.alarms import COUNT
 from hil.store.entry import Attachment, Note, Run, RunEntry
 from hil.store.filters import VERDICT
+from hil.store.row_faults import faults_of, mended
 
 _RUNS = (
     "SELECT runs.*, coalesce(rig_files.name, '') AS rig_name, coalesce(rig_files.text, '') AS rig_text, "
@@ -68,17 +69,24 @@ def read_runs(
     return [_run(database, folder, row, document) for row in rows]
 
 
-def _run(database: sqlite3.Connection, folder: Path, row: sqlite3.Row, document: str) -> Run:
-    run_id = int(row["id"])
+def _run(database: sqlite3.Connection, folder: Path, read: sqlite3.Row, document: str) -> Run:
+    run_id = int(read["id"])
+    faults = faults_of(folder, dict(read))
+    row = mended(dict(read), faults)
+    if faults:
+        row["outcome"] = _damaged(faults, folder)
 
     def of_run(query: str) -> list[sqlite3.Row]:
         return database.execute(query, (run_id,)).fetchall()
 
     entry = RunEntry(
         recording=folder / row["recording"],
-        rig_name=row["rig_name"],
-        rig_text=row["rig_text"],
-        eds_sha256={row["inverter"]: row["sha256"] for row in of_run("SELECT * FROM eds WHERE run_id = ?")},
+        rig_name=str(row["rig_name"]),
+        rig_text=str(row["rig_text"]),
+        eds_sha256={
+            str(inverter): str(sha256)
+            for inverter, sha256 in of_run("SELECT inverter, sha256 FROM eds WHERE run_id = ?")
+        },
         settings=json.loads(row["settings"]),
         **{name: row[name] for name in _SAME_NAME},
     )
@@ -88,10 +96,17 @@ def _run(database: sqlite3.Connection, folder: Path, row: sqlite3.Row, document:
         run_id,
         entry,
         str(row["verdict"]),
-        tuple(Note(*note) for note in notes),
+        tuple(Note(str(written_utc), str(text)) for written_utc, text in notes),
         tuple(
-            Attachment(kind, added_utc, None if path is None else folder / path, text)
+            Attachment(str(kind), str(added_utc), None if path is None else folder / str(path), str(text))
             for kind, added_utc, path, text in attached
         ),
         int(row["alarms"]),
+    )
+
+
+def _damaged(faults: Sequence[str], folder: Path) -> str:
+    return (
+        f"damaged in the store ({', '.join(faults)}). 'hil runs rebuild --store {folder}' reads the run again from its "
+        "recording"
     )

@@ -70,7 +70,7 @@ def _rows(connection: sqlite3.Connection, query: str) -> list[Row]:
     found: dict[Any, Row] = {}
     for order in ("ASC", "DESC"):
         # The damage ends the reading; what came before it counts.
-        with contextlib.suppress(sqlite3.DatabaseError):
+        with contextlib.suppress(sqlite3.DatabaseError, UnicodeDecodeError):
             for row in connection.execute(f"{query} ORDER BY place {order}"):
                 found.setdefault(row["place"], {name: row[name] for name in row.keys() if name != "place"})
     return list(found.values())

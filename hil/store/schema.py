@@ -91,6 +91,25 @@ def bring_up_to_date(connection: sqlite3.Connection) -> None:
         raise
 
 
+def columns_of(connection: sqlite3.Connection) -> dict[str, set[str]]:
+    """Return the columns of every table of a store."""
+    tables = [str(row[0]) for row in connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'")]
+    return {
+        table: {str(row[0]) for row in connection.execute("SELECT name FROM pragma_table_info(?)", (table,))}
+        for table in tables
+    }
+
+
+def expected_columns() -> dict[str, set[str]]:
+    """Return the columns that a store of this version has."""
+    connection = sqlite3.connect(":memory:", isolation_level=None)
+    try:
+        bring_up_to_date(connection)
+        return columns_of(connection)
+    finally:
+        connection.close()
+
+
 def roll_back(connection: sqlite3.Connection) -> None:
     """Undo the transaction that is open; a full disk has ended it already."""
     if connection.in_transaction:

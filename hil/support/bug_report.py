@@ -18,13 +18,13 @@ from hil.support.versions import versions
 ABOUT = """What is in this report, for whoever is asked to send it: read it before you do.
 
 versions.json   versions of hil, Python and its libraries; the kind of machine
-rig/            the rig file, as it is but for what is named below
+rig/            the rig file without its comments, as it is but for what is named below
 log/            what hil was asked to do, and how it ended
 last_run.json   what the last recording says of itself: experiment, settings, timing; none of its samples
 
-Taken out and marked: keys, passwords, tokens and certificates; users in addresses; the folders of paths; the names of
-the user and of this machine. Operator's notes and recordings are not in it. Names of files and rigs are, and so are
-addresses of devices.
+Taken out and marked: keys, passwords, tokens and certificates; users and passwords in addresses; the folders of
+paths; the names of the user and of this machine. Comments of the rig file, operator's notes and recordings are not in
+it. Names of files and rigs are, and so are addresses of devices.
 """
 
 
@@ -87,7 +87,9 @@ def bug_report(rigs: tuple[Path, ...], runs: Path) -> BugReport:
     if not rigs:
         missing.append("rig file: none was named; give it by --rig")
     try:
-        parts.append(_json("last_run.json", redaction.document(_last_run(runs))))
+        run = _last_run(runs)
+        run["rig_text"] = redaction.toml(run["rig_text"])
+        parts.append(_json("last_run.json", redaction.document(run)))
     except InputError as error:  # a damaged store is what a report may be about
         missing.append(f"last run: {error}")
     return BugReport((*parts, *logs), redaction.counts, tuple(missing))
@@ -95,7 +97,8 @@ def bug_report(rigs: tuple[Path, ...], runs: Path) -> BugReport:
 
 def _rig(path: Path, redaction: Redaction) -> Part:
     try:
-        return Part(f"rig/{path.name}", _redacted(path, redaction))
+        text = path.read_text(encoding="utf-8", errors="replace")
+        return Part(f"rig/{path.name}", redaction.toml(text).encode())
     except OSError as error:
         raise UsageError(f"--rig {path}: expected a readable file, came: {error.strerror}") from error
 

@@ -14,12 +14,15 @@ import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from io import TextIOWrapper
 from logging.handlers import RotatingFileHandler
+from pathlib import Path
 from typing import Final
 
 from hil import __version__
 from hil.errors import UsageError
 from hil.support.folders import log_file
+from hil.support.redact import Redaction
 
 LEVELS: Final = ("debug", "info", "warning", "error", "off")
 """From everything, each frame on the bus included, to nothing."""
@@ -98,17 +101,38 @@ def _begin(command: str, arguments: Sequence[str]) -> None:
     LOGGER.info("version %s, Python %s, %s", __version__, platform.python_version(), platform.platform())
 
 
+class _OwnFile(RotatingFileHandler):
+    """A log that nobody else can read, also where an older version of this program has left it readable."""
+
+    def _open(self) -> TextIOWrapper:
+        for path in Path(self.baseFilename).parent.glob(f"{Path(self.baseFilename).name}*"):
+            path.chmod(0o600)
+        opened = os.fdopen(os.open(self.baseFilename, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600), "ab")
+        return TextIOWrapper(opened, encoding="utf-8", errors="backslashreplace", write_through=True)
+
+
+class _WithoutSecrets(logging.Formatter):
+    """Lines without passwords and tokens: a command line may hold them, and so may what a library says."""
+
+    def __init__(self, form: str, times: str) -> None:
+        super().__init__(form, times)
+        self._redaction = Redaction()
+
+    def format(self, record: logging.LogRecord) -> str:
+        return self._redaction.secrets(super().format(record))
+
+
 def _opened(level: str) -> logging.Handler | None:
     """Return the handler of the log; None, and a note, where none can be kept: no command fails for want of a log."""
     path = log_file()
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handler = RotatingFileHandler(path, maxBytes=BYTES, backupCount=KEPT, encoding="utf-8")
+        path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+        handler = _OwnFile(path, maxBytes=BYTES, backupCount=KEPT, encoding="utf-8")
     except OSError as error:
         sys.stderr.write(f"note: no log is kept, {path}: {error.strerror}. Set {VARIABLE}=off to go without.\n")
         return None
     handler.setLevel(level.upper())
-    form = logging.Formatter("%(asctime)s.%(msecs)03dZ %(process)d %(levelname)s %(name)s: %(message)s", "%FT%T")
+    form = _WithoutSecrets("%(asctime)s.%(msecs)03dZ %(process)d %(levelname)s %(name)s: %(message)s", "%FT%T")
     form.converter = time.gmtime
     handler.setFormatter(form)
     return handler

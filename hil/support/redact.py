@@ -1,14 +1,16 @@
 """Takes out of a text what is nobody else's business: secrets, and where on a disk things are.
 
-Taken out are, in this order: PEM blocks; values of keys and options whose name says secret (password, token, key, ca,
-certificate, ...); user and password in a URL; the folders of absolute paths (the file's name stays, and so do paths
-inside this program); names of the user and of the machine. What it takes out it marks, so that a reader sees that
-something was there. Too much is better than too little: a value after ``key`` goes even where it was harmless.
+Taken out are, in this order: PEM blocks; tokens of HTTP headers; values of keys and options whose name says secret
+(password, pass, auth, token, key, ca, certificate, ...), user or comment; user, password and token in a URL; the
+folders of absolute paths (the file's name stays, and so do paths inside this program); names of the user and of the
+machine. What it takes out it marks, so that a reader sees that something was there. Too much is better than too little:
+a value after ``key`` goes even where it was harmless.
 """
 
 from __future__ import annotations
 
 import getpass
+import os
 import platform
 import re
 import sys
@@ -18,7 +20,18 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-from hil.support.private_patterns import ASSIGNED, OPTION, PATH, PEM, QUOTED_PATH, SECRET_NAME, URL_USER
+from hil.support.private_patterns import (
+    ASSIGNED,
+    AUTHORISATION,
+    BUS_TOKEN,
+    OPTION,
+    PATH,
+    PEM,
+    QUOTED_PATH,
+    SECRET_NAME,
+    TOML_TEXT_OR_COMMENT,
+    URL_USER,
+)
 
 REMOVED: Final = "[removed]"
 FOLDER: Final = "[folder]"
@@ -50,13 +63,23 @@ class Redaction:
 
     def text(self, text: str) -> str:
         """Return a text without what is private."""
-        text = self._sub("PEM blocks", PEM, lambda _: REMOVED, text)
-        for pattern in (ASSIGNED, OPTION):
-            text = self._sub("secret values", pattern, lambda match: f'{match["name"]}"{REMOVED}"', text)
-        text = self._sub("users in URLs", URL_USER, lambda _: f"{REMOVED}@", text)
+        text = self.secrets(text)
         text = self._sub("folders", QUOTED_PATH, self._quoted, text)
         text = self._sub("folders", PATH, lambda match: self._path(match[0]), text)
         return self._without_names(text)
+
+    def secrets(self, text: str) -> str:
+        """Return a text without secrets, where folders and names may stay: a file of the user's own."""
+        text = self._sub("PEM blocks", PEM, lambda _: REMOVED, text)
+        text = self._sub("secret values", AUTHORISATION, lambda match: f"{match['scheme']} {REMOVED}", text)
+        for pattern in (ASSIGNED, OPTION):
+            text = self._sub("secret values", pattern, lambda match: f'{match["name"]}"{REMOVED}"', text)
+        text = self._sub("users in URLs", URL_USER, lambda _: f"{REMOVED}@", text)
+        return self._sub("tokens in URLs", BUS_TOKEN, lambda match: f"{match['server']}{REMOVED}", text)
+
+    def toml(self, text: str) -> str:
+        """Return a TOML file's text the same way as `text`, and without what people wrote beside its keys."""
+        return self.text(self._sub("comments", TOML_TEXT_OR_COMMENT, _without_comment, text))
 
     def document(self, value: Any, name: str = "") -> Any:
         """Return a JSON document the same way: each of its texts, and whatever stands under a secret name."""
@@ -95,6 +118,10 @@ class Redaction:
         return f"{FOLDER}/{parts.rpartition('/')[2]}"
 
 
+def _without_comment(match: re.Match[str]) -> str:
+    return "" if match["comment"] is not None else match[0]
+
+
 def _places() -> Iterator[tuple[str, str]]:
     found = {str(PACKAGES / name): f"<{name}>" for name in ("hil", "drivers", "estimator")}
     found |= {str(Path(prefix)): "<python>" for prefix in (sys.prefix, sys.base_prefix) if len(Path(prefix).parts) > 1}
@@ -102,7 +129,12 @@ def _places() -> Iterator[tuple[str, str]]:
 
 
 def _names() -> Iterator[tuple[str, str]]:
-    for name, mark in ((_user(), "[user]"), (Path.home().name, "[user]"), (platform.node(), "[host]")):
+    users = {
+        _user(),
+        Path.home().name,
+        *(os.environ.get(each, "") for each in ("USER", "LOGNAME", "SUDO_USER", "USERNAME")),
+    }
+    for name, mark in (*((user, "[user]") for user in sorted(users)), (platform.node(), "[host]")):
         if len(name) > 2 and name.lower() not in COMMON_NAMES:
             yield name, mark
 

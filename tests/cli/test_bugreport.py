@@ -37,6 +37,22 @@ SECRETS = {
     r"C:\Users\anna\customer\rig.toml": "customer",
     r'"C:\Users\the customer\rig.toml"': "customer",
     "user anna on annas-laptop": "anna",
+    'pass = "hunter2"': "hunter2",
+    "db_pass: hunter2": "hunter2",
+    "pwd=hunter2": "hunter2",
+    'auth = ["bert", "hunter2"]': "hunter2",
+    'basic_auth: "hunter2"': "hunter2",
+    "Authorization: Bearer abc123.def": "abc123",
+    "came Bearer abc123def": "abc123",
+    "Authorization: Basic YmVydDpodW50ZXIy": "YmVyd",
+    'user = "bert"': "bert",
+    "hil x --user bert": "bert",
+    '"username": "bert"': "bert",
+    'operator = "bert"': "bert",
+    'comment = "bert was here"': "bert",
+    "https://bert:hun/ter2@plc.example/x": "ter2",
+    "ftp://bert@plc.example": "bert",
+    "ready bus=ws://127.0.0.1:41003/GfkoLbtFsGWvu_qStyDe-CWzFLArjvay/ modbus=127.0.0.1:1": "GfkoL",
 }
 
 HARMLESS = (
@@ -48,6 +64,8 @@ HARMLESS = (
     "keyboard = 3, monkeys = 4, cable = 5",
     "see docs/formats.md",
     "host = 192.168.0.10, port = 502",
+    "high_pass_hz = 0.3, bypassed = 2",
+    "a basic identification, passed",
 )
 
 
@@ -87,6 +105,15 @@ def test_secrets_in_a_document_go_at_any_depth() -> None:
     assert json.loads(text)["n"] == 3
     assert not [secret for secret in ("k1", "p1") if secret in text]
     assert json.loads(text)["token"] == ["[removed]", "[removed]"]
+
+
+def test_comments_of_a_rig_file_are_taken_out_and_texts_with_a_hash_stay() -> None:
+    text = (
+        'name = "cell #2"  # Anna says: pin 1234\n# bert 0171 5550\nx = \'#3\' # y\nlong = """\n# kept\n"""\nn = 1 # z'
+    )
+    found = redaction()
+    assert found.toml(text) == 'name = "cell #2"\n\nx = \'#3\'\nlong = """\n# kept\n"""\nn = 1'
+    assert found.counts["comments"] == 4
 
 
 PRINTABLE = st.text(st.characters(min_codepoint=33, max_codepoint=126, exclude_characters="\"'\\#"), min_size=6)

@@ -86,7 +86,7 @@ def test_it_is_found_written_and_simulated_again(model: Path, tmp_path: Path) ->
         retarded(path, i)
     out = tmp_path / "elsewhere" / "out"
     out.parent.mkdir()
-    command = ["diagnose", str(names[0]), str(names[1]), "--model", str(model), "--out", str(out)]
+    command = ["diagnose", str(names[0]), str(names[1]), "--model", str(model), "--trust-laws", "--out", str(out)]
     assert run([*command, "--holdout", str(names[2])]) == 0
     verdict = json.loads((out / "diagnosis.json").read_text())
     assert verdict["verdict"] == "explained"
@@ -100,7 +100,9 @@ def test_it_is_found_written_and_simulated_again(model: Path, tmp_path: Path) ->
     own_law.install(())
     simulated = tmp_path / "simulated.csv"
     augmented = str(out / "augmented.toml")
-    assert run(["simulate", "--model", augmented, "--input", str(names[2]), "--out", str(simulated)]) == 0
+    assert (
+        run(["simulate", "--trust-laws", "--model", augmented, "--input", str(names[2]), "--out", str(simulated)]) == 0
+    )
     with simulated.open() as file:
         speed = np.array([float(row["speed_sim_rad_s"]) for row in csv.DictReader(file)])
     measured = np.genfromtxt(names[2], delimiter=",", names=True)["speed_rad_s"]
@@ -112,7 +114,7 @@ def test_it_is_rejected_where_it_is_not(model: Path, tmp_path: Path) -> None:
     for i, path in enumerate(recordings):
         bench.record(path, i, noise=0.02)
     out = tmp_path / "out"
-    assert run(["diagnose", *map(str, recordings), "--model", str(model), "--out", str(out)]) == 0
+    assert run(["diagnose", *map(str, recordings), "--model", str(model), "--trust-laws", "--out", str(out)]) == 0
     verdict = json.loads((out / "diagnosis.json").read_text())
     assert verdict["verdict"] == "no_mismatch"
     assert "retarder" in [rival["name"] for rival in verdict["rejected"]]
@@ -140,6 +142,6 @@ def test_a_law_that_can_not_be_used_is_refused(
     recording = tmp_path / "run.csv"
     bench.record(recording, 1)
     out = tmp_path / "out.csv"
-    assert run(["simulate", "--model", str(model), "--input", str(recording), "--out", str(out)]) == 2
+    assert run(["simulate", "--trust-laws", "--model", str(model), "--input", str(recording), "--out", str(out)]) == 2
     assert said in " ".join(capsys.readouterr().err.split())
     assert not out.exists()

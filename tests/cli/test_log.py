@@ -71,6 +71,19 @@ def test_an_unknown_level_is_refused(
     assert ("--log-level" if where == "option" else "HIL_LOG") in error
 
 
+def test_nobody_else_can_read_it_and_it_holds_no_secret() -> None:
+    log_file().parent.mkdir(parents=True)
+    old = log_file().with_name("hil.log.1")
+    for path in (log_file(), old):
+        path.touch(mode=0o644)
+    assert run(["effects", "--password", "hunter2", "wss://bert:hunter2@plc.example/"], keep_log=True) == 2
+    for path in (log_file(), old):
+        assert path.stat().st_mode & 0o077 == 0
+    assert "hil effects --password" in log()
+    assert "hunter2" not in log()
+    assert "bert" not in log()
+
+
 def test_it_rotates_and_keeps_a_few(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(command_log, "BYTES", 500)
     for _ in range(12):

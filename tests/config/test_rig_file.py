@@ -312,3 +312,17 @@ class TestFilesItNames:
             read_rig(path)
         assert any(problem in line for line in refusal.value.problems)
         assert refusal.value.path == tmp_path / "plc.toml"
+
+
+@pytest.mark.parametrize("leads", ["absolute", "up", "link"])
+def test_a_file_outside_the_rigs_folder_is_refused(tmp_path: Path, leads: str) -> None:
+    """A rig file may be someone else's: what it names is in its own folder."""
+    outside, home = tmp_path / "other.eds", tmp_path / "rig"
+    outside.write_bytes(data_file("inverter.eds").read_bytes())
+    home.mkdir()
+    (home / "link.eds").symlink_to(outside)
+    named = {"absolute": str(outside), "up": "../other.eds", "link": "link.eds"}[leads]
+    text = EXAMPLE.read_text("utf-8").replace("[inverters.m1]", f'[inverters.m1]\neds = "{named}"', 1)
+    (home / "rig.toml").write_text(text, "utf-8")
+    with pytest.raises(RigFileError, match=r"inverters\.m1\.eds \| expected the name of a file inside .*/rig, none"):
+        read_rig(home / "rig.toml")

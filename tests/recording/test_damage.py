@@ -11,11 +11,12 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from hil.errors import RecordingError
 from hil.recording import RecordingWriter, Table, read_table, write_table
-from hil.recording.checksum import CHECKSUM, data_sha256, text_sha256
+from hil.recording.checksum import CHECKSUM, CHECKSUMS, data_sha256, sealed, text_sha256
 from hil.recording.differences import losses
 from hil.recording.formats import FORMATS, read_metadata
 from hil.recording.kinds import as_text
@@ -23,8 +24,8 @@ from hil.recording.sidecar import sidecar_of
 
 WRITABLE = [suffix for suffix, form in FORMATS.items() if form.write]
 
-TRIALS = {".mf4": 3}
-"""A damaged MDF file is read by a process of its own, which takes a second; the others take milliseconds."""
+TRIALS = {".mf4": 12}
+"""A damaged MDF file may end its reader, and a new one takes a second to start; the others take milliseconds."""
 
 
 @pytest.fixture
@@ -65,7 +66,10 @@ def test_a_damaged_recording_is_refused_or_read_as_it_was(tmp_path: Path, told: 
     for table in read:
         if not isinstance(table, str):
             assert [loss for loss in losses(told, table) if loss.startswith("column")] == []
-            assert table.metadata.get("rig_file") == told.metadata["rig_file"]
+            assert {key: value for key, value in table.metadata.items() if key in told.metadata} == told.metadata
+            assert {name: unit for name, unit in table.units.items() if unit} == {
+                n: u for n, u in told.units.items() if u
+            }
 
 
 def read_or_refusal(path: Path) -> Table | str:
@@ -178,3 +182,34 @@ def test_a_folder_that_can_not_be_written_is_told(tmp_path: Path, told: Table) -
         write_table(told, tmp_path / "taken.h5", replace=True)
     shutil.rmtree(tmp_path / "taken.h5")
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("suffix", WRITABLE)
+@pytest.mark.parametrize(
+    "other",
+    [
+        {"units": {"x": "gurlongs"}},
+        {"units": {}},
+        {"metadata": {"operator": "vindyday"}},
+        {"metadata": {"nperator": "windyday"}},
+        {"metadata": {}},
+        {"metadata": {"operator": "windyday", "more": ""}},
+    ],
+)
+def test_what_a_recording_says_of_itself_is_what_it_was_written_with(
+    tmp_path: Path, suffix: str, other: dict[str, dict[str, str]]
+) -> None:
+    """As if a bit had flipped in a unit, a key or a text, wherever a format keeps them."""
+    whole = sealed(Table(tmp_path / "x", {"x": np.arange(4.0)}, {"x": "furlongs"}, {"operator": "windyday"}))
+    said = {key: whole.metadata[key] for key in CHECKSUMS}
+    changed = replace(whole, **({**other, "metadata": other["metadata"] | said} if "metadata" in other else other))
+    for table, holds in ((whole, True), (changed, False)):
+        path = tmp_path / f"run_{holds}{suffix}"
+        write = FORMATS[suffix].write
+        assert write is not None
+        write(table, path)
+        if holds:
+            assert read_table(path).units == {"x": "furlongs"}
+        else:
+            with pytest.raises(RecordingError, match="expected the units and metadata it was written with, SHA-256"):
+                read_table(path)

@@ -12,7 +12,7 @@ import scipy.io
 
 from hil.errors import RecordingError
 from hil.recording import Table, read_table, write_table
-from hil.recording.checksum import CHECKSUM, data_sha256
+from hil.recording.checksum import sealed
 from hil.recording.formats import FORMATS
 
 
@@ -20,7 +20,7 @@ def test_parquet_keeps_units_and_metadata(tmp_path: Path, own_table: Table) -> N
     write_table(own_table, tmp_path / "run.parquet")
     table = read_table(tmp_path / "run.parquet")
     assert dict(table.units) == dict(own_table.units)
-    assert dict(table.metadata) == {**own_table.metadata, CHECKSUM: data_sha256(own_table.columns)}
+    assert dict(table.metadata) == dict(sealed(own_table).metadata)
 
 
 def test_parquet_of_other_programs_is_read(tmp_path: Path) -> None:
@@ -107,7 +107,7 @@ def test_a_file_that_is_not_there_is_refused(tmp_path: Path, suffix: str) -> Non
 
 def test_a_folder_is_no_recording(tmp_path: Path) -> None:
     (tmp_path / "run.csv").mkdir()
-    with pytest.raises(RecordingError, match="Is a directory"):
+    with pytest.raises(RecordingError, match="came a folder"):
         read_table(tmp_path / "run.csv")
 
 

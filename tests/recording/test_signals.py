@@ -292,3 +292,21 @@ def test_on_a_bench_the_position_is_imposed_and_the_torque_is_the_output(tmp_pat
     assert record.output[record.okay] == pytest.approx((20.0 * np.arange(20.0))[record.okay])
     assert record.torque_trusted.all()
     assert read_records([tmp_path / "bench.csv"], config, True)[0].imposed is not None
+
+
+@pytest.mark.parametrize("factor", [1e-300, 1e-100, 1e-20, 1e20, 1e25])
+@pytest.mark.parametrize("column", ["torque_m1_nm", "speed_rad_s", "time_s"])
+def test_values_that_no_drive_has_are_refused_by_file_and_column(
+    tmp_path: Path, own_table: Table, column: str, factor: float
+) -> None:
+    scaled = Table(tmp_path / "x.csv", {**own_table.columns, column: own_table.columns[column] * factor})
+    write_table(scaled, tmp_path / "x.csv")
+    said = "expected a sampling period between" if column == "time_s" else f"column {column}: expected a signal in SI"
+    with pytest.raises(RecordingError, match=rf"x\.csv: {said}"):
+        read_record(tmp_path / "x.csv")
+
+
+def test_a_torque_that_is_zero_throughout_is_a_torque(tmp_path: Path, own_table: Table) -> None:
+    idle = Table(tmp_path / "x.csv", {**own_table.columns, "torque_m1_nm": np.zeros(own_table.n_rows)})
+    write_table(idle, tmp_path / "x.csv")
+    assert not read_record(tmp_path / "x.csv").torque_nm[:, 0].any()

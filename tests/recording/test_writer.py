@@ -10,8 +10,9 @@ import pytest
 
 from hil.errors import RecordingError
 from hil.recording import RecordingWriter, columns, read_record, read_table
-from hil.recording.checksum import CHECKSUM, data_sha256
+from hil.recording.checksum import CHECKSUM, SAID, data_sha256, said_sha256
 from hil.recording.formats import FORMATS
+from hil.recording.writer import HEADER
 from hil.rig.sample import Sample, SampleFlag
 
 WRITABLE = [suffix for suffix, form in FORMATS.items() if form.write]
@@ -63,7 +64,8 @@ def test_a_recording_carries_units_metadata_and_checksum(tmp_path: Path, suffix:
     with RecordingWriter(tmp_path / f"run{suffix}", {"schema": "hil.recording/1", "rig": "bench"}) as writer:
         writer.append(sample(1))
     table = read_table(tmp_path / f"run{suffix}")
-    assert dict(table.metadata) == {"schema": "hil.recording/1", "rig": "bench", CHECKSUM: data_sha256(table.columns)}
+    said = {"schema": "hil.recording/1", "rig": "bench", SAID: said_sha256(table)}
+    assert dict(table.metadata) == {**said, CHECKSUM: data_sha256(table.columns)}
     assert dict(table.units) == dict(columns.UNITS)
 
 
@@ -176,3 +178,40 @@ def test_what_is_kept_is_known_when_the_run_is_over(tmp_path: Path) -> None:
         assert writer.kept is None
         writer.append(sample(1))
     assert writer.kept == tmp_path / "run.csv"
+
+
+@pytest.mark.parametrize("left", [HEADER, HEADER[:-1], HEADER[:7], ""])
+def test_a_part_file_without_a_sample_blocks_no_name(tmp_path: Path, left: str) -> None:
+    (tmp_path / "run.part.csv").write_text(left)
+    with RecordingWriter(tmp_path / "run.csv") as writer:
+        for k in range(12):
+            writer.append(sample(k))
+    check(tmp_path / "run.csv", 12)
+
+
+@pytest.mark.parametrize("left", [f"{HEADER}0.0", "time_s\n", f" {HEADER}"])
+def test_one_with_anything_else_in_it_does(tmp_path: Path, left: str) -> None:
+    (tmp_path / "run.part.csv").write_text(left)
+    with (
+        pytest.raises(RecordingError, match=r"run\.part\.csv: expected no such file"),
+        RecordingWriter(tmp_path / "run.csv"),
+    ):
+        pass
+    assert (tmp_path / "run.part.csv").read_text() == left
+
+
+def test_nor_is_one_taken_from_a_run_that_has_just_begun(tmp_path: Path) -> None:
+    with RecordingWriter(tmp_path / "run.csv") as first:
+        with pytest.raises(RecordingError, match="that goes on"), RecordingWriter(tmp_path / "run.csv"):
+            pass
+        first.append(sample(0))
+    check(tmp_path / "run.csv", 1)
+
+
+def test_a_disk_that_is_full_from_the_start_is_told_with_the_name_and_leaves_nothing(tmp_path: Path) -> None:
+    from tests.recording.test_damage import largest_file
+
+    refusal = pytest.raises(RecordingError, match=r"run\.csv: expected room for the recording, came: .*too large")
+    with refusal, largest_file(10), RecordingWriter(tmp_path / "run.csv"):
+        pass
+    assert list(tmp_path.iterdir()) == []

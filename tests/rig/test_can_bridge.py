@@ -64,6 +64,5 @@ def test_host_that_dies_in_the_middle_of_frames_is_no_defect() -> None:
 
 def test_taken_port_is_refused() -> None:
     with CanBridge(ANY_PORT, "a") as first:
-        port = int(first.url.rstrip("/").rpartition(":")[2])
         with pytest.raises(BusDown, match=r"can't serve at 127\.0\.0\.1"):
-            CanBridge(Address("127.0.0.1", port), "b")
+            CanBridge(Address("127.0.0.1", first.port), "b")

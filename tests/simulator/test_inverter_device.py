@@ -94,7 +94,7 @@ def test_leaving_operation_enabled_takes_the_torque_away_at_once(command: Comman
     (990, 20, 600.0, True),
     (-1000, 0, -600.0, False),
     (-1000, -1, -600.0, True),
-    (32767, 32767, 600.0, True),
+    (1000, 1000, 600.0, True),
     (990, -20, 582.0, False),
 ])  # fmt: skip
 def test_torque_is_limited_to_max_torque_and_says_so(base: int, prbs: int, torque_nm: float, limited: bool) -> None:
@@ -105,6 +105,25 @@ def test_torque_is_limited_to_max_torque_and_says_so(base: int, prbs: int, torqu
     assert made.torque_nm == pytest.approx(torque_nm)
     assert made.read(0x6077) == round(torque_nm / 0.6)
     assert bool((made.read(0x6041) or 0) & 1 << 11) is limited
+
+
+@pytest.mark.parametrize("index", [0x6071, 0x60B2])
+@pytest.mark.parametrize(("value", "abort_code"), [(1001, 0x06090031), (32767, 0x06090031), (-1001, 0x06090032)])
+def test_a_torque_beyond_max_torque_is_refused_and_the_one_before_holds(
+    index: int, value: int, abort_code: int
+) -> None:
+    made = enabled()
+    made.write(index, 100)
+    with pytest.raises(ObjectRefused) as refusal:
+        made.write(index, value)
+    assert refusal.value.abort_code == abort_code
+    made.step(0.0, PERIOD_S)
+    assert made.torque_nm == pytest.approx(60.0)
+    assert (made.read(0x6041) or 0) & 1 << 11
+    made.write(index, 50)
+    made.step(0.0, PERIOD_S)
+    assert made.torque_nm == pytest.approx(30.0)
+    assert not (made.read(0x6041) or 0) & 1 << 11
 
 
 def test_profile_torque_starts_its_slope_at_zero_each_time_it_is_enabled() -> None:

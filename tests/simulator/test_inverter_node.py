@@ -192,3 +192,35 @@ def test_heartbeat_follows_its_object_and_the_nmt_state(armed: Bench) -> None:
 
 def test_controlword_over_sdo_and_rpdo_is_one_object(armed: Bench) -> None:
     assert objects(armed).upload(0x6040) == 0x000F
+
+
+@pytest.mark.parametrize("permille", [1001, 32767, -32768])
+def test_rpdo_beyond_max_torque_is_not_taken_and_said_in_the_statusword(armed: Bench, permille: int) -> None:
+    with armed.intruder() as bus:
+        bus.send(frame(0x205, b"\x0f\x00" + permille.to_bytes(2, "little", signed=True) + bytes(2)))
+        assert armed.m1.await_feedback(armed.link.sync(), timeout_s=5.0) is not None
+    assert armed.rig.torque_nm[0] == pytest.approx(120.0)
+    assert objects(armed).upload(0x6041) & 1 << 11
+
+
+@pytest.mark.parametrize("length", range(8))
+def test_an_sdo_frame_that_is_too_short_is_passed_over(armed: Bench, length: int) -> None:
+    """One of length 0 ended the simulated bus."""
+    with armed.intruder() as bus:
+        bus.send(frame(0x600 + M1.node_id, b"\x40\x41\x60\x00\x00\x00\x00\x00"[:length]))
+    with suppress(ProtocolViolation):
+        armed.link.raise_if_failed()
+    assert objects(armed).upload(0x6040) == 0x000F
+    assert armed.m1.await_feedback(armed.link.sync(), timeout_s=5.0) is not None
+    assert armed.rig.torque_nm[0] == pytest.approx(120.0)
+
+
+@pytest.mark.parametrize("cob_id", [0x080 + M1.node_id, 0x180 + M1.node_id, 0x200 + M1.node_id, 0x580 + M1.node_id,
+                                    0x600 + M1.node_id, 0x700 + M1.node_id, 0x77F, 0x7E5, 0x000])  # fmt: skip
+def test_an_empty_frame_of_any_service_ends_nothing(armed: Bench, cob_id: int) -> None:
+    with armed.intruder() as bus:
+        bus.send(frame(cob_id, b""))
+    with suppress(ProtocolViolation):
+        armed.link.raise_if_failed()
+    armed.cycle(guarded(120.0))
+    assert armed.rig.torque_nm[0] == pytest.approx(120.0)

@@ -10,11 +10,13 @@ from typing import Any
 import pytest
 
 from estimator.identification.tracking.alarm import Alarm, Level
-from hil.store import RunStore, register_run
+from hil.recording import read_table
+from hil.store import RunStore, entry_of, register_run
 from hil.store.alarms import found_changes, statements
 from hil.store.entry import ONLINE
 from hil.store.facts import alarms_of, facts_of, results_of
 from hil.store.remove import remove_files
+from hil.store.results import ONLINE_SCHEMA
 
 Record = Callable[..., Path]
 
@@ -89,7 +91,7 @@ def test_an_alarm_comes_back_from_json_as_it_was() -> None:
 def test_a_recording_that_is_deleted_takes_its_course_along(tmp_path: Path, record: Record) -> None:
     recording = record("a.csv")
     path = tmp_path / "a.online.json"
-    path.write_text("{}", encoding="utf-8")
-    assert path in remove_files(recording)
+    path.write_text(json.dumps({"schema": ONLINE_SCHEMA}), encoding="utf-8")
+    assert path in remove_files(entry_of(read_table(recording)))
     assert not path.exists()
     assert not recording.exists()

@@ -19,7 +19,7 @@ MANUFACTURER = range(0x2000, 0x6000)
 """Indices that belong to the maker."""
 
 _LISTS = ("MandatoryObjects", "OptionalObjects", "ManufacturerObjects")
-_POSITION = re.compile(r"\d+")
+_POSITION = re.compile(r"\d{1,9}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +51,7 @@ def check_lists(context: EdsContext) -> Iterator[EdsFinding]:
 
 
 def _count(section: EdsSection) -> Iterator[EdsFinding]:
-    there = [int(key) for key in section.keys if _POSITION.fullmatch(key)]
+    there = {int(key) for key in section.keys if _POSITION.fullmatch(key)}
     written = read_number(section.get("SupportedObjects") or "")
     if written != len(there):
         expected = f"{len(there)}, the objects in the list"

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from drivers.canopen.pdo_map import (
     COB_ID_EXTENDED,
     COB_ID_INVALID,
+    MAX_MAPPED,
     MAX_PDO_BYTES,
     RPDO_COMMUNICATION,
     RPDO_MAPPING,
@@ -104,6 +105,10 @@ def _mapping(context: EdsContext, direction: _Direction, described: EdsObject) -
     if zero is None or not count or count in MULTIPLEX:
         return
     severity, bits = context.severity(described.index), 0
+    if not 0 < count <= MAX_MAPPED:
+        expected = f"at most {MAX_MAPPED} mapped objects (CiA 301)"
+        yield at_key(severity, zero.section, "DefaultValue", expected, "", "Correct the count.")
+        return
     for n in range(1, count + 1):
         entry = described.entries.get(n)
         value = None if entry is None else entry.default(SAMPLE_NODE_ID)

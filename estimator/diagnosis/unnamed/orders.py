@@ -23,6 +23,12 @@ APART = 10.0
 
 BINS_PER_WAVE = 4.0
 
+LONGEST_TRAVEL = 30_000.0
+"""Angle of one spectrum [rad], some 5000 turns: its grid has a million places."""
+
+FEWEST_SAMPLES = 1024
+"""Samples in such a piece; with fewer its waves are not seen."""
+
 
 def peaks(signals: Sequence[FloatArray], angles: Sequence[FloatArray]) -> FloatArray:
     """Return the orders at which signals of recordings have most power over the angle, strongest first.
@@ -38,6 +44,9 @@ def peaks(signals: Sequence[FloatArray], angles: Sequence[FloatArray]) -> FloatA
         Periods per motor turn; K may be 0.
     """
     width = 2.0 * np.pi / (BINS_PER_WAVE * HIGHEST_ORDER)
+    signals, angles = _pieces(signals, angles)
+    if not angles:
+        return np.zeros(0)
     travel = max(float(np.ptp(angle)) for angle in angles)
     if travel < 2.0 * np.pi * SLOWEST_WAVE / HIGHEST_ORDER:
         return np.zeros(0)
@@ -60,6 +69,26 @@ def peaks(signals: Sequence[FloatArray], angles: Sequence[FloatArray]) -> FloatA
                 fresh.append(i)
         chosen += fresh
     return np.asarray(orders[chosen])
+
+
+def _pieces(
+    signals: Sequence[FloatArray], angles: Sequence[FloatArray]
+) -> tuple[Sequence[FloatArray], Sequence[FloatArray]]:
+    """Cut recordings that travel further than `LONGEST_TRAVEL`, whose grid over the angle would have no bound.
+
+    Pieces with too few samples for the waves in them are left out: all of them where the angle's unit is wrong.
+    """
+    if max(float(np.ptp(angle)) for angle in angles) <= LONGEST_TRAVEL:
+        return signals, angles
+    cut: tuple[list[FloatArray], list[FloatArray]] = ([], [])
+    for signal, angle in zip(signals, angles, strict=True):
+        place = np.floor((angle - angle.min()) / LONGEST_TRAVEL)
+        for each in np.unique(place):
+            inside = place == each
+            if np.count_nonzero(inside) >= FEWEST_SAMPLES:
+                cut[0].append(signal[inside])
+                cut[1].append(angle[inside])
+    return cut
 
 
 def _centred(signal: FloatArray) -> FloatArray:

@@ -20,6 +20,7 @@ from hil.cli.commission.options import (
     Yes,
 )
 from hil.cli.pace import Pace, PaceOption
+from hil.cli.trust_option import TrustLaws
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -39,6 +40,7 @@ def commission(
     repeat: Repeat = None,
     keep_results: KeepResults = "",
     model: Model = None,
+    trust_laws: TrustLaws = False,
     travel: Travel = None,
     pace: PaceOption = Pace.REAL,
     bus: Bus = None,
@@ -66,12 +68,12 @@ def commission(
     source = RigSource(rig, rig.read_text(encoding="utf-8"), bus, modbus)
     console = Console(stderr=as_json, highlight=False)
     if dry_run:
-        print_plan(job_in(out, source, model, travel, pace, console), console, as_json)
+        print_plan(job_in(out, source, model, trust_laws, travel, pace, console), console, as_json)
         return
     require_folder(out)
     out.mkdir(parents=True, exist_ok=True)
     with sole_use(out):
-        job = job_in(out, source, model, travel, pace, console)
+        job = job_in(out, source, model, trust_laws, travel, pace, console)
         _to_its_report(job, who_answers(console, yes, keep_results), asked, console, as_json)
 
 

@@ -21,7 +21,13 @@ if TYPE_CHECKING:
 
 
 def job_in(
-    folder: Path, source: RigSource, model: Path | None, travel_m_per_rad: float | None, pace: Pace, console: Console
+    folder: Path,
+    source: RigSource,
+    model: Path | None,
+    trust_laws: bool,
+    travel_m_per_rad: float | None,
+    pace: Pace,
+    console: Console,
 ) -> Job:
     """Make the job of a folder, with the state an earlier call has left there."""
     rig = source.rig()
@@ -34,7 +40,7 @@ def job_in(
         rig=rig,
         state=state,
         runner=Runner(source, folder, conditions),
-        nominal=None if model is None else read_model(model).model,
+        nominal=None if model is None else read_model(model, trust_laws).model,
         travel_m_per_rad=DEFAULT_TRAVEL_M_PER_RAD if travel_m_per_rad is None else travel_m_per_rad,
         travel_is_given=travel_m_per_rad is not None,
         say=lambda line: console.print(line, markup=False, soft_wrap=not console.is_terminal),

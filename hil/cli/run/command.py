@@ -9,6 +9,7 @@ import typer
 
 from hil.cli.filter_option import FilterOf, FilterRun
 from hil.cli.pace import Pace, PaceOption
+from hil.cli.trust_option import TrustLaws
 from hil.errors import UsageError
 
 
@@ -35,6 +36,7 @@ def run(
     ] = True,
     filter_of: FilterOf = None,
     filter_run: FilterRun = None,
+    trust_laws: TrustLaws = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Run one experiment, record its measured part, and follow the resonance while driving.
@@ -49,7 +51,7 @@ def run(
     if dry_run:
         from hil.cli.run.prediction import predict
 
-        predict(rig_file, experiment, as_json)
+        predict(rig_file, experiment, as_json, trust_laws)
         return
     if out is None:
         raise UsageError("hil run: expected --out REC, a recording to write, or --dry-run; came neither.")

@@ -11,9 +11,9 @@ from hil.config.rig_file import Rig
 from hil.rig.dry_run import dry_run
 
 
-def predict(rig: Rig, experiment: str, as_json: bool) -> None:
+def predict(rig: Rig, experiment: str, as_json: bool, trust_laws: bool) -> None:
     """Print torque and speed of an experiment as predicted."""
-    prediction = dry_run(rig, experiment)
+    prediction = dry_run(rig, experiment, trust_laws)
     if as_json:
         typer.echo(json.dumps({"schema": "hil.dry_run/1", "experiment": experiment, **asdict(prediction)}))
         return

@@ -22,14 +22,16 @@ def delete(
 
     As long as the recording is there, 'hil runs rebuild' enters it again.
     """
-    from hil.store.remove import remove_files
+    from hil.store.remove import remove_files, require_own
 
     with opened(store) as runs:
         found = runs.get(run)
+        if with_recording:
+            require_own(found.entry)
         what = f"run {run}, {found.entry.experiment} of {found.entry.started_utc}"
         _confirm(f"delete {what}{f', and {found.entry.recording}' if with_recording else ''}?", yes)
         runs.delete(run)
-    removed = remove_files(found.entry.recording) if with_recording else []
+    removed = remove_files(found.entry) if with_recording else []
     typer.echo(f"deleted {what}")
     for path in removed:
         typer.echo(f"deleted {path}")

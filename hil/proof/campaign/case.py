@@ -7,7 +7,6 @@ recordings.
 from __future__ import annotations
 
 import json
-import shutil
 import tempfile
 import time
 from collections.abc import Mapping, Sequence
@@ -19,6 +18,7 @@ from hil.proof.campaign.kinds import Kind
 from hil.proof.command import CommandFailed, run_hil
 from hil.proof.fresh import fresh_over_floor
 from hil.proof.make_case import write_recording, write_sealed, write_shown
+from hil.proof.own_folder import replace_own
 from hil.proof.truth.case import Case, TruthRecording, make_case
 
 
@@ -70,8 +70,7 @@ def run_made(case: Case, folder: Path, limit_s: float) -> tuple[dict[str, Any], 
     """Diagnose and unseal a case that is made already; see `run_case`."""
     with tempfile.TemporaryDirectory(prefix="hil-case-") as neutral:
         answer = _ask(case, Path(neutral), limit_s)
-        shutil.rmtree(folder, ignore_errors=True)
-        shutil.copytree(neutral, folder)
+        replace_own(folder, Path(neutral))
     write_sealed(case, folder / "sealed")
     return json.loads(json.dumps(case.truth())), answer
 

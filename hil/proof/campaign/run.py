@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from hil.errors import RecordingError, UsageError
+from hil.parse_json import parse_json
 from hil.proof.campaign.band import score_band
 from hil.proof.campaign.case import run_case
 from hil.proof.campaign.kinds import ALL, Group, Kind, parse_kinds, parse_seeds
@@ -49,9 +50,9 @@ def read_results(path: Path) -> dict[tuple[str, int], Row]:
         return rows
     for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
         try:
-            row = json.loads(line)
+            row = parse_json(line)
             rows[row["kind"], row["seed"]] = row
-        except (json.JSONDecodeError, KeyError, TypeError) as error:
+        except (ValueError, KeyError, TypeError) as error:
             raise RecordingError(
                 path, f"line {number}: expected one case as JSON with kind and seed, came {line[:40]!r}. Remove it."
             ) from error

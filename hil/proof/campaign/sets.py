@@ -8,12 +8,12 @@ campaign's are.
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 from hil.errors import RecordingError
+from hil.parse_json import parse_json
 from hil.proof.campaign.run import write_summary
 from hil.proof.campaign.statistics import Row
 
@@ -37,8 +37,8 @@ def _rows(path: Path) -> list[Row]:
             path, f"expected the scoreboard of an opened set, it is not there. hil prove open {path.parent}"
         )
     try:
-        rows: list[Row] = json.loads(path.read_text(encoding="utf-8"))["cases"]
-    except (json.JSONDecodeError, KeyError, TypeError) as error:
+        rows: list[Row] = parse_json(path.read_text(encoding="utf-8"))["cases"]
+    except (ValueError, KeyError, TypeError) as error:
         raise RecordingError(path, f"expected a scoreboard with its cases, came another file ({error}).") from error
     return rows
 

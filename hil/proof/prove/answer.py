@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from hil.proof.command import CommandFailed, run_hil
+from hil.proof.own_folder import replace_own
 from hil.proof.prove.each import each
 from hil.proof.prove.make import Progress
 from hil.proof.prove.manifest import (
@@ -25,6 +26,7 @@ from hil.proof.prove.manifest import (
     Shown,
     digest_of,
     digests_of,
+    place_in,
     read_commitments,
     read_list,
     require_unchanged,
@@ -43,7 +45,8 @@ def answer(folder: Path, jobs: int, progress: Progress, limit_s: float = LIMIT_S
     Raises
     ------
     UsageError, SealBroken
-        If the folder has no set, or a case has changed since it was made.
+        If the folder has no set, a case has changed since it was made, or its answer would take the place of something
+        else.
     """
     cases = read_commitments(folder)
     answered: dict[str, Any] = _answered(folder, cases)
@@ -64,12 +67,12 @@ def _answered(folder: Path, cases: Mapping[str, Shown]) -> dict[str, Any]:
     return {
         name: entry
         for name, entry in listed.items()
-        if entry["case"] == known.get(name) and (folder / VERDICTS / name).is_dir()
+        if entry.get("case") == known.get(name) and (folder / VERDICTS / name).is_dir()
     }
 
 
 def _answer_one(folder: Path, name: str, shown: Shown, limit_s: float) -> dict[str, Any]:
-    case, out = folder / CASES / name, folder / VERDICTS / name
+    case, out = place_in(folder, CASES, name), place_in(folder, VERDICTS, name)
     require_unchanged(case, shown.files)
     began = time.perf_counter()
     with tempfile.TemporaryDirectory(prefix="hil-case-") as neutral:
@@ -84,7 +87,7 @@ def _answer_one(folder: Path, name: str, shown: Shown, limit_s: float) -> dict[s
         except CommandFailed as failure:
             (Path(neutral) / "out" / FAULT).write_text(f"{failure}\n", encoding="utf-8")
         took_s = time.perf_counter() - began
-        shutil.rmtree(out, ignore_errors=True)
-        shutil.copytree(Path(neutral) / "out", out)
-    files = digests_of(out, sorted(path.name for path in out.iterdir()))
+        built = Path(neutral) / "out"
+        files = digests_of(built, sorted(path.name for path in built.iterdir()))
+        replace_own(out, built)
     return {"case": digest_of(dict(shown.files)), "files": files, "diagnose_s": round(took_s, 2)}

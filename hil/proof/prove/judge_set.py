@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from hil.errors import UsageError
+from hil.parse_json import parse_json
 from hil.proof.campaign.band import score_band
 from hil.proof.campaign.case import Answer
 from hil.proof.campaign.kinds import kind
@@ -26,6 +27,7 @@ from hil.proof.prove.manifest import (
     VERDICTS_LIST,
     Shown,
     digest_of,
+    place_in,
     read_commitments,
     read_list,
     require_unchanged,
@@ -34,6 +36,9 @@ from hil.proof.prove.vault import unlock
 from hil.proof.seal import SealBroken, verify
 
 Row = dict[str, Any]
+
+LARGEST_TRUTH_BYTES = 1 << 28
+"""What is unpacked of a sealed truth at most; with its fresh recordings one has a few million bytes."""
 
 
 def judge_set(folder: Path, key: bytes, jobs: int, progress: Progress, verdicts: str | None = None) -> list[Row]:
@@ -64,6 +69,9 @@ def judge_set(folder: Path, key: bytes, jobs: int, progress: Progress, verdicts:
         raise UsageError(
             f"{folder}: expected a verdict for every case, none for {', '.join(missing)}. hil prove run DIR"
         )
+    for name, entry in answered.items():
+        if not isinstance(entry.get("diagnose_s"), int | float):
+            raise UsageError(f"{folder / VERDICTS_LIST}: {name}: expected diagnose_s, a number of seconds, came none")
     rows: dict[str, Row] = {}
     for name, row in each(lambda name: _judge_one(folder, key, name, cases[name], answered[name]), list(cases), jobs):
         rows[name] = row
@@ -72,19 +80,31 @@ def judge_set(folder: Path, key: bytes, jobs: int, progress: Progress, verdicts:
 
 
 def _judge_one(folder: Path, key: bytes, name: str, shown: Shown, answered: Mapping[str, Any]) -> Row:
-    require_unchanged(folder / CASES / name, shown.files)
-    if answered["case"] != digest_of(dict(shown.files)):
+    require_unchanged(place_in(folder, CASES, name), shown.files)
+    if answered.get("case") != digest_of(dict(shown.files)):
         raise SealBroken(f"{folder / VERDICTS / name}: answers another case than {folder / CASES / name}")
-    require_unchanged(folder / VERDICTS / name, answered["files"])
-    opened = json.loads(zlib.decompress(unlock(key, name, folder / SEALED / f"{name}.sealed")))
+    require_unchanged(place_in(folder, VERDICTS, name), answered["files"])
+    sealed = place_in(folder, SEALED, f"{name}.sealed")
+    opened = _unpacked(sealed, unlock(key, name, sealed))
     truth = verify(shown.commitment, opened)
     planted, case, fresh = kind(str(truth["kind"])), truth["case"], truth["fresh"]
     if not isinstance(case, dict) or not isinstance(fresh, dict):
         raise SealBroken(f"{folder / SEALED / name}: expected a truth with case and fresh recordings")
-    answer = _answer(folder / VERDICTS / name, fresh, float(answered["diagnose_s"]))
+    answer = _answer(folder / VERDICTS / name, fresh, answered["diagnose_s"])
     seed = int(str(truth["seed"]))
     band = score_band(planted, seed, case, answer.diagnosis)
     return {"case": name, **score(planted, seed, case, answer), "band": band}
+
+
+def _unpacked(path: Path, content: bytes) -> object:
+    unpacking = zlib.decompressobj()
+    try:
+        text = unpacking.decompress(content, LARGEST_TRUTH_BYTES)
+        if not unpacking.eof:
+            raise ValueError(f"more than {LARGEST_TRUTH_BYTES} bytes, or a part of them")
+        return parse_json(text.decode("utf-8"))
+    except (ValueError, zlib.error) as error:
+        raise SealBroken(f"{path}: expected a truth as hil prove make seals it, came {error}") from error
 
 
 def _answer(verdict: Path, fresh: Mapping[str, str], took_s: float) -> Answer:

@@ -14,12 +14,17 @@ from pathlib import Path
 from typing import Any
 
 from hil.errors import UsageError
+from hil.inside import is_inside, is_plain
+from hil.parse_json import parse_json
 from hil.proof.seal import SealBroken, canonical_json
 
 CASES, SEALED, VERDICTS = "cases", "sealed", "verdicts"
 COMMITMENTS = Path(CASES) / "commitments.json"
 VERDICTS_LIST = Path(VERDICTS) / "verdicts.json"
 SCHEMA = "hil.prove/1"
+
+_SHOWN = 80
+"""Characters of a wrong name that a message shows."""
 
 Digests = Mapping[str, str]
 """File name to SHA-256."""
@@ -42,9 +47,11 @@ def require_unchanged(folder: Path, digests: Digests) -> None:
     ------
     SealBroken
         Naming the first that is missing or has changed.
+    UsageError
+        If one is a link that leads out of the folder.
     """
     for name, digest in digests.items():
-        path = folder / name
+        path = place_in(folder, name)
         if not path.is_file():
             raise SealBroken(f"{path}: expected the file that is in the list, it is gone. Believe no score without it.")
         if digests_of(folder, [name])[name] != digest:
@@ -67,7 +74,11 @@ def read_commitments(folder: Path) -> dict[str, Shown]:
     UsageError
         If the folder has no set, or its list is damaged.
     """
-    listed = read_list(folder / COMMITMENTS, "hil prove make DIR makes one")
+    path, advice = folder / COMMITMENTS, "hil prove make DIR makes one"
+    listed = read_list(path, advice)
+    for name, entry in listed.items():
+        if not isinstance(entry.get("commitment"), str):
+            raise UsageError(f"{path}: {name}: expected a commitment, came none; {advice}")
     return {name: Shown(entry["commitment"], entry["files"]) for name, entry in listed.items()}
 
 
@@ -77,10 +88,10 @@ def read_list(path: Path, advice: str) -> dict[str, Any]:
     Raises
     ------
     UsageError
-        If there is none, or it is damaged; with advice.
+        If there is none, it is damaged, or a name in it is more than that; with advice.
     """
     try:
-        listed = json.loads(path.read_text(encoding="utf-8"))
+        listed = parse_json(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise UsageError(f"{path}: expected a list of cases, can't be read: {error.strerror}; {advice}") from error
     except ValueError as error:
@@ -88,7 +99,35 @@ def read_list(path: Path, advice: str) -> dict[str, Any]:
     if not isinstance(listed, dict) or listed.get("schema") != SCHEMA or not isinstance(listed.get("cases"), dict):
         raise UsageError(f"{path}: expected an object of schema {SCHEMA} with cases; {advice}")
     cases: dict[str, Any] = listed["cases"]
+    for name, entry in cases.items():
+        if fault := _fault(name, entry):
+            raise UsageError(f"{path}: {fault}; {advice}")
     return cases
+
+
+def place_in(folder: Path, *names: str) -> Path:
+    """Return the path of a file or folder of a set.
+
+    Raises
+    ------
+    UsageError
+        If it is a link, or behind one, that leads out of the folder.
+    """
+    path = folder.joinpath(*names)
+    if not is_inside(folder, path):
+        raise UsageError(f"{path}: expected a place inside {folder}, came a link that leads out of it. Remove it.")
+    return path
+
+
+def _fault(name: str, entry: object) -> str:
+    """Say what is wrong with an entry of a list; names in it become paths. Empty where nothing is."""
+    if not is_plain(name):
+        return f"expected names of cases, plain ones such as case_001, came {name[:_SHOWN]!r}"
+    files = entry.get("files") if isinstance(entry, dict) else None
+    if not isinstance(files, dict) or not all(isinstance(digest, str) for digest in files.values()):
+        return f"{name}: expected an object with files, each with its digest, came something else"
+    wrong = next((file for file in files if not is_plain(file)), None)
+    return "" if wrong is None else f"{name}: expected names of files, plain ones, came {wrong[:_SHOWN]!r}"
 
 
 def write_list(path: Path, entries: Mapping[str, Any]) -> None:

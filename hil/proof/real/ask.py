@@ -25,6 +25,7 @@ from estimator.diagnosis.preconditions import prepare
 from estimator.signals.record import FloatArray, Record
 from hil.config.model_file import ModelFile, read_model, read_model_for_recordings, write_model
 from hil.proof.command import run_hil
+from hil.proof.own_folder import replace_own
 from hil.proof.real.case_file import MODEL, CaseFile, Judged, RunEntry
 from hil.proof.real.held_out import inner_blocks
 from hil.proof.real.prepare import write_shown
@@ -104,8 +105,7 @@ _FILES = {BEFORE: "retuned", AFTER: "augmented"}
 
 def _keep(answered: Path, out: Path, key: str) -> None:
     """Keep what the command wrote; the key comes last, so that what has one is whole."""
-    shutil.rmtree(out, ignore_errors=True)
-    shutil.copytree(answered, out)
+    replace_own(out, answered)
     (out / KEY).write_text(key)
 
 

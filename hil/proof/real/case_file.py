@@ -12,13 +12,17 @@ from pydantic import Field, model_validator
 from hil.config.problems import Fault, read_toml, refuse, validate
 from hil.config.table import Positive, Table, Text
 from hil.errors import FileProblem, UsageError
+from hil.inside import PLAIN
 from hil.recording.format_hints import FormatHints
 
 ROOM = Path(__file__).parent
 CASE, MODEL, TRUTH, PROVENANCE = "case.toml", "model.toml", "truth.toml", "provenance.md"
 
 Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
-Relative = Annotated[str, Field(pattern=r"^[^/\\.][^\\]*$")]
+_PART = rf"{PLAIN}( {PLAIN})*"
+Name = Annotated[str, Field(pattern=f"^{PLAIN}$")]
+Relative = Annotated[str, Field(pattern=f"^{_PART}(/{_PART})*$")]
+"""A path whose every part is a plain name; blanks between its words."""
 
 
 class RealFileError(FileProblem):
@@ -89,7 +93,7 @@ class RunEntry(Table):
     Without any held out, the blocks count that the diagnosis keeps out of a second fit of its own.
     """
 
-    name: Annotated[str, Field(pattern="^[A-Za-z0-9_.-]+$")]
+    name: Name
     fit: Annotated[list[Text], Field(min_length=1)]
     held_out: list[Text] = Field(default_factory=list)
 
@@ -121,7 +125,7 @@ class CaseFile(Table):
     judged: Annotated[Judged, Field(strict=False)]
     format: FormatHints = FormatHints()
     black_box: BlackBoxEntry
-    recordings: Annotated[dict[str, RecordingEntry], Field(min_length=1)]
+    recordings: Annotated[dict[Name, RecordingEntry], Field(min_length=1)]
     runs: Annotated[list[RunEntry], Field(min_length=1)]
 
     @model_validator(mode="after")

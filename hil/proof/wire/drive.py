@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 import tempfile
 import time
 from pathlib import Path
@@ -13,6 +12,7 @@ from hil.proof.campaign.case import Answer
 from hil.proof.campaign.kinds import kind
 from hil.proof.campaign.score import score
 from hil.proof.command import CommandFailed, run_hil
+from hil.proof.own_folder import replace_own
 from hil.proof.seal import verify
 from hil.proof.wire.concealed import Concealed
 from hil.proof.wire.rig_text import rig_text
@@ -51,8 +51,7 @@ def drive(name: str, concealed: Concealed, seed: int, out: Path, limit_s: float)
             (place / "rig.toml").write_text(rig_text(sealed), encoding="utf-8")
             answer = _work(place, limit_s)
             truth = _truth(sealed, concealed)
-        shutil.rmtree(out / name, ignore_errors=True)
-        shutil.copytree(place, out / name)
+        replace_own(out / name, place)
     told = {"case": name, "where": concealed.where, "said": answer.fault or ""}
     if concealed.refused:
         return {**told, **_refusal(concealed, seed, answer)}

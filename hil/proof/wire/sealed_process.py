@@ -5,13 +5,13 @@ from __future__ import annotations
 import json
 import re
 import subprocess
-import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import IO, cast
 
+from hil.child import environment, python
 from hil.errors import RunAborted
 from hil.proof.wire.sealed_rig import OPEN
 
@@ -105,17 +105,19 @@ def sealed_process(*arguments: str) -> Iterator[SealedProcess]:
     RunAborted
         If the rig does not come up; with what it said.
     """
-    with tempfile.TemporaryFile() as complaints:
-        pipes = _start(arguments, complaints)
+    with tempfile.TemporaryFile() as complaints, tempfile.TemporaryDirectory(prefix="hil-sealed-") as folder:
+        pipes = _start(arguments, complaints, folder)
         try:
             yield _meet(pipes)
         finally:
             pipes.end()
 
 
-def _start(arguments: tuple[str, ...], complaints: IO[bytes]) -> _Pipes:
+def _start(arguments: tuple[str, ...], complaints: IO[bytes], folder: str) -> _Pipes:
     process = subprocess.Popen(
-        [sys.executable, "-m", "hil.proof.wire.sealed_rig", *arguments],
+        python("-m", "hil.proof.wire.sealed_rig", *arguments),
+        cwd=folder,
+        env=environment(),
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=complaints,

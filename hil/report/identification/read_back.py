@@ -18,6 +18,7 @@ from estimator.identification.online.adaptation import Adaptation
 from estimator.signals.record import FloatArray
 from hil.config.problems import validate
 from hil.errors import FileProblem, UsageError
+from hil.parse_json import parse_json
 
 
 class _Part(BaseModel):
@@ -130,13 +131,15 @@ def _chosen(path: Path, entries: Sequence[_Recording], run: str | None, option: 
 
 def _json(path: Path) -> dict[str, Any]:
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
+        found = parse_json(path.read_text(encoding="utf-8"))
     except OSError as cause:
         raise FileProblem(path, f"the file | expected identification.json | came: {cause.strerror}") from cause
     except UnicodeDecodeError as cause:
         raise FileProblem(path, f"the file | expected UTF-8 text | came: {cause.reason}") from cause
     except json.JSONDecodeError as cause:
         raise FileProblem(path, f"line {cause.lineno} | expected JSON | came: {cause.msg}") from cause
+    except ValueError as cause:
+        raise FileProblem(path, f"the file | expected JSON | came: {cause}") from cause
     if not isinstance(found, dict):
         raise FileProblem(path, f"the file | expected a JSON object | came a {type(found).__name__}")
     return found

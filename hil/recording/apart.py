@@ -1,0 +1,174 @@
+"""Recordings read in a process apart: what a damaged or malicious file does to a compiled library ends there.
+
+Libraries that read binary formats trust what they read: a few changed bytes have them loop for ever, ask for all
+memory, or end the process. So none of them is let near a file here, whoever wrote it. The process is bounded in memory
+and time, runs nothing of the folder it is called in, and answers with plain arrays. It is started with the first file
+and serves the next ones, for starting takes a second; after anything but an answer it is ended, and a new one started.
+"""
+
+from __future__ import annotations
+
+import atexit
+import json
+import signal
+import subprocess
+import tempfile
+import threading
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final, Literal
+
+from hil.child import environment, python
+from hil.errors import RecordingError
+from hil.recording.bounds import memory_bytes, processor_s
+from hil.recording.kinds import Column
+from hil.recording.table import Table
+from hil.recording.table_stream import Document, receive, table_of
+
+PROCESS: Final = "hil.recording.apart_process"
+
+WAITING: Final = 6.0
+"""How much longer than its processor's time a reading may last, on a machine that does other things."""
+
+ENDING_S: Final = 5.0
+"""How long a process may take to end by itself."""
+
+ENVIRONMENT: Final = {
+    "OPENBLAS_NUM_THREADS": "1",
+    "OMP_NUM_THREADS": "1",
+    "MALLOC_ARENA_MAX": "2",
+    "ARROW_DEFAULT_MEMORY_POOL": "system",
+}
+"""Threads and allocators that reserve address space, which is what is bounded, are left out."""
+
+What = Literal["table", "metadata"]
+
+
+class _Gone(Exception):
+    """The process has ended before it answered."""
+
+
+class _Process:
+    """One process that reads, with its pipes and its empty folder."""
+
+    def __init__(self) -> None:
+        self._folder = tempfile.TemporaryDirectory(prefix="hil-reading-", ignore_cleanup_errors=True)
+        self._process: Any = subprocess.Popen(
+            python("-m", PROCESS),
+            cwd=self._folder.name,
+            env=environment(**ENVIRONMENT),
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+        )
+
+    def ask(self, path: Path, what: What, limit_s: float) -> tuple[Document, dict[str, Column]]:
+        """Have a file read.
+
+        Raises
+        ------
+        _Gone
+            If it does not answer, within the limit or at all.
+        """
+        watchdog = threading.Timer(limit_s, self._process.kill)
+        watchdog.start()
+        try:
+            request = json.dumps({"path": str(path.absolute()), "what": what})
+            self._process.stdin.write(f"{request}\n".encode())
+            self._process.stdin.flush()
+            return receive(self._process.stdout)
+        except (OSError, EOFError, ValueError, MemoryError) as error:  # also what is no answer at all
+            raise _Gone from error
+        finally:
+            watchdog.cancel()
+            watchdog.join()
+
+    def end(self, at_once: bool = True) -> int:
+        """End it, and return the status it ended with; one that is ending by itself is waited for."""
+        if at_once:
+            self._process.kill()
+        try:
+            self._process.wait(ENDING_S)  # how it ends by itself tells why
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        for pipe in (self._process.stdin, self._process.stdout):
+            try:
+                pipe.close()
+            except OSError:  # what was still to be written to a process that is gone
+                continue
+        self._folder.cleanup()
+        return int(self._process.returncode)
+
+
+class Reader:
+    """Reads recordings in a process apart, one after the other."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._process: _Process | None = None
+
+    def table(self, path: Path) -> Table:
+        """Read a recording.
+
+        Raises
+        ------
+        RecordingError
+            If it can't be read, also where that ends the process, or takes more than it may.
+        """
+        document, columns = self._read(path, "table")
+        return table_of(path, document, columns)
+
+    def metadata(self, path: Path) -> Mapping[str, str]:
+        """Read what a recording says of itself.
+
+        Raises
+        ------
+        RecordingError
+            As `table`.
+        """
+        said: Mapping[str, str] = self._read(path, "metadata")[0]["metadata"]
+        return said
+
+    def end(self) -> None:
+        """End the process, if there is one."""
+        with self._lock:
+            self._end()
+
+    def _read(self, path: Path, what: What) -> tuple[Document, dict[str, Column]]:
+        size = path.stat().st_size
+        with self._lock:
+            self._process = process = self._process or _Process()
+            try:
+                document, columns = process.ask(path, what, WAITING * processor_s(size))
+            except _Gone:
+                raise RecordingError(path, _why(self._end(at_once=False), size)) from None
+            except BaseException:  # Ctrl-C, for one: half an answer is no beginning for the next
+                self._end()
+                raise
+        if "problems" in document:
+            raise RecordingError(path, *document["problems"])
+        return document, columns
+
+    def _end(self, at_once: bool = True) -> int:
+        process, self._process = self._process, None
+        return 0 if process is None else process.end(at_once)
+
+
+def _why(status: int, file_bytes: int) -> str:
+    """Say what an ended process says of its file."""
+    if status in (-getattr(signal, "SIGXCPU", 0), -getattr(signal, "SIGKILL", 0)):
+        return (
+            f"expected a recording that is read in {processor_s(file_bytes):.0f} s, came one that is not: it is "
+            "damaged, or made to keep a program busy. Take a copy that is whole."
+        )
+    return (
+        f"expected a whole recording that is read in {memory_bytes(file_bytes) >> 20} MiB, came one that ends its "
+        f"reader (status {status}): it is damaged. Take a copy that is whole."
+    )
+
+
+READER: Final = Reader()
+"""The one of this program."""
+
+atexit.register(READER.end)

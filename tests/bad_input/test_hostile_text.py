@@ -1,0 +1,221 @@
+"""TOML, JSON and traces that no person wrote: refused by file and place, whichever command reads them."""
+
+from __future__ import annotations
+
+import json
+import os
+import struct
+import tracemalloc
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+
+import can
+import numpy as np
+import pytest
+
+from drivers.canopen.pdo_map import MAX_MAPPED, read_layout
+from drivers.datasheet.check.check import check_eds
+from drivers.datasheet.file import EdsFile
+from drivers.datasheet.number import octal_matters, read_formula, read_number
+from drivers.errors import ConfigMismatch
+from drivers.plc.register_map import RegisterMapError, load_register_map
+from drivers.resources import data_file
+from hil.cli.main import run
+from hil.config.problems import read_toml
+from hil.errors import InputError, RecordingError, RigFileError
+from hil.parse_json import parse_json
+from hil.recording import Table, read_table, write_table
+from hil.recording.sidecar import sidecar_of
+from hil.rig import replay as replaying
+from hil.rig.blf_file import CONTAINER_BYTES
+from hil.rig.replay import replay
+from hil.rig.trace_file import read_frames
+from tests.rig.serving import small_rig
+
+DEEP = 3000
+
+HOSTILE = {
+    "nested lists": f"x = {'[' * DEEP}{']' * DEEP}",
+    "nested tables": f"x = {'{a=' * DEEP}1{'}' * DEEP}",
+    "dotted": ".".join("a" * DEEP) + " = 1",
+    "long whole number": "x = " + "9" * 5000,
+    "whole number beyond a float": "x = " + "9" * 400,
+    "hexadecimal": "x = 0x" + "f" * 6000,
+    "below 64 bit": f"x = {-(1 << 63) - 1}",
+}
+
+
+@pytest.mark.parametrize("text", HOSTILE.values(), ids=HOSTILE)
+def test_toml_that_no_person_wrote_is_refused_by_every_reader(
+    tmp_path: Path, text: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "file.toml"
+    path.write_text(text)
+    with pytest.raises(RigFileError, match=r"file\.toml: .* \| expected .* \| came"):
+        read_toml(path, RigFileError)
+    for line in (
+        f"check {path}",
+        f"compare {path} a.csv",
+        f"run {path} x --dry-run",
+        f"commission {path} --out {tmp_path}/o",
+    ):
+        assert run(line.split()) == 2
+        assert "file.toml" in capsys.readouterr().err
+    with pytest.raises(RegisterMapError):
+        load_register_map(path)
+
+
+def test_whole_numbers_of_64_bit_are_read(tmp_path: Path) -> None:
+    (tmp_path / "file.toml").write_text(f"a = {(1 << 63) - 1}\nb = {-(1 << 63)}\nc = [[true]]")
+    assert read_toml(tmp_path / "file.toml", RigFileError) == {"a": (1 << 63) - 1, "b": -(1 << 63), "c": [[True]]}
+
+
+@pytest.mark.parametrize("kind", ["pipe", "folder", "device", "large"])
+def test_what_is_no_file_of_a_person_is_refused_and_not_waited_for(tmp_path: Path, kind: str) -> None:
+    path = Path("/dev/zero") if kind == "device" else tmp_path / "file.toml"
+    if kind == "pipe":
+        os.mkfifo(path)
+    elif kind == "folder":
+        path.mkdir()
+    elif kind == "large":
+        path.write_bytes(b"# comment\n" * (2 << 20))
+    with pytest.raises(RigFileError, match="expected a readable TOML file"):
+        read_toml(path, RigFileError)
+
+
+JSON = {"nested": "[" * DEEP + "]" * DEEP, "nested objects": '{"a":' * DEEP, "long": '{"a": ' + "9" * 5000 + "}"}
+
+
+@pytest.mark.parametrize("text", JSON.values(), ids=JSON)
+def test_json_that_no_person_wrote_is_refused_by_every_reader(
+    tmp_path: Path, text: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(ValueError, match=r"too deep|digits|Expecting|delimiter"):
+        parse_json(text)
+    recording = tmp_path / "run.csv"
+    write_table(Table(recording, {"x": np.arange(3.0)}, {"x": "s"}), recording)
+    sidecar_of(recording).write_text(text)
+    with pytest.raises(RecordingError, match=r"run\.csv\.json"):
+        read_table(recording)
+    (tmp_path / "identification.json").write_text(text)
+    (tmp_path / "cases").mkdir()
+    (tmp_path / "cases" / "commitments.json").write_text(text)
+    for line in (
+        f"replay {recording} --filter {tmp_path}/identification.json",
+        f"export st --model {tmp_path}/identification.json --out {tmp_path}/x.st",
+        f"prove run {tmp_path}",
+    ):
+        assert run(line.split()) == 2
+        capsys.readouterr()
+
+
+def log(path: Path, *times: str) -> Path:
+    path.write_text("".join(f"({time}) can0 080#\n" for time in times))
+    return path
+
+
+@pytest.mark.parametrize("time", ["inf", "-inf", "nan", "1e300", "1e18", "9" * 400])
+def test_a_trace_with_a_time_of_no_clock_is_refused(tmp_path: Path, time: str) -> None:
+    with pytest.raises(RecordingError, match=r"made\.log: expected"):
+        list(read_frames(log(tmp_path / "made.log", "1.0", time)))
+
+
+def test_a_trace_with_a_gap_of_years_is_not_filled_with_rows(tmp_path: Path) -> None:
+    path = log(tmp_path / "made.log", "1.0", "1.01", "1.02", "1e9", f"{1e9 + 0.01}")
+    with pytest.raises(RecordingError, match="expected one run, came one without SYNC for"):
+        list(replay(path, small_rig(), whole=True))
+    assert replaying.MOST_MISSED * 0.01 >= 600  # ten minutes of a sleeping host are
+
+
+def container(data: bytes, size: int | None = None, method: int = 2) -> bytes:
+    packed = zlib.compress(data, 9) if method == 2 else data
+    body = struct.pack("<H6xL4x", method, len(data)) + packed
+    head = struct.pack("<4sHHLL", b"LOBJ", 16, 1, 16 + len(body) if size is None else size, 10)
+    return head + body + bytes((16 + len(body)) % 4)
+
+
+@pytest.fixture
+def blf(tmp_path: Path) -> Callable[[bytes], Path]:
+    path = tmp_path / "made.blf"
+    with can.Logger(path) as logger:
+        logger(can.Message(timestamp=1.0, arbitration_id=0x80, is_extended_id=False))
+    head = path.read_bytes()[:144]
+
+    def write(content: bytes) -> Path:
+        path.write_bytes(head + content)
+        return path
+
+    return write
+
+
+def objects(count: int) -> bytes:
+    """Objects of a kind nobody knows, 32 bytes each."""
+    return struct.pack("<4sHHLL", b"LOBJ", 16, 1, 32, 99).ljust(32, b"\0") * count
+
+
+BAD_BLF = {
+    "one container of gigabytes": lambda: container(bytes(4 * CONTAINER_BYTES)),
+    "many containers": lambda: container(objects(CONTAINER_BYTES // 64)) * 40,
+    "an object of length 0": lambda: container(struct.pack("<4sHHLL", b"LOBJ", 16, 9, 0, 1).ljust(64, b"\0")),
+    "an object shorter than its header": lambda: container(
+        struct.pack("<4sHHLL", b"LOBJ", 16, 9, 8, 1).ljust(64, b"\0")
+    ),
+    "a container of length 0": lambda: container(objects(1), size=0),
+    "a method nobody knows": lambda: container(objects(1), method=7),
+}
+
+
+@pytest.mark.parametrize("make", BAD_BLF.values(), ids=BAD_BLF)
+def test_a_blf_that_unpacks_to_much_or_never_ends_is_refused(
+    blf: Callable[[bytes], Path], make: Callable[[], bytes]
+) -> None:
+    path = blf(make())
+    assert path.stat().st_size < 1 << 20
+    tracemalloc.start()
+    with pytest.raises(RecordingError, match=r"made\.blf: expected a bus trace"):
+        list(read_frames(path))
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 128 << 20
+
+
+def test_a_blf_with_objects_nobody_knows_is_read(blf: Callable[[bytes], Path]) -> None:
+    assert list(read_frames(blf(container(objects(3)) + container(objects(2), method=0)))) == []
+
+
+@pytest.mark.parametrize("count", [MAX_MAPPED + 1, 255, 1_600_000_000])
+def test_a_mapping_of_more_objects_than_a_pdo_has_is_refused(tmp_path: Path, count: int) -> None:
+    with pytest.raises(ConfigMismatch, match=f"expected at most {MAX_MAPPED} objects"):
+        read_layout(lambda index, subindex: count, 0x1800, 0x1A00)
+    text = data_file("inverter.eds").read_text("utf-8")
+    head, found, rest = text.partition("[1A00sub0]")
+    assert found
+    section, bracket, rest = rest.partition("\n[")
+    lines = [line for line in section.splitlines() if not line.startswith(("DefaultValue", "DataType"))]
+    changed = "\n".join([*lines, "DataType=0x0007", f"DefaultValue={count}"])
+    (tmp_path / "x.eds").write_text(head + found + changed + bracket + rest, "utf-8")
+    said = " ".join(str(finding) for finding in check_eds(tmp_path / "x.eds").findings)
+    assert "mapped objects" in said or count in (254, 255)
+    with pytest.raises(ConfigMismatch):
+        EdsFile(tmp_path / "x.eds", 1).pdo_carrying(0x1800, 0x1A00, 0x6041, 0x6077)
+
+
+@pytest.mark.parametrize("text", ["9" * 5000, "0" + "7" * 5000, "0x" + "f" * 5000, "-" + "1" * 5000])
+def test_a_number_of_thousands_of_digits_is_none(text: str) -> None:
+    assert read_number(text) is None
+    assert read_formula(f"$NODEID+{text}") is None
+    assert octal_matters(text) is False
+
+
+def test_a_list_with_keys_of_thousands_of_digits_and_a_million_entries_is_checked(tmp_path: Path) -> None:
+    entries = "\n".join(f"{n}=0x2000" for n in range(1, 100_000, 2))
+    text = data_file("inverter.eds").read_text("utf-8")
+    text += f"\n[ManufacturerObjects]\nSupportedObjects=1600000000\n{'9' * 5000}=0x2000\n{entries}\n"
+    (tmp_path / "x.eds").write_text(text, "utf-8")
+    assert check_eds(tmp_path / "x.eds").findings
+
+
+def test_every_refusal_is_of_the_input() -> None:
+    assert issubclass(RigFileError, InputError)
+    assert json.loads("1") == parse_json("1")

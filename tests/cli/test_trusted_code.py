@@ -1,0 +1,184 @@
+"""No code comes with a file: laws run only where they are trusted, and no process imports from its working folder."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from estimator.diagnosis import first_use
+from hil.child import python, safe_path
+from hil.cli.main import run
+from hil.proof.command import run_hil
+from hil.proof.wire.sealed_process import sealed_process
+from hil.recording import read_table
+from hil.simulator.simulation_model import simulation_model
+from tests.cli import bench
+
+ROOT = Path(__file__).resolve().parents[2]
+EXAMPLES = ROOT / "examples"
+
+RAN = "ran.txt"
+MODULE = f"""
+from pathlib import Path
+Path(__file__).with_name("{RAN}").write_text("ran")
+def drag(time_s, motor_speed, load_speed, twist, torque, size):
+    return size * motor_speed
+"""
+LAW = """
+[laws.retarder]
+function = "laws_of_another:drag"
+element = "motor"
+parameters = { size = { low = 0.0, high = 50.0, start = 1.0 } }
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Recordings, models and a rig file of someone else, with a law."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delitem(sys.modules, "laws_of_another", raising=False)
+    (tmp_path / "laws_of_another.py").write_text(MODULE)
+    for name in ("a.csv", "b.csv"):
+        bench.record(tmp_path / name, len(name))
+    bench.model(tmp_path / "drive.toml", bench.MODEL + LAW)
+    text = (EXAMPLES / "rig.toml").read_text("utf-8").replace("\n[simulation]", '\n[simulation]\nmodel = "drive.toml"')
+    (tmp_path / "rig.toml").write_text(text, "utf-8")
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "diagnose a.csv b.csv --model drive.toml --out out",
+        "simulate --model drive.toml --input a.csv --out out.csv",
+        "compare drive.toml a.csv",
+        "identify a.csv --model drive.toml --out out",
+        "paper a.csv b.csv --model drive.toml --out out",
+        "replay a.csv --model drive.toml",
+        "run rig.toml cruise --dry-run",
+        "sim rig.toml",
+        "commission rig.toml --model drive.toml --out out --dry-run",
+        "monitor rig.toml --model drive.toml --snapshot out.svg",
+        "monitor rig.toml --simulate --snapshot out.svg",
+    ],
+)
+def test_no_command_runs_the_laws_of_a_file_that_is_not_trusted(
+    folder: Path, capsys: pytest.CaptureFixture[str], line: str
+) -> None:
+    assert run(line.split()) == 2
+    said = " ".join(capsys.readouterr().err.split())
+    assert "drive.toml: laws.retarder | expected --trust-laws" in said
+    assert f"it would run laws_of_another:drag of {folder}" in said
+    assert not (folder / RAN).exists()
+
+
+def test_a_trusted_law_runs(folder: Path) -> None:
+    run(["run", "rig.toml", "cruise", "--dry-run", "--trust-laws"])
+    assert (folder / RAN).exists()
+
+
+def test_a_law_is_not_looked_for_in_an_archive(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Python imports from any file that ends like a zip archive, such as an HDF5 recording with one behind it."""
+    with zipfile.ZipFile(folder / "archive.h5", "w") as archive:
+        archive.writestr("packed_laws.py", MODULE)
+    law = LAW.replace("laws_of_another", "packed_laws").replace("element", 'folder = "archive.h5"\nelement')
+    bench.model(folder / "drive.toml", bench.MODEL + law)
+    assert run(["run", "rig.toml", "cruise", "--dry-run", "--trust-laws"]) == 2
+    assert "laws.retarder.folder | expected an existing folder" in " ".join(capsys.readouterr().err.split())
+    assert "packed_laws" not in sys.modules
+
+
+TRAP = f"""
+from pathlib import Path
+Path(__file__).with_name("{RAN}").write_text(__name__)
+raise SystemExit(7)
+"""
+
+
+@pytest.fixture
+def trapped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A working folder with modules of the names that processes import first."""
+    place = tmp_path / "theirs"
+    place.mkdir()
+    for name in ("pickle", "typer", "numpy", "multiprocessing", "hil", "estimator", "can", "encodings", "asammdf"):
+        (place / f"{name}.py").write_text(TRAP)
+    monkeypatch.chdir(place)
+    return place
+
+
+def test_the_public_command_of_a_proof_runs_nothing_of_the_cases_folder(trapped: Path) -> None:
+    run_hil(["effects"], trapped, 60.0)
+    assert not (trapped / RAN).exists()
+
+
+def test_a_recording_that_is_read_apart_runs_nothing_of_the_folder(trapped: Path, tmp_path: Path) -> None:
+    from tests.recording.test_mdf_format import foreign
+
+    foreign(path := tmp_path / "theirs.mf4")
+    assert read_table(path).n_rows
+    assert not (trapped / RAN).exists()
+
+
+def test_a_sealed_rig_runs_nothing_of_the_folder(trapped: Path) -> None:
+    with sealed_process("--seed", "5") as sealed:
+        assert sealed.commitment
+    assert not (trapped / RAN).exists()
+
+
+def test_compiling_runs_nothing_of_the_folder(trapped: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(first_use, "SIDE_BY_SIDE", (((), ()),))
+    first_use.compile_kernels()
+    assert not (trapped / RAN).exists()
+
+
+def test_a_spawned_process_runs_nothing_of_the_folder(trapped: Path) -> None:
+    process = multiprocessing.get_context("spawn").Process(target=os.getpid)
+    with safe_path():
+        process.start()
+    process.join()
+    assert process.exitcode == 0
+    assert not (trapped / RAN).exists()
+
+
+def test_every_process_is_started_so() -> None:
+    """What the tests above do not start is found in the source."""
+    for path in (*(ROOT / "hil").rglob("*.py"), *(ROOT / "estimator").rglob("*.py"), *(ROOT / "drivers").rglob("*.py")):
+        text = path.read_text("utf-8")
+        assert text.count("sys.executable,") == text.count('sys.executable, "-P"'), path
+        assert ('get_context("spawn")' in text) <= ("with safe_path()" in text), path
+
+
+@pytest.mark.parametrize("arguments", [("-c", "import pickle"), ("-m", "pickletools")])
+def test_without_care_the_folder_counts(trapped: Path, arguments: tuple[str, str]) -> None:
+    """The check can fail: this is what Python does by itself."""
+    subprocess.run([sys.executable, *arguments], check=False, stdin=subprocess.DEVNULL, capture_output=True)
+    assert (trapped / RAN).exists()
+    (trapped / RAN).unlink()
+    subprocess.run(python(*arguments), check=False, stdin=subprocess.DEVNULL, capture_output=True)
+    with safe_path():
+        subprocess.run([sys.executable, *arguments], check=False, stdin=subprocess.DEVNULL, capture_output=True)
+    assert not (trapped / RAN).exists()
+
+
+def test_python_dash_m_hil_runs_nothing_of_the_folder(trapped: Path) -> None:
+    (trapped / "hil.py").unlink()  # Python has found hil before hil can do anything
+    done = subprocess.run([sys.executable, "-m", "hil", "--version"], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert not (trapped / RAN).exists()
+
+
+def test_the_api_asks_for_trust_too(folder: Path) -> None:
+    from hil.config.rig_file import read_rig
+    from hil.errors import ModelFileError
+
+    simulation = read_rig(folder / "rig.toml").simulation
+    assert simulation is not None
+    with pytest.raises(ModelFileError, match="--trust-laws"):
+        simulation_model(simulation)
+    assert "J_M" in simulation_model(simulation, trust_laws=True).values()

@@ -1,0 +1,283 @@
+"""A file that a library can't be trusted with: its reader is bounded in memory and time, and ends alone."""
+
+from __future__ import annotations
+
+import os
+import resource
+import subprocess
+import sys
+import textwrap
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet
+import pytest
+import scipy.io
+
+from hil.child import python
+from hil.errors import RecordingError
+from hil.recording import Table, apart, read_table, write_table
+from hil.recording.apart import ENVIRONMENT, Reader
+from hil.recording.bounds import CELLS, MEMORY_BYTES, most_cells
+from hil.recording.formats import FORMATS, read_metadata
+from hil.recording.kinds import as_text
+
+GIB = 1 << 30
+
+
+def peak_bytes(path: Path) -> int:
+    """Read a file in a process of its own, and return the most memory of it and its reader, whatever comes of it."""
+    program = f"""
+        import resource
+        from hil.errors import RecordingError
+        from hil.recording import read_table
+        from hil.recording.apart import READER
+        try:
+            read_table({str(path)!r})
+        except RecordingError as error:
+            print(error)
+        READER.end()
+        print(sum(resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)))
+    """
+    done = subprocess.run(
+        python("-c", textwrap.dedent(program)), capture_output=True, text=True, timeout=100, check=True
+    )
+    *said, peak = done.stdout.splitlines()
+    assert any(str(path) in line for line in said), done.stdout
+    return int(peak) * 1024
+
+
+def sparse_hdf5(path: Path) -> None:
+    with h5py.File(path, "w") as file:
+        file.create_dataset("speed", shape=(10**12,), dtype="f8", chunks=(1 << 20,), fillvalue=1.0)
+
+
+def many_sparse_hdf5(path: Path) -> None:
+    with h5py.File(path, "w") as file:
+        for name in "abcdefgh":
+            file.create_dataset(name, shape=(CELLS - 1,), dtype="f8", chunks=(1 << 20,))
+
+
+def wide_hdf5(path: Path) -> None:
+    with h5py.File(path, "w") as file:
+        file.create_dataset("table", shape=(10**4,), dtype=np.dtype([("x", "f8", (10**5,))]), chunks=(1,))
+
+
+def sparse_mat73(path: Path) -> None:
+    with h5py.File(path, "w", userblock_size=512) as file:
+        file.create_dataset("v", shape=(1, 10**11), dtype="f8", chunks=(1, 1 << 20))
+    content = bytearray(path.read_bytes())
+    content[:20] = b"MATLAB 7.3 MAT-file "
+    path.write_bytes(content)
+
+
+def bomb_mat5(path: Path) -> None:
+    scipy.io.savemat(path, {"v": np.zeros(GIB // 8)}, do_compression=True)
+
+
+def bomb_parquet(path: Path) -> None:
+    zeros = pa.chunked_array([pa.array(np.zeros(1 << 22))] * 40)
+    pa.parquet.write_table(pa.table({"x": zeros}), path, compression="zstd")
+
+
+def text_parquet(path: Path) -> None:
+    """One long text, referred to by every row."""
+    texts = pa.DictionaryArray.from_arrays(pa.array(np.zeros(10**5, dtype=np.int32)), pa.array(["x" * 10**6]))
+    pa.parquet.write_table(pa.table({"t": texts}), path, compression="zstd")
+
+
+BOMBS: list[tuple[str, Callable[[Path], None]]] = [
+    (".h5", sparse_hdf5),
+    (".h5", many_sparse_hdf5),
+    (".h5", wide_hdf5),
+    (".mat", sparse_mat73),
+    (".parquet", bomb_parquet),
+    (".parquet", text_parquet),
+]
+
+
+@pytest.mark.parametrize(("suffix", "make"), BOMBS, ids=[make.__name__ for _, make in BOMBS])
+def test_a_small_file_that_unpacks_to_much_is_refused_and_takes_little(
+    tmp_path: Path, suffix: str, make: Callable[[Path], None]
+) -> None:
+    path = tmp_path / f"bomb{suffix}"
+    make(path)
+    assert path.stat().st_size < 4 << 20
+    assert peak_bytes(path) < GIB
+
+
+@pytest.mark.parametrize("n_bytes", [3 * GIB])
+def test_a_compressed_mat_file_is_unpacked_no_further_than_allowed(tmp_path: Path, n_bytes: int) -> None:
+    """Made by hand: scipy would need the memory itself. The variable is a vector of zeros behind zlib (version 5)."""
+    path = tmp_path / "bomb.mat"
+    rows = n_bytes // 8
+    flags = (6).to_bytes(4, "little") + (8).to_bytes(4, "little") + (6).to_bytes(4, "little") + bytes(4)
+    shape = (
+        (5).to_bytes(4, "little") + (8).to_bytes(4, "little") + rows.to_bytes(4, "little") + (1).to_bytes(4, "little")
+    )
+    name = (1).to_bytes(2, "little") + (1).to_bytes(2, "little") + b"v\0\0\0"
+    head = flags + shape + name + (9).to_bytes(4, "little") + (n_bytes & 0xFFFFFFFF).to_bytes(4, "little")
+    packing = zlib.compressobj(9)
+    element = (14).to_bytes(4, "little") + ((len(head) + n_bytes) & 0xFFFFFFFF).to_bytes(4, "little") + head
+    packed = packing.compress(element)
+    for _ in range(n_bytes >> 24):
+        packed += packing.compress(bytes(1 << 24))
+    packed += packing.flush()
+    with path.open("wb") as file:
+        file.write(b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM")
+        file.write((15).to_bytes(4, "little") + len(packed).to_bytes(4, "little") + packed)
+    assert peak_bytes(path) < GIB
+
+
+def test_a_recording_of_the_bound_is_read() -> None:
+    assert most_cells(100) == CELLS
+    assert most_cells(10 * CELLS) == 10 * CELLS
+    assert CELLS * 8 * 2 < MEMORY_BYTES
+
+
+@pytest.mark.parametrize("kind", ["external link", "external storage", "virtual"])
+def test_content_in_another_file_is_refused(tmp_path: Path, kind: str) -> None:
+    other = tmp_path / "secret.bin"
+    with h5py.File(tmp_path / "other.h5", "w") as file:
+        file["x"] = np.arange(10.0)
+    other.write_bytes(bytes(80))
+    with h5py.File(tmp_path / "run.h5", "w") as file:
+        file["time"] = np.arange(10.0)
+        group = file.create_group("deep")
+        if kind == "external link":
+            group["x"] = h5py.ExternalLink("other.h5", "x")
+        elif kind == "external storage":
+            group.create_dataset("x", (10,), "f8", external=[(str(other), 0, 80)])
+        else:
+            layout = h5py.VirtualLayout((10,), "f8")
+            layout[:] = h5py.VirtualSource("other.h5", "x", (10,))
+            group.create_virtual_dataset("x", layout)
+    with pytest.raises(
+        RecordingError, match=r"run\.h5: deep/x: expected data in this file, came a reference to another"
+    ):
+        read_table(tmp_path / "run.h5")
+
+
+@pytest.mark.parametrize("suffix", sorted(FORMATS))
+@pytest.mark.parametrize("read", [read_table, read_metadata])
+def test_a_pipe_is_refused_and_not_waited_for(tmp_path: Path, suffix: str, read: Callable[[Path], object]) -> None:
+    path = tmp_path / f"pipe{suffix}"
+    os.mkfifo(path)
+    with pytest.raises(RecordingError, match="expected a file, came a folder, a pipe or a device"):
+        read(path)
+
+
+def test_a_parquet_file_with_a_column_twice_is_refused(tmp_path: Path) -> None:
+    table = pa.Table.from_arrays([pa.array([1.0, 2.0])] * 2, names=["x", "x"])
+    pa.parquet.write_table(table, tmp_path / "run.parquet")
+    with pytest.raises(RecordingError, match="column x comes twice"):
+        read_table(tmp_path / "run.parquet")
+
+
+def test_a_parquet_file_whose_text_is_no_utf_8_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "run.parquet"
+    broken = pa.Array.from_buffers(pa.string(), 1, [None, pa.py_buffer(b"\0\0\0\0\2\0\0\0"), pa.py_buffer(b"\xff\xfe")])
+    pa.parquet.write_table(pa.table({"t": broken}), path)
+    with pytest.raises(RecordingError, match=r"run\.parquet: expected a whole Parquet file"):
+        read_table(path)
+
+
+def test_names_of_an_hdf5_file_that_are_no_utf_8_are_read(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "run.h5", "w") as file:
+        file[b"a\xff"] = np.arange(3.0)
+        file["b"] = np.arange(3.0)
+        h5py.h5a.create(file.id, b"k\xfe", h5py.h5t.NATIVE_INT64, h5py.h5s.create(h5py.h5s.SCALAR))
+    assert set(read_table(tmp_path / "run.h5").columns) == {"a\ufffd", "b"}
+
+
+STUB = """
+import os, sys, time
+for line in sys.stdin:
+    {act}
+"""
+
+
+@pytest.mark.parametrize(
+    ("act", "said"),
+    [
+        ("time.sleep(100)", "came one that is not: it is damaged, or made to keep a program busy"),
+        ("os.abort()", r"came one that ends its reader \(status -6\)"),
+        ("sys.exit(3)", r"came one that ends its reader \(status 3\)"),
+        ("sys.stdout.write('no answer' * 9); sys.stdout.flush(); os._exit(0)", "came one that ends its reader"),
+    ],
+)
+def test_a_reader_that_does_not_answer_is_ended_and_the_next_file_is_read(
+    tmp_path: Path, own_table: Table, monkeypatch: pytest.MonkeyPatch, act: str, said: str
+) -> None:
+    path = tmp_path / "run.h5"
+    write_table(own_table, path)
+    (tmp_path / "stub_reader.py").write_text(STUB.format(act=act))
+    reader = Reader()
+    with monkeypatch.context() as patch:
+        patch.setenv("PYTHONPATH", str(tmp_path))
+        patch.setattr(apart, "PROCESS", "stub_reader")
+        patch.setattr(apart, "WAITING", 0.05)
+        with pytest.raises(RecordingError, match=rf"run\.h5: .*{said}"):
+            reader.table(path)
+    try:
+        assert reader.table(path).n_rows == own_table.n_rows
+    finally:
+        reader.end()
+
+
+def test_an_interruption_ends_the_reading(tmp_path: Path, own_table: Table, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "run.h5"
+    write_table(own_table, path)
+    reader = Reader()
+
+    def interrupt(stream: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(apart, "receive", interrupt)
+        with pytest.raises(KeyboardInterrupt):
+            reader.table(path)
+    try:
+        assert reader.table(path).n_rows == own_table.n_rows
+    finally:
+        reader.end()
+
+
+@pytest.mark.parametrize("suffix", [suffix for suffix, form in FORMATS.items() if form.write and form.apart])
+def test_every_kind_of_column_comes_through(tmp_path: Path, suffix: str) -> None:
+    columns = {
+        "x": np.array([0.0, -0.0, np.nan]),
+        "n": np.array([1, -2, 1 << 62]),
+        "b": np.array([True, False, True]),
+        "t": as_text(["", "ä\u2028", "1"]),
+    }
+    path = tmp_path / f"run{suffix}"
+    write_table(Table(path, columns, {"x": "Nm"}, {"who": "me"}), path)
+    read = read_table(path)
+    for name, column in columns.items():
+        assert read.columns[name].dtype == column.dtype
+        np.testing.assert_array_equal(read.columns[name], column)
+    assert read.units["x"] == "Nm"
+    assert read_metadata(path)["who"] == "me"
+
+
+def test_the_limits_are_set_where_it_reads() -> None:
+    program = "from hil.recording.apart_process import _limit; import resource; _limit(0)\n" + "".join(
+        f"print(resource.getrlimit(resource.{name})[0])\n" for name in ("RLIMIT_CORE", "RLIMIT_CPU", "RLIMIT_AS")
+    )
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", program],
+        env={**os.environ, **ENVIRONMENT},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    core, cpu_s, space = map(int, done.stdout.split())
+    assert core == 0
+    assert 10 <= cpu_s <= 60
+    assert MEMORY_BYTES < space < MEMORY_BYTES + GIB
+    assert resource.getrlimit(resource.RLIMIT_AS)[0] != space
