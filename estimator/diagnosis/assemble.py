@@ -11,6 +11,7 @@ import numpy as np
 from estimator.diagnosis.chain import Chain
 from estimator.diagnosis.evidence import gain_from_squares
 from estimator.diagnosis.holdout import Examiner
+from estimator.diagnosis.inherit import line_values
 from estimator.diagnosis.intervals import (
     Z95,
     interval_both_ways,
@@ -24,7 +25,6 @@ from estimator.diagnosis.trial import Trial
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effects import road_grade
 from estimator.physics.fit import FitResult
-from estimator.physics.layout import slot
 from estimator.physics.model import DrivelineModel, EffectValue, parameter_unit, unit
 from estimator.physics.problem import local_part
 from estimator.physics.steps import moments_of
@@ -148,9 +148,7 @@ def _parameters(name: str, result: FitResult, cov: FloatArray, model: DrivelineM
 
 def _derived(name: str, result: FitResult) -> Mapping[str, float]:
     """Return the values of an effect that are held but follow from what was fitted."""
-    of_line = result.problem.grid.structure.parameter_names
-    nominal = {key: float(result.p[slot("", key)]) for key in of_line}
-    return EFFECTS[name].derived(result.values_of(name), nominal)
+    return EFFECTS[name].derived(result.values_of(name), line_values(result))
 
 
 def _derived_value(name: str, key: str, result: FitResult) -> float:

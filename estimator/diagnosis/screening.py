@@ -95,10 +95,10 @@ class _Steps:
 class Screen:
     """Looks at effects around one fit."""
 
-    def __init__(self, result: FitResult, model: DrivelineModel) -> None:
+    def __init__(self, result: FitResult, model: DrivelineModel, projector: Projector | None = None) -> None:
         self._result = result
         self._model = model
-        self._projector = Projector(result)
+        self._projector = projector or Projector(result)
         self._rows = np.cumsum([0, *(int(use.sum()) for use in result.problem.use)])
 
     def looks(self, name: str, kept: str = "") -> list[Look]:
