@@ -1,0 +1,208 @@
+"""The search over sets of effects: add, drop, exchange, until no change lowers the score."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from estimator.diagnosis.hypotheses import NOTHING, Effects, with_effect
+from estimator.diagnosis.inference.disturbances import Limits, limits_for
+from estimator.diagnosis.inference.likelihood import Hypothesis, compared, fitted
+from estimator.diagnosis.inference.looks import screen
+from estimator.diagnosis.inherit import forgetting, inheriting, kept
+from estimator.diagnosis.noise import noise_floor
+from estimator.diagnosis.screening import Look, promising
+from estimator.physics.catalogue import EFFECTS
+from estimator.physics.grid import Grid, grid_for
+from estimator.physics.model import DrivelineModel
+from estimator.physics.parallel import concurrently
+from estimator.physics.problem import Problem, make_problem, start_vector
+from estimator.physics.starts import warm_start
+from estimator.physics.unknowns import Release, nominal_unknowns, own_unknowns
+from estimator.signals.record import BoolArray, Record
+
+GRADE = "road_grade"
+"""The effect that is no law: a load that walks further than any load does by itself."""
+
+MOST_FITS = 6
+"""Effects that are fitted on top of a hypothesis, the most promising of a first look."""
+
+WORTH_FITTING = 0.1
+"""Share of the best promise below which an effect is not fitted."""
+
+SAME_PROMISE = 0.5
+"""Share of what an effect promises that a look-alike must promise in its place."""
+
+MOST_EFFECTS = 8
+FINISHED = 2
+"""Best of these that are fitted to their end."""
+
+
+@dataclass
+class Search:
+    """Hypotheses on a model and recordings; each set of effects is fitted once."""
+
+    model: DrivelineModel
+    records: Sequence[Record]
+    use: Sequence[BoolArray]
+    names: Sequence[str]
+    grid: Grid | None = None
+    visited: dict[Effects, Hypothesis] = field(default_factory=dict)
+    log: list[str] = field(default_factory=list)
+    _limits: Limits | None = None
+
+    @property
+    def limits(self) -> Limits:
+        """Usual disturbances of these recordings and their bounds."""
+        if self._limits is None:
+            self._limits = limits_for(self.records, noise_floor(self.records))
+        return self._limits
+
+    def run(self) -> Hypothesis:
+        """Return the best set of effects found."""
+        current = self.nothing()
+        for _ in range(2 * MOST_EFFECTS):
+            better = self._best_addition(current) if len(current.effects) < MOST_EFFECTS else None
+            better = better or self._best_drop(current) or self._best_exchange(current) or self._graded(current)
+            if better is None:
+                break
+            current = better
+            self.log.append(f"{sorted(current.effects)} {current.score:.0f}")
+        return current
+
+    def nothing(self) -> Hypothesis:
+        """Fit the nominal model."""
+        if NOTHING not in self.visited:
+            own = tuple(own_unknowns(self.model.effects, record) for record in self.records)
+            problem = self._problem(NOTHING, Release(nominal_unknowns(self.model), own))
+            self._keep(
+                fitted(NOTHING, problem, start_vector(problem), self.limits.usual, self.limits, len(self.names))
+            )
+        return self.visited[NOTHING]
+
+    def _best_addition(self, current: Hypothesis) -> Hypothesis | None:
+        looks = self._looks(current, [name for name in self.names if name not in current.effects])
+        rough = concurrently(lambda name: self._added(current, name, looks[name]), list(looks))
+        found = [each for each in rough if each is not None]
+        found.sort(key=lambda each: each.score)
+        finished = concurrently(self.finish, found[:FINISHED])
+        self.log.append("  " + " ".join(f"{'+'.join(sorted(h.effects - current.effects))}:{current.score - h.score:.0f}" for h in [*finished, *found[FINISHED:]]))
+        return self._better(finished, current)
+
+    def _graded(self, current: Hypothesis) -> Hypothesis | None:
+        """Return a hypothesis with a load that walks far, which follows whatever is slow: after all laws."""
+        if GRADE not in self.names or GRADE in current.effects:
+            return None
+        return self._better([self._with_grade(current)], current)
+
+    def _better(self, found: Sequence[Hypothesis], current: Hypothesis) -> Hypothesis | None:
+        best = min(found, key=lambda each: each.score, default=None)
+        return best if best is not None and best.score < current.score else None
+
+    def _looks(self, current: Hypothesis, names: Sequence[str], rival: str = "") -> dict[str, list[Look]]:
+        """Return the starts of the effects that are worth a fit, the most promising effect first.
+
+        Beside a ``rival`` those are worth it that promise nearly as much.
+        """
+        view = screen(current, self.model)
+        contained = {special for have in current.effects for special in EFFECTS[have].contains}
+        tried = [name for name in names if name != GRADE and name not in contained]
+        looks = dict(zip(tried, concurrently(view.looks, tried), strict=True))
+        order = sorted(tried, key=lambda name: -looks[name][0].promise)
+        least = max(WORTH_FITTING * looks[order[0]][0].promise, np.log(current.plain.residual.size)) if order else 0.0
+        if rival and rival != GRADE:
+            least = max(least, SAME_PROMISE * view.looks(rival)[0].promise)
+        loose = [name for name in order if EFFECTS[name].loosens]
+        worth = [name for name in order if looks[name][0].promise >= least][:MOST_FITS]
+        return {name: promising(looks[name]) for name in dict.fromkeys([*worth, *(loose if not current.effects and not rival else [])])}
+
+    def _added(self, current: Hypothesis, name: str, looks: Sequence[Look]) -> Hypothesis | None:
+        """Fit an effect on top of a hypothesis a few steps, from each of its starts; None where no value is one."""
+        effects = with_effect(current.effects, name)
+        if effects in self.visited:
+            return self.visited[effects]
+        fits = []
+        for look in looks:
+            problem = self._extended(current, effects, inheriting(name, look.release, current.plain))
+            x = warm_start(problem, current.plain)
+            fits.append(compared(effects, problem, x, current, len(self.names)))
+        best = min(fits, key=lambda each: each.score)
+        return best if self._is_plausible(best) else None
+
+    def _limits_of(self, effects: Effects) -> Limits:
+        return self.limits.freed() if GRADE in effects else self.limits
+
+    def _with_grade(self, current: Hypothesis) -> Hypothesis:
+        effects = current.effects | {GRADE}
+        return self.finish(replace(current, effects=effects, limits=self._limits_of(effects)))
+
+    def finish(self, rough: Hypothesis) -> Hypothesis:
+        """Take a fit to its end."""
+        if rough.effects not in self.visited:
+            plain = rough.plain
+            whole = fitted(rough.effects, plain.problem, plain.x, rough.sizes, rough.limits, len(self.names))
+            self._keep(whole if self._is_plausible(whole) else rough)
+        return self.visited[rough.effects]
+
+    def _is_plausible(self, hypothesis: Hypothesis) -> bool:
+        for name in hypothesis.effects - {GRADE}:
+            values, entry = hypothesis.plain.values_of(name), EFFECTS[name]
+            if entry.implausible(self.model, self.records, values) or entry.unresolved(
+                self.model, self.records, values
+            ):
+                return False
+        return True
+
+    def without(self, current: Hypothesis, name: str) -> Hypothesis:
+        """Fit a hypothesis without one of its effects, the others begun where they are."""
+        effects = current.effects - {name}
+        if effects not in self.visited:
+            plain = current.plain
+            if name != GRADE:
+                release = kept(plain, (effects - {GRADE}) | set(self.model.effects))
+                problem = self._problem(effects, release)
+                plain = forgetting(plain, name)
+                x = warm_start(problem, plain)
+            else:
+                problem, x = plain.problem, plain.x
+            limits = self._limits_of(effects)
+            self._keep(fitted(effects, problem, x, current.sizes, limits, len(self.names)))
+        return self.visited[effects]
+
+    def _best_drop(self, current: Hypothesis) -> Hypothesis | None:
+        """Return a hypothesis without an effect that others made superfluous; None where there is none."""
+        return self._better(concurrently(lambda name: self.without(current, name), sorted(current.effects)), current)
+
+    def _best_exchange(self, current: Hypothesis) -> Hypothesis | None:
+        """Return the best hypothesis with a look-alike in the place of one effect; None where none is better."""
+        found = []
+        for name in sorted(current.effects):
+            base = self.without(current, name)
+            alike = [other for other in self.names if other not in current.effects and are_alike(name, other)]
+            looks = self._looks(base, alike, name)
+            rough = concurrently(lambda other, base=base, looks=looks: self._added(base, other, looks[other]), list(looks))
+            found += [each for each in rough if each is not None]
+        found.sort(key=lambda each: each.score)
+        near = [each for each in found if each.score < current.score + 0.2 * abs(self.nothing().score - current.score)]
+        finished = concurrently(self.finish, near[:FINISHED])
+        return self._better(finished, current)
+
+    def _extended(self, current: Hypothesis, effects: Effects, release: Release) -> Problem:
+        common = kept(current.plain, (effects - {GRADE}) | set(self.model.effects))
+        own = tuple((*old, *mine) for old, mine in zip(common.own, release.own, strict=True))
+        return self._problem(effects, Release((*common.shared, *release.shared), own))
+
+    def _problem(self, effects: Effects, release: Release) -> Problem:
+        return make_problem(self.model, self.records, release.shared, own=release.own, use=self.use, grid=self.grid or grid_for(self.model, self.records))
+
+    def _keep(self, hypothesis: Hypothesis) -> None:
+        self.visited[hypothesis.effects] = hypothesis
+
+
+def are_alike(one: str, other: str) -> bool:
+    """Tell whether two effects are known to resemble each other, or act at one element."""
+    a, b = EFFECTS[one], EFFECTS[other]
+    kin = {*a.resembles, *a.equivalent}, {*b.resembles, *b.equivalent}
+    return other in kin[0] or one in kin[1] or a.element is b.element
