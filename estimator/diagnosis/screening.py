@@ -177,6 +177,8 @@ class Screen:
         return found
 
     def _in_phase(self, release: Release, found: list[list[Wave]]) -> Look:
+        if not all(np.isfinite(wave.answers @ wave.answers.T).all() for mine in found for wave in mine):
+            return Look(release, 0.0)  # so far out that the line flies apart
         amplitudes, phases, promise = self._regress(found)
         shared = tuple(
             replace(u, start=float(np.clip(amplitudes[u.name] / u.scale, u.low, u.high))) if u.name in amplitudes else u

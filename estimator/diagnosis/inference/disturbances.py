@@ -243,7 +243,9 @@ def estimate(
     def at(sizes: FloatArray) -> tuple[float, FloatArray, FloatArray]:
         filtered = whitener(line, sizes, period_s, use)
         innovations = filtered(error)
-        logs = np.concatenate([np.log(spread[mask]) for spread, mask in zip(filtered.spread, filtered.use, strict=True)])
+        logs = np.concatenate(
+            [np.log(spread[mask]) for spread, mask in zip(filtered.spread, filtered.use, strict=True)]
+        )
         value = 2.0 * float(logs.sum()) + float(innovations @ innovations) + minus_twice_log_prior(sizes, limits)
         return value, innovations, logs
 

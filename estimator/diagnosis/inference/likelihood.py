@@ -28,9 +28,12 @@ from estimator.signals.record import FloatArray
 SAME = 1.0
 """Fall of minus twice the log-likelihood below which another pass over unknowns and disturbances is not made."""
 
+DIGITS = 0.02
+"""The same over the difference from a rival that the fit is for."""
+
 MOST_PASSES = 6
 
-ITERATIONS, ROUGH, ROUNDS = 12, 4, 3
+ITERATIONS, ROUGH, ROUNDS = 8, 4, 2
 """Jacobians of a pass at most; of a first comparison; steps of Fisher scoring in a pass."""
 
 
@@ -92,18 +95,31 @@ def choices_of(effects: Effects, hypotheses: int) -> float:
 
 
 def fitted(
-    effects: Effects, problem: Problem, x: FloatArray, sizes: FloatArray, limits: Limits, hypotheses: int
+    effects: Effects,
+    problem: Problem,
+    x: FloatArray,
+    sizes: FloatArray,
+    limits: Limits,
+    hypotheses: int,
+    rival: float = math.nan,
 ) -> Hypothesis:
-    """Fit a hypothesis from unknowns ``x`` and disturbances ``sizes`` to its end."""
+    """Fit a hypothesis from unknowns ``x`` and disturbances ``sizes``.
+
+    ``rival`` is minus twice the log-likelihood of the hypothesis it will be compared with: the farther from it, the
+    less the last digits matter. Without one it is fitted to its end.
+    """
     plain, choices = not_fitted(problem, x), choices_of(effects, hypotheses)
     best: Hypothesis | None = None
     passes: list[float] = []
     while best is None or len(passes) < MOST_PASSES:
         plain = _with_moments(_weighted(plain, sizes, ITERATIONS), sizes)
         sizes, now = _disturbances(plain, sizes, limits)
-        if best is not None and now > best.minus_twice_log - SAME:
+        enough = SAME if math.isnan(rival) else max(SAME, DIGITS * abs(now - rival))
+        last = best is not None and now > best.minus_twice_log - enough
+        if best is None or now < best.minus_twice_log:
+            best = Hypothesis(effects, plain, sizes, limits, now, choices)
+        if last:
             break
-        best = Hypothesis(effects, plain, sizes, limits, now, choices)
         passes.append(now)
     return best
 

@@ -1,20 +1,25 @@
 """What is believed of an effect: probability over all sets that hold it, and weight in the error.
 
 A score is minus twice a log-probability, if the model were the world. Worlds are written in other forms than the model,
-and what they leave takes part in every difference of scores: these count ``1 / TEMPERED``, calibrated so that of the
-effects given 0.9 to 1 as many are there (``calibration.toml``).
+and what they leave takes part in every difference of scores: these are divided by what is calibrated (``calibration``)
+and by what the best set leaves that is no noise (``remainder``).
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from estimator.diagnosis.hypotheses import Effects
-from estimator.diagnosis.inference.likelihood import Hypothesis
+from estimator.diagnosis.inference.disturbances import Size
+from estimator.diagnosis.inference.likelihood import Hypothesis, residuals
+from estimator.diagnosis.inference.search import GRADE
 from estimator.physics.catalogue import EFFECTS
+from estimator.physics.jacobian import changes
+from estimator.physics.problem import own_part
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,8 +66,8 @@ def beliefs(
         found.append(
             Belief(
                 name,
-                _probability({name, *alike}, visited, tempered),
-                (without.plain.squares - best.plain.squares) / nothing.plain.squares,
+                _probability({name, *alike, *_same_law(name)}, visited, tempered),
+                (_squares(without) - _squares(best)) / _squares(nothing),
                 without.score - best.score,
                 alike,
             )
@@ -70,9 +75,34 @@ def beliefs(
     return tuple(sorted(found, key=lambda belief: -belief.share))
 
 
-def _alike(
-    name: str, best: Hypothesis, visited: Mapping[Effects, Hypothesis], within: float
-) -> tuple[str, ...]:
+def _same_law(name: str) -> set[str]:
+    """Return the effects that hold this one as a special case, or are one of it."""
+    return {*EFFECTS[name].contains, *(other for other, entry in EFFECTS.items() if name in entry.contains)}
+
+
+def free_rms(hypothesis: Hypothesis) -> float:
+    """Return the RMS of the free-run error, load torque and initial state as they leave least of it."""
+    return math.sqrt(max(_squares(hypothesis), 0.0) / hypothesis.plain.residual.size)
+
+
+def _squares(hypothesis: Hypothesis) -> float:
+    """Return the squared free-run error, each recording's load torque and initial state as they leave least of it.
+
+    A load that may walk far leaves the noise of the reading: the rest is what it did.
+    """
+    plain = hypothesis.plain
+    if GRADE in hypothesis.effects:
+        return plain.residual.size * float(np.sum(np.exp(2.0 * hypothesis.sizes[[Size.WHITE, Size.COLOURED]])))
+    left = 0.0
+    for i, error in enumerate(residuals(hypothesis, plain.residual)):
+        first = own_part(plain.problem, i).start
+        columns = np.arange(first, first + plain.problem.local[i].own_rows.start)
+        start = np.linalg.qr(changes(plain.problem, plain.x, i, columns, plain.outputs))[0]
+        left += float(error @ error) - float(np.sum((start.T @ error) ** 2))
+    return left
+
+
+def _alike(name: str, best: Hypothesis, visited: Mapping[Effects, Hypothesis], within: float) -> tuple[str, ...]:
     others = best.effects - {name}
     exchanged = {
         next(iter(effects - others)): each

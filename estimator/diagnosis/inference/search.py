@@ -7,22 +7,26 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from estimator.diagnosis.hypotheses import NOTHING, Effects, with_effect
+from estimator.diagnosis.hypotheses import NOTHING, Effects, open_hypotheses, with_effect
 from estimator.diagnosis.inference.disturbances import Limits, limits_for
 from estimator.diagnosis.inference.likelihood import Hypothesis, compared, fitted
 from estimator.diagnosis.inference.looks import screen
 from estimator.diagnosis.inherit import forgetting, inheriting, kept
 from estimator.diagnosis.noise import noise_floor
 from estimator.diagnosis.screening import Look, promising
+from estimator.diagnosis.trial import has_edge
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.grid import Grid, grid_for
+from estimator.physics.layout import slot
 from estimator.physics.model import DrivelineModel
 from estimator.physics.parallel import concurrently
-from estimator.physics.problem import Problem, make_problem, start_vector
+from estimator.physics.problem import Problem, make_problem, start_of, start_vector
+from estimator.physics.simulate import simulate
 from estimator.physics.starts import warm_start
 from estimator.physics.unknowns import Release, nominal_unknowns, own_unknowns
 from estimator.signals.record import BoolArray, Record
 
+BLIND = "speed_sign_blind"
 GRADE = "road_grade"
 """The effect that is no law: a load that walks further than any load does by itself."""
 
@@ -34,6 +38,9 @@ WORTH_FITTING = 0.1
 
 SAME_PROMISE = 0.5
 """Share of what an effect promises that a look-alike must promise in its place."""
+
+NEARLY = 0.3
+"""Share of what an effect explains by which a look-alike's first few steps may be behind for it to be fitted."""
 
 MOST_EFFECTS = 8
 FINISHED = 2
@@ -50,7 +57,7 @@ class Search:
     names: Sequence[str]
     grid: Grid | None = None
     visited: dict[Effects, Hypothesis] = field(default_factory=dict)
-    log: list[str] = field(default_factory=list)
+    rivals: dict[str, float] = field(default_factory=dict)
     _limits: Limits | None = None
 
     @property
@@ -69,7 +76,6 @@ class Search:
             if better is None:
                 break
             current = better
-            self.log.append(f"{sorted(current.effects)} {current.score:.0f}")
         return current
 
     def nothing(self) -> Hypothesis:
@@ -77,19 +83,30 @@ class Search:
         if NOTHING not in self.visited:
             own = tuple(own_unknowns(self.model.effects, record) for record in self.records)
             problem = self._problem(NOTHING, Release(nominal_unknowns(self.model), own))
-            self._keep(
-                fitted(NOTHING, problem, start_vector(problem), self.limits.usual, self.limits, len(self.names))
-            )
+            self._keep(fitted(NOTHING, problem, start_vector(problem), self.limits.usual, self.limits, len(self.names)))
         return self.visited[NOTHING]
 
     def _best_addition(self, current: Hypothesis) -> Hypothesis | None:
-        looks = self._looks(current, [name for name in self.names if name not in current.effects])
+        looks = self._looks(current, [name for name in self._open(current) if name not in current.effects])
         rough = concurrently(lambda name: self._added(current, name, looks[name]), list(looks))
         found = [each for each in rough if each is not None]
         found.sort(key=lambda each: each.score)
-        finished = concurrently(self.finish, found[:FINISHED])
-        self.log.append("  " + " ".join(f"{'+'.join(sorted(h.effects - current.effects))}:{current.score - h.score:.0f}" for h in [*finished, *found[FINISHED:]]))
+        finished = concurrently(lambda each: self.finish(each, current), found[:FINISHED])
         return self._better(finished, current)
+
+    def _open(self, current: Hypothesis) -> Sequence[str]:
+        """Return the effects that can be told; behind a sensor blind for the sign reversals are the motion's own."""
+        if BLIND not in current.effects and BLIND not in self.model.effects:
+            return self.names
+        plain = current.plain
+        p = np.array([plain.p_of(i) for i in range(len(self.records))])
+        p[:, slot(BLIND, "share")] = 0.0
+        seeing = [
+            replace(record, output=simulate(plain.problem.grid, record, mine, start_of(plain.problem, plain.x, i)))
+            for i, (record, mine) in enumerate(zip(self.records, p, strict=True))
+        ]
+        told = open_hypotheses(self.model, seeing)[0]
+        return list(dict.fromkeys([*self.names, *told]))
 
     def _graded(self, current: Hypothesis) -> Hypothesis | None:
         """Return a hypothesis with a load that walks far, which follows whatever is slow: after all laws."""
@@ -116,7 +133,10 @@ class Search:
             least = max(least, SAME_PROMISE * view.looks(rival)[0].promise)
         loose = [name for name in order if EFFECTS[name].loosens]
         worth = [name for name in order if looks[name][0].promise >= least][:MOST_FITS]
-        return {name: promising(looks[name]) for name in dict.fromkeys([*worth, *(loose if not current.effects and not rival else [])])}
+        return {
+            name: promising(looks[name])
+            for name in dict.fromkeys([*worth, *(loose if not current.effects and not rival else [])])
+        }
 
     def _added(self, current: Hypothesis, name: str, looks: Sequence[Look]) -> Hypothesis | None:
         """Fit an effect on top of a hypothesis a few steps, from each of its starts; None where no value is one."""
@@ -129,6 +149,7 @@ class Search:
             x = warm_start(problem, current.plain)
             fits.append(compared(effects, problem, x, current, len(self.names)))
         best = min(fits, key=lambda each: each.score)
+        self.rivals[name] = min(best.score, self.rivals.get(name, best.score))
         return best if self._is_plausible(best) else None
 
     def _limits_of(self, effects: Effects) -> Limits:
@@ -136,24 +157,30 @@ class Search:
 
     def _with_grade(self, current: Hypothesis) -> Hypothesis:
         effects = current.effects | {GRADE}
-        return self.finish(replace(current, effects=effects, limits=self._limits_of(effects)))
+        return self.finish(replace(current, effects=effects, limits=self._limits_of(effects)), current)
 
-    def finish(self, rough: Hypothesis) -> Hypothesis:
-        """Take a fit to its end."""
+    def finish(self, rough: Hypothesis, rival: Hypothesis) -> Hypothesis:
+        """Take a fit as far as a comparison with a rival needs."""
         if rough.effects not in self.visited:
             plain = rough.plain
-            whole = fitted(rough.effects, plain.problem, plain.x, rough.sizes, rough.limits, len(self.names))
+            whole = fitted(
+                rough.effects, plain.problem, plain.x, rough.sizes, rough.limits, len(self.names), rival.minus_twice_log
+            )
             self._keep(whole if self._is_plausible(whole) else rough)
         return self.visited[rough.effects]
 
     def _is_plausible(self, hypothesis: Hypothesis) -> bool:
-        for name in hypothesis.effects - {GRADE}:
-            values, entry = hypothesis.plain.values_of(name), EFFECTS[name]
-            if entry.implausible(self.model, self.records, values) or entry.unresolved(
-                self.model, self.records, values
-            ):
-                return False
-        return True
+        """Tell whether the values of every effect are a case of it."""
+        plain = hypothesis.plain
+        values = {name: plain.values_of(name) for name in hypothesis.effects - {GRADE}}
+        if any(EFFECTS[name].implausible(self.model, self.records, values[name]) for name in values):
+            return False
+        return all(has_edge(name, plain) for name in values if EFFECTS[name].event)
+
+    def is_resolved(self, hypothesis: Hypothesis, name: str) -> bool:
+        """Tell whether an effect is large enough to be told from another way of sampling."""
+        values = hypothesis.plain.values_of(name)
+        return name == GRADE or not EFFECTS[name].unresolved(self.model, self.records, values)
 
     def without(self, current: Hypothesis, name: str) -> Hypothesis:
         """Fit a hypothesis without one of its effects, the others begun where they are."""
@@ -168,7 +195,7 @@ class Search:
             else:
                 problem, x = plain.problem, plain.x
             limits = self._limits_of(effects)
-            self._keep(fitted(effects, problem, x, current.sizes, limits, len(self.names)))
+            self._keep(fitted(effects, problem, x, current.sizes, limits, len(self.names), current.minus_twice_log))
         return self.visited[effects]
 
     def _best_drop(self, current: Hypothesis) -> Hypothesis | None:
@@ -177,17 +204,18 @@ class Search:
 
     def _best_exchange(self, current: Hypothesis) -> Hypothesis | None:
         """Return the best hypothesis with a look-alike in the place of one effect; None where none is better."""
-        found = []
-        for name in sorted(current.effects):
-            base = self.without(current, name)
-            alike = [other for other in self.names if other not in current.effects and are_alike(name, other)]
-            looks = self._looks(base, alike, name)
-            rough = concurrently(lambda other, base=base, looks=looks: self._added(base, other, looks[other]), list(looks))
-            found += [each for each in rough if each is not None]
-        found.sort(key=lambda each: each.score)
-        near = [each for each in found if each.score < current.score + 0.2 * abs(self.nothing().score - current.score)]
-        finished = concurrently(self.finish, near[:FINISHED])
-        return self._better(finished, current)
+        nearest = concurrently(lambda name: self._nearest(current, name), sorted(current.effects))
+        return self._better([each for each in nearest if each is not None], current)
+
+    def _nearest(self, current: Hypothesis, name: str) -> Hypothesis | None:
+        """Fit the look-alike that explains most in an effect's place to its end; None where none comes near."""
+        base = self.without(current, name)
+        alike = [other for other in self.names if other not in current.effects and are_alike(name, other)]
+        looks = self._looks(base, alike, name)
+        rough = [self._added(base, other, looks[other]) for other in looks]
+        near = current.score + NEARLY * max(base.score - current.score, 0.0)
+        found = [each for each in rough if each is not None and each.score < near]
+        return self.finish(min(found, key=lambda each: each.score), current) if found else None
 
     def _extended(self, current: Hypothesis, effects: Effects, release: Release) -> Problem:
         common = kept(current.plain, (effects - {GRADE}) | set(self.model.effects))
@@ -195,7 +223,14 @@ class Search:
         return self._problem(effects, Release((*common.shared, *release.shared), own))
 
     def _problem(self, effects: Effects, release: Release) -> Problem:
-        return make_problem(self.model, self.records, release.shared, own=release.own, use=self.use, grid=self.grid or grid_for(self.model, self.records))
+        return make_problem(
+            self.model,
+            self.records,
+            release.shared,
+            own=release.own,
+            use=self.use,
+            grid=self.grid or grid_for(self.model, self.records),
+        )
 
     def _keep(self, hypothesis: Hypothesis) -> None:
         self.visited[hypothesis.effects] = hypothesis

@@ -79,9 +79,7 @@ class Line:
         return int(self.error.size)
 
 
-def lines(
-    result: FitResult, forces: Sequence[Force] | None = None, length: int | None = None
-) -> tuple[Line, ...]:
+def lines(result: FitResult, forces: Sequence[Force] | None = None, length: int | None = None) -> tuple[Line, ...]:
     """Return the recordings of a fit in blocks, under further torques where there are any.
 
     ``length`` is the samples per block, by default as few as the fit's own line needs.
