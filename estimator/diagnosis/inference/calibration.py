@@ -17,6 +17,10 @@ ALIKE_WITHIN = 10.0
 """Difference in score within which another effect in an effect's place is as good: very strong evidence in the scale
 of Kass and Raftery, J. Am. Stat. Assoc. 90, 1995."""
 
+ALIKE_SHARE = 0.03
+"""The same over what the effect itself explains: nature's laws are written in other forms, and none is known to better
+than some per cent of what it does."""
+
 MOST_PREDICTABLE = 0.03
 """Share of the innovations' variance that their own past may foretell."""
 

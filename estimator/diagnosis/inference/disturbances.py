@@ -221,6 +221,16 @@ def minus_twice_log_prior(sizes: FloatArray, limits: Limits) -> float:
     return float(np.sum(((sizes - limits.usual) / PRIOR_SPREAD) ** 2))
 
 
+def starts(sizes: FloatArray, limits: Limits) -> list[FloatArray]:
+    """Return where else a noise model is begun: a drifting torque and a walking load take each other's place."""
+    found = [sizes]
+    for large, small in ((Size.WALK, Size.DRIFT), (Size.DRIFT, Size.WALK)):
+        other = sizes.copy()
+        other[large], other[small] = limits.high[large] - np.log(2.0), sizes[small] - np.log(10.0)
+        found.append(np.clip(other, limits.low, limits.high))
+    return found
+
+
 def estimate(
     line: Line,
     error: FloatArray,
@@ -267,7 +277,10 @@ def estimate(
         information = 4.0 * by_log @ by_log.T + 2.0 * pure @ pure.T + 2.0 * np.eye(sizes.size) / PRIOR_SPREAD**2
         promised = 0.0
         while damping < 1e6:
-            step = -np.linalg.solve(information + damping * np.diag(np.diag(information)), gradient)
+            free = ~(((sizes <= limits.low) & (gradient > 0.0)) | ((sizes >= limits.high) & (gradient < 0.0)))
+            damped = (information + damping * np.diag(np.diag(information)))[np.ix_(free, free)]
+            step = np.zeros(sizes.size)
+            step[free] = -np.linalg.solve(damped, gradient[free])
             tried = np.clip(sizes + np.clip(step, -2.0, 2.0), limits.low, limits.high)
             moved_value, moved_innovations, moved_logs = at(tried)
             promised = value - moved_value

@@ -16,7 +16,7 @@ from functools import cached_property
 import numpy as np
 
 from estimator.diagnosis.hypotheses import Effects
-from estimator.diagnosis.inference.disturbances import Limits, Whitener, estimate, line_of, whitener
+from estimator.diagnosis.inference.disturbances import Limits, Whitener, estimate, line_of, starts, whitener
 from estimator.diagnosis.inference.moments import moved
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import MOMENT_NAMES, FitResult, not_fitted
@@ -113,7 +113,8 @@ def fitted(
     passes: list[float] = []
     while best is None or len(passes) < MOST_PASSES:
         plain = _with_moments(_weighted(plain, sizes, ITERATIONS), sizes)
-        sizes, now = _disturbances(plain, sizes, limits)
+        begun = [sizes] if passes else starts(sizes, limits)
+        sizes, now = min((_disturbances(plain, each, limits) for each in begun), key=lambda found: found[1])
         enough = SAME if math.isnan(rival) else max(SAME, DIGITS * abs(now - rival))
         last = best is not None and now > best.minus_twice_log - enough
         if best is None or now < best.minus_twice_log:

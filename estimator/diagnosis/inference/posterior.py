@@ -46,7 +46,12 @@ class Belief:
 
 
 def beliefs(
-    best: Hypothesis, visited: Mapping[Effects, Hypothesis], nothing: Hypothesis, tempered: float, alike_within: float
+    best: Hypothesis,
+    visited: Mapping[Effects, Hypothesis],
+    nothing: Hypothesis,
+    tempered: float,
+    alike_within: float,
+    alike_share: float,
 ) -> tuple[Belief, ...]:
     """Return what is believed of each effect of the best set, the weightiest first.
 
@@ -58,16 +63,19 @@ def beliefs(
         By which differences of scores are divided.
     alike_within : float
         Difference in score within which another effect in an effect's place is as good.
+    alike_share : float
+        The same over what the effect itself explains.
     """
     found = []
     for name in sorted(best.effects):
-        alike = _alike(name, best, visited, alike_within)
         without = visited[best.effects - {name}]
+        within = max(alike_within, alike_share * (without.score - best.score))
+        alike = _alike(name, best, visited, within)
         found.append(
             Belief(
                 name,
                 _probability({name, *alike, *_same_law(name)}, visited, tempered),
-                (_squares(without) - _squares(best)) / _squares(nothing),
+                (squares_of(without) - squares_of(best)) / squares_of(nothing),
                 without.score - best.score,
                 alike,
             )
@@ -82,10 +90,10 @@ def _same_law(name: str) -> set[str]:
 
 def free_rms(hypothesis: Hypothesis) -> float:
     """Return the RMS of the free-run error, load torque and initial state as they leave least of it."""
-    return math.sqrt(max(_squares(hypothesis), 0.0) / hypothesis.plain.residual.size)
+    return math.sqrt(max(squares_of(hypothesis), 0.0) / hypothesis.plain.residual.size)
 
 
-def _squares(hypothesis: Hypothesis) -> float:
+def squares_of(hypothesis: Hypothesis) -> float:
     """Return the squared free-run error, each recording's load torque and initial state as they leave least of it.
 
     A load that may walk far leaves the noise of the reading: the rest is what it did.
@@ -109,8 +117,9 @@ def _alike(name: str, best: Hypothesis, visited: Mapping[Effects, Hypothesis], w
         for effects, each in visited.items()
         if len(effects - others) == 1 and others <= effects
     }
-    near = {other for other, each in exchanged.items() if each.score - best.score < within}
-    return tuple(sorted((near | set(EFFECTS[name].equivalent)) - best.effects))
+    near = {name, *(other for other, each in exchanged.items() if each.score - best.score < within)}
+    equivalent = {twin for other in near for twin in EFFECTS[other].equivalent}
+    return tuple(sorted((near | equivalent) - best.effects))
 
 
 def _probability(names: set[str], visited: Mapping[Effects, Hypothesis], tempered: float) -> float:

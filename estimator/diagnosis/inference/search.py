@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -16,6 +16,8 @@ from estimator.diagnosis.noise import noise_floor
 from estimator.diagnosis.screening import Look, promising
 from estimator.diagnosis.trial import has_edge
 from estimator.physics.catalogue import EFFECTS
+from estimator.physics.effect import Element
+from estimator.physics.fit import FitResult
 from estimator.physics.grid import Grid, grid_for
 from estimator.physics.layout import slot
 from estimator.physics.model import DrivelineModel
@@ -23,6 +25,7 @@ from estimator.physics.parallel import concurrently
 from estimator.physics.problem import Problem, make_problem, start_of, start_vector
 from estimator.physics.simulate import simulate
 from estimator.physics.starts import warm_start
+from estimator.physics.torque_path import shaft_torque
 from estimator.physics.unknowns import Release, nominal_unknowns, own_unknowns
 from estimator.signals.record import BoolArray, Record
 
@@ -41,6 +44,9 @@ SAME_PROMISE = 0.5
 
 NEARLY = 0.3
 """Share of what an effect explains by which a look-alike's first few steps may be behind for it to be fitted."""
+
+LEAST_THROUGH = 0.2
+"""Share of the torque's RMS that must get through the torque path: less switches the input off to explain nothing."""
 
 MOST_EFFECTS = 8
 FINISHED = 2
@@ -175,7 +181,27 @@ class Search:
         values = {name: plain.values_of(name) for name in hypothesis.effects - {GRADE}}
         if any(EFFECTS[name].implausible(self.model, self.records, values[name]) for name in values):
             return False
-        return all(has_edge(name, plain) for name in values if EFFECTS[name].event)
+        edges = all(has_edge(name, plain) for name in values if EFFECTS[name].event)
+        return edges and self._is_driven(plain) and not self._is_stuck(values)
+
+    def _is_driven(self, plain: FitResult) -> bool:
+        """Tell whether the torque path lets a real part of the torque through in every recording."""
+        for i, record in enumerate(self.records):
+            torque = shaft_torque(record.torque_nm, record.time_s - record.time_s[0], plain.p_of(i))
+            if float(torque @ torque) < LEAST_THROUGH**2 * float(record.total_torque_nm @ record.total_torque_nm):
+                return False
+        return True
+
+    def _is_stuck(self, values: Mapping[str, Mapping[str, float]]) -> bool:
+        """Tell whether a torque against the motion is above all torque that was applied."""
+        most = max(float(np.abs(record.total_torque_nm).max()) for record in self.records)
+        return any(
+            values[name].get(parameter.name, 0.0) > most
+            for name in values
+            if EFFECTS[name].element in (Element.MOTOR, Element.LOAD)
+            for parameter in EFFECTS[name].parameters
+            if parameter.dimension == "torque"
+        )
 
     def is_resolved(self, hypothesis: Hypothesis, name: str) -> bool:
         """Tell whether an effect is large enough to be told from another way of sampling."""
@@ -197,6 +223,12 @@ class Search:
             limits = self._limits_of(effects)
             self._keep(fitted(effects, problem, x, current.sizes, limits, len(self.names), current.minus_twice_log))
         return self.visited[effects]
+
+    def exchanged(self, current: Hypothesis, name: str, other: str) -> Hypothesis | None:
+        """Fit another effect in the place of one; None where no value is one."""
+        base = self.without(current, name)
+        rough = self._added(base, other, promising(screen(base, self.model).looks(other)))
+        return None if rough is None else self.finish(rough, current)
 
     def _best_drop(self, current: Hypothesis) -> Hypothesis | None:
         """Return a hypothesis without an effect that others made superfluous; None where there is none."""

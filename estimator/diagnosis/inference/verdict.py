@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimator.diagnosis.inference.calibration import (
+    ALIKE_SHARE,
     ALIKE_WITHIN,
     CLEARLY_BELOW,
     LEAST_PROBABILITY,
@@ -15,10 +16,11 @@ from estimator.diagnosis.inference.calibration import (
 )
 from estimator.diagnosis.inference.disturbances import Size
 from estimator.diagnosis.inference.likelihood import Hypothesis
-from estimator.diagnosis.inference.posterior import Belief, beliefs
+from estimator.diagnosis.inference.posterior import Belief, beliefs, squares_of
 from estimator.diagnosis.inference.remainder import Test, tests
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.result import Verdict
+from estimator.physics.catalogue import EFFECTS
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,12 +54,13 @@ class Decision:
 
 def decide(search: Search, with_findings: bool = False) -> Decision:
     """Search, and decide; ``with_findings`` where faults of the acquisition were recognised and compensated."""
-    best, nothing = search.run(), search.nothing()
+    nothing = search.nothing()
+    best = _as_simple_as_will_do(search, search.run())
     for name in best.effects:
         search.without(best, name)
     failed = tuple(test for test in tests(best) if test.failed)
     tempered = TEMPERED + best.plain.residual.size * sum(test.value for test in failed if test.is_share)
-    found = beliefs(best, search.visited, nothing, tempered, ALIKE_WITHIN)
+    found = beliefs(best, search.visited, nothing, tempered, ALIKE_WITHIN, ALIKE_SHARE)
     established = [each for each in found if each.probability >= LEAST_PROBABILITY]
     named = tuple(each for each in established if each.share >= LEAST_SHARE and search.is_resolved(best, each.name))
     noise = float(np.hypot(*np.exp(best.sizes[[Size.WHITE, Size.COLOURED]])))
@@ -73,6 +76,22 @@ def decide(search: Search, with_findings: bool = False) -> Decision:
         left,
         best.plain.rms / noise,
     )
+
+
+def _as_simple_as_will_do(search: Search, best: Hypothesis) -> Hypothesis:
+    """Return the best set with special cases in the place of general laws that hardly move the error beside them.
+
+    What a general law has beyond its special case would be a trace.
+    """
+    for name in sorted(best.effects):
+        for special in EFFECTS[name].contains:
+            simpler = search.exchanged(best, name, special)
+            if simpler is None:
+                continue
+            if squares_of(simpler) - squares_of(best) < LEAST_SHARE * squares_of(search.nothing()):
+                best = simpler
+                break
+    return best
 
 
 def _verdict(best: Hypothesis, is_named: bool, is_more_than_noise: bool) -> Verdict:
