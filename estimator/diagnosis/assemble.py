@@ -236,4 +236,12 @@ def augmented_model(result: FitResult, model: DrivelineModel, effects: Sequence[
     added: dict[str, Mapping[str, EffectValue]] = {
         effect.name: {name: EffectValue(p.value, p.ci95) for name, p in effect.parameters.items()} for effect in effects
     }
-    return replace(model, parameters=parameters, effects={**model.effects, **added})
+    return replace(model, parameters=parameters, effects={**_retuned_effects(result, model), **added})
+
+
+def _retuned_effects(result: FitResult, model: DrivelineModel) -> dict[str, Mapping[str, EffectValue]]:
+    """Return the effects that a model had, those known roughly with the values that were fitted."""
+    return {
+        name: {key: replace(v, value=result.values_of(name).get(key, v.value)) for key, v in values.items()}
+        for name, values in model.effects.items()
+    }

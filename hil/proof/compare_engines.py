@@ -25,6 +25,7 @@ from estimator.errors import EstimatorError
 from hil.config.model_file import read_model_for_recordings
 from hil.proof.campaign.kinds import parse_seeds
 from hil.proof.make_case import write_shown
+from hil.proof.truth.bus import NOMINAL_TOLERANCE
 from hil.proof.truth.case import Case, make_case
 from hil.proof.truth.dirty import Known, make_dirty
 from hil.proof.truth.registry import EFFECTS
@@ -43,24 +44,29 @@ STRONG = [name for name in KINDS if name not in ACQUIRED]
 Row = dict[str, Any]
 
 
+def knows(seed: int) -> Known:
+    """Return what the model file of a dirty case knows of its imperfections; each in turn."""
+    return list(Known)[seed % len(Known)]
+
+
 def case_of(which: str, seed: int) -> tuple[Case, dict[str, dict[str, float]], str]:
     """Return a case of a set, what its model file knows beyond the line, and what is strong in it."""
     if which == "clean":
         strong = NOTHING if seed % 9 == 0 else KINDS[seed % len(KINDS)]
         return make_case(strong, seed), {}, strong
     strong = NOTHING if which == "quiet" else STRONG[seed % len(STRONG)]
-    known = list(Known)[seed % len(Known)]
-    return *make_dirty(strong, seed, known), strong
+    return *make_dirty(strong, seed, knows(seed)), strong
 
 
 def answered(which: str, seed: int, engine: str) -> Row:
     """Return the row of a case: what is there, what was named, and how long it took."""
     case, known, strong = case_of(which, seed)
+    tolerance = NOMINAL_TOLERANCE if knows(seed) is Known.OFF else 0.0
     with tempfile.TemporaryDirectory(prefix="hil-case-") as place:
         shown = Path(place)
         write_shown(case, shown)
         with (shown / "model.toml").open("a", encoding="utf-8") as model:
-            model.write("".join(_stated(name, sizes) for name, sizes in known.items()))
+            model.write("".join(_stated(name, sizes, tolerance) for name, sizes in known.items()))
         file = read_model_for_recordings(shown / "model.toml")
         records = read_records(sorted(shown.glob("run_*.csv")), file.signals, file.on_bench)
     hidden = [name for name in case.specimen.sizes if name != NOTHING and name not in known]
@@ -83,8 +89,11 @@ def answered(which: str, seed: int, engine: str) -> Row:
     }
 
 
-def _stated(name: str, sizes: dict[str, float]) -> str:
-    return f"\n[effects.{name}]\n" + "".join(f"{key} = {{ value = {value:.6g} }}\n" for key, value in sizes.items())
+def _stated(name: str, sizes: dict[str, float], tolerance: float) -> str:
+    """Return a table of a model file for what it knows; without a tolerance it is held."""
+    trusted = f", tolerance = {tolerance}" if tolerance else ""
+    lines = [f"{key} = {{ value = {value:.6g}{trusted} }}" for key, value in sizes.items()]
+    return "\n".join([f"\n[effects.{name}]", *lines, ""])
 
 
 def table(rows: Sequence[Row]) -> str:

@@ -45,6 +45,14 @@ from estimator.signals.record import OutputKind, Record
 
 SMALLEST_P = 1e-300
 
+BUDGET_S = 30.0
+"""Time after which no further change of the best set is tried [s]."""
+
+STOPPED = (
+    f"the search was stopped after {BUDGET_S:g} s with the best set of effects so far: further effects on top of it, "
+    "and look-alikes in the place of those named, were not tried"
+)
+
 DIMENSIONS = {OutputKind.SPEED: "speed", OutputKind.POSITION: "angle", OutputKind.FORCE: "torque"}
 
 
@@ -75,7 +83,9 @@ def _diagnose(records: Sequence[Record], model: DrivelineModel, progress: Progre
     names, untestable = open_hypotheses(line, chain.records)
     fitted_to = as_slow_as_needed(chain.records, line)
     progress("comparing hypotheses", 0.1)
-    search = Search(line, fitted_to, everything(fitted_to), names)
+    search = Search(
+        line, fitted_to, everything(fitted_to), names, is_over=lambda: time.perf_counter() - began > BUDGET_S
+    )
     decision = decide(search, with_findings=bool(chain.findings))
     progress("writing the verdict", 0.9)
     named = decision.verdict in (Verdict.EXPLAINED, Verdict.PARTLY_EXPLAINED)
@@ -103,6 +113,7 @@ def _diagnose(records: Sequence[Record], model: DrivelineModel, progress: Progre
         timing_s={"total": time.perf_counter() - began},
         augmented=augmented_model(believed.plain, model, effects),
         traces=_courses(chain, line, retuned, final),
+        warnings=(STOPPED,) if search.stopped else (),
         discrepancy=_seen(decision, believed, line) if mismatch.detected else None,
         remainder=_remainder(decision),
         slight=tuple(

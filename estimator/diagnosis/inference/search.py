@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -53,9 +53,24 @@ FINISHED = 2
 """Best of these that are fitted to their end."""
 
 
+def never() -> bool:
+    """Leave a search all the time it needs."""
+    return False
+
+
 @dataclass
 class Search:
-    """Hypotheses on a model and recordings; each set of effects is fitted once."""
+    """Hypotheses on a model and recordings; each set of effects is fitted once.
+
+    Attributes
+    ----------
+    visited : dict of set of effects to Hypothesis
+        Those that were fitted to their end.
+    rivals : dict of str to float
+        Best score of a set with each effect that was fitted at all.
+    is_over : callable
+        Tells when no further change is to be tried: ``stopped`` says that it was so.
+    """
 
     model: DrivelineModel
     records: Sequence[Record]
@@ -64,6 +79,8 @@ class Search:
     grid: Grid | None = None
     visited: dict[Effects, Hypothesis] = field(default_factory=dict)
     rivals: dict[str, float] = field(default_factory=dict)
+    is_over: Callable[[], bool] = never
+    stopped: bool = False
     _limits: Limits | None = None
 
     @property
@@ -77,6 +94,9 @@ class Search:
         """Return the best set of effects found."""
         current = self.nothing()
         for _ in range(2 * MOST_EFFECTS):
+            if self.is_over():
+                self.stopped = True
+                break
             better = self._best_addition(current) if len(current.effects) < MOST_EFFECTS else None
             better = better or self._best_drop(current) or self._best_exchange(current) or self._graded(current)
             if better is None:

@@ -15,6 +15,7 @@ from estimator.diagnosis.inference.remainder import tests as examined
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.inference.verdict import Decision, decide
 from estimator.diagnosis.result import Verdict
+from estimator.physics.model import EffectValue
 from estimator.signals.record import Record
 from tests.estimator.diagnosis.one_effect import bench_with
 from tests.estimator.diagnosis.planted import SIGMA
@@ -97,3 +98,31 @@ def test_noise_passes_its_tests() -> None:
     nothing = searched(bench_with(*PLAIN)).nothing()
     assert [test.name for test in examined(nothing) if test.failed] == []
     assert free_rms(nothing) == pytest.approx(SIGMA, rel=0.05)
+
+
+def knowing(bench: Bench, name: str, key: str, value: float, tolerance: float) -> Bench:
+    """The same recordings with a model that knows an effect, and how far its size is trusted."""
+    effects = {name: {key: EffectValue(value, None, tolerance)}}
+    return replace(bench, model=replace(bench.model, effects=effects))
+
+
+def test_an_effect_that_is_known_roughly_is_tuned_and_no_finding() -> None:
+    bench = bench_with("coulomb_friction_motor", {"friction_nm": 8.0})
+    roughly = knowing(bench, "coulomb_friction_motor", "friction_nm", 7.0, 0.3)
+    decision = decide(searched(roughly))
+    assert decision.verdict is Verdict.NO_MISMATCH
+    assert decision.best.plain.value("coulomb_friction_motor", "friction_nm") == pytest.approx(8.0, rel=0.02)
+
+
+def test_an_effect_that_is_known_wrongly_and_held_is_a_mismatch() -> None:
+    bench = bench_with("coulomb_friction_motor", {"friction_nm": 8.0})
+    held = knowing(bench, "coulomb_friction_motor", "friction_nm", 5.0, 0.0)
+    nothing = searched(held).nothing()
+    assert nothing.plain.rms > 1.5 * SIGMA
+
+
+def test_a_search_that_is_over_tells_the_best_so_far() -> None:
+    search = searched(bench_with("coulomb_friction_motor", {"friction_nm": 8.0}))
+    search.is_over = lambda: True
+    assert search.run() is search.nothing()
+    assert search.stopped
