@@ -17,7 +17,7 @@ from enum import IntEnum
 import numpy as np
 from scipy.linalg import expm
 
-from estimator.diagnosis.inference.whitening import fill_gains, innovate
+from estimator.diagnosis.line.whitening import fill_gains, innovate
 from estimator.physics.fit import FitResult
 from estimator.physics.layout import slot
 from estimator.physics.model import Structure
