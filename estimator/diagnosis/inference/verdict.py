@@ -16,7 +16,7 @@ from estimator.diagnosis.inference.calibration import (
 )
 from estimator.diagnosis.inference.disturbances import Size
 from estimator.diagnosis.inference.likelihood import Hypothesis
-from estimator.diagnosis.inference.posterior import Belief, beliefs, squares_of
+from estimator.diagnosis.inference.posterior import Belief, beliefs, free_rms, squares_of
 from estimator.diagnosis.inference.remainder import Test, tests
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.result import Verdict
@@ -64,7 +64,7 @@ def decide(search: Search, with_findings: bool = False) -> Decision:
     established = [each for each in found if each.probability >= LEAST_PROBABILITY]
     named = tuple(each for each in established if each.share >= LEAST_SHARE and search.is_resolved(best, each.name))
     noise = float(np.hypot(*np.exp(best.sizes[[Size.WHITE, Size.COLOURED]])))
-    left = max(best.plain.rms**2 - noise**2, 0.0) / nothing.plain.rms**2
+    left = max(free_rms(best) ** 2 - noise**2, 0.0) / free_rms(nothing) ** 2
     return Decision(
         _verdict(best, bool(named) or with_findings, bool(failed)),
         best,
@@ -74,7 +74,7 @@ def decide(search: Search, with_findings: bool = False) -> Decision:
         tuple(each for each in found if each.probability < LEAST_PROBABILITY),
         failed,
         left,
-        best.plain.rms / noise,
+        free_rms(best) / noise,
     )
 
 
@@ -95,7 +95,7 @@ def _as_simple_as_will_do(search: Search, best: Hypothesis) -> Hypothesis:
 
 
 def _verdict(best: Hypothesis, is_named: bool, is_more_than_noise: bool) -> Verdict:
-    if best.plain.rms > CLEARLY_BELOW * _spread(best):
+    if free_rms(best) > CLEARLY_BELOW * _spread(best):
         return Verdict.UNEXPLAINED
     if is_named:
         return Verdict.PARTLY_EXPLAINED if is_more_than_noise else Verdict.EXPLAINED
