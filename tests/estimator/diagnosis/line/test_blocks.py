@@ -47,9 +47,10 @@ def test_a_long_recording_is_used_in_stretches_from_end_to_end() -> None:
 
 def test_a_line_that_grew_slower_keeps_its_blocks_where_they_are_asked_for() -> None:
     """A law over blocks is one of that length: blocks of the slower line's own would not match it."""
-    fast = record(drive_torque(1), exact_states(TWO_MASS, drive_torque(1), START, 1e-3)[:, SPEED], sample_time_s=1e-3)
-    slower = fit(make_problem(model({**TWO_MASS, "k": 0.5 * TWO_MASS["k"]}), [fast], ()))
-    length = block_length(fit(make_problem(model(TWO_MASS), [fast], ())))
+    stiff = {**TWO_MASS, "k": 4.0 * TWO_MASS["k"]}
+    fast = record(drive_torque(1), exact_states(stiff, drive_torque(1), START, 1e-3)[:, SPEED], sample_time_s=1e-3)
+    slower = fit(make_problem(model(TWO_MASS), [fast], ()))
+    length = block_length(fit(make_problem(model(stiff), [fast], ())))
     assert block_length(slower) > length
     (line,) = lines(slower, length=length)
     assert line.length == length
