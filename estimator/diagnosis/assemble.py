@@ -11,6 +11,7 @@ import numpy as np
 from estimator.diagnosis.chain import Chain
 from estimator.diagnosis.evidence import gain_from_squares
 from estimator.diagnosis.holdout import Examiner
+from estimator.diagnosis.inherit import line_values
 from estimator.diagnosis.intervals import (
     Z95,
     interval_both_ways,
@@ -24,7 +25,6 @@ from estimator.diagnosis.trial import Trial
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effects import road_grade
 from estimator.physics.fit import FitResult
-from estimator.physics.layout import slot
 from estimator.physics.model import DrivelineModel, EffectValue, parameter_unit, unit
 from estimator.physics.problem import local_part
 from estimator.physics.steps import moments_of
@@ -48,11 +48,11 @@ def _found(
     entry = EFFECTS[trial.name]
     nulls = {parameter.name: parameter.null for parameter in entry.parameters}
     twins = selection.lookalikes.get(trial.name, ())
-    profiles = _profiles(selection.result, cov, model) if entry.profile else {}
+    profiles = profiles_of(selection.result, cov, model) if entry.profile else {}
     parameters = (
-        _profile_size(selection.result, cov, model)
+        profile_size(selection.result, cov, model)
         if entry.profile
-        else _parameters(trial.name, selection.result, cov, model)
+        else parameters_of(trial.name, selection.result, cov, model)
     )
     held = trial.holdout
     if held is None:
@@ -63,14 +63,14 @@ def _found(
         element=entry.element,
         statement=entry.sentence(nulls | {name: p.value for name, p in parameters.items()}, model.motion),
         parameters=parameters,
-        time_s=_moments(trial.name, selection.result) if entry.event else {},
+        time_s=moments_in(trial.name, selection.result) if entry.event else {},
         indistinguishable_from=twins,
         evidence=Evidence(trial.gain.delta_bic, held.before, held.after, trial.p_value),
         profiles=profiles,
     )
 
 
-def _moments(name: str, result: FitResult) -> dict[str, tuple[Interval, ...]]:
+def moments_in(name: str, result: FitResult) -> dict[str, tuple[Interval, ...]]:
     """Return when an event lasts in each recording that has it, on the recording's own time [s]."""
     found: dict[str, tuple[Interval, ...]] = {}
     for record, (from_s, to_s) in zip(result.problem.records, moments_of(result, name), strict=True):
@@ -116,7 +116,7 @@ def rms_of(errors: Sequence[FloatArray]) -> float:
     return float(np.sqrt(_squares(errors) / sum(error.size for error in errors)))
 
 
-def _parameters(name: str, result: FitResult, cov: FloatArray, model: DrivelineModel) -> dict[str, Estimated]:
+def parameters_of(name: str, result: FitResult, cov: FloatArray, model: DrivelineModel) -> dict[str, Estimated]:
     """Return what was fitted, and what was held; a held value at its null only where a model file needs it."""
     entry = EFFECTS[name]
     units = {parameter.name: parameter.unit(model.motion) for parameter in entry.parameters}
@@ -148,16 +148,15 @@ def _parameters(name: str, result: FitResult, cov: FloatArray, model: DrivelineM
 
 def _derived(name: str, result: FitResult) -> Mapping[str, float]:
     """Return the values of an effect that are held but follow from what was fitted."""
-    of_line = result.problem.grid.structure.parameter_names
-    nominal = {key: float(result.p[slot("", key)]) for key in of_line}
-    return EFFECTS[name].derived(result.values_of(name), nominal)
+    return EFFECTS[name].derived(result.values_of(name), line_values(result))
 
 
 def _derived_value(name: str, key: str, result: FitResult) -> float:
     return _derived(name, result)[key]
 
 
-def _profiles(result: FitResult, cov: FloatArray, model: DrivelineModel) -> dict[str, Profile]:
+def profiles_of(result: FitResult, cov: FloatArray, model: DrivelineModel) -> dict[str, Profile]:
+    """Return the course of a load profile over each recording's own time, with its 95 % band."""
     torque_unit = unit("torque", model.motion)
     profiles = {}
     first = len(result.problem.shared)
@@ -174,8 +173,9 @@ def _profiles(result: FitResult, cov: FloatArray, model: DrivelineModel) -> dict
     return profiles
 
 
-def _profile_size(result: FitResult, cov: FloatArray, model: DrivelineModel) -> dict[str, Estimated]:
-    profiles = _profiles(result, cov, model).values()
+def profile_size(result: FitResult, cov: FloatArray, model: DrivelineModel) -> dict[str, Estimated]:
+    """Return the size of a load profile: its RMS over all recordings, with its interval."""
+    profiles = profiles_of(result, cov, model).values()
     value = np.concatenate([profile.value for profile in profiles])
     half = np.concatenate([0.5 * (profile.high - profile.low) for profile in profiles])
     size = float(np.sqrt(np.mean(value**2)))
@@ -236,4 +236,12 @@ def augmented_model(result: FitResult, model: DrivelineModel, effects: Sequence[
     added: dict[str, Mapping[str, EffectValue]] = {
         effect.name: {name: EffectValue(p.value, p.ci95) for name, p in effect.parameters.items()} for effect in effects
     }
-    return replace(model, parameters=parameters, effects={**model.effects, **added})
+    return replace(model, parameters=parameters, effects={**_retuned_effects(result, model), **added})
+
+
+def _retuned_effects(result: FitResult, model: DrivelineModel) -> dict[str, Mapping[str, EffectValue]]:
+    """Return the effects that a model had, those known roughly with the values that were fitted."""
+    return {
+        name: {key: replace(v, value=result.values_of(name).get(key, v.value)) for key, v in values.items()}
+        for name, values in model.effects.items()
+    }

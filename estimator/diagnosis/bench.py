@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from estimator.diagnosis.evidence import VERY_STRONG, gain
 from estimator.diagnosis.hypotheses import NOTHING, Effects, effects_of
-from estimator.diagnosis.inherit import forgetting, inheriting, kept, placed
+from estimator.diagnosis.inherit import forgetting, inheriting, kept, line_values, placed
 from estimator.diagnosis.screening import Screen, promising
 from estimator.diagnosis.shooting import can_be_shot, shot
 from estimator.physics.catalogue import EFFECTS
@@ -124,7 +124,7 @@ class Bench:
         self._retold.add((effects, name))
         entry = EFFECTS[name]
         fits = []
-        for other in entry.retold(self.model, self.records, values, had.values_of("")):
+        for other in entry.retold(self.model, self.records, values, line_values(had)):
             warm = placed(forgetting(had, name), other.line)
             starts = self._retold_from(name, other.start)
             (heat,) = begun(self._problems(effects, warm, starts), warm, STEPS_ANEW)

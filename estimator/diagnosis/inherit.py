@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult
+from estimator.physics.layout import slot
 from estimator.physics.unknowns import Release, Shared
 
 
@@ -46,6 +47,11 @@ def forgetting(result: FitResult, name: str) -> FitResult:
     left = [*keep, *[True] * (result.x.size - len(keep))]
     problem = replace(result.problem, shared=shared)
     return replace(result, problem=problem, x=result.x[left], derivative=None)  # which was found with the effect
+
+
+def line_values(result: FitResult) -> dict[str, float]:
+    """Return the values of the line's own parameters in a fit, those that it may not change among them."""
+    return {name: float(result.p[slot("", name)]) for name in result.problem.grid.structure.parameter_names}
 
 
 def placed(result: FitResult, line: Mapping[str, float]) -> FitResult:

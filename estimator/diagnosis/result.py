@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
@@ -14,9 +15,10 @@ Interval = tuple[float, float]
 
 
 class Verdict(Enum):
-    """The three honest answers."""
+    """The honest answers."""
 
     EXPLAINED = "explained"
+    PARTLY_EXPLAINED = "partly_explained"
     UNEXPLAINED = "unexplained"
     NO_MISMATCH = "no_mismatch"
 
@@ -94,6 +96,28 @@ class FoundEffect:
     indistinguishable_from: tuple[str, ...]
     evidence: Evidence
     profiles: Mapping[str, Profile] = field(default_factory=dict)
+    share: float = math.nan
+    probability: float = math.nan
+
+
+@dataclass(frozen=True, slots=True)
+class Remainder:
+    """What is left beyond noise and drift: its share of the re-tuned model's squared error, and of what kind it is."""
+
+    share: float
+    times_noise: float
+    element: Element | None
+    band_hz: Interval | None
+    law: str
+
+
+@dataclass(frozen=True, slots=True)
+class Slight:
+    """An effect that the data show but that hardly moves the error (a trace in the contract)."""
+
+    name: str
+    share: float
+    parameters: Mapping[str, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -362,3 +386,5 @@ class Diagnosis:
     warnings: tuple[str, ...] = ()
     discrepancy: Discrepancy | None = None
     strays: tuple[Stray, ...] = ()
+    remainder: Remainder | None = None
+    slight: tuple[Slight, ...] = ()

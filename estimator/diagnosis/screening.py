@@ -95,10 +95,10 @@ class _Steps:
 class Screen:
     """Looks at effects around one fit."""
 
-    def __init__(self, result: FitResult, model: DrivelineModel) -> None:
+    def __init__(self, result: FitResult, model: DrivelineModel, projector: Projector | None = None) -> None:
         self._result = result
         self._model = model
-        self._projector = Projector(result)
+        self._projector = projector or Projector(result)
         self._rows = np.cumsum([0, *(int(use.sum()) for use in result.problem.use)])
 
     def looks(self, name: str, kept: str = "") -> list[Look]:
@@ -177,6 +177,8 @@ class Screen:
         return found
 
     def _in_phase(self, release: Release, found: list[list[Wave]]) -> Look:
+        if not all(np.isfinite(wave.answers @ wave.answers.T).all() for mine in found for wave in mine):
+            return Look(release, 0.0)  # so far out that the line flies apart
         amplitudes, phases, promise = self._regress(found)
         shared = tuple(
             replace(u, start=float(np.clip(amplitudes[u.name] / u.scale, u.low, u.high))) if u.name in amplitudes else u

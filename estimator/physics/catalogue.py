@@ -115,6 +115,11 @@ def effect_problems(name: str, values: Mapping[str, EffectValue], model: Driveli
         for key, entry_value in values.items()
         if not math.isfinite(entry_value.value)
     ]
+    problems += [
+        f"effects.{name}.{key}.tolerance: expected a relative tolerance from 0 up to 1, came {entry_value.tolerance}"
+        for key, entry_value in values.items()
+        if not 0 <= entry_value.tolerance < 1
+    ]
     return problems + _limit_problems(entry, values)
 
 

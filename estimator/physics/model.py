@@ -123,11 +123,12 @@ class Parameter:
 class EffectValue:
     """One parameter of an effect: its value and, where it was estimated, its 95 % interval.
 
-    A profile (road grade over time) has several values; a scalar parameter has one.
+    ``tolerance`` is the share of the value within which re-tuning it is no missing physics; 0 holds it.
     """
 
     value: float
     ci95: tuple[float, float] | None = None
+    tolerance: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

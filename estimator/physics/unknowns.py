@@ -43,12 +43,26 @@ class Shared:
 
 
 def nominal_unknowns(model: DrivelineModel) -> tuple[Shared, ...]:
-    """Return the nominal parameters as unknowns within their tolerances; one trusted exactly is not free."""
-    return tuple(
+    """Return the nominal parameters as unknowns within their tolerances; one trusted exactly is not free.
+
+    So are the parameters of effects that the model has, where it says how far they are trusted.
+    """
+    line = (
         Shared("", name, p.value, 1.0 - p.tolerance, 1.0 + p.tolerance, 1.0)
         for name, p in model.parameters.items()
         if p.tolerance > 0 and p.value > 0
     )
+    return (*line, *_known_roughly(model))
+
+
+def _known_roughly(model: DrivelineModel) -> Iterable[Shared]:
+    """Yield the parameters of the model's own effects that may be re-tuned, within what their laws allow."""
+    for name, values in model.effects.items():
+        for parameter in EFFECTS[name].shared_parameters:
+            given = values.get(parameter.name)
+            if given is not None and given.tolerance > 0 and given.value != 0.0:
+                high = min(1.0 + given.tolerance, max(parameter.most / abs(given.value), 1.0))
+                yield Shared(name, parameter.name, given.value, 1.0 - given.tolerance, high, 1.0)
 
 
 @dataclass(frozen=True, slots=True)

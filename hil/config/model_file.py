@@ -58,6 +58,7 @@ class _ParameterEntry(_Entry):
 
 class _EffectEntry(_Entry):
     ci95: Annotated[list[float], Field(min_length=2, max_length=2)] | None = None
+    tolerance: float = 0.0
 
     @model_validator(mode="after")
     def _interval_is_ordered(self) -> Self:
@@ -222,11 +223,11 @@ def _number(entry: object, key: str, otherwise: Default) -> float | Default:
 
 
 def _effect_value(entry: object) -> EffectValue:
-    interval = _table(entry).get("ci95")
-    match interval:
+    value, tolerance = _number(entry, "value", NEUTRAL), _number(entry, "tolerance", 0.0)
+    match _table(entry).get("ci95"):
         case [int() | float() as low, int() | float() as high]:
-            return EffectValue(_number(entry, "value", NEUTRAL), (float(low), float(high)))
-    return EffectValue(_number(entry, "value", NEUTRAL))
+            return EffectValue(value, (float(low), float(high)), tolerance)
+    return EffectValue(value, None, tolerance)
 
 
 def _as_toml(model: DrivelineModel, signals: SignalsConfig | None, laws: Mapping[str, LawTable]) -> str:
@@ -259,6 +260,8 @@ def _effects_table(model: DrivelineModel) -> Table:
             entry: dict[str, Any] = {"value": float(value.value)}
             if value.ci95 is not None and all(math.isfinite(bound) for bound in value.ci95):
                 entry["ci95"] = [float(bound) for bound in value.ci95]
+            if value.tolerance > 0:
+                entry["tolerance"] = float(value.tolerance)
             effect[key] = _inline(entry)
         effects[name] = effect
     return effects

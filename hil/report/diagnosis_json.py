@@ -24,7 +24,9 @@ from estimator.diagnosis.result import (
     Mismatch,
     Profile,
     RejectedEffect,
+    Remainder,
     Retuned,
+    Slight,
     UnnamedLaw,
 )
 from hil.report.numbers import json_number
@@ -64,7 +66,24 @@ def diagnosis_json(diagnosis: Diagnosis) -> Json:
             {"parameter": stray.name, "ratio": json_number(stray.ratio), "tolerance": json_number(stray.tolerance)}
             for stray in diagnosis.strays
         ],
+        "remainder": None if diagnosis.remainder is None else _remainder(diagnosis.remainder),
+        "traces": [_slight(each) for each in diagnosis.slight],
     }
+
+
+def _remainder(remainder: Remainder) -> Json:
+    return {
+        "share": json_number(remainder.share),
+        "times_noise": json_number(remainder.times_noise),
+        "element": None if remainder.element is None else remainder.element.value,
+        "band_hz": None if remainder.band_hz is None else _numbers(remainder.band_hz),
+        "law": remainder.law,
+    }
+
+
+def _slight(trace: Slight) -> Json:
+    parameters = {name: json_number(value) for name, value in trace.parameters.items()}
+    return {"name": trace.name, "share": json_number(trace.share), "parameters": parameters}
 
 
 def _numbers(values: Iterable[float]) -> list[float | None]:
@@ -157,6 +176,8 @@ def _effect(effect: FoundEffect) -> Json:
         "parameters": {name: _estimated(value) for name, value in effect.parameters.items()},
         "time_s": _times(effect.time_s),
         "indistinguishable_from": list(effect.indistinguishable_from),
+        "share": json_number(effect.share),
+        "probability": json_number(effect.probability),
         "evidence": _evidence(effect.evidence),
     }
     if effect.profiles:

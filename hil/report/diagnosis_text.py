@@ -14,7 +14,14 @@ from estimator.diagnosis.result import Diagnosis, Verdict
 from hil.report.numbers import shown, shown_interval, shown_ratio
 from hil.report.wording import BADGES, ELEMENTS, headline
 
-_COLOURS = MappingProxyType({Verdict.EXPLAINED: "blue", Verdict.UNEXPLAINED: "yellow", Verdict.NO_MISMATCH: "green"})
+_COLOURS = MappingProxyType(
+    {
+        Verdict.EXPLAINED: "blue",
+        Verdict.PARTLY_EXPLAINED: "blue",
+        Verdict.UNEXPLAINED: "yellow",
+        Verdict.NO_MISMATCH: "green",
+    }
+)
 
 MOST_RIVALS = 6
 """Rivals that a terminal shows, the nearest first."""

@@ -15,6 +15,7 @@ from hil.report.numbers import shown, shown_p, shown_times
 BADGES = MappingProxyType(
     {
         Verdict.EXPLAINED: "✓ explained",
+        Verdict.PARTLY_EXPLAINED: "✓ partly explained",
         Verdict.UNEXPLAINED: "? mismatch, not explained",
         Verdict.NO_MISMATCH: "= no mismatch",
     }
@@ -84,6 +85,8 @@ def headline(diagnosis: Diagnosis) -> str:
     found = [_title(effect.name) for effect in diagnosis.effects]
     if diagnosis.verdict is Verdict.EXPLAINED:
         return f"Missing in the model: {listed(found)}"
+    if diagnosis.verdict is Verdict.PARTLY_EXPLAINED:
+        return f"Missing in the model: {listed(found)}, and a remainder that is more than noise"
     if diagnosis.verdict is Verdict.NO_MISMATCH:
         return "Nothing is missing: the nominal model, re-tuned, explains the recordings"
     if found:

@@ -328,3 +328,20 @@ def test_an_interval_that_is_not_finite_is_left_out(tmp_path: Path) -> None:
     write_model(tmp_path / "out.toml", replace(model, effects=effects))
     read = read_model(tmp_path / "out.toml").model
     assert read.effects["coulomb_friction_motor"]["friction_nm"] == EffectValue(3.0)
+
+
+def test_an_effect_that_is_known_roughly_says_how_far_it_is_trusted(tmp_path: Path) -> None:
+    text = ONE_MASS + "\n[effects.coulomb_friction_motor]\nfriction_nm = { value = 5.0, tolerance = 0.3 }\n"
+    (tmp_path / "m.toml").write_text(text)
+    model = read_model(tmp_path / "m.toml").model
+    assert model.effects["coulomb_friction_motor"]["friction_nm"] == EffectValue(5.0, None, 0.3)
+    write_model(tmp_path / "again.toml", model)
+    assert read_model(tmp_path / "again.toml").model == model
+
+
+@pytest.mark.parametrize("tolerance", ["1.0", "-0.1", "nan"])
+def test_a_tolerance_of_an_effect_is_a_share_below_one(tmp_path: Path, tolerance: str) -> None:
+    text = ONE_MASS + f"\n[effects.coulomb_friction_motor]\nfriction_nm = {{ value = 5.0, tolerance = {tolerance} }}\n"
+    (tmp_path / "m.toml").write_text(text)
+    with pytest.raises(ModelFileError, match=r"coulomb_friction_motor\.friction_nm\.tolerance"):
+        read_model(tmp_path / "m.toml")

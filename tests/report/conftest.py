@@ -112,6 +112,8 @@ def diagnosis() -> Diagnosis:
                 time_s={"run_1": ((1.5, 6.2),)},
                 indistinguishable_from=("shaft_hysteresis",),
                 evidence=Evidence(5321.0, 0.41, 0.052, 1e-12),
+                share=0.94,
+                probability=0.999,
             ),
             FoundEffect(
                 name="road_grade",

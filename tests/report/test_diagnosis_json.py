@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from estimator.diagnosis.result import Diagnosis, Mismatch, Stray, UnnamedLaw, Verdict
+from estimator.diagnosis.result import Diagnosis, Mismatch, Remainder, Slight, Stray, UnnamedLaw, Verdict
 from estimator.physics.effect import Element
 from hil.report.diagnosis_json import diagnosis_json, diagnosis_text
 from hil.report.numbers import json_number
@@ -40,6 +40,8 @@ def test_the_text_is_strict_json_of_the_contract(diagnosis: Diagnosis) -> None:
         "warnings",
         "discrepancy",
         "strays",
+        "remainder",
+        "traces",
     ]
     assert content["schema"] == "hil.diagnosis/1"
     assert content["verdict"] == "explained"
@@ -61,6 +63,8 @@ def test_the_text_is_strict_json_of_the_contract(diagnosis: Diagnosis) -> None:
         },
         "time_s": {"run_1": [[1.5, 6.2]]},
         "indistinguishable_from": ["shaft_hysteresis"],
+        "share": 0.94,
+        "probability": 0.999,
         "evidence": {
             "delta_bic": 5321.0,
             "holdout_rms_before": 0.41,
@@ -92,6 +96,25 @@ def test_the_text_is_strict_json_of_the_contract(diagnosis: Diagnosis) -> None:
     assert content["timing_s"] == {"total": 4.2}
 
 
+def test_what_is_left_and_what_hardly_counts_are_told_where_they_are_known(diagnosis: Diagnosis) -> None:
+    content = diagnosis_json(diagnosis)
+    assert content["remainder"] is None
+    assert content["traces"] == []
+    left = Remainder(0.06, 2.0, Element.LOAD, (0.0, 0.4), "a slow course")
+    slight = Slight("resolver_error", 0.001, {"once_rad": 4e-4, "twice_rad": math.nan})
+    content = diagnosis_json(replace(diagnosis, remainder=left, slight=(slight,)))
+    assert content["remainder"] == {
+        "share": 0.06,
+        "times_noise": 2.0,
+        "element": "load",
+        "band_hz": [0.0, 0.4],
+        "law": "a slow course",
+    }
+    assert content["traces"] == [
+        {"name": "resolver_error", "share": 0.001, "parameters": {"once_rad": 4e-4, "twice_rad": None}}
+    ]
+
+
 def test_a_profile_goes_with_its_effect(diagnosis: Diagnosis) -> None:
     profile = diagnosis_json(diagnosis)["effects"][1]["profiles"]["run_1"]
     assert profile["unit"] == "Nm"
@@ -102,7 +125,7 @@ def test_a_profile_goes_with_its_effect(diagnosis: Diagnosis) -> None:
 def test_what_is_not_known_is_null(diagnosis: Diagnosis, verdict: Verdict) -> None:
     nothing = Mismatch(False, None, {}, None, None, math.nan)
     content = diagnosis_json(replace(diagnosis, verdict=verdict, mismatch=nothing, effects=()))
-    assert content["verdict"] in ("explained", "unexplained", "no_mismatch")
+    assert content["verdict"] in ("explained", "partly_explained", "unexplained", "no_mismatch")
     assert content["mismatch"] == {
         "detected": False,
         "element": None,

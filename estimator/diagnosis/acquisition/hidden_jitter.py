@@ -230,7 +230,8 @@ def _likeliest(error: FloatArray, steepness: FloatArray) -> _Jitter | None:
         again = optimize.minimize_scalar(
             lambda log_noise: cost(np.array([log_noise, log_jitter])), bounds=bounds, method="bounded"
         )
-        return float(again.fun) - float(best.fun) - float(stats.chi2.ppf(0.95, 1))
+        least = min(float(again.fun), cost(np.array([best.x[0], log_jitter])))  # where the noise is next to none
+        return least - float(best.fun) - float(stats.chi2.ppf(0.95, 1))
 
     centre = float(best.x[1])
     low, high = (_crossing(excess, centre, centre + side) for side in (-2.0, 2.0))

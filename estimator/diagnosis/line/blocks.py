@@ -79,9 +79,12 @@ class Line:
         return int(self.error.size)
 
 
-def lines(result: FitResult, forces: Sequence[Force] | None = None) -> tuple[Line, ...]:
-    """Return the recordings of a fit in blocks, under further torques where there are any."""
-    length = block_length(result)
+def lines(result: FitResult, forces: Sequence[Force] | None = None, length: int | None = None) -> tuple[Line, ...]:
+    """Return the recordings of a fit in blocks, under further torques where there are any.
+
+    ``length`` is the samples per block, by default as few as the fit's own line needs.
+    """
+    length = length or block_length(result)
     count = len(result.problem.records)
     every = [NO_FORCE] * count if forces is None else forces
     return tuple(concurrently(lambda i: _line(result, i, length, every[i]), range(count)))

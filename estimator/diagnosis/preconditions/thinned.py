@@ -21,6 +21,9 @@ from estimator.physics.model import DrivelineModel, Structure, natural_frequenci
 from estimator.signals.record import Record
 
 LONGEST_S = 0.01
+LONGEST_OF_RIGID_S = 0.02
+"""The same where a likelihood of the samples is formed: on a millisecond's grid only an encoder's steps are seen."""
+
 PER_PERIOD = 12.0
 """Samples kept per period of the line's fastest mode, at least; and one in `LONGEST_S`."""
 
@@ -32,12 +35,17 @@ def thinned(records: Sequence[Record], model: DrivelineModel) -> list[Record]:
     return [_thin(record, factor_for(record.sample_time_s, model)) for record in records]
 
 
-def factor_for(sample_time_s: float, model: DrivelineModel) -> int:
+def as_slow_as_needed(records: Sequence[Record], model: DrivelineModel) -> list[Record]:
+    """Return recordings with no more samples than the line can answer to: between them only the sensor is seen."""
+    return [_thin(record, factor_for(record.sample_time_s, model, LONGEST_OF_RIGID_S)) for record in records]
+
+
+def factor_for(sample_time_s: float, model: DrivelineModel, longest_s: float = LONGEST_S) -> int:
     """Return one in how many samples is enough."""
     if model.structure is Structure.JOINT:
         return 1
     fastest = float(natural_frequencies_rad_s(model.values())[-1])
-    longest_s = LONGEST_S if fastest == 0.0 else min(LONGEST_S, 2.0 * np.pi / (PER_PERIOD * fastest))
+    longest_s = longest_s if fastest == 0.0 else min(longest_s, 2.0 * np.pi / (PER_PERIOD * fastest))
     return max(1, int(longest_s / sample_time_s * (1.0 + 1e-9)))
 
 

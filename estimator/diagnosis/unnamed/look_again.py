@@ -67,7 +67,8 @@ def without_law(hunt: Hunt) -> FitResult:
 
 def _looked(hunt: Hunt, moved: FitResult, extra: Extra, weights: list[FloatArray], law: Found) -> Hunt:
     """Look at the error of a simulation with a law, and choose among the forms again."""
-    view = Scene(moved, lines(moved, extra.forces), hunt.view.explanations)
+    cut = lines(moved, extra.forces, hunt.view.cut[0].length)  # in which the law found is written
+    view = Scene(moved, cut, hunt.view.explanations)
     known = answers(view, hunt.element, [[w[:, np.newaxis] for w in weights]])[0]
     error = np.concatenate([line.error[line.rows] for line in view.cut])
     ground = Ground(view.cut, _jacobian(view, extra), error + known, moved.pinned)

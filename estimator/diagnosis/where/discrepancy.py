@@ -9,7 +9,7 @@ import numpy as np
 
 from estimator.diagnosis.evidence import VERY_STRONG
 from estimator.diagnosis.intervals import Z95
-from estimator.diagnosis.line import Explanation, Input, Line, Motion, explain_all, lines
+from estimator.diagnosis.line import Explanation, Input, Line, explain_all, lines
 from estimator.diagnosis.result import Course, Discrepancy, Equivalent, LawPicture, RankedLaw
 from estimator.diagnosis.unnamed import ROUNDS, Hunt, Scene, UnnamedLaw, hunts_of, judged, without_law
 from estimator.diagnosis.where.axes import input_unit
@@ -108,16 +108,16 @@ def _course(line: Line, found: Input) -> Course:
 def _pictures_of_effects(
     named: Sequence[str], final: FitResult, floor: float, motion: model.Motion
 ) -> tuple[LawPicture, ...]:
-    motions = [line.motion for line in lines(final)]
-    drawn = [_picture_of_effect(name, final, motions, floor, motion) for name in named]
+    cut = lines(final)
+    drawn = [_picture_of_effect(name, final, cut, floor, motion) for name in named]
     return tuple(each for each in drawn if each is not None)
 
 
 def _picture_of_effect(
-    name: str, final: FitResult, motions: Sequence[Motion], floor: float, motion: model.Motion
+    name: str, final: FitResult, cut: Sequence[Line], floor: float, motion: model.Motion
 ) -> LawPicture | None:
-    without = without_effect(final, name)
-    return picture(name, EFFECTS[name].element, without, final.outputs, motions, floor, motion)
+    without, motions = without_effect(final, name), [line.motion for line in cut]
+    return picture(name, EFFECTS[name].element, without, final.outputs, motions, floor, motion, cut[0].length)
 
 
 def without_effect(result: FitResult, name: str) -> FitResult:
@@ -146,6 +146,13 @@ def _picture_of_law(
     motions = hunt.view.motions(hunt.element)
     outputs = hunt.view.result.outputs
     drawn = picture(
-        " + ".join(name for name, _ in best.terms[:3]), best.element, without_law(hunt), outputs, motions, floor, motion
+        " + ".join(name for name, _ in best.terms[:3]),
+        best.element,
+        without_law(hunt),
+        outputs,
+        motions,
+        floor,
+        motion,
+        hunt.view.cut[0].length,
     )
     return () if drawn is None else (drawn,)

@@ -34,6 +34,7 @@ def picture(
     motions: Sequence[Motion],
     floor: float,
     kind: Kind,
+    length: int,
 ) -> LawPicture | None:
     """Return a law over the signal that it is most nearly a function of; None where it is a function of none.
 
@@ -45,8 +46,10 @@ def picture(
         Simulations with the law.
     motions : sequence of Motion
         What then happens, per block.
+    length : int
+        Samples of such a block.
     """
-    cut = lines(without)
+    cut = lines(without, length=length)
     place = PLACES[element]
     found = explain(without, cut, place, floor)
     size = size_at(without, place)

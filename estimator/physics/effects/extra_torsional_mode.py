@@ -137,6 +137,8 @@ def implausible(model: DrivelineModel, records: Sequence[Record], values: Mappin
         too_stiff = values["line_share"] >= 0.99 * STIFFEST
         return f"an inertia on so stiff a spring belongs to the {belongs}" if too_stiff else ""
     impedance = 4.0 * math.pi * values["inertia_kg_m2"] * values["frequency_hz"]
+    if impedance == 0.0:
+        return "a branch without inertia is no mode"
     most = min(MOST_DAMPING + model.parameters["c"].value / impedance, 0.5 / LEAST_AMPLIFIED)
     if values["damping_ratio"] <= most:
         return ""

@@ -87,6 +87,7 @@ def _findings(result: Diagnosis) -> list[Finding]:
     advice = {
         Verdict.NO_MISMATCH: "",
         Verdict.EXPLAINED: f"{MODEL_FILE} has it; see the diagnosis for its evidence, and whether it is to be mended",
+        Verdict.PARTLY_EXPLAINED: f"{MODEL_FILE} has what is established; see the diagnosis for what it leaves",
         Verdict.UNEXPLAINED: "See where it is in the diagnosis, and what to look at there",
     }[result.verdict]
     findings = [

@@ -29,6 +29,7 @@ class Stream(IntEnum):
     SIZES = 3
     RECORDING = 4
     CHOICE = 5
+    WORLD = 6
 
 
 def stream(seed: int, purpose: Stream, *key: int) -> np.random.Generator:

@@ -10,11 +10,11 @@ import pytest
 
 from estimator.diagnosis.acquisition import Finding, Sized
 from estimator.diagnosis.assemble import (
-    _parameters,
     acquired_effects,
     augmented_model,
     found_effects,
     load_torques,
+    parameters_of,
     retuned_parameters,
 )
 from estimator.diagnosis.bench import Bench
@@ -379,7 +379,7 @@ def test_a_held_value_is_told_at_its_null_where_a_model_file_needs_it() -> None:
         Shared("torque_ripple", "order", 1.0, 6.0, 6.0, 6.0),
     )
     fitted = replace(result, problem=replace(result.problem, shared=shared), x=np.array([0.5, 0.0, 6.0]))
-    told = _parameters("torque_ripple", fitted, np.eye(3), LINE)
+    told = parameters_of("torque_ripple", fitted, np.eye(3), LINE)
     assert set(told) == {"amplitude_nm", "order"}
     assert told["order"].ci95 == (6.0, 6.0)
     values = {name: EffectValue(each.value, each.ci95) for name, each in told.items()}

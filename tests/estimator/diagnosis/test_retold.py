@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -94,3 +96,18 @@ def test_a_torque_derates_by_its_own_heat_where_that_is_seen(heating_nm: float) 
     told = found.values_of(name)
     assert told["time_constant_s"] == pytest.approx(6.0, rel=0.1)
     assert told["depth"] / told["heating_nm"] ** 2 == pytest.approx(0.2 / heating_nm**2, rel=0.05)
+
+
+@pytest.mark.parametrize("exact", sorted(TWO_MASS))
+def test_a_law_is_told_another_way_beside_a_parameter_that_is_trusted_exactly(exact: str) -> None:
+    """A fit without it among its unknowns still has its value."""
+    name = "extra_torsional_mode"
+    bench, effects = (
+        bench_with(name, {"between_kg_m2": 0.2, "line_share": 0.7, "damping_ratio": 0.02}, SHAKES),
+        frozenset({name}),
+    )
+    parameters = dict(bench.model.parameters)
+    parameters[exact] = replace(parameters[exact], tolerance=0.0)
+    held = replace(bench, model=replace(bench.model, parameters=parameters))
+    beside = held.fit(effects, held.fit(NOTHING))
+    assert held.fit_retold(effects, name).squares <= beside.squares

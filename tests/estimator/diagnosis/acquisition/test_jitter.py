@@ -9,6 +9,7 @@ import pytest
 
 from estimator.diagnosis.acquisition import OUTPUT, compensate, hidden_jitter, recognise
 from estimator.diagnosis.acquisition.finding import Finding
+from estimator.diagnosis.acquisition.hidden_jitter import _likeliest
 from estimator.signals.record import FloatArray, Record
 from tests.estimator.diagnosis.acquisition.bench import (
     KINDS,
@@ -161,3 +162,13 @@ def test_a_delay_that_comes_and_goes_is_no_jitter(delay_s: float) -> None:
         slopes.append(np.stack([steep, steep]))
         errors.append(steep * late_s + 0.05 * rng.standard_normal(SAMPLES))
     assert hidden_jitter(records, errors, slopes, [record.okay for record in records]) is None
+
+
+@pytest.mark.parametrize("noise", [1e-12, 1e-6, 1e-3])
+def test_jitter_next_to_no_noise_has_an_interval(noise: float) -> None:
+    """A few steep rows make the size of the error: the noise of the others is far below it, by any factor."""
+    rng = np.random.default_rng(5)
+    steepness = np.exp(4.0 * rng.standard_normal(4000))
+    found = _likeliest(2e-3 * steepness * rng.standard_normal(4000) + noise * rng.standard_normal(4000), steepness)
+    assert found is not None
+    assert found.ci95[0] < 2e-3 < found.ci95[1]

@@ -43,3 +43,15 @@ def test_a_long_recording_is_used_in_stretches_from_end_to_end() -> None:
     assert used[0]
     assert used[-1]
     assert spread_stretches(500, 10_000).all()
+
+
+def test_a_line_that_grew_slower_keeps_its_blocks_where_they_are_asked_for() -> None:
+    """A law over blocks is one of that length: blocks of the slower line's own would not match it."""
+    stiff = {**TWO_MASS, "k": 4.0 * TWO_MASS["k"]}
+    fast = record(drive_torque(1), exact_states(stiff, drive_torque(1), START, 1e-3)[:, SPEED], sample_time_s=1e-3)
+    slower = fit(make_problem(model(TWO_MASS), [fast], ()))
+    length = block_length(fit(make_problem(model(stiff), [fast], ())))
+    assert block_length(slower) > length
+    (line,) = lines(slower, length=length)
+    assert line.length == length
+    assert line.size == 1500 // length

@@ -1,0 +1,221 @@
+"""The fit of one hypothesis under the weighting of its own disturbances, and its score.
+
+A hypothesis is a set of effects. Its unknowns ``x`` and the sizes of its disturbances are estimated in turn, each where
+the other ended, until the likelihood of the recordings stays: ``x`` by Gauss-Newton steps on the innovations, the sizes
+by Fisher scoring. Source: Ljung, System Identification (2nd ed., 1999), chapters 4 and 7: prediction errors of a model
+of Box and Jenkins, here with a noise model of physical sizes in place of free polynomials.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from estimator.diagnosis.hypotheses import Effects
+from estimator.diagnosis.inference.disturbances import Limits, Whitener, estimate, line_of, starts, whitener
+from estimator.diagnosis.inference.moments import moved
+from estimator.physics.catalogue import EFFECTS
+from estimator.physics.fit import MOMENT_NAMES, FitResult, not_fitted
+from estimator.physics.jacobian import jacobian_at
+from estimator.physics.least_squares import minimise
+from estimator.physics.problem import Problem, bounds, outputs_at, residual_at
+from estimator.signals.record import FloatArray
+
+SAME = 1.0
+"""Fall of minus twice the log-likelihood below which another pass over unknowns and disturbances is not made."""
+
+DIGITS = 0.02
+"""The same over the difference from a rival that the fit is for."""
+
+MOST_PASSES = 6
+
+ITERATIONS, ROUGH, ROUNDS = 8, 4, 2
+"""Jacobians of a pass at most; of a first comparison; steps of Fisher scoring in a pass."""
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """A set of effects, fitted.
+
+    Attributes
+    ----------
+    effects : frozenset of str
+    plain : FitResult
+        Unknowns, simulations and errors; no derivative.
+    sizes : ndarray, shape (7,)
+        Logarithms of the disturbances' sizes and times.
+    limits : Limits
+    minus_twice_log : float
+        Minus twice the log-likelihood of the recordings, and of the disturbances' prior.
+    choices : float
+        Logarithm of the number of sets of effects of this size it was chosen among.
+    """
+
+    effects: Effects
+    plain: FitResult
+    sizes: FloatArray
+    limits: Limits
+    minus_twice_log: float
+    choices: float
+
+    @property
+    def unknowns(self) -> int:
+        """How many unknowns were fitted; moments of events only where these act."""
+        low, high = bounds(self.plain.problem)
+        return int(np.sum(low < high)) - _idle_moments(self.plain)
+
+    @property
+    def score(self) -> float:
+        """Minus twice the log-likelihood with the price of the unknowns and of the choice (Schwarz, 1978)."""
+        n = self.plain.residual.size
+        freed = "road_grade" in self.effects
+        return self.minus_twice_log + (self.unknowns + freed) * math.log(n) + 2.0 * self.choices
+
+    @cached_property
+    def filter(self) -> Whitener:
+        """The filter that whitens errors under the hypothesis' own disturbances."""
+        problem = self.plain.problem
+        return whitener(line_of(self.plain), self.sizes, problem.records[0].sample_time_s, problem.use)
+
+    @cached_property
+    def white(self) -> FitResult:
+        """The fit with its errors and their derivative as innovations: independent, of variance 1."""
+        derivative = jacobian_at(self.plain.problem, self.plain.x, self.plain.outputs)
+        return replace(self.plain, residual=self.filter(self.plain.residual), derivative=self.filter(derivative))
+
+
+def choices_of(effects: Effects, hypotheses: int) -> float:
+    """Return the logarithm of the number of sets of so many effects among so many."""
+    count = len(effects)
+    return math.lgamma(hypotheses + 1) - math.lgamma(count + 1) - math.lgamma(max(hypotheses - count, 0) + 1)
+
+
+def fitted(
+    effects: Effects,
+    problem: Problem,
+    x: FloatArray,
+    sizes: FloatArray,
+    limits: Limits,
+    hypotheses: int,
+    rival: float = math.nan,
+) -> Hypothesis:
+    """Fit a hypothesis from unknowns ``x`` and disturbances ``sizes``.
+
+    ``rival`` is minus twice the log-likelihood of the hypothesis it will be compared with: the farther from it, the
+    less the last digits matter. Without one it is fitted to its end.
+    """
+    plain, choices = not_fitted(problem, x), choices_of(effects, hypotheses)
+    best: Hypothesis | None = None
+    passes: list[float] = []
+    while best is None or len(passes) < MOST_PASSES:
+        plain = _with_moments(_weighted(plain, sizes, ITERATIONS), sizes)
+        begun = [sizes] if passes else starts(sizes, limits)
+        sizes, now = min((_disturbances(plain, each, limits) for each in begun), key=lambda found: found[1])
+        enough = SAME if math.isnan(rival) else max(SAME, DIGITS * abs(now - rival))
+        last = best is not None and now > best.minus_twice_log - enough
+        if best is None or now < best.minus_twice_log:
+            best = Hypothesis(effects, plain, sizes, limits, now, choices)
+        if last:
+            break
+        passes.append(now)
+    return best
+
+
+def compared(effects: Effects, problem: Problem, x: FloatArray, parent: Hypothesis, hypotheses: int) -> Hypothesis:
+    """Fit a hypothesis a few steps under another's disturbances, to be compared with others like it.
+
+    Its disturbances would be smaller: with all of them in one proportion minus twice the log-likelihood falls by
+    ``n log(Q / Q')``, Q the squared innovations.
+    """
+    plain = _weighted(not_fitted(problem, x), parent.sizes, ROUGH)
+    before, after = (float(np.sum(parent.filter(fit.residual) ** 2)) for fit in (parent.plain, plain))
+    fall = plain.residual.size * math.log(before / after)
+    choices = choices_of(effects, hypotheses)
+    return Hypothesis(effects, plain, parent.sizes, parent.limits, parent.minus_twice_log - fall, choices)
+
+
+def _disturbances(plain: FitResult, sizes: FloatArray, limits: Limits) -> tuple[FloatArray, float]:
+    problem, period_s = plain.problem, plain.problem.records[0].sample_time_s
+    return estimate(line_of(plain), plain.residual, sizes, limits, period_s, problem.use, ROUNDS)
+
+
+def _weighted(plain: FitResult, sizes: FloatArray, iterations: int) -> FitResult:
+    """Return a fit whose innovations under fixed disturbances are least."""
+    problem = plain.problem
+    low, high = bounds(problem)
+    filtered = whitener(line_of(plain), sizes, problem.records[0].sample_time_s, problem.use)
+    seen: dict[bytes, tuple[FloatArray, ...]] = {plain.x.tobytes(): plain.outputs}
+
+    def outputs(x: FloatArray) -> tuple[FloatArray, ...]:
+        key = x.tobytes()
+        if key not in seen:
+            seen.clear()
+            seen[key] = outputs_at(problem, x)
+        return seen[key]
+
+    solution = minimise(
+        lambda x: filtered(residual_at(problem, outputs(x))),
+        lambda x: filtered(jacobian_at(problem, x, outputs(x))),
+        plain.x,
+        low,
+        high,
+        iterations,
+        smooth=not _has_moments(problem),
+    )
+    found = outputs(solution.x)
+    return FitResult(problem, solution.x, found, residual_at(problem, found), None, solution.converged)
+
+
+def _with_moments(plain: FitResult, sizes: FloatArray) -> FitResult:
+    """Return a fit with moments of events where the innovations are least, and fitted from there."""
+    problem = plain.problem
+    if not _has_moments(problem):
+        return plain
+    for _ in range(3):
+        filtered = whitener(line_of(plain), sizes, problem.records[0].sample_time_s, problem.use)
+        x = moved(plain, filtered)
+        if x is None:
+            break
+        plain = _weighted(not_fitted(problem, x), sizes, ITERATIONS)
+    return plain
+
+
+def _has_moments(problem: Problem) -> bool:
+    return any(u.name in MOMENT_NAMES and u.low < u.high for basis in problem.local for u in basis.own)
+
+
+def _idle_moments(plain: FitResult) -> int:
+    """Return how many moments are of events that do not take place in their recording."""
+    count = 0
+    for i, basis in enumerate(plain.problem.local):
+        values = plain.local_of(i)[basis.own_rows]
+        own = {(u.effect, u.name): (u, float(v)) for u, v in zip(basis.own, values, strict=True)}
+        for name in {u.effect for u in basis.own if EFFECTS[u.effect].event}:
+            (begin, from_s), (end, to_s) = own[name, "from_s"], own[name, "to_s"]
+            movable = (begin.low < begin.high) + (end.low < end.high)
+            if to_s <= from_s:
+                count += movable
+            else:  # one that begins or ends with the recording has no moment there
+                first, last = (float(t) for t in plain.problem.records[i].since_start_s[[0, -1]])
+                count += (begin.low < begin.high and from_s <= first) + (end.low < end.high and to_s >= last)
+    return count
+
+
+def covariance(hypothesis: Hypothesis) -> FloatArray:
+    """Return the covariance of the scaled unknowns, shape (U, U): the inverse of the Fisher information."""
+    white = hypothesis.white
+    free = ~white.pinned
+    full = np.zeros((white.x.size, white.x.size))
+    j = white.jacobian[:, free]
+    full[np.ix_(free, free)] = np.linalg.pinv(j.T @ j, hermitian=True)
+    return full
+
+
+def residuals(hypothesis: Hypothesis, stacked: FloatArray) -> Sequence[FloatArray]:
+    """Split stacked values into those of each recording."""
+    ends = np.cumsum([int(use.sum()) for use in hypothesis.plain.problem.use])[:-1]
+    return np.split(stacked, ends)

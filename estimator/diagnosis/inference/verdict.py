@@ -1,0 +1,109 @@
+"""The decision: which effects are named, which are traces, and what the rest is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimator.diagnosis.inference.calibration import (
+    ALIKE_SHARE,
+    ALIKE_WITHIN,
+    CLEARLY_BELOW,
+    LEAST_PROBABILITY,
+    LEAST_SHARE,
+    TEMPERED,
+)
+from estimator.diagnosis.inference.disturbances import Size
+from estimator.diagnosis.inference.likelihood import Hypothesis
+from estimator.diagnosis.inference.posterior import Belief, beliefs, free_rms, squares_of
+from estimator.diagnosis.inference.remainder import Test, tests
+from estimator.diagnosis.inference.search import Search
+from estimator.diagnosis.result import Verdict
+from estimator.physics.catalogue import EFFECTS
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """A verdict and what it rests on.
+
+    Attributes
+    ----------
+    named, traces : tuple of Belief
+        Effects that are established, the weightiest first; those among them that hardly move the error.
+    doubted : tuple of Belief
+        Effects of the best set that are not established.
+    failed : tuple of Test
+        What the best set leaves that noise has not.
+    left : float
+        Share of the re-tuned model's squared error that is left beyond the reading's noise.
+    times_noise : float
+        RMS of what is left over the reading's noise.
+    """
+
+    verdict: Verdict
+    best: Hypothesis
+    nothing: Hypothesis
+    named: tuple[Belief, ...]
+    traces: tuple[Belief, ...]
+    doubted: tuple[Belief, ...]
+    failed: tuple[Test, ...]
+    left: float
+    times_noise: float
+
+
+def decide(search: Search, with_findings: bool = False) -> Decision:
+    """Search, and decide; ``with_findings`` where faults of the acquisition were recognised and compensated."""
+    nothing = search.nothing()
+    best = _as_simple_as_will_do(search, search.run())
+    for name in best.effects:
+        search.without(best, name)
+    failed = tuple(test for test in tests(best) if test.failed)
+    tempered = TEMPERED + best.plain.residual.size * sum(test.value for test in failed if test.is_share)
+    found = beliefs(best, search.visited, nothing, tempered, ALIKE_WITHIN, ALIKE_SHARE)
+    established = [each for each in found if each.probability >= LEAST_PROBABILITY]
+    named = tuple(each for each in established if each.share >= LEAST_SHARE and search.is_resolved(best, each.name))
+    noise = float(np.hypot(*np.exp(best.sizes[[Size.WHITE, Size.COLOURED]])))
+    left = max(free_rms(best) ** 2 - noise**2, 0.0) / free_rms(nothing) ** 2
+    return Decision(
+        _verdict(best, bool(named) or with_findings, bool(failed)),
+        best,
+        nothing,
+        named,
+        tuple(each for each in established if each not in named),
+        tuple(each for each in found if each.probability < LEAST_PROBABILITY),
+        failed,
+        left,
+        free_rms(best) / noise,
+    )
+
+
+def _as_simple_as_will_do(search: Search, best: Hypothesis) -> Hypothesis:
+    """Return the best set with special cases in the place of general laws that hardly move the error beside them.
+
+    What a general law has beyond its special case would be a trace.
+    """
+    for name in sorted(best.effects):
+        for special in EFFECTS[name].contains:
+            simpler = search.exchanged(best, name, special)
+            if simpler is None:
+                continue
+            if squares_of(simpler) - squares_of(best) < LEAST_SHARE * squares_of(search.nothing()):
+                best = simpler
+                break
+    return best
+
+
+def _verdict(best: Hypothesis, is_named: bool, is_more_than_noise: bool) -> Verdict:
+    if free_rms(best) > CLEARLY_BELOW * _spread(best):
+        return Verdict.UNEXPLAINED
+    if is_named:
+        return Verdict.PARTLY_EXPLAINED if is_more_than_noise else Verdict.EXPLAINED
+    return Verdict.UNEXPLAINED if is_more_than_noise else Verdict.NO_MISMATCH
+
+
+def _spread(best: Hypothesis) -> float:
+    """Return how far the output itself is spread, each recording around its mean."""
+    problem = best.plain.problem
+    parts = [record.output[use] for record, use in zip(problem.records, problem.use, strict=True)]
+    return float(np.std(np.concatenate([part - part.mean() for part in parts])))

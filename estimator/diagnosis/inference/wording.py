@@ -1,0 +1,51 @@
+"""A decision in the words of a driveline engineer."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from estimator.diagnosis.inference.verdict import Decision
+from estimator.diagnosis.result import Fit, FoundEffect, UntestableEffect, Verdict
+
+
+def statement(
+    decision: Decision, effects: Sequence[FoundEffect], fit: Fit, untestable: Sequence[UntestableEffect]
+) -> str:
+    """Return one paragraph: verdict, figures, and what to do next."""
+    parts = [_headline(decision, effects, fit)]
+    if decision.failed:
+        parts.append(
+            f"What is left, {decision.times_noise:.2g} times the reading's noise, is more than noise and drift: it is "
+            f"{', '.join(test.name for test in decision.failed)}."
+        )
+    if decision.traces:
+        parts.append(f"Too small to count, but seen: {', '.join(each.name for each in decision.traces)}.")
+    twins = sorted({twin for effect in effects for twin in effect.indistinguishable_from})
+    if twins:
+        parts.append(f"From torque and speed alone this can't be told from {' or '.join(twins)}.")
+    tests = sorted({entry.suggested_test for entry in untestable if not entry.needs})
+    if tests:
+        names = ", ".join(entry.name for entry in untestable if not entry.needs)
+        parts.append(f"These recordings can't tell {names}; a {' or '.join(tests)} test would.")
+    parts += [f"Without {entry.needs}, {entry.name} can't be told." for entry in untestable if entry.needs]
+    return " ".join(parts)
+
+
+def _headline(decision: Decision, effects: Sequence[FoundEffect], fit: Fit) -> str:
+    if decision.verdict is Verdict.NO_MISMATCH:
+        return (
+            "Nothing is missing: re-tuned inside its tolerances, the nominal model leaves nothing but the noise and "
+            f"slow drift of the readings (free-run error {fit.retuned:.3g} {fit.unit}, noise {fit.noise_floor:.3g} "
+            f"{fit.unit})."
+        )
+    if effects:
+        found = "; ".join(effect.statement for effect in effects)
+        part = "part of it" if decision.verdict is Verdict.PARTLY_EXPLAINED else "all of it"
+        return (
+            f"The model leaves something out, and this explains {part}: {found}. The free-run error falls from "
+            f"{fit.retuned:.3g} to {fit.augmented:.3g} {fit.unit}."
+        )
+    return (
+        f"There is a mismatch that no entry of the catalogue explains: the re-tuned nominal model leaves "
+        f"{fit.retuned:.3g} {fit.unit} against a noise of {fit.noise_floor:.3g} {fit.unit}."
+    )

@@ -1,0 +1,148 @@
+"""``python -m hil.proof.compare_engines --set SET --seeds A..B --out DIR``: one set of cases, answered by both engines.
+
+Sets: ``clean`` (one effect of the catalogue by itself, in turn, and nothing every ninth seed), ``dirty`` (one strong
+effect among small imperfections and coloured disturbances), ``quiet`` (the same with nothing strong). Cases come from
+the truth simulator. ``DIR/SET.jsonl`` has a line per case and engine; called again, it goes on where it was
+interrupted. The table that it prints has the shares of cases in which what is strong was named, and of names that are
+not there.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from estimator.diagnosis.diagnose import diagnose as by_rules
+from estimator.diagnosis.inference.diagnose import diagnose as by_likelihood
+from estimator.diagnosis.result import Diagnosis
+from estimator.errors import EstimatorError
+from hil.config.model_file import read_model_for_recordings
+from hil.proof.campaign.kinds import parse_seeds
+from hil.proof.make_case import write_shown
+from hil.proof.truth.bus import NOMINAL_TOLERANCE
+from hil.proof.truth.case import Case, make_case
+from hil.proof.truth.dirty import Known, make_dirty
+from hil.proof.truth.registry import EFFECTS
+from hil.recording import read_records
+from hil.report.diagnosis_json import diagnosis_json
+
+ENGINES: dict[str, Callable[..., Diagnosis]] = {"rules": by_rules, "likelihood": by_likelihood}
+
+NOTHING = "none"
+KINDS = [name for name, effect in EFFECTS.items() if effect.catalogued and name != NOTHING]
+ACQUIRED = {"stale_samples", "lost_samples", "sample_jitter", "clock_drift", "speed_quantisation", "speed_sign_blind"}
+"""Effects of the acquisition, recognised before any engine; none of them is the strong one of a dirty world."""
+
+STRONG = [name for name in KINDS if name not in ACQUIRED]
+
+Row = dict[str, Any]
+
+
+def knows(seed: int) -> Known:
+    """Return what the model file of a dirty case knows of its imperfections; each in turn."""
+    return list(Known)[seed % len(Known)]
+
+
+def case_of(which: str, seed: int) -> tuple[Case, dict[str, dict[str, float]], str]:
+    """Return a case of a set, what its model file knows beyond the line, and what is strong in it."""
+    if which == "clean":
+        strong = NOTHING if seed % 9 == 0 else KINDS[seed % len(KINDS)]
+        return make_case(strong, seed), {}, strong
+    strong = NOTHING if which == "quiet" else STRONG[seed % len(STRONG)]
+    return *make_dirty(strong, seed, knows(seed)), strong
+
+
+def answered(which: str, seed: int, engine: str) -> Row:
+    """Return the row of a case: what is there, what was named, and how long it took."""
+    case, known, strong = case_of(which, seed)
+    tolerance = NOMINAL_TOLERANCE if knows(seed) is Known.OFF else 0.0
+    with tempfile.TemporaryDirectory(prefix="hil-case-") as place:
+        shown = Path(place)
+        write_shown(case, shown)
+        with (shown / "model.toml").open("a", encoding="utf-8") as model:
+            model.write("".join(_stated(name, sizes, tolerance) for name, sizes in known.items()))
+        file = read_model_for_recordings(shown / "model.toml")
+        records = read_records(sorted(shown.glob("run_*.csv")), file.signals, file.on_bench)
+    hidden = [name for name in case.specimen.sizes if name != NOTHING and name not in known]
+    row: Row = {"set": which, "seed": seed, "engine": engine, "strong": strong, "hidden": hidden}
+    began = time.perf_counter()
+    try:
+        answer = diagnosis_json(ENGINES[engine](records, file.model))
+    except EstimatorError as error:
+        return row | {"verdict": "refused", "named": [], "false": [], "fault": str(error)}
+    claims = {effect["name"]: {effect["name"], *effect["indistinguishable_from"]} for effect in answer["effects"]}
+    known_names = set(known)  # their sizes may be off: naming one again is no invention
+    return row | {
+        "verdict": answer["verdict"],
+        "named": list(claims),
+        "strong_named": any(strong in claim for claim in claims.values()),
+        "false": [name for name, claim in claims.items() if not claim & ({*hidden} | known_names)],
+        "probability": {effect["name"]: effect["probability"] for effect in answer["effects"]},
+        "traces": [trace["name"] for trace in answer["traces"]],
+        "time_s": round(time.perf_counter() - began, 2),
+    }
+
+
+def _stated(name: str, sizes: dict[str, float], tolerance: float) -> str:
+    """Return a table of a model file for what it knows; without a tolerance it is held."""
+    trusted = f", tolerance = {tolerance}" if tolerance else ""
+    lines = [f"{key} = {{ value = {value:.6g}{trusted} }}" for key, value in sizes.items()]
+    return "\n".join([f"\n[effects.{name}]", *lines, ""])
+
+
+def table(rows: Sequence[Row]) -> str:
+    """Return the comparison as a table in Markdown."""
+    lines = ["| set | engine | cases | strong named | names | false names | no false name | median [s] |"]
+    lines.append("| --- | --- | --- | --- | --- | --- | --- | --- |")
+    for which, engine in sorted({(row["set"], row["engine"]) for row in rows}):
+        mine = [row for row in rows if (row["set"], row["engine"]) == (which, engine)]
+        strong = [row for row in mine if row["strong"] != NOTHING]
+        times = sorted(row.get("time_s", 0.0) for row in mine)
+        names, false = (sum(len(row[key]) for row in mine) for key in ("named", "false"))
+        lines.append(
+            f"| {which} | {engine} | {len(mine)} | {sum(row.get('strong_named', False) for row in strong)} of "
+            f"{len(strong)} | {names} | {false} | {sum(not row['false'] for row in mine)} | "
+            f"{times[len(times) // 2]:.1f} |"
+        )
+    return "\n".join(lines) + "\n"
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m hil.proof.compare_engines", description="Answer one set of cases with both engines."
+    )
+    parser.add_argument("--set", required=True, choices=["clean", "dirty", "quiet"], dest="which")
+    parser.add_argument("--seeds", required=True, help="A..B, both included")
+    parser.add_argument("--engines", default=",".join(ENGINES), help="of rules, likelihood (default: both)")
+    parser.add_argument("--out", required=True, type=Path, help="folder for the results")
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run or go on with a comparison; return the exit status."""
+    options = _parser().parse_args(arguments)
+    options.out.mkdir(parents=True, exist_ok=True)
+    path = options.out / f"{options.which}.jsonl"
+    rows = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()] if path.exists() else []
+    done = {(row["seed"], row["engine"]) for row in rows}
+    for seed in parse_seeds(options.seeds):
+        for engine in options.engines.split(","):
+            if (seed, engine) not in done:
+                row = answered(options.which, seed, engine)
+                rows.append(row)
+                with path.open("a", encoding="utf-8") as file:
+                    file.write(json.dumps(row, allow_nan=False) + "\n")
+                sys.stdout.write(f"{seed} {engine} {row['strong']}: {row['verdict']} {row['named']} {row['false']}\n")
+                sys.stdout.flush()
+    sys.stdout.write(table(rows))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,128 @@
+"""What is there is found among all of the catalogue, and nothing where nothing is; what a decision rests on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimator.diagnosis.bench import Bench
+from estimator.diagnosis.hypotheses import everything, open_hypotheses
+from estimator.diagnosis.inference.posterior import free_rms
+from estimator.diagnosis.inference.remainder import tests as examined
+from estimator.diagnosis.inference.search import Search
+from estimator.diagnosis.inference.verdict import Decision, decide
+from estimator.diagnosis.result import Verdict
+from estimator.physics.model import EffectValue
+from estimator.signals.record import Record
+from tests.estimator.diagnosis.one_effect import bench_with
+from tests.estimator.diagnosis.planted import SIGMA
+
+PLAIN = ("quadratic_friction", {"quadratic_nm_s2": 1e-9})
+"""An effect so small that it is none."""
+
+
+def searched(bench: Bench, records: list[Record] | None = None) -> Search:
+    records = list(bench.records) if records is None else records
+    return Search(bench.model, records, everything(records), open_hypotheses(bench.model, records)[0])
+
+
+def decided(name: str, values: Mapping[str, float]) -> Decision:
+    return decide(searched(bench_with(name, values)))
+
+
+def test_nothing_is_named_where_nothing_is_missing() -> None:
+    decision = decided(*PLAIN)
+    assert decision.verdict is Verdict.NO_MISMATCH
+    assert decision.named == decision.traces == ()
+    assert decision.best.plain.rms == pytest.approx(SIGMA, rel=0.05)
+    assert decision.times_noise == pytest.approx(1.0, abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("coulomb_friction_motor", {"friction_nm": 8.0}),
+        ("actuator_lag", {"time_constant_s": 0.008}),
+        ("backlash", {"gap_rad": 0.01}),
+    ],
+)
+def test_a_planted_effect_is_named_and_explains_all(name: str, values: Mapping[str, float]) -> None:
+    decision = decided(name, values)
+    assert decision.verdict is Verdict.EXPLAINED
+    (belief,) = decision.named
+    assert name in {belief.name, *belief.alike}
+    assert belief.probability > 0.99
+    assert 0.5 < belief.share <= 1.0
+    assert belief.score > 100.0
+    if belief.name == name:
+        for key, value in values.items():
+            assert decision.best.plain.value(name, key) == pytest.approx(value, rel=0.1)
+
+
+def test_every_set_is_fitted_once_and_the_best_of_them_is_taken() -> None:
+    search = searched(bench_with("coulomb_friction_motor", {"friction_nm": 8.0}))
+    best = search.run()
+    assert search.nothing() is search.visited[frozenset()]
+    assert best.score == min(each.score for each in search.visited.values())
+    assert search.without(best, next(iter(best.effects))) is search.visited[frozenset()]
+
+
+def test_the_price_of_an_unknown_is_that_of_schwarz() -> None:
+    search = searched(bench_with(*PLAIN))
+    nothing = search.nothing()
+    n = nothing.plain.residual.size
+    assert nothing.score == pytest.approx(nothing.minus_twice_log + nothing.unknowns * np.log(n))
+    dearer = replace(nothing, effects=frozenset({"road_grade"}), choices=3.0)
+    assert dearer.score == pytest.approx(nothing.score + np.log(n) + 6.0)
+
+
+@pytest.mark.parametrize("wave_hz", [3.5, 11.0])
+def test_a_wave_that_no_effect_makes_is_a_remainder(wave_hz: float) -> None:
+    """A wave in the reading, in step with neither speed nor angle."""
+    bench = bench_with(*PLAIN)
+    waved = [
+        replace(record, output=record.output + 2.0 * SIGMA * np.sin(2.0 * np.pi * wave_hz * record.time_s))
+        for record in bench.records
+    ]
+    search = searched(bench, waved)
+    decision = decide(search)
+    assert decision.verdict in (Verdict.UNEXPLAINED, Verdict.PARTLY_EXPLAINED)
+    assert "a line in its spectrum" in {test.name for test in decision.failed}
+    assert not decision.named
+
+
+def test_noise_passes_its_tests() -> None:
+    nothing = searched(bench_with(*PLAIN)).nothing()
+    assert [test.name for test in examined(nothing) if test.failed] == []
+    assert free_rms(nothing) == pytest.approx(SIGMA, rel=0.05)
+
+
+def knowing(bench: Bench, name: str, key: str, value: float, tolerance: float) -> Bench:
+    """The same recordings with a model that knows an effect, and how far its size is trusted."""
+    effects = {name: {key: EffectValue(value, None, tolerance)}}
+    return replace(bench, model=replace(bench.model, effects=effects))
+
+
+def test_an_effect_that_is_known_roughly_is_tuned_and_no_finding() -> None:
+    bench = bench_with("coulomb_friction_motor", {"friction_nm": 8.0})
+    roughly = knowing(bench, "coulomb_friction_motor", "friction_nm", 7.0, 0.3)
+    decision = decide(searched(roughly))
+    assert decision.verdict is Verdict.NO_MISMATCH
+    assert decision.best.plain.value("coulomb_friction_motor", "friction_nm") == pytest.approx(8.0, rel=0.02)
+
+
+def test_an_effect_that_is_known_wrongly_and_held_is_a_mismatch() -> None:
+    bench = bench_with("coulomb_friction_motor", {"friction_nm": 8.0})
+    held = knowing(bench, "coulomb_friction_motor", "friction_nm", 5.0, 0.0)
+    nothing = searched(held).nothing()
+    assert nothing.plain.rms > 1.5 * SIGMA
+
+
+def test_a_search_that_is_over_tells_the_best_so_far() -> None:
+    search = searched(bench_with("coulomb_friction_motor", {"friction_nm": 8.0}))
+    search.is_over = lambda: True
+    assert search.run() is search.nothing()
+    assert search.stopped

@@ -1,0 +1,66 @@
+"""Dirty worlds: small things that are small, one that is not, and disturbances with a colour."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hil.errors import UsageError
+from hil.proof.truth.dirty import FEWEST, KNOWN_AS, LEAST_PART, MOST, MOST_PART, SMALL, Known, make_dirty
+from hil.proof.truth.sensors import USUAL, coloured, speed_reading
+from hil.proof.truth.specimen import draw_specimen
+
+
+@pytest.mark.parametrize(("strong", "seed"), [("brake_drag", 1), ("actuator_lag", 2), ("none", 3)])
+def test_small_effects_are_some_and_small_and_not_the_strong_one_again(strong: str, seed: int) -> None:
+    case, known = make_dirty(strong, seed)
+    small = {name: sizes for name, sizes in case.specimen.sizes.items() if name != strong}
+    assert FEWEST <= len(small) <= MOST
+    assert set(small) <= set(SMALL)
+    assert known == {}
+    assert case.specimen.sizes[strong] == draw_specimen(strong, seed).sizes[strong]
+    for name, sizes in small.items():
+        whole = draw_specimen(name, seed).sizes[name]
+        for key in SMALL[name]:
+            assert LEAST_PART * abs(whole[key]) <= abs(sizes[key]) <= MOST_PART * abs(whole[key])
+
+
+def test_the_same_seed_makes_the_same_world_and_another_another() -> None:
+    one, again, other = (make_dirty("brake_drag", seed)[0] for seed in (4, 4, 5))
+    np.testing.assert_array_equal(one.recordings[0].speed_rad_s, again.recordings[0].speed_rad_s)
+    assert one.specimen.sizes != other.specimen.sizes
+
+
+@pytest.mark.parametrize("known", list(Known))
+def test_the_model_file_knows_what_it_is_to_know(known: Known) -> None:
+    case, stated = make_dirty("none", 6, known)
+    sizes = case.specimen.sizes
+    true = {
+        (name, word): sizes[name][key]
+        for (name, key), word in KNOWN_AS.items()
+        if name in sizes and known is not Known.NONE
+    }
+    assert {(name, word) for name, words in stated.items() for word in words} == set(true)
+    for (name, word), value in true.items():
+        assert stated[name][word] == pytest.approx(value, rel=0.15 if known is Known.OFF else 1e-12)
+    if known is Known.OFF:
+        assert any(stated[name][word] != value for (name, word), value in true.items())
+
+
+def test_an_unknown_strong_effect_is_refused() -> None:
+    with pytest.raises(UsageError, match="expected one of"):
+        make_dirty("gremlin", 1)
+
+
+def test_coloured_noise_has_its_size_and_corner() -> None:
+    noise = coloured(0.3, 2.0, 400_000, np.random.default_rng(1))
+    assert np.std(noise) == pytest.approx(0.3, rel=0.03)
+    kept = float(noise[1:] @ noise[:-1] / (noise @ noise))
+    assert kept == pytest.approx(np.exp(-2.0 * np.pi * 2.0 * 0.01), rel=0.01)
+
+
+def test_a_sensor_without_colour_draws_what_it_always_drew() -> None:
+    """Cases that were made before sensors had a colour stay the same to the last digit."""
+    rng, again = np.random.default_rng(2), np.random.default_rng(2)
+    np.testing.assert_array_equal(speed_reading(np.zeros(50), rng, USUAL), again.normal(0.0, 0.05, 50))
+    assert rng.random() == again.random()
