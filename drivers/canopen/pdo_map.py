@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from drivers.errors import CommandRefused, ConfigMismatch, ProtocolViolation
 from drivers.scaling import IntegerType
@@ -20,6 +20,12 @@ TPDO_MAPPING = 0x1A00
 
 COB_ID_INVALID = 1 << 31
 """Bit of the COB-ID entry that switches a PDO off (CiA 301, 7.5.2.35)."""
+
+COB_ID_NO_RTR = 1 << 30
+"""Bit by which a TPDO says that it can't be asked for by a remote frame; without meaning in an RPDO."""
+
+COB_ID_EXTENDED = 1 << 29
+"""Bit of an identifier of 29 bits, which this program neither sends nor hears."""
 
 MAX_PDO_BYTES = 8
 
@@ -67,13 +73,17 @@ class PdoLayout:
     communication_index, mapping_index
         Where its parameters are, for example 0x1800 and 0x1A00.
     cob_id
-        CAN identifier, 11 bits.
+        CAN identifier: its lower 11 bits, all of it unless ``extended``.
     valid
         False if bit 31 of the COB-ID entry switches the PDO off.
     transmission_type
         1 to 240: at every n-th SYNC; 254, 255: event-driven.
     objects
         Mapped objects in the order of the frame.
+    extended
+        Whether the identifier has 29 bits: no frame of this PDO is sent or heard here.
+    no_rtr
+        Whether bit 30 forbids remote frames. None are sent, so that layouts which differ in it alone are the same.
     """
 
     communication_index: int
@@ -82,10 +92,12 @@ class PdoLayout:
     valid: bool
     transmission_type: int
     objects: tuple[MappedObject, ...]
+    extended: bool = False
+    no_rtr: bool = field(default=False, compare=False)
 
     def __str__(self) -> str:
         mapped = ", ".join(map(str, self.objects)) or "nothing"
-        state = "" if self.valid else " (switched off)"
+        state = (" (of 29 bits)" if self.extended else "") + ("" if self.valid else " (switched off)")
         return f"COB-ID 0x{self.cob_id:03X}{state}, transmission type {self.transmission_type}, maps {mapped}"
 
 
@@ -99,23 +111,34 @@ def read_layout(read: ReadObject, communication_index: int, mapping_index: int) 
         valid=not cob_id & COB_ID_INVALID,
         transmission_type=read(communication_index, 2),
         objects=tuple(MappedObject.from_entry(read(mapping_index, n + 1)) for n in range(read(mapping_index, 0))),
+        extended=bool(cob_id & COB_ID_EXTENDED),
+        no_rtr=bool(cob_id & COB_ID_NO_RTR),
     )
 
 
-def configuration_writes(layout: PdoLayout) -> tuple[tuple[int, int, int], ...]:
+def configuration_writes(layout: PdoLayout, present: int) -> tuple[tuple[int, int, int], ...]:
     """List the writes ``(index, subindex, value)`` that give a device this layout.
 
-    The order is that of CiA 301, 7.5.2.36: switch the PDO off, set the number of mapped objects to 0, map,
-    set the number, switch it on.
+    The order is that of CiA 301, 7.5.2.35 and 7.5.2.36: switch the PDO off and change no other bit of its COB-ID,
+    set the number of mapped objects to 0, map, set the number, give it its identifier and switch it on. Bit 30 is
+    the device's: many know no remote frames, and refuse an entry that allows them.
+
+    Parameters
+    ----------
+    layout
+        What it shall have.
+    present
+        COB-ID entry it has now.
     """
     communication, mapping = layout.communication_index, layout.mapping_index
+    no_rtr = present & COB_ID_NO_RTR | (COB_ID_NO_RTR if layout.no_rtr else 0)
     return (
-        (communication, 1, layout.cob_id | COB_ID_INVALID),
+        (communication, 1, present | COB_ID_INVALID),
         (communication, 2, layout.transmission_type),
         (mapping, 0, 0),
         *((mapping, n, mapped.entry) for n, mapped in enumerate(layout.objects, start=1)),
         (mapping, 0, len(layout.objects)),
-        (communication, 1, layout.cob_id),
+        (communication, 1, layout.cob_id | no_rtr),
     )
 
 
@@ -139,12 +162,18 @@ class PdoCodec:
     Raises
     ------
     ConfigMismatch
-        If a mapped object is unknown, has another length than its type, or the frame is over 8 bytes.
+        If the identifier has 29 bits, a mapped object is unknown or has another length than its type, or the frame
+        is over 8 bytes.
     """
 
     def __init__(self, layout: PdoLayout, types: Mapping[tuple[int, int], IntegerType], where: str) -> None:
         self.layout = layout
         self._where = f"{where}: PDO 0x{layout.communication_index:04X} (COB-ID 0x{layout.cob_id:03X})"
+        if layout.extended:
+            raise ConfigMismatch(
+                f"{self._where} has an identifier of 29 bits (bit 29 of 0x{layout.communication_index:04X}:01), "
+                "expected one of 11. Give the PDO such an identifier in the EDS."
+            )
         self._types = tuple(self._type_of(mapped, types) for mapped in layout.objects)
         self._struct = struct.Struct("<" + "".join(_STRUCT_CODES[kind] for kind in self._types))
         if self._struct.size > MAX_PDO_BYTES:

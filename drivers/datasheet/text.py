@@ -22,6 +22,10 @@ MAX_BYTES = 16 << 20
 MAX_LINE_LENGTH = 255
 """Characters in a line of an EDS (CiA 306)."""
 
+_DCF_SUFFIX = ".dcf"
+COMMISSIONING = ("DeviceComissioning", "DeviceCommissioning")
+"""Section of a DCF; CiA 306 spells it the first way."""
+
 _UTF_16_MARKS = (b"\xff\xfe", b"\xfe\xff")
 _UTF_8_MARK = b"\xef\xbb\xbf"
 _LINE_ENDS = re.compile(r"\r\n|\n|\r")
@@ -86,6 +90,17 @@ class EdsText:
     def section(self, name: str) -> EdsSection | None:
         """Look up a section, whatever its case."""
         return self.sections.get(name.lower())
+
+    @property
+    def commissioning(self) -> EdsSection | None:
+        """What a DCF says of the node it is for."""
+        found = (self.section(name) for name in COMMISSIONING)
+        return next((section for section in found if section is not None), None)
+
+    @property
+    def is_dcf(self) -> bool:
+        """Whether it describes one commissioned device (CiA 306), by its name or by the section that only such has."""
+        return self.path.suffix.lower() == _DCF_SUFFIX or self.commissioning is not None
 
 
 def read_eds_text(path: Path) -> EdsText:

@@ -97,6 +97,9 @@ def inverter_settings(name: str, table: InverterTable) -> InverterSettings:
         rpdo_deadline_ms=table.rpdo_deadline_ms,
         option_codes=table.option_codes.by_object,
         torque_slope_nm_per_s=table.torque_slope_nm_per_s,
+        speed_unit=None if table.speed_unit is None else table.speed_unit.speed_unit,
+        rated_torque_unit_nm=table.rated_torque_unit.nm,
+        accepted=table.accepted.by_name,
     )
 
 

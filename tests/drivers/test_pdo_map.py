@@ -98,7 +98,7 @@ def test_layout_is_read_from_its_objects(valid: bool) -> None:
 def test_configuration_gives_the_layout_it_was_made_from() -> None:
     """Written to an empty dictionary in order, with the PDO off while the mapping changes."""
     objects: dict[tuple[int, int], int] = {}
-    for index, subindex, value in configuration_writes(TPDO):
+    for index, subindex, value in configuration_writes(TPDO, present=0x185):
         if index == 0x1A00:
             assert objects[0x1800, 1] & 1 << 31
             assert subindex == 0 or objects[0x1A00, 0] == 0
