@@ -14,7 +14,7 @@ from canopen.objectdictionary import ObjectDictionary
 from drivers.canopen.pdo_map import PdoCodec, PdoLayout
 from drivers.datasheet.dictionary import build_dictionary
 from drivers.datasheet.finding import Severity
-from drivers.datasheet.objects import read_objects
+from drivers.datasheet.objects import objects_of_use, read_objects
 from drivers.datasheet.sheet import DataSheet, read_commissioning
 from drivers.datasheet.text import NO_EDS, EdsText, read_eds_text
 from drivers.errors import ConfigMismatch
@@ -56,7 +56,7 @@ class EdsFile:
         self.path = path or data_file("inverter.eds")
         self.node_id = node_id
         text = _readable(read_eds_text(self.path))
-        objects = read_objects(text)
+        objects = objects_of_use(read_objects(text))
         self.sheet = DataSheet(self.path, objects, node_id, read_commissioning(text))
         self.dictionary: ObjectDictionary = build_dictionary(text, objects, node_id)
         if not len(self.dictionary):

@@ -19,6 +19,10 @@ from drivers.datasheet.number import read_formula, read_number
 from drivers.datasheet.text import EdsSection, EdsText
 from drivers.datasheet.types import DATA_TYPES, DOMAIN, UNSIGNED8, DataType
 
+_PDO_PARAMETERS = range(0x1400, 0x1C00)
+_OTHER_PARAMETER = 0x200
+"""Bit by which the indices of communication and mapping parameter differ."""
+
 OBJECT_SECTION = re.compile(r"[0-9a-f]{4}")
 SUB_SECTION = re.compile(r"([0-9a-f]{4})sub([0-9a-f]{1,2})")
 
@@ -138,6 +142,19 @@ def read_objects(text: EdsText) -> dict[int, EdsObject]:
     names = sorted(name for name in text.sections if OBJECT_SECTION.fullmatch(name))
     subs = sub_sections(text)
     return {int(name, 16): _object(text, name, subs.get(int(name, 16), {})) for name in names}
+
+
+def objects_of_use(objects: Mapping[int, EdsObject]) -> dict[int, EdsObject]:
+    """Leave out objects without any value, and a PDO's communication or mapping parameter without the other.
+
+    The ``canopen`` library looks for the second wherever the first is.
+    """
+    there = {index: each for index, each in objects.items() if each.entries}
+    return {
+        index: each
+        for index, each in there.items()
+        if index not in _PDO_PARAMETERS or index ^ _OTHER_PARAMETER in there
+    }
 
 
 def sub_sections(text: EdsText) -> dict[int, dict[int, EdsSection]]:

@@ -119,16 +119,14 @@ def _require_action(plan: DrivePlan, settings: InverterSettings) -> None:
 
 
 def _sync(plan: DrivePlan) -> Iterator[DriveSetting]:
-    entry = plan.sheet.entry(SYNC_COB_ID_OBJECT)
-    if entry is None:
-        return
-    if not plan.has(Function.SYNC_ID):
+    value = plan.sheet.value(SYNC_COB_ID_OBJECT)
+    if plan.abilities[Function.SYNC_ID].writable(plan.sheet):
+        yield DriveSetting(SYNC_COB_ID_OBJECT, 0, "COB-ID SYNC", SYNC_COB_ID, THIS_PROGRAM)
+    elif value not in (None, SYNC_COB_ID):
         raise ConfigMismatch(
             f"{plan.sheet.kind} {plan.sheet.path}: expected COB-ID SYNC {object_name(SYNC_COB_ID_OBJECT)} that is "
-            f"0x{SYNC_COB_ID:08X} or can be written, found {entry.access} {entry.value_text}. The drive can't be used."
+            f"0x{SYNC_COB_ID:08X} or can be written, found 0x{value:08X} for good. The drive can't be used."
         )
-    if entry.writable:
-        yield DriveSetting(SYNC_COB_ID_OBJECT, 0, "COB-ID SYNC", SYNC_COB_ID, THIS_PROGRAM)
 
 
 def _emcy(plan: DrivePlan) -> Iterator[DriveSetting]:

@@ -65,7 +65,7 @@ EDITS = [
     # entries
     Fault("6071", "ParameterName=Target torque\n", "", W, "ParameterName", "a name", "none"),
     Fault("1018sub1", "ParameterName=Vendor-ID", "ParameterName=", W, "ParameterName", "a name", "none"),
-    Fault("6502", "ObjectType=0x7", "ObjectType=0x4", E, "ObjectType", "one of 0x7 (VAR)", "'0x4'"),
+    Fault("6502", "ObjectType=0x7", "ObjectType=0x4", W, "ObjectType", "one of 0x7 (VAR)", "'0x4'"),
     Fault("1018sub3", "ObjectType=0x7", "ObjectType=0x8", W, "ObjectType", "0x7 (VAR) for a sub-index", "'0x8'"),
     Fault("1018", "SubNumber=5", "SubNumber=4", W, "SubNumber", "5, the sub-indices described", "'4'"),
     Fault("1018", "SubNumber=5\n", "", W, "SubNumber", "5, the sub-indices described", "none"),

@@ -196,6 +196,21 @@ def test_multiplexed_pdo_and_one_of_another_type_are_passed_over(tmp_path: Path)
     assert drive(path, tmp_path, SHORT).flagged == 0
 
 
+@pytest.mark.parametrize("gone", [0x1601, 0x1401, 0x1801, 0x1A01])
+def test_pdo_parameter_without_the_other_is_no_hindrance(gone: int, tmp_path: Path) -> None:
+    """The library looks for the second wherever the first is."""
+    assert drive(written(COMPLETE.but(gone), tmp_path), tmp_path, SHORT).flagged == 0
+
+
+def test_object_of_no_known_kind_is_no_hindrance(tmp_path: Path) -> None:
+    head = "[1601]\nParameterName=object 1601\nObjectType={}\n"
+    text = COMPLETE.text()
+    assert head.format("0x9") in text
+    path = tmp_path / "drive.eds"
+    path.write_text(text.replace(head.format("0x9"), head.format("-1")))
+    assert drive(path, tmp_path, SHORT).flagged == 0
+
+
 @pytest.mark.parametrize(
     "name", ["elmo_gold.dcf", "epos4_50_15.dcf", "sevcon_gen4.eds", "technosoft_ipos.eds", "yiyou.eds"]
 )

@@ -17,7 +17,7 @@ from drivers.datasheet.check.rig_lines import RigLine, rig_lines
 from drivers.datasheet.check.sections import check_sections
 from drivers.datasheet.check.values import check_values
 from drivers.datasheet.finding import EdsFinding, Severity
-from drivers.datasheet.objects import EdsObject, read_objects
+from drivers.datasheet.objects import EdsObject, objects_of_use, read_objects
 from drivers.datasheet.sheet import DataSheet, read_commissioning
 from drivers.datasheet.text import ADVICE, EdsText, EdsUnreadable, read_eds_text
 
@@ -73,7 +73,7 @@ def check_eds(path: Path) -> EdsReport:
 def _context(text: EdsText, objects: Mapping[int, EdsObject]) -> EdsContext:
     commissioning = read_commissioning(text)
     node_id = None if commissioning is None else commissioning.node_id
-    plan = plan_drive(DataSheet(text.path, objects, node_id or SAMPLE_NODE_ID, commissioning))
+    plan = plan_drive(DataSheet(text.path, objects_of_use(objects), node_id or SAMPLE_NODE_ID, commissioning))
     replaced = {carrier.layout.mapping_index for carrier in plan.carriers if carrier.mapped_here}
     return EdsContext(text, objects, plan, (plan.used | ALWAYS_USED) - replaced)
 
