@@ -29,6 +29,9 @@ COMMISSIONING = ("DeviceComissioning", "DeviceCommissioning")
 _UTF_16_MARKS = (b"\xff\xfe", b"\xfe\xff")
 _UTF_8_MARK = b"\xef\xbb\xbf"
 _LINE_ENDS = re.compile(r"\r\n|\n|\r")
+_MANUFACTURER = re.compile(r"[2-5][0-9a-f]{3}(sub[0-9a-f]+)?$", re.IGNORECASE)
+"""Sections of the maker's own objects, which this program does not use."""
+
 _INLINE_COMMENT = re.compile(r"\s;")
 
 
@@ -220,6 +223,8 @@ class _Reader:
         expected = f"this key once; line {first.line} has it with {first.value!r}"
         if first.value == second.value:
             self._warn(second.line, expected, "it again", "Take one out.", place)
+        elif self._here is not None and _MANUFACTURER.match(self._here.name):
+            self._warn(second.line, expected, f"it again with {second.value!r}", "The first counts.", place)
         else:
             self._err(second.line, expected, f"it again with {second.value!r}", "Keep the right one.", place)
 

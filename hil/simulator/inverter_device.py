@@ -327,7 +327,7 @@ class InverterDevice:
     def _supported_modes(self) -> int:
         torque_modes = sum(mode.support_bit for mode in TorqueMode)
         described = self._defaults.get(0x6502)
-        if described is not None and not described & torque_modes:
+        if described and not described & torque_modes:
             return described  # it says less than it can do
         return (described or 0) & ~torque_modes | sum(mode.support_bit for mode in self._modes)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from drivers.canopen.pdo_map import COB_ID_INVALID, MAX_PDO_BYTES, MappedObject, PdoLayout, ReadObject, read_layout
-from drivers.capability.carrier import FILLERS, MAX_OBJECTS, PDO_NUMBERS, RPDO, TPDO, Direction
+from drivers.capability.carrier import FILLERS, MAX_OBJECTS, PDO_NUMBERS, RESERVED_COB_IDS, RPDO, TPDO, Direction
 from drivers.capability.table import EVENT_TIMER
 from drivers.datasheet.file import EdsFile
 from drivers.datasheet.types import DATA_TYPES
@@ -109,7 +109,8 @@ class PdoObjects:
             if self._read(mapping, 0) > MAX_OBJECTS:  # a multiplexed PDO
                 continue
             frame = self._frame(read_layout(self._read_or_nothing, communication, mapping))
-            if frame.layout.valid and frame.layout.objects and frame.fits:
+            reserved = any(frame.layout.cob_id in taken for taken in RESERVED_COB_IDS)
+            if frame.layout.valid and frame.layout.objects and frame.fits and not reserved:
                 yield frame
 
     def _frame(self, layout: PdoLayout) -> PdoFrame:

@@ -45,10 +45,16 @@ def rig_lines(plan: DrivePlan) -> tuple[RigLine, ...]:
 
 def usual_mode(plan: DrivePlan) -> TorqueMode:
     """Choose the mode of operation: cyclic synchronous torque, unless the drive has profile torque alone."""
-    supported = plan.sheet.value(0x6502) if plan.has(Function.SUPPORTED_MODES) else None
+    supported = _supported_modes(plan)
     cyclic, profile = TorqueMode.CYCLIC_SYNCHRONOUS_TORQUE, TorqueMode.PROFILE_TORQUE
     only_profile = supported is not None and not supported & cyclic.support_bit and supported & profile.support_bit
     return profile if only_profile else cyclic
+
+
+def _supported_modes(plan: DrivePlan) -> int | None:
+    """Read supported drive modes from the data sheet; 0 is a place left free."""
+    value = plan.sheet.value(0x6502) if plan.has(Function.SUPPORTED_MODES) else None
+    return value or None
 
 
 def _lines(plan: DrivePlan) -> Iterator[RigLine]:
@@ -66,7 +72,7 @@ def _lines(plan: DrivePlan) -> Iterator[RigLine]:
     if no_action and plan.abilities[Function.ABORT_CONNECTION].writable(plan.sheet):
         codes = {ABORT_CONNECTION: 2}
         yield RigLine("option_codes.abort_connection = 2", "0x6007 is 0, no action: 2 disables the voltage")
-    supported = plan.sheet.value(0x6502) if plan.has(Function.SUPPORTED_MODES) else None
+    supported = _supported_modes(plan)
     if supported is not None and not any(supported & each.support_bit for each in TorqueMode):
         reason = f"0x6502 is 0x{supported:08X}, without a torque mode: the mode display 0x6061 alone confirms it"
         yield RigLine(acceptance_line("supported_modes"), reason)
