@@ -21,6 +21,28 @@ from drivers.torque_guard import GuardedTorque
 CONTROLWORD, TARGET_TORQUE, TORQUE_OFFSET = 0x6040, 0x6071, 0x60B2
 
 
+def command_codec(eds: EdsFile, where: str) -> PdoCodec:
+    """Build packer and unpacker of the RPDO that carries the torque command in a run.
+
+    Raises
+    ------
+    ConfigMismatch
+        If there is none, and none can be mapped.
+    """
+    return eds.codec(plan_drive(eds.sheet).carrier(RPDO).layout, where)
+
+
+def feedback_codec(eds: EdsFile, where: str) -> PdoCodec:
+    """Build packer and unpacker of the TPDO that carries the feedback in a run.
+
+    Raises
+    ------
+    ConfigMismatch
+        If there is none, and none can be mapped.
+    """
+    return eds.codec(plan_drive(eds.sheet).carrier(TPDO).layout, where)
+
+
 class InverterPdos:
     """Frames of one inverter, down and up.
 
@@ -55,8 +77,8 @@ class InverterPdos:
         self.velocity: VelocityScale = speed_scale(self.plan, settings.speed_unit, where)
         self._torque = TorqueScale(settings.rated_torque_nm)
         self._where = where
-        self._rpdo: PdoCodec = self.eds.codec(self.command.layout, where)
-        self._tpdo: PdoCodec = self.eds.codec(self.feedback.layout, where)
+        self._rpdo: PdoCodec = command_codec(self.eds, where)
+        self._tpdo: PdoCodec = feedback_codec(self.eds, where)
 
     @property
     def has_offset(self) -> bool:
