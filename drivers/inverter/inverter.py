@@ -339,7 +339,8 @@ class Inverter:
     def _torque_objects(self) -> tuple[int, ...]:
         """List what has to be zero for no torque to be asked for: also an offset that no PDO carries."""
         offset = self._plan.sheet.entry(TORQUE_OFFSET)
-        return (TARGET_TORQUE, TORQUE_OFFSET) if offset is not None and offset.writable else (TARGET_TORQUE,)
+        there = offset is not None and offset.writable and (TORQUE_OFFSET, 0) in self._pdos.eds.types()
+        return (TARGET_TORQUE, TORQUE_OFFSET) if there else (TARGET_TORQUE,)
 
     def _error_code(self) -> int | None:
         """Give the error code of the drive's last EMCY; None if it sent none."""

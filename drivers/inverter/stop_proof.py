@@ -30,6 +30,9 @@ SOURCE = "proof"
 
 CONSUMER_HEARTBEAT = 0x1016
 
+HEARD_PERIODS = 3
+"""So many of the host's heartbeats come before they end: a consumer watches from the first it hears (CiA 301)."""
+
 PATIENCE_S = 0.5
 """How much later than promised a drive may say that its host is gone [s]: neither end is a real-time system."""
 
@@ -141,6 +144,7 @@ class StopProof:
 
     def _without_heartbeat(self) -> Iterator[Difference]:
         self._make_ready()
+        time.sleep(HEARD_PERIODS * self._settings.heartbeat_ms / 1000.0)
         self._link.stop_heartbeat()
         yield from self._noticed(
             "stop without heartbeat", "heartbeat_consumer", self._settings.heartbeat_timeout_ms, _wait

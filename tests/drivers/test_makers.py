@@ -202,6 +202,11 @@ def test_pdo_parameter_without_the_other_is_no_hindrance(gone: int, tmp_path: Pa
     assert drive(written(COMPLETE.but(gone), tmp_path), tmp_path, SHORT).flagged == 0
 
 
+def test_offset_of_no_known_type_is_not_written_either(tmp_path: Path) -> None:
+    odd = COMPLETE.having({0x60B2: Entry(0x99, "rww", "0", 1)})
+    assert drive(written(odd, tmp_path), tmp_path, SHORT).flagged == 0
+
+
 def test_object_of_no_known_kind_is_no_hindrance(tmp_path: Path) -> None:
     head = "[1601]\nParameterName=object 1601\nObjectType={}\n"
     text = COMPLETE.text()
