@@ -58,6 +58,15 @@ _OPENING_ERRORS = (
 """What opening a bus raises, by back end: all of them mean it can't be opened as the URL has it."""
 
 
+def is_canopen(message: can.Message) -> bool:
+    """Whether a frame may be one of CANopen's: data, classic CAN, an identifier of 11 bits.
+
+    A frame with 29 bits is another protocol's on the same wire (SAE J1939), whatever number its identifier is; so is
+    CAN FD. Remote frames are asked of nobody here.
+    """
+    return not (message.is_extended_id or message.is_remote_frame or message.is_error_frame or message.is_fd)
+
+
 class _Network(canopen.Network):
     """A canopen network whose sending raises `BusDown`, whatever the back end calls it."""
 
@@ -228,7 +237,7 @@ class CanLink:
                 self.network.tap(message, t_ns)
             if message.is_error_frame:
                 self._take_error(message.arbitration_id)
-            elif not message.is_remote_frame:
+            elif is_canopen(message):
                 self._dispatch(message.arbitration_id, bytes(message.data), t_ns)
         except BusDown as error:  # a callback had to answer, and the bus has gone, or been closed, meanwhile
             self._lost = error

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Callable
 
 from drivers.canopen import emcy
 from drivers.canopen.heartbeat import HeartbeatMonitor, NmtState
@@ -11,6 +12,9 @@ from drivers.errors import DeviceFault, DeviceTimeout, ProtocolViolation
 
 _CONNECTION_CLASSES = (0x8100, 0x8200)
 """Error classes communication and protocol (CiA 301, table "Emergency error codes")."""
+
+ASK_AGAIN_S = 0.1
+"""Between two NMT commands for the same state: a node has its heartbeat, or the next one, by then."""
 
 _NMT_STATES = {state.value: state for state in NmtState}
 
@@ -87,25 +91,44 @@ class NodeMonitor:
         self._expected = state
         self._past_emergency = None
 
-    def await_state(self, state: NmtState, timeout_s: float) -> None:
-        """Wait for a heartbeat, from now on, that reports ``state``.
+    def await_state(self, state: NmtState, timeout_s: float, ask: Callable[[], None]) -> None:
+        """Ask for a state, again and again, until a heartbeat that comes after the first time reports it.
+
+        No NMT command is acknowledged: it may be lost, and a node that still writes what it was given does not
+        take it.
+
+        Parameters
+        ----------
+        state
+            What to wait for.
+        timeout_s
+            How long to wait [s].
+        ask
+            Sends the NMT command.
 
         Raises
         ------
         DeviceTimeout
-            If none comes in ``timeout_s``.
+            If none reports it in ``timeout_s``.
         """
         deadline = time.monotonic() + timeout_s
+        ask()
+        first = self._beats
+        while not self._reports(state, first, min(ASK_AGAIN_S, deadline - time.monotonic())):
+            if time.monotonic() >= deadline:
+                raise DeviceTimeout(
+                    f"{self._where}: last heartbeat reports {_title(self._heartbeat.state)} after "
+                    f"{timeout_s:g} s, expected {state.title}. Check power, node id and wiring, and that "
+                    "the drive produces a heartbeat (0x1017)."
+                )
+            ask()
+
+    def _reports(self, state: NmtState, first: int, timeout_s: float) -> bool:
+        """Wait for a heartbeat behind number ``first`` that reports a state."""
         with self._changed:
-            first = self._beats
-            while self._beats == first or self._heartbeat.state is not state:
-                if not self._changed.wait(deadline - time.monotonic()):
-                    seen = self._heartbeat.state
-                    raise DeviceTimeout(
-                        f"{self._where}: last heartbeat reports {_title(seen)} after "
-                        f"{timeout_s:g} s, expected {state.title}. Check power, node id and wiring, and that "
-                        "the drive produces a heartbeat (0x1017)."
-                    )
+            return self._changed.wait_for(
+                lambda: self._beats != first and self._heartbeat.state is state, max(timeout_s, 0.0)
+            )
 
     def raise_if_unwell(self, now_ns: int) -> None:
         """Check emergencies, heartbeat and NMT state at ``now_ns``.

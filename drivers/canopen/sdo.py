@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import queue
 from collections.abc import Callable
 from typing import TypeVar
 
 from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
-from drivers.canopen.sdo_node import SdoNode
+from drivers.canopen.sdo_node import SdoNode, SdoSilence
 from drivers.datasheet.file import EdsFile
 from drivers.errors import ConfigMismatch, DeviceTimeout, ProtocolViolation
 
@@ -97,8 +96,15 @@ class SdoChannel:
         data = self._eds.integer_type(index, subindex).encode(value, where)
         self._transfer(index, subindex, lambda: self._client.download(index, subindex, data))
 
-    def download_confirmed(self, index: int, subindex: int, value: int) -> None:
+    def download_confirmed(self, index: int, subindex: int, value: int, ignored: int = 0) -> None:
         """Write an object and read it back.
+
+        Parameters
+        ----------
+        index, subindex, value
+            What to write where.
+        ignored
+            Bits that are the device's own affair.
 
         Raises
         ------
@@ -107,7 +113,7 @@ class SdoChannel:
         """
         self.download(index, subindex, value)
         found = self.upload(index, subindex)
-        if found != value:
+        if (found ^ value) & ~ignored:
             raise ConfigMismatch(
                 f"{self._where}: object {object_name(index, subindex)} reads {found} (0x{found:X}) "
                 "after writing "
@@ -124,13 +130,12 @@ class SdoChannel:
                 "in the EDS. "
                 "Compare EDS and drive, and the value with the drive's manual."
             ) from error
+        except SdoSilence as error:
+            raise DeviceTimeout(
+                f"{self._where}: no SDO answer for object {name} within {self._client.RESPONSE_TIMEOUT:g} s. "
+                "Check that the drive is powered, its node id and bit rate, and the wiring."
+            ) from error
         except SdoCommunicationError as error:
-            if isinstance(error.__context__, queue.Empty):
-                raise DeviceTimeout(
-                    f"{self._where}: no SDO answer for object {name} within "
-                    f"{self._client.RESPONSE_TIMEOUT:g} s. "
-                    "Check that the drive is powered, its node id and bit rate, and the wiring."
-                ) from error
             raise ProtocolViolation(
                 f"{self._where}: object {name}: {error}; expected the answer to this request. "
                 "Check the device's firmware version, and that no other SDO client talks to this node."

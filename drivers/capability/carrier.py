@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from drivers.canopen.pdo_map import (
+    COB_ID_EXTENDED,
     COB_ID_INVALID,
     MAX_PDO_BYTES,
     RPDO_COMMUNICATION,
@@ -37,9 +38,6 @@ PDO_NUMBERS: Final = range(0x200)
 
 FILLERS: Final = range(1, 8)
 """Indices by which an RPDO maps nothing, in the width of that data type (CiA 301, 7.4.7.1)."""
-
-EXTENDED_FRAME: Final = 1 << 29
-"""Bit of the COB-ID entry for a 29-bit identifier, which this program does not use."""
 
 MAX_OBJECTS: Final = 0x40
 """Most objects of a mapping; greater counts stand for a multiplexed PDO (CiA 301, 7.5.2.36)."""
@@ -173,7 +171,7 @@ def cob_id_of(sheet: DataSheet, direction: Direction, number: int) -> int | None
     value = None if entry is None else entry.value(sheet.node_id)
     first = direction.predefined(number)
     own = entry is not None and (entry.node_relative or sheet.commissioned_node == sheet.node_id)
-    if own and value is not None and not value & EXTENDED_FRAME:
+    if own and value is not None and not value & COB_ID_EXTENDED:
         return value & 0x7FF
     return None if first is None else first + sheet.node_id
 
@@ -292,10 +290,17 @@ def _carrier(
     cob_id = cob_id_of(sheet, direction, number)
     if cob_id is None:
         raise _Unusable(f"no identifier in 0x{communication:04X}:01, and none in the pre-defined connection set")
-    if (communication, 1) in fixed and (described is None or described.cob_id != cob_id or not described.valid):
+    held = described is not None and described.valid and not described.extended and described.cob_id == cob_id
+    if (communication, 1) in fixed and not held:
         raise _Unusable(f"0x{communication:04X}:01 can not be written and has not COB-ID 0x{cob_id:03X}, switched on")
     layout = PdoLayout(
-        communication, mapping, cob_id, True, _transmission_type(sheet, direction, communication), objects
+        communication,
+        mapping,
+        cob_id,
+        True,
+        _transmission_type(sheet, direction, communication),
+        objects,
+        no_rtr=described is not None and described.no_rtr,
     )
     return Carrier(layout, described, mapped_here, fixed)
 

@@ -66,6 +66,7 @@ class StatusBit(IntFlag):
     WARNING = 1 << 7
     REMOTE = 1 << 9
     INTERNAL_LIMIT_ACTIVE = 1 << 11
+    FOLLOWS_TARGET = 1 << 12  # in cyclic synchronous torque mode; 0: the target torque is ignored
 
 
 _S, _C = PowerState, Command

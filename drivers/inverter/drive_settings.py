@@ -24,6 +24,7 @@ from drivers.inverter.settings import InverterSettings
 __all__ = ["OPTION_CODES", "DriveSetting", "drive_settings"]
 
 SYNC_COB_ID_OBJECT: Final = 0x1005
+SYNC_COUNTER_OVERFLOW: Final = 0x1019
 EMCY_COB_ID_OBJECT: Final = 0x1014
 ABORT_CONNECTION: Final = 0x6007
 TORQUE_SLOPE: Final = 0x6087
@@ -88,6 +89,7 @@ def drive_settings(plan: DrivePlan, settings: InverterSettings) -> tuple[DriveSe
     _require_action(plan, settings)
     return (
         *_sync(plan),
+        *_no_sync_counter(plan),
         *_emcy(plan),
         *_no_node_guarding(plan),
         *_option_codes(plan, settings),
@@ -126,6 +128,20 @@ def _sync(plan: DrivePlan) -> Iterator[DriveSetting]:
         raise ConfigMismatch(
             f"{plan.sheet.kind} {plan.sheet.path}: expected COB-ID SYNC {object_name(SYNC_COB_ID_OBJECT)} that is "
             f"0x{SYNC_COB_ID:08X} or can be written, found 0x{value:08X} for good. The drive can't be used."
+        )
+
+
+def _no_sync_counter(plan: DrivePlan) -> Iterator[DriveSetting]:
+    """Switch the SYNC counter off: the host sends none, and a drive that counts takes no other (CiA 301, 7.5.2.22)."""
+    entry = plan.sheet.entry(SYNC_COUNTER_OVERFLOW)
+    if entry is None:
+        return
+    if entry.writable:
+        yield DriveSetting(SYNC_COUNTER_OVERFLOW, 0, "SYNC counter overflow", 0, THIS_PROGRAM)
+    elif value := plan.sheet.value(SYNC_COUNTER_OVERFLOW):
+        raise ConfigMismatch(
+            f"{plan.sheet.kind} {plan.sheet.path}: expected SYNC counter overflow {object_name(SYNC_COUNTER_OVERFLOW)} "
+            f"that is 0 or can be written, found {value} for good. The drive can't be used."
         )
 
 

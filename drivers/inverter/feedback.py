@@ -7,8 +7,11 @@ import time
 from dataclasses import dataclass
 
 from drivers.canopen.pdo_map import PdoCodec
-from drivers.inverter.cia402 import PowerState, state_of
+from drivers.inverter.cia402 import PowerState, StatusBit, state_of
 from drivers.scaling import TorqueScale, VelocityScale
+
+_LIMITED, _FOLLOWS = StatusBit.INTERNAL_LIMIT_ACTIVE.value, StatusBit.FOLLOWS_TARGET.value
+"""As plain numbers, for one statusword in every cycle."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +32,10 @@ class InverterFeedback:
         Counts the TPDOs received from this inverter, from 1.
     torque_raw, speed_raw
         The counts on the bus, so that a wrong scale can be corrected later.
+    limited
+        Statusword bit 11: a limit of the drive's own acts, and the torque is not what was asked for.
+    follows
+        Statusword bit 12, which says in cyclic synchronous torque mode that the target torque is followed.
     """
 
     torque_nm: float
@@ -38,6 +45,8 @@ class InverterFeedback:
     sequence: int
     torque_raw: int
     speed_raw: int
+    limited: bool = False
+    follows: bool = True
 
 
 class FeedbackReceiver:
@@ -80,14 +89,17 @@ class FeedbackReceiver:
             return
         values = self._codec.unpack(data)
         torque_raw, speed_raw = values[self._torque_at], values[self._speed_at]
+        statusword = values[self._statusword_at]
         feedback = InverterFeedback(
             torque_nm=self._torque.to_nm(torque_raw),
             speed_rad_s=self._velocity.to_rad_s(speed_raw),
-            state=state_of(values[self._statusword_at]),
+            state=state_of(statusword),
             t_ns=t_ns,
             sequence=self._sequence + 1,
             torque_raw=torque_raw,
             speed_raw=speed_raw,
+            limited=bool(statusword & _LIMITED),
+            follows=bool(statusword & _FOLLOWS),
         )
         with self._arrived:
             self._sequence = feedback.sequence

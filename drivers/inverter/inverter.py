@@ -17,7 +17,7 @@ from drivers.canopen.can_link import CanLink
 from drivers.canopen.emcy import EMCY_COB_ID
 from drivers.canopen.heartbeat import HEARTBEAT_COB_ID, NMT_COB_ID, NmtCommand, NmtState, nmt_frame
 from drivers.canopen.node_monitor import NodeMonitor
-from drivers.canopen.pdo_map import COB_ID_INVALID, configuration_writes, read_layout
+from drivers.canopen.pdo_map import COB_ID_INVALID, COB_ID_NO_RTR, configuration_writes, read_layout
 from drivers.canopen.sdo import SdoChannel
 from drivers.canopen.sdo_node import SdoNode
 from drivers.capability.carrier import Carrier
@@ -27,6 +27,7 @@ from drivers.inverter.cia402 import Command
 from drivers.inverter.commissioned import CommissionedValue, commissioned_values
 from drivers.inverter.drive_settings import drive_settings
 from drivers.inverter.feedback import FeedbackReceiver, InverterFeedback
+from drivers.inverter.follow_watch import FollowWatch
 from drivers.inverter.frozen_feedback import FrozenFeedback
 from drivers.inverter.pdos import TARGET_TORQUE, TORQUE_OFFSET, InverterPdos, TorqueCounts
 from drivers.inverter.power_control import PowerControl
@@ -73,12 +74,18 @@ class Inverter:
         self._monitor = self._subscribe_monitor()
         self._power = PowerControl(self._sdo, settings, self._torque_objects(), self._error_code)
         self._frozen = FrozenFeedback(self._where)
+        self._following = FollowWatch(settings)
         self._armed = False
 
     @property
     def latest(self) -> InverterFeedback | None:
         """The last feedback received; None before the first after `configure`."""
         return self._feedback.latest
+
+    @property
+    def follows(self) -> bool:
+        """Whether the drive has said, since `arm`, that it follows its target torque; True where it can't say."""
+        return self._following.follows(self.latest)
 
     def check(self) -> tuple[Difference, ...]:
         """Compare the device with rig file and EDS; reads objects, writes none.
@@ -181,8 +188,9 @@ class Inverter:
             self._sdo.download_confirmed(setting.index, setting.subindex, setting.value)
         self._feedback.start_anew()
         self._monitor.forget_lost_host()
-        self._send_nmt(NmtCommand.START)
-        self._monitor.await_state(NmtState.OPERATIONAL, self.settings.state_timeout_s)
+        self._monitor.await_state(
+            NmtState.OPERATIONAL, self.settings.nmt_timeout_s, ask=lambda: self._send_nmt(NmtCommand.START)
+        )
         self._monitor.expect(NmtState.OPERATIONAL)
 
     def arm(self) -> None:
@@ -200,6 +208,7 @@ class Inverter:
         self._power.select_mode()
         self._power.zero_targets()
         self._power.enable_operation()
+        self._following.start_anew()
         self._armed = True
 
     def command(self, torque: GuardedTorque) -> None:
@@ -218,6 +227,7 @@ class Inverter:
             )
         counts = self._pdos.counts(torque)
         self._frozen.commanded(counts.total, self.latest)
+        self._following.commanded(counts.total)
         self._send_rpdo(Command.ENABLE_OPERATION, counts)
 
     def await_feedback(self, after_ns: int, timeout_s: float) -> InverterFeedback | None:
@@ -323,8 +333,8 @@ class Inverter:
         Raises
         ------
         DeviceFault
-            If the drive has sent an EMCY, is in FAULT, has left NMT OPERATIONAL, or sends the same feedback again and
-            again while its command changes.
+            If the drive has sent an EMCY, is in FAULT, has left NMT OPERATIONAL, ignores its target torque, or sends
+            the same feedback again and again while its command changes.
         DeviceTimeout
             If its heartbeat is lost, or never came.
         BusDown, ProtocolViolation
@@ -333,8 +343,10 @@ class Inverter:
         self._link.raise_if_failed()
         self._monitor.raise_if_unwell(time.monotonic_ns())
         self._frozen.raise_if_frozen()
-        if self.latest is not None:
-            self._power.raise_if_fault(self.latest.state)
+        latest = self.latest
+        if latest is not None:
+            self._power.raise_if_fault(latest.state)
+        self._following.raise_if_ignored(latest)
 
     def _torque_objects(self) -> tuple[int, ...]:
         """List what has to be zero for no torque to be asked for: also an offset that no PDO carries."""
@@ -353,7 +365,8 @@ class Inverter:
         present = self._sdo.upload(layout.communication_index, 1)
         for index, subindex, value in configuration_writes(layout, present):
             if carrier.written(index, subindex):
-                self._sdo.download_confirmed(index, subindex, value)
+                is_cob_id = (index, subindex) == (layout.communication_index, 1)
+                self._sdo.download_confirmed(index, subindex, value, ignored=COB_ID_NO_RTR if is_cob_id else 0)
         found = read_layout(self._sdo.upload, layout.communication_index, layout.mapping_index)
         if found != layout:  # what is not written has to be there
             raise ConfigMismatch(
@@ -365,7 +378,7 @@ class Inverter:
         """Switch off a PDO that would disturb."""
         present = self._sdo.upload(communication_index, 1)
         if not present & COB_ID_INVALID:
-            self._sdo.download_confirmed(communication_index, 1, present | COB_ID_INVALID)
+            self._sdo.download_confirmed(communication_index, 1, present | COB_ID_INVALID, ignored=COB_ID_NO_RTR)
 
     def _subscribe_feedback(self) -> FeedbackReceiver:
         receiver = self._pdos.receiver()

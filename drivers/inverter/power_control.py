@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from typing import TypeVar
 
-from drivers.canopen.emcy import cause_of
+from drivers.canopen.emcy_codes import cause_of
 from drivers.canopen.sdo import SdoChannel
 from drivers.errors import ConfigMismatch, DeviceFault, DeviceTimeout
 from drivers.inverter.cia402 import (
@@ -68,7 +68,7 @@ class PowerControl:
         DeviceTimeout
             If 0x6061 does not follow.
         """
-        mode, timeout_s = self._settings.mode, self._settings.state_timeout_s
+        mode, timeout_s = self._settings.mode, self._settings.mode_timeout_s
         try:
             self._sdo.download(0x6060, 0, mode)
         except ConfigMismatch as error:
@@ -76,7 +76,7 @@ class PowerControl:
                 f"{self._where}: mode of operation {mode.title} refused, it stays at "
                 f"{self._sdo.upload(0x6061)}. Check object 0x6502 for supported modes. ({error})"
             ) from error
-        display = self._poll(lambda: self._sdo.upload(0x6061), lambda shown: shown == mode)
+        display = self._poll(lambda: self._sdo.upload(0x6061), lambda shown: shown == mode, timeout_s)
         if display != mode:
             raise DeviceTimeout(
                 f"{self._where}: mode of operation is {display} after {timeout_s:g} s, expected "
@@ -141,12 +141,13 @@ class PowerControl:
             sync()
             return self._sdo.upload(0x6077)
 
-        torque = self._poll(torque_permille, lambda permille: abs(permille) <= _NO_TORQUE_PERMILLE)
+        timeout_s = self._settings.state_timeout_s
+        torque = self._poll(torque_permille, lambda permille: abs(permille) <= _NO_TORQUE_PERMILLE, timeout_s)
         state = self.state()
         if abs(torque) > _NO_TORQUE_PERMILLE and state in TORQUE_STATES:
             raise DeviceTimeout(
                 f"{self._where}: torque actual value 0x6077 is {torque / 10:g} % of rated "
-                f"{self._settings.state_timeout_s:g} s after a quick stop, in {state.value}, expected none. Compare "
+                f"{timeout_s:g} s after a quick stop, in {state.value}, expected none. Compare "
                 "the quick stop option code 0x605A and the slope it names with the drive's manual."
             )
 
@@ -187,7 +188,7 @@ class PowerControl:
         return state_of(self._sdo.upload(0x6041))
 
     def _await(self, accept: Callable[[PowerState], bool], expected: str) -> PowerState:
-        state = self._poll(self.state, accept)
+        state = self._poll(self.state, accept, self._settings.state_timeout_s)
         if not accept(state):
             raise DeviceTimeout(
                 f"{self._where}: power state is {state.value} after {self._settings.state_timeout_s:g} s, "
@@ -230,9 +231,9 @@ class PowerControl:
             return "cause unknown (no 0x603F in the drive, no EMCY since this program began)"
         return f"error code of its EMCY is 0x{told:04X} {cause_of(told)}"
 
-    def _poll(self, read: Callable[[], T], accept: Callable[[T], bool]) -> T:
+    def _poll(self, read: Callable[[], T], accept: Callable[[T], bool], timeout_s: float) -> T:
         """Read until accepted or out of time; the last value either way."""
-        deadline = time.monotonic() + self._settings.state_timeout_s
+        deadline = time.monotonic() + timeout_s
         while not accept(value := read()) and time.monotonic() < deadline:
             time.sleep(_POLL_PAUSE_S)
         return value

@@ -33,6 +33,8 @@ class InverterSettings:
         Identity expected in object 0x1018; None for the EDS's.
     heartbeat_ms
         Heartbeat period, of the drive and of the host [ms].
+    follow_bit
+        Whether the drive says in bit 12 of its statusword that it follows the target torque (mode 10 only).
     rpdo_deadline_ms
         Without an RPDO for so long the drive takes the host for dead [ms].
     option_codes
@@ -47,8 +49,10 @@ class InverterSettings:
         What the drive lacks and somebody has accepted, by name.
     sdo_timeout_s
         Longest wait for an SDO answer [s].
+    mode_timeout_s
+        Longest wait for the mode of operation to be shown in 0x6061 [s].
     state_timeout_s
-        Longest wait for a change of mode, power state or NMT state [s].
+        Longest wait for a change of power state or NMT state [s].
     """
 
     name: str
@@ -60,6 +64,7 @@ class InverterSettings:
     vendor_id: int | None = None
     product_code: int | None = None
     heartbeat_ms: int = 100
+    follow_bit: bool = True
     rpdo_deadline_ms: int = 200
     option_codes: Mapping[int, int] = field(default_factory=dict)
     torque_slope_nm_per_s: float | None = None
@@ -67,6 +72,7 @@ class InverterSettings:
     rated_torque_unit_nm: float = 1e-3
     accepted: Mapping[str, Acceptance] = field(default_factory=dict)
     sdo_timeout_s: float = 0.5
+    mode_timeout_s: float = 2.0
     state_timeout_s: float = 2.0
 
     @property
@@ -77,6 +83,11 @@ class InverterSettings:
         real-time system; not above the 16 bits of object 0x1016.
         """
         return min(max(5 * self.heartbeat_ms, 500), 0xFFFF)
+
+    @property
+    def nmt_timeout_s(self) -> float:
+        """Longest wait for an NMT state: two heartbeats at least, for it is the heartbeat that reports it [s]."""
+        return max(self.state_timeout_s, 2.0 * self.heartbeat_ms / 1000.0)
 
     @property
     def where(self) -> str:

@@ -10,6 +10,7 @@ What is done about pymodbus 3.16.1 here:
 - it retries and reconnects behind the caller's back: both are switched off, a lost PLC must be seen;
 - it does not say why there is no connection, and has no name of the server to check: `drivers.plc.modbus_dial`
   connects for it;
+- it passes over an answer of another transaction or unit: `drivers.plc.mbap_framer` keeps which ones came;
 - it logs to standard error where logging is not configured: a `NullHandler` ends that.
 """
 
@@ -24,6 +25,7 @@ from pymodbus.exceptions import ModbusException
 from pymodbus.pdu import DecodePDU, ExceptionResponse, ModbusPDU
 
 from drivers.errors import BusDown, DeviceFault, DeviceTimeout, DriverError, ProtocolViolation
+from drivers.plc.mbap_framer import AnswerIds, MbapFramer
 from drivers.plc.modbus_dial import Dial
 from drivers.plc.modbus_security import ClientSecurity, own_role
 from drivers.plc.register import RegisterKind
@@ -123,7 +125,7 @@ class ModbusLink:
         """
         self.close()
         dial = Dial(self._host, self._port, self._timeout_s, self._security, self.place)
-        dial.client.ctx.framer.decoder = _Decoder(False)
+        dial.client.ctx.framer = MbapFramer(_Decoder(False))
         await dial.open()
         self._dial = dial
 
@@ -189,12 +191,16 @@ class ModbusLink:
 
     async def _answer(self, dial: Dial, what: str, request: Awaitable[ModbusPDU], function_code: int) -> ModbusPDU:
         """Wait for the answer and see that it is one."""
+        framer = _framer(dial)
+        framer.begin()
         try:
             with dial.asking():
                 answer = await request
         except ModbusException as cause:  # its one way to say: nothing came
-            raise self._no_answer(dial, what) from cause
+            raise self._foreign_answer(dial, what) or self._no_answer(dial, what) from cause
         dial.answered = True
+        if answer.transaction_id != dial.client.ctx.request_transaction_id:  # pymodbus lets a 0 pass
+            raise self._wrong_answer(what, str(self._expected(dial)), str(framer.came[-1]))
         if isinstance(answer, _Undecodable):
             raise self._wrong_answer(what, "a Modbus answer", f"bytes {answer.frame.hex(' ')}")
         if isinstance(answer, ExceptionResponse):
@@ -203,12 +209,24 @@ class ModbusLink:
             raise self._wrong_answer(what, f"function {function_code}", f"function {answer.function_code}")
         return answer
 
+    def _expected(self, dial: Dial) -> AnswerIds:
+        return AnswerIds(dial.client.ctx.request_transaction_id, self._device_id)
+
+    def _foreign_answer(self, dial: Dial, what: str) -> ProtocolViolation | None:
+        """Tell of answers that were none to this request; late ones, to requests before it, are no fault of theirs."""
+        expected = self._expected(dial)
+        foreign = [each for each in _framer(dial).came if not self._is_late(each, expected)]
+        return self._wrong_answer(what, f"an answer with {expected}", str(foreign[0])) if foreign else None
+
+    def _is_late(self, came: AnswerIds, expected: AnswerIds) -> bool:
+        return came.unit == expected.unit and 0 < came.transaction < expected.transaction
+
     def _no_answer(self, dial: Dial, what: str) -> DriverError:
         if dial.client.connected:
             part = dial.client.ctx.recv_buffer
-            came = (
-                f"only {len(part)} bytes came that are no whole one ({part[:8].hex(' ')} ...)" if part else "none came"
-            )
+            came = "one to an earlier request came, too late" if _framer(dial).came else "none came"
+            if part:
+                came = f"only {len(part)} bytes came that are no whole one ({part[:8].hex(' ')} ...)"
             return DeviceTimeout(
                 f"{self.place}: {what}: expected an answer within {self._timeout_s:g} s, {came}. "
                 "Check that the PLC's program runs and that device_id in the register map is its own."
@@ -235,3 +253,10 @@ class ModbusLink:
             f"{self.place}: {what}: expected {expected}, came {came}. "
             "Check that a PLC with this register map is at this address."
         )
+
+
+def _framer(dial: Dial) -> MbapFramer:
+    framer = dial.client.ctx.framer
+    if not isinstance(framer, MbapFramer):
+        raise TypeError(f"expected the framer this module gave the client, came {framer!r}")
+    return framer

@@ -21,11 +21,12 @@ from types import TracebackType
 from typing import Final, Self, TypeVar
 
 from drivers.errors import ConfigMismatch, DeviceFault, DeviceTimeout, ProtocolViolation
-from drivers.plc.map_needs import from_si, require_usable, to_si
+from drivers.plc.map_needs import from_si, require_usable
 from drivers.plc.modbus_link import ModbusLink
 from drivers.plc.modbus_security import ClientSecurity
+from drivers.plc.reading import Reading, reading
 from drivers.plc.register import Value
-from drivers.plc.register_map import RegisterMap, blocks_of
+from drivers.plc.register_map import Block, RegisterMap, blocks_of
 from drivers.plc.types import ClutchState, DriveMode, PlcStatus, PlcWatchdog, PrbsSettings, PrbsSource
 from drivers.torque_guard import GuardedTorque
 
@@ -297,15 +298,43 @@ class Plc:
                 "Check [plc] host and port of the rig file, or give the map of this PLC."
             )
 
+    async def read_registers(self) -> tuple[Reading, ...]:
+        """Read every register of the map, in the order of the map; what can't be believed says so and is kept.
+
+        Raises
+        ------
+        BusDown, DeviceTimeout
+            If the PLC can't be asked, or does not answer.
+        """
+        readings: dict[str, Reading] = {}
+        for block in blocks_of(self._map, self._map.registers):
+            try:
+                readings |= await self._read_block(block)
+            except (ProtocolViolation, DeviceFault) as error:
+                readings |= {
+                    name: Reading(name, self._map[name], None, str(error), "a register that can be read")
+                    for name in block.names
+                }
+        return tuple(readings[name] for name in self._map.registers)
+
     async def _read(self, names: Iterable[str]) -> dict[str, Value]:
         values: dict[str, Value] = {}
         for block in blocks_of(self._map, names):
-            words = await self._link.read(block.kind, block.address, block.count)
-            for name in block.names:
-                register = self._map[name]
-                offset = register.address - block.address
-                values[name] = to_si(name, register, register.decode(words[offset : offset + register.size]))
+            for name, each in (await self._read_block(block)).items():
+                try:
+                    values[name] = each.required()
+                except ProtocolViolation as error:
+                    raise ProtocolViolation(f"{self._link.place}: {error}") from error
         return values
+
+    async def _read_block(self, block: Block) -> dict[str, Reading]:
+        words = await self._link.read(block.kind, block.address, block.count)
+        readings = {}
+        for name in block.names:
+            register = self._map[name]
+            offset = register.address - block.address
+            readings[name] = reading(name, register, words[offset : offset + register.size])
+        return readings
 
     def _encoded(self, values: Mapping[str, Value]) -> dict[str, tuple[int, ...]]:
         registers = {name: self._map[name] for name in values}

@@ -11,11 +11,14 @@ import asyncio
 from collections.abc import Awaitable, Callable, Iterator
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Final, Self
+from typing import Final, Self, TypeVar
 
 from drivers.errors import BusDown, ConfigMismatch, DeviceTimeout
 from drivers.plc.plc import Plc
+from drivers.plc.reading import Reading
 from drivers.plc.types import PlcStatus
+
+T = TypeVar("T")
 
 PASSING: Final = (BusDown, DeviceTimeout)
 """What may be over at the next attempt; everything else is a PLC that is there and says so."""
@@ -103,19 +106,32 @@ class PlcReader:
         ConfigMismatch, ProtocolViolation, DeviceFault
             At once: another attempt would find the same.
         """
+        return await self._read(self._plc.read_status)
+
+    async def read_registers(self) -> tuple[Reading, ...]:
+        """Read every register of the map, as `Plc.read_registers` gives them; connect first as `read_status` does.
+
+        Raises
+        ------
+        BusDown, DeviceTimeout, ConfigMismatch, ProtocolViolation, DeviceFault
+            As `read_status`.
+        """
+        return await self._read(self._plc.read_registers)
+
+    async def _read(self, read: Callable[[], Awaitable[T]]) -> T:
         for pause_s in self._backoff.pauses_s():
             try:
-                return await self._attempt()
+                return await self._attempt(read)
             except PASSING:
                 await self._sleep(pause_s)
-        return await self._attempt()
+        return await self._attempt(read)
 
-    async def _attempt(self) -> PlcStatus:
+    async def _attempt(self, read: Callable[[], Awaitable[T]]) -> T:
         try:
             if not self._connected:
                 await self._plc.connect()
             self._connected = True
-            return await self._plc.read_status()
+            return await read()
         except PASSING:
             self._connected = False
             self._plc.close()

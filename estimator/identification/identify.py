@@ -1,9 +1,10 @@
 """The paper's chain from a recording to a model: one pure function and its settings.
 
 1. Both signals lose their slow part by the same high-pass and go from 10 to 20 ms through the same low-pass.
-2. A batch output-error model gives the observation filter L and the off-line model to compare with.
+2. A batch output-error model of these gives the observation filter L.
 3. OEFO runs through N = 1024 samples: the on-line model.
-4. The spectral estimate of the same data stands beside both.
+4. Off line, at the recording's own period, at which the torque was held: the output-error model and the spectral
+   estimate of all samples.
 5. Poles become natural frequency and damping.
 
 The filter L. The paper takes all of A_hat. Where the load varies strongly, the batch model puts one or two
@@ -15,7 +16,7 @@ is :attr:`FilterPart.ALL`. In 24 simulated cruises each, the worst error of the 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 
 import numpy as np
@@ -29,7 +30,7 @@ from estimator.identification.online.adaptation import Adaptation, DecreasingThe
 from estimator.identification.online.oefo import Oefo
 from estimator.identification.online.recursive import Estimate, Trajectory
 from estimator.identification.spectral.welch import SpectralEstimate, spectral_estimate
-from estimator.signals.decimate import decimate
+from estimator.signals.decimate import HIGH_PASS_HZ, decimate, high_passed
 from estimator.signals.record import FloatArray, Record
 from estimator.signals.settings import Requirement, is_positive, require
 
@@ -50,7 +51,9 @@ class Settings:
     orders : Orders
         na = nb = 4, nk = 1.
     sample_time_s : float
-        Sampling period of the models [s].
+        Sampling period of the on-line model [s].
+    offline_sample_time_s : float or None
+        That of the off-line models [s]; None for the recording's own.
     high_pass_hz : float
         Corner of the high-pass [Hz].
     samples : int or None
@@ -61,18 +64,19 @@ class Settings:
         What of the batch model's A makes L.
     band_hz : tuple of float
         Where the resonance is looked for [Hz].
-    segment_samples : int
-        Segment of the spectral estimate.
+    segment_s : float
+        Segment of the spectral estimate [s].
     """
 
     orders: Orders = field(default_factory=Orders)
     sample_time_s: float = 0.02
-    high_pass_hz: float = 0.3
+    offline_sample_time_s: float | None = None
+    high_pass_hz: float = HIGH_PASS_HZ
     samples: int | None = 1024
     adaptation: Adaptation = field(default_factory=DecreasingThenConstantTrace)
     filter_part: FilterPart = FilterPart.OSCILLATING
     band_hz: tuple[float, float] = (2.0, 25.0)
-    segment_samples: int = 256
+    segment_s: float = 5.12
 
     def __post_init__(self) -> None:
         low, high = self.band_hz
@@ -103,6 +107,19 @@ class Settings:
             )
         return factor
 
+    def offline(self, record: Record) -> Record:
+        """Return a recording as the off-line models take it: high-passed, at their period.
+
+        Raises
+        ------
+        BadSetting
+            As :meth:`factor`.
+        """
+        if self.offline_sample_time_s is None:
+            return high_passed(record, self.high_pass_hz)
+        factor = replace(self, sample_time_s=self.offline_sample_time_s).factor(record)
+        return decimate(record, factor, self.high_pass_hz)
+
     def estimator(self, L: FloatArray) -> Oefo:
         """Return the recursive estimator of these settings with an observation filter, ready for samples."""
         start_up = SAMPLES_PER_PARAMETER * self.orders.n_parameters
@@ -118,7 +135,9 @@ class Identification:
     name : str
         The recording.
     data : Record
-        What the models were fitted to: high-passed and decimated.
+        What the on-line model was fitted to: high-passed and decimated.
+    offline : Record
+        What the off-line models were fitted to: high-passed, at the recording's own period by default.
     L : ndarray
         Observation filter's denominator.
     batch : OutputErrorFit
@@ -128,18 +147,22 @@ class Identification:
     online : LinearModel
         The last of them as a model.
     spectral : SpectralEstimate or None
-        None if the mask leaves too few unbroken segments.
+        None if the mask leaves too few unbroken segments of any useful length.
+    no_spectral : str
+        Why there is none.
     batch_resonance, online_resonance : Mode or None
         Dominant lightly damped mode of each.
     """
 
     name: str
     data: Record
+    offline: Record
     L: FloatArray
     batch: OutputErrorFit
     trajectory: Trajectory
     online: LinearModel
     spectral: SpectralEstimate | None
+    no_spectral: str
     batch_resonance: Mode | None
     online_resonance: Mode | None
 
@@ -183,20 +206,27 @@ def identify(record: Record, settings: Settings | None = None) -> Identification
     """
     settings = Settings() if settings is None else settings
     data = decimate(record, settings.factor(record), settings.high_pass_hz)
-    batch = fit_output_error(data, settings.orders)
-    L = observation_filter(batch.model, settings.filter_part, settings.band_hz[0])
+    offline = settings.offline(record)
+    batch = fit_output_error(offline, settings.orders)
+    observer = (
+        batch if settings.offline_sample_time_s == settings.sample_time_s else fit_output_error(data, settings.orders)
+    )
+    L = observation_filter(observer.model, settings.filter_part, settings.band_hz[0])
     estimator = settings.estimator(L)
     n = _samples_holding(data, settings.samples)
     trajectory = estimator.run(data.total_torque_nm[:n], data.output[:n], data.okay[:n])
     online = estimator.model(data.sample_time_s)
+    spectral, no_spectral = _spectral(offline, settings.segment_s)
     return Identification(
         name=record.name,
         data=data,
+        offline=offline,
         L=L,
         batch=batch,
         trajectory=trajectory,
         online=online,
-        spectral=_spectral_if_unbroken(data, settings.segment_samples),
+        spectral=spectral,
+        no_spectral=no_spectral,
         batch_resonance=resonance(batch.model, settings.band_hz),
         online_resonance=resonance(online, settings.band_hz),
     )
@@ -209,8 +239,8 @@ def _samples_holding(data: Record, good: int | None) -> int:
     return int(np.searchsorted(np.cumsum(data.okay), good)) + 1
 
 
-def _spectral_if_unbroken(data: Record, segment_samples: int) -> SpectralEstimate | None:
+def _spectral(data: Record, segment_s: float) -> tuple[SpectralEstimate | None, str]:
     try:
-        return spectral_estimate(data, segment_samples)
-    except NotExciting:
-        return None
+        return spectral_estimate(data, round(segment_s / data.sample_time_s)), ""
+    except NotExciting as error:
+        return None, str(error)

@@ -1,12 +1,8 @@
 """Everything an expert asks of one identification: how sure, how good, in closed loop or not, and of which drive.
 
-What :func:`estimator.identification.identify.identify` found is taken as it is; here it is questioned. Each part has
-its derivation in its own module.
-
-A second off-line model, by Box and Jenkins, of third order and at the recording's own period, stands beside: there the
-torque was held from one sample to the next, which it is no more after the low-pass of the decimation, and its noise
-model takes what the road does, which an output-error fit would take for parameters. It is the one physical parameters
-are taken from, and the one that can tell feedback: the low-pass looks ahead, and so would a decimated residual.
+What :func:`estimator.identification.identify.identify` found is taken as it is and examined; the best estimate, a
+Box-Jenkins model (:mod:`estimator.identification.best`), stands first, and physical parameters are taken from its
+third-order form.
 """
 
 from __future__ import annotations
@@ -14,69 +10,48 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from estimator.errors import BadModel, NotExciting
+from estimator.errors import BadModel
+from estimator.identification.best import BestEstimate, best_estimate
 from estimator.identification.identify import Identification, Settings
-from estimator.identification.modes.physical import RESPONDING, PhysicalEstimate, physical_parameters
+from estimator.identification.modes.physical import PhysicalEstimate, physical_parameters
 from estimator.identification.modes.reduced import Reduced, third_order
-from estimator.identification.modes.uncertainty import (
-    PoleZeroMap,
-    UncertainMode,
-    pole_zero_map,
-    uncertain_resonance,
-)
-from estimator.identification.offline.box_jenkins import fit_box_jenkins
-from estimator.identification.offline.feedback import Feedback, judge_feedback
-from estimator.identification.offline.linear_fit import LinearFit
+from estimator.identification.modes.uncertainty import PoleZeroMap, UncertainMode, pole_zero_map
+from estimator.identification.offline.feedback import Feedback
 from estimator.identification.offline.validation import Validation, validate
 from estimator.identification.online.chain import OnlineChain
 from estimator.identification.online.online_estimate import OnlineTrajectory
-from estimator.signals.decimate import decimate
 from estimator.signals.record import Record
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class NativeModel:
-    """A third-order fit at the recording's own period, and its validation on that recording."""
-
-    fit: LinearFit
-    validation: Validation
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class Study:
-    """One identification, questioned.
+    """One identification, examined.
 
     Attributes
     ----------
     found : Identification
         What was identified.
-    resonance : UncertainMode or None
-        Of the off-line model, with intervals; None where it has none.
+    best : BestEstimate
+        The headline: Box-Jenkins model, pole pair with intervals, verdict.
     roots : PoleZeroMap
-        Of the off-line model, with ellipses and what cancels.
+        Of the output-error model, with ellipses and what cancels.
     third_order : Reduced
-        Equivalent of the off-line model.
+        Equivalent of the output-error model.
     validation : Validation
-        Of the off-line model, also on the other recordings.
-    native : NativeModel or None
-        The third-order model at the recording's own period; None where there is none.
-    feedback : Feedback or None
-        Whether the torque followed the speed; None where there is no such model.
+        Of the output-error model, also on the other recordings.
     course : OnlineTrajectory
         The on-line estimate over the whole recording, with standard deviations.
     physical : PhysicalEstimate or None
         The two-mass drive; None where no such drive responds like this.
     not_physical : str
-        Why there is none; also why there is no native model.
+        Why there is none.
     """
 
     found: Identification
-    resonance: UncertainMode | None
+    best: BestEstimate
     roots: PoleZeroMap
     third_order: Reduced
     validation: Validation
-    native: NativeModel | None
-    feedback: Feedback | None
     course: OnlineTrajectory
     physical: PhysicalEstimate | None
     not_physical: str
@@ -86,9 +61,19 @@ class Study:
         """The recording's."""
         return self.found.name
 
+    @property
+    def resonance(self) -> UncertainMode | None:
+        """The best estimate's pole pair; None where the data carry none."""
+        return self.best.mode
+
+    @property
+    def feedback(self) -> Feedback:
+        """Whether the torque followed the speed."""
+        return self.best.feedback
+
 
 def study(record: Record, found: Identification, settings: Settings, others: Sequence[Identification] = ()) -> Study:
-    """Question an identification.
+    """Examine an identification.
 
     Parameters
     ----------
@@ -102,35 +87,22 @@ def study(record: Record, found: Identification, settings: Settings, others: Seq
         Of other recordings with the same settings: the model is tried on each.
     """
     model, covariance = found.batch.model, found.batch.covariance
-    validation = validate(found.batch, found.data, [other.data for other in others])
-    native, no_model = _native(record, settings)
-    physical, not_physical = (None, no_model) if native is None else _physical(native.fit)
+    best = best_estimate(record, settings.high_pass_hz)
+    physical, not_physical = _physical(best)
     return Study(
         found=found,
-        resonance=uncertain_resonance(model, covariance, settings.band_hz),
+        best=best,
         roots=pole_zero_map(model, covariance),
-        third_order=third_order(model, covariance),
-        validation=validation,
-        native=native,
-        feedback=None if native is None else judge_feedback(native.validation),
+        third_order=third_order(model),
+        validation=validate(found.batch, found.offline, [other.offline for other in others]),
         course=OnlineChain(settings, record.sample_time_s, found.L).run(record),
         physical=physical,
         not_physical=not_physical,
     )
 
 
-def _native(record: Record, settings: Settings) -> tuple[NativeModel | None, str]:
-    """Fit a two-mass drive's structure at the recording's own period; or say why that can't be done."""
-    data = decimate(record, 1, settings.high_pass_hz)
+def _physical(best: BestEstimate) -> tuple[PhysicalEstimate | None, str]:
     try:
-        fit = fit_box_jenkins(data, RESPONDING)
-    except NotExciting as error:
-        return None, str(error)
-    return NativeModel(fit, validate(fit, data)), ""
-
-
-def _physical(fit: LinearFit) -> tuple[PhysicalEstimate | None, str]:
-    try:
-        return physical_parameters(fit.model, fit.covariance), ""
+        return physical_parameters(best.two_mass.model, best.two_mass.covariance), ""
     except BadModel as error:
         return None, str(error)

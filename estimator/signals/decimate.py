@@ -42,6 +42,9 @@ models' spare pole, with nothing to hold it, drifts across z = -1: seen in half 
 0.75, in none at 1.
 """
 
+HIGH_PASS_HZ = 0.3
+"""Corner of the high-pass: below, a road grade and the driver move the speed more than the torque does."""
+
 EDGE = 1.0
 """Edge of the low-pass (half amplitude) in parts of the new Nyquist frequency."""
 
@@ -55,11 +58,16 @@ class Decimated:
     okay: BoolArray
 
 
+def low_pass_length(factor: float) -> float:
+    """Return how many taps the anti-aliasing filter of a factor above 1 has."""
+    return 2 * HALF_LENGTH * factor + 1
+
+
 def low_pass_taps(factor: int) -> FloatArray:
     """Return the taps of the anti-aliasing filter, shape (16 * factor + 1,), sum 1; one tap for factor 1."""
     if factor == 1:
         return np.ones(1)
-    taps: FloatArray = firwin(2 * HALF_LENGTH * factor + 1, EDGE / factor, window="hamming")
+    taps: FloatArray = firwin(round(low_pass_length(factor)), EDGE / factor, window="hamming")
     return taps
 
 
@@ -83,7 +91,7 @@ class Decimator:
 
     __slots__ = ("_counters", "_factor", "_level", "_share", "_taps", "_window", "sample_time_s")
 
-    def __init__(self, sample_time_s: float, factor: int, high_pass_hz: float = 0.3) -> None:
+    def __init__(self, sample_time_s: float, factor: int, high_pass_hz: float = HIGH_PASS_HZ) -> None:
         nyquist_hz = 0.5 / (sample_time_s * factor) if sample_time_s * factor > 0 else math.inf
         require(
             "decimation",
@@ -171,7 +179,47 @@ class Decimator:
         self._counters[:], self._level[:], self._window[:] = state["counters"], state["level"], state["window"]
 
 
-def decimate(record: Record, factor: int, high_pass_hz: float = 0.3) -> Record:
+def high_passed(record: Record, high_pass_hz: float = HIGH_PASS_HZ) -> Record:
+    """Return a recording's total torque and output through the high-pass alone, at its own period; for use off line.
+
+    Parameters
+    ----------
+    record : Record
+        With any number of torque inputs, which are summed.
+    high_pass_hz : float
+        Corner of the high-pass [Hz].
+
+    Returns
+    -------
+    Record
+        One torque column, the same mask. What was not measured is bridged by a straight line ahead of the filter, which
+        has a memory: a value held would leave a transient behind it.
+
+    Raises
+    ------
+    BadSetting
+        As :class:`Decimator`.
+    """
+    good = np.flatnonzero(record.okay)
+    rows = np.arange(record.okay.shape[0])
+    bridged = np.interp(rows, good, record.output[good]) if good.size else np.zeros(rows.shape)
+    passed = Decimator(record.sample_time_s, 1, high_pass_hz).run(
+        record.total_torque_nm, bridged, np.ones_like(record.okay)
+    )
+    return Record(
+        name=record.name,
+        sample_time_s=record.sample_time_s,
+        time_s=record.time_s,
+        torque_nm=passed.u[:, np.newaxis],
+        output=passed.y,
+        okay=record.okay,
+        kind=record.kind,
+        location=record.location,
+        torque_okay=record.read,
+    )
+
+
+def decimate(record: Record, factor: int, high_pass_hz: float = HIGH_PASS_HZ) -> Record:
     """Filter a recording's total torque and output and keep one in ``factor`` samples.
 
     Parameters

@@ -124,6 +124,11 @@ class Record:
         return np.broadcast_to(by_row, self.torque_nm.shape)
 
     @property
+    def read(self) -> BoolArray | None:
+        """Where every torque was read and is to be trusted, shape (N,); None where all of them were."""
+        return None if self.torque_okay is None else np.asarray(self.torque_trusted.all(axis=1), dtype=np.bool_)
+
+    @property
     @once
     def since_start_s(self) -> FloatArray:
         """Time since the recording began, shape (N,) [s]."""

@@ -13,7 +13,10 @@ import typer
 from hil.errors import InputError, UsageError
 
 if TYPE_CHECKING:
+    from rich.table import Table as RichTable
+
     from drivers.datasheet.check import EdsReport
+    from drivers.plc.reading import Reading
     from hil.config.rig_file import Rig
     from hil.rig.check import Finding
 
@@ -108,6 +111,9 @@ def _print(name: str, findings: tuple[Finding, ...]) -> None:
     console = Console()
     console.print(table)
     for finding in findings:
+        if finding.registers:
+            console.print(_register_table(finding))
+    for finding in findings:
         for line in (*finding.notes, *_details(finding)):
             console.print(f"{finding.device}: {line}", markup=False, highlight=False, soft_wrap=True)
 
@@ -117,6 +123,22 @@ def _details(finding: Finding) -> Iterator[str]:
     yield from finding.remarks
     yield from (f"not the same everywhere: {each}" for each in finding.commissioned)
     yield from (f"without its host: {each}" for each in finding.protections)
+
+
+def _register_table(finding: Finding) -> RichTable:
+    """Lay out what each register holds, in its unit."""
+    from rich.table import Table
+
+    table = Table(title=f"registers of {finding.device}", title_justify="left")
+    for column in ("register", "where", "value", "unit"):
+        table.add_column(column, justify="right" if column == "value" else "left", overflow="fold")
+    if any(each.problem is not None for each in finding.registers):
+        table.add_column("result")
+    for each in finding.registers:
+        result = "" if each.problem is None else "not plausible" if each.value is not None else "not read"
+        row = (each.name, f"{each.register.kind.value} {each.register.address}", each.shown, each.unit, result)
+        table.add_row(*row[: len(table.columns)])
+    return table
 
 
 def _document(rig: Rig | None, findings: tuple[Finding, ...], reports: tuple[EdsReport, ...]) -> dict[str, Any]:
@@ -142,4 +164,15 @@ def _device(finding: Finding) -> dict[str, Any]:
         "remarks": list(finding.remarks),
         "commissioned": [asdict(each) for each in finding.commissioned],
         "protections": [asdict(each) for each in finding.protections],
+    } | ({"registers": [_register(each) for each in finding.registers]} if finding.registers else {})
+
+
+def _register(reading: Reading) -> dict[str, Any]:
+    return {
+        "name": reading.name,
+        "kind": reading.register.kind.value,
+        "address": reading.register.address,
+        "value": reading.value,
+        "unit": reading.register.unit,
+        "problem": reading.problem,
     }

@@ -19,11 +19,14 @@ app = typer.Typer(add_completion=False)
 )
 def convert(
     source: Path = typer.Argument(
-        ..., metavar="IN", help="Recording (.csv, .parquet, .mf4, .mdf, .h5, .mat) or bus trace (.log, .blf, .asc)."
+        ...,
+        metavar="IN",
+        help="Recording (.csv, .parquet, .mf4, .mdf, .h5, .mat) or bus trace (.log, .blf, .asc, .trc).",
     ),
     target: Path = typer.Argument(..., metavar="OUT", help="Recording to write: .csv, .parquet, .mf4, .h5 or .mat."),
     rig: Path | None = typer.Option(None, "--rig", metavar="RIG", help="Rig file of the run; a bus trace needs it."),
     every: bool = typer.Option(False, "--all", help="Of a trace: every cycle, not only the measured part."),
+    channel: str | None = typer.Option(None, metavar="NAME", help="Of a trace that has several channels: can0, 1."),
     force: bool = typer.Option(False, "--force", help="Replace OUT where it exists."),
     encoding: str = typer.Option("utf-8", metavar="NAME", help="Of a text IN, such as latin-1."),
     delimiter: str = typer.Option("", metavar="CHARACTER", help="Of a CSV IN, where its header does not tell it."),
@@ -39,7 +42,11 @@ def convert(
     from hil.recording import write_table
 
     _require_room(target, force)
-    table = _trace(source, rig, every) if _is_trace(source) else _recording(source, rig, every, encoding, delimiter)
+    if _is_trace(source):
+        table = _trace(source, rig, every, channel)
+    else:
+        _refuse_for_recording(source, rig, every, channel)
+        table = _recording(source, encoding, delimiter)
     lost: list[str] = []
     write_table(table, target, replace=force, on_loss=lost.extend)
     for line in (*(f"{source}: {remark}" for remark in table.remarks), *(f"{target}: lost: {what}" for what in lost)):
@@ -61,20 +68,27 @@ def _require_room(target: Path, force: bool) -> None:
 
 
 def _is_trace(source: Path) -> bool:
-    from hil.rig.trace import SUFFIXES
+    from hil.rig.trace import is_trace
 
-    return source.suffix.lower() in SUFFIXES
+    return is_trace(source)
 
 
-def _recording(source: Path, rig: Path | None, every: bool, encoding: str, delimiter: str) -> Table:
+def _refuse_for_recording(source: Path, rig: Path | None, every: bool, channel: str | None) -> None:
+    from hil.errors import UsageError
+
+    if rig is not None or every or channel is not None:
+        raise UsageError(
+            f"{source}: expected a bus trace with --rig, --all or --channel, came a recording. Leave them out."
+        )
+
+
+def _recording(source: Path, encoding: str, delimiter: str) -> Table:
     from pydantic import ValidationError
 
     from hil.errors import UsageError
     from hil.recording import read_table
     from hil.recording.format_hints import FormatHints
 
-    if rig is not None or every:
-        raise UsageError(f"{source}: expected a bus trace with --rig or --all, came a recording. Leave them out.")
     try:
         hints = FormatHints(encoding=encoding, delimiter=delimiter)
     except ValidationError as error:
@@ -84,7 +98,7 @@ def _recording(source: Path, rig: Path | None, every: bool, encoding: str, delim
     return read_table(source, hints)
 
 
-def _trace(source: Path, rig: Path | None, every: bool) -> Table:
+def _trace(source: Path, rig: Path | None, every: bool, channel: str | None) -> Table:
     from hil.config.rig_file import read_rig
     from hil.errors import UsageError
     from hil.recording.samples import table_of
@@ -96,7 +110,7 @@ def _trace(source: Path, rig: Path | None, every: bool) -> Table:
             f"{source}: expected --rig RIG beside a bus trace: its EDS files say which bits are torque and speed, "
             "came none."
         )
-    samples = list(replay(source, read_rig(rig), whole=every))
+    samples = list(replay(source, read_rig(rig), whole=every, channel=channel))
     return table_of(samples, source, replay_metadata(rig, source, samples[0].t_ns if samples else 0))
 
 

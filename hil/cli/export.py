@@ -3,10 +3,42 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from hil.export.plcopen import Tc6
+
+if TYPE_CHECKING:
+    from hil.export.plc_estimator import PlcEstimator
+    from hil.export.pou import Project
+
 app = typer.Typer(add_completion=False, no_args_is_help=True)
+
+Identification = Annotated[
+    Path | None,
+    typer.Argument(metavar="[IDENTIFICATION]", help="identification.json of hil identify; without it --adaptive."),
+]
+Run = Annotated[str | None, typer.Option("--run", metavar="NAME", help="Recording whose observation filter is taken.")]
+Adaptive = Annotated[
+    bool,
+    typer.Option("--adaptive", help="Let the filter follow the estimate (AFOLOE): where there is no batch model."),
+]
+Cycle = Annotated[float, typer.Option("--cycle", metavar="SECONDS", help="Period of the PLC task that will call it.")]
+Profile = Annotated[
+    str,
+    typer.Option(
+        "--profile",
+        metavar="PROFILE",
+        help="Adaptation gain, NAME or NAME:k=v,...: decreasing_then_constant_trace (the paper's), decreasing_gain, "
+        "constant_forgetting, variable_forgetting, variable_forgetting_then_constant_trace, constant_trace, "
+        "constant_gain.",
+    ),
+]
+Single = Annotated[bool, typer.Option("--single", help="32-bit REAL instead of 64-bit LREAL.")]
+
+CYCLE_S = 0.01
+PROFILE = "decreasing_then_constant_trace"
 
 
 @app.callback(epilog="Example: hil export st identified/identification.json --run cruise --out estimator.st")
@@ -16,37 +48,69 @@ def export() -> None:
 
 @app.command(epilog="Example: hil export st identified/identification.json --run cruise --out estimator.st")
 def st(
-    identification: Path | None = typer.Argument(
-        None, metavar="[IDENTIFICATION]", help="identification.json of hil identify; without it --adaptive."
-    ),
-    out: Path = typer.Option(
-        ..., "--out", metavar="FILE", help="Structured Text to write; replaced where it is there."
-    ),
-    run: str | None = typer.Option(None, "--run", metavar="NAME", help="Recording whose observation filter is taken."),
-    adaptive: bool = typer.Option(
-        False, "--adaptive", help="Let the filter follow the estimate (AFOLOE): where there is no batch model."
-    ),
-    cycle: float = typer.Option(0.01, "--cycle", metavar="SECONDS", help="Period of the PLC task that will call it."),
-    profile: str = typer.Option(
-        "decreasing_then_constant_trace",
-        "--profile",
-        metavar="PROFILE",
-        help="Adaptation gain, NAME or NAME:k=v,...: decreasing_then_constant_trace (the paper's), decreasing_gain, "
-        "constant_forgetting, variable_forgetting, variable_forgetting_then_constant_trace, constant_trace, "
-        "constant_gain.",
-    ),
-    single: bool = typer.Option(False, "--single", help="32-bit REAL instead of 64-bit LREAL."),
+    out: Annotated[
+        Path, typer.Option("--out", metavar="FILE", help="Structured Text to write; replaced where it is there.")
+    ],
+    identification: Identification = None,
+    run: Run = None,
+    adaptive: Adaptive = False,
+    cycle: Cycle = CYCLE_S,
+    profile: Profile = PROFILE,
+    single: Single = False,
 ) -> None:
     """Write the estimator with its settings as IEC 61131-3 Structured Text for the PLC.
 
-    Three function blocks: FB_HilDecimator, FB_HilOefo, and FB_HilEstimator, which is the one to call.
+    One text of data types, function blocks and an example; FB_HilEstimator is the block to call.
     """
     from hil.export.command import written_estimator
-    from hil.export.structured_text import Precision, structured_text
-    from hil.report.outputs import publish
+    from hil.export.structured_text import structured_text
 
     estimator = written_estimator(identification, run, adaptive, cycle, profile)
-    text = structured_text(estimator, Precision.SINGLE if single else Precision.DOUBLE)
+    _write(out, structured_text(_project(estimator, single)), estimator)
+
+
+@app.command(epilog="Example: hil export plcopen identified/identification.json --run cruise --out estimator.xml")
+def plcopen(
+    out: Annotated[
+        Path, typer.Option("--out", metavar="FILE", help="PLCopen XML to write; replaced where it is there.")
+    ],
+    identification: Identification = None,
+    run: Run = None,
+    adaptive: Adaptive = False,
+    cycle: Cycle = CYCLE_S,
+    profile: Profile = PROFILE,
+    single: Single = False,
+    tc6: Annotated[
+        Tc6,
+        typer.Option(
+            "--tc6",
+            metavar="VERSION",
+            help="Version of the format, 2.01 or 2.0; CODESYS and TwinCAT themselves write 2.0.",
+        ),
+    ] = Tc6.V2_01,
+) -> None:
+    """Write the same as PLCopen XML, which CODESYS, TwinCAT and others import in one step.
+
+    Data types, function blocks and an example; FB_HilEstimator is the block to call.
+    """
+    from datetime import UTC, datetime
+
+    from hil.export.command import written_estimator
+    from hil.export.plcopen import plcopen_xml
+
+    estimator = written_estimator(identification, run, adaptive, cycle, profile)
+    _write(out, plcopen_xml(_project(estimator, single), datetime.now(UTC), tc6), estimator)
+
+
+def _project(estimator: PlcEstimator, single: bool) -> Project:
+    from hil.export.filling import Precision, project
+
+    return project(estimator, Precision.SINGLE if single else Precision.DOUBLE)
+
+
+def _write(out: Path, text: str, estimator: PlcEstimator) -> None:
+    from hil.report.outputs import publish
+
     publish(out.parent, {out.name: lambda path: path.write_text(text, encoding="ascii")})
     orders = estimator.settings.orders
     typer.echo(f"{out}: {estimator.origin}; na {orders.na}, nb {orders.nb}, nk {orders.nk}; call FB_HilEstimator")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -35,11 +36,12 @@ def identify(
     samples: int = typer.Option(
         1024, "--samples", metavar="N", help="Good samples the on-line estimate is run through; 0 for all."
     ),
-    sample_time: float = typer.Option(
-        0.02,
+    sample_time: float | None = typer.Option(
+        None,
         "--sample-time",
         metavar="SECONDS",
-        help="Sampling period of the models; a multiple of the recording's.",
+        help="Sampling period of all models, a multiple of the recording's. Without it: 20 ms on line, off line the "
+        "recording's own.",
     ),
     order: str = typer.Option("4", "--order", metavar="N|auto", help="nA = nB; auto: what the data pay for."),
     delay: str = typer.Option("1", "--delay", metavar="N|auto", help="Total delay in samples; auto: what fits."),
@@ -66,7 +68,9 @@ def identify(
 
     require_folder(out)
     require_even_cycles(recordings)
-    settings = Settings(sample_time_s=sample_time, samples=samples or None)
+    settings = Settings(samples=samples or None)
+    if sample_time is not None:
+        settings = replace(settings, sample_time_s=sample_time, offline_sample_time_s=sample_time)
     entries = chosen_estimators(estimator)
     file = None if model is None else read_model_for_recordings(model)
     if model is not None and file is not None and file.on_bench:
@@ -89,7 +93,7 @@ def identify(
 
 
 def _identified(records: Sequence[Record], settings: Settings) -> list[Study]:
-    """Identify from each and question it, with a bar on standard error where that is a terminal."""
+    """Identify from each and examine it, with a bar on standard error where that is a terminal."""
     from rich.console import Console
     from rich.progress import track
 
@@ -102,7 +106,7 @@ def _identified(records: Sequence[Record], settings: Settings) -> list[Study]:
     pairs = list(zip(records, results, strict=True))
     return [
         study(record, found, settings, [other for other in results if other is not found])
-        for record, found in bar(pairs, "questioning")
+        for record, found in bar(pairs, "examining")
     ]
 
 
@@ -123,7 +127,7 @@ def _publish(
     from hil.report.identification.document import FILE_NAME, identification_text
     from hil.report.identification.page import identification_page
     from hil.report.identification.terminal import compared_summary, summary
-    from hil.report.identification.wording import warnings
+    from hil.report.identification.wording import verdict, warnings
     from hil.report.outputs import publish
 
     models = [beside(record, each.found, model) for record, each in zip(records, studies, strict=True)]
@@ -141,6 +145,8 @@ def _publish(
         typer.echo(text, nl=False)
         return
     console = Console()
+    for each in studies:
+        console.print(verdict(each), highlight=False, markup=False)
     console.print(summary(studies, nominal))
     if compared:
         console.print(compared_summary(compared))

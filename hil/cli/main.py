@@ -51,7 +51,7 @@ COMMANDS: dict[str, str] = {
     "model": "The schema of model files, for editors.",
     "completion": "Print the completion script of a shell.",
     "bugreport": "Pack what a supporter needs, without secrets.",
-    "export": "Write the on-line estimator as Structured Text for the PLC.",
+    "export": "Write the on-line estimator for the PLC: Structured Text or PLCopen XML.",
 }
 """Each command's line in ``hil --help``; the command itself is ``app`` in ``hil.cli.<name>``."""
 

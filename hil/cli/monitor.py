@@ -38,6 +38,9 @@ def monitor(
         Path | None,
         typer.Option(metavar="REC", help="Play a recording, or a bus trace of RIG; opens no rig."),
     ] = None,
+    channel: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Of a bus trace with --replay that has several: can0, 1.")
+    ] = None,
     speed: Annotated[float, typer.Option(min=0.01, max=1000.0, help="Of --replay, in multiples of real time.")] = 1.0,
     page: Annotated[str, typer.Option(help="First page: overview, model, resonance, bus or log.")] = "overview",
     snapshot: Annotated[
@@ -57,7 +60,7 @@ def monitor(
         raise UsageError(f"--snapshot {snapshot}: expected an existing folder, there is no {snapshot.parent}")
     _require_page(page)
     typer.echo("hil monitor: starting", err=True)
-    opening = _open(rig, replay, out, model, bus, modbus, simulate, speed)
+    opening = _open(rig, replay, out, model, bus, modbus, simulate, speed, channel)
     with opening.source:  # its process starts up while this one does
         view = _view(opening, out, page, None if snapshot is None else (snapshot, after))
         view.run(headless=snapshot is not None, size=None if snapshot is None else screen)
@@ -73,6 +76,7 @@ def _open(
     modbus: str | None,
     simulate: bool,
     speed: float,
+    channel: str | None,
 ) -> Opening:
     from hil.config.rig_file import read_rig
     from hil.monitor.opening import open_recording, open_rig
@@ -82,7 +86,7 @@ def _open(
     if replay is not None:
         if simulate:
             raise UsageError("hil monitor: expected --replay or --simulate, came both")
-        opening = open_recording(replay, rig_file, speed, model)
+        opening = open_recording(replay, rig_file, speed, model, channel)
     elif rig is None or rig_file is None:
         raise UsageError("hil monitor: expected RIG, a rig file to watch, or --replay REC; came neither")
     else:

@@ -22,6 +22,9 @@ PAGE, DATA = "report.html", "paper.json"
 EXPERIMENTS = 8
 """As many local models as the paper's Fig. 5 has."""
 
+PAPER_PERIOD_S = 0.02
+"""Sampling period of the paper's models, on line and off line [s]."""
+
 SHOWN_SIGNALS = 3
 """Recordings in the paper's Fig. 2."""
 
@@ -68,7 +71,7 @@ def paper(
 
     require_folder(out)
     require_matplotlib()
-    settings = Settings(orders=Orders(nk=delay))
+    settings = Settings(orders=Orders(nk=delay), offline_sample_time_s=PAPER_PERIOD_S)
     if recordings:
         _publish(out, _recorded(recordings, model, settings), settings, as_json=as_json)
         return

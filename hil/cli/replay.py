@@ -29,7 +29,8 @@ app = typer.Typer(add_completion=False)
 )
 def replay(
     recording: Annotated[
-        Path, typer.Argument(metavar="REC", help="Recording, or bus trace of a run: .blf, .log (candump) or .asc.")
+        Path,
+        typer.Argument(metavar="REC", help="Recording, or bus trace of a run: .blf, .log (candump), .asc or .trc."),
     ],
     speed: Annotated[
         float | None, typer.Option(metavar="X", help="Multiple of real time; as fast as it goes without it.")
@@ -52,6 +53,9 @@ def replay(
     every: Annotated[
         bool, typer.Option("--all", help="Every cycle of a bus trace from the first SYNC, not only the measured part.")
     ] = False,
+    channel: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Channel of a bus trace that has several: can0, 1.")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Play a recording through the on-line chain: the estimates and alarms of the run, to the bit; opens no bus.
@@ -61,7 +65,8 @@ def replay(
     """
     from hil.report.outputs import publish
     from hil.rig.live import tracking_settings
-    from hil.rig.live_replay import Pace, is_trace
+    from hil.rig.live_replay import Pace
+    from hil.rig.trace import is_trace
     from hil.store.alarms import statements
 
     if speed is not None and not speed > 0:
@@ -71,9 +76,11 @@ def replay(
     begun_s = time.perf_counter()
     if is_trace(recording):
         _require(recording, "a bus trace", {"--rig": rig}, {"--model": model})
-        course, result = _play_trace(recording, rig or Path(), out, every, settings, pace, filter_l)
+        course, result = _play_trace(recording, rig or Path(), out, every, channel, settings, pace, filter_l)
     else:
-        _require(recording, "a recording", {}, {"--rig": rig, "--out": out, "--all": every or None})
+        _require(
+            recording, "a recording", {}, {"--rig": rig, "--out": out, "--all": every or None, "--channel": channel}
+        )
         course, result = _play_recording(recording, model, settings, pace, filter_l)
     took_s = time.perf_counter() - begun_s
     if estimate is not None:
@@ -118,6 +125,7 @@ def _play_trace(
     rig_path: Path,
     out: Path | None,
     every: bool,
+    channel: str | None,
     settings: Settings,
     pace: Pace,
     filter_l: FloatArray | None,
@@ -129,7 +137,7 @@ def _play_trace(
     from hil.rig.replay import replay as replayed
 
     rig = read_rig(rig_path)
-    samples = list(replayed(path, rig, whole=every))  # all of them before any is written
+    samples = list(replayed(path, rig, whole=every, channel=channel))  # all of them before any is written
     course = play_samples(samples, rig.period_s, settings, pace, _show(pace), filter_l)
     if out is not None:
         with RecordingWriter(out, replay_metadata(rig_path, path, samples[0].t_ns)) as recorder:

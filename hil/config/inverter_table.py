@@ -27,6 +27,10 @@ OptionCode = Annotated[int, Field(ge=-32768, le=32767)]
 """INTEGER16; the negative codes are the maker's own."""
 
 
+TimeOut = Annotated[float, Field(ge=0.05, le=60.0)]
+"""Longest wait [s]: not so short that a healthy drive on a busy bus misses it."""
+
+
 class OptionCodesTable(Table):
     """What the drive does by itself when something ends, where it is not to be the EDS's (CiA 402-2)."""
 
@@ -82,6 +86,10 @@ class InverterTable(Table):
     speed_unit: SpeedUnitTable | None = None
     rated_torque_unit: Annotated[RatedTorqueUnit, Field(strict=False)] = RatedTorqueUnit.MILLI
     accepted: AcceptedTable = AcceptedTable()
+    follow_bit: bool = True
+    sdo_timeout_s: TimeOut = 0.5
+    mode_timeout_s: TimeOut = 2.0
+    state_timeout_s: TimeOut = 2.0
     eds: ExistingFile | None = None
 
     @model_validator(mode="before")

@@ -1,4 +1,4 @@
-"""What ``hil export st`` asks for, put together from its arguments."""
+"""What ``hil export st`` and ``hil export plcopen`` ask for, put together from their arguments."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from hil.export.profiles import profile as read_profile
 def written_estimator(
     identification: Path | None, run: str | None, adaptive: bool, cycle_s: float, profile: str
 ) -> PlcEstimator:
-    """Return the estimator that the arguments of ``hil export st`` describe.
+    """Return the estimator that the arguments of a command describe.
 
     Raises
     ------

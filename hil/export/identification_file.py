@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from estimator.errors import BadModel
 from estimator.identification.online.adaptation import Adaptation
+from hil.errors import FileProblem
 from hil.export.plc_estimator import PlcEstimator
 from hil.report.identification.read_back import identified
 
@@ -29,8 +31,16 @@ def plc_estimator(
 
     Raises
     ------
-    UsageError, FileProblem
-        As `hil.report.identification.read_back.identified`.
+    UsageError
+        If the recording is not in the file, or none is named and there are several.
+    FileProblem
+        If the file is wrong, or its filter could not filter.
+    BadSetting
+        As `PlcEstimator`.
     """
     found = identified(path, run, adaptation)
-    return PlcEstimator(found.settings, cycle_s, None if adaptive else found.L, f"{path.name}, recording {found.name}")
+    origin = f"{path.name}, recording {found.name}"
+    try:
+        return PlcEstimator(found.settings, cycle_s, None if adaptive else found.L, origin)
+    except BadModel as cause:
+        raise FileProblem(path, f"recordings.{found.name}.filter_L | {cause}") from cause

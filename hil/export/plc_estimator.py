@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from estimator.errors import BadSetting
@@ -9,11 +10,11 @@ from estimator.identification.excitation import SAMPLES_PER_PARAMETER
 from estimator.identification.identify import Settings
 from estimator.identification.online.chain import OnlineChain, oefo
 from estimator.identification.online.oefo import Oefo
-from estimator.signals.decimate import Decimator
+from estimator.signals.decimate import Decimator, low_pass_length
 from estimator.signals.record import FloatArray
 
 PLC_WORD = 32767
-"""Largest INT of IEC 61131-3: array sizes and counters on the PLC stay below it."""
+"""Largest INT of IEC 61131-3. Array sizes stay below it: a loop to it would count beyond and never end."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,7 +35,7 @@ class PlcEstimator:
     Raises
     ------
     BadSetting
-        If ``cycle_s`` does not divide the models' period, or a counter would not fit a PLC's INT.
+        If ``cycle_s`` does not divide the models' period, or an index would not fit a PLC's INT.
     BadModel
         If L is no stable polynomial.
     """
@@ -45,13 +46,29 @@ class PlcEstimator:
     origin: str = "the defaults"
 
     def __post_init__(self) -> None:
+        for array, size, cure in self._arrays():
+            if size >= PLC_WORD:
+                raise BadSetting(
+                    f"PLC estimator: {array} has {size:.0f} elements, expected fewer than {PLC_WORD}, the largest INT "
+                    f"of a PLC. {cure}"
+                )
         OnlineChain(self.settings, self.cycle_s, self.L)
-        taps = self.decimator().taps.shape[0]
-        if taps > PLC_WORD:
-            raise BadSetting(
-                f"PLC estimator: its low-pass has {taps} taps, expected at most {PLC_WORD}, the largest INT of a "
-                f"PLC. Call it less often than every {self.cycle_s:g} s."
-            )
+
+    def _arrays(self) -> Iterator[tuple[str, float, str]]:
+        """Yield the largest arrays, each with its size and what makes it smaller."""
+        orders = self.settings.orders
+        if self.cycle_s > 0.0:  # what is no period is refused by the chain
+            taps = low_pass_length(self.settings.sample_time_s / self.cycle_s)
+            yield "the low-pass", taps, f"Call it less often than every {self.cycle_s:g} s."
+        yield "the memory", self.depth, "Lower the orders, the delay, or the order of the observation filter."
+        yield "the gain F", orders.n_parameters**2, "Lower the orders."
+
+    @property
+    def depth(self) -> int:
+        """Samples that are remembered."""
+        orders = self.settings.orders
+        filter_order = orders.na if self.L is None else self.L.shape[0] - 1
+        return max(orders.na, orders.nk + orders.nb, filter_order + 1)
 
     @property
     def adapts_filter(self) -> bool:

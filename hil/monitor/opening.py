@@ -22,7 +22,7 @@ from hil.report.outputs import require_folder
 from hil.rig.dry_run import dry_run
 from hil.rig.replay import replay
 from hil.rig.sample import Sample
-from hil.rig.trace import SUFFIXES
+from hil.rig.trace import is_trace
 from hil.simulator.rig_server import required_simulation
 from hil.simulator.simulation_model import simulation_model
 
@@ -55,7 +55,9 @@ def open_rig(rig_path: Path, rig: Rig, out: Path, simulate: bool, model: Path | 
     return Opening(source, state, tuple(Choice(name, _summary(rig, name)) for name in rig.experiments))
 
 
-def open_recording(path: Path, rig: Rig | None, speed: float, model: Path | None) -> Opening:
+def open_recording(
+    path: Path, rig: Rig | None, speed: float, model: Path | None, channel: str | None = None
+) -> Opening:
     """Prepare to play a recording, or a bus trace with the rig file it is of.
 
     Raises
@@ -67,10 +69,10 @@ def open_recording(path: Path, rig: Rig | None, speed: float, model: Path | None
     ModelFileError
         As `open_rig`.
     """
-    if path.suffix.lower() in SUFFIXES:
+    if is_trace(path):
         if rig is None:
             raise UsageError(f"{path}: expected its rig file as well: hil monitor RIG --replay {path.name}; came none")
-        samples = list(replay(path, rig, whole=True))
+        samples = list(replay(path, rig, whole=True, channel=channel))
         measured = _has_prbs
     else:
         samples = recorded_samples(path)

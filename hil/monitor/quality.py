@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hil.monitor.ring import Ring
-from hil.rig.sample import Sample, SampleFlag
+from hil.rig.sample import REMARKS, Sample, SampleFlag
 
 WINDOW_S = 10.0
 """What the counts reach back [s]: short enough that what is over goes away, a thousand cycles at 10 ms."""
@@ -22,6 +22,8 @@ NO_VALUE = 1 << 8
 _WORDS = {
     SampleFlag.LATE: "cycle late",
     SampleFlag.PLC_STALE: "PLC silent",
+    SampleFlag.M1_LIMITED: "m1 in its internal limit",
+    SampleFlag.M2_LIMITED: "m2 in its internal limit",
     NO_VALUE: "no value",
 }
 
@@ -36,7 +38,7 @@ class Quality:
         How many, since the first good one of this stretch (listening, or one run); before it there is no counting:
         a drive that has never answered is told by its own life signs.
     against
-        What is against those that are not good, and how often; the most frequent first.
+        What is against those that are not good, what is remarked on others, and how often; the most frequent first.
     standing_s
         Time since the last good sample [s]; 0 while the latest is good.
     why
@@ -66,9 +68,9 @@ class Quality:
 
 
 def against(sample: Sample) -> int:
-    """Tell what is against a sample: its flags, or that a number is missing; 0 for a good one."""
+    """Tell what is against a sample: its flags but remarks, or that a number is missing; 0 for a good one."""
     numbers = (sample.torque_m1_nm, sample.torque_m2_nm, sample.speed_rad_s)
-    return int(sample.flags) or (0 if all(map(math.isfinite, numbers)) else NO_VALUE)
+    return int(sample.flags & ~REMARKS) or (0 if all(map(math.isfinite, numbers)) else NO_VALUE)
 
 
 def words(bits: int) -> str:
@@ -106,7 +108,7 @@ class QualityWatch:
         elif self._last_good_ns is None:
             self._last_good_ns = sample.t_ns
         if self._begun:
-            self._ring.append((sample.t_ns / 1e9, self._latest))
+            self._ring.append((sample.t_ns / 1e9, self._latest | int(sample.flags)))
         return self._latest
 
     def look(self, now_ns: int) -> Quality:
@@ -117,7 +119,7 @@ class QualityWatch:
         standing_ns = now_ns - self._last_good_ns if self._latest and self._last_good_ns is not None else 0
         return Quality(
             samples=bits.size,
-            good=int(np.count_nonzero(bits == 0)),
+            good=int(np.count_nonzero(bits & ~int(REMARKS) == 0)),
             against=tuple(sorted(((what, n) for what, n in counts if n), key=lambda entry: -entry[1])),
             standing_s=standing_ns / 1e9,
             why=words(self._latest),

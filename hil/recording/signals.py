@@ -111,7 +111,7 @@ def _inside(values: FloatArray, mask: MaskRange) -> NDArray[np.bool_]:
 def _flagged(table: Table, signals: SignalsConfig) -> NDArray[np.bool_]:
     if not (signals.is_own_recording and columns.FLAGS in table.columns):
         return np.zeros(table.n_rows, dtype=np.bool_)
-    flagged: NDArray[np.bool_] = table.numeric([columns.FLAGS])[columns.FLAGS] != 0
+    flagged: NDArray[np.bool_] = ~np.isin(table.numeric([columns.FLAGS])[columns.FLAGS], columns.COUNTING_FLAGS)
     return flagged
 
 

@@ -40,8 +40,11 @@ def publish(folder: Path, files: Mapping[str, Callable[[Path], object]]) -> None
     Raises
     ------
     UsageError
-        If the folder, or the disk it is on, does not take them.
+        If the folder, or the disk it is on, does not take them, or a file has the name of a folder that is there.
     """
+    for path in (folder / name for name in files):
+        if path.is_dir():
+            raise UsageError(f"{path}: expected the name of a file to write, came a folder. Name a file in it.")
     require_folder(folder)
     try:
         _publish(folder, files)

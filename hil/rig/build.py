@@ -100,6 +100,10 @@ def inverter_settings(name: str, table: InverterTable) -> InverterSettings:
         speed_unit=None if table.speed_unit is None else table.speed_unit.speed_unit,
         rated_torque_unit_nm=table.rated_torque_unit.nm,
         accepted=table.accepted.by_name,
+        follow_bit=table.follow_bit,
+        sdo_timeout_s=table.sdo_timeout_s,
+        mode_timeout_s=table.mode_timeout_s,
+        state_timeout_s=table.state_timeout_s,
     )
 
 

@@ -19,6 +19,7 @@ from drivers.inverter.commissioned import CommissionedValue
 from drivers.inverter.inverter import Inverter
 from drivers.inverter.protection import Protection
 from drivers.plc.reader import Backoff, PlcReader
+from drivers.plc.reading import Reading
 from drivers.plc.types import PlcStatus
 from hil.config.rig_file import InverterTable, PlcTable, Rig
 from hil.rig.build import inverter_settings, plc_client
@@ -29,6 +30,10 @@ NO_NEEDS = Needs(torque_of_one_nm=0.0)
 
 PLC_BACKOFF = Backoff(first_s=0.1, longest_s=0.2, attempts=3)
 """A person waits for a check: a connection lost once is made again, a PLC that is not there is soon said to be."""
+
+
+MAP = "register map"
+"""Where it stands what a register should hold."""
 
 
 class Verdict(Enum):
@@ -61,6 +66,8 @@ class Finding:
         Where DCF, device and rig file are not of one mind.
     protections
         What stands between a dead host and torque.
+    registers
+        What the registers of a PLC hold.
     """
 
     device: str
@@ -71,6 +78,7 @@ class Finding:
     remarks: tuple[str, ...] = ()
     commissioned: tuple[CommissionedValue, ...] = ()
     protections: tuple[Protection, ...] = ()
+    registers: tuple[Reading, ...] = ()
 
 
 def check_rig(rig: Rig, prove_stop: bool = False) -> tuple[Finding, ...]:
@@ -156,16 +164,39 @@ def _node(table: InverterTable) -> str:
 
 def _plc(table: PlcTable) -> Finding:
     def compare() -> Finding:
-        status = asyncio.run(_plc_status(table))
-        return Finding("plc", address, Verdict.AGREES, notes=tuple(reasons_against(status, NO_NEEDS)))
+        registers, status = asyncio.run(_asked(table))
+        differences = tuple(
+            Difference(
+                "plc",
+                f"{each.name}, {each.register.kind.value} {each.register.address}",
+                each.expected,
+                each.problem,
+                MAP,
+            )
+            for each in registers
+            if each.problem is not None
+        )
+        notes = () if status is None else tuple(reasons_against(status, NO_NEEDS))
+        return Finding(
+            "plc",
+            address,
+            Verdict.DIFFERS if differences else Verdict.AGREES,
+            differences,
+            notes,
+            registers=registers,
+        )
 
     address = f"{table.host}:{table.port}"
     return _or_failed("plc", address, compare)
 
 
-async def _plc_status(table: PlcTable) -> PlcStatus:
+async def _asked(table: PlcTable) -> tuple[tuple[Reading, ...], PlcStatus | None]:
+    """Read every register, and the status where they can be believed."""
     async with PlcReader(plc_client(table), PLC_BACKOFF) as reader:
-        return await reader.read_status()
+        registers = await reader.read_registers()
+        if any(each.problem is not None for each in registers):
+            return registers, None
+        return registers, await reader.read_status()
 
 
 def _or_failed(device: str, address: str, compare: Callable[[], Finding]) -> Finding:

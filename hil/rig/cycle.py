@@ -27,18 +27,19 @@ class _Station:
     name: str
     inverter: Inverter
     stale: SampleFlag
+    limited: SampleFlag
     torque_nm: float = math.nan
     speed_rad_s: float = math.nan
     answered_ns: int | None = None
 
     def take(self, feedback: InverterFeedback | None, now_ns: int) -> SampleFlag:
-        """Keep an answer, or flag that there is none."""
+        """Keep an answer, or flag that there is none; flag a torque that a limit of the drive holds back."""
         if feedback is None:
             return self.stale
         self.torque_nm = feedback.torque_nm
         self.speed_rad_s = feedback.speed_rad_s
         self.answered_ns = now_ns
-        return SampleFlag.GOOD
+        return self.limited if feedback.limited else SampleFlag.GOOD
 
 
 class Cycle:
@@ -73,8 +74,8 @@ class Cycle:
         timing: RunTiming | None = None,
     ) -> None:
         self._link = link
-        self._m1 = _Station("m1", m1, SampleFlag.M1_STALE)
-        self._m2 = _Station("m2", m2, SampleFlag.M2_STALE)
+        self._m1 = _Station("m1", m1, SampleFlag.M1_STALE, SampleFlag.M1_LIMITED)
+        self._m2 = _Station("m2", m2, SampleFlag.M2_STALE, SampleFlag.M2_LIMITED)
         self._guard = guard
         self.timing = timing or RunTiming(period_ns)
         self._answer_timeout_ns = round(answer_timeout_s * NS_PER_S)
@@ -87,8 +88,8 @@ class Cycle:
 
     @property
     def answered(self) -> bool:
-        """Whether both inverters have answered at least once."""
-        return self._m1.answered_ns is not None and self._m2.answered_ns is not None
+        """Whether both inverters have answered at least once, and follow their target torques."""
+        return all(each.answered_ns is not None and each.inverter.follows for each in (self._m1, self._m2))
 
     def step(self, tick: Tick, request: TorqueRequest, time_s: float, flags: SampleFlag) -> Sample:
         """Run one cycle.

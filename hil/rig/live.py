@@ -81,7 +81,7 @@ class LiveEstimate:
         """Take the next sample."""
         if phase is not Phase.MEASURE:
             return
-        good = not sample.flags
+        good = sample.counts
         m1, m2 = self._m1.take(sample.torque_m1_nm, good), self._m2.take(sample.torque_m2_nm, good)
         self._begun |= m1 and m2
         torque_nm = self._m1.torque_nm + self._m2.torque_nm if self._begun else math.nan

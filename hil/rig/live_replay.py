@@ -8,7 +8,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -17,7 +16,6 @@ from estimator.signals.record import FloatArray, Record
 from hil.rig.live import LiveEstimate, tracking_chain
 from hil.rig.live_course import Course
 from hil.rig.sample import Sample
-from hil.rig.trace import SUFFIXES
 
 BLOCK_SAMPLES = 10_000
 """Samples of a block when nothing has to be waited for."""
@@ -100,8 +98,3 @@ def play_samples(
             wait(sample.time_s)
             told(live.course, sample.time_s)
     return live.course
-
-
-def is_trace(path: Path) -> bool:
-    """Tell a bus trace from a recording, by its suffix."""
-    return path.suffix.lower() in SUFFIXES

@@ -39,12 +39,13 @@ LOOKED_AT = 1000
 class _Station:
     """One inverter of the trace: the command before the next SYNC, the answer after the last one."""
 
-    def __init__(self, settings: InverterSettings, stale: SampleFlag) -> None:
+    def __init__(self, settings: InverterSettings, stale: SampleFlag, limited: SampleFlag) -> None:
         self._pdos = InverterPdos(settings)
         self._receiver = self._pdos.receiver()
         self._receiver.start_anew()
-        self._stale = stale
+        self._stale, self._limited = stale, limited
         self._answered = False
+        self._remark = SampleFlag.GOOD
         self.rpdo_cob_id, self.tpdo_cob_id = self._pdos.command.layout.cob_id, self._pdos.feedback.layout.cob_id
         self._next = (0.0, 0.0)
         self.torque_ref_nm, self.prbs_nm = 0.0, 0.0
@@ -72,12 +73,13 @@ class _Station:
         feedback = self._receiver.latest
         if feedback is not None and not self._answered:
             self.torque_nm, self.speed_rad_s = feedback.torque_nm, feedback.speed_rad_s
+            self._remark = self._limited if feedback.limited else SampleFlag.GOOD
             self._answered = True
 
     def end(self) -> SampleFlag:
         """Close the cycle; the flag it deserves."""
         self.cycles_old = 0 if self._answered else self.cycles_old + 1
-        return SampleFlag.GOOD if self._answered else self._stale
+        return self._remark if self._answered else self._stale
 
 
 @dataclass(slots=True)
@@ -152,7 +154,7 @@ class _Reader:
         )
 
 
-def replay(path: Path, rig: Rig, whole: bool = False) -> Iterator[Sample]:
+def replay(path: Path, rig: Rig, whole: bool = False, channel: str | None = None) -> Iterator[Sample]:
     """Read the samples of a bus trace.
 
     Parameters
@@ -163,6 +165,8 @@ def replay(path: Path, rig: Rig, whole: bool = False) -> Iterator[Sample]:
         The rig it was recorded on: nodes, EDS, rated torques and period.
     whole
         Every cycle from the first SYNC, not only the measured part, where the PRBS runs.
+    channel
+        Which channel of the trace; None where it has one.
 
     Yields
     ------
@@ -172,19 +176,20 @@ def replay(path: Path, rig: Rig, whole: bool = False) -> Iterator[Sample]:
     Raises
     ------
     RecordingError
-        If the file can't be read, a frame is not what the EDS says, or there is no measured part, or a second.
+        If the file can't be read, has several channels and none is chosen, a frame is not what the EDS says, or there
+        is no measured part, or a second.
     """
     period = period_ns(rig.period_s)
-    clock = _Clock(period, paced=_is_paced(path, period))
-    m1 = _Station(inverter_settings("m1", rig.inverters.m1), SampleFlag.M1_STALE)
-    m2 = _Station(inverter_settings("m2", rig.inverters.m2), SampleFlag.M2_STALE)
+    clock = _Clock(period, paced=_is_paced(path, period, channel))
+    m1 = _Station(inverter_settings("m1", rig.inverters.m1), SampleFlag.M1_STALE, SampleFlag.M1_LIMITED)
+    m2 = _Station(inverter_settings("m2", rig.inverters.m2), SampleFlag.M2_STALE, SampleFlag.M2_LIMITED)
     if not whole and not (m1.has_offset and m2.has_offset):
         raise RecordingError(
             path,
             "expected the PRBS in an object of its own (0x60B2), by which the measured part is known, came drives that "
             "get base torque and PRBS as one sum (0x6071). For every cycle: --all.",
         )
-    every = _Reader(clock, m1, m2).samples(read_frames(path))
+    every = _Reader(clock, m1, m2).samples(read_frames(path, channel))
     chosen = every if whole else _measured(path, every)
     try:
         yield from _evenly(chosen, period)
@@ -192,9 +197,9 @@ def replay(path: Path, rig: Rig, whole: bool = False) -> Iterator[Sample]:
         raise RecordingError(path, f"{error} Or the rig file is not the one of this trace.") from error
 
 
-def _is_paced(path: Path, period: int) -> bool:
+def _is_paced(path: Path, period: int, channel: str | None) -> bool:
     """Whether the SYNC of a trace followed a clock."""
-    every = (t_ns for cob_id, _, t_ns in read_frames(path) if cob_id == SYNC_COB_ID)
+    every = (t_ns for cob_id, _, t_ns in read_frames(path, channel) if cob_id == SYNC_COB_ID)
     times = list(itertools.islice(every, LOOKED_AT + 1))
     if len(times) < 2:
         raise RecordingError(path, f"expected SYNC (0x{SYNC_COB_ID:03X}), came {len(times)}. Trace a run of cycles.")

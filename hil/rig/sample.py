@@ -14,6 +14,12 @@ class SampleFlag(IntFlag):
     M2_STALE = 2
     LATE = 4  # the cycle started later than half a period after its time
     PLC_STALE = 8
+    M1_LIMITED = 16  # an internal limit of m1 acts (statusword bit 11): less torque than asked for, read as ever
+    M2_LIMITED = 32
+
+
+REMARKS = SampleFlag.M1_LIMITED | SampleFlag.M2_LIMITED
+"""Flags of samples that count all the same: what was read is what was."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +41,11 @@ class Sample:
     speed_rad_s: float
     age_ns: int
     flags: SampleFlag
+
+    @property
+    def counts(self) -> bool:
+        """Whether the readings are those of this cycle; a flag that is a remark takes nothing from them."""
+        return not self.flags & ~REMARKS
 
     @property
     def torque_ref_nm(self) -> float:

@@ -20,6 +20,9 @@ from hil.errors import RecordingError
 SUFFIXES = (".blf", ".log", ".asc")
 """Vector's binary and text logs, and the text of Linux's candump: what ``can.Logger`` writes by these names."""
 
+READABLE = (*SUFFIXES, ".trc")
+"""What can be read: PEAK's text log too, whose times are whole microseconds at best."""
+
 WRITE_EVERY_S = 0.05
 
 NS_PER_S = 1_000_000_000
@@ -108,8 +111,13 @@ class BusTrace:
             self.n_frames += 1
 
 
+def is_trace(path: Path) -> bool:
+    """Tell a bus trace from a recording, by its suffix."""
+    return path.suffix.lower() in READABLE
+
+
 def require_trace_name(path: Path) -> None:
-    """Refuse a name no trace can have.
+    """Refuse a name no trace that is written can have.
 
     Raises
     ------

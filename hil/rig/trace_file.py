@@ -1,9 +1,14 @@
-"""Read a bus trace, by python-can's own readers, as data frames with their time; every fault by the file's name."""
+"""Read a bus trace, by python-can's own readers, as data frames with their time; every fault by the file's name.
+
+A trace is that of one bus. Where a log has several channels one has to be chosen: merged, the frames of two buses
+would be taken for those of one.
+"""
 
 from __future__ import annotations
 
 import struct
 import zlib
+from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import IO, Any
@@ -11,38 +16,86 @@ from typing import IO, Any
 import can
 from can.io.blf import BLFParseError
 
+from drivers.canopen.can_link import is_canopen
 from hil.errors import RecordingError
-from hil.rig.trace import require_trace_name
+from hil.rig.trace import READABLE, is_trace
 
 NS_PER_S = 1_000_000_000
 
+COUNTED_FROM_1 = (".blf", ".asc")
+"""Formats whose channels python-can counts from 0, and their files and every other program from 1."""
+
 _READING_ERRORS = (OSError, ValueError, IndexError, KeyError, EOFError, struct.error, zlib.error, BLFParseError)
 """What python-can's readers raise for a file that is damaged or of another format."""
+
+
+class _TrcReader(can.TRCReader):
+    """python-can's reader of PEAK's text log (1.0, 1.1, 1.3, 2.0, 2.1), which passes over a line that is cut short."""
+
+    def _parse_line(self, line: str) -> can.Message | None:
+        return self._parse_cols(tuple(line.split(maxsplit=self._num_columns)))
 
 
 _READERS: dict[str, Callable[..., Any]] = {
     ".blf": can.BLFReader,
     ".log": can.CanutilsLogReader,
     ".asc": can.ASCReader,
+    ".trc": _TrcReader,
 }
 
 
-def read_frames(path: Path) -> Iterator[tuple[int, bytes, int]]:
-    """Give identifier, data and time [ns] of every data frame with an 11-bit identifier, in the file's order.
+def read_frames(path: Path, channel: str | None = None) -> Iterator[tuple[int, bytes, int]]:
+    """Give identifier, data and time [ns] of every frame of CANopen's kind, in the file's order.
+
+    Parameters
+    ----------
+    path
+        The trace.
+    channel
+        Name of the channel to read, as the file has it; None for the only one.
 
     Raises
     ------
     RecordingError
-        If the file can't be read to its end, or is no trace.
+        If the file can't be read to its end, is no trace, has no such channel, or has several and none is chosen.
     """
-    require_trace_name(path)
+    first, found = channel, channel is None
+    for name, message in _frames(path):
+        first = name if first is None else first
+        if name == first:
+            found = True
+            yield message.arbitration_id, bytes(message.data), round(message.timestamp * NS_PER_S)
+        elif channel is None:
+            raise _which(path, "expected the traffic of one bus")
+    if not found:
+        raise _which(path, f"expected channel {channel!r}")
+
+
+def _which(path: Path, expected: str) -> RecordingError:
+    counts = Counter(name for name, _ in _frames(path))
+    came = ", ".join(f"{name} ({count} frames)" for name, count in sorted(counts.items()))
+    return RecordingError(
+        path,
+        f"{expected}, came channels {came or 'without a frame'}. Say which: --channel {next(iter(counts), 'NAME')}",
+    )
+
+
+def _frames(path: Path) -> Iterator[tuple[str, can.Message]]:
+    """Give channel and frame; those of other protocols on the same wire are left out."""
+    if not is_trace(path):
+        raise RecordingError(path, f"expected a name that ends in one of {', '.join(READABLE)}, came {path.suffix!r}")
     if not path.is_file():
         raise RecordingError(path, "expected a bus trace to read, there is no such file")
+    suffix = path.suffix.lower()
     try:
-        with _opened(path) as file, _READERS[path.suffix.lower()](file) as reader:
+        with _opened(path) as file, _READERS[suffix](file) as reader:
             for message in reader:
-                if not (message.is_error_frame or message.is_remote_frame or message.is_extended_id):
-                    yield message.arbitration_id, bytes(message.data), round(message.timestamp * NS_PER_S)
+                if is_canopen(message):
+                    if len(message.data) != message.dlc:
+                        raise ValueError(f"a frame of {message.dlc} bytes that has {len(message.data)}")
+                    yield _channel(message, suffix), message
+    except NotImplementedError as error:
+        raise RecordingError(path, f"expected a version of {suffix} that python-can reads, came: {error}") from error
     except _READING_ERRORS as error:
         raise RecordingError(
             path,
@@ -51,6 +104,13 @@ def read_frames(path: Path) -> Iterator[tuple[int, bytes, int]]:
         ) from error
 
 
+def _channel(message: can.Message, suffix: str) -> str:
+    channel = message.channel
+    return str(channel + 1) if suffix in COUNTED_FROM_1 and isinstance(channel, int) else str(channel)
+
+
 def _opened(path: Path) -> IO[Any]:
     """Open a trace; a reader that opens it itself leaves it open where the file is at fault."""
-    return path.open("rb") if path.suffix.lower() == ".blf" else path.open(encoding="utf-8")
+    if path.suffix.lower() == ".blf":
+        return path.open("rb")
+    return path.open(encoding="utf-8", errors="replace")  # comments and names may be of another code page

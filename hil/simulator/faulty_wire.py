@@ -19,7 +19,7 @@ from typing import Self
 import can
 import numpy as np
 
-from drivers.canopen.can_link import SYNC_COB_ID
+from drivers.canopen.can_link import SYNC_COB_ID, is_canopen
 from drivers.canopen.inline_bus import InlineBus
 from hil.simulator.bus_faults import BusFaults, Since
 
@@ -133,7 +133,9 @@ class Lane:
 
     def _acting(self, since: Since | None, message: can.Message) -> float | None:
         """Amount of a fault that touches this frame now."""
-        if since is None or self._step() < since.step or not since.frames.meant(message.arbitration_id):
+        if since is None or self._step() < since.step or not is_canopen(message):
+            return None
+        if not since.frames.meant(message.arbitration_id):
             return None
         return since.frames.amount
 
@@ -187,7 +189,7 @@ class FaultyWire:
         return self._syncs
 
     def _from_host(self, message: can.Message) -> None:
-        if message.arbitration_id == SYNC_COB_ID and not message.is_error_frame:
+        if message.arbitration_id == SYNC_COB_ID and is_canopen(message):
             self._syncs += 1
         if not self._off():
             self._to_devices.carry(message)

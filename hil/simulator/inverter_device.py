@@ -56,6 +56,7 @@ _HALT = 1 << 8
 
 _REMOTE, _VOLTAGE_ENABLED = StatusBit.REMOTE.value, StatusBit.VOLTAGE_ENABLED.value
 _INTERNAL_LIMIT_ACTIVE, _WARNING = StatusBit.INTERNAL_LIMIT_ACTIVE.value, StatusBit.WARNING.value
+_FOLLOWS_TARGET = StatusBit.FOLLOWS_TARGET.value
 """Bits as plain numbers, for one statusword at every SYNC."""
 
 
@@ -114,6 +115,7 @@ class InverterDevice:
         self._ramp = 0.0
         self._torque = 0.0
         self._limited = False
+        self._follows = False
         self._sensors.clear()
         self._errors = ErrorList()
         self._meet_faults()
@@ -268,6 +270,7 @@ class InverterDevice:
         self._mode = value
 
     def _torque_in_effect(self, speed_rad_s: float, period_s: float) -> float:
+        self._follows = False
         if self.hung or self.state not in TORQUE_STATES:
             return 0.0
         if self._stop is not None:
@@ -277,12 +280,20 @@ class InverterDevice:
         if self._controlword & _HALT:
             self._ramp = self._halting(halt_ramp(self._parameters), period_s)
             return self._ramp
+        if self._ignores_target:
+            return 0.0
         if self._mode == TorqueMode.PROFILE_TORQUE:
             self._ramp = _towards(self._parameters[0x6071], self._ramp, self._slope(Ramp.SLOPE) * period_s)
         else:
             self._ramp = self._parameters[0x6071]
+            self._follows = True
         added = round(self.added_nm * 1000.0 / self._settings.rated_torque_nm)
         return self._within_limits(round(self._ramp) + self._parameters[0x60B2] + added, speed_rad_s)
+
+    @property
+    def _ignores_target(self) -> bool:
+        since = self._settings.faults.ignores_target_from_step
+        return since is not None and self._steps >= since
 
     def _stopping(self, stop: Stop, period_s: float) -> float:
         torque = self._ramp = _towards(0.0, self._torque, self._slope(stop.ramp) * period_s)
@@ -339,6 +350,8 @@ class InverterDevice:
             bits |= _INTERNAL_LIMIT_ACTIVE
         if self._heat.derating:
             bits |= _WARNING
+        if self._follows and self.state is PowerState.OPERATION_ENABLED:
+            bits |= _FOLLOWS_TARGET
         return bits
 
 

@@ -61,6 +61,7 @@ INVERTER_KINDS: Final[Mapping[str, Kind[InverterFaults]]] = MappingProxyType(
         "reset": Kind(True, _set(reset_at_step=_step)),
         "bus_off": Kind(True, _set(bus_off_at_step=_step)),
         "stale_pdo": Kind(True, _set(stale_from_step=_step)),
+        "ignores_target": Kind(True, _set(ignores_target_from_step=_step)),
         "stale_share": Kind(False, _set(stale_share=_size), number("SHARE", 0.0, 1.0, "of the PDOs")),
         "fault": Kind(True, _set(fault=_error), error_code(OVERCURRENT)),
         "emcy": Kind(True, _set(emcy=_error), error_code()),

@@ -44,6 +44,8 @@ class InverterFaults:
         Its TPDOs repeat what the one before this step said.
     stale_share
         Share of TPDOs that repeat what the one before them said, at random: a drive too slow for its SYNC.
+    ignores_target_from_step
+        It ignores the target torque from this step on, in operation, and says so in bit 12 of its statusword.
     fault
         A fault it meets.
     emcy
@@ -71,6 +73,7 @@ class InverterFaults:
     bus_off_at_step: int | None = None
     stale_from_step: int | None = None
     stale_share: float = 0.0
+    ignores_target_from_step: int | None = None
     fault: FaultAtStep | None = None
     emcy: FaultAtStep | None = None
     brown_out_at_step: int | None = None

@@ -110,7 +110,8 @@ class PdoObjects:
                 continue
             frame = self._frame(read_layout(self._read_or_nothing, communication, mapping))
             reserved = any(frame.layout.cob_id in taken for taken in RESERVED_COB_IDS)
-            if frame.layout.valid and frame.layout.objects and frame.fits and not reserved:
+            usable = frame.layout.valid and not frame.layout.extended and not reserved
+            if usable and frame.layout.objects and frame.fits:
                 yield frame
 
     def _frame(self, layout: PdoLayout) -> PdoFrame:

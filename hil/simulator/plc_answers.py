@@ -19,3 +19,5 @@ class Answers(Enum):
     HALF = "half"
     RESET = "reset"
     TOO_FEW = "too few"  # one register less than was asked for
+    WRONG_UNIT = "wrong unit"  # as a gateway does that mixes up its devices
+    WRONG_TRANSACTION = "wrong transaction"

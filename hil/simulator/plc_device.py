@@ -81,6 +81,10 @@ class PlcFaults:
     exceptions_at_s, late_at_s, half_at_s, resets_at_s, too_few_at_s : float
         From then on it answers with exception 04, late, with half an answer, by resetting the connection, or with
         one register less than was asked for. How it answers is for whoever serves it to carry out.
+    wrong_unit_at_s, wrong_transaction_at_s : float
+        From then on its answers have another unit or transaction identifier than the request.
+    swaps_floats : bool
+        Its floating-point values have their two words in the other order than the register map says.
     refused_modes : frozenset of DriveMode
         The PLC takes the request and does not follow it.
     """
@@ -94,6 +98,9 @@ class PlcFaults:
     half_at_s: float = math.inf
     resets_at_s: float = math.inf
     too_few_at_s: float = math.inf
+    wrong_unit_at_s: float = math.inf
+    wrong_transaction_at_s: float = math.inf
+    swaps_floats: bool = False
     refused_modes: frozenset[DriveMode] = frozenset()
 
     def answers(self, time_s: float) -> Answers:
@@ -105,6 +112,8 @@ class PlcFaults:
             self.half_at_s: Answers.HALF,
             self.resets_at_s: Answers.RESET,
             self.too_few_at_s: Answers.TOO_FEW,
+            self.wrong_unit_at_s: Answers.WRONG_UNIT,
+            self.wrong_transaction_at_s: Answers.WRONG_TRANSACTION,
         }
         return begun[max(due)] if (due := [at_s for at_s in begun if at_s <= time_s]) else Answers.WELL
 
@@ -187,6 +196,11 @@ class PlcDevice:
         """How the PLC answers now; for whoever serves it."""
         with self._lock:
             return self._faults.answers(self._time_s)
+
+    @property
+    def swaps_floats(self) -> bool:
+        """Whether its floating-point values have their words in another order than the register map says."""
+        return self._faults.swaps_floats
 
     def close_clutch(self) -> None:
         """Close the clutch now, whatever the drive mode."""

@@ -20,6 +20,9 @@ PLC_KINDS: Final[Mapping[str, Kind[PlcFaults]]] = MappingProxyType(
         "slow": Kind(True, lambda faults, when: replace(faults, late_at_s=when.at_s)),
         "half_answer": Kind(True, lambda faults, when: replace(faults, half_at_s=when.at_s)),
         "reset": Kind(True, lambda faults, when: replace(faults, resets_at_s=when.at_s)),
+        "wrong_unit": Kind(True, lambda faults, when: replace(faults, wrong_unit_at_s=when.at_s)),
+        "wrong_transaction": Kind(True, lambda faults, when: replace(faults, wrong_transaction_at_s=when.at_s)),
+        "swapped_floats": Kind(False, lambda faults, when: replace(faults, swaps_floats=True)),
         "wrong_width": Kind(True, lambda faults, when: replace(faults, too_few_at_s=when.at_s)),
     }
 )

@@ -11,7 +11,7 @@ from pymodbus.simulator import DataType, SimData, SimDevice
 from pymodbus.simulator.simcore import SimCore
 
 from drivers.errors import ConfigMismatch, ProtocolViolation
-from drivers.plc.register import Access, RegisterKind, Value
+from drivers.plc.register import Access, Register, RegisterKind, Value, ValueType, WordOrder
 from drivers.plc.register_map import RegisterMap
 from hil.simulator.plc_device import PlcDevice, ValueRefusedError
 
@@ -96,8 +96,15 @@ class PlcRegisters(SimCore):
             register.address + offset: word
             for name, register in self._map.registers.items()
             if register.kind is kind
-            for offset, word in enumerate(register.encode(values[name]))
+            for offset, word in enumerate(self._ordered(register).encode(values[name]))
         }
+
+    def _ordered(self, register: Register) -> Register:
+        """Give a register as this PLC has it: a fault of its own may have the words of floats the other way round."""
+        if register.type is not ValueType.FLOAT32 or not self._device.swaps_floats:
+            return register
+        other = next(each for each in WordOrder if each is not register.word_order)
+        return register.model_copy(update={"word_order": other})
 
     def _written(self, kind: RegisterKind, address: int, count: int) -> list[str] | None:
         """Name the registers that make up a range; None unless it is writable registers from end to end."""
@@ -115,4 +122,4 @@ class PlcRegisters(SimCore):
     def _decoded(self, name: str, address: int, values: Sequence[int] | Sequence[bool]) -> Value:
         register = self._map[name]
         offset = register.address - address
-        return register.decode([int(value) for value in values[offset : offset + register.size]])
+        return self._ordered(register).decode([int(value) for value in values[offset : offset + register.size]])

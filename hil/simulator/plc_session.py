@@ -140,6 +140,10 @@ class PlcSession(ServerRequestHandler):
             return b""
         if sending and self._plc.answers() is Answers.HALF:
             return packet[: len(packet) // 2]
+        if sending and self._plc.answers() is Answers.WRONG_UNIT:
+            return packet[:6] + bytes((packet[6] ^ 0x80,)) + packet[7:]
+        if sending and self._plc.answers() is Answers.WRONG_TRANSACTION:
+            return bytes((packet[0] ^ 0x80,)) + packet[1:]
         return packet
 
     def _send_exception(self, request: ModbusPDU, code: ExcCodes) -> None:

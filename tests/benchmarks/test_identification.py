@@ -2,15 +2,135 @@
 
 from __future__ import annotations
 
+import json
 import math
 
 import numpy as np
 import pytest
 
-from estimator.identification.linear_model import LinearModel
-from tests.benchmarks import identification, peers
-from tests.benchmarks.identification import Experiment, Rate, buses, coverage, cruises, experiment
-from tests.benchmarks.peers import Score, model_of, read, rows
+from tests.benchmarks.buses.drive import CLEAN, ON_THE_ROAD
+from tests.benchmarks.identification.__main__ import main
+from tests.benchmarks.identification.answer import BAND_HZ, Answer, Case, Interval, high_passed, make_case, of_poles
+from tests.benchmarks.identification.healthy import COUNT, at_10_ms, passed, recordings
+from tests.benchmarks.identification.peers import PEERS, REFERENCE, Peer
+from tests.benchmarks.identification.report import document, tables
+from tests.benchmarks.identification.rigs import Experiment, buses, coverage, cruises, experiment
+from tests.benchmarks.identification.run import Judged, judge
+from tests.benchmarks.identification.scores import Rate, coverages, errors
+
+TRUTH = {"frequency": 8.0, "damping": 0.05}
+
+
+def poles_of(frequency_hz: float, damping: float) -> list[complex]:
+    """Return the pair in z at 10 ms."""
+    s = 2 * math.pi * frequency_hz * complex(-damping, math.sqrt(1 - damping**2))
+    z = complex(np.exp(s * 0.01))
+    return [z, z.conjugate()]
+
+
+def said(frequency_hz: float, damping: float = 0.05, intervals: dict[str, Interval] | None = None) -> Judged:
+    """Return a bus about which one method said this."""
+    return Judged(7, TRUTH, {"m": Answer(frequency_hz, damping, intervals or {}, cpu_s=0.2)})
+
+
+@pytest.fixture(scope="module")
+def road_case() -> Case:
+    return make_case(1, ON_THE_ROAD)
+
+
+@pytest.fixture(scope="module")
+def judged() -> Judged:
+    return judge(3, CLEAN)
+
+
+def test_the_least_damped_pair_in_the_band_is_the_answer() -> None:
+    slow, seen, other = poles_of(BAND_HZ[0] / 2, 0.01), poles_of(8.0, 0.05), poles_of(15.0, 0.3)
+    found = of_poles(np.array([*slow, *seen, *other, 0.99]))
+    assert (found.frequency_hz, found.damping) == pytest.approx((8.0, 0.05))
+
+
+@pytest.mark.parametrize("poles", [[0.9, 0.5, 0.1], poles_of(8.0, -0.01), poles_of(8.0, 0.6)])
+def test_without_a_lightly_damped_stable_pair_there_is_no_answer(poles: list[complex]) -> None:
+    assert not of_poles(np.array(poles)).is_there
+
+
+def test_the_high_pass_takes_a_constant_and_leaves_the_resonance() -> None:
+    t = 0.01 * np.arange(3000)
+    left = high_passed(100.0 + np.sin(2 * np.pi * 8.0 * t))[1000:]
+    assert abs(left.mean()) < 1e-3
+    assert np.sqrt(2) * left.std() == pytest.approx(1.0, abs=2e-3)
+
+
+@pytest.mark.parametrize("peer", PEERS, ids=lambda peer: peer.name)
+def test_every_peer_finds_the_resonance_of_a_bus_on_the_road(peer: Peer, road_case: Case) -> None:
+    if not peer.is_installed:
+        pytest.skip(f"pip install {peer.requirement}")
+    found = peer(road_case)
+    assert found.frequency_hz == pytest.approx(road_case.truth["frequency"], rel=0.01)
+    assert found.damping == pytest.approx(road_case.truth["damping"], rel=0.1)
+
+
+def test_what_a_peer_can_not_do_is_no_answer(road_case: Case) -> None:
+    def fails(u: object, y: object) -> np.ndarray:
+        raise np.linalg.LinAlgError("SVD did not converge")
+
+    answer = Peer("broken", "numpy", "numpy", fails)(road_case)
+    assert not answer.is_there
+    assert answer.refusal == "LinAlgError: SVD did not converge"
+
+
+def test_the_reference_is_one_of_the_peers() -> None:
+    assert REFERENCE in {peer.name for peer in PEERS}
+
+
+def test_every_method_is_asked_about_a_bus_and_told_in_the_tables(judged: Judged) -> None:
+    told = tables([judged])
+    assert judged.seed == 3
+    assert all(name in told for name in judged.answers)
+    assert all(answer.cpu_s > 0.0 for answer in judged.answers.values())
+    best = judged.answers["this project: Box-Jenkins, 10 ms"]
+    assert best.frequency_hz == pytest.approx(judged.truth["frequency"], rel=0.005)
+    assert set(judged.truth) == set(best.intervals)
+
+
+def test_the_document_is_json_without_nan(judged: Judged) -> None:
+    refused = Judged(4, judged.truth, {name: Answer(refusal="why", cpu_s=0.1) for name in judged.answers})
+    text = json.dumps(document([judged, refused], {"first_seed": 3}), allow_nan=False)
+    assert json.loads(text)["buses"][1]["answers"][next(iter(judged.answers))]["frequency_hz"] is None
+
+
+def test_errors_are_those_of_the_buses_answered_for() -> None:
+    found = errors([said(8.08), said(7.96, 0.055), Judged(9, TRUTH, {"m": Answer(cpu_s=0.4)})], "m")
+    assert found.frequency_rms == pytest.approx(math.sqrt((1.0 + 0.25) / 2))
+    assert found.damping_rms == pytest.approx(math.sqrt(100 / 2))
+    assert (found.frequency_worst, found.damping_worst, found.cpu_s) == pytest.approx((1.0, 10.0, 0.2))
+    assert (found.none.held, found.none.runs) == (1, 3)
+
+
+def test_coverage_counts_what_the_intervals_hold() -> None:
+    holding, above = Interval(8.01, 7.99, 8.03), Interval(8.1, 8.05, 8.15)
+    impossible, unsure = Interval(-0.1, -0.2, -0.05), Interval(0.01, -0.1, 0.2, is_determined=False)
+    printed = [{"frequency": holding}, {"frequency": above, "damping": impossible}, {"damping": unsure}]
+    frequency, damping = coverages([said(8.0, intervals=intervals) for intervals in printed], "m")
+    assert (frequency.held.held, frequency.held.runs, frequency.refused, frequency.impossible) == (1, 2, 1, 0)
+    assert (damping.held.held, damping.held.runs, damping.impossible) == (1, 2, 1)
+    assert (damping.held_determined.held, damping.held_determined.runs) == (0, 1)
+    assert frequency.error_rms == pytest.approx(100 * math.sqrt((0.01**2 + 0.1**2) / 2) / 8)
+
+
+def test_wilsons_interval() -> None:
+    """The formula by hand: centre and reach of (p + z^2 / 2n +- z sqrt(p q / n + z^2 / 4n^2)) / (1 + z^2 / n)."""
+    n, p, z = 200, 0.95, 1.959964
+    low, high = Rate(190, n).interval
+    centre, reach = p + z**2 / (2 * n), z * math.sqrt(p * (1 - p) / n + z**2 / (4 * n**2))
+    assert (low, high) == pytest.approx(((centre - reach) / (1 + z**2 / n), (centre + reach) / (1 + z**2 / n)))
+    assert Rate(190, n).text.startswith("95.0 % (91.0 to 97.3)")
+    assert Rate(0, 0).text == "none"
+
+
+def test_healthy_recordings_pass_the_residual_test_of_their_own_model() -> None:
+    assert len(list(recordings())) == COUNT
+    assert passed(CLEAN, at_10_ms) == COUNT
 
 
 def test_experiments_keep_the_limits_on_both_simulators() -> None:
@@ -26,56 +146,21 @@ def test_an_experiment_off_its_limit_is_not_good() -> None:
         assert not Experiment("run", online, (0.0, 0.0), response_db).is_good
 
 
-def test_coverage_counts_what_the_intervals_hold() -> None:
+def test_coverage_of_the_tests_driveline() -> None:
     rates = coverage(cruises(4))
     assert set(rates) == {"resonance", "damping", "J_M", "J_L", "k", "c + b_M"}
-    assert all(rate.runs == 4 and error < 5 * said for rate, error, said in rates.values())
+    assert all(rate.runs == 4 and error < 5 * stated for rate, error, stated in rates.values())
 
 
-def test_wilsons_interval() -> None:
-    """The formula by hand: centre and reach of (p + z^2 / 2n +- z sqrt(p q / n + z^2 / 4n^2)) / (1 + z^2 / n)."""
-    n, p, z = 200, 0.95, 1.959964
-    low, high = Rate(190, n).interval
-    centre, reach = p + z**2 / (2 * n), z * math.sqrt(p * (1 - p) / n + z**2 / (4 * n**2))
-    assert (low, high) == pytest.approx(((centre - reach) / (1 + z**2 / n), (centre + reach) / (1 + z**2 / n)))
-    assert Rate(190, n).text.startswith("95.0 % (91.0 to 97.3)")
-
-
-def test_a_peers_polynomials_are_read_as_the_model_they_are() -> None:
-    model = LinearModel((-1.6, 0.8), (0.1, 0.05), 1, 0.01)
-    read_back = model_of(np.array([0.2, 0.1]), np.array([2.0, -3.2, 1.6]), 0.01)  # scaled, no leading zero
-    frequency_hz = np.array([0.5, 8.0, 30.0])
-    np.testing.assert_allclose(read_back.response(frequency_hz), model.response(frequency_hz))
-
-
-def test_what_a_peer_gives_back_is_judged_alike() -> None:
-    pair = next(peers.pairs(1))
-    right = peers.ours(pair)["Box-Jenkins"]
-    fit = peers.fit_box_jenkins(pair.fitted, peers.TWO_MASS).model
-    results = {
-        "linear|num": fit.B,
-        "linear|den": fit.A,
-        "own free run|fresh": pair.fresh.output,
-        "unstable|num": np.array([0.0, 1.0]),
-        "unstable|den": np.array([1.0, -1.1]),
-        "none|failed": np.array("ValueError: why"),
-    }
-    scores = read(results, pair)
-    assert scores["linear"] == right
-    assert scores["own free run"].fit_percent == pytest.approx(100.0)
-    assert scores["unstable"].fit_percent == scores["none"].fit_percent == -math.inf
-
-
-def test_the_best_median_is_told_first_and_failures_as_none() -> None:
-    table = rows(
-        {"poor": [Score(20.0), Score(30.0)], "good": [Score(90.0, 0.01, -0.02)] * 2, "lost": [Score(-math.inf)]}
-    )
-    assert [line[0] for line in table] == ["good", "poor", "lost"]
-    assert table[0][1:] == ("90.00 %", "90.00 %", "1.000 %", "2.000 %")
-    assert table[2][1:] == ("none", "none", "none", "none")
-
-
-def test_unknown_part_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["speed"], "expected buses, clean, healthy, accuracy, coverage, truth, came speed"),
+        (["--buses", "0"], "expected 1 or more"),
+        (["--jobs", "0"], "expected 1 or more"),
+    ],
+)
+def test_wrong_use_is_refused(arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
-        identification.main(["speed"])
-    assert "expected accuracy, coverage, truth, came speed" in capsys.readouterr().err
+        main(arguments)
+    assert message in capsys.readouterr().err

@@ -12,6 +12,7 @@ import pytest
 from hil.cli.main import run
 from hil.config.rig_file import read_rig
 from hil.simulator.inverter_settings import FaultAtStep, InverterFaults
+from hil.simulator.plc_device import PlcFaults
 from hil.simulator.rig_server import RigFaults
 from tests.rig.serving import served
 
@@ -45,6 +46,27 @@ def test_json(short_rig: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert m2["differences"][0]["expected"] == "0x000003E7"
     assert m2["differences"][0]["found"] == "0x00000001"
     assert "m2" in printed.err
+
+
+@pytest.mark.parametrize("options", [(), ("--json",)])
+def test_registers_of_the_plc_are_shown_and_one_that_can_not_be_is_refused(
+    short_rig: Path, options: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    with rig_with(RigFaults(plc=PlcFaults(swaps_floats=True)), short_rig) as command:
+        assert run([*command, *options]) == 3
+    printed = capsys.readouterr()
+    assert "plc" in printed.err
+    if options:
+        plc = json.loads(printed.out)["devices"][3]
+        held = {each["name"]: each for each in plc["registers"]}
+        assert (held["torque_limit"]["value"], held["torque_limit"]["unit"]) == (pytest.approx(400.0), "Nm")
+        assert held["torque_limit"]["problem"] is None
+        assert "'high_word_first'" in held["speed_limit"]["problem"]
+    else:
+        rows = {row.split()[1]: row for row in printed.out.splitlines() if "│" in row and len(row.split()) > 1}
+        assert "400" in rows["torque_limit"]
+        assert "Nm" in rows["torque_limit"]
+        assert "not plausible" in rows["speed_limit"]
 
 
 @pytest.mark.parametrize("options", [(), ("--json",)])

@@ -1,8 +1,10 @@
-"""``hil export st`` on real files: what it writes, what it refuses."""
+"""``hil export st`` and ``hil export plcopen`` on real files: what they write, what they refuse."""
 
 from __future__ import annotations
 
 import json
+import re
+from datetime import datetime
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +13,13 @@ import pytest
 from estimator.identification.identify import Settings
 from estimator.signals.record import Record
 from hil.cli.main import run
+from hil.export.filling import Precision, project
 from hil.export.plc_estimator import PlcEstimator
-from hil.export.structured_text import Precision, structured_text
+from hil.export.plcopen import Tc6, plcopen_xml
+from hil.export.structured_text import structured_text
 from hil.report.identification.document import identification_text
+
+BOTH = pytest.mark.parametrize("what", ["st", "plcopen"])
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "estimator.st"
 
@@ -39,14 +45,34 @@ def test_the_filter_and_the_settings_are_those_of_the_run(
     assert run(["export", "st", str(identified), "--run", "run_2", "--out", str(out), *option]) == 0
     L = json.loads(identified.read_text())["recordings"][1]["filter_L"]
     expected = PlcEstimator(Settings(), 0.01, np.array(L), "identification.json, recording run_2")
-    assert out.read_text(encoding="ascii") == structured_text(expected, precision)
+    assert out.read_text(encoding="ascii") == structured_text(project(expected, precision))
+
+
+@pytest.mark.parametrize(
+    ("options", "precision", "version"),
+    [
+        ((), Precision.DOUBLE, Tc6.V2_01),
+        (("--single",), Precision.SINGLE, Tc6.V2_01),
+        (("--tc6", "2.0"), Precision.DOUBLE, Tc6.V2_0),
+    ],
+)
+def test_plcopen_has_the_same_content(
+    identified: Path, tmp_path: Path, options: tuple[str, ...], precision: Precision, version: Tc6
+) -> None:
+    out = tmp_path / "estimator.xml"
+    assert run(["export", "plcopen", str(identified), "--run", "run_2", "--out", str(out), *options]) == 0
+    text = out.read_text(encoding="ascii")
+    L = json.loads(identified.read_text())["recordings"][1]["filter_L"]
+    expected = project(PlcEstimator(Settings(), 0.01, np.array(L), "identification.json, recording run_2"), precision)
+    written = datetime.fromisoformat(text.partition('creationDateTime="')[2].partition('"')[0])
+    assert text == plcopen_xml(expected, written, version)
 
 
 def test_without_a_model_the_filter_is_adapted(tmp_path: Path) -> None:
     out = tmp_path / "estimator.st"
     assert run(["export", "st", "--adaptive", "--cycle", "0.02", "--out", str(out)]) == 0
     text = out.read_text(encoding="ascii")
-    assert "ADAPT_FILTER : BOOL := TRUE;" in text
+    assert re.search(r"ADAPT_FILTER +: BOOL := TRUE;", text)
     assert "Call it once per cycle of 0.02 s" in text
 
 
@@ -58,6 +84,7 @@ def test_the_example_is_what_the_command_writes_today(tmp_path: Path) -> None:
     )
 
 
+@BOTH
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
@@ -69,19 +96,26 @@ def test_the_example_is_what_the_command_writes_today(tmp_path: Path) -> None:
         (["FILE", "--run", "run_1", "--profile", "constant_forgetting:lambda=1"], "lambda1, initial_gain"),
         (["FILE", "--run", "run_1", "--profile", "constant_forgetting:lambda1=2"], "at most 1"),
         (["FILE", "--run", "run_1", "--profile", "constant_forgetting:lambda1=1,lambda1=1"], "at most once"),
+        (["FILE", "--run", "run_1", "--cycle", "0"], "whole fraction"),
+        (["FILE", "--run", "run_1", "--cycle", "nan"], "whole fraction"),
+        (["FILE", "--run", "run_1", "--cycle", "1e-9"], "low-pass has 320000001 elements, expected fewer than 32767"),
+        (["FILE", "--run", "run_1", "--single", "--profile", "constant_gain:initial_gain=1e60"], "REAL has no number"),
+        (["FILE", "--run", "run_1", "--single", "--profile", "constant_gain:initial_gain=1e-60"], "REAL has no number"),
+        (["missing.json"], "missing.json: the file | expected identification.json | came: No such file"),
         ([], "--adaptive"),
         (["--adaptive", "--run", "run_1"], "came no file"),
     ],
 )
 def test_wrong_use_is_refused(
-    identified: Path, tmp_path: Path, arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
+    what: str, identified: Path, tmp_path: Path, arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     given = [str(identified) if word == "FILE" else word for word in arguments]
-    assert run(["export", "st", *given, "--out", str(tmp_path / "estimator.st")]) == 2
+    assert run(["export", what, *given, "--out", str(tmp_path / "estimator")]) == 2
     assert said in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
 
 
+@BOTH
 @pytest.mark.parametrize(
     ("content", "said"),
     [
@@ -93,36 +127,79 @@ def test_wrong_use_is_refused(
     ],
 )
 def test_a_wrong_file_is_refused_by_place(
-    content: bytes, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    what: str, content: bytes, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    path, out = tmp_path / "identification.json", tmp_path / "estimator.st"
+    path, out = tmp_path / "identification.json", tmp_path / "estimator"
     path.write_bytes(content)
-    assert run(["export", "st", str(path), "--out", str(out)]) == 2
+    assert run(["export", what, str(path), "--out", str(out)]) == 2
     assert said in capsys.readouterr().err
     assert not out.exists()
 
 
-def _changed(identified: Path, folder: Path, **changes: object) -> Path:
+def _changed(identified: Path, folder: Path, part: str, **changes: object) -> Path:
     document = json.loads(identified.read_text())
-    document["recordings"][0].update(changes)
+    target = document["settings"] if part == "settings" else document["recordings"][0]
+    target.update(changes)
     path = folder / "identification.json"
     path.write_text(json.dumps(document), encoding="utf-8")
     return path
 
 
+@BOTH
 @pytest.mark.parametrize(
-    ("changes", "said"),
+    ("part", "changes", "said"),
     [
-        ({"output": "position"}, "expected 'speed'"),
-        ({"filter_L": [1.0, -1.2]}, "root of magnitude 1.2"),
-        ({"filter_L": []}, "recordings.0.filter_L"),
-        ({"filter_L": ["1"]}, "recordings.0.filter_L.0"),
+        ("recording", {"output": "position"}, "expected 'speed'"),
+        ("recording", {"filter_L": [1.0, -1.2]}, "recordings.run_1.filter_L | oefo: L has a root of magnitude 1.2"),
+        ("recording", {"filter_L": [1.0, float("nan")]}, "recordings.run_1.filter_L | oefo: L is"),
+        ("recording", {"filter_L": [2.0, 0.5]}, "recordings.run_1.filter_L | oefo: L is"),
+        ("recording", {"filter_L": []}, "recordings.0.filter_L"),
+        ("recording", {"filter_L": ["1"]}, "recordings.0.filter_L.0"),
+        ("recording", {"filter_L": [1.0] + [0.0] * 40000}, "memory has 40001 elements"),
+        ("settings", {"na": -1}, "identification.json: settings | model orders: na is -1"),
+        ("settings", {"nb": 0}, "identification.json: settings | model orders: nb is 0"),
+        ("settings", {"na": "4"}, "settings.na | expected a valid integer"),
+        ("settings", {"na": 400, "nb": 400}, "gain F has 640000 elements"),
+        ("settings", {"nk": 40000}, "memory has 40004 elements"),
+        ("settings", {"sample_time_s": 0.0}, "identification.json: settings | identification: sample_time_s is 0.0"),
+        ("settings", {"high_pass_hz": 100.0}, "below 25 Hz"),
     ],
 )
 def test_a_model_that_can_not_serve_is_refused(
-    identified: Path, tmp_path: Path, changes: dict[str, object], said: str, capsys: pytest.CaptureFixture[str]
+    what: str,
+    identified: Path,
+    tmp_path: Path,
+    part: str,
+    changes: dict[str, object],
+    said: str,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    path, out = _changed(identified, tmp_path, **changes), tmp_path / "estimator.st"
-    assert run(["export", "st", str(path), "--run", "run_1", "--out", str(out)]) == 2
+    path, out = _changed(identified, tmp_path, part, **changes), tmp_path / "estimator"
+    assert run(["export", what, str(path), "--run", "run_1", "--out", str(out)]) == 2
     assert said in capsys.readouterr().err
     assert not out.exists()
+
+
+@BOTH
+def test_a_filter_that_rounding_makes_unstable_is_refused(
+    what: str, identified: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = _changed(identified, tmp_path, "recording", filter_L=[1.0, -0.99999999])
+    arguments = ["export", what, str(path), "--run", "run_1", "--out"]
+    assert run([*arguments, str(tmp_path / "double")]) == 0
+    assert run([*arguments, str(tmp_path / "single"), "--single"]) == 2
+    assert "rounded to REAL, oefo: L has a root of magnitude 1" in capsys.readouterr().err
+    assert not (tmp_path / "single").exists()
+
+
+@BOTH
+def test_other_orders_for_a_and_b_are_exported(what: str, identified: Path, tmp_path: Path) -> None:
+    path, out = _changed(identified, tmp_path, "settings", na=2, nb=3), tmp_path / "estimator"
+    assert run(["export", what, str(path), "--run", "run_1", "--out", str(out)]) == 0
+    assert "a1 .. a2, b1 .. b3" in out.read_text(encoding="ascii")
+
+
+@BOTH
+def test_a_folder_is_no_file_to_write(what: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["export", what, "--adaptive", "--out", str(tmp_path)]) == 2
+    assert f"{tmp_path}: expected the name of a file to write, came a folder" in capsys.readouterr().err

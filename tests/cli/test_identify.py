@@ -73,7 +73,7 @@ def test_writes_the_identification_of_every_recording(recordings: list[Path], tm
         assert (entry["online"]["status"], entry["online"]["reason"]) == ("estimated", "")
         assert entry["online"]["samples_used"] == 1024
         spectral = entry["spectral"]
-        assert {len(spectral[key]) for key in ("frequency_hz", "magnitude", "phase_rad", "coherence")} == {128}
+        assert {len(spectral[key]) for key in ("frequency_hz", "magnitude", "phase_rad", "coherence")} == {256}
     assert sorted(path.name for path in (tmp_path / "made" / "out").iterdir()) == ["identification.json", "report.html"]
 
 
@@ -129,7 +129,8 @@ def test_samples_and_period_can_be_chosen(recordings: list[Path], tmp_path: Path
     assert entry["online"]["sample_time_s"] == 0.01
     assert run(arguments(recordings[:1], tmp_path, "--samples", "0")) == 0
     entry = json.loads((tmp_path / "identification.json").read_text())["recordings"][0]
-    assert entry["online"]["samples_used"] == entry["batch"]["samples_used"] > 1024
+    assert entry["online"]["samples_used"] > 1024
+    assert entry["batch"]["sample_time_s"] == 0.01  # off line the recording's own, on line the paper's
 
 
 def test_each_entry_says_how_sure_it_is_and_what_speaks_against_it(recordings: list[Path], tmp_path: Path) -> None:
@@ -138,12 +139,16 @@ def test_each_entry_says_how_sure_it_is_and_what_speaks_against_it(recordings: l
     for entry in json.loads((tmp_path / "identification.json").read_text())["recordings"]:
         interval = entry["resonance_interval"]
         low, high = interval["frequency_hz"]["ci95"]
-        assert low < entry["batch"]["resonance"]["frequency_hz"] < high
+        best = entry["best"]
+        assert low < best["frequency_hz"] < high
+        assert (best["estimator"], best["verdict"]) == ("box_jenkins", "model_good")
+        assert best["damping_ci95"][0] < best["damping"] < best["damping_ci95"][1]
+        assert "Resonance at 8.2" in best["statement"]
         assert interval["frequency_hz"]["value"] == pytest.approx(frequency_hz, rel=0.01)
         assert interval["damping"]["std"] < 0.1 * damping
         assert len(entry["third_order"]["poles"]) == 3
         validation = entry["validation"]
-        assert validation["own"]["fit_percent"] == pytest.approx(entry["batch"]["fit_percent"], abs=1.0)
+        assert validation["own"]["fit_percent"] == pytest.approx(entry["batch"]["fit_percent"], abs=2.0)
         assert [unseen["name"] for unseen in validation["unseen"]] == [
             n for n in ("run_1", "run_2") if n != entry["name"]
         ]

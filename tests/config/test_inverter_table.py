@@ -35,6 +35,13 @@ def test_what_the_rig_file_gives_reaches_the_driver(tmp_path: Path) -> None:
     assert rig.inverters.m2.option_codes.by_object == {}
 
 
+def test_time_outs_are_each_drive_s_own(tmp_path: Path) -> None:
+    rig = read_rig(with_keys(tmp_path, "sdo_timeout_s = 1.5", "mode_timeout_s = 8.0", "state_timeout_s = 4.0"))
+    m1, m2 = inverter_settings("m1", rig.inverters.m1), inverter_settings("m2", rig.inverters.m2)
+    assert (m1.sdo_timeout_s, m1.mode_timeout_s, m1.state_timeout_s) == (1.5, 8.0, 4.0)
+    assert (m2.sdo_timeout_s, m2.mode_timeout_s, m2.state_timeout_s) == (0.5, 2.0, 2.0)
+
+
 @pytest.mark.parametrize(
     ("lines", "tables", "problem"),
     [
@@ -46,6 +53,9 @@ def test_what_the_rig_file_gives_reaches_the_driver(tmp_path: Path) -> None:
         (("rpdo_deadline_ms = 0.1",), "", "m1.rpdo_deadline_ms | expected a valid integer"),
         (("rpdo_deadline_ms = 15",), "", "m1.rpdo_deadline_ms | expected at least two periods (20), or one RPDO"),
         (("torque_slope_nm_per_s = 0.0",), "", "m1.torque_slope_nm_per_s | expected greater"),
+        (("sdo_timeout_s = 0.0",), "", "m1.sdo_timeout_s | expected greater"),
+        (("mode_timeout_s = 3600.0",), "", "m1.mode_timeout_s | expected less"),
+        (('state_timeout_s = "2 s"',), "", "m1.state_timeout_s | expected a valid number"),
     ],
 )
 def test_what_can_not_be_is_refused_by_its_key(

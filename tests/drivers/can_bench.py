@@ -26,6 +26,7 @@ M1 = InverterSettings(
     torque_limit_nm=400.0,
     heartbeat_ms=10,
     sdo_timeout_s=2.0,
+    mode_timeout_s=0.2,
     state_timeout_s=0.2,
 )
 """Patient, for a loaded machine is slow and not at fault."""

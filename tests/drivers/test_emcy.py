@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from drivers.canopen.emcy import Emergency, cause_of, decode
+from drivers.canopen.emcy import Emergency, decode
+from drivers.canopen.emcy_codes import CAUSES, cause_of
 from drivers.errors import ProtocolViolation
 
 
@@ -18,16 +19,35 @@ def test_frame_survives_encoding_and_decoding() -> None:
     ("code", "cause"),
     [
         (0x2310, "continuous over-current, motor side"),
-        (0x2311, "continuous over-current"),
+        (0x2311, "continuous over-current, motor side, no. 1"),
+        (0x231A, "continuous over-current, motor side"),
+        (0x23AA, "current, device output side"),
+        (0x5201, "control hardware"),
+        (0x7121, "motor blocked"),
+        (0x7180, "power stage"),
+        (0x7305, "incremental sensor 1 fault"),
+        (0x7320, "position sensor"),
+        (0x73AA, "sensor"),
+        (0x7ABC, "additional modules"),
+        (0x8480, "velocity controller"),
+        (0x8611, "following error"),
+        (0x8612, "reference limit"),
         (0x2FFF, "current"),
         (0x8130, "life guard or heartbeat error"),
         (0x4310, "excess temperature of the drive"),
-        (0xFF01, "device specific"),
+        (0xFF01, "device specific: see the maker's manual"),
         (0xB000, "a code outside CiA 301 and CiA 402"),
     ],
 )
 def test_the_longest_known_code_names_the_cause(code: int, cause: str) -> None:
     assert cause_of(code) == cause
+
+
+def test_every_code_of_the_tables_is_in_the_range_of_a_class() -> None:
+    """So that a code nobody has listed is still named by its class."""
+    for code in CAUSES:
+        assert code & 0xF000 in CAUSES, f"0x{code:04X}"
+        assert cause_of(code) == CAUSES[code]
 
 
 def test_message_shows_manufacturer_data_only_where_there_is_any() -> None:

@@ -116,10 +116,25 @@ def test_toggle_bit_of_node_guarding_is_no_state() -> None:
 def test_awaited_state_that_does_not_come_names_the_one_seen() -> None:
     monitor = node_monitor()
     with pytest.raises(DeviceTimeout, match="reports nothing so far after 0 s, expected OPERATIONAL"):
-        monitor.await_state(NmtState.OPERATIONAL, 0.0)
+        monitor.await_state(NmtState.OPERATIONAL, 0.0, ask=lambda: None)
     monitor.on_heartbeat(b"\x7f", 0)
     with pytest.raises(DeviceTimeout, match="reports PRE-OPERATIONAL after 0 s, expected OPERATIONAL"):
-        monitor.await_state(NmtState.OPERATIONAL, 0.0)
+        monitor.await_state(NmtState.OPERATIONAL, 0.0, ask=lambda: None)
+
+
+def test_state_is_asked_for_again_until_it_is_reported() -> None:
+    """A heartbeat from before the first time of asking counts for nothing."""
+    monitor = node_monitor()
+    monitor.on_heartbeat(b"\x05", 0)
+    asked = []
+
+    def ask() -> None:
+        asked.append(1)
+        if len(asked) > 1:
+            monitor.on_heartbeat(b"\x05" if len(asked) > 2 else b"\x7f", 0)
+
+    monitor.await_state(NmtState.OPERATIONAL, 30.0, ask)
+    assert len(asked) == 3
 
 
 def test_the_first_emergency_stays_until_it_is_reset() -> None:

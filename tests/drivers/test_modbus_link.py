@@ -79,18 +79,55 @@ def test_a_wrong_answer_is_refused(pdu: bytes, expected: str) -> None:
         read_from(lambda request: frame(request, pdu))
 
 
-@pytest.mark.parametrize(
-    "answer",
-    [
-        lambda request: b"",
-        lambda request: frame(request, b"\x03\x04\x12\x34\xab\xcd", unit=9),
-        lambda request: frame(request, b"\x03\x04\x12\x34\xab\xcd", transaction=4711),
-    ],
-    ids=["silent", "another unit", "another transaction"],
-)
-def test_no_answer_to_this_request_is_a_timeout(answer: Answer) -> None:
+def test_no_answer_is_a_timeout() -> None:
     with pytest.raises(DeviceTimeout, match=r"expected an answer within 0\.1 s, none came"):
+        read_from(lambda request: b"")
+
+
+WELL = b"\x03\x04\x12\x34\xab\xcd"
+
+
+@pytest.mark.parametrize(
+    ("answer", "came"),
+    [
+        (lambda request: frame(request, WELL, unit=9), "transaction id 1, unit id 9"),
+        (lambda request: frame(request, WELL, transaction=4711), "transaction id 4711, unit id 1"),
+        (lambda request: frame(request, WELL, transaction=0), "transaction id 0, unit id 1"),
+        (lambda request: frame(request, b"\x83\x02", unit=255), "transaction id 1, unit id 255"),
+        (lambda request: 2 * frame(request, WELL, transaction=4711), "transaction id 4711, unit id 1"),
+    ],
+)
+def test_an_answer_with_other_identifiers_is_told_as_such(answer: Answer, came: str) -> None:
+    with pytest.raises(ProtocolViolation, match=rf"transaction id 1, unit id 1, came {came}"):
         read_from(answer)
+
+
+def test_an_answer_with_other_identifiers_before_the_right_one_does_no_harm() -> None:
+    both = lambda request: frame(request, WELL, unit=9) + frame(request, WELL)  # noqa: E731
+    assert read_from(both) == (0x1234, 0xABCD)
+
+
+def test_a_late_answer_is_not_taken_for_that_of_the_next_request_and_is_no_wrong_one() -> None:
+    """The first request stays unanswered; its answer comes in the place of the second's."""
+    requests: list[bytes] = []
+
+    def answer(request: bytes) -> bytes:
+        requests.append(request)
+        return b"" if len(requests) == 1 else frame(requests[0], WELL)
+
+    async def run() -> None:
+        async with peer(answer) as port:
+            link = ModbusLink("127.0.0.1", port, 1, TIMEOUT_S)
+            await link.open()
+            try:
+                with pytest.raises(DeviceTimeout, match="none came"):
+                    await link.read(HOLDING, 5, 2)
+                with pytest.raises(DeviceTimeout, match="one to an earlier request came, too late"):
+                    await link.read(HOLDING, 5, 2)
+            finally:
+                link.close()
+
+    asyncio.run(run())
 
 
 @pytest.mark.parametrize(

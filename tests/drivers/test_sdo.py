@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from threading import Timer
 
 import pytest
 
@@ -12,7 +13,7 @@ from drivers.canopen.sdo import SdoChannel
 from drivers.canopen.sdo_node import SdoNode
 from drivers.datasheet.file import EdsFile
 from drivers.errors import BusDown, CommandRefused, ConfigMismatch, DeviceTimeout, ProtocolViolation
-from tests.drivers.can_bench import new_channel, virtual_bus
+from tests.drivers.can_bench import new_channel
 
 NODE_ID = 5
 
@@ -41,7 +42,7 @@ class Pair:
 @pytest.fixture
 def pair() -> Iterator[Pair]:
     channel = new_channel()
-    with CanLink(virtual_bus(channel)) as device, CanLink(virtual_bus(channel)) as link:
+    with CanLink.open(f"virtual:{channel}") as device, CanLink.open(f"virtual:{channel}") as link:
         node = ScriptedNode(device)
         device.subscribe(0x600 + NODE_ID, node.on_request)
         eds = EdsFile(None, NODE_ID)
@@ -110,8 +111,121 @@ def test_late_answers_to_other_requests_are_left_alone(pair: Pair) -> None:
     pair.node.answers = lambda request: [late, late_abort]
     with pytest.raises(DeviceTimeout, match="0x6040:00"):
         pair.sdo.download(0x6040, 0, 0)
-    pair.node.answers = lambda request: [late, uploaded(bytes.fromhex("40 77 60 00"), b"\1\1"), acknowledged(request)]
+    pair.node.answers = lambda request: [
+        late,
+        uploaded(bytes.fromhex("40 77 60 00"), b"\1\1"),
+        uploaded(request, bytes(4)) if request[0] == 0x40 else acknowledged(request),
+    ]
     pair.sdo.download(0x6040, 0, 0)
+
+
+@dataclass
+class LateOnce:
+    """Keeps its answer to the first of the requests for one object, and lets it go later.
+
+    ``release`` says when: ``before`` its answer to the probe, as a node that works its requests off in their order;
+    ``behind`` it, as a gateway with several queues; ``never``, for a frame that was lost.
+    """
+
+    index: bytes
+    release: str
+    values: list[bytes]
+    kept: list[bytes] = field(default_factory=list)
+    first: bool = True
+
+    def __call__(self, request: bytes) -> list[bytes]:
+        if request[0] == 0x80:
+            return []
+        if request[1:3] != self.index:
+            answer, kept = uploaded(request, bytes(4)), self.kept
+            self.kept = []
+            return {"before": [*kept, answer], "behind": [answer, *kept], "never": [answer]}[self.release]
+        answer = uploaded(request, self.values.pop(0)) if request[0] == 0x40 else acknowledged(request)
+        if not self.first:
+            return [answer]
+        self.first, self.kept = False, [answer]
+        return []
+
+
+@pytest.mark.parametrize("release", ["before", "behind", "never"])
+def test_late_answer_is_never_taken_for_that_of_the_same_object_asked_for_again(pair: Pair, release: str) -> None:
+    pair.node.answers = LateOnce(b"\x41\x60", release, [b"\x27\x00", b"\x08\x00", b"\x40\x00"])
+    with pytest.raises(DeviceTimeout):
+        pair.sdo.upload(0x6041)
+    assert pair.sdo.upload(0x6041) == 0x0008
+    assert pair.sdo.upload(0x6041) == 0x0040
+
+
+def test_answer_that_comes_in_the_time_out_after_the_probe_is_left_alone(pair: Pair) -> None:
+    """As `LateOnce` behind the probe, from another thread: the next request for the object waits for it."""
+    late = uploaded(bytes.fromhex("40 41 60 00"), b"\x27\x00")
+    pair.node.answers = lambda request: []
+    with pytest.raises(DeviceTimeout):
+        pair.sdo.upload(0x6041)
+    pair.sdo._client.RESPONSE_TIMEOUT = 30.0
+    sender = Timer(0.05, lambda: pair.node.link.send(0x580 + NODE_ID, late))
+
+    def answer(request: bytes) -> list[bytes]:
+        if request[1:3] == b"\x41\x60":
+            return [uploaded(request, b"\x08\x00")]
+        sender.start()
+        return [uploaded(request, bytes(4))]
+
+    pair.node.answers = answer
+    assert pair.sdo.upload(0x6041) == 0x0008
+    sender.join()
+
+
+@pytest.mark.parametrize("release", ["before", "behind", "never"])
+def test_late_acknowledgement_does_not_confirm_the_same_object_written_again(pair: Pair, release: str) -> None:
+    node = LateOnce(b"\x40\x60", release, [])
+    pair.node.answers = node
+    with pytest.raises(DeviceTimeout):
+        pair.sdo.download(0x6040, 0, 6)
+    pair.node.answers = lambda request: node(request) if request[1:3] != b"\x40\x60" else []
+    with pytest.raises(DeviceTimeout):
+        pair.sdo.download(0x6040, 0, 7)
+
+
+def test_request_to_a_node_that_says_nothing_goes_out_all_the_same(pair: Pair) -> None:
+    """It may be the one that takes the torque away: a node that can't be heard may hear."""
+    for value in (1, 2, 3, 4, 5, 6):
+        with pytest.raises(DeviceTimeout, match="0x6040:00"):
+            pair.sdo.download(0x6040, 0, value)
+    written = [request[4] for request in pair.node.requests if request[:3] == b"\x2b\x40\x60"]
+    assert written == [1, 2, 3, 4, 5, 6]
+
+
+def test_node_that_answers_again_is_believed_again(pair: Pair) -> None:
+    for _ in range(6):
+        with pytest.raises(DeviceTimeout):
+            pair.sdo.upload(0x6041)
+    pair.node.answers = lambda request: [uploaded(request, b"\x08\x00" if request[1] == 0x41 else bytes(4))]
+    assert pair.sdo.upload(0x6041) == 8
+
+
+def test_transfer_given_up_names_its_object(pair: Pair) -> None:
+    """CiA 301, 7.2.4.3.17: an abort carries the multiplexer of what it ends."""
+    with pytest.raises(DeviceTimeout):
+        pair.sdo.upload(0x1018, 1)
+    assert pair.node.requests[-1] == bytes.fromhex("80 18 10 01 00 00 04 05")
+
+
+@pytest.mark.parametrize("write", [False, True])
+def test_abort_that_names_no_object_is_an_abort(pair: Pair, write: bool) -> None:
+    pair.node.answers = lambda request: [bytes.fromhex("80 00 00 00 22 00 00 08")]
+    with pytest.raises(ConfigMismatch, match=r"object 0x6071:00 refused .*0x08000022"):
+        pair.sdo.download(0x6071, 0, 0) if write else pair.sdo.upload(0x6071)
+
+
+def test_late_segment_is_no_answer_to_what_is_asked_next(pair: Pair) -> None:
+    good = in_segments(b"Traction inverter")
+    pair.node.answers = lambda request: good(request) if request[0] >> 5 == 2 else []
+    with pytest.raises(DeviceTimeout, match="0x1008:00"):
+        pair.sdo.upload_text(0x1008)
+    late = b"\x00Tractio"
+    pair.node.answers = lambda request: [late, uploaded(request, b"\x08\x00" if request[1] == 0x41 else bytes(4))]
+    assert pair.sdo.upload(0x6041) == 8
 
 
 def test_answer_of_another_length_is_a_violation_at_the_next_sync(pair: Pair) -> None:

@@ -10,8 +10,9 @@ import numpy as np
 
 from estimator.identification.online.recursive import Trajectory
 from estimator.signals.record import BoolArray, FloatArray
+from hil.export.filling import Precision, project
 from hil.export.plc_estimator import PlcEstimator
-from hil.export.structured_text import Precision, structured_text
+from hil.export.structured_text import structured_text
 from tests.export.iec.machine import Machine
 
 STATUS = {"unestimated": 0, "estimated": 1, "invalid": 2}
@@ -51,11 +52,16 @@ def on_host(estimator: PlcEstimator, cycles: Cycles) -> Trajectory:
     return estimator.oefo().run(kept.u, kept.y, kept.okay)
 
 
+def exported(estimator: PlcEstimator, precision: Precision = Precision.DOUBLE) -> str:
+    """Return the Structured Text of an estimator."""
+    return structured_text(project(estimator, precision))
+
+
 def on_plc(
     estimator: PlcEstimator, cycles: Cycles, folder: Path, precision: Precision = Precision.DOUBLE, reset_at: int = -1
 ) -> Kept:
     """Export and execute."""
-    return execute(structured_text(estimator, precision), cycles, folder, reset_at)
+    return execute(exported(estimator, precision), cycles, folder, reset_at)
 
 
 def execute(text: str, cycles: Cycles, folder: Path, reset_at: int = -1) -> Kept:

@@ -12,12 +12,14 @@ from estimator.identification.identify import Settings
 from estimator.identification.linear_model import Orders
 from estimator.identification.online.adaptation import Adaptation
 from estimator.identification.online.chain import OnlineChain
+from estimator.identification.online.recursive import Status
 from estimator.signals.record import FloatArray
+from hil.export.filling import Precision
 from hil.export.plc_estimator import PlcEstimator
 from hil.export.profiles import PROFILES, profile
-from hil.export.structured_text import Precision, structured_text
 from tests.export.drives import bad_drive, clean_drive, still_drive
-from tests.export.plc_runs import Cycles, assert_equal_bits, execute_oefo, on_host, on_plc, summed
+from tests.export.iec.machine import Machine
+from tests.export.plc_runs import Cycles, assert_equal_bits, execute_oefo, exported, on_host, on_plc, summed
 
 RESONANCE = np.poly([0.85 * np.exp(1.0j), 0.85 * np.exp(-1.0j)]).real
 """A filter near the bus's own: 8 Hz at 20 ms is 1.0 rad per sample."""
@@ -77,7 +79,7 @@ def test_a_trace_that_is_reached_and_held(tmp_path: Path) -> None:
 def test_the_estimator_alone_without_the_decimator_to_hold_bad_values(L: FloatArray | None, tmp_path: Path) -> None:
     estimator = PlcEstimator(Settings(adaptation=profile(TRACE_REACHED)), L=L)
     u, y, okay = summed(bad_drive())
-    plc = execute_oefo(structured_text(estimator), u, y, okay, tmp_path)
+    plc = execute_oefo(exported(estimator), u, y, okay, tmp_path)
     assert_equal_bits(plc, estimator.oefo().run(u, y, okay))
 
 
@@ -88,6 +90,17 @@ def test_it_does_what_the_chain_of_a_run_does(tmp_path: Path) -> None:
     times = 0.01 * np.arange(drive.okay.shape[0])
     estimates = chain.run_block(times, *summed(drive)).estimates
     assert_equal_bits(on_plc(estimator, drive, tmp_path), estimates)
+
+
+def test_the_example_program_keeps_the_last_estimate_that_may_be_used(tmp_path: Path) -> None:
+    drive, estimator = clean_drive(), PlcEstimator(L=RESONANCE)
+    machine = Machine(exported(estimator), "PRG_HilExample", tmp_path)
+    for m1, m2, speed, okay in zip(*vars(drive).values(), strict=True):
+        out = machine(torqueM1=m1, torqueM2=m2, speed=speed, fresh=bool(okay), seriesMode=True, clutchOpen=True)
+    host = on_host(estimator, drive)
+    estimated = [k for k in range(len(host)) if host[k].status is Status.ESTIMATED]
+    assert out.estimates == len(estimated) > 100
+    assert [*out.theta] == host.theta[estimated[-1]].tolist()
 
 
 def test_a_reset_forgets_everything(tmp_path: Path) -> None:

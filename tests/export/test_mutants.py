@@ -12,10 +12,9 @@ from estimator.identification.identify import Settings
 from estimator.identification.online.recursive import Trajectory
 from hil.export.plc_estimator import PlcEstimator
 from hil.export.profiles import profile
-from hil.export.structured_text import structured_text
 from tests.export.drives import bad_drive
 from tests.export.mutants import MUTANTS
-from tests.export.plc_runs import Kept, assert_equal_bits, execute, execute_oefo, on_host, summed
+from tests.export.plc_runs import Kept, assert_equal_bits, execute, execute_oefo, exported, on_host, summed
 
 SETTINGS = Settings(adaptation=profile("decreasing_then_constant_trace:trace=1.0"))
 
@@ -30,7 +29,7 @@ def both_sides(before: str, after: str, folder: Path) -> Iterator[tuple[Kept, Tr
     drive = bad_drive()
     for L in (np.array([1.0, -0.9, 0.72]), None):
         estimator = PlcEstimator(SETTINGS, L=L)
-        text = structured_text(estimator)
+        text = exported(estimator)
         assert before in text
         wrong = text.replace(before, after)
         yield execute(wrong, drive, folder), on_host(estimator, drive)

@@ -14,12 +14,14 @@ from estimator.identification.linear_model import Orders
 from estimator.identification.online import regression_kernel
 from estimator.signals import decimate_kernel
 from estimator.signals.record import FloatArray
+from hil.export.filling import POUS, Precision, project
 from hil.export.plc_estimator import PlcEstimator
-from hil.export.structured_text import BLOCKS, Precision, structured_text
+from hil.export.pou import SectionKind
+from hil.export.pou_reader import read_pou, read_types
 from tests.export.iec.parser import Parser
 from tests.export.iec.to_c import to_c
-from tests.export.iec.tokens import NotStructuredText
 from tests.export.iec.tree import REALS
+from tests.export.plc_runs import exported
 
 L = np.array([1.0, -0.9, 0.72])
 
@@ -29,7 +31,7 @@ SLOW = pytest.mark.campaign
 
 @pytest.mark.parametrize("precision", Precision)
 def test_it_is_plain_and_narrow(precision: Precision) -> None:
-    text = structured_text(PlcEstimator(L=L), precision)
+    text = exported(PlcEstimator(L=L), precision)
     assert text.isascii()
     assert "$" not in text
     assert "\t" not in text
@@ -38,20 +40,28 @@ def test_it_is_plain_and_narrow(precision: Precision) -> None:
 
 @pytest.mark.parametrize("precision", Precision)
 def test_it_has_one_real_type_alone(precision: Precision) -> None:
-    blocks = Parser(structured_text(PlcEstimator(L=L), precision)).blocks()
-    assert list(blocks) == list(BLOCKS)
-    types = {variable.type for block in blocks.values() for variable in block.variables.values()}
+    blocks = Parser(exported(PlcEstimator(L=L), precision)).blocks()
+    assert list(blocks) == list(POUS)
+    types = {variable.shape.element for block in blocks.values() for variable in block.variables.values()}
     assert types & set(REALS) == {precision.value}
 
 
-@pytest.mark.parametrize("name", BLOCKS)
-def test_every_input_and_output_has_a_comment(name: str) -> None:
-    text = structured_text(PlcEstimator(L=L))
-    block = text.partition(f"FUNCTION_BLOCK {name}\n")[2].partition("END_FUNCTION_BLOCK")[0]
-    interface = re.findall(r"VAR_(?:IN|OUT)PUT\n(.*?)END_VAR", block, re.S)
-    lines = [line for part in interface for line in part.splitlines() if ":" in line and ";" in line]
-    assert len(lines) > 5
-    assert [line for line in lines if "(*" not in line] == []
+def test_every_input_and_output_has_a_comment() -> None:
+    parameters = [
+        variable
+        for pou in project(PlcEstimator(L=L)).pous
+        for section in pou.sections
+        if section.kind is not SectionKind.LOCAL
+        for variable in section.variables
+    ]
+    assert len(parameters) > 40
+    assert [variable.name for variable in parameters if not variable.comment] == []
+
+
+def test_what_is_handed_over_has_a_named_type() -> None:
+    for pou in project(PlcEstimator(L=L)).pous:
+        for section in pou.sections:
+            assert section.kind is SectionKind.LOCAL or all(isinstance(each.type, str) for each in section.variables)
 
 
 @pytest.mark.parametrize(
@@ -67,10 +77,10 @@ def test_an_independent_parser_reads_the_same_program(precision: Precision, filt
         pytest.skip("blark, a parser of IEC 61131-3, is not installed: pip install blark==0.8.3")
     from blark.parse import parse_source_code
 
-    text = structured_text(PlcEstimator(L=filter_L), precision)
+    text = exported(PlcEstimator(L=filter_L), precision)
     found = parse_source_code(text)
     assert found.exception is None
-    printed_from_its_tree = str(found.transform())
+    printed_from_its_tree = re.sub(r"\b(END_IF|END_FOR)$", r"\1;", str(found.transform()), flags=re.M)  # it prints none
     assert to_c(Parser(printed_from_its_tree).blocks()) == to_c(Parser(text).blocks())
 
 
@@ -97,8 +107,8 @@ def test_decimator_and_estimator_agree_on_what_is_no_measurement() -> None:
 
 
 def test_the_origin_can_not_end_the_comment() -> None:
-    blocks = Parser(structured_text(PlcEstimator(L=L, origin="a *) b (* c é"))).blocks()
-    assert list(blocks) == list(BLOCKS)
+    blocks = Parser(exported(PlcEstimator(L=L, origin="a *) b (* c é"))).blocks()
+    assert list(blocks) == list(POUS)
 
 
 @pytest.mark.parametrize(
@@ -108,7 +118,7 @@ def test_the_origin_can_not_end_the_comment() -> None:
         (0.0, Settings(), "sample_time_s|expected"),
         (-0.01, Settings(), "expected"),
         (float("nan"), Settings(), "expected"),
-        (0.000005, Settings(), "at most 32767"),
+        (0.000005, Settings(), "fewer than 32767"),
         (0.01, Settings(high_pass_hz=30.0), "Nyquist"),
     ],
 )
@@ -122,25 +132,38 @@ def test_a_filter_that_could_not_filter_is_refused() -> None:
         PlcEstimator(L=np.array([1.0, -1.2]))
 
 
+def test_orders_are_in_the_head_for_the_reader() -> None:
+    text = exported(PlcEstimator(Settings(orders=Orders(2, 3, 4)), L=L))
+    assert "y(t) = -a1 y(t-1) - .. - a2 y(t-2) + b1 u(t-4) + .. + b3 u(t-6)" in text
+
+
 @pytest.mark.parametrize(
-    "fault",
+    "text",
     [
-        "FUNCTION_BLOCK F VAR a : INT; A : INT; END_VAR END_FUNCTION_BLOCK",
-        "FUNCTION_BLOCK F VAR r : INT; END_VAR END_FUNCTION_BLOCK",
-        "FUNCTION_BLOCK F VAR a : INT; END_VAR a := 1.0; END_FUNCTION_BLOCK",
-        "FUNCTION_BLOCK F VAR a : INT; b : LREAL; END_VAR b := b * a; END_FUNCTION_BLOCK",
-        "FUNCTION_BLOCK F VAR a : INT; END_VAR b := 1; END_FUNCTION_BLOCK",
-        "FUNCTION_BLOCK F VAR CONSTANT a : INT := 1; END_VAR a := 1; END_FUNCTION_BLOCK",
-        "FUNCTION_BLOCK F VAR a : INT; END_VAR FOR a := 1 TO 2 DO a := 1; END_FOR END_FUNCTION_BLOCK",
-        "FUNCTION_BLOCK F VAR a : INT; END_VAR IF a THEN a := 1; END_IF END_FUNCTION_BLOCK",
-        "FUNCTION_BLOCK F (* one (* two *) three *) END_FUNCTION_BLOCK",
+        "TYPE\n    T_A : INT;    (* no array *)\nEND_TYPE\n",
+        "TYPE\n    T_A : ARRAY[1..2] OF INT;\nEND_TYPE\n",  # no comment
+        "TYPE\n    T_A : ARRAY[1..2] OF INT;    (* a *)\nEND_TYPE\nTYPE\n",
     ],
 )
-def test_the_reader_of_these_tests_refuses_what_a_plc_refuses(fault: str) -> None:
-    with pytest.raises(NotStructuredText):
-        Parser(fault).blocks()
+def test_types_that_are_laid_out_otherwise_are_refused(text: str) -> None:
+    with pytest.raises(ValueError, match=r"expected ARRAY|not laid out"):
+        read_types(text)
 
 
-def test_orders_are_in_the_head_for_the_reader() -> None:
-    text = structured_text(PlcEstimator(Settings(orders=Orders(2, 3, 4)), L=L))
-    assert "y(t) = -a1 y(t-1) - .. - a2 y(t-2) + b1 u(t-4) + .. + b3 u(t-6)" in text
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        ("(* what it does *)\n", ""),
+        ("    a : INT;    (* a *)\n", "    a : INT    (* a *)\n"),
+        ("    a : INT;", "    a, b : INT;"),
+        ("    a : INT;    (* a *)\n", "    (* alone *)\n    a : INT;\n"),
+        ("END_VAR\n", "END_VAR;\n"),
+        ("END_PROGRAM\n", "END_PROGRAM\nEND_PROGRAM\n"),
+    ],
+)
+def test_a_pou_that_is_laid_out_otherwise_is_refused(before: str, after: str) -> None:
+    right = "(* what it does *)\nPROGRAM PRG\nVAR\n    a : INT;    (* a *)\nEND_VAR\n\na := 1;\nEND_PROGRAM\n"
+    assert read_pou(right).body == "a := 1;"
+    assert before in right
+    with pytest.raises(ValueError, match="not laid out"):
+        read_pou(right.replace(before, after))

@@ -28,6 +28,13 @@ def test_reasons_are_counted_the_most_frequent_first() -> None:
     assert quality.bad_share == pytest.approx(0.6)
 
 
+def test_a_limit_of_the_drive_is_counted_and_takes_nothing_from_the_sample() -> None:
+    quality = seen(GOOD, SampleFlag.M1_LIMITED, SampleFlag.M1_LIMITED | M2)
+    assert (quality.samples, quality.good) == (3, 2)
+    assert quality.reasons == "m1 in its internal limit 2x, m2 silent 1x"
+    assert seen(GOOD, SampleFlag.M2_LIMITED).standing_s == 0.0
+
+
 def test_cycles_before_the_first_answer_are_no_fault() -> None:
     quality = seen(M1 | M2, M1 | M2, M2, GOOD, GOOD)
     assert (quality.samples, quality.good, quality.against) == (2, 2, ())

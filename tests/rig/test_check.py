@@ -5,8 +5,12 @@ from __future__ import annotations
 import pytest
 
 from drivers.inverter.cia402 import PowerState
+from drivers.plc.register_map import load_register_map
+from drivers.resources import data_file
 from hil.rig.check import Verdict, check_rig
+from hil.simulator.fault_spec import rig_faults
 from hil.simulator.inverter_settings import FaultAtStep, InverterFaults
+from hil.simulator.plc_device import PlcFaults
 from hil.simulator.rig_server import RigFaults
 from tests.rig.observer import power_state
 from tests.rig.serving import changed, served
@@ -53,6 +57,34 @@ def test_missing_plc() -> None:
     with served() as (_, rig):
         findings = check_rig(changed(rig, {"plc": {"port": 9}}))
     assert [finding.verdict for finding in findings] == [*[Verdict.AGREES] * 3, Verdict.FAILED]
+
+
+def test_registers_of_the_plc_are_shown_in_their_units() -> None:
+    with served() as (_, rig):
+        plc = check_rig(rig)[-1]
+    held = {each.name: (each.value, each.unit) for each in plc.registers}
+    assert held["speed_limit"] == (320.0, "rad/s")
+    assert held["torque_limit"] == (pytest.approx(400.0), "Nm")
+    assert held["drive_mode"] == ("series", "")
+    assert list(held) == list(load_register_map(data_file("plc.toml")).registers)
+
+
+def test_floats_in_the_other_word_order_are_refused_with_what_they_would_be() -> None:
+    with served(faults=RigFaults(plc=PlcFaults(swaps_floats=True))) as (_, rig):
+        plc = check_rig(rig)[-1]
+    assert plc.verdict is Verdict.DIFFERS
+    [difference] = plc.differences
+    assert difference.what == "speed_limit, input_register 6"
+    assert difference.expected == "0, or 0.1 to 10000 rad/s"
+    assert "With word_order = 'high_word_first' in the register map it would be 320 rad/s" in difference.found
+
+
+@pytest.mark.parametrize("fault", ["wrong_unit", "wrong_transaction"])
+def test_plc_that_answers_with_other_identifiers_is_told_as_such(fault: str) -> None:
+    with served(faults=rig_faults([f"plc.{fault}@0"], 0.01)) as (_, rig):
+        plc = check_rig(rig)[-1]
+    assert plc.verdict is Verdict.FAILED
+    assert "expected an answer with transaction id 1, unit id 1, came transaction id" in plc.notes[0]
 
 
 def test_drive_in_fault_is_a_note_not_a_difference() -> None:

@@ -50,6 +50,7 @@ def run_with(*texts: str, patience_s: float = 0.1) -> tuple[RunSummary, Samples]
         ("m1.emcy@S=0x4210", DeviceFault, "inverter m1.*EMCY 0x4210 excess temperature of the device"),
         ("m1.brown_out@S", DeviceFault, "inverter m1.*EMCY 0x3220 DC link under-voltage"),
         ("m2.fault@S=0x7303", DeviceFault, "inverter m2.*EMCY 0x7303 resolver 1 fault"),
+        ("m2.ignores_target@S", DeviceFault, "inverter m2.*statusword 0x6041 bit 12 is 0.*ignores the target torque"),
         ("m1.stale_pdo@S", DeviceFault, r"inverter m1.*feedback stands still.*through 10 steps of the command"),
         ("bus.corrupt@S=1:0x181", ProtocolViolation, "inverter m1.*frame of 7 bytes, expected 8"),
         ("bus.corrupt@S=1:0x202", DeviceFault, "inverter m2.*EMCY 0x8210 PDO not processed: wrong length"),
@@ -138,15 +139,18 @@ def test_frames_that_come_late_within_the_patience_change_nothing(fault: str) ->
 
 
 @pytest.mark.parametrize(
-    ("fault", "changes"),
+    ("fault", "changes", "remark"),
     [
-        ("m1.coarse_torque=20", "torque_m1_nm"),
-        ("m2.weak_cooling=20", "torque_m2_nm"),
-        ("m1.field_weakening=1", "torque_m1_nm"),
-        ("m1.clock_drift=5000", "speed_rad_s"),
+        ("m1.coarse_torque=20", "torque_m1_nm", SampleFlag.GOOD),
+        ("m2.weak_cooling=20", "torque_m2_nm", SampleFlag.M2_LIMITED),
+        ("m1.field_weakening=1", "torque_m1_nm", SampleFlag.M1_LIMITED),
+        ("m1.clock_drift=5000", "speed_rad_s", SampleFlag.GOOD),
     ],
 )
-def test_limits_of_a_drive_are_seen_in_what_it_tells(fault: str, changes: str) -> None:
+def test_limits_of_a_drive_are_seen_in_what_it_tells(fault: str, changes: str, remark: SampleFlag) -> None:
+    """A sample in which a limit acts is flagged, and counts: its torque was read."""
     clean, limited = (run_with(*texts)[1] for texts in ([], [fault]))
     assert limited.column(changes) != clean.column(changes)
-    assert {row.flags for row in limited.rows} == {SampleFlag.GOOD}
+    assert {row.flags for row in limited.rows} <= {SampleFlag.GOOD, remark}
+    assert remark in {row.flags for row in limited.rows}
+    assert all(row.counts for row in limited.rows)

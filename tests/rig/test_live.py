@@ -14,11 +14,12 @@ from hil.recording import RecordingWriter, read_record
 from hil.rig.build import open_devices
 from hil.rig.experiments.base import Phase
 from hil.rig.live import LiveEstimate, tracking_chain, tracking_settings
-from hil.rig.live_replay import Pace, is_trace, play_record, play_samples
+from hil.rig.live_replay import Pace, play_record, play_samples
 from hil.rig.plan import plan_run
 from hil.rig.sample import Sample, SampleFlag
 from hil.rig.session import run_plan
 from hil.rig.stop import StopRequest
+from hil.rig.trace import is_trace
 from tests.estimator.identification.tracking.drives import drives
 from tests.rig.observer import assert_disarmed
 from tests.rig.serving import Samples, fast, served
@@ -135,4 +136,5 @@ def test_period_that_does_not_fit_is_refused() -> None:
 
 def test_traces_are_told_by_their_suffix() -> None:
     assert is_trace(Path("a.BLF"))
+    assert is_trace(Path("a.trc"))
     assert not is_trace(Path("a.csv"))

@@ -12,6 +12,7 @@ from hil.errors import RecordingError
 from hil.rig.replay import replay
 from hil.rig.sample import Sample, SampleFlag
 from hil.rig.trace import SUFFIXES, BusTrace
+from hil.simulator.fault_spec import rig_faults
 from hil.simulator.inverter_settings import InverterFaults
 from hil.simulator.rig_server import RigFaults
 from tests.rig.serving import changed, small_rig
@@ -50,6 +51,14 @@ def test_replay_with_noise_and_stale_answers(tmp_path: Path) -> None:
     assert len(set(column(live, "speed_rad_s"))) > len(live) // 2
     for name in MEASURED:
         assert column(again, name) == column(live, name), name
+
+
+def test_replay_flags_the_samples_in_which_a_limit_of_the_drive_acts(tmp_path: Path) -> None:
+    path = tmp_path / "run.blf"
+    rig = small_rig()
+    live = traced_run(path, rig, rig_faults(["m1.field_weakening=1"], rig.period_s)).rows
+    assert SampleFlag.M1_LIMITED in column(live, "flags")
+    assert column(list(replay(path, rig)), "flags") == column(live, "flags")
 
 
 def test_whole_trace_has_the_approach_and_the_way_out_too(tmp_path: Path) -> None:
@@ -139,6 +148,135 @@ def test_trace_that_is_no_run_is_refused(
         list(replay(written(*rows), small_rig()))
 
 
+def trc(version: str, rows: list[tuple[int, int, bytes]]) -> str:
+    """PEAK's text log in one of the versions that python-can reads, as PCAN-View and its description have them."""
+    start = "45000.5"  # days since 30 December 1899
+    head = {
+        "1.0": ";   Start time: 15.03.2023 12:00:00.000.0\n",
+        "1.1": f";$FILEVERSION=1.1\n;$STARTTIME={start}\n",
+        "1.3": f";$FILEVERSION=1.3\n;$STARTTIME={start}\n",
+        "2.0": f";$FILEVERSION=2.0\n;$STARTTIME={start}\n;$COLUMNS=N,O,T,I,d,l,D\n",
+        "2.1": f";$FILEVERSION=2.1\n;$STARTTIME={start}\n;$COLUMNS=N,O,T,B,I,d,R,L,D\n",
+    }[version]
+    line = {
+        "1.0": "{n}) {ms:.0f} {id:04X} {length} {data}",
+        "1.1": "{n}) {ms:.1f} Rx {id:04X} {length} {data}",
+        "1.3": "{n}) {ms:.1f} 1 Rx {id:04X} - {length} {data}",
+        "2.0": "{n} {ms:.3f} DT {id:04X} Rx {length} {data}",
+        "2.1": "{n} {ms:.3f} DT 1 {id:04X} Rx - {length} {data}",
+    }[version]
+    lines = (
+        line.format(n=n, ms=ms, id=cob_id, length=len(data), data=data.hex(" ").upper())
+        for n, (ms, cob_id, data) in enumerate(rows, 1)
+    )
+    return head + ";   Nach der Kopfzeile: \xfc\n" + "\n".join(lines) + "\n"
+
+
+CYCLES = [row for n in range(8) for row in cycle(10 * n, 10 * n, answer_m2_ms=9 if n == 3 else 1)]
+
+
+@pytest.mark.parametrize("version", ["1.0", "1.1", "1.3", "2.0", "2.1"])
+def test_log_of_peak_gives_the_same_samples_in_every_version(
+    version: str, written: Callable[..., Path], tmp_path: Path
+) -> None:
+    path = tmp_path / "made.trc"
+    path.write_text(trc(version, CYCLES), encoding="latin-1")
+    again, wanted = list(replay(path, small_rig())), list(replay(written(*CYCLES), small_rig()))
+    for name in MEASURED:
+        assert column(again, name) == column(wanted, name), name
+
+
+def test_log_of_peak_as_python_can_writes_it(tmp_path: Path) -> None:
+    path = tmp_path / "made.trc"
+    with can.Logger(path) as logger:
+        for message in frames(*CYCLES):
+            logger(message)
+    assert len(list(replay(path, small_rig()))) == 8
+
+
+@pytest.mark.parametrize("spoil", ["cut", "unknown", "text"])
+def test_log_of_peak_that_is_damaged_is_refused(spoil: str, tmp_path: Path) -> None:
+    """python-can passes over a line that is cut short: a sample would be missing, and nobody would know."""
+    path = tmp_path / "made.trc"
+    text = trc("2.1", CYCLES)
+    path.write_text(
+        {"cut": text[:-12], "unknown": text.replace("=2.1", "=9.9"), "text": "no such\nfile\n"}[spoil],
+        encoding="latin-1",
+    )
+    with pytest.raises(RecordingError, match=r"made\.trc: expected a bus trace"):
+        list(replay(path, small_rig()))
+
+
+def two_buses(path: Path) -> Path:
+    """A log of two channels with a rig on each; the second's torques are others."""
+    other = [(ms, cob_id, data if cob_id != TPDO_M1 else tpdo(77)) for ms, cob_id, data in CYCLES]
+    with can.Logger(path) as logger:
+        for one, two in zip(frames(*CYCLES), frames(*other), strict=True):
+            one.channel, two.channel = 0, 1
+            logger(one)
+            logger(two)
+    return path
+
+
+NAMES = {".blf": ("1", "2"), ".asc": ("1", "2"), ".log": ("can0", "can1"), ".trc": ("1", "2")}
+
+
+@pytest.mark.parametrize("suffix", NAMES)
+def test_log_of_several_channels_asks_which_and_never_merges_them(
+    suffix: str, written: Callable[..., Path], tmp_path: Path
+) -> None:
+    path = two_buses(tmp_path / f"two{suffix}")
+    one, two = NAMES[suffix]
+    with pytest.raises(RecordingError, match=rf"came channels {one} \(40 frames\), {two} \(40 frames\)\. Say which"):
+        list(replay(path, small_rig()))
+    wanted = list(replay(written(*CYCLES), small_rig()))
+    for name in MEASURED:
+        assert column(list(replay(path, small_rig(), channel=one)), name) == column(wanted, name)
+    assert set(column(list(replay(path, small_rig(), channel=two)), "torque_m1_nm")) == {77 * RATED_NM / 1000.0}
+    with pytest.raises(RecordingError, match=rf"expected channel 'can7', came channels {one} \(40 frames\)"):
+        list(replay(path, small_rig(), channel="can7"))
+
+
+def public_traffic() -> list[can.Message]:
+    """What else is on a vehicle's wire: SAE J1939, other nodes' CANopen, remote frames, error frames, CAN FD."""
+    made = []
+    for n in range(40):
+        at_s = 1.0 + n * 0.002
+        fd = {"data": bytes(48), "is_fd": True, "is_extended_id": False}
+        made += [
+            can.Message(timestamp=at_s, arbitration_id=0x0CF00400, data=bytes(8), is_extended_id=True),
+            can.Message(timestamp=at_s, arbitration_id=SYNC, data=b"", is_extended_id=True),
+            can.Message(timestamp=at_s, arbitration_id=TPDO_M1, data=tpdo(500), is_extended_id=True),
+            can.Message(timestamp=at_s, arbitration_id=RPDO_M2, data=b"\x01", is_extended_id=True),
+            can.Message(timestamp=at_s, arbitration_id=TPDO_M1, is_remote_frame=True, dlc=8, is_extended_id=False),
+            can.Message(timestamp=at_s, arbitration_id=TPDO_M1, **fd),
+            can.Message(timestamp=at_s, arbitration_id=0x1A3, data=bytes(5), is_extended_id=False),
+            can.Message(timestamp=at_s, arbitration_id=0x72A, data=b"\x05", is_extended_id=False),
+        ]
+    return made
+
+
+@pytest.mark.parametrize("suffix", [".blf", ".log", ".asc"])
+def test_public_traffic_spliced_in_changes_no_sample(suffix: str, written: Callable[..., Path], tmp_path: Path) -> None:
+    path = tmp_path / f"busy{suffix}"
+    everything = sorted([*frames(*CYCLES), *public_traffic()], key=lambda message: message.timestamp)
+    with can.Logger(path) as logger:
+        for message in everything:
+            logger(message)
+    again, wanted = list(replay(path, small_rig())), list(replay(written(*CYCLES), small_rig()))
+    for name in (*MEASURED, "torque_ref_m1_nm", "prbs_nm"):
+        assert column(again, name) == column(wanted, name), name
+
+
+def test_another_channel_with_another_protocol_alone_leaves_no_choice(tmp_path: Path) -> None:
+    path = tmp_path / "two.log"
+    with can.Logger(path) as logger:
+        for message in frames(*CYCLES):
+            logger(message)
+        logger(can.Message(timestamp=2.0, arbitration_id=0x0CF00400, data=bytes(8), channel="can5"))
+    assert len(list(replay(path, small_rig()))) == 8
+
+
 @pytest.mark.parametrize(("name", "content"), [("a.blf", b"LOGG"), ("a.blf", b"no such format"), ("a.log", b"x y z\n")])
 def test_file_that_is_no_trace_is_refused_by_name(tmp_path: Path, name: str, content: bytes) -> None:
     path = tmp_path / name
@@ -150,7 +288,7 @@ def test_file_that_is_no_trace_is_refused_by_name(tmp_path: Path, name: str, con
 def test_missing_and_misnamed_traces_are_refused(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match="no such file"):
         list(replay(tmp_path / "a.blf", small_rig()))
-    with pytest.raises(RecordingError, match=r"ends in one of \.blf, \.log, \.asc"):
+    with pytest.raises(RecordingError, match=r"ends in one of \.blf, \.log, \.asc, \.trc"):
         list(replay(tmp_path / "a.pcap", small_rig()))
 
 

@@ -60,6 +60,16 @@ def test_a_sound_cable_carries_everything_both_ways() -> None:
         assert [(message.arbitration_id, bytes(message.data)) for message in ends.at_device] == [(0x205, b"\1\2\3")]
 
 
+def test_a_frame_of_another_protocol_is_no_pdo_and_no_sync() -> None:
+    """Its 29-bit identifier has the number of one: it arrives whole, and no time passes by it."""
+    with cable(BusFaults(lose=some(1.0, TPDO), off_at_step=1)) as ends:
+        for number in (SYNC, TPDO):
+            ends.host.send(can.Message(arbitration_id=number, data=b"\1", is_extended_id=True))
+            ends.device.send(can.Message(arbitration_id=number, data=b"\1", is_extended_id=True))
+        assert [message.arbitration_id for message in ends.at_device] == [SYNC, TPDO]
+        assert [message.arbitration_id for message in ends.at_host] == [SYNC, TPDO]
+
+
 def test_lost_frames_are_as_many_as_asked_for_and_the_same_for_the_same_seed() -> None:
     arrived = []
     for seed in (1, 1, 2):

@@ -30,6 +30,8 @@ DEVICE_FAILURE = bytes.fromhex("0001 0000 0003 01 84 04")
         ("half_answer", "half_at_s"),
         ("reset", "resets_at_s"),
         ("wrong_width", "too_few_at_s"),
+        ("wrong_unit", "wrong_unit_at_s"),
+        ("wrong_transaction", "wrong_transaction_at_s"),
     ],
 )
 def test_each_is_put_into_the_device_by_name(name: str, field: str) -> None:
@@ -53,6 +55,8 @@ def answer_of(faults: PlcFaults, timeout_s: float) -> bytes:
         (PlcFaults(half_at_s=0.0), TWO[: len(TWO) // 2]),
         (PlcFaults(too_few_at_s=0.0), ONE),
         (PlcFaults(late_at_s=0.0), TWO),
+        (PlcFaults(wrong_unit_at_s=0.0), TWO[:6] + b"\x81" + TWO[7:]),
+        (PlcFaults(wrong_transaction_at_s=0.0), b"\x80" + TWO[1:]),
     ],
 )
 def test_what_comes_back(faults: PlcFaults, answer: bytes) -> None:

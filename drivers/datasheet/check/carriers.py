@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from drivers.canopen.pdo_map import COB_ID_INVALID
-from drivers.capability.carrier import EXTENDED_FRAME, RESERVED_COB_IDS, RPDO, TPDO, Carrier, CarrierSearch, Direction
+from drivers.canopen.pdo_map import COB_ID_EXTENDED, COB_ID_INVALID
+from drivers.capability.carrier import RESERVED_COB_IDS, RPDO, TPDO, Carrier, CarrierSearch, Direction
 from drivers.capability.function import Function
 from drivers.capability.plan import COMMAND, FEEDBACK, wanted_names
 from drivers.datasheet.check.context import EdsContext, at_file, at_key, at_section, hexadecimal
@@ -66,8 +66,8 @@ def _as_described(context: EdsContext, carrier: Carrier) -> Iterator[EdsFinding]
         yield at_key(Severity.WARNING, kind.section, kind.value_key, expected, "", "A run gives it this value.")
     cob_id = context.entry(layout.communication_index, 1)
     value = None if cob_id is None else cob_id.value(context.node_id)
-    if cob_id is not None and value is not None and value & (EXTENDED_FRAME | 0x7FF) != layout.cob_id:
-        if value & EXTENDED_FRAME or any(value & 0x7FF in taken for taken in RESERVED_COB_IDS):
+    if cob_id is not None and value is not None and value & (COB_ID_EXTENDED | 0x7FF) != layout.cob_id:
+        if value & COB_ID_EXTENDED or any(value & 0x7FF in taken for taken in RESERVED_COB_IDS):
             return  # said with the other PDOs
         expected = f"$NODEID+0x{layout.cob_id - context.node_id:X}, for this is a constant"
         yield at_key(Severity.WARNING, cob_id.section, cob_id.value_key, expected, "", "A run gives it this value.")

@@ -11,6 +11,7 @@ from drivers.datasheet.check.carriers import check_carriers
 from drivers.datasheet.check.context import SAMPLE_NODE_ID, EdsContext, at_file
 from drivers.datasheet.check.entries import check_entries
 from drivers.datasheet.check.lists import check_lists
+from drivers.datasheet.check.modes import check_modes
 from drivers.datasheet.check.needs import ALWAYS_USED, check_needs
 from drivers.datasheet.check.pdos import check_pdos
 from drivers.datasheet.check.rig_lines import RigLine, rig_lines
@@ -21,7 +22,7 @@ from drivers.datasheet.objects import EdsObject, objects_of_use, read_objects
 from drivers.datasheet.sheet import DataSheet, read_commissioning
 from drivers.datasheet.text import ADVICE, EdsText, EdsUnreadable, read_eds_text
 
-RULES = (check_sections, check_lists, check_entries, check_values, check_pdos, check_needs, check_carriers)
+RULES = (check_sections, check_lists, check_entries, check_values, check_pdos, check_needs, check_modes, check_carriers)
 
 
 @dataclass(frozen=True, slots=True)

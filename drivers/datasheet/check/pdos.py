@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from drivers.canopen.pdo_map import COB_ID_INVALID, MAX_PDO_BYTES, MappedObject
-from drivers.capability.carrier import EXTENDED_FRAME, FILLERS, PDO_NUMBERS, RESERVED_COB_IDS, RPDO, TPDO, Direction
+from drivers.canopen.pdo_map import COB_ID_EXTENDED, COB_ID_INVALID, MAX_PDO_BYTES, MappedObject
+from drivers.capability.carrier import FILLERS, PDO_NUMBERS, RESERVED_COB_IDS, RPDO, TPDO, Direction
 from drivers.datasheet.check.context import EdsContext, at_key, at_section, hexadecimal
 from drivers.datasheet.finding import EdsFinding, Severity
 from drivers.datasheet.number import read_number
@@ -51,15 +51,16 @@ def _pair(context: EdsContext, direction: Direction, communication: int, mapping
 def _cob_id(context: EdsContext, communication: int) -> Iterator[EdsFinding]:
     entry = context.entry(communication, 1)
     value = None if entry is None else entry.value(context.node_id)
-    if entry is None or value is None or value & COB_ID_INVALID:
+    if entry is None or value is None:
         return
     given = {carrier.layout.communication_index: carrier.layout.cob_id for carrier in context.plan.carriers}
-    replaced = communication in given and given[communication] != value & (EXTENDED_FRAME | 0x7FF)
+    used, switched_on = communication in given, not value & COB_ID_INVALID
+    replaced = used and given[communication] != value & (COB_ID_EXTENDED | 0x7FF)
     severity = Severity.WARNING if replaced else context.severity(communication)
-    if value & EXTENDED_FRAME:
+    if value & COB_ID_EXTENDED and (switched_on or used):
         expected = "an identifier of 11 bits (bit 29 clear)"
         yield at_key(severity, entry.section, entry.value_key, expected, "", "Give the PDO one.")
-    elif any(value & 0x7FF in taken for taken in RESERVED_COB_IDS):
+    elif switched_on and any(value & 0x7FF in taken for taken in RESERVED_COB_IDS):
         expected = "an identifier a PDO may have, such as 0x181 to 0x57F (CiA 301)"
         found = f"0x{value & 0x7FF:03X} for node {context.node_id} from"
         yield at_key(severity, entry.section, entry.value_key, expected, found, "Give the PDO another.")

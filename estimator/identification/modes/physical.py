@@ -192,7 +192,29 @@ def physical_parameters(
     if not (x[:3] > 0.0).all():
         raise BadModel(f"linear model: J_M, J_L, k came out as {x[:3].tolist()}, expected all above 0. Record longer.")
     spread = np.linalg.pinv(jacobian.T @ jacobian, hermitian=True) * np.outer(scale, scale)
-    return _estimate(x, spread, 2.0 * float(solution.cost))
+    return _plausible(_estimate(x, spread, 2.0 * float(solution.cost)))
+
+
+def _plausible(estimate: PhysicalEstimate) -> PhysicalEstimate:
+    """Return an estimate no part of which is surely negative.
+
+    Raises
+    ------
+    BadModel
+        If the whole interval of a parameter or sum lies below 0: then the response is not that of two masses.
+    """
+    both = {**estimate.parameters, **estimate.sums}
+    negative = [name for name, one in both.items() if one.estimate.ci95[1] < 0.0]
+    if negative:
+        intervals = "; ".join(
+            f"{name} {both[name].estimate.ci95[0]:.4g} to {both[name].estimate.ci95[1]:.4g}" for name in negative
+        )
+        raise BadModel(
+            f"linear model: {intervals} with 95 % confidence, expected values of 0 or more: this is not a two-mass "
+            "line. A delay or lag between torque and speed, a third mass or a gap look like this; see the residual "
+            "tests, or diagnose the recording."
+        )
+    return estimate
 
 
 def _checked(model: LinearModel, covariance: FloatArray, known: Mapping[str, Uncertain]) -> dict[int, Uncertain]:

@@ -15,7 +15,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import solve_discrete_lyapunov
 
 from estimator.errors import BadModel, BadShape
 from estimator.identification.linear_model import LinearModel
@@ -24,6 +23,9 @@ from estimator.identification.modes.propagate import propagate, square_root
 from estimator.signals.record import FloatArray
 
 THIRD = 3
+
+MOST_DOUBLINGS = 60
+"""2^60 samples: a pole whose time constant is longer is no pole of a recording."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,6 +88,19 @@ def reduce_order(model: LinearModel, order: int, covariance: FloatArray | None =
     return Reduced(reduced, spread, hankel, 2.0 * float(np.sum(hankel[order:])))
 
 
+def _gramian(A: FloatArray, Q: FloatArray) -> FloatArray:
+    """Return the sum of ``A^k Q (A^T)^k`` over k, by doubling (R. A. Smith, SIAM J. Applied Mathematics 16, 1968).
+
+    A solver of the Lyapunov equation divides by what a pole lacks to 1; this only adds, however slow the pole.
+    """
+    total, power = Q, A
+    for _ in range(MOST_DOUBLINGS):
+        total, power = total + power @ total @ power.T, power @ power
+        if np.abs(power).max() < np.finfo(np.float64).eps:
+            break
+    return np.asarray(total, dtype=np.float64)
+
+
 def _like(theta: FloatArray, model: LinearModel) -> LinearModel:
     return LinearModel.from_theta(theta, model.orders, model.sample_time_s)
 
@@ -102,8 +117,8 @@ def _truncated(model: LinearModel, order: int) -> tuple[FloatArray, FloatArray]:
     With a delay of 1 or more theta is ``[a_1 .. a_r, b_1 .. b_r]``, without ``[a_1 .. a_r, b_0 .. b_r]``.
     """
     A, B, C, D = state_space(model)
-    reach = square_root(np.asarray(solve_discrete_lyapunov(A, B @ B.T), dtype=np.float64))
-    see = square_root(np.asarray(solve_discrete_lyapunov(A.T, C.T @ C), dtype=np.float64))
+    reach = square_root(_gramian(A, B @ B.T))
+    see = square_root(_gramian(A.T, C.T @ C))
     left, hankel, right_t = np.linalg.svd(see.T @ reach)
     kept = min(order, A.shape[0])
     scale = 1.0 / np.sqrt(np.maximum(hankel[:kept], np.finfo(np.float64).tiny))

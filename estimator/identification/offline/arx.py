@@ -19,9 +19,9 @@ import numpy as np
 from estimator.errors import NotExciting
 from estimator.identification.linear_model import Orders
 from estimator.identification.offline.covariance import sandwich
+from estimator.identification.offline.fitting import problem_of
 from estimator.identification.offline.linear_fit import LinearFit, Method, summary
 from estimator.identification.offline.noise_model import NoiseModel, fit_noise, reach
-from estimator.identification.offline.output_error import problem_of
 from estimator.identification.offline.starts import arx, complete_rows, regressor
 from estimator.signals.record import Record
 
@@ -64,6 +64,6 @@ def fit_arx(record: Record, orders: Orders | None = None) -> LinearFit:
     x = problem.start(model)
     noise = NoiseModel(model.A, float(np.sqrt(np.mean(equation_error[rows] ** 2))))
     result = summary(
-        Method.ARX, model, sandwich(phi, rows, left), x[orders.n_parameters :], first, y, okay, problem.error(x), noise
+        Method.ARX, model, sandwich(phi, rows, left), problem.state(x), first, y, okay, problem.error(x), noise, block=1
     )
     return replace(result, n_samples=int(np.count_nonzero(rows)))

@@ -8,7 +8,8 @@ import numpy as np
 
 from estimator.errors import BadModel
 from estimator.identification.linear_model import LinearModel
-from estimator.identification.offline.linear_fit import fit_percent, one_step_error
+from estimator.identification.offline.blocks import block_of
+from estimator.identification.offline.linear_fit import fit_percent, one_step_fit
 from estimator.identification.offline.noise_model import NoiseModel
 from estimator.identification.offline.problem import Problem
 from estimator.signals.record import FloatArray, Record
@@ -65,11 +66,10 @@ def free_run(model: LinearModel, record: Record, noise: NoiseModel) -> FreeRun:
     u, y, okay = record.total_torque_nm[first:], record.output[first:], record.okay[first:]
     problem = Problem(u, y, okay, model.orders, model.sample_time_s)
     error = np.where(okay, problem.error(problem.start(model)), np.nan)
-    ahead, complete = one_step_error(np.nan_to_num(error), okay, noise)
     return FreeRun(
         name=record.name,
         error=np.concatenate([np.full(first, np.nan), error]),
         rms=float(np.sqrt(np.mean(error[okay] ** 2))),
         fit_percent=fit_percent(error[okay], y[okay]),
-        one_step_fit_percent=fit_percent(ahead[complete], y[complete]) if complete.any() else float("nan"),
+        one_step_fit_percent=one_step_fit(error, y, okay, noise, block_of(period_s)),
     )

@@ -21,10 +21,10 @@ from scipy.signal import lfilter
 
 from estimator.errors import BadShape, NotExciting
 from estimator.identification.linear_model import LinearModel, Orders, free_response
-from estimator.identification.offline.linear_fit import LinearFit, Method, summary
+from estimator.identification.offline.fitting import problem_of, summarised
+from estimator.identification.offline.linear_fit import LinearFit, Method
 from estimator.identification.offline.noise_model import fit_noise, reach
-from estimator.identification.offline.output_error import problem_of
-from estimator.identification.offline.problem import Problem
+from estimator.identification.offline.problem import Problem, simulated, transient
 from estimator.identification.offline.starts import HIGH_ORDER, arx, candidates, delayed, regressor, stabilised
 from estimator.signals.record import BoolArray, FloatArray, Record
 
@@ -68,7 +68,7 @@ def fit_instrumental(record: Record, orders: Orders | None = None, instrument: F
                 names,
             )
         x: FloatArray = np.asarray(np.linalg.solve(S, zeta[rows].T @ target[rows]), dtype=np.float64)
-        before, model = model.theta, stabilised(problem.model(x))
+        before, model = model.theta, stabilised(_linear(problem, x))
         if np.linalg.norm(model.theta - before) <= STILL * np.linalg.norm(before):
             break
     return _summary(problem, model, first, r)
@@ -93,10 +93,11 @@ def _turn(problem: Problem, model: LinearModel, r: FloatArray) -> tuple[FloatArr
 
     The free response of the time before is a regressor, and its own instrument: nothing but A is in it.
     """
-    A, state = model.A, problem.start(model)[problem.orders.n_parameters :]
-    filled = np.where(problem.okay, problem.y, model.simulate(problem.u, state))
+    A, state = model.A, problem.state(problem.start(model))
+    filled = np.where(problem.okay, problem.y, simulated(model, problem.u, state))
     impulse_f = free_response(A, np.ones(1), r.shape[0])
     free = [delayed(impulse_f, j) for j in range(problem.orders.n_states)]
+    free.append(transient(r.shape[0], problem.sample_time_s))
     x_f, r_f, y_f, u_f = (lfilter([1.0], A, x) for x in (model.simulate(r), r, filled, problem.u))
     zeta, phi = regressor(r_f, x_f, problem.orders), regressor(u_f, y_f, problem.orders)
     return np.column_stack([zeta, *free]), np.column_stack([phi, *free]), y_f, problem.okay
@@ -112,7 +113,9 @@ def _summary(problem: Problem, model: LinearModel, first: int, r: FloatArray) ->
     scale = left.std**2 * n_rows / max(n_rows - spent, 1)
     covariance = (scale * inverse @ (coloured.T @ coloured) @ inverse.T)[:n, :n]
     x = problem.start(model)
-    error = problem.error(x)
-    noise = fit_noise(error, problem.okay, reach(problem.sample_time_s))
-    method = Method.INSTRUMENTAL_VARIABLE
-    return summary(method, model, covariance, x[n:], first, problem.y, problem.okay, error, noise)
+    noise = fit_noise(problem.blocks.mean(problem.error(x)), problem.blocks.okay, reach(problem.period_s))
+    return summarised(Method.INSTRUMENTAL_VARIABLE, problem, x, first, covariance, noise)
+
+
+def _linear(problem: Problem, theta: FloatArray) -> LinearModel:
+    return LinearModel.from_theta(theta[: problem.orders.n_parameters], problem.orders, problem.sample_time_s)

@@ -13,7 +13,9 @@ from enum import Enum
 import numpy as np
 
 from estimator.identification.linear_model import LinearModel
+from estimator.identification.offline.blocks import Blocks
 from estimator.identification.offline.noise_model import NoiseModel
+from estimator.identification.offline.problem import simulated
 from estimator.signals.record import BoolArray, FloatArray
 
 
@@ -38,8 +40,8 @@ class LinearFit:
         Transfer function.
     covariance : ndarray, shape (na+nb, na+nb)
         Covariance of theta, the residual's colour taken into account.
-    state : ndarray, shape (n_states,)
-        C, the free response's numerator, from sample ``first`` of the data.
+    state : ndarray, shape (n_states + 1,)
+        ``[c, h]``: numerator of the free response from sample ``first`` of the data, and that of the high-pass.
     first : int
         First good sample; the simulation starts there.
     rms : float
@@ -50,6 +52,8 @@ class LinearFit:
         The same for the prediction one step ahead.
     noise : NoiseModel
         Of the free-run residual; predicts one step ahead.
+    block : int
+        Samples whose mean residual is one sample to the noise model.
     n_samples : int
         Good samples used.
     """
@@ -64,11 +68,12 @@ class LinearFit:
     one_step_fit_percent: float
     noise: NoiseModel
     n_samples: int
+    block: int = 1
 
     def simulate(self, u: FloatArray) -> FloatArray:
         """Free-run simulation over the data's inputs, shape (N,); the time before ``first`` is 0."""
         out = np.zeros(u.shape[0])
-        out[self.first :] = self.model.simulate(u[self.first :], self.state)
+        out[self.first :] = simulated(self.model, u[self.first :], self.state)
         return out
 
 
@@ -78,9 +83,13 @@ def fit_percent(error: FloatArray, measured: FloatArray) -> float:
     return 100.0 * (1.0 - float(np.linalg.norm(error)) / spread) if spread > 0.0 else float("nan")
 
 
-def one_step_error(error: FloatArray, okay: BoolArray, noise: NoiseModel) -> tuple[FloatArray, BoolArray]:
-    """Return the error of the prediction one step ahead, and where its past is complete; each of shape (N,)."""
-    return noise.whiten(np.where(okay, error, 0.0)), noise.complete(okay)
+def one_step_fit(error: FloatArray, y: FloatArray, okay: BoolArray, noise: NoiseModel, block: int) -> float:
+    """Return the fit [%] of the prediction one step of the noise model ahead; NaN where no past is complete."""
+    blocks = Blocks(okay, block)
+    complete = noise.complete(blocks.okay)
+    if not complete.any():
+        return float("nan")
+    return fit_percent(noise.whiten(blocks.mean(error))[complete], blocks.mean(y)[complete])
 
 
 def summary(
@@ -93,9 +102,9 @@ def summary(
     okay: BoolArray,
     error: FloatArray,
     noise: NoiseModel,
+    block: int,
 ) -> LinearFit:
     """Put a result together; y, okay and the free-run error of shape (N - first,)."""
-    ahead, complete = one_step_error(error, okay, noise)
     return LinearFit(
         method=method,
         model=model,
@@ -104,7 +113,8 @@ def summary(
         first=first,
         rms=float(np.sqrt(np.mean(error[okay] ** 2))),
         fit_percent=fit_percent(error[okay], y[okay]),
-        one_step_fit_percent=fit_percent(ahead[complete], y[complete]) if complete.any() else float("nan"),
+        one_step_fit_percent=one_step_fit(error, y, okay, noise, block),
         noise=noise,
         n_samples=int(np.count_nonzero(okay)),
+        block=block,
     )

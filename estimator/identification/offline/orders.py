@@ -1,35 +1,29 @@
 """Order and delay: how many coefficients the data pay for.
 
-All candidates are fitted to the same data, whitened by one noise model, that of the richest candidate. So the
-residual's own correlation is in the comparison, and the Bayesian information criterion (G. Schwarz, Annals of
-Statistics 6, 1978) counts independent samples::
+Every candidate is a Box-Jenkins model with a noise model of its own, all of one order, so the Bayesian information
+criterion (G. Schwarz, Annals of Statistics 6, 1978) counts innovations, which are independent::
 
     BIC = N ln(mean of w^2) + (number of parameters) ln N
 
-On a coloured residual, N independent samples would be counted where there are far fewer, and the order come out too
-high. So it does where the load drifts: a slow pole more, with its free response, fits the drift. Both signals
-therefore pass a high-pass at the lower end of the band in which a driveline resounds. Cross-validation stands beside
-it: the free-run fit on recordings that took no part.
+A slow pole more can still fit what the load does slowly. Both signals therefore pass a high-pass at the lower end of
+the band in which a driveline resonates. Cross-validation is shown with it: the free-run fit on recordings that took no
+part.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import chain
 
 import numpy as np
 
 from estimator.errors import BadSetting
 from estimator.identification.linear_model import LinearModel, Orders
-from estimator.identification.offline.box_jenkins import fit_box_jenkins, whitened_by
+from estimator.identification.offline.box_jenkins import fit_box_jenkins
 from estimator.identification.offline.free_run import free_run
-from estimator.identification.offline.noise_model import NoiseModel
-from estimator.identification.offline.output_error import problem_of
-from estimator.identification.offline.problem import Problem
-from estimator.identification.offline.starts import candidates as starts
+from estimator.identification.offline.linear_fit import LinearFit
 from estimator.signals.decimate import decimate
-from estimator.signals.record import FloatArray, Record
+from estimator.signals.record import Record
 
 DEFAULT = tuple(Orders(n, n, nk) for nk in (1, 2, 3) for n in (2, 3, 4, 5))
 """Second to fifth order, a delay of one to three samples."""
@@ -119,11 +113,8 @@ def select_orders(record: Record, among: Sequence[Orders] = DEFAULT, unseen: Seq
     """
     if not among:
         raise BadSetting("order selection: 0 candidates, expected one or more. Give the orders to choose from.")
-    richest = max(among, key=lambda orders: (orders.n_parameters, -orders.nk))
-    record, *unseen = (_prepared(one) for one in (record, *unseen))
-    problem, _ = problem_of(record, richest)
-    noise = fit_box_jenkins(record, richest).noise
-    found = [_candidate(replace(problem, orders=orders), noise, unseen) for orders in among]
+    prepared, *others = (_prepared(one) for one in (record, *unseen))
+    found = [_candidate(prepared, orders, others) for orders in among]
     least = min(candidate.criterion for candidate in found)
     ranked = sorted(found, key=lambda candidate: candidate.criterion)
     return OrderChoice(tuple(replace(candidate, criterion=candidate.criterion - least) for candidate in ranked))
@@ -136,23 +127,20 @@ def _prepared(record: Record) -> Record:
     return replace(passed, okay=passed.okay & settled)
 
 
-def _solved(problem: Problem, first: Sequence[LinearModel] = ()) -> FloatArray:
-    usual = starts(problem.u, problem.y, problem.okay, problem.orders, problem.sample_time_s)
-    return problem.solve(chain(first, usual))
-
-
-def _candidate(plain: Problem, noise: NoiseModel, unseen: Sequence[Record]) -> Candidate:
-    """Fit one structure to the whitened data, from the minimum of the plain data."""
-    whitened = whitened_by(plain, noise)
-    x = _solved(whitened, [plain.model(_solved(plain))])
-    model, rest = whitened.model(x), whitened.residual(x)
-    power, n = float(np.mean(rest**2)), rest.shape[0]
-    runs = [free_run(model, other, noise).fit_percent for other in unseen]
+def _candidate(record: Record, orders: Orders, unseen: Sequence[Record]) -> Candidate:
+    fit = fit_box_jenkins(record, orders)
+    runs = [free_run(fit.model, other, fit.noise).fit_percent for other in unseen]
     return Candidate(
-        orders=plain.orders,
-        criterion=n * float(np.log(max(power, np.finfo(np.float64).tiny)))
-        + plain.orders.n_parameters * float(np.log(n)),
-        rms=float(np.sqrt(power)),
+        orders=orders,
+        criterion=criterion(fit),
+        rms=fit.noise.std,
         unseen_fit_percent=float(np.mean(runs)) if runs else float("nan"),
-        model=model,
+        model=fit.model,
     )
+
+
+def criterion(fit: LinearFit) -> float:
+    """Return the BIC of a Box-Jenkins fit; to be compared on one recording and with one order of D."""
+    n = fit.n_samples / fit.block
+    power = max(fit.noise.std**2, np.finfo(np.float64).tiny)
+    return n * float(np.log(power)) + fit.model.orders.n_parameters * float(np.log(n))

@@ -20,8 +20,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import chi2
+from threadpoolctl import threadpool_limits
 
 from estimator.identification.modes.propagate import CONFIDENCE, QUANTILE
+from estimator.identification.offline.blocks import Blocks
 from estimator.identification.offline.free_run import FreeRun, free_run
 from estimator.identification.offline.linear_fit import LinearFit
 from estimator.identification.offline.noise_model import fit_noise, reach
@@ -111,7 +113,7 @@ def validate(fit: LinearFit, record: Record, unseen: Sequence[Record] = (), lags
     unseen : sequence of Record
         Prepared alike, not used for the fit.
     lags : int
-        Lags of each test [samples].
+        Lags of each test, in samples of the noise model.
 
     Raises
     ------
@@ -119,26 +121,28 @@ def validate(fit: LinearFit, record: Record, unseen: Sequence[Record] = (), lags
         If a recording is sampled at another period than the model, or the model is unstable.
     """
     own = free_run(fit.model, record, fit.noise)
-    okay = record.okay & np.isfinite(own.error)
-    error = np.where(okay, own.error, 0.0)
-    white_error, white_input, both = _prewhitened(error, record.total_torque_nm, okay, record.sample_time_s)
+    blocks = Blocks(record.okay & np.isfinite(own.error), fit.block)
+    error = blocks.mean(own.error)
+    u = Blocks(np.ones_like(record.okay), fit.block).mean(record.total_torque_nm)
+    with threadpool_limits(1):
+        white_error, white_input, both = _prewhitened(error, u, blocks.okay, record.sample_time_s * fit.block)
     first = min(fit.model.nk, LEAST_DELAY)
-    ahead, behind = np.arange(first, first + lags), np.arange(-lags, first)
+    late = first if fit.block == 1 else 0  # within one block both directions are possible
     return Validation(
         own=own,
         unseen=tuple(free_run(fit.model, other, fit.noise) for other in unseen),
-        independence=correlation_test(white_error, white_input, both, ahead),
-        feedback=correlation_test(white_error, white_input, both, behind),
-        autocorrelation=correlation_test(error, error, okay, np.arange(1, lags + 1)),
+        independence=correlation_test(white_error, white_input, both, np.arange(first, first + lags)),
+        feedback=correlation_test(white_error, white_input, both, np.arange(-lags, late)),
+        autocorrelation=correlation_test(error, error, blocks.okay, np.arange(1, lags + 1)),
     )
 
 
 def _prewhitened(
-    error: FloatArray, u: FloatArray, okay: BoolArray, sample_time_s: float
+    error: FloatArray, u: FloatArray, okay: BoolArray, period_s: float
 ) -> tuple[FloatArray, FloatArray, BoolArray]:
     """Return residual and input, each whitened by its own autoregression, and where both have their past."""
     everywhere = np.ones_like(okay)
-    order = reach(sample_time_s)
+    order = reach(period_s)
     of_error, of_input = fit_noise(error, okay, order), fit_noise(u - u.mean(), everywhere, order)
     both = of_error.complete(okay) & of_input.complete(everywhere)
     return of_error.whiten(error), of_input.whiten(u - u.mean()), both

@@ -41,6 +41,8 @@ class SpectralEstimate:
     method : SpectralMethod
     freedom : float
         Degrees of freedom the standard deviation was estimated with: few where it comes from few periods.
+    used_samples, bridged_samples : int
+        Samples inside the segments, and how many of the recording were missing and bridged; 0 where not counted.
     """
 
     frequency_hz: FloatArray
@@ -50,6 +52,8 @@ class SpectralEstimate:
     n_averages: float
     method: SpectralMethod = SpectralMethod.WELCH
     freedom: float = math.inf
+    used_samples: int = 0
+    bridged_samples: int = 0
 
     def magnitude_interval(self, confidence: float = 0.95) -> tuple[FloatArray, FloatArray]:
         """Return the ends of the interval of ``|response|``, each of shape (M,); by Student's t, and not below 0."""

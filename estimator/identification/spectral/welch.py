@@ -11,11 +11,15 @@ for K of them, with rho = 1/6 the correlation of the window with itself half its
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.signal import get_window
 
 from estimator.errors import NotExciting
 from estimator.identification.linear_model import ComplexArray
+from estimator.identification.offline.blocks import Blocks, block_of
+from estimator.identification.offline.missing import gaps
 from estimator.identification.spectral.estimate import SpectralEstimate, SpectralMethod, from_spectra
 from estimator.signals.record import BoolArray, FloatArray, Record
 from estimator.signals.settings import Requirement, require
@@ -34,37 +38,74 @@ def good_segments(okay: BoolArray, length: int) -> list[int]:
     return [s for s in range(0, okay.shape[0] - length + 1, length // 2) if okay[s : s + length].all()]
 
 
+SHORT_S = 0.03
+"""Gaps up to this long are bridged by straight lines [s]: under a quarter of a period at 8 Hz, a resonance's."""
+
+SHORTEST_S = 1.0
+"""Segments are halved down to this length [s] where long gaps leave too few: below, a resonance is one line wide."""
+
+
 def spectral_estimate(record: Record, segment_samples: int = 256) -> SpectralEstimate:
     """Estimate the transfer function from total torque to output.
+
+    Short gaps are bridged, segments lie between long ones; they are halved until there are three of them. Samples
+    faster than 10 ms are averaged in blocks first, which changes both spectra alike.
 
     Parameters
     ----------
     record : Record
         With the slow part removed.
     segment_samples : int
-        Length of a segment; the frequencies are 1 / (length * sampling period) apart.
+        Length of a segment, in samples of the recording; the frequencies are the inverse of its duration apart.
 
     Raises
     ------
     BadSetting
         If a segment is shorter than 8 samples.
     NotExciting
-        If the mask leaves fewer than three unbroken segments.
+        If the mask leaves fewer than three unbroken segments of one second.
     """
+    block = block_of(record.sample_time_s)
+    period_s = block * record.sample_time_s
+    length = segment_samples // block
     require(
         "spectral estimate",
-        (Requirement("segment_samples", segment_samples, segment_samples >= 8, "8 or more samples"),),
+        (Requirement("segment_samples", segment_samples, length >= 8, f"{8 * block} or more samples"),),
     )
-    starts = good_segments(record.okay, segment_samples)
+    okay = record.okay if record.read is None else record.okay & record.read
+    usable, bridged = _bridged_mask(okay, SHORT_S / record.sample_time_s)
+    blocks = Blocks(usable, block)
+    starts = good_segments(blocks.okay, length)
+    while len(starts) < FEWEST_SEGMENTS and length * period_s / 2.0 >= SHORTEST_S:
+        length //= 2
+        starts = good_segments(blocks.okay, length)
     if len(starts) < FEWEST_SEGMENTS:
         raise NotExciting(
-            f"recording {record.name}: {len(starts)} unbroken segments of {segment_samples} samples, "
-            f"expected {FEWEST_SEGMENTS} or more. Record longer or take shorter segments.",
+            f"recording {record.name}: {len(starts)} unbroken segments of {length * period_s:.3g} s, expected "
+            f"{FEWEST_SEGMENTS} or more. Record longer, or with fewer long gaps.",
             ("frequency response",),
         )
-    u = _spectra(record.total_torque_nm, starts, segment_samples)
-    y = _spectra(record.output, starts, segment_samples)
-    return _estimate(u, y, segment_samples, record.sample_time_s)
+    signals = (blocks.mean(_bridge(x, okay)) for x in (record.total_torque_nm, record.output))
+    u, y = (_spectra(x, starts, length) for x in signals)
+    covered = np.zeros(blocks.okay.shape, dtype=np.bool_)
+    for start in starts:
+        covered[start : start + length] = True
+    estimate = _estimate(u, y, length, period_s)
+    return replace(estimate, used_samples=int(covered.sum()) * block, bridged_samples=bridged)
+
+
+def _bridged_mask(okay: BoolArray, longest: float) -> tuple[BoolArray, int]:
+    """Return where samples are measured or in a gap of at most so many, and how many are in such gaps."""
+    usable = okay.copy()
+    for start, end in gaps(okay):
+        if end - start <= longest and 0 < start and end < okay.shape[0]:
+            usable[start:end] = True
+    return usable, int(np.count_nonzero(usable & ~okay))
+
+
+def _bridge(x: FloatArray, okay: BoolArray) -> FloatArray:
+    rows = np.arange(x.shape[0])
+    return np.asarray(np.interp(rows, rows[okay], x[okay]), dtype=np.float64)
 
 
 def _spectra(x: FloatArray, starts: list[int], length: int) -> ComplexArray:

@@ -58,6 +58,7 @@ def identification_text(
             "nb": settings.orders.nb,
             "nk": settings.orders.nk,
             "sample_time_s": settings.sample_time_s,
+            "offline_sample_time_s": settings.offline_sample_time_s,
             "high_pass_hz": settings.high_pass_hz,
             "samples": settings.samples,
             "filter_part": settings.filter_part.value,
@@ -92,6 +93,7 @@ def _recording(found: Identification) -> dict[str, Any]:
         "batch": offline,
         "filter_L": found.L.tolist(),
         "spectral": None if found.spectral is None else _spectral(found.spectral),
+        "no_spectral": found.no_spectral,
     }
 
 
@@ -123,6 +125,8 @@ def _spectral(estimate: SpectralEstimate) -> dict[str, Any]:
         "magnitude_std": [json_number(s) for s in estimate.magnitude_std.tolist()],
         "coherence": [json_number(c) for c in estimate.coherence.tolist()],
         "n_averages": estimate.n_averages,
+        "used_samples": estimate.used_samples,
+        "bridged_samples": estimate.bridged_samples,
     }
 
 

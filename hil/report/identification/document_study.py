@@ -8,12 +8,14 @@ from estimator.identification.modes.propagate import Uncertain
 from estimator.identification.offline.free_run import FreeRun
 from estimator.identification.offline.validation import CorrelationTest
 from estimator.identification.study import Study
+from hil.report.identification.wording import best_statement, verdict
 from hil.report.numbers import json_number
 
 
 def studied(each: Study) -> dict[str, Any]:
     """Return intervals, third order, validation, feedback, cancellations, physical parameters; JSON types only."""
     return {
+        "best": _best(each),
         "resonance_interval": None
         if each.resonance is None
         else {
@@ -34,9 +36,7 @@ def studied(each: Study) -> dict[str, Any]:
             "independence": _test(each.validation.independence),
             "autocorrelation": _test(each.validation.autocorrelation),
         },
-        "feedback": None
-        if each.feedback is None
-        else {
+        "feedback": {
             "detected": each.feedback.detected,
             "p_value": json_number(each.feedback.p_value),
             "statement": each.feedback.statement,
@@ -50,6 +50,43 @@ def studied(each: Study) -> dict[str, Any]:
             for one in each.roots.cancellations
         ],
         "physical": _physical(each),
+    }
+
+
+def _best(each: Study) -> dict[str, Any]:
+    """Return the headline; frequency and damping are null where the data carry no pole pair."""
+    best, mode = each.best, each.best.mode
+    linearity = best.linearity
+    return {
+        "estimator": best.fit.method.value,
+        "frequency_hz": None if mode is None else mode.frequency_hz.value,
+        "damping": None if mode is None else mode.damping.value,
+        "frequency_ci95_hz": None if mode is None else [json_number(end) for end in mode.frequency_hz.ci95],
+        "damping_ci95": None if mode is None else [json_number(end) for end in mode.damping.ci95],
+        "statement": best_statement(each),
+        "verdict": best.verdict.value,
+        "advice": verdict(each),
+        "band_hz": list(best.band_hz),
+        "order": best.fit.model.orders.na,
+        "sample_time_s": best.fit.model.sample_time_s,
+        "A": best.fit.model.A.tolist(),
+        "B": best.fit.model.B.tolist(),
+        "covariance": best.fit.covariance.tolist(),
+        "independence": _test(best.validation.independence),
+        "linearity": {
+            "p_value": json_number(linearity.p_value),
+            "linear": linearity.is_linear,
+            "depends_on": None if linearity.is_linear else linearity.depends_on,
+        },
+        "by_shaft_torque": [
+            {
+                "low_nm": one.low,
+                "high_nm": one.high,
+                "frequency_hz": None if one.mode is None else one.mode.frequency_hz,
+                "damping": None if one.mode is None else one.mode.damping,
+            }
+            for one in best.regions
+        ],
     }
 
 

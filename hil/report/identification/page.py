@@ -19,7 +19,7 @@ from hil.report.identification.pole_map import PoleSet, known_sets, pole_figure
 from hil.report.identification.recording_section import recording_section
 from hil.report.identification.responses import responses_figure
 from hil.report.identification.tables import compared_table, numbers_table, orders_table, physical_tables
-from hil.report.identification.wording import headline, plus_minus, statement, warnings
+from hil.report.identification.wording import headline, plus_minus, statement, verdict, warnings
 from hil.report.numbers import shown
 
 MOST_DRAWN = 12
@@ -67,9 +67,11 @@ def identification_page(
 
 def _top(models: Sequence[LocalModel], studies: Sequence[Study]) -> str:
     notes = "".join(html.paragraph(f"Note: {text}", "warning") for text in warnings(studies))
+    verdicts = "".join(html.paragraph(verdict(each), "statement") for each in studies)
     return (
         f'<header class="top">\n<h1>{escape(headline(studies))}</h1>\n'
-        + html.paragraph(statement(models, studies), "statement")
+        + verdicts
+        + html.paragraph(statement(models, studies))
         + notes
         + html.tiles(_tiles(studies))
         + "\n</header>"
@@ -96,7 +98,7 @@ def _tiles(studies: Sequence[Study]) -> list[tuple[str, str, str]]:
 
 def _physical(studies: Sequence[Study]) -> str:
     note = (
-        "The two-mass drive, at the motor shaft, whose response a third-order model at the recording's own period is. "
+        "The two-mass drive, at the motor shaft, whose response the third-order Box-Jenkins model is. "
         "Sums are often known where their parts are not."
     )
     return html.section("Physical parameters", html.paragraph(note, "note"), *physical_tables(studies))

@@ -11,6 +11,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
+from estimator.errors import BadSetting
 from estimator.identification.identify import Settings
 from estimator.identification.linear_model import Orders
 from estimator.identification.online.adaptation import Adaptation
@@ -102,14 +103,19 @@ def identified(path: Path, run: str | None, adaptation: Adaptation, option: str 
     entry = _chosen(path, file.recordings, run, option)
     if entry.output != "speed":
         raise FileProblem(path, f"recordings.{entry.name}.output | expected 'speed' | came {entry.output!r}")
-    given = file.settings
-    settings = Settings(
-        orders=Orders(given.na, given.nb, given.nk),
-        sample_time_s=given.sample_time_s,
-        high_pass_hz=given.high_pass_hz,
-        adaptation=adaptation,
-    )
-    return Identified(entry.name, settings, np.array(entry.filter_L))
+    return Identified(entry.name, _settings(path, file.settings, adaptation), np.array(entry.filter_L))
+
+
+def _settings(path: Path, given: _Settings, adaptation: Adaptation) -> Settings:
+    try:
+        return Settings(
+            orders=Orders(given.na, given.nb, given.nk),
+            sample_time_s=given.sample_time_s,
+            high_pass_hz=given.high_pass_hz,
+            adaptation=adaptation,
+        )
+    except BadSetting as cause:
+        raise FileProblem(path, f"settings | {cause}") from cause
 
 
 def _chosen(path: Path, entries: Sequence[_Recording], run: str | None, option: str) -> _Recording:

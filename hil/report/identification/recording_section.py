@@ -5,16 +5,18 @@ from __future__ import annotations
 import numpy as np
 
 from estimator.identification.modes.uncertainty import UncertainRoot
+from estimator.identification.offline.validation import CorrelationTest
 from estimator.identification.study import Study
 from estimator.signals.record import FloatArray
 from hil.figures.local_model import LocalModel
-from hil.figures.palette import BLUE, GREEN, VERMILION
+from hil.figures.palette import BLACK, BLUE, GREEN, VERMILION
 from hil.report import page as html
 from hil.report.figures import Line, Panel, Style, time_figure
 from hil.report.identification.course import course_figure
 from hil.report.identification.pole_map import PoleSet, known_sets, pole_figure
 from hil.report.identification.residuals import residual_figure
 from hil.report.identification.responses import response_figure
+from hil.report.identification.wording import best_statement
 from hil.report.numbers import shown, shown_p
 
 STRETCHES = 900
@@ -28,12 +30,15 @@ def recording_section(model: LocalModel, study: Study, number: int) -> str:
     """Return the section; ``number`` makes its figures' names unique in the page."""
     return html.section(
         f"Recording {model.name}",
+        html.paragraph(best_statement(study)),
         html.paragraph(study.validation.statement),
+        *_regional(study),
         "<h3>Frequency response</h3>",
-        response_figure(f"response-{number}", model),
+        html.paragraph(_spectral(study), "note"),
+        response_figure(f"response-{number}", model, study.best.fit.model),
         "<h3>Poles and zeros</h3>",
         *_roots(model, study, number),
-        "<h3>Free run of the off-line model</h3>",
+        "<h3>Free run of the output-error model</h3>",
         _free_run(study, number),
         "<h3>Residual tests</h3>",
         _tests(study),
@@ -43,41 +48,71 @@ def recording_section(model: LocalModel, study: Study, number: int) -> str:
     )
 
 
+def _spectral(study: Study) -> str:
+    """Say which samples the spectral estimate is of, or why there is none."""
+    spectral = study.found.spectral
+    if spectral is None:
+        return f"No spectral estimate. {study.found.no_spectral}"
+    bridged = f", {spectral.bridged_samples} missing ones bridged" if spectral.bridged_samples else ""
+    return (
+        f"Spectral estimate of {spectral.used_samples} of {study.found.offline.okay.size} samples{bridged}: "
+        f"{spectral.n_averages:.0f} independent averages, a line every {spectral.frequency_hz[0]:.2g} Hz."
+    )
+
+
+def _regional(study: Study) -> list[str]:
+    """Return the table of what the resonance depends on; nothing where the drive is linear."""
+    if not study.best.regions:
+        return []
+    rows = [
+        (
+            f"{one.low:.0f} to {one.high:.0f}",
+            "none" if one.mode is None else shown(one.mode.frequency_hz),
+            "" if one.mode is None else shown(one.mode.damping),
+        )
+        for one in study.best.regions
+    ]
+    return ["<h3>What the resonance depends on</h3>", html.table(("torque in the shaft [Nm]", "[Hz]", "damping"), rows)]
+
+
 def _roots(model: LocalModel, study: Study, number: int) -> list[str]:
-    offline = study.found.batch.model
+    offline, best = study.found.batch.model, study.best.fit.model
     third = study.third_order.model
+    k = model.online.sample_time_s / offline.sample_time_s  # a pole sampled k times as slowly is its k-th power
     sets = [
+        PoleSet("best: Box-Jenkins", best.poles**k, best.zeros**k, BLACK),
         PoleSet("on line", model.online.poles, model.online.zeros, BLUE),
-        PoleSet("off line, 95 %", offline.poles, offline.zeros, VERMILION, regions=_regions(study)),
-        PoleSet("off line, third order", third.poles, third.zeros, GREEN, hidden=True),
+        PoleSet("output error, 95 %", offline.poles**k, offline.zeros**k, VERMILION, regions=_regions(study, k)),
+        PoleSet("output error, third order", third.poles**k, third.zeros**k, GREEN, hidden=True),
         *known_sets([model]),
     ]
     told = [html.paragraph(each.statement) for each in study.roots.cancellations]
     bound = shown(study.third_order.largest_error)
     note = (
-        "Crosses are poles, circles zeros. Outlines: where they are with 95 % confidence, a line for a real one; left "
+        f"Crosses are poles, circles zeros, drawn at the on-line model's period, {1e3 * model.online.sample_time_s:g} "
+        "ms (exact for poles alone). Outlines: where they are with 95 % confidence, a line for a real one; left "
         f"out where they would cover the map. The third-order equivalent changes the response by {bound} at most."
     )
     return [html.paragraph(note, "note"), *told, pole_figure(f"poles-{number}", sets, model.online.sample_time_s)]
 
 
-def _regions(study: Study) -> tuple[FloatArray, ...]:
-    outlines = [_outline(root) for root in (*study.roots.poles, *study.roots.zeros)]
+def _regions(study: Study, k: float) -> tuple[FloatArray, ...]:
+    outlines = [_outline(root, k) for root in (*study.roots.poles, *study.roots.zeros)]
     return tuple(each for each in outlines if np.isfinite(each).all() and np.ptp(each, axis=0).max() < LARGEST_REGION)
 
 
-def _outline(root: UncertainRoot) -> FloatArray:
-    around = root.ellipse()
+def _outline(root: UncertainRoot, k: float) -> FloatArray:
+    around = root.ellipse() ** k
     return np.column_stack([around.real, around.imag])
 
 
 def _free_run(study: Study, number: int) -> str:
-    data, error = study.found.data, study.validation.own.error
+    data, error = study.found.offline, study.validation.own.error
     measured = np.where(data.okay, data.output, np.nan)
     panels = (
         Panel(
             f"{data.kind.value}, high-passed",
-            (Line("measured", measured, Style.MEASURED), Line("off-line model", measured - error, Style.AFTER)),
+            (Line("measured", measured, Style.MEASURED), Line("output-error model", measured - error, Style.AFTER)),
         ),
         Panel("error", (Line("error", error, Style.BEFORE),)),
     )
@@ -86,19 +121,35 @@ def _free_run(study: Study, number: int) -> str:
 
 def _tests(study: Study) -> str:
     tests = study.validation
+    best, linearity = study.best, study.best.linearity
+    past = best.validation.independence
+    linear = "none seen: linear" if linearity.is_linear else f"not linear: it depends on {linearity.depends_on}"
     rows = [
-        ("residual with past input", shown_p(tests.independence.p_value), _verdict(tests.independence.is_independent)),
+        ("output error, with past input", shown_p(tests.independence.p_value), _verdict(tests.independence)),
         (
-            "residual with itself",
+            "Box-Jenkins, with past input",
+            shown_p(past.p_value),
+            _verdict(past),
+        ),
+        ("Box-Jenkins, with later input", shown_p(best.feedback.p_value), _feedback(study)),
+        ("Box-Jenkins, with functions of torque and speed", shown_p(linearity.p_value), linear),
+        (
+            "output error, with itself",
             shown_p(tests.autocorrelation.p_value),
             "shown; road and load colour it, and say nothing against the model",
         ),
     ]
-    if study.feedback is not None:
-        told = "none seen" if not study.feedback.detected else "the torque follows the speed"
-        rows.append(("feedback, at the recording's own period", shown_p(study.feedback.p_value), told))
-    return html.table(("test", "p", "result"), rows, numbers=(1,))
+    return html.table(("residual of", "p", "result"), rows, numbers=(1,))
 
 
-def _verdict(is_independent: bool) -> str:
-    return "independent: the model holds" if is_independent else "dependent: the model misses a part of the response"
+def _feedback(study: Study) -> str:
+    if not study.feedback.detected:
+        return "none seen: the torque does not follow the speed"
+    if not study.best.linearity.is_linear:
+        return "seen, which a drive that is not linear explains as well"
+    return "the torque follows the speed"
+
+
+def _verdict(test: CorrelationTest) -> str:
+    good = "independent: the model holds"
+    return good if test.is_independent else "dependent: the model misses a part of the response"

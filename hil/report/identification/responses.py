@@ -9,7 +9,7 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from estimator.identification.linear_model import ComplexArray
+from estimator.identification.linear_model import ComplexArray, LinearModel
 from estimator.signals.record import FloatArray, IntArray
 from hil.figures.local_model import LocalModel, decibels, degrees
 from hil.figures.palette import BLACK, BLUE, GREY, VERMILION, faded, series_colour
@@ -23,6 +23,9 @@ HEIGHT_PX = 760
 LOWEST_HZ = 0.5
 """Below, the high-pass has taken away what the models could be held against."""
 
+HIGHEST_HZ = 50.0
+"""Above there are no resonances of drivelines."""
+
 POINTS = 300
 
 CONFIDENCE = 1.96
@@ -31,13 +34,16 @@ CONFIDENCE = 1.96
 PHASE_TICKS_DEG = (-180, -90, 0, 90, 180)
 
 
-def response_figure(name: str, model: LocalModel) -> str:
-    """Draw one experiment: spectral estimate with its 95 % interval, both models, and the reference."""
+def response_figure(name: str, model: LocalModel, best: LinearModel | None = None) -> str:
+    """Draw one experiment: spectral estimate with its 95 % interval, the models, and the reference."""
     figure = _panels()
     f = frequencies_hz(model)
     _spectral(figure, model, GREY, "spectral estimate, 95 %", band=True)
-    _curve(figure, f, model.found.batch.model.response(f), "off-line model", {"color": VERMILION, "dash": "dash"})
-    _curve(figure, f, model.online.response(f), "on-line model", {"color": BLUE, "width": 2.2})
+    if best is not None:
+        _curve(figure, f, best.response(f), "best: Box-Jenkins", {"color": BLACK, "width": 2.2})
+    _curve(figure, f, model.found.batch.model.response(f), "output error", {"color": VERMILION, "dash": "dash"})
+    below = f[f <= 0.5 / model.online.sample_time_s]
+    _curve(figure, below, model.online.response(below), "on line", {"color": BLUE, "width": 2.2})
     _reference(figure, model, f)
     return figure_html(_finished(figure, [model]), name, HEIGHT_PX)
 
@@ -61,8 +67,8 @@ def responses_figure(name: str, models: Sequence[LocalModel]) -> str:
 
 
 def frequencies_hz(model: LocalModel) -> FloatArray:
-    """Return the frequencies a model is drawn at, up to its Nyquist frequency, shape (M,) [Hz]."""
-    return np.geomspace(LOWEST_HZ, 0.5 / model.online.sample_time_s, POINTS)
+    """Return the frequencies a model is drawn at, up to half the sampling rate or 50 Hz, shape (M,) [Hz]."""
+    return np.geomspace(LOWEST_HZ, min(0.5 / model.found.batch.model.sample_time_s, HIGHEST_HZ), POINTS)
 
 
 def _panels() -> go.Figure:

@@ -20,10 +20,10 @@ def numbers_table(models: Sequence[LocalModel], studies: Sequence[Study]) -> str
     """Return resonance and damping on line and off line, and how well the models do, of every recording."""
     headings = (
         "recording",
+        "best [Hz]",
+        "damping",
         "on line [Hz]",
-        "off line [Hz]",
-        "damping on line",
-        "off line",
+        "damping",
         "free-run fit",
         "one step",
         "unseen",
@@ -32,23 +32,24 @@ def numbers_table(models: Sequence[LocalModel], studies: Sequence[Study]) -> str
     rows = [_numbers(each) for each in studies]
     known = [model for model in models if model.reference_mode is not None]
     if known and (mode := known[0].reference_mode) is not None and known[0].reference is not None:
-        rows.append((known[0].reference.name, "", shown(mode.frequency_hz), "", shown(mode.damping), "", "", "", ""))
+        rows.append((known[0].reference.name, shown(mode.frequency_hz), shown(mode.damping), "", "", "", "", "", ""))
     note = (
-        "± is half the 95 % interval. Free-run fit: 100 % less the simulation error over the output's own variation; "
-        "one step ahead uses the measured output and is no measure of a model. Unseen: free run on the others."
+        "Best: the Box-Jenkins model. ± is half the 95 % interval. Free-run fit, of the output-error model: 100 % less "
+        "the simulation error over the output's own variation; one step ahead uses the measured output and is no "
+        "measure of a model. Unseen: free run on the others."
     )
     return html.table(headings, rows, numbers=range(1, 8)) + html.paragraph(note, "note")
 
 
 def _numbers(each: Study) -> tuple[str, ...]:
-    online, offline, own = each.found.online_resonance, each.resonance, each.validation.own
+    online, best, own = each.found.online_resonance, each.resonance, each.validation.own
     unseen = [run.fit_percent for run in each.validation.unseen]
     return (
         each.name,
+        "–" if best is None else plus_minus(best.frequency_hz),
+        "–" if best is None else plus_minus(best.damping),
         "–" if online is None else shown(online.frequency_hz),
-        "–" if offline is None else plus_minus(offline.frequency_hz),
         "–" if online is None else shown(online.damping),
-        "–" if offline is None else plus_minus(offline.damping),
         shown(own.fit_percent, "%"),
         shown(own.one_step_fit_percent, "%"),
         shown(sum(unseen) / len(unseen), "%") if unseen else "–",

@@ -14,32 +14,35 @@ from estimator.identification.online.recursive import Status
 from estimator.identification.study import Study
 from hil.report.identification.wording import plus_minus
 
+NAME_WIDTH = 20
+"""Longest name of a recording in the table; what is longer goes on in a second line."""
+
 
 def summary(studies: Sequence[Study], nominal: Mode | None) -> Table:
-    """Return resonance and damping of each recording, on line and off line; it fits into 80 columns.
+    """Return each recording's best estimate and on-line estimate; it fits into 80 columns, numbers are never cut.
 
     The status of the on-line estimates has a column where one of them is not as it should be.
     """
     wrong = any(each.found.estimate.status is not Status.ESTIMATED for each in studies)
     table = Table(title="Resonance and damping", title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
-    for heading in ("recording", "on line", "", "off line", "", "fit"):
-        table.add_column(heading, no_wrap=True)
+    table.add_column("recording", overflow="fold", max_width=NAME_WIDTH)
+    for heading in ("best [Hz]", "damping", "on line", "damping"):
+        table.add_column(heading, no_wrap=True, justify="right")
     if wrong:
-        table.add_column("on-line status")
+        table.add_column("on line is", no_wrap=True)
     for each in studies:
-        fit = f"{each.found.batch.fit_percent:.1f} %"
-        status = [_status(each)] if wrong else []
-        table.add_row(each.name, *_shown(each.found.online_resonance), *_known(each), fit, *status)
+        status = [each.found.estimate.status.value] if wrong else []
+        table.add_row(each.name, *_known(each), *_shown(each.found.online_resonance), *status)
     if nominal is not None:
         table.add_section()
-        table.add_row("model file", "", "", *_shown(nominal))
+        table.add_row("model file", *_shown(nominal), "", "")
     return table
 
 
 def compared_summary(compared: Iterable[Compared]) -> Table:
     """Return what several recursive estimators made of the same data."""
     table = Table(title="Recursive estimators", title_justify="left", box=SIMPLE_HEAD)
-    for heading in ("recording", "estimator", "frequency", "damping", "free-run fit", "status"):
+    for heading in ("recording", "estimator", "[Hz]", "damping", "fit", "status"):
         table.add_column(heading)
     told = list(compared)
     for each in told:
@@ -51,15 +54,9 @@ def compared_summary(compared: Iterable[Compared]) -> Table:
 
 
 def _shown(mode: Mode | None) -> tuple[str, str]:
-    return ("none", "") if mode is None else (f"{mode.frequency_hz:.2f} Hz", f"{mode.damping:.3f}")
+    return ("none", "") if mode is None else (f"{mode.frequency_hz:.2f}", f"{mode.damping:.3f}")
 
 
 def _known(each: Study) -> tuple[str, str]:
     mode = each.resonance
-    return ("none", "") if mode is None else (plus_minus(mode.frequency_hz, "Hz"), plus_minus(mode.damping))
-
-
-def _status(each: Study) -> str:
-    estimate = each.found.estimate
-    message = estimate.reason.message
-    return f"{estimate.status.value}: {message}" if message else estimate.status.value
+    return ("none", "") if mode is None else (plus_minus(mode.frequency_hz), plus_minus(mode.damping))

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from estimator.identification.modes.modes import Mode
+from estimator.identification.best import SEEN, Verdict
 from estimator.identification.modes.propagate import Uncertain
 from estimator.identification.online.recursive import Status
 from estimator.identification.study import Study
@@ -18,16 +18,78 @@ from hil.report.wording import listed
 FAR_APART = 0.03
 """On-line and off-line frequency further apart than this share are worth a warning: docs/identification.md."""
 
-
 LITTLE_PERCENT = 50.0
 """Free-run fit below which most of the output comes from elsewhere than from the torque."""
+
+ADVICE = {
+    Verdict.GOOD: "the linear model is good",
+    Verdict.NOT_LINEAR: "the drive is not linear, and its damping depends on {depends}",
+    Verdict.CLOSED_LOOP: "the torque follows the speed (closed loop); the Box-Jenkins model allows for that, the "
+    "output-error, recursive and spectral estimates may be biased",
+    Verdict.NOT_EXCITED: "no pole pair: {reason}",
+    Verdict.INCOMPLETE: "the model misses a part of the response to past torque",
+}
+"""What each verdict says of a recording."""
+
+CURES = {
+    Verdict.GOOD: "",
+    Verdict.NOT_LINEAR: "Take frequency and damping for this torque only; hil diagnose names the cause",
+    Verdict.CLOSED_LOOP: "Hold the torque but for the PRBS, or believe the Box-Jenkins model",
+    Verdict.NOT_EXCITED: "Raise the PRBS, record longer or faster, or expect none",
+    Verdict.INCOMPLETE: "Look at the residual tests; try --order auto, or diagnose the recording",
+}
+
+
+def verdict(each: Study) -> str:
+    """Return one sentence: whether to believe the linear model of a recording, and what to do."""
+    best = each.best
+    says = ADVICE[best.verdict].format(depends=best.linearity.depends_on, reason=best.reason)
+    cure = CURES[best.verdict]
+    text = f"{each.name}: {says}." + (f" {cure}." if cure else "")
+    if best.too_slow and best.mode is not None:
+        f, period_s = best.mode.frequency_hz.value, best.fit.model.sample_time_s
+        text += (
+            f" {1.0 / (f * period_s):.1f} samples in a period of {f:.3g} Hz are too few for its damping: record every "
+            f"{1e3 / (10.0 * f):.2g} ms."
+        )
+    elif best.band_hz[1] < LEAST_BAND_HZ:
+        text += (
+            f" Sampled every {1e3 * best.fit.model.sample_time_s:g} ms, no mode above {best.band_hz[1]:.3g} Hz can be "
+            f"seen: record every {1e3 * SEEN * 0.5 / LEAST_BAND_HZ:g} ms or faster."
+        )
+    if apart := _apart(each):
+        text += f" The on-line estimate is {100.0 * apart:.1f} % off in frequency: see its course before you use it."
+    return text
+
+
+def best_statement(each: Study) -> str:
+    """Return the best estimate in a sentence, or why there is none."""
+    best = each.best
+    if best.mode is None:
+        return f"No resonance between {best.band_hz[0]:g} and {best.band_hz[1]:.3g} Hz: {best.reason}."
+    text = (
+        f"Resonance at {plus_minus(best.mode.frequency_hz, 'Hz')}, damping {plus_minus(best.mode.damping)} (95 %), by "
+        f"a Box-Jenkins model of order {best.fit.model.orders.na} at {1e3 * best.fit.model.sample_time_s:g} ms."
+    )
+    if best.regions:
+        seen = "; ".join(
+            f"{one.low:.0f} to {one.high:.0f} Nm: "
+            + ("none" if one.mode is None else f"{one.mode.frequency_hz:.3g} Hz, {one.mode.damping:.3f}")
+            for one in best.regions
+        )
+        text += f" By torque in the shaft: {seen}."
+    return text
+
+
+LEAST_BAND_HZ = 25.0
+"""Up to here driveline resonances are common; a recording that can't show them is told so."""
 
 
 def headline(studies: Sequence[Study]) -> str:
     """Return the result in a line."""
     modes = [each.resonance for each in studies if each.resonance is not None]
     if not modes:
-        return "No lightly damped mode in the band"
+        return "No resonance that the data need"
     frequencies = [mode.frequency_hz.value for mode in modes]
     dampings = [mode.damping.value for mode in modes]
     return f"Resonance at {_span(frequencies, 'Hz')}, damping {_span(dampings)}"
@@ -45,16 +107,18 @@ def statement(models: Sequence[LocalModel], studies: Sequence[Study]) -> str:
     seconds = sum(float(np.count_nonzero(m.record.okay)) * m.record.sample_time_s for m in models)
     count = f"{len(models)} recordings" if len(models) > 1 else f"recording {models[0].name}"
     text = (
-        f"From {count}, {seconds:.0f} s of good samples, models with nA = {orders.na}, nB = {orders.nb} and a total "
-        f"delay of {orders.nk} were identified at {1e3 * first.online.sample_time_s:g} ms, on line by OEFO and off "
-        "line by an output-error fit."
+        f"From {count}, {seconds:.0f} s of good samples: off line by Box-Jenkins and output-error models at "
+        f"{1e3 * first.batch.model.sample_time_s:g} ms, on line by OEFO with nA = {orders.na}, nB = {orders.nb} and a "
+        f"total delay of {orders.nk} at {1e3 * first.online.sample_time_s:g} ms."
     )
     modes = [each.resonance for each in studies if each.resonance is not None]
     if modes:
         widest = max(mode.frequency_hz.ci95[1] - mode.frequency_hz.ci95[0] for mode in modes) / 2.0
-        text += f" Off line the resonance is known to ± {shown(widest, 'Hz')} in each (95 %)."
+        text += f" The resonance is known to ± {shown(widest, 'Hz')} in each (95 %)."
+    low, high = studies[0].best.band_hz
+    text += f" It was looked for between {low:g} and {high:.3g} Hz, what the sampling allows."
     fits = [each.validation.own.fit_percent for each in studies]
-    text += f" Simulated in free run, the off-line model reproduces {_span(fits, '%')} of its recording"
+    text += f" Simulated in free run, the output-error model reproduces {_span(fits, '%')} of its recording"
     unseen = [run.fit_percent for each in studies for run in each.validation.unseen]
     return text + (f" and {_span(unseen, '%')} of the others." if unseen else ".")
 
@@ -72,22 +136,20 @@ def warnings(studies: Sequence[Study]) -> list[str]:
                 "from elsewhere than from the torque, and a resonance of such a model is none to believe. Raise the "
                 "PRBS or record longer."
             )
-        if each.feedback is not None and each.feedback.detected:
-            told.append(f"{each.name}: {each.feedback.statement}")
-        if apart := _apart(each.found.online_resonance, each.found.batch_resonance):
-            told.append(f"{each.name}: on line and off line differ by {100.0 * apart:.1f} % in frequency.")
     if missed := [each.name for each in studies if not each.validation.independence.is_independent]:
         told.append(
-            f"In {listed(missed)} the residual still depends on the input: the models miss a part of the response. "
-            "Resonance and damping can be right all the same; look at the frequency response and the residual tests."
+            f"In {listed(missed)} the output-error model's residual still depends on the input: it misses a part of "
+            "the response. The best estimate has tests of its own."
         )
     return told
 
 
-def _apart(online: Mode | None, offline: Mode | None) -> float:
-    if online is None or offline is None:
+def _apart(each: Study) -> float:
+    """Return by how much on-line and best frequency differ, relative; 0 where they agree or one is missing."""
+    online, best = each.found.online_resonance, each.resonance
+    if online is None or best is None:
         return 0.0
-    apart = abs(online.frequency_hz / offline.frequency_hz - 1.0)
+    apart = abs(online.frequency_hz / best.frequency_hz.value - 1.0)
     return apart if apart > FAR_APART else 0.0
 
 

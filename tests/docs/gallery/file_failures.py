@@ -5,6 +5,8 @@ from __future__ import annotations
 from functools import partial
 from pathlib import Path
 
+import can
+
 from tests.cli import bench
 from tests.docs.gallery.case import Failure, Told, said
 from tests.docs.gallery.recordings import cruise
@@ -40,6 +42,22 @@ def data_sheet(before: str, after: str) -> Told:
     return told_of("hil check --eds drive.eds")
 
 
+def unsigned_torque() -> Told:
+    """Check an EDS that has the torque actual value without a sign."""
+    before = "[6077]\nParameterName=Torque actual value\nObjectType=0x7\nDataType=0x0003"
+    return data_sheet(before, before.replace("0x0003", "0x0006"))
+
+
+def two_channels() -> Told:
+    """Replay a log of two buses."""
+    write_rig()
+    with can.Logger("drive.log") as logger:
+        for n in range(3):
+            for channel in ("can0", "can1"):
+                logger(can.Message(timestamp=1.0 + n, arbitration_id=0x80, is_extended_id=False, channel=channel))
+    return told_of("hil replay drive.log --rig rig.toml --out again.csv")
+
+
 def limits_refused() -> Told:
     """Plan a run whose PRBS is above what its limits allow."""
     write_rig((("amplitude_nm = 120.0", "amplitude_nm = 300.0"),))
@@ -73,6 +91,8 @@ FILES = (
     Failure("rig_file", rig_file, quick=True),
     Failure("missing_eds_object", partial(data_sheet, "\n[6071]\n", "\n[60B3]\n"), quick=True),
     Failure("wrong_pdo_map", partial(data_sheet, MAPPED, OTHER_FOR_GOOD), quick=True),
+    Failure("unsigned_torque", unsigned_torque, quick=True),
+    Failure("two_channels", two_channels, quick=True),
     Failure("limits_refused", limits_refused, quick=True),
     Failure("time_backwards", time_backwards, quick=True),
     Failure("cut_recording", cut_short, quick=True),

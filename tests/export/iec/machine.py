@@ -1,4 +1,4 @@
-"""A PLC of one function block: the text translated to C, compiled by gcc, called from here."""
+"""A PLC of one function block or program: the text translated to C, compiled by gcc, called from here."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ FLAGS = ("-std=c11", "-O2", "-ffp-contract=off", "-Wall", "-Werror", "-Wno-paren
 
 
 class Machine:
-    """One instance of a function block; inputs are set and outputs read by name."""
+    """One instance of a function block or program; inputs are set and outputs read by name."""
 
     def __init__(self, text: str, block: str, folder: Path) -> None:
         blocks = Parser(text).blocks()
@@ -51,8 +51,8 @@ def _structures(blocks: dict[str, Block]) -> dict[str, Any]:
     for block in blocks.values():
         fields = []
         for variable in block.variables.values():
-            kind = NUMBERS.get(variable.type) or made[variable.type]
-            for low, high in reversed(variable.bounds):
+            kind = NUMBERS.get(variable.shape.element) or made[variable.shape.element]
+            for low, high in reversed(variable.shape.bounds):
                 kind = kind * (high - low + 1)
             fields.append((variable.name, kind))
         made[block.name] = type(block.name, (ctypes.Structure,), {"_fields_": fields})

@@ -18,8 +18,6 @@ HEAD = """#include <math.h>
 #include <string.h>
 #define NUMBER(x) ({real})(x)
 #define ABS(x) {abs}(x)
-#define MAX(a, b) ((a) > (b) ? (a) : (b))
-#define MIN(a, b) ((a) < (b) ? (a) : (b))
 static int at(int i, int low, int high) {{ if (i < low || i > high) abort(); return i - low; }}
 #define AT(i, low, high) at(i, low, high)
 """
@@ -27,7 +25,7 @@ static int at(int i, int low, int high) {{ if (i < low || i > high) abort(); ret
 
 def to_c(blocks: dict[str, Block]) -> str:
     """Return the program; NAME_start(self) puts a block into its first state, NAME(self) calls it."""
-    kinds = {variable.type for block in blocks.values() for variable in block.variables.values()}
+    kinds = {variable.shape.element for block in blocks.values() for variable in block.variables.values()}
     single = "REAL" in kinds
     lines = [HEAD.format(real="float" if single else "double", abs="fabsf" if single else "fabs")]
     for block in blocks.values():
@@ -38,8 +36,8 @@ def to_c(blocks: dict[str, Block]) -> str:
 def _block(block: Block) -> Iterator[str]:
     yield "typedef struct {"
     for variable in block.variables.values():
-        sizes = "".join(f"[{high - low + 1}]" for low, high in variable.bounds)
-        yield f"  {TYPES.get(variable.type, variable.type)} {variable.name}{sizes};"
+        sizes = "".join(f"[{high - low + 1}]" for low, high in variable.shape.bounds)
+        yield f"  {TYPES.get(variable.shape.element, variable.shape.element)} {variable.name}{sizes};"
     yield f"}} {block.name};"
     yield f"void {block.name}_start({block.name} *self) {{"
     yield "  char *bytes = (char *)self; for (size_t i = 0; i < sizeof *self; i++) bytes[i] = 0;"
@@ -52,10 +50,11 @@ def _block(block: Block) -> Iterator[str]:
 
 
 def _start(variable: Variable) -> Iterator[str]:
-    if variable.type not in TYPES:
-        yield f"  {variable.type}_start(&self->{variable.name});"
+    kind = variable.shape.element
+    if kind not in TYPES:
+        yield f"  {kind}_start(&self->{variable.name});"
     for number, value in enumerate(variable.initial):
-        yield f"  self->{variable.name}{f'[{number}]' if variable.bounds else ''} = {value};"
+        yield f"  self->{variable.name}{f'[{number}]' if variable.shape.bounds else ''} = {value};"
 
 
 def _statements(body: tuple[Statement, ...]) -> Iterator[str]:
@@ -72,7 +71,7 @@ def _statement(statement: Statement) -> Iterator[str]:
                 place = f"self->{instance.name}.{name}"
                 is_array = value.type == "array"
                 yield f"memcpy({place}, {value.c}, sizeof {place});" if is_array else f"{place} = {value.c};"
-            yield f"{instance.type}_call(&self->{instance.name});"
+            yield f"{instance.shape.element}_call(&self->{instance.name});"
         case If(branches):
             for number, (condition, inner) in enumerate(branches):
                 word = "else" if condition is None else f"{'else ' if number else ''}if ({condition.c})"

@@ -1,4 +1,4 @@
-"""The tree of a text: what a function block declares and what it does, typed."""
+"""The tree of a text: what a function block or a program declares and what it does, typed."""
 
 from __future__ import annotations
 
@@ -6,26 +6,47 @@ from dataclasses import dataclass, field
 
 REALS = ("LREAL", "REAL")
 INTEGERS = ("INT", "DINT")
+ELEMENTARY = ("BOOL", *INTEGERS, *REALS)
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """A type: an elementary one or a function block, or an array of the former under a name, or under none ('')."""
+
+    element: str
+    bounds: tuple[tuple[int, int], ...] = ()
+    name: str = ""
+
+    @property
+    def size(self) -> int:
+        """Number of elements."""
+        found = 1
+        for low, high in self.bounds:
+            found *= high - low + 1
+        return found
 
 
 @dataclass(frozen=True, slots=True)
 class Variable:
-    """A declared variable; ``type`` is an elementary type or a function block; ``bounds`` those of an array."""
+    """A declared variable; ``section`` is the keyword it stands under."""
 
     name: str
-    type: str
-    bounds: tuple[tuple[int, int], ...] = ()
-    initial: tuple[str, ...] = ()  # literals in C's spelling
+    shape: Shape
+    section: str = "VAR"
     constant: bool = False
-    is_input: bool = False
+    initial: tuple[str, ...] = ()  # literals in C's spelling
 
 
 @dataclass(frozen=True, slots=True)
 class Expression:
-    """C text of an expression and the type it has in Structured Text; literals of integers have type ``int``."""
+    """C text of an expression and its type in Structured Text; literals have type ``int`` or ``real``.
+
+    ``literal`` is the value of a literal integer, with its sign.
+    """
 
     c: str
     type: str
+    literal: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,8 +85,9 @@ Statement = Assign | Call | If | For | Exit
 
 @dataclass(slots=True)
 class Block:
-    """A function block."""
+    """A function block or a program."""
 
     name: str
+    is_program: bool = False
     variables: dict[str, Variable] = field(default_factory=dict)  # by name in small letters: ST tells no case
     body: tuple[Statement, ...] = ()

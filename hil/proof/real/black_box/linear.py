@@ -19,7 +19,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from estimator.identification.linear_model import LinearModel, Orders, free_response
-from estimator.identification.offline.problem import MOST_EVALUATIONS, REFUSED
+from estimator.identification.offline.problem import MOST_EVALUATIONS
 from estimator.identification.offline.starts import candidates
 from estimator.signals.record import FloatArray, OutputKind
 from hil.proof.real.black_box.series import Stretch
@@ -33,6 +33,9 @@ SOURCES = 3
 MOST_STARTS = 3
 """Starts that are followed, those of the least error first."""
 
+
+REFUSED = 1e100
+"""Error of every sample at an unstable A: above any other, and finite, as the solver needs it."""
 
 LEAK = 0.1
 """Share of a position that a start forgets over a whole stretch."""

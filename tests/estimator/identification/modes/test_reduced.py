@@ -67,7 +67,7 @@ def test_the_papers_fourth_order_models_keep_their_resonance(
     cruises: list[Cruise], identified: list[Identification]
 ) -> None:
     for drive, result in zip(cruises, identified, strict=True):
-        mode = resonance(third_order(result.batch.model, result.batch.covariance).model)
+        mode = resonance(third_order(result.batch.model).model)
         assert mode is not None
         assert mode.frequency_hz == pytest.approx(drive.resonance_hz, rel=0.01)
         assert mode.damping == pytest.approx(drive.damping, rel=0.15)

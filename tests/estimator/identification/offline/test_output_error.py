@@ -51,7 +51,7 @@ def test_with_noise_the_residual_falls_to_it_and_the_parameters_lie_in_their_int
 def test_the_state_before_the_first_sample_is_estimated() -> None:
     state = np.array([40.0, -30.0, 25.0])
     fit = fitted(noisy(1, noise=0.05, state=state))
-    np.testing.assert_allclose(fit.state, state, atol=0.3)
+    np.testing.assert_allclose(fit.state[:-1], state, atol=0.3)
     assert fit.rms == pytest.approx(0.05, rel=0.06)
 
 

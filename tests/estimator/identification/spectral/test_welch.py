@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.signal
@@ -80,8 +82,10 @@ def test_an_input_without_power_has_no_coherence_and_infinite_error() -> None:
 
 
 def test_too_few_unbroken_segments_are_refused() -> None:
-    with pytest.raises(NotExciting, match="2 unbroken segments of 256 samples") as refusal:
-        spectral_estimate(record(400, noise=0.1), 256)
+    source = record(400, noise=0.1)
+    okay = np.arange(400) % 40 > 10  # gaps of 0.22 s, and 0.58 s between them
+    with pytest.raises(NotExciting, match=r"0 unbroken segments of 1\.28 s, expected 3 or more") as refusal:
+        spectral_estimate(replace(source, okay=okay), 256)
     assert refusal.value.names == ("frequency response",)
 
 

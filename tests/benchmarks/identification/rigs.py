@@ -1,23 +1,17 @@
-"""``python -m tests.benchmarks.identification``: how right the identified models are, over many simulated runs.
+"""How right the identified models are on the drivelines of the tests and of the proof: no driver holds the speed there.
 
 ``accuracy``  eight cruises, as many as the paper has: resonance and damping on line (N = 1024, Ts = 20 ms) and off line
               against the truth; frequency responses against each other around the resonance
 ``coverage``  how often the 95 % intervals of the off-line model hold the truth: resonance, damping, physical parameters
 ``truth``     the same on the independent truth simulator: every run another bus, other inverters, another road
-
-Rates are told with their own 95 % confidence interval (E. B. Wilson, J. American Statistical Association 22, 1927).
 """
 
 from __future__ import annotations
 
-import argparse
-import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
-from scipy.stats import binomtest
 
 from estimator.identification.identify import identify
 from estimator.identification.linear_model import LinearModel, Orders
@@ -33,11 +27,12 @@ from estimator.signals.record import Record
 from hil.proof.truth.bus import NOMINAL_ERROR
 from hil.proof.truth.case import record as drive
 from hil.proof.truth.specimen import draw_specimen
+from tests.benchmarks.identification.scores import Rate
 from tests.benchmarks.ratios import table
 from tests.estimator.identification import driveline
 from tests.estimator.identification.driveline import cruise
 
-RUNS, EXPERIMENTS = 200, 8
+EXPERIMENTS = 8
 
 FIRST_SEED = 10_000
 """Far from the seeds of the tests, on which settings were chosen."""
@@ -102,31 +97,6 @@ def estimates(truth: Truth) -> dict[str, tuple[Uncertain, float]]:
         "damping": (mode.damping, truth.mode.damping),
         **{name: (both[name].estimate, value) for name, value in truth.parameters.items()},
     }
-
-
-@dataclass(frozen=True, slots=True)
-class Rate:
-    """How often something held, and how well that is known."""
-
-    held: int
-    runs: int
-
-    @property
-    def value(self) -> float:
-        """Share."""
-        return self.held / self.runs
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        """95 % confidence, Wilson's."""
-        ends = binomtest(self.held, self.runs).proportion_ci(method="wilson")
-        return float(ends.low), float(ends.high)
-
-    @property
-    def text(self) -> str:
-        """As a table shows it."""
-        low, high = self.interval
-        return f"{100 * self.value:.1f} % ({100 * low:.1f} to {100 * high:.1f})"
 
 
 def coverage(truths: Iterator[Truth]) -> dict[str, tuple[Rate, float, float]]:
@@ -220,29 +190,3 @@ def accuracy(source: Callable[[int], Iterator[Truth]] = cruises) -> str:
 def truth_part(runs: int) -> str:
     """Both comparisons on the truth simulator's buses."""
     return f"{accuracy(buses)}\n{coverage_table(runs, buses)}"
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Simulate, identify and write the report; return the exit status."""
-    parts: dict[str, Callable[[int], str]] = {
-        "accuracy": lambda _: accuracy(),
-        "coverage": partial(coverage_table, source=cruises),
-        "truth": truth_part,
-    }
-    parser = argparse.ArgumentParser(
-        prog="python -m tests.benchmarks.identification", description="How right the identified models are."
-    )
-    parser.add_argument("parts", nargs="*", metavar="PART", help=f"{', '.join(parts)} (default: all)")
-    parser.add_argument("--runs", type=int, default=RUNS, help="runs of each rate (default: %(default)s)")
-    options = parser.parse_args(arguments)
-    unknown = [name for name in options.parts if name not in parts]
-    if unknown:
-        parser.error(f"expected {', '.join(parts)}, came {', '.join(unknown)}")
-    for name in options.parts or parts:
-        sys.stdout.write(f"\n### {name.capitalize()}\n\n{parts[name](options.runs)}")
-        sys.stdout.flush()
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

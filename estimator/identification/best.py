@@ -1,0 +1,207 @@
+"""The best estimate of a recording: a pole pair that the data need, its intervals, and whether to believe it.
+
+A Box-Jenkins model at the recording's own period, where the torque was held from one sample to the next. Its order is
+that of two masses, three, and is raised only where the residual still depends on past torque. The pair is given where
+the data pay for it (a model without is worse by the Bayesian criterion), where no zero cancels it, and where its
+frequency is known to better than a half.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+from estimator.identification.linear_model import Orders
+from estimator.identification.modes.cancellation import Cancellation
+from estimator.identification.modes.physical import RESPONDING
+from estimator.identification.modes.uncertainty import UncertainMode, pole_zero_map, uncertain_modes
+from estimator.identification.offline.blocks import block_of
+from estimator.identification.offline.box_jenkins import fit_of, solved
+from estimator.identification.offline.feedback import Feedback, judge_feedback
+from estimator.identification.offline.linear_fit import LinearFit
+from estimator.identification.offline.linearity import Linearity, judge_linearity, shaft_torque
+from estimator.identification.offline.orders import criterion
+from estimator.identification.offline.problem import Problem
+from estimator.identification.offline.regions import RegionalMode, modes_by_region
+from estimator.identification.offline.validation import Validation, validate
+from estimator.signals.decimate import HIGH_PASS_HZ, high_passed
+from estimator.signals.record import FloatArray, Record
+
+RIGID = Orders(1, 1, 1)
+"""One mass: the model that a pole pair has to be better than."""
+
+RICHER = (Orders(4, 4, 1), Orders(5, 5, 1))
+"""Tried where two masses miss a part of the response: a lag or a further delay, a third mass."""
+
+SEEN = 0.8
+"""Part of half the sampling rate up to which a mode is looked for: above, its samples say little of its damping."""
+
+LOWEST_HZ, HIGHEST_HZ = 2.0, 50.0
+"""Below, road and driver move the speed; above lie no resonances of drivelines (the paper's band ends there)."""
+
+SAMPLES_PER_PERIOD = 4.0
+"""Fewer samples in one period of the resonance leave its damping to the low-pass of the sampling."""
+
+MOST_UNCERTAIN = 0.5
+"""Largest half width of the frequency's 95 % interval, in parts of it."""
+
+
+class Verdict(Enum):
+    """What a reader may do with the linear model; the value is its name in files."""
+
+    GOOD = "model_good"
+    NOT_LINEAR = "not_linear"
+    CLOSED_LOOP = "closed_loop"
+    NOT_EXCITED = "not_excited"
+    INCOMPLETE = "incomplete"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BestEstimate:
+    """The headline of one recording.
+
+    Attributes
+    ----------
+    fit : LinearFit
+        The Box-Jenkins model it is taken from.
+    two_mass : LinearFit
+        The one of third order, which physical parameters are taken from.
+    mode : UncertainMode or None
+        The pole pair, None where the data carry none.
+    reason : str
+        Why there is none.
+    band_hz : tuple of float
+        Where it was looked for [Hz].
+    validation : Validation
+        Of the fit on its recording.
+    feedback : Feedback
+        Whether the torque followed the speed.
+    linearity : Linearity
+        Whether a linear model is enough.
+    regions : tuple of RegionalMode
+        The resonance by region of the shaft's torque [Nm]; empty where the drive is linear.
+    verdict : Verdict
+    """
+
+    fit: LinearFit
+    two_mass: LinearFit
+    mode: UncertainMode | None
+    reason: str
+    band_hz: tuple[float, float]
+    validation: Validation
+    feedback: Feedback
+    linearity: Linearity
+    regions: tuple[RegionalMode, ...]
+    verdict: Verdict
+
+    @property
+    def too_slow(self) -> bool:
+        """Tell whether the recording has too few samples in a period of the resonance."""
+        period_s = self.fit.model.sample_time_s
+        return self.mode is not None and self.mode.frequency_hz.value * period_s > 1.0 / SAMPLES_PER_PERIOD
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Rung:
+    """One order tried: its problem, minimum and fit."""
+
+    problem: Problem
+    x: FloatArray
+    first: int
+    fit: LinearFit
+    validation: Validation
+
+
+def best_estimate(record: Record, high_pass_hz: float = HIGH_PASS_HZ) -> BestEstimate:
+    """Return the best estimate of a recording.
+
+    Parameters
+    ----------
+    record : Record
+        As recorded; not changed.
+    high_pass_hz : float
+        Corner of the high-pass [Hz].
+
+    Raises
+    ------
+    NotExciting
+        If the recording can't determine a third-order model.
+    """
+    data = high_passed(record, high_pass_hz)
+    rungs = [_rung(data, RESPONDING)]
+    if not rungs[0].validation.independence.is_independent:
+        rungs += [_rung(data, orders) for orders in RICHER]
+    chosen = min(rungs, key=lambda rung: criterion(rung.fit))
+    band_hz = band_of(record)
+    mode, reason = _needed_pair(chosen.fit, band_hz, _rung(data, RIGID).fit)
+    linearity = judge_linearity(chosen.problem, chosen.x, record, chosen.first, high_pass_hz)
+    feedback = judge_feedback(chosen.validation)
+    regions: tuple[RegionalMode, ...] = ()
+    if not linearity.is_linear:
+        signal = shaft_torque(chosen.fit.model, record.total_torque_nm[chosen.first :])
+        regions = modes_by_region(chosen.problem, chosen.x, signal, band_hz)
+    return BestEstimate(
+        fit=chosen.fit,
+        two_mass=rungs[0].fit,
+        mode=mode,
+        reason=reason,
+        band_hz=band_hz,
+        validation=chosen.validation,
+        feedback=feedback,
+        linearity=linearity,
+        regions=regions,
+        verdict=_verdict(mode, chosen.validation, feedback, linearity),
+    )
+
+
+def band_of(record: Record) -> tuple[float, float]:
+    """Return where a recording's resonance is looked for [Hz]."""
+    period_s = record.sample_time_s * block_of(record.sample_time_s)
+    return LOWEST_HZ, min(HIGHEST_HZ, SEEN * 0.5 / period_s)
+
+
+def _rung(data: Record, orders: Orders) -> _Rung:
+    problem, x, first = solved(data, orders)
+    fit = fit_of(problem, x, first)
+    return _Rung(problem, x, first, fit, validate(fit, data))
+
+
+def _needed_pair(fit: LinearFit, band_hz: tuple[float, float], rigid: LinearFit) -> tuple[UncertainMode | None, str]:
+    """Return the pair of the highest peak that the data need, or why there is none."""
+    low, high = band_hz
+    within = f"between {low:g} and {high:.3g} Hz"
+    pairs = [each for each in uncertain_modes(fit.model, fit.covariance) if low <= each.frequency_hz.value <= high]
+    if not pairs:
+        return None, f"the model has no oscillating pole pair {within}"
+    if criterion(rigid) <= criterion(fit):
+        return None, "one mass explains the recording as well: the data do not need a pole pair"
+    cancelled = [_frequency_hz(one, fit) for one in pole_zero_map(fit.model, fit.covariance).cancellations]
+    needed = [each for each in pairs if not np.isclose(each.frequency_hz.value, cancelled, rtol=1e-6).any()]
+    if not needed:
+        return None, f"the pole pair at {pairs[0].frequency_hz.value:.3g} Hz and a pair of zeros can't be told apart"
+    sure = [each for each in needed if _half_width(each) <= MOST_UNCERTAIN * each.frequency_hz.value]
+    if not sure:
+        return None, f"a pole pair {within} is there, its frequency not known to better than a half"
+    return sure[0], ""
+
+
+def _frequency_hz(one: Cancellation, fit: LinearFit) -> float:
+    return float(abs(np.log(one.pole)) / (2.0 * np.pi * fit.model.sample_time_s)) if one.pole.imag else 0.0
+
+
+def _half_width(mode: UncertainMode) -> float:
+    low, high = mode.frequency_hz.ci95
+    return (high - low) / 2.0
+
+
+def _verdict(mode: UncertainMode | None, validation: Validation, feedback: Feedback, linearity: Linearity) -> Verdict:
+    """Name what matters most; a nonlinear drive also looks like feedback, so that it comes first."""
+    if mode is None:
+        return Verdict.NOT_EXCITED
+    if not linearity.is_linear:
+        return Verdict.NOT_LINEAR
+    if not validation.independence.is_independent:
+        return Verdict.INCOMPLETE
+    return Verdict.CLOSED_LOOP if feedback.detected else Verdict.GOOD

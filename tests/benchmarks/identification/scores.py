@@ -1,0 +1,148 @@
+"""Errors of the methods over many buses, and how often printed intervals held the truth."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from statistics import median
+
+import numpy as np
+from scipy.stats import binomtest
+
+from tests.benchmarks.identification.run import Judged
+
+
+@dataclass(frozen=True, slots=True)
+class Rate:
+    """How often something held, and how well that is known."""
+
+    held: int
+    runs: int
+
+    @property
+    def value(self) -> float:
+        """Share; NaN of none."""
+        return self.held / self.runs if self.runs else math.nan
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 % confidence (E. B. Wilson, J. American Statistical Association 22, 1927)."""
+        ends = binomtest(self.held, self.runs).proportion_ci(method="wilson")
+        return float(ends.low), float(ends.high)
+
+    @property
+    def text(self) -> str:
+        """As a table shows it."""
+        if not self.runs:
+            return "none"
+        low, high = self.interval
+        return f"{100 * self.value:.1f} % ({100 * low:.1f} to {100 * high:.1f})"
+
+
+@dataclass(frozen=True, slots=True)
+class Errors:
+    """Relative errors of a method over the buses it answered for [%], and what it cost.
+
+    ``worst_seed`` is that of the bus with the largest error of frequency.
+    """
+
+    method: str
+    frequency_rms: float
+    damping_rms: float
+    frequency_worst: float
+    damping_worst: float
+    worst_seed: int
+    none: Rate
+    cpu_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Coverage:
+    """How often the printed intervals of one quantity held the truth.
+
+    Attributes
+    ----------
+    method, quantity
+        Whose, and of what.
+    held : Rate
+        Of all intervals printed.
+    held_determined : Rate
+        Of those called determined.
+    impossible : int
+        Called determined although all of the interval is at or below 0.
+    refused : int
+        Buses without such an interval.
+    error_rms, half_width : float
+        Relative to the truth: RMS of the error, and the median half width of the intervals.
+    scatter : float
+        Error over stated standard deviation, its median size over that of a normal variable: 1 is right.
+    """
+
+    method: str
+    quantity: str
+    held: Rate
+    held_determined: Rate
+    impossible: int
+    refused: int
+    error_rms: float
+    half_width: float
+    scatter: float
+
+
+NORMAL_QUARTILE, NORMAL_95 = 0.67449, 1.95996
+
+
+def errors(judged: Sequence[Judged], method: str) -> Errors:
+    """Return the errors of a method."""
+    answered = [one for one in judged if one.answers[method].is_there]
+    relative = np.array(
+        [
+            (one.answers[method].frequency_hz / one.truth["frequency"] - 1.0,
+             one.answers[method].damping / one.truth["damping"] - 1.0)
+            for one in answered
+        ]
+    ).reshape(-1, 2)  # fmt: skip
+    size = 100.0 * np.abs(relative)
+    rms = np.sqrt(np.mean(size**2, axis=0)) if answered else np.full(2, math.nan)
+    worst = size.max(axis=0) if answered else np.full(2, math.nan)
+    return Errors(
+        method=method,
+        frequency_rms=float(rms[0]),
+        damping_rms=float(rms[1]),
+        frequency_worst=float(worst[0]),
+        damping_worst=float(worst[1]),
+        worst_seed=answered[int(size[:, 0].argmax())].seed if answered else -1,
+        none=Rate(len(judged) - len(answered), len(judged)),
+        cpu_s=median(one.answers[method].cpu_s for one in judged),
+    )
+
+
+def coverages(judged: Sequence[Judged], method: str) -> list[Coverage]:
+    """Return the coverage of every quantity that a method prints with an interval."""
+    names = [name for name in judged[0].truth if any(name in one.answers[method].intervals for one in judged)]
+    return [coverage(judged, method, name) for name in names]
+
+
+def coverage(judged: Sequence[Judged], method: str, quantity: str) -> Coverage:
+    """Return the coverage of one quantity."""
+    pairs = [
+        (one.answers[method].intervals[quantity], one.truth[quantity])
+        for one in judged
+        if quantity in one.answers[method].intervals
+    ]
+    determined = [(interval, truth) for interval, truth in pairs if interval.is_determined]
+    half = np.array([0.5 * (interval.high - interval.low) for interval, _ in pairs])
+    error = np.array([interval.value - truth for interval, truth in pairs])
+    size = np.abs([truth for _, truth in pairs])
+    return Coverage(
+        method=method,
+        quantity=quantity,
+        held=Rate(sum(interval.holds(truth) for interval, truth in pairs), len(pairs)),
+        held_determined=Rate(sum(interval.holds(truth) for interval, truth in determined), len(determined)),
+        impossible=sum(interval.high <= 0.0 for interval, _ in determined),
+        refused=len(judged) - len(pairs),
+        error_rms=float(100.0 * np.sqrt(np.mean((error / size) ** 2))),
+        half_width=float(100.0 * np.median(half / size)),
+        scatter=float(np.median(np.abs(error) / half) * NORMAL_95 / NORMAL_QUARTILE),
+    )

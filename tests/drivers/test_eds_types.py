@@ -1,0 +1,134 @@
+"""What a data sheet has wrong that would be read as other numbers, and what of a drive a run has to be told."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from drivers.capability.carrier import RPDO
+from drivers.datasheet.finding import Severity
+from drivers.errors import ConfigMismatch
+from drivers.resources import data_file
+from drivers.scaling import IntegerType, TorqueScale
+from tests.drivers.eds_bench import E, W, checked, edited, line_of
+from tests.drivers.fake_drive import FakeDrive, on_bus
+
+COUNTER = """[1019]
+ParameterName=Synchronous counter overflow value
+ObjectType=0x7
+DataType=0x0005
+AccessType=rw
+DefaultValue=10
+PDOMapping=0
+
+"""
+
+
+def of_data_type(text: str, key: str, folder: Path) -> list[Severity]:
+    """Severities of what is said of the data type of one object."""
+    return [finding.severity for finding in checked(folder, text).findings if finding.place == f"[{key}] DataType"]
+
+
+def test_torque_read_without_its_sign_would_be_enormous() -> None:
+    """Minus 1 % of 450 Nm, sent as INTEGER16 and read as UNSIGNED16."""
+    raw = IntegerType.UNSIGNED16.decode(IntegerType.INTEGER16.encode(-10, "drive"))
+    assert TorqueScale(450.0).to_nm(raw) == pytest.approx(29_486.7)
+
+
+@pytest.mark.parametrize(
+    ("index", "old", "new"),
+    [
+        ("6077", "0x0003", "0x0006"),
+        ("6077", "0x0003", "0x0004"),
+        ("6071", "0x0003", "0x0006"),
+        ("606C", "0x0004", "0x0007"),
+        ("606C", "0x0004", "0x0003"),
+        ("6061", "0x0002", "0x0005"),
+        ("6041", "0x0006", "0x0007"),
+    ],
+)
+def test_used_object_of_another_sign_or_width_is_an_error_of_the_check(
+    index: str, old: str, new: str, tmp_path: Path
+) -> None:
+    text = edited(index, f"DataType={old}", f"DataType={new}")
+    report = checked(tmp_path, text)
+    assert not report.usable
+    [finding] = [each for each in report.findings if each.place == f"[{index}] DataType" and each.severity is E]
+    assert finding.line == line_of(text, index, "DataType")
+
+
+def test_torque_offset_without_a_sign_is_done_without(tmp_path: Path) -> None:
+    """Base torque and PRBS go into the target torque as a sum, so that nothing is read as another number."""
+    text = edited("60B2", "DataType=0x0003", "DataType=0x0006")
+    report = checked(tmp_path, text)
+    assert report.usable
+    [finding] = [each for each in report.findings if each.place == "[60B2] DataType"]
+    assert finding.severity is W
+    assert finding.line == line_of(text, "60B2", "DataType")
+    assert report.plan is not None
+    assert 0x60B2 not in {mapped.index for mapped in report.plan.carrier(RPDO).layout.objects}
+
+
+def test_max_torque_as_a_signed_number_means_the_same(tmp_path: Path) -> None:
+    assert of_data_type(edited("6072", "DataType=0x0006", "DataType=0x0003"), "6072", tmp_path) != [E]
+
+
+def test_drive_without_a_torque_mode_is_told(tmp_path: Path) -> None:
+    text = edited("6502", "DefaultValue=0x00000208", "DefaultValue=0x00000065")
+    told = [each for each in checked(tmp_path, text).findings if each.place == "[6502] DefaultValue"]
+    assert [each.severity for each in told] == [W]
+    assert "4 (profile torque) or 10 (cyclic synchronous torque)" in told[0].expected
+
+
+def with_counter(access: str = "rw") -> str:
+    text = data_file("inverter.eds").read_text(encoding="utf-8")
+    text = text.replace("[1029]", COUNTER.replace("AccessType=rw", f"AccessType={access}") + "[1029]", 1)
+    count = next(line for line in text.split("[OptionalObjects]")[1].splitlines() if line.startswith("SupportedObj"))
+    number = int(count.split("=")[1])
+    return text.replace(count, f"SupportedObjects={number + 1}\n{number + 1}=0x1019", 1)
+
+
+@pytest.mark.parametrize(("access", "severity"), [("rw", W), ("const", E)])
+def test_sync_counter_is_told(access: str, severity: Severity, tmp_path: Path) -> None:
+    told = [each for each in checked(tmp_path, with_counter(access)).findings if each.place == "[1019] DefaultValue"]
+    assert [each.severity for each in told] == [severity]
+
+
+class CountsSync(FakeDrive):
+    """Takes no SYNC without a counter while 0x1019 is not 0, and says so by EMCY 0x8240 (CiA 301, 7.2.2.5)."""
+
+    def take_sync(self, data: bytes) -> None:
+        if self.objects[0x1019, 0] and len(data) != 1:
+            self.link.send(0x080 + self.node_id, bytes.fromhex("40 82 11 00 00 00 00 00"))
+        else:
+            super().take_sync(data)
+
+
+def test_drive_that_counts_syncs_is_told_and_set_to_take_ours(tmp_path: Path) -> None:
+    path = tmp_path / "drive.eds"
+    path.write_text(with_counter(), encoding="utf-8")
+    with on_bus(CountsSync, eds_path=path) as (drive, inverter, link):
+        assert inverter.check() == ()
+        assert inverter.remarks() == ("SYNC counter overflow 0x1019:00 is 10, a run gives it 0 (this program)",)
+        inverter.configure()
+        assert drive.objects[0x1019, 0] == 0
+        assert inverter.await_feedback(link.sync(), 5.0) is not None
+        inverter.raise_if_faulted()
+
+
+def test_drive_that_counts_syncs_with_another_value_than_its_eds_is_a_difference(tmp_path: Path) -> None:
+    path = tmp_path / "drive.eds"
+    path.write_text(with_counter(), encoding="utf-8")
+    with on_bus(CountsSync, eds_path=path) as (drive, inverter, _):
+        drive.objects[0x1019, 0] = 5
+        [difference] = inverter.check()
+        assert str(difference).endswith("SYNC counter overflow 0x1019:00 is 5, expected 0 (this program)")
+
+
+def test_drive_that_counts_syncs_for_good_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "drive.eds"
+    path.write_text(with_counter("const"), encoding="utf-8")
+    with pytest.raises(ConfigMismatch, match=r"0x1019:00 that is 0 or can be written, found 10 for good"):
+        with on_bus(CountsSync, eds_path=path):
+            pass

@@ -1,0 +1,305 @@
+"""The host's inverter against drives with the habits of real ones, each one as makers and users have reported it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import can
+import pytest
+
+from drivers.canopen.can_link import CanLink
+from drivers.canopen.heartbeat import NmtState
+from drivers.errors import ConfigMismatch, DeviceFault, DeviceTimeout
+from drivers.inverter.cia402 import PowerState, StatusBit, TorqueMode
+from drivers.inverter.follow_watch import MOST_IGNORED
+from drivers.inverter.inverter import Inverter, InverterSettings
+from drivers.resources import data_file
+from tests.drivers.can_bench import M1, bench, guarded
+from tests.drivers.fake_drive import DEVICE_STATE, FOLLOWS, VALUE_RANGE, FakeDrive, on_bus
+
+NO_RTR, INVALID = 1 << 30, 1 << 31
+
+
+def is_cob_id(index: int, subindex: int) -> bool:
+    return subindex == 1 and (0x1400 <= index < 0x1600 or 0x1800 <= index < 0x1A00)
+
+
+class NoRemoteFrames(FakeDrive):
+    """A stack that knows no RTR: its TPDOs have bit 30, and one without it is refused (embedded-office)."""
+
+    def __init__(self, *args: object) -> None:
+        super().__init__(*args)  # type: ignore[arg-type]
+        self.objects[0x1800, 1] |= NO_RTR
+
+    def refusal(self, index: int, subindex: int, value: int) -> int | None:
+        return VALUE_RANGE if index == 0x1800 and subindex == 1 and not value & NO_RTR else None
+
+
+class SetsBit30(FakeDrive):
+    """Sets bit 30 by itself, whatever is written."""
+
+    def written(self, index: int, subindex: int, value: int) -> int:
+        return value | NO_RTR if is_cob_id(index, subindex) else value
+
+
+class ClearsBit30(NoRemoteFrames):
+    """Clears bit 30, whatever is written."""
+
+    def refusal(self, index: int, subindex: int, value: int) -> int | None:
+        return None
+
+    def written(self, index: int, subindex: int, value: int) -> int:
+        return value & ~NO_RTR if is_cob_id(index, subindex) else value
+
+
+class Strict(FakeDrive):
+    """Takes CiA 301, 7.5.2.35 by its word: no bit but 31 changes while a PDO is on, and none is mapped then."""
+
+    def refusal(self, index: int, subindex: int, value: int) -> int | None:
+        if is_cob_id(index, subindex):
+            present = self.objects[index, 1]
+            return VALUE_RANGE if not present & INVALID and (present ^ value) & ~INVALID else None
+        if 0x1600 <= index < 0x1800 or 0x1A00 <= index < 0x1C00:
+            on = not self.objects[index - 0x200, 1] & INVALID
+            return DEVICE_STATE if on or (subindex and self.objects[index, 0]) else None
+        return None
+
+
+def with_bit_30(folder: Path, entry: str = "$NODEID+0x40000180") -> Path:
+    text = data_file("inverter.eds").read_text(encoding="utf-8")
+    assert text.count("$NODEID+0x180") == 1
+    path = folder / "drive.eds"
+    path.write_text(text.replace("$NODEID+0x180", entry), encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("in_eds", [False, True])
+@pytest.mark.parametrize("drive_type", [NoRemoteFrames, SetsBit30, ClearsBit30, Strict])
+def test_bit_30_of_a_cob_id_is_the_drive_s(drive_type: type[FakeDrive], in_eds: bool, tmp_path: Path) -> None:
+    with on_bus(drive_type, eds_path=with_bit_30(tmp_path) if in_eds else None) as (drive, inverter, link):
+        inverter.configure()
+        inverter.arm()
+        inverter.command(guarded(60.0))
+        feedback = inverter.await_feedback(link.sync(), 5.0)
+        assert feedback is not None
+        assert feedback.torque_nm == 60.0
+        inverter.disarm()
+        assert inverter.check() == ()
+        assert drive.objects[0x1800, 1] & 0x7FF == 0x180 + M1.node_id
+
+
+def test_cob_id_that_the_drive_had_before_is_switched_off_as_it_is() -> None:
+    """Bits 0 to 29 do not change while the PDO is on, an identifier of 29 bits included."""
+    with on_bus(Strict) as (drive, inverter, _):
+        drive.objects[0x1800, 1] = 1 << 29 | 0x12345
+        [difference] = inverter.check()
+        assert "of 29 bits" in difference.found
+        inverter.configure()
+        assert drive.objects[0x1800, 1] == 0x180 + M1.node_id
+
+
+def test_pdo_of_29_bits_in_the_eds_is_given_an_identifier_of_11(tmp_path: Path) -> None:
+    with on_bus(eds_path=with_bit_30(tmp_path, "$NODEID+0x20000180")) as (drive, inverter, _):
+        drive.objects[0x1800, 1] = 1 << 29 | 0x180 + M1.node_id
+        assert inverter.check() == ()
+        [remark] = inverter.remarks()
+        assert "(of 29 bits)" in remark
+        inverter.configure()
+        assert drive.objects[0x1800, 1] == 0x180 + M1.node_id
+
+
+def test_pdo_of_29_bits_for_good_is_refused(tmp_path: Path) -> None:
+    """Its lower 11 bits are those of the identifier it should have."""
+    path = with_bit_30(tmp_path, "$NODEID+0x20000180")
+    text, before = path.read_text(encoding="utf-8"), "AccessType=rw\nDefaultValue=$NODEID+0x20000180"
+    assert text.count(before) == 1
+    path.write_text(text.replace(before, before.replace("=rw", "=ro")), encoding="utf-8")
+    with pytest.raises(ConfigMismatch, match=r"0x1800:01 can not be written and has not COB-ID 0x185, switched on"):
+        with on_bus(eds_path=path):
+            pass
+
+
+class DeafAtFirst(FakeDrive):
+    """Does not take START while it still writes what it was given (CANopenNode#26)."""
+
+    starts = 0
+
+    def take_nmt(self, command: int) -> None:
+        self.starts += command == 1
+        if command != 1 or self.starts > 2:
+            super().take_nmt(command)
+
+
+def test_start_is_sent_again_until_the_heartbeat_says_operational() -> None:
+    with on_bus(DeafAtFirst, replace(M1, state_timeout_s=5.0)) as (drive, inverter, _):
+        inverter.configure()
+        assert drive.nmt is NmtState.OPERATIONAL
+        assert isinstance(drive, DeafAtFirst)
+        assert drive.starts == 3
+
+
+class DeafForGood(FakeDrive):
+    def take_nmt(self, command: int) -> None:
+        if command != 1:
+            super().take_nmt(command)
+
+
+def test_start_that_is_never_taken_is_a_time_out() -> None:
+    with on_bus(DeafForGood) as (_, inverter, _link):
+        with pytest.raises(DeviceTimeout, match=r"reports PRE-OPERATIONAL after 0\.2 s, expected OPERATIONAL"):
+            inverter.configure()
+
+
+class ShowsNoModeAtFirst(FakeDrive):
+    """Shows mode -1 for some seconds before the one it was given (ros_canopen#457)."""
+
+    looks = 0
+
+    def read(self, index: int, subindex: int) -> int:
+        if index == 0x6061:
+            self.looks += 1
+            return -1 if self.looks < 20 else super().read(index, subindex)
+        return super().read(index, subindex)
+
+
+def test_mode_may_take_the_time_that_the_rig_file_gives_it() -> None:
+    with on_bus(ShowsNoModeAtFirst, replace(M1, mode_timeout_s=30.0)) as (drive, inverter, _):
+        inverter.configure()
+        inverter.arm()
+        assert drive.state is PowerState.OPERATION_ENABLED
+
+
+def test_mode_that_takes_longer_is_refused_with_what_it_shows() -> None:
+    with on_bus(ShowsNoModeAtFirst, replace(M1, mode_timeout_s=0.001)) as (_, inverter, _link):
+        inverter.configure()
+        with pytest.raises(DeviceTimeout, match=r"mode of operation is -1 after 0\.001 s"):
+            inverter.arm()
+
+
+@pytest.mark.parametrize(
+    ("number", "data"),
+    [
+        (0x181, bytes.fromhex("08 00 08 00 08 00 08 00")),  # as a TPDO that reports a fault
+        (0x081, bytes.fromhex("10 23 01 00 00 00 00 00")),  # as an EMCY
+        (0x701, b"\x04"),  # as a heartbeat of a node that is stopped
+        (0x701, b"\x99"),  # as a heartbeat that is none
+        (0x581, b"\x60"),  # as an SDO answer cut short
+    ],
+)
+@pytest.mark.parametrize("kind", ["extended", "fd"])
+def test_frames_of_another_protocol_are_none_of_ours(number: int, data: bytes, kind: str) -> None:
+    """A frame of 29 bits, or of CAN FD, whose identifier has the same number as one of the drive's."""
+    number += M1.node_id - 1
+    with bench() as rig:
+        rig.m1.configure()
+        rig.m1.arm()
+        with rig.intruder() as bus:
+            for _ in range(3):
+                before = rig.cycle(guarded(60.0))
+                bus.send(
+                    can.Message(arbitration_id=number, data=data, is_extended_id=kind == "extended", is_fd=kind == "fd")
+                )
+                assert rig.m1.latest is before
+                rig.m1.raise_if_faulted()
+        rig.m1.disarm()
+
+
+IGNORED = StatusBit.REMOTE | StatusBit.VOLTAGE_ENABLED
+
+
+class FollowsLater(FakeDrive):
+    """Magnetises its motor first: in operation, and without bit 12, for some SYNCs."""
+
+    syncs = 0
+
+    def take_sync(self, data: bytes) -> None:
+        self.syncs += self.state is PowerState.OPERATION_ENABLED
+        self.status_bits = IGNORED | (FOLLOWS if self.syncs > 20 else 0)
+        super().take_sync(data)
+
+
+class IgnoresTarget(FakeDrive):
+    """In operation, and makes nothing of its target: readings of one count of noise, bit 12 is 0."""
+
+    def take_sync(self, data: bytes) -> None:
+        self.objects[0x606C, 0] ^= 1
+        super().take_sync(data)
+
+    def torque_of(self, target: int, offset: int) -> int:
+        return self.objects[0x606C, 0]
+
+
+def driven(inverter: Inverter, link: CanLink, cycles: int, torque_nm: float = 60.0) -> None:
+    for n in range(cycles):
+        inverter.command(guarded(torque_nm if n % 4 < 2 else -torque_nm))
+        assert inverter.await_feedback(link.sync(), 5.0) is not None
+        inverter.raise_if_faulted()
+
+
+def test_drive_that_stops_following_its_target_ends_the_run_with_that_cause() -> None:
+    with on_bus(IgnoresTarget) as (drive, inverter, link):
+        inverter.configure()
+        inverter.arm()
+        driven(inverter, link, 20)
+        assert inverter.follows
+        drive.status_bits = IGNORED
+        driven(inverter, link, MOST_IGNORED - 1)
+        with pytest.raises(DeviceFault, match=r"statusword 0x6041 bit 12 is 0 .*the drive ignores the target torque"):
+            driven(inverter, link, 1)
+        inverter.disarm()
+
+
+def test_drive_may_take_its_time_before_it_follows() -> None:
+    with on_bus(FollowsLater, replace(M1, state_timeout_s=30.0)) as (_, inverter, link):
+        inverter.configure()
+        inverter.arm()
+        driven(inverter, link, 20, torque_nm=0.0)
+        assert not inverter.follows
+        driven(inverter, link, 20)
+        assert inverter.follows
+
+
+def test_drive_that_never_follows_is_given_up_after_the_time_for_a_state() -> None:
+    with on_bus(IgnoresTarget, replace(M1, state_timeout_s=0.05)) as (drive, inverter, link):
+        drive.status_bits = IGNORED
+        inverter.configure()
+        inverter.arm()
+        with pytest.raises(DeviceFault, match="bit 12 is 0"):
+            driven(inverter, link, 1_000_000, torque_nm=0.0)
+        assert not inverter.follows
+
+
+def test_drive_that_never_follows_has_no_time_once_a_torque_is_asked_for() -> None:
+    with on_bus(IgnoresTarget, replace(M1, state_timeout_s=30.0)) as (drive, inverter, link):
+        drive.status_bits = IGNORED
+        inverter.configure()
+        inverter.arm()
+        driven(inverter, link, 3 * MOST_IGNORED, torque_nm=0.0)
+        driven(inverter, link, MOST_IGNORED - 1)
+        with pytest.raises(DeviceFault, match="the drive ignores the target torque"):
+            driven(inverter, link, 1)
+
+
+@pytest.mark.parametrize(
+    "settings", [replace(M1, follow_bit=False), replace(M1, mode=TorqueMode.PROFILE_TORQUE)], ids=["without", "mode 4"]
+)
+def test_bit_12_means_nothing_where_a_drive_has_it_not(settings: InverterSettings) -> None:
+    with on_bus(IgnoresTarget, settings) as (drive, inverter, link):
+        drive.status_bits = IGNORED
+        inverter.configure()
+        inverter.arm()
+        driven(inverter, link, 3 * MOST_IGNORED)
+        assert inverter.follows
+
+
+def test_internal_limit_is_part_of_the_feedback() -> None:
+    with on_bus() as (drive, inverter, link):
+        inverter.configure()
+        inverter.arm()
+        driven(inverter, link, 2)
+        assert inverter.latest is not None
+        assert not inverter.latest.limited
+        drive.status_bits |= StatusBit.INTERNAL_LIMIT_ACTIVE
+        driven(inverter, link, 2)
+        assert inverter.latest.limited

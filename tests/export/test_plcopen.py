@@ -1,0 +1,123 @@
+"""The exported PLCopen XML: valid against the TC6 schema, and the same program when another library reads it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import fields, is_dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from lxml import etree
+
+from estimator.identification.identify import Settings
+from estimator.identification.linear_model import Orders
+from hil.export.filling import Precision, project
+from hil.export.plc_estimator import PlcEstimator
+from hil.export.plcopen import Tc6, plcopen_xml
+from hil.export.pou import Project
+from tests.export.drives import bad_drive
+from tests.export.iec.parser import Parser
+from tests.export.iec.to_c import to_c
+from tests.export.plc_runs import assert_equal_bits, execute, exported, on_host
+from tests.export.plcopen_reading import as_structured_text, read_plcopen, text_of
+
+SCHEMA = etree.XMLSchema(etree.parse(Path(__file__).parent / "schema" / "tc6_xml_v201.xsd"))
+WRITTEN = datetime(2026, 2, 3, 4, 5, 6, tzinfo=UTC)
+L = np.array([1.0, -0.9, 0.72])
+
+ESTIMATORS = [
+    PlcEstimator(L=L),
+    PlcEstimator(),
+    PlcEstimator(L=np.ones(1)),
+    PlcEstimator(Settings(orders=Orders(0, 6, 1), sample_time_s=0.01), 0.01),
+    PlcEstimator(L=L, origin="a <b> & \"c\" *) é.json, recording ]]> 'd'"),
+]
+
+
+def document(estimator: PlcEstimator, precision: Precision = Precision.DOUBLE) -> str:
+    return plcopen_xml(project(estimator, precision), WRITTEN)
+
+
+def refusal(text: str) -> str:
+    SCHEMA.validate(etree.fromstring(text.encode()))
+    return str(SCHEMA.error_log)
+
+
+@pytest.mark.parametrize("precision", Precision)
+@pytest.mark.parametrize("estimator", ESTIMATORS, ids=range(len(ESTIMATORS)))
+def test_it_is_valid_against_the_schema(estimator: PlcEstimator, precision: Precision) -> None:
+    assert refusal(document(estimator, precision)) == ""
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "said"),
+    [
+        ("tc6_0201", "tc6_0200", "No matching global declaration"),
+        ("<LREAL />", "<DOUBLE />", "DOUBLE"),
+        ('lower="1" ', "", "lower"),
+        ("<configurations />", "", "configurations"),
+        ("coordinateInfo>", "coordinates>", "coordinates"),
+        ('pouType="functionBlock"', 'pouType="block"', "block"),
+        ("2026-02-03T04:05:06", "2026-02-03 04:05:06", "dateTime"),
+        ('constant="true"', 'constant="yes"', "boolean"),
+    ],
+)
+def test_the_schema_would_notice(before: str, after: str, said: str) -> None:
+    text = document(PlcEstimator(L=L))
+    assert before in text
+    assert said in refusal(text.replace(before, after))
+
+
+@pytest.mark.parametrize("precision", Precision)
+@pytest.mark.parametrize("estimator", ESTIMATORS, ids=range(len(ESTIMATORS)))
+def test_another_library_reads_the_same_program(estimator: PlcEstimator, precision: Precision) -> None:
+    read = as_structured_text(read_plcopen(document(estimator, precision)))
+    assert to_c(Parser(read).blocks()) == to_c(Parser(exported(estimator, precision)).blocks())
+
+
+def test_what_it_read_is_executed_and_equals_the_host_to_the_bit(tmp_path: Path) -> None:
+    estimator = PlcEstimator(L=L)
+    read = as_structured_text(read_plcopen(document(estimator)))
+    assert_equal_bits(execute(read, bad_drive(), tmp_path), on_host(estimator, bad_drive()))
+
+
+def test_what_it_read_has_every_text() -> None:
+    written = project(PlcEstimator(L=L))
+    read = read_plcopen(plcopen_xml(written, WRITTEN))
+    assert sorted(_texts(read)) == sorted(_bodies_and_comments(written))
+    assert read.content_header.comment == written.comment
+
+
+def test_the_header_says_what_wrote_it_and_when() -> None:
+    header = read_plcopen(document(PlcEstimator())).file_header
+    assert (header.product_name, header.creation_date_time.to_datetime()) == ("hil", WRITTEN)
+
+
+def test_the_versions_differ_in_the_namespace_alone() -> None:
+    written = project(PlcEstimator(L=L))
+    newer, older = (plcopen_xml(written, WRITTEN, version) for version in (Tc6.V2_01, Tc6.V2_0))
+    assert newer.count("tc6_0201") == 1
+    assert older == newer.replace("tc6_0201", "tc6_0200")
+
+
+def _texts(part: Any) -> Iterator[str]:
+    """Yield every formatted text below a part of what was read."""
+    if isinstance(part, list):
+        for each in part:
+            yield from _texts(each)
+    elif hasattr(part, "w3_org_1999_xhtml_element"):
+        yield text_of(part)
+    elif is_dataclass(part):
+        for field in fields(part):
+            yield from _texts(getattr(part, field.name))
+
+
+def _bodies_and_comments(written: Project) -> Iterator[str]:
+    yield from (kind.comment for kind in written.types)
+    for pou in written.pous:
+        yield from (pou.comment, pou.body)
+        for section in pou.sections:
+            yield from filter(None, (section.comment, *(variable.comment for variable in section.variables)))
