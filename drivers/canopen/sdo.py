@@ -40,6 +40,10 @@ class SdoChannel:
         self._eds = eds
         self._where = where
 
+    def has(self, index: int, subindex: int = 0) -> bool:
+        """Whether the EDS lists the object."""
+        return self._eds.dictionary.get_variable(index, subindex) is not None
+
     def upload(self, index: int, subindex: int = 0) -> int:
         """Read an object.
 

@@ -56,13 +56,13 @@ def _variable(entry: EdsEntry, node_id: int) -> ODVariable:
 
 
 def _default(entry: EdsEntry, node_id: int) -> int | float | str | bytes | None:
-    if entry.kind is None or entry.default_text is None or entry.kind.is_integer:
-        return entry.default(node_id)
+    if entry.kind is None or entry.value_text is None or entry.kind.is_integer:
+        return entry.value(node_id)
     if entry.kind.is_real:
-        return read_real(entry.default_text)
+        return read_real(entry.value_text)
     if entry.kind.code in (OCTET_STRING, DOMAIN):
-        return read_octets(entry.default_text)
-    return entry.default_text
+        return read_octets(entry.value_text)
+    return entry.value_text
 
 
 def read_real(text: str) -> float | None:

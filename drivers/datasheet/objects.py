@@ -1,5 +1,8 @@
 """The objects an EDS describes: sections ``[1018]``, ``[1018sub1]`` and ``[1018Name]`` put together.
 
+In a device configuration file (DCF) a ParameterValue counts before the DefaultValue. In an EDS it says nothing: there
+it is left over from somebody's tool.
+
 Read with the tolerance that vendors' files need: a missing ObjectType is VAR (CiA 306), or RECORD where
 there are sub-indices; a blank PDOMapping is 0; ``CompactSubObj`` is written out. What is wrong is for
 `drivers.datasheet.check` to tell; here it is None, and whoever needs it refuses.
@@ -9,15 +12,22 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 
-from drivers.datasheet.number import read_number
+from drivers.datasheet.number import read_formula, read_number
 from drivers.datasheet.text import EdsSection, EdsText
 from drivers.datasheet.types import DATA_TYPES, DOMAIN, UNSIGNED8, DataType
 
+_PDO_PARAMETERS = range(0x1400, 0x1C00)
+_OTHER_PARAMETER = 0x200
+"""Bit by which the indices of communication and mapping parameter differ."""
+
 OBJECT_SECTION = re.compile(r"[0-9a-f]{4}")
 SUB_SECTION = re.compile(r"([0-9a-f]{4})sub([0-9a-f]{1,2})")
+
+COB_ID_MASK = 0x7FF
+"""Bits of an identifier; above them are switches."""
 
 ACCESS_TYPES = ("ro", "wo", "rw", "rwr", "rww", "const")
 """CiA 306: rwr may be mapped into a TPDO only, rww into an RPDO only."""
@@ -40,6 +50,9 @@ class ObjectType(IntEnum):
         return self in (ObjectType.ARRAY, ObjectType.RECORD)
 
 
+_WITH_VALUES = (ObjectType.VAR, ObjectType.DOMAIN, ObjectType.ARRAY, ObjectType.RECORD)
+
+
 @dataclass(frozen=True, slots=True)
 class EdsEntry:
     """One value of the object dictionary.
@@ -60,6 +73,8 @@ class EdsEntry:
         Whether a PDO may carry it.
     default_text
         DefaultValue as written; None if missing or blank.
+    parameter_text
+        ParameterValue as written in a DCF; None if missing or blank, and in an EDS.
     """
 
     index: int
@@ -70,10 +85,37 @@ class EdsEntry:
     access: str | None
     mappable: bool
     default_text: str | None
+    parameter_text: str | None = None
 
-    def default(self, node_id: int) -> int | None:
-        """Default value of an integer; None if there is none that can be read and fits."""
-        return self._integer(self.default_text, node_id)
+    @property
+    def value_text(self) -> str | None:
+        """Value as written that counts."""
+        return self.default_text if self.parameter_text is None else self.parameter_text
+
+    @property
+    def value_key(self) -> str:
+        """Key of the value that counts."""
+        return "DefaultValue" if self.parameter_text is None else "ParameterValue"
+
+    @property
+    def writable(self) -> bool:
+        """Whether it may be written by SDO."""
+        return self.access is not None and "w" in self.access
+
+    @property
+    def readable(self) -> bool:
+        """Whether it may be read by SDO."""
+        return self.access is not None and self.access != "wo"
+
+    @property
+    def node_relative(self) -> bool:
+        """Whether its value is given by the node id."""
+        formula = read_formula(self.value_text or "")
+        return formula is not None and formula.of_node_id
+
+    def value(self, node_id: int) -> int | None:
+        """Value of an integer as the file has it; None if there is none that can be read and fits."""
+        return self._integer(self.value_text, node_id)
 
     def limit(self, key: str, node_id: int) -> int | None:
         """``LowLimit`` or ``HighLimit`` of an integer; None if there is none that can be read and fits."""
@@ -100,6 +142,19 @@ def read_objects(text: EdsText) -> dict[int, EdsObject]:
     names = sorted(name for name in text.sections if OBJECT_SECTION.fullmatch(name))
     subs = sub_sections(text)
     return {int(name, 16): _object(text, name, subs.get(int(name, 16), {})) for name in names}
+
+
+def objects_of_use(objects: Mapping[int, EdsObject]) -> dict[int, EdsObject]:
+    """Leave out objects without any value, and a PDO's communication or mapping parameter without the other.
+
+    The ``canopen`` library looks for the second wherever the first is.
+    """
+    there = {index: each for index, each in objects.items() if each.entries}
+    return {
+        index: each
+        for index, each in there.items()
+        if index not in _PDO_PARAMETERS or index ^ _OTHER_PARAMETER in there
+    }
 
 
 def sub_sections(text: EdsText) -> dict[int, dict[int, EdsSection]]:
@@ -139,7 +194,9 @@ def _object(text: EdsText, name: str, subs: Mapping[int, EdsSection]) -> EdsObje
     index = int(name, 16)
     compact = read_number(section.get("CompactSubObj") or "") or 0
     kind = object_type(section, bool(subs) or compact > 0)
-    if kind is None or not kind.has_entries:
+    if kind not in _WITH_VALUES:  # a definition of a type, or nobody knows what: it has no value to be asked for
+        entries = {}
+    elif kind not in (ObjectType.ARRAY, ObjectType.RECORD):
         entries = {0: _entry(text, section, index, 0)}
     else:
         entries = {n: _entry(text, sub, index, n) for n, sub in subs.items()}
@@ -162,15 +219,31 @@ def _entry(text: EdsText, section: EdsSection, index: int, subindex: int) -> Eds
         access=access if access in ACCESS_TYPES else None,
         mappable=bool(read_number(section.get("PDOMapping") or "0")),
         default_text=section.get("DefaultValue"),
+        parameter_text=_parameter_text(text, section),
     )
+
+
+def _parameter_text(text: EdsText, section: EdsSection) -> str | None:
+    """Read the ParameterValue of a DCF; what it is by the node id it is for every node, as its DefaultValue says."""
+    written = section.get("ParameterValue") if text.is_dcf else None
+    default = read_formula(section.get("DefaultValue") or "")
+    value = None if written is None else read_formula(written)
+    node_id = None if text.commissioning is None else read_number(text.commissioning.get("NodeID") or "")
+    if default is None or value is None or not default.of_node_id or value.of_node_id or node_id is None:
+        return written
+    constant = value.constant - node_id
+    same = not (constant ^ default.constant) & COB_ID_MASK
+    return f"$NODEID+0x{constant:X}" if same and constant >= 0 else written
 
 
 def _compact_entries(text: EdsText, section: EdsSection, index: int, count: int) -> Iterator[tuple[int, EdsEntry]]:
     """Write out what ``CompactSubObj`` stands for (CiA 306): the number of entries, and as many alike."""
     names = text.section(f"{section.name}Name")
+    values = text.section(f"{section.name}Value") if text.is_dcf else None
     unsigned8 = DATA_TYPES[UNSIGNED8]
     yield 0, EdsEntry(index, 0, section, "NrOfObjects", unsigned8, "ro", mappable=False, default_text=str(count))
     alike = _entry(text, section, index, 0)
     for n in range(1, count + 1):
         name = (None if names is None else names.get(str(n))) or f"{alike.name}{n}"
-        yield n, EdsEntry(index, n, section, name, alike.kind, alike.access, alike.mappable, alike.default_text)
+        parameter = None if values is None else values.get(str(n))
+        yield n, replace(alike, subindex=n, name=name, parameter_text=parameter)

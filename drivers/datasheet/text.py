@@ -22,9 +22,16 @@ MAX_BYTES = 16 << 20
 MAX_LINE_LENGTH = 255
 """Characters in a line of an EDS (CiA 306)."""
 
+_DCF_SUFFIX = ".dcf"
+COMMISSIONING = ("DeviceComissioning", "DeviceCommissioning")
+"""Section of a DCF; CiA 306 spells it the first way."""
+
 _UTF_16_MARKS = (b"\xff\xfe", b"\xfe\xff")
 _UTF_8_MARK = b"\xef\xbb\xbf"
 _LINE_ENDS = re.compile(r"\r\n|\n|\r")
+_MANUFACTURER = re.compile(r"[2-5][0-9a-f]{3}(sub[0-9a-f]+)?$", re.IGNORECASE)
+"""Sections of the maker's own objects, which this program does not use."""
+
 _INLINE_COMMENT = re.compile(r"\s;")
 
 
@@ -86,6 +93,17 @@ class EdsText:
     def section(self, name: str) -> EdsSection | None:
         """Look up a section, whatever its case."""
         return self.sections.get(name.lower())
+
+    @property
+    def commissioning(self) -> EdsSection | None:
+        """What a DCF says of the node it is for."""
+        found = (self.section(name) for name in COMMISSIONING)
+        return next((section for section in found if section is not None), None)
+
+    @property
+    def is_dcf(self) -> bool:
+        """Whether it describes one commissioned device (CiA 306), by its name or by the section that only such has."""
+        return self.path.suffix.lower() == _DCF_SUFFIX or self.commissioning is not None
 
 
 def read_eds_text(path: Path) -> EdsText:
@@ -205,6 +223,8 @@ class _Reader:
         expected = f"this key once; line {first.line} has it with {first.value!r}"
         if first.value == second.value:
             self._warn(second.line, expected, "it again", "Take one out.", place)
+        elif self._here is not None and _MANUFACTURER.match(self._here.name):
+            self._warn(second.line, expected, f"it again with {second.value!r}", "The first counts.", place)
         else:
             self._err(second.line, expected, f"it again with {second.value!r}", "Keep the right one.", place)
 

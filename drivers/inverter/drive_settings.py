@@ -1,58 +1,44 @@
 """What configuring gives a drive beside its PDO layouts: which object, which value, and who asks for it.
 
-A dead host must mean zero torque, and three settings see to that together:
+A dead host must mean zero torque; `drivers.inverter.protection` lists what of this sees to that.
 
-======== ==================================================================================
-0x1016   the drive watches the host's heartbeat: a host whose program or cable is gone
-0x14xx:5 the drive expects an RPDO that often: a host whose cycle hangs and whose heart beats
-0x6007   what the drive does then: abort connection option code
-======== ==================================================================================
-
-The event timer of an RPDO is its deadline monitoring (CiA 301, 7.5.2.35): it runs from the first RPDO received,
-and a drive that misses the next says EMCY 0x8250.
+An option code is written where the rig file or a DCF has one: somebody has chosen it. The default of an EDS is nobody's
+choice, and a drive that was commissioned otherwise keeps its own.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Final
 
 from drivers.canopen.can_link import HOST_NODE_ID
-from drivers.canopen.pdo_map import PdoLayout
+from drivers.canopen.emcy import EMCY_COB_ID
 from drivers.canopen.sdo import object_name
-from drivers.datasheet.file import EdsFile
+from drivers.capability.function import Function
+from drivers.capability.plan import DrivePlan
+from drivers.capability.table import EVENT_TIMER, OPTION_CODES, SYNC_COB_ID
 from drivers.errors import ConfigMismatch
 from drivers.inverter.settings import InverterSettings
 
+__all__ = ["OPTION_CODES", "DriveSetting", "drive_settings"]
+
 SYNC_COB_ID_OBJECT: Final = 0x1005
 SYNC_COUNTER_OVERFLOW: Final = 0x1019
-
+EMCY_COB_ID_OBJECT: Final = 0x1014
 ABORT_CONNECTION: Final = 0x6007
-
-OPTION_CODES: Final = MappingProxyType(
-    {
-        ABORT_CONNECTION: "abort connection option code",
-        0x605A: "quick stop option code",
-        0x605B: "shutdown option code",
-        0x605C: "disable operation option code",
-        0x605D: "halt option code",
-        0x605E: "fault reaction option code",
-    }
-)
-"""What the drive does by itself when something ends (CiA 402-2)."""
-
 TORQUE_SLOPE: Final = 0x6087
+PRODUCER_HEARTBEAT: Final = 0x1017
 
-RPDO_EVENT_TIMER: Final = 5
-"""Sub-index of an RPDO's communication parameter: its deadline [ms]."""
+GUARDING: Final = ((0x100C, "guard time"), (0x100D, "life time factor"))
 
-GUARD_TIME: Final = 0x100C
-LIFE_TIME_FACTOR: Final = 0x100D
+NODES: Final = range(1, 128)
 
 NO_ACTION: Final = 0
 """Abort connection option code that leaves the torque as it is."""
+
+THIS_PROGRAM: Final = "this program"
+RIG_FILE: Final = "rig file"
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +54,7 @@ class DriveSetting:
     value
         What it is given.
     source
-        Who asks for it: rig file, EDS, or this program.
+        Who asks for it: rig file, DCF, or this program.
     watches_host
         Whether the drive watches the host by it; such a setting is made anew at every run.
     """
@@ -84,101 +70,143 @@ class DriveSetting:
         return f"{self.name} {object_name(self.index, self.subindex)}"
 
 
-def drive_settings(eds: EdsFile, settings: InverterSettings, rpdo: PdoLayout) -> tuple[DriveSetting, ...]:
+def drive_settings(plan: DrivePlan, settings: InverterSettings) -> tuple[DriveSetting, ...]:
     """List what a drive is given, in the order of writing.
 
     Parameters
     ----------
-    eds
-        Which of the objects the drive has, and their values where the rig file is silent.
+    plan
+        Which of the objects the drive has.
     settings
         What the rig file says.
-    rpdo
-        The RPDO that carries the torque command.
 
     Raises
     ------
     ConfigMismatch
-        If the drive would keep its torque without the host, lacks an object the rig file has a value for, or is to
-        be watched by node guarding.
+        If the drive would keep its torque without the host, lacks an object the rig file has a value for, or has one
+        for good that this program can't work with.
     """
-    listed = (
-        *_sync(eds),
-        *_no_sync_counter(eds),
-        *_no_node_guarding(eds),
-        *_option_codes(eds, settings),
-        *_torque_slope(eds, settings),
-        *_deadline(eds, settings, rpdo),
-        *_heartbeats(settings),
+    _require_action(plan, settings)
+    return (
+        *_sync(plan),
+        *_no_sync_counter(plan),
+        *_emcy(plan),
+        *_no_node_guarding(plan),
+        *_option_codes(plan, settings),
+        *_torque_slope(plan, settings),
+        *_deadline(plan, settings),
+        *_heartbeats(plan, settings),
     )
-    for setting in listed:
-        if (setting.index, setting.value) == (ABORT_CONNECTION, NO_ACTION):
-            raise ConfigMismatch(
-                f"{settings.where}: {setting} is to be 0, no action ({setting.source}): the torque would stay without "
-                "the host. Expected 1 (fault), 2 (disable voltage) or 3 (quick stop). Set abort_connection under "
-                "option_codes of this inverter in the rig file."
-            )
-    return listed
 
 
-def _sync(eds: EdsFile) -> Iterator[DriveSetting]:
-    if eds.has(SYNC_COB_ID_OBJECT):
-        yield DriveSetting(SYNC_COB_ID_OBJECT, 0, "COB-ID SYNC", eds.default(SYNC_COB_ID_OBJECT), "EDS")
+def chosen_code(plan: DrivePlan, settings: InverterSettings, index: int) -> tuple[int, str] | None:
+    """Give the option code somebody has chosen, and who; None where it is the drive's own."""
+    asked, commissioned = settings.option_codes.get(index), plan.sheet.commissioned(index)
+    if asked is not None:
+        return asked, RIG_FILE
+    return None if commissioned is None else (commissioned, plan.sheet.kind)
 
 
-def _no_sync_counter(eds: EdsFile) -> Iterator[DriveSetting]:
-    """Switch the SYNC counter off: the host sends none, and a drive that counts takes no other (CiA 301, 7.5.2.22)."""
-    if eds.has(SYNC_COUNTER_OVERFLOW):
-        yield DriveSetting(SYNC_COUNTER_OVERFLOW, 0, "SYNC counter overflow", 0, "this program")
-
-
-def _no_node_guarding(eds: EdsFile) -> Iterator[DriveSetting]:
-    if not (eds.has(GUARD_TIME) and eds.has(LIFE_TIME_FACTOR)):
-        return
-    guarded = eds.has_default(GUARD_TIME) and eds.has_default(LIFE_TIME_FACTOR)  # blank is off, as at power-on
-    if guarded and eds.default(GUARD_TIME) and eds.default(LIFE_TIME_FACTOR):
+def _require_action(plan: DrivePlan, settings: InverterSettings) -> None:
+    """See that the drive does something without its host, by the values of rig file and data sheet."""
+    chosen = chosen_code(plan, settings, ABORT_CONNECTION)
+    code, source = chosen or (plan.sheet.value(ABORT_CONNECTION), plan.sheet.kind)
+    accepted = "abort_connection" in settings.accepted
+    if plan.has(Function.ABORT_CONNECTION) and code == NO_ACTION and not accepted:
         raise ConfigMismatch(
-            f"EDS {eds.path}: node guarding is on (guard time {object_name(GUARD_TIME)} is {eds.default(GUARD_TIME)} "
-            f"ms, life time factor {object_name(LIFE_TIME_FACTOR)} is {eds.default(LIFE_TIME_FACTOR)}), expected 0. "
-            "Node guarding needs remote frames, which CiA 301 advises against and many adapters do not send, and it "
-            "excludes the heartbeat, by which this program and the drive watch each other. Set both to 0 in the EDS."
+            f"{settings.where}: abort connection option code {object_name(ABORT_CONNECTION)} is to be 0, no action "
+            f"({source}): the torque would stay without the host. Expected 1 (fault), 2 (disable voltage) or 3 (quick "
+            "stop). Set abort_connection under option_codes of this inverter in the rig file."
         )
-    yield DriveSetting(GUARD_TIME, 0, "guard time (heartbeat instead)", 0, "this program")
-    yield DriveSetting(LIFE_TIME_FACTOR, 0, "life time factor (heartbeat instead)", 0, "this program")
 
 
-def _option_codes(eds: EdsFile, settings: InverterSettings) -> Iterator[DriveSetting]:
-    for index, name in OPTION_CODES.items():
-        asked = settings.option_codes.get(index)
-        if asked is not None:
-            _require(eds, settings, index, name)
-            yield DriveSetting(index, 0, name, asked, "rig file")
-        elif eds.has(index):
-            yield DriveSetting(index, 0, name, eds.default(index), "EDS")
-
-
-def _torque_slope(eds: EdsFile, settings: InverterSettings) -> Iterator[DriveSetting]:
-    if settings.torque_slope_nm_per_s is not None:
-        _require(eds, settings, TORQUE_SLOPE, "torque slope")
-        permille_per_s = round(1000.0 * settings.torque_slope_nm_per_s / settings.rated_torque_nm)
-        yield DriveSetting(TORQUE_SLOPE, 0, "torque slope", permille_per_s, "rig file")
-
-
-def _deadline(eds: EdsFile, settings: InverterSettings, rpdo: PdoLayout) -> Iterator[DriveSetting]:
-    if eds.dictionary.get_variable(rpdo.communication_index, RPDO_EVENT_TIMER) is not None:
-        index, deadline_ms = rpdo.communication_index, settings.rpdo_deadline_ms
-        yield DriveSetting(index, RPDO_EVENT_TIMER, "RPDO event timer", deadline_ms, "rig file", watches_host=True)
-
-
-def _heartbeats(settings: InverterSettings) -> Iterator[DriveSetting]:
-    consumer = HOST_NODE_ID << 16 | settings.heartbeat_timeout_ms
-    yield DriveSetting(0x1016, 1, "consumer heartbeat time", consumer, "rig file", watches_host=True)
-    yield DriveSetting(0x1017, 0, "producer heartbeat time", settings.heartbeat_ms, "rig file", watches_host=True)
-
-
-def _require(eds: EdsFile, settings: InverterSettings, index: int, name: str) -> None:
-    if not eds.has(index):
+def _sync(plan: DrivePlan) -> Iterator[DriveSetting]:
+    value = plan.sheet.value(SYNC_COB_ID_OBJECT)
+    if plan.abilities[Function.SYNC_ID].writable(plan.sheet):
+        yield DriveSetting(SYNC_COB_ID_OBJECT, 0, "COB-ID SYNC", SYNC_COB_ID, THIS_PROGRAM)
+    elif value not in (None, SYNC_COB_ID):
         raise ConfigMismatch(
-            f"{settings.where}: the rig file gives a value for {name} {object_name(index)}, which EDS {eds.path} "
-            "does not have. Take the key out of the rig file, or use the EDS of the drive's firmware version."
+            f"{plan.sheet.kind} {plan.sheet.path}: expected COB-ID SYNC {object_name(SYNC_COB_ID_OBJECT)} that is "
+            f"0x{SYNC_COB_ID:08X} or can be written, found 0x{value:08X} for good. The drive can't be used."
+        )
+
+
+def _no_sync_counter(plan: DrivePlan) -> Iterator[DriveSetting]:
+    """Switch the SYNC counter off: the host sends none, and a drive that counts takes no other (CiA 301, 7.5.2.22)."""
+    entry = plan.sheet.entry(SYNC_COUNTER_OVERFLOW)
+    if entry is None:
+        return
+    if entry.writable:
+        yield DriveSetting(SYNC_COUNTER_OVERFLOW, 0, "SYNC counter overflow", 0, THIS_PROGRAM)
+    elif value := plan.sheet.value(SYNC_COUNTER_OVERFLOW):
+        raise ConfigMismatch(
+            f"{plan.sheet.kind} {plan.sheet.path}: expected SYNC counter overflow {object_name(SYNC_COUNTER_OVERFLOW)} "
+            f"that is 0 or can be written, found {value} for good. The drive can't be used."
+        )
+
+
+def _emcy(plan: DrivePlan) -> Iterator[DriveSetting]:
+    """Have EMCY sent where it is heard, if it alone tells the cause of a fault, or goes out as another node's."""
+    wanted, described = EMCY_COB_ID + plan.sheet.node_id, plan.sheet.value(EMCY_COB_ID_OBJECT)
+    of_another = described is not None and described - EMCY_COB_ID in NODES
+    needed = described != wanted and (of_another or not plan.has(Function.ERROR_CODE))
+    if needed and plan.abilities[Function.EMCY_ID].writable(plan.sheet):
+        yield DriveSetting(EMCY_COB_ID_OBJECT, 0, "COB-ID EMCY", wanted, THIS_PROGRAM)
+
+
+def _no_node_guarding(plan: DrivePlan) -> Iterator[DriveSetting]:
+    entries = [(plan.sheet.entry(index), name) for index, name in GUARDING]
+    if all(entry is not None for entry, _ in entries):
+        for entry, name in entries:
+            if entry is not None and entry.writable:
+                yield DriveSetting(entry.index, 0, f"{name} (heartbeat instead)", 0, THIS_PROGRAM)
+
+
+def _option_codes(plan: DrivePlan, settings: InverterSettings) -> Iterator[DriveSetting]:
+    for index, function in OPTION_CODES.items():
+        chosen = chosen_code(plan, settings, index)
+        if chosen is None:
+            continue
+        code, source = chosen
+        if source == RIG_FILE:
+            _require(plan, settings, function, index)
+        if plan.abilities[function].writable(plan.sheet):
+            yield DriveSetting(index, 0, function.value, code, source)
+
+
+def _torque_slope(plan: DrivePlan, settings: InverterSettings) -> Iterator[DriveSetting]:
+    if settings.torque_slope_nm_per_s is not None:
+        _require(plan, settings, Function.TORQUE_SLOPE, TORQUE_SLOPE)
+        permille_per_s = round(1000.0 * settings.torque_slope_nm_per_s / settings.rated_torque_nm)
+        yield DriveSetting(TORQUE_SLOPE, 0, "torque slope", permille_per_s, RIG_FILE)
+
+
+def _deadline(plan: DrivePlan, settings: InverterSettings) -> Iterator[DriveSetting]:
+    for part in plan.abilities[Function.RPDO_DEADLINE].parts:
+        deadline_ms = settings.rpdo_deadline_ms
+        yield DriveSetting(part.index, EVENT_TIMER, "RPDO event timer", deadline_ms, RIG_FILE, watches_host=True)
+
+
+def _heartbeats(plan: DrivePlan, settings: InverterSettings) -> Iterator[DriveSetting]:
+    if plan.has(Function.HEARTBEAT_CONSUMER):
+        consumer = HOST_NODE_ID << 16 | settings.heartbeat_timeout_ms
+        yield DriveSetting(0x1016, 1, "consumer heartbeat time", consumer, RIG_FILE, watches_host=True)
+    if plan.abilities[Function.HEARTBEAT_PRODUCER].writable(plan.sheet):
+        period_ms = settings.heartbeat_ms
+        yield DriveSetting(PRODUCER_HEARTBEAT, 0, "producer heartbeat time", period_ms, RIG_FILE, watches_host=True)
+        return
+    fixed_ms = plan.sheet.value(PRODUCER_HEARTBEAT)
+    if fixed_ms is not None and fixed_ms > settings.heartbeat_ms:
+        raise ConfigMismatch(
+            f"{settings.where}: heartbeat_ms is {settings.heartbeat_ms}, expected at least {fixed_ms}: the drive's "
+            f"heartbeat {object_name(PRODUCER_HEARTBEAT)} can't be set. Write heartbeat_ms = {fixed_ms}."
+        )
+
+
+def _require(plan: DrivePlan, settings: InverterSettings, function: Function, index: int) -> None:
+    if not plan.abilities[function].writable(plan.sheet):
+        raise ConfigMismatch(
+            f"{settings.where}: the rig file gives a value for {function.value} {object_name(index)}, which "
+            f"{plan.sheet.kind} {plan.sheet.path} does not have, or not to be written. Take the key out of the rig "
+            "file, or use the EDS of the drive's firmware version."
         )

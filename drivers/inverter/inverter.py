@@ -10,30 +10,35 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
+from typing import Final
 
 from drivers.canopen.can_link import CanLink
 from drivers.canopen.emcy import EMCY_COB_ID
 from drivers.canopen.heartbeat import HEARTBEAT_COB_ID, NMT_COB_ID, NmtCommand, NmtState, nmt_frame
 from drivers.canopen.node_monitor import NodeMonitor
-from drivers.canopen.pdo_map import COB_ID_NO_RTR, PdoLayout, configuration_writes
+from drivers.canopen.pdo_map import COB_ID_INVALID, COB_ID_NO_RTR, configuration_writes, read_layout
 from drivers.canopen.sdo import SdoChannel
 from drivers.canopen.sdo_node import SdoNode
-from drivers.datasheet.file import EdsFile
+from drivers.capability.carrier import Carrier
 from drivers.errors import CommandRefused, ConfigMismatch, DriverError
-from drivers.inverter.check import Difference, configurable_differences, fixed_differences
+from drivers.inverter.check import Difference, configurable_differences, fixed_differences, remarks
 from drivers.inverter.cia402 import Command
+from drivers.inverter.commissioned import CommissionedValue, commissioned_values
 from drivers.inverter.drive_settings import drive_settings
 from drivers.inverter.feedback import FeedbackReceiver, InverterFeedback
 from drivers.inverter.follow_watch import FollowWatch
 from drivers.inverter.frozen_feedback import FrozenFeedback
-from drivers.inverter.pdos import command_codec, feedback_codec, feedback_receiver
+from drivers.inverter.pdos import TARGET_TORQUE, TORQUE_OFFSET, InverterPdos, TorqueCounts
 from drivers.inverter.power_control import PowerControl
+from drivers.inverter.protection import Protection, protections, require_protections
 from drivers.inverter.settings import InverterSettings
 from drivers.inverter.stop_proof import StopProof
-from drivers.scaling import TorqueScale
 from drivers.torque_guard import GuardedTorque
 
 __all__ = ["Difference", "Inverter", "InverterFeedback", "InverterSettings"]
+
+NO_TORQUE: Final = TorqueCounts()
 
 
 class Inverter:
@@ -49,25 +54,25 @@ class Inverter:
     Raises
     ------
     ConfigMismatch
-        If the EDS can't be read, has no PDOs that carry the torque command and its feedback, or would have the
-        drive keep its torque without a host.
+        If the EDS can't be read, has no PDOs that carry the torque command and its feedback or can be made to, or would
+        have the drive keep its torque without a host, and nobody has accepted that.
     """
 
     def __init__(self, link: CanLink, settings: InverterSettings) -> None:
         self.settings = settings
         self._link = link
         self._where = settings.where
-        self._eds = EdsFile(settings.eds_path, settings.node_id)
-        self._torque = TorqueScale(settings.rated_torque_nm)
-        self._rpdo = command_codec(self._eds, self._where)
-        self._tpdo = feedback_codec(self._eds, self._where)
-        self._given = drive_settings(self._eds, settings, self._rpdo.layout)
-        node = SdoNode(settings.node_id, self._eds.dictionary)
+        self._pdos = InverterPdos(settings)
+        self._plan = self._pdos.plan
+        self._given = drive_settings(self._plan, settings)
+        require_protections(self._plan, settings)
+        self._proof: dict[str, str] = {}
+        node = SdoNode(settings.node_id, self._pdos.eds.dictionary)
         link.network.add_node(node)
-        self._sdo = SdoChannel(node, self._eds, self._where, settings.sdo_timeout_s)
-        self._power = PowerControl(self._sdo, settings)
+        self._sdo = SdoChannel(node, self._pdos.eds, self._where, settings.sdo_timeout_s)
         self._feedback = self._subscribe_feedback()
         self._monitor = self._subscribe_monitor()
+        self._power = PowerControl(self._sdo, settings, self._torque_objects(), self._error_code)
         self._frozen = FrozenFeedback(self._where)
         self._following = FollowWatch(settings)
         self._armed = False
@@ -98,8 +103,34 @@ class Inverter:
             If it lacks an object of the EDS.
         """
         return (
-            *fixed_differences(self._sdo, self._eds, self.settings),
-            *configurable_differences(self._sdo, self.settings, self._layouts, self._given),
+            *fixed_differences(self._sdo, self._plan, self.settings),
+            *configurable_differences(self._sdo, self._plan, self.settings, self._given),
+        )
+
+    def remarks(self) -> tuple[str, ...]:
+        """Say what a run will set that the drive does not have yet; reads objects, writes none.
+
+        Raises
+        ------
+        DeviceTimeout, ConfigMismatch
+            As `check`.
+        """
+        return tuple(remarks(self._sdo, self._plan, self.settings, self._given))
+
+    def commissioned(self) -> tuple[CommissionedValue, ...]:
+        """List where DCF, device and rig file are not of one mind; empty without a DCF. Reads objects, writes none.
+
+        Raises
+        ------
+        DeviceTimeout
+            If the node does not answer.
+        """
+        return tuple(commissioned_values(self._sdo, self._plan, self.settings))
+
+    def protections(self) -> tuple[Protection, ...]:
+        """List what stands between a dead host and torque, with what the last `prove_stop` has seen of it."""
+        return tuple(
+            replace(each, proof=self._proof.get(each.name, "")) for each in protections(self._plan, self.settings)
         )
 
     def fault(self) -> str | None:
@@ -144,12 +175,14 @@ class Inverter:
         self._frozen.start_anew()
         self._monitor.expect(None)
         self._send_nmt(NmtCommand.ENTER_PRE_OPERATIONAL)
-        if differences := tuple(fixed_differences(self._sdo, self._eds, self.settings)):
+        if differences := tuple(fixed_differences(self._sdo, self._plan, self.settings)):
             raise ConfigMismatch(
                 f"{'; '.join(map(str, differences))}. Correct the rig file, or connect the drive it describes."
             )
-        for layout in self._layouts:
-            self._write_layout(layout)
+        for index in self._plan.strangers:
+            self._switch_off(index)
+        for carrier in self._plan.carriers:
+            self._write_layout(carrier)
         self._link.produce_heartbeat(self.settings.heartbeat_ms / 1000.0)  # before the drive listens for it
         for setting in self._given:
             self._sdo.download_confirmed(setting.index, setting.subindex, setting.value)
@@ -192,11 +225,10 @@ class Inverter:
             raise CommandRefused(
                 f"{self._where}: {torque.base_nm} Nm commanded while disarmed, expected arm() before. Nothing was sent."
             )
-        base = self._torque.to_raw(torque.base_nm, self._where)
-        prbs = self._torque.to_raw(torque.prbs_nm, self._where)
-        self._frozen.commanded(base + prbs, self.latest)
-        self._following.commanded(base + prbs)
-        self._send_rpdo(Command.ENABLE_OPERATION, base, prbs)
+        counts = self._pdos.counts(torque)
+        self._frozen.commanded(counts.total, self.latest)
+        self._following.commanded(counts.total)
+        self._send_rpdo(Command.ENABLE_OPERATION, counts)
 
     def await_feedback(self, after_ns: int, timeout_s: float) -> InverterFeedback | None:
         """Wait for the TPDO received after ``after_ns``, the result of `CanLink.sync` [ns].
@@ -219,12 +251,12 @@ class Inverter:
             If the drive does not follow.
         """
         self._armed = False
-        self._send_rpdo(Command.QUICK_STOP, 0, 0)  # overwrites the RPDO still waiting for SYNC
+        self._send_rpdo(Command.QUICK_STOP)  # overwrites the RPDO still waiting for SYNC
         self._power.quick_stop(self._go_on_stopping)
 
     def _go_on_stopping(self) -> None:
         """Repeat the command with every SYNC, or the drive would take the host for dead before its ramp is over."""
-        self._send_rpdo(Command.QUICK_STOP, 0, 0)
+        self._send_rpdo(Command.QUICK_STOP)
         self._link.sync()
 
     def prove_stop(self, period_s: float) -> tuple[Difference, ...]:
@@ -253,9 +285,11 @@ class Inverter:
             self._power,
             self._monitor,
             self.configure,
-            lambda: self._send_rpdo(Command.SHUTDOWN, 0, 0),
+            lambda: self._send_rpdo(Command.SHUTDOWN),
         )
-        return tuple(proof.run(self._given, period_s))
+        differences = tuple(proof.run(self._given, period_s))
+        self._proof = proof.seen
+        return differences
 
     def disarm(self) -> None:
         """Take the torque to zero and leave OPERATION_ENABLED, confirmed by the statusword.
@@ -271,7 +305,7 @@ class Inverter:
         self._armed = False
         errors = _try_all(
             # Overwrites the RPDO still waiting for SYNC: it would enable the drive again.
-            lambda: self._send_rpdo(Command.DISABLE_VOLTAGE, 0, 0),
+            lambda: self._send_rpdo(Command.DISABLE_VOLTAGE),
             self._power.zero_targets,
             self._power.disable_voltage,
         )
@@ -314,19 +348,41 @@ class Inverter:
             self._power.raise_if_fault(latest.state)
         self._following.raise_if_ignored(latest)
 
-    @property
-    def _layouts(self) -> tuple[PdoLayout, PdoLayout]:
-        return self._rpdo.layout, self._tpdo.layout
+    def _torque_objects(self) -> tuple[int, ...]:
+        """List what has to be zero for no torque to be asked for: also an offset that no PDO carries."""
+        offset = self._plan.sheet.entry(TORQUE_OFFSET)
+        there = offset is not None and offset.writable and (TORQUE_OFFSET, 0) in self._pdos.eds.types()
+        return (TARGET_TORQUE, TORQUE_OFFSET) if there else (TARGET_TORQUE,)
 
-    def _write_layout(self, layout: PdoLayout) -> None:
+    def _error_code(self) -> int | None:
+        """Give the error code of the drive's last EMCY; None if it sent none."""
+        emergency = self._monitor.emergency
+        return None if emergency is None else emergency.code
+
+    def _write_layout(self, carrier: Carrier) -> None:
+        """Give a PDO its layout, but for what the drive holds for good."""
+        layout = carrier.layout
         present = self._sdo.upload(layout.communication_index, 1)
         for index, subindex, value in configuration_writes(layout, present):
-            is_cob_id = (index, subindex) == (layout.communication_index, 1)
-            self._sdo.download_confirmed(index, subindex, value, ignored=COB_ID_NO_RTR if is_cob_id else 0)
+            if carrier.written(index, subindex):
+                is_cob_id = (index, subindex) == (layout.communication_index, 1)
+                self._sdo.download_confirmed(index, subindex, value, ignored=COB_ID_NO_RTR if is_cob_id else 0)
+        found = read_layout(self._sdo.upload, layout.communication_index, layout.mapping_index)
+        if found != layout:  # what is not written has to be there
+            raise ConfigMismatch(
+                f"{self._where}: PDO 0x{layout.communication_index:04X}/0x{layout.mapping_index:04X} has [{found}], "
+                f"expected [{layout}], and can't be given it. Use the EDS of the drive's firmware version."
+            )
+
+    def _switch_off(self, communication_index: int) -> None:
+        """Switch off a PDO that would disturb."""
+        present = self._sdo.upload(communication_index, 1)
+        if not present & COB_ID_INVALID:
+            self._sdo.download_confirmed(communication_index, 1, present | COB_ID_INVALID, ignored=COB_ID_NO_RTR)
 
     def _subscribe_feedback(self) -> FeedbackReceiver:
-        receiver = feedback_receiver(self._eds, self._tpdo, self._torque)
-        self._link.subscribe(self._tpdo.layout.cob_id, receiver.on_frame)
+        receiver = self._pdos.receiver()
+        self._link.subscribe(self._pdos.feedback.layout.cob_id, receiver.on_frame)
         return receiver
 
     def _subscribe_monitor(self) -> NodeMonitor:
@@ -338,10 +394,8 @@ class Inverter:
     def _send_nmt(self, command: NmtCommand) -> None:
         self._link.send(NMT_COB_ID, nmt_frame(command, self.settings.node_id))
 
-    def _send_rpdo(self, command: Command, base: int, prbs: int) -> None:
-        values = {0x6040: command.value, 0x6071: base, 0x60B2: prbs}
-        data = self._rpdo.pack(tuple([values[index] for index in self._rpdo.indices]))
-        self._link.send(self._rpdo.layout.cob_id, data)
+    def _send_rpdo(self, command: Command, counts: TorqueCounts = NO_TORQUE) -> None:
+        self._link.send(self._pdos.command.layout.cob_id, self._pdos.pack(command, counts))
 
 
 def _try_all(*steps: Callable[[], None]) -> list[DriverError]:

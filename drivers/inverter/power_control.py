@@ -39,11 +39,23 @@ class PowerControl:
         The drive's objects.
     settings
         Mode, time-outs and name.
+    torque_objects
+        What is to be zero for no torque to be asked for, by index.
+    last_error
+        Gives the error code of the drive's last EMCY, or None; for a drive without 0x603F.
     """
 
-    def __init__(self, sdo: SdoChannel, settings: InverterSettings) -> None:
+    def __init__(
+        self,
+        sdo: SdoChannel,
+        settings: InverterSettings,
+        torque_objects: tuple[int, ...],
+        last_error: Callable[[], int | None],
+    ) -> None:
         self._sdo = sdo
         self._settings = settings
+        self._torque_objects = torque_objects
+        self._last_error = last_error
         self._where = settings.where
 
     def select_mode(self) -> None:
@@ -73,9 +85,9 @@ class PowerControl:
             )
 
     def zero_targets(self) -> None:
-        """Write zero to target torque and torque offset."""
-        self._sdo.download(0x6071, 0, 0)
-        self._sdo.download(0x60B2, 0, 0)
+        """Write zero to target torque and, where there is one, torque offset."""
+        for index in self._torque_objects:
+            self._sdo.download(index, 0, 0)
 
     def enable_operation(self) -> None:
         """Step to OPERATION_ENABLED; the torque is what the targets say.
@@ -185,7 +197,7 @@ class PowerControl:
         return state
 
     def raise_if_fault(self, state: PowerState) -> None:
-        """Refuse a fault state, with the cause the drive gives in its error code 0x603F.
+        """Refuse a fault state, with the cause the drive gives in its error code 0x603F, or in its EMCY without one.
 
         Raises
         ------
@@ -195,17 +207,29 @@ class PowerControl:
         if state in FAULT_STATES:
             raise DeviceFault(f"{self._where}: {self._fault_of(state)}")
 
+    def reacts_to_a_lost_host(self) -> bool:
+        """Whether the drive says what it does without its host: by an abort connection option code other than 0."""
+        return self._sdo.has(0x6007) and self._sdo.upload(0x6007) != 0
+
     def fault(self) -> str | None:
         """Read whether the drive is in a fault state: state, cause and cure in words, or None. Nothing is written."""
         state = self.state()
         return self._fault_of(state) if state in FAULT_STATES else None
 
     def _fault_of(self, state: PowerState) -> str:
-        code = self._sdo.upload(0x603F)
         return (
-            f"power state is {state.value}, error code 0x603F is 0x{code:04X} {cause_of(code)}, expected a drive "
-            "without fault. Mend the cause at the drive, reset the fault."
+            f"power state is {state.value}, {self._cause()}, expected a drive without fault. Mend the cause at the "
+            "drive, reset the fault."
         )
+
+    def _cause(self) -> str:
+        if self._sdo.has(0x603F):
+            code = self._sdo.upload(0x603F)
+            return f"error code 0x603F is 0x{code:04X} {cause_of(code)}"
+        told = self._last_error()
+        if told is None:
+            return "cause unknown (no 0x603F in the drive, no EMCY since this program began)"
+        return f"error code of its EMCY is 0x{told:04X} {cause_of(told)}"
 
     def _poll(self, read: Callable[[], T], accept: Callable[[T], bool], timeout_s: float) -> T:
         """Read until accepted or out of time; the last value either way."""

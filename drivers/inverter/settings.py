@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from drivers.capability.speed_unit import SpeedUnit
+from drivers.inverter.acceptance import Acceptance
 from drivers.inverter.cia402 import TorqueMode
 
 
@@ -39,6 +41,12 @@ class InverterSettings:
         Option codes by object, 0x6007 and 0x605A to 0x605E, where not the EDS's.
     torque_slope_nm_per_s
         Torque slope of profile torque mode, object 0x6087; None for the drive's own [Nm/s].
+    speed_unit
+        Unit of 0x606C; None for the drive's own.
+    rated_torque_unit_nm
+        What one count of 0x6076 is; CiA 402 has a thousandth [Nm].
+    accepted
+        What the drive lacks and somebody has accepted, by name.
     sdo_timeout_s
         Longest wait for an SDO answer [s].
     mode_timeout_s
@@ -60,6 +68,9 @@ class InverterSettings:
     rpdo_deadline_ms: int = 200
     option_codes: Mapping[int, int] = field(default_factory=dict)
     torque_slope_nm_per_s: float | None = None
+    speed_unit: SpeedUnit | None = None
+    rated_torque_unit_nm: float = 1e-3
+    accepted: Mapping[str, Acceptance] = field(default_factory=dict)
     sdo_timeout_s: float = 0.5
     mode_timeout_s: float = 2.0
     state_timeout_s: float = 2.0

@@ -4,6 +4,10 @@ The drive is configured as for a run and brought to READY TO SWITCH ON: its powe
 to torque. Then the host plays dead, once by its commands, once by its heartbeat. A drive that watches its host says
 so by EMCY, and leaves READY TO SWITCH ON as its abort connection option code 0x6007 has it: the same reaction that
 takes the torque away in a run. What it would do with a torque is not seen; that much is its maker's word.
+
+A drive lacks some of this, and somebody has accepted that. Without a deadline of its RPDO it is left without commands
+and without SYNC all the same: what it then does by itself is part of the evidence. Without a consumer of heartbeats
+there is nothing to play dead to. Without 0x6007 it is to say that its host is gone; what it then does is written down.
 """
 
 from __future__ import annotations
@@ -13,15 +17,21 @@ from collections.abc import Callable, Iterator
 
 from drivers.canopen.can_link import CanLink
 from drivers.canopen.node_monitor import NodeMonitor
+from drivers.capability.table import EVENT_TIMER
 from drivers.errors import DeviceFault
 from drivers.inverter.check import Difference
 from drivers.inverter.cia402 import FAULT_STATES, TORQUE_STATES, PowerState
-from drivers.inverter.drive_settings import RPDO_EVENT_TIMER, DriveSetting
+from drivers.inverter.drive_settings import DriveSetting
 from drivers.inverter.power_control import PowerControl
 from drivers.inverter.settings import InverterSettings
 
 SOURCE = "proof"
 """Where the expectations come from, in the differences found."""
+
+CONSUMER_HEARTBEAT = 0x1016
+
+HEARD_PERIODS = 3
+"""So many of the host's heartbeats come before they end: a consumer watches from the first it hears (CiA 301)."""
 
 PATIENCE_S = 0.5
 """How much later than promised a drive may say that its host is gone [s]: neither end is a real-time system."""
@@ -45,6 +55,11 @@ class StopProof:
         Configures it, as for a run.
     send_ready
         Sends its RPDO with the command that keeps READY TO SWITCH ON, and no torque.
+
+    Attributes
+    ----------
+    seen
+        What was seen of each protection, by its name in the rig file.
     """
 
     def __init__(
@@ -62,6 +77,8 @@ class StopProof:
         self._monitor = monitor
         self._configure = configure
         self._send_ready = send_ready
+        self._reacts = True
+        self.seen: dict[str, str] = {}
 
     def run(self, given: tuple[DriveSetting, ...], period_s: float) -> Iterator[Difference]:
         """Play dead in both ways; the drive is disabled at the end.
@@ -80,11 +97,18 @@ class StopProof:
             program drives it.
         """
         self._refuse_if_driven()
+        self._reacts = self._power.reacts_to_a_lost_host()
+        timers = [setting for setting in given if setting.subindex == EVENT_TIMER and setting.watches_host]
+        consumers = [setting for setting in given if setting.index == CONSUMER_HEARTBEAT]
         try:
-            yield from self._without_commands(given, period_s)
+            if timers:
+                yield from self._without_commands(timers[0], period_s)
+            else:
+                self._without_anything()
             self._revive()
-            yield from self._without_heartbeat()
-            self._revive()
+            if consumers:
+                yield from self._without_heartbeat()
+                self._revive()
         finally:
             self._link.stop_heartbeat()
             self._power.disable_voltage()
@@ -97,52 +121,73 @@ class StopProof:
                 "program drives it, and this proof would take its torque away. End that program first."
             )
 
-    def _without_commands(self, given: tuple[DriveSetting, ...], period_s: float) -> Iterator[Difference]:
-        timers = [setting for setting in given if setting.subindex == RPDO_EVENT_TIMER and setting.watches_host]
-        if not timers:
-            yield Difference(
-                self._settings.where,
-                "stop without commands",
-                "an RPDO with an event timer (deadline monitoring)",
-                "none in the EDS: a host whose cycle hangs and whose heart beats is not noticed",
-                SOURCE,
-            )
-            return
+    def _without_commands(self, timer: DriveSetting, period_s: float) -> Iterator[Difference]:
         self._make_ready()
         self._send_ready()
         self._link.sync()
-        yield from self._noticed("stop without commands", timers[0].value, lambda: self._sync_and_wait(period_s))
+        yield from self._noticed(
+            "stop without commands", "rpdo_deadline", timer.value, lambda: self._sync_and_wait(period_s)
+        )
+
+    def _without_anything(self) -> None:
+        """Let a drive without a deadline be without commands and SYNC, and write down what it does by itself."""
+        self._make_ready()
+        self._send_ready()
+        self._link.sync()
+        self._watch(self._settings.rpdo_deadline_ms, _wait)
+        state = self._power.state()
+        if self._monitor.emergency is not None or state is not PowerState.READY_TO_SWITCH_ON:
+            self.seen["drive_watchdog"] = f"proven without commands and SYNC: {self._answer(state)}"
+        else:
+            within_ms = self._settings.rpdo_deadline_ms
+            self.seen["rpdo_deadline"] = f"without commands and SYNC nothing happened within {within_ms} ms"
 
     def _without_heartbeat(self) -> Iterator[Difference]:
         self._make_ready()
+        time.sleep(HEARD_PERIODS * self._settings.heartbeat_ms / 1000.0)
         self._link.stop_heartbeat()
-        yield from self._noticed("stop without heartbeat", self._settings.heartbeat_timeout_ms, _wait)
+        yield from self._noticed(
+            "stop without heartbeat", "heartbeat_consumer", self._settings.heartbeat_timeout_ms, _wait
+        )
 
     def _revive(self) -> None:
         """Come back to life; a fault that playing dead has made, 0x6007 being 1, is reset."""
         self._link.produce_heartbeat(self._settings.heartbeat_ms / 1000.0)
         if self._power.state() in FAULT_STATES:
             self._power.reset_fault()
+        else:
+            self._power.disable_voltage()  # what comes next takes the connection away, which it need not notice now
 
     def _make_ready(self) -> None:
         self._configure()
         self._power.make_ready()
         self._monitor.forget_emergency()
 
-    def _noticed(self, what: str, within_ms: int, pause: Callable[[], None]) -> Iterator[Difference]:
+    def _noticed(self, what: str, name: str, within_ms: int, pause: Callable[[], None]) -> Iterator[Difference]:
+        self._watch(within_ms, pause)
+        state = self._power.state()
+        left = state is not PowerState.READY_TO_SWITCH_ON
+        if self._complained() and (left or not self._reacts):
+            self.seen[name] = f"proven: {self._answer(state)}"
+            self.seen.setdefault("abort_connection", f"seen without a host: power state {state.value}")
+            return
+        expected = f"an EMCY 0x81xx or 0x82xx within {within_ms} ms"
+        yield Difference(
+            self._settings.where,
+            what,
+            f"{expected}, and READY TO SWITCH ON left" if self._reacts else expected,
+            self._answer(state),
+            SOURCE,
+        )
+
+    def _watch(self, within_ms: int, pause: Callable[[], None]) -> None:
+        """Wait until the drive says that its host is gone, or the time is over."""
         deadline_s = time.monotonic() + within_ms / 1000.0 + PATIENCE_S
         while not self._complained() and time.monotonic() < deadline_s:
             pause()
-        state = self._power.state()
-        if not self._complained() or state is PowerState.READY_TO_SWITCH_ON:
-            emergency = self._monitor.emergency
-            yield Difference(
-                self._settings.where,
-                what,
-                f"an EMCY 0x81xx or 0x82xx within {within_ms} ms, and READY TO SWITCH ON left",
-                f"{emergency or 'no EMCY'}, power state {state.value}",
-                SOURCE,
-            )
+
+    def _answer(self, state: PowerState) -> str:
+        return f"{self._monitor.emergency or 'no EMCY'}, power state {state.value}"
 
     def _complained(self) -> bool:
         emergency = self._monitor.emergency

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -112,8 +114,15 @@ def _print(name: str, findings: tuple[Finding, ...]) -> None:
         if finding.registers:
             console.print(_register_table(finding))
     for finding in findings:
-        for note in finding.notes:
-            console.print(f"{finding.device}: {note}", markup=False, highlight=False)
+        for line in (*finding.notes, *_details(finding)):
+            console.print(f"{finding.device}: {line}", markup=False, highlight=False, soft_wrap=True)
+
+
+def _details(finding: Finding) -> Iterator[str]:
+    """Say what is no difference: what a run sets, where the DCF is of another mind, what stops a dead host's torque."""
+    yield from finding.remarks
+    yield from (f"not the same everywhere: {each}" for each in finding.commissioned)
+    yield from (f"without its host: {each}" for each in finding.protections)
 
 
 def _register_table(finding: Finding) -> RichTable:
@@ -152,6 +161,9 @@ def _device(finding: Finding) -> dict[str, Any]:
             for each in finding.differences
         ],
         "notes": list(finding.notes),
+        "remarks": list(finding.remarks),
+        "commissioned": [asdict(each) for each in finding.commissioned],
+        "protections": [asdict(each) for each in finding.protections],
     } | ({"registers": [_register(each) for each in finding.registers]} if finding.registers else {})
 
 

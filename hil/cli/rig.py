@@ -33,6 +33,12 @@ def new(
     simulated: Annotated[
         bool, typer.Option("--simulated", help="For the simulated rig of hil sim: every answer has a default.")
     ] = False,
+    eds: Annotated[
+        Path | None,
+        typer.Option(
+            "--eds", metavar="EDS", help="Data sheet (EDS, DCF) of both inverters, in place of the shipped one."
+        ),
+    ] = None,
     yes: Annotated[bool, typer.Option("--yes", help="Ask nothing: defaults stand for what is not given.")] = False,
     name: Annotated[str | None, _answer("Name of the rig, for people.")] = None,
     can: Annotated[str | None, _answer("CAN bus, INTERFACE:CHANNEL.")] = None,
@@ -53,9 +59,13 @@ def new(
     Asks for what is not given as an option, and again where an answer does not fit. On a vehicle nothing that limits
     torque has a default. Guard, PRBS and experiments follow from the torque limit. rig.schema.json is written beside
     it, for editors.
+
+    With --eds identity, mode, and from a DCF node id and bit rate, are the data sheet's; what it does not say and the
+    drive needs is written with its reason. On a vehicle such a line is a comment until somebody fills it in.
     """
     from hil.config.file_schema import FileKind
     from hil.config.new_rig.answers import answers
+    from hil.config.new_rig.drive import new_drive
     from hil.config.new_rig.text import rig_text
     from hil.config.schema import schema_text
     from hil.errors import UsageError
@@ -79,9 +89,11 @@ def new(
     }
     if not yes and not sys.stdin.isatty():
         raise UsageError("expected someone at a terminal to ask, or --yes, came neither. See: hil rig new --help")
+    drive = None if eds is None else new_drive(eds, file, simulated)
     ask = None if yes else _asker(simulated)
-    found = answers({key: text for key, text in given.items() if text is not None}, simulated, ask)
-    write_new(file, rig_text(found, file.name, simulated))
+    told = {key: text for key, text in given.items() if text is not None}
+    found = answers(told, simulated, ask, None if drive is None else drive.defaults)
+    write_new(file, rig_text(found, file, simulated, () if drive is None else drive.lines))
     typer.echo(f"{file}: written. Go through it, then: hil check {file}")
     schema = file.with_name(FileKind.RIG.value)
     if not schema.exists():

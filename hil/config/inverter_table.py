@@ -10,6 +10,7 @@ from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 
 from drivers.inverter.cia402 import TorqueMode
 from drivers.inverter.drive_settings import ABORT_CONNECTION
+from hil.config.drive_tables import AcceptedTable, RatedTorqueUnit, SpeedUnitTable
 from hil.config.problems import Fault, refuse
 from hil.config.table import ExistingFile, Positive, Table, Unsigned32
 
@@ -82,6 +83,9 @@ class InverterTable(Table):
     rpdo_deadline_ms: Annotated[int, Field(ge=2, le=65535)] = 200
     option_codes: OptionCodesTable = OptionCodesTable()
     torque_slope_nm_per_s: Positive | None = None
+    speed_unit: SpeedUnitTable | None = None
+    rated_torque_unit: Annotated[RatedTorqueUnit, Field(strict=False)] = RatedTorqueUnit.MILLI
+    accepted: AcceptedTable = AcceptedTable()
     follow_bit: bool = True
     sdo_timeout_s: TimeOut = 0.5
     mode_timeout_s: TimeOut = 2.0

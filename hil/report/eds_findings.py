@@ -1,4 +1,4 @@
-"""What a check of an EDS came to: lines as a compiler writes them, and the same for JSON."""
+"""What a check of an EDS came to: lines as a compiler writes them, the capability table, and the same for JSON."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Any
 
 import typer
 
+from drivers.capability.ability import Ability
 from drivers.datasheet.check import EdsReport
 from drivers.datasheet.finding import EdsFinding, Severity
 
@@ -22,13 +23,38 @@ def eds_lines(report: EdsReport) -> Iterator[str]:
         severity = typer.style(finding.severity.value, fg=_COLOURS[finding.severity], bold=True)
         line = "" if finding.line is None else f"{finding.line}:"
         yield f"{report.path}:{line} {severity}: {finding}"
+    yield from _table(report)
     yield f"{report.path}: {verdict(report)}"
+
+
+def _table(report: EdsReport) -> Iterator[str]:
+    """Write the capability table of a drive that can be used, and the lines its rig file needs."""
+    if report.plan is None or not report.usable:
+        return
+    for ability in report.plan.abilities.values():
+        row = ability.capability
+        yield f"{row.function.value:32} {_by(ability) or f'none: {row.instead}{_cost(row.cost)}'}"
+    for direction, carrier in zip(("RPDO", "TPDO"), report.plan.carriers, strict=False):
+        how = "mapped by each run" if carrier.mapped_here else "as described"
+        yield f"{direction:32} 0x{carrier.layout.communication_index:04X}, {how}: {carrier.layout}"
+    if report.lines:
+        yield "# under [inverters.m1] and [inverters.m2] of the rig file:"
+        yield from (f"{line.text}  # {line.reason}" for line in report.lines)
+
+
+def _by(ability: Ability) -> str:
+    return ", ".join(f"0x{part.index:04X}:{part.subindex:02X}" for part in ability.parts)
+
+
+def _cost(cost: str) -> str:
+    return f" ({cost})" if cost else ""
 
 
 def verdict(report: EdsReport) -> str:
     """Say whether the file is usable, and count the findings: ``not usable: 1 error, 2 warnings``."""
+    usable = "usable with the lines above" if report.lines else "usable"
     counts = [f"{n} {each.value}{'' if n == 1 else 's'}" for each in Severity if (n := report.count(each))]
-    return f"{'usable' if report.usable else 'not usable'}: {', '.join(counts) or 'nothing to remark'}"
+    return f"{usable if report.usable else 'not usable'}: {', '.join(counts) or 'nothing to remark'}"
 
 
 def eds_section(report: EdsReport) -> dict[str, Any]:
@@ -37,6 +63,20 @@ def eds_section(report: EdsReport) -> dict[str, Any]:
         "file": str(report.path),
         "usable": report.usable,
         "findings": [_finding(finding) for finding in report.findings],
+        "rig_file_lines": [{"line": line.text, "reason": line.reason} for line in report.lines],
+        "capabilities": [] if report.plan is None else [_ability(each) for each in report.plan.abilities.values()],
+    }
+
+
+def _ability(ability: Ability) -> dict[str, Any]:
+    row = ability.capability
+    return {
+        "function": row.function.value,
+        "by": [f"0x{part.index:04X}:{part.subindex:02X}" for part in ability.parts],
+        "without": row.without.value,
+        "instead": row.instead,
+        "cost": row.cost,
+        "key": row.key,
     }
 
 

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
+from urllib.parse import parse_qsl, urlsplit
 
 from drivers.canopen.can_link import CanLink
 from drivers.datasheet.check import check_eds
+from drivers.datasheet.file import EdsFile
 from drivers.datasheet.finding import Severity
 from drivers.errors import DriverError
 from drivers.inverter.check import Difference
+from drivers.inverter.commissioned import CommissionedValue
 from drivers.inverter.inverter import Inverter
+from drivers.inverter.protection import Protection
 from drivers.plc.reader import Backoff, PlcReader
 from drivers.plc.reading import Reading
 from drivers.plc.types import PlcStatus
@@ -56,6 +60,12 @@ class Finding:
         What does not agree; empty unless it differs.
     notes
         Why it failed, or what would keep it from a run at present.
+    remarks
+        What a run will set by itself, and what the drive keeps of its own.
+    commissioned
+        Where DCF, device and rig file are not of one mind.
+    protections
+        What stands between a dead host and torque.
     registers
         What the registers of a PLC hold.
     """
@@ -65,6 +75,9 @@ class Finding:
     verdict: Verdict
     differences: tuple[Difference, ...] = ()
     notes: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
+    commissioned: tuple[CommissionedValue, ...] = ()
+    protections: tuple[Protection, ...] = ()
     registers: tuple[Reading, ...] = ()
 
 
@@ -95,10 +108,15 @@ def _can(rig: Rig, prove_stop: bool) -> tuple[Finding, ...]:
         )
     with link:
         bus = Finding("can", rig.can.url, Verdict.AGREES)
-        return (bus, *(_inverter(link, name, table, prove_stop, rig.period_s) for name, table in tables.items()))
+        return (
+            bus,
+            *(_inverter(link, name, table, prove_stop, rig.period_s, rig.can.url) for name, table in tables.items()),
+        )
 
 
-def _inverter(link: CanLink, name: str, table: InverterTable, prove_stop: bool, period_s: float) -> Finding:
+def _inverter(
+    link: CanLink, name: str, table: InverterTable, prove_stop: bool, period_s: float, can_url: str
+) -> Finding:
     def compare() -> Finding:
         inverter = Inverter(link, inverter_settings(name, table))
         differences, fault = inverter.check(), inverter.fault()
@@ -106,7 +124,16 @@ def _inverter(link: CanLink, name: str, table: InverterTable, prove_stop: bool, 
             differences = inverter.prove_stop(period_s)
         verdict = Verdict.DIFFERS if differences else Verdict.AGREES
         notes = (*_eds_note(table.eds), *(() if fault is None else (fault,)))
-        return Finding(name, address, verdict, differences, notes)
+        return Finding(
+            name,
+            address,
+            verdict,
+            differences,
+            notes,
+            inverter.remarks(),
+            (*_rate(table, can_url), *inverter.commissioned()),
+            inverter.protections(),
+        )
 
     address = _node(table)
     return _or_failed(name, address, compare)
@@ -118,6 +145,17 @@ def _eds_note(path: Path | None) -> tuple[str, ...]:
     if report is None or report.usable:
         return ()
     return (f"EDS {path} has errors ({report.count(Severity.ERROR)}). See: hil check --eds {path}",)
+
+
+def _rate(table: InverterTable, can_url: str) -> Iterator[CommissionedValue]:
+    """Compare the bit rate of a DCF with that of the bus URL, where both say one [kbit/s]."""
+    told = dict(parse_qsl(urlsplit(can_url).query)).get("bitrate", "")
+    if table.eds is None or not told.isdecimal():
+        return
+    commissioning = EdsFile(table.eds, table.node_id).sheet.commissioning
+    rate = None if commissioning is None else commissioning.bit_rate_kbit_s
+    if rate is not None and rate * 1000 != int(told):
+        yield CommissionedValue("bit rate", f"{rate} kbit/s", "", f"{int(told) / 1000:g} kbit/s")
 
 
 def _node(table: InverterTable) -> str:
@@ -140,7 +178,12 @@ def _plc(table: PlcTable) -> Finding:
         )
         notes = () if status is None else tuple(reasons_against(status, NO_NEEDS))
         return Finding(
-            "plc", address, Verdict.DIFFERS if differences else Verdict.AGREES, differences, notes, registers
+            "plc",
+            address,
+            Verdict.DIFFERS if differences else Verdict.AGREES,
+            differences,
+            notes,
+            registers=registers,
         )
 
     address = f"{table.host}:{table.port}"

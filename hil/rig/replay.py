@@ -18,11 +18,9 @@ from pathlib import Path
 from statistics import median
 
 from drivers.canopen.can_link import SYNC_COB_ID
-from drivers.datasheet.file import EdsFile
 from drivers.errors import ProtocolViolation
-from drivers.inverter.pdos import command_codec, feedback_codec, feedback_receiver
+from drivers.inverter.pdos import InverterPdos
 from drivers.inverter.settings import InverterSettings
-from drivers.scaling import TorqueScale
 from hil.config.rig_file import Rig
 from hil.errors import RecordingError
 from hil.rig.build import inverter_settings
@@ -45,28 +43,32 @@ class _Station:
     """One inverter of the trace: the command before the next SYNC, the answer after the last one."""
 
     def __init__(self, settings: InverterSettings, stale: SampleFlag, limited: SampleFlag) -> None:
-        eds = EdsFile(settings.eds_path, settings.node_id)
-        self._scale = TorqueScale(settings.rated_torque_nm)
-        self._rpdo = command_codec(eds, settings.where)
-        tpdo = feedback_codec(eds, settings.where)
-        self._receiver = feedback_receiver(eds, tpdo, self._scale)
+        self._pdos = InverterPdos(settings)
+        self._receiver = self._pdos.receiver()
         self._receiver.start_anew()
-        self._base_at, self._prbs_at = self._rpdo.position(0x6071), self._rpdo.position(0x60B2)
         self._stale, self._limited = stale, limited
         self._answered = False
         self._remark = SampleFlag.GOOD
-        self.rpdo_cob_id, self.tpdo_cob_id = self._rpdo.layout.cob_id, tpdo.layout.cob_id
+        self.rpdo_cob_id, self.tpdo_cob_id = self._pdos.command.layout.cob_id, self._pdos.feedback.layout.cob_id
         self._next = (0.0, 0.0)
-        self.base_nm, self.prbs_nm = 0.0, 0.0
+        self.torque_ref_nm, self.prbs_nm = 0.0, 0.0
         self.torque_nm, self.speed_rad_s = math.nan, math.nan
         self.cycles_old = 0
 
+    @property
+    def has_offset(self) -> bool:
+        """Whether base torque and PRBS can be told apart."""
+        return self._pdos.has_offset
+
     def take_command(self, data: bytes) -> None:
-        values = self._rpdo.unpack(data)
-        self._next = (self._scale.to_nm(values[self._base_at]), self._scale.to_nm(values[self._prbs_at]))
+        torque = self._pdos.unpack(data)
+        if torque.offset_nm is None:  # the sum is all that was on the bus
+            self._next = (torque.target_nm, math.nan)
+        else:
+            self._next = (torque.target_nm + torque.offset_nm, torque.offset_nm)
 
     def begin(self) -> None:
-        self.base_nm, self.prbs_nm = self._next
+        self.torque_ref_nm, self.prbs_nm = self._next
         self._answered = False
 
     def take_answer(self, data: bytes, t_ns: int) -> None:
@@ -144,8 +146,8 @@ class _Reader:
             cycle=self._cycle,
             t_ns=self._sync_ns,
             time_s=0.0,
-            torque_ref_m1_nm=self.m1.base_nm + self.m1.prbs_nm,
-            torque_ref_m2_nm=self.m2.base_nm + self.m2.prbs_nm,
+            torque_ref_m1_nm=self.m1.torque_ref_nm,
+            torque_ref_m2_nm=self.m2.torque_ref_nm,
             prbs_nm=self.m1.prbs_nm + self.m2.prbs_nm,
             torque_m1_nm=self.m1.torque_nm,
             torque_m2_nm=self.m2.torque_nm,
@@ -184,6 +186,12 @@ def replay(path: Path, rig: Rig, whole: bool = False, channel: str | None = None
     clock = _Clock(period, paced=_is_paced(path, period, channel))
     m1 = _Station(inverter_settings("m1", rig.inverters.m1), SampleFlag.M1_STALE, SampleFlag.M1_LIMITED)
     m2 = _Station(inverter_settings("m2", rig.inverters.m2), SampleFlag.M2_STALE, SampleFlag.M2_LIMITED)
+    if not whole and not (m1.has_offset and m2.has_offset):
+        raise RecordingError(
+            path,
+            "expected the PRBS in an object of its own (0x60B2), by which the measured part is known, came drives that "
+            "get base torque and PRBS as one sum (0x6071). For every cycle: --all.",
+        )
     every = _Reader(clock, m1, m2).samples(read_frames(path, channel))
     chosen = every if whole else _measured(path, every)
     try:

@@ -35,8 +35,8 @@ class DriveSensors:
     ----------
     settings
         Noise, coarseness, and whether it samples at SYNC.
-    si_unit_velocity
-        Object 0x60A9, the unit of speed.
+    velocity
+        Scale of the velocity actual value.
     seed
         Of the noise.
 
@@ -50,11 +50,10 @@ class DriveSensors:
 
     __slots__ = ("_clock", "_noise", "_settings", "_velocity_scale", "current", "speed", "torque")
 
-    def __init__(self, settings: SimulatedInverter, si_unit_velocity: int, seed: int) -> None:
+    def __init__(self, settings: SimulatedInverter, velocity: VelocityScale, seed: int) -> None:
         self._settings = settings
         self._noise = _normal(np.random.default_rng([seed, settings.node_id]))
-        where = f"simulated inverter, node {settings.node_id}"
-        self._velocity_scale = VelocityScale.from_object(si_unit_velocity, where)
+        self._velocity_scale = velocity
         self._clock = SampleClock(settings.faults.clock_drift_ppm)
         self.clear()
 

@@ -6,6 +6,7 @@ limits; the torque offset is added in profile torque mode too, unsloped.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from typing import Final
 
@@ -22,6 +23,7 @@ from drivers.inverter.cia402 import (
     command_of,
     next_state,
 )
+from drivers.scaling import VelocityScale
 from hil.simulator.dc_link import DcLink
 from hil.simulator.drive_sensors import DriveSensors
 from hil.simulator.error_list import ErrorList
@@ -83,16 +85,20 @@ class InverterDevice:
     settings
         What it is.
     defaults
-        Power-on values of the objects in `PARAMETERS` and of 0x60A9, from its EDS.
+        Power-on values of the objects in `PARAMETERS`, from its EDS, and of supported drive modes 0x6502 if it has any.
+    velocity
+        Scale of its velocity actual value.
     seed
         Of its reading noise.
     """
 
-    def __init__(self, settings: SimulatedInverter, defaults: Mapping[int, int], seed: int) -> None:
+    def __init__(
+        self, settings: SimulatedInverter, defaults: Mapping[int, int], velocity: VelocityScale, seed: int
+    ) -> None:
         self._settings = settings
         self._limits = settings.faults.limits
         self._defaults = defaults
-        self._sensors = DriveSensors(settings, defaults[0x60A9], seed)
+        self._sensors = DriveSensors(settings, velocity, seed)
         self._heat = Heat(self._limits)
         self._dc_link = DcLink()
         self._steps = 0
@@ -274,7 +280,7 @@ class InverterDevice:
             self._enter(target)
 
     def _take_mode(self, value: int) -> None:
-        if value not in self._settings.supported_modes:
+        if value not in self._modes:
             raise ObjectRefused(VALUE_RANGE_EXCEEDED)
         self._mode = value
 
@@ -314,8 +320,8 @@ class InverterDevice:
         return 0.0 if ramp is Ramp.AT_ONCE else _towards(0.0, self._torque, self._slope(ramp) * period_s)
 
     def _slope(self, ramp: Ramp) -> float:
-        """Steepness [per mille of rated torque per second]."""
-        return QUICK_SLOPE_PERMILLE_PER_S if ramp is Ramp.QUICK else float(self._parameters[0x6087])
+        """Steepness [per mille of rated torque per second]; a slope of 0 is none, so that the torque steps."""
+        return QUICK_SLOPE_PERMILLE_PER_S if ramp is Ramp.QUICK else float(self._parameters[0x6087]) or math.inf
 
     def _within_limits(self, wanted: int, speed_rad_s: float) -> float:
         maximum = self._heat.limit_permille(self._parameters[0x6072]) * self._limits.weakening(speed_rad_s)
@@ -331,15 +337,25 @@ class InverterDevice:
             0x6041: self._statusword,
             0x6061: lambda: self._mode,
             0x606C: lambda: self._sensors.speed,
-            0x6076: lambda: round(self._settings.rated_torque_nm * 1000.0),
+            0x6076: lambda: round(self._settings.rated_torque_nm / self._settings.rated_torque_unit_nm),
             0x6077: lambda: self._sensors.torque,
             0x6078: lambda: self._sensors.current,
             0x6079: lambda: self._dc_link.millivolts,
             0x6502: self._supported_modes,
         }
 
+    @property
+    def _modes(self) -> frozenset[TorqueMode]:
+        """Torque modes it takes: those its EDS lists, or all it knows if that lists none."""
+        listed = frozenset(mode for mode in TorqueMode if self._defaults.get(0x6502, 0) & mode.support_bit)
+        return self._settings.supported_modes & (listed or self._settings.supported_modes)
+
     def _supported_modes(self) -> int:
-        return sum(mode.support_bit for mode in self._settings.supported_modes)
+        torque_modes = sum(mode.support_bit for mode in TorqueMode)
+        described = self._defaults.get(0x6502)
+        if described and not described & torque_modes:
+            return described  # it says less than it can do
+        return (described or 0) & ~torque_modes | sum(mode.support_bit for mode in self._modes)
 
     def _statusword(self) -> int:
         bits = STATUSWORD_STATE_BITS[self.state] | _REMOTE

@@ -1,7 +1,8 @@
 """A simulated inverter on the bus: NMT slave, heartbeat, EMCY, PDOs and supervision of one node.
 
 NMT is done here, for the library's slave sends no boot-up message after a reset and its heartbeat timer outlives
-the bus. PDOs follow the configured mapping.
+the bus. PDOs follow the configured mapping, identifiers and transmission types, from those of the EDS on. An event is a
+changed value; values change at SYNC, for that is when simulated time goes on.
 
 It looks for its host (`hil.simulator.host_watch`) at every frame it takes and before each heartbeat of its own, so
 that it also notices when nothing comes any more.
@@ -22,20 +23,24 @@ from canopen.sdo.exceptions import SdoAbortedError
 from drivers.canopen.can_link import CanLink, FrameCallback
 from drivers.canopen.emcy import EMCY_COB_ID, Emergency
 from drivers.canopen.heartbeat import HEARTBEAT_COB_ID, NMT_COB_ID, HeartbeatProducer, NmtCommand, NmtState
-from drivers.canopen.pdo_map import PdoCodec
+from drivers.canopen.pdo_map import COB_ID_INVALID
+from drivers.capability.plan import plan_drive
+from drivers.capability.speed_unit import described_scale, speed_scale
 from drivers.datasheet.file import EdsFile
-from drivers.errors import ProtocolViolation
-from drivers.scaling import IntegerType
+from drivers.scaling import IntegerType, VelocityScale
 from hil.simulator.heartbeat_consumer import HeartbeatConsumer
 from hil.simulator.host_watch import HEARTBEAT_ERROR, RPDO_TIMEOUT, HostWatch
 from hil.simulator.inverter_device import LOST_CONNECTION, PARAMETERS, InverterDevice, ObjectRefused
 from hil.simulator.inverter_settings import SimulatedInverter
 from hil.simulator.object_server import ObjectServer
-from hil.simulator.pdo_objects import PdoObjects
+from hil.simulator.pdo_frame import PdoFrame
+from hil.simulator.pdo_objects import ACYCLIC, EVENT_DRIVEN, PdoObjects
 
 _SDO_REQUEST_COB_ID = 0x600
 _CONSUMER_HEARTBEAT_TIME = (0x1016, 1)
 _PRODUCER_HEARTBEAT_TIME = 0x1017
+_ERROR_BEHAVIOUR = (0x1029, 1)
+_EMCY_COB_ID = 0x1014
 _PDO_LENGTH_ERROR = 0x8210
 """Error code of CiA 301."""
 
@@ -44,6 +49,10 @@ _STALE_STREAM = 1
 
 _NMT_COMMANDS = {bytes((command,)): command for command in NmtCommand}
 _INTEGERS = frozenset(IntegerType)
+_CYCLIC = range(1, 241)
+
+_LOST_HOST_STATES = {0: NmtState.PRE_OPERATIONAL, 2: NmtState.STOPPED}
+"""Where the error behaviour for communication errors, 0x1029:01, leads from OPERATIONAL; 1 is to stay."""
 
 
 class InverterNode:
@@ -67,14 +76,15 @@ class InverterNode:
         self._faults = settings.faults
         self._lock = RLock()  # frames are taken in one thread, the heartbeat is sent by another
         self._eds = EdsFile(settings.eds_path, settings.node_id)
-        self._device = InverterDevice(settings, self._defaults(), seed)
+        self._identity = {1: settings.identity[0], 2: settings.identity[1]}
+        self._device = InverterDevice(settings, self._defaults(), self._velocity(settings), seed)
         self._random = np.random.default_rng([seed, settings.node_id, _STALE_STREAM])
         self._server = ObjectServer(self._node_id, self._eds, settings.faults, self._on_read, self._on_write)
         link.network.add_node(self._server)
         self._pdo_objects = PdoObjects(self._eds, self._value)
         self._producer: HeartbeatProducer | None = None
-        self._rpdos: dict[int, PdoCodec] = {}
-        self._tpdos: tuple[PdoCodec, ...] = ()
+        self._rpdos: dict[int, PdoFrame] = {}
+        self._tpdos: tuple[PdoFrame, ...] = ()
         self._pending: dict[int, bytes] = {}
         self._sources: dict[int, tuple[Callable[[], int], ...]] = {}
         self._last_sent: dict[int, bytes] = {}
@@ -130,8 +140,8 @@ class InverterNode:
                 return
             if self._host.heartbeat_lost(now_ns):
                 self._lose_host(HEARTBEAT_ERROR)
-                if self._state is NmtState.OPERATIONAL:  # error behaviour 0x1029:1 is 0
-                    self._state = NmtState.PRE_OPERATIONAL
+                if self._state is NmtState.OPERATIONAL:
+                    self._state = _LOST_HOST_STATES.get(self._error_behaviour(), self._state)
             if self._host.rpdo_missed(now_ns) and self._state is NmtState.OPERATIONAL:
                 self._lose_host(RPDO_TIMEOUT)
 
@@ -141,8 +151,7 @@ class InverterNode:
             if self._dead or self._state is not NmtState.OPERATIONAL:
                 return
             for tpdo in self._tpdos:
-                if self._syncs % tpdo.layout.transmission_type == 0:
-                    self._send(tpdo.layout.cob_id, self._tpdo_data(tpdo))
+                self._send_if_due(tpdo)
 
     def close(self) -> None:
         """End the heartbeat; the link is its owner's to close."""
@@ -154,9 +163,27 @@ class InverterNode:
         return self._device.hung or self._off_bus
 
     def _defaults(self) -> dict[int, int]:
-        """Power-on values of what the device holds, from the EDS where it lists them."""
-        listed = {index: self._eds.default(index) for index in PARAMETERS if self._eds.has(index)}
-        return {**PARAMETERS, **listed, 0x60A9: self._eds.default(0x60A9)}
+        """Power-on values of what the device holds, from the EDS where it has them."""
+        described = {index: self._eds.sheet.value(index) for index in (*PARAMETERS, 0x6502)}
+        return {**PARAMETERS, **{index: value for index, value in described.items() if value is not None}}
+
+    def _velocity(self, settings: SimulatedInverter) -> VelocityScale:
+        """Scale of its speed: its EDS's, else what the rig file states of it."""
+        plan = plan_drive(self._eds.sheet)
+        where = f"simulated inverter, node {settings.node_id}"
+        return described_scale(plan, where) or speed_scale(plan, settings.speed_unit, where)
+
+    def _error_behaviour(self) -> int:
+        return 0 if self._eds.sheet.entry(*_ERROR_BEHAVIOUR) is None else self._value(*_ERROR_BEHAVIOUR)
+
+    def _send_if_due(self, tpdo: PdoFrame) -> None:
+        kind, cob_id = tpdo.layout.transmission_type, tpdo.layout.cob_id
+        if kind == ACYCLIC or kind in EVENT_DRIVEN:
+            before = self._last_sent.get(tpdo.layout.communication_index)
+            if self._tpdo_data(tpdo) != before:
+                self._send(cob_id, self._last_sent[tpdo.layout.communication_index])
+        elif kind in _CYCLIC and self._syncs % kind == 0:
+            self._send(cob_id, self._tpdo_data(tpdo))
 
     def _meet_faults(self) -> None:
         if self._faults.reset_at_step == self._syncs:
@@ -167,11 +194,11 @@ class InverterNode:
             self._off_bus = True
             self._stop_heartbeat()
 
-    def _tpdo_data(self, tpdo: PdoCodec) -> bytes:
-        cob_id = tpdo.layout.cob_id
-        if cob_id not in self._last_sent or not self._is_stale():
-            self._last_sent[cob_id] = tpdo.pack(tuple([read() for read in self._sources[cob_id]]))
-        return self._last_sent[cob_id]
+    def _tpdo_data(self, tpdo: PdoFrame) -> bytes:
+        index = tpdo.layout.communication_index
+        if index not in self._last_sent or not self._is_stale():
+            self._last_sent[index] = tpdo.pack([read() for read in self._sources[index]])
+        return self._last_sent[index]
 
     def _is_stale(self) -> bool:
         """Whether the next TPDO repeats the one before."""
@@ -183,6 +210,8 @@ class InverterNode:
         if not self._device.hung:
             self._send(HEARTBEAT_COB_ID + self._node_id, bytes((NmtState.INITIALISING,)))
             self._state = NmtState.PRE_OPERATIONAL
+            if self._eds.sheet.value(_PRODUCER_HEARTBEAT_TIME):
+                self._start_heartbeat(self._value(_PRODUCER_HEARTBEAT_TIME, 0) / 1000.0)
             self._send_emergencies()
 
     def _on_nmt(self, data: bytes, t_ns: int) -> None:
@@ -218,7 +247,9 @@ class InverterNode:
     def _start_pdos(self) -> None:
         self._tpdos = self._pdo_objects.tpdos()
         self._sources = {
-            tpdo.layout.cob_id: tuple(self._source(each.index, each.subindex) for each in tpdo.layout.objects)
+            tpdo.layout.communication_index: tuple(
+                self._source(each.index, each.subindex) for each in tpdo.layout.objects
+            )
             for tpdo in self._tpdos
         }
         self._rpdos = {rpdo.layout.cob_id: rpdo for rpdo in self._pdo_objects.rpdos()}
@@ -227,6 +258,10 @@ class InverterNode:
         )
         for cob_id in self._rpdos:
             self._hear(cob_id, partial(self._on_rpdo, cob_id))
+        self._last_sent.clear()
+        for tpdo in self._tpdos:
+            if tpdo.layout.transmission_type in EVENT_DRIVEN:
+                self._send_if_due(tpdo)
 
     def _hear(self, cob_id: int, callback: FrameCallback) -> None:
         if cob_id not in self._heard:
@@ -243,7 +278,10 @@ class InverterNode:
         with self._lock:
             if self._dead or self._state is not NmtState.OPERATIONAL or cob_id not in self._rpdos:
                 return
-            self._pending[cob_id] = data
+            if self._rpdos[cob_id].layout.transmission_type in EVENT_DRIVEN:
+                self._put_into_effect(self._rpdos[cob_id], data)
+            else:
+                self._pending[cob_id] = data
             self._host.received(cob_id, t_ns)
             self._recover(RPDO_TIMEOUT)
 
@@ -260,13 +298,11 @@ class InverterNode:
             self._device.recover(error_code)
             self._send_emergencies()
 
-    def _put_into_effect(self, rpdo: PdoCodec, data: bytes) -> None:
-        try:
-            values = rpdo.unpack(data)
-        except ProtocolViolation:  # CiA 301, 7.2.2.6: it is not processed, the error goes out as EMCY
+    def _put_into_effect(self, rpdo: PdoFrame, data: bytes) -> None:
+        if len(data) != rpdo.size_bytes:  # CiA 301, 7.2.2.6: it is not processed, the error goes out as EMCY
             self._send_emergency(Emergency(_PDO_LENGTH_ERROR, 0, bytes(5)))
             return
-        for mapped, value in zip(rpdo.layout.objects, values, strict=True):
+        for mapped, value in rpdo.unpack(data):
             if mapped.index not in self._server.ignored_writes:
                 with suppress(ObjectRefused):  # a PDO has no answer; the device says it in its statusword, where it can
                     self._device.write(mapped.index, value)
@@ -279,7 +315,18 @@ class InverterNode:
                 self._send_emergencies()
 
     def _on_read(self, *, index: int, subindex: int, od: Any) -> int | None:
-        return self._device.read(index, subindex)
+        value = self._device.read(index, subindex)
+        if value is None and index == 0x1018 and self._eds.sheet.value(index, subindex) is None:
+            value = self._identity.get(subindex)
+        return None if value is None else self._fitting(value, od.data_type)
+
+    @staticmethod
+    def _fitting(value: int, data_type: int) -> int:
+        """Give a value in the range of its object: makers have narrower ones than CiA 402."""
+        if data_type not in _INTEGERS:
+            return value
+        kind = IntegerType(data_type)
+        return min(max(value, kind.low), kind.high)
 
     def _on_write(self, *, index: int, subindex: int, od: Any, data: bytes) -> None:
         if od.data_type not in _INTEGERS:
@@ -300,10 +347,10 @@ class InverterNode:
         return self._device.reader(index) or partial(self._value, index, subindex)
 
     def _value(self, index: int, subindex: int) -> int:
-        value = self._device.read(index, subindex)
-        if value is not None:
-            return value
-        return self._eds.integer_type(index, subindex).decode(self._server.get_data(index, subindex))
+        entry = self._eds.sheet.entry(index, subindex)
+        if entry is None or entry.kind is None or entry.kind.bits is None:
+            return 0
+        return int.from_bytes(self._server.get_data(index, subindex), "little", signed=entry.kind.signed)
 
     def _start_heartbeat(self, period_s: float) -> None:
         self._stop_heartbeat()
@@ -329,7 +376,11 @@ class InverterNode:
             self._send_emergency(emergency)
 
     def _send_emergency(self, emergency: Emergency) -> None:
-        self._send(EMCY_COB_ID + self._node_id, emergency.encode())
+        cob_id = EMCY_COB_ID + self._node_id
+        if self._eds.sheet.value(_EMCY_COB_ID) is not None:
+            cob_id = self._value(_EMCY_COB_ID, 0)
+        if cob_id & 0x7FF and not cob_id & COB_ID_INVALID:
+            self._send(cob_id & 0x7FF, emergency.encode())
 
     def _send(self, cob_id: int, data: bytes) -> None:
         if not self._off_bus:

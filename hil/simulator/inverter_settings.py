@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from drivers.capability.speed_unit import SpeedUnit
 from drivers.inverter.cia402 import TorqueMode
 from hil.simulator.torque_limits import DriveLimits
 
@@ -103,6 +104,12 @@ class SimulatedInverter:
         Standard deviation of the speed reading [rad/s].
     eds_path
         Its EDS; None for the one that is shipped.
+    identity
+        Vendor-ID and product code where its EDS has none.
+    speed_unit
+        Unit of its velocity actual value where its EDS has none.
+    rated_torque_unit_nm
+        What one count of its object 0x6076 is [Nm].
     faults
         What is wrong with it.
     """
@@ -113,4 +120,7 @@ class SimulatedInverter:
     torque_noise_counts: float = 1.0
     speed_noise_rad_s: float = 0.05
     eds_path: Path | None = None
+    identity: tuple[int, int] = (0, 0)
+    speed_unit: SpeedUnit | None = None
+    rated_torque_unit_nm: float = 1e-3
     faults: InverterFaults = InverterFaults()

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import Any
 
 import canopen
+from canopen.sdo.exceptions import SdoAbortedError
 
 from drivers.canopen.heartbeat import NMT_COB_ID
 from drivers.datasheet.file import EdsFile
@@ -17,6 +18,7 @@ from hil.simulator.inverter_settings import InverterFaults
 
 NO_SUCH_OBJECT = 0x06020000
 READ_ONLY = 0x06010002
+NO_VALUE = 0x060A0023
 """SDO abort codes."""
 
 _DOWNLOAD, _UPLOAD = 1, 2
@@ -51,6 +53,7 @@ class ObjectServer(canopen.LocalNode):
         on_write: Callable[..., None],
     ) -> None:
         super().__init__(node_id, eds.dictionary)
+        self._eds = eds
         self.ignored_writes = faults.ignored_writes
         self._missing = faults.missing_objects
         self._locked = faults.locked_objects
@@ -75,6 +78,18 @@ class ObjectServer(canopen.LocalNode):
         else:
             sdo: Any = self.sdo  # the library's server has no types
             sdo.on_request(self.sdo.rx_cobid, request, t_ns)
+
+    def get_data(self, index: int, subindex: int, check_readable: bool = False) -> bytes:
+        """Read an object; a number without a value is 0, as in a drive whose memory was cleared."""
+        entry = self._eds.sheet.entry(index, subindex)
+        value: bytes
+        try:
+            value = super().get_data(index, subindex, check_readable)
+        except SdoAbortedError as error:
+            if error.code != NO_VALUE or entry is None or entry.kind is None or entry.kind.bits is None:
+                raise
+            value = bytes((entry.kind.bits + 7) // 8)
+        return value
 
     def set_data(self, index: int, subindex: int, data: bytes, check_writable: bool = False) -> None:
         """Write an object, unless it is one that forgets."""

@@ -215,6 +215,9 @@ def _inverter(table: InverterTable, simulation: SimulationTable, faults: Inverte
         torque_noise_counts=simulation.torque_noise_permille,  # a count is one per mille of the rated torque
         speed_noise_rad_s=simulation.speed_noise_rad_s,
         eds_path=table.eds,
+        identity=(table.vendor_id, table.product_code),
+        speed_unit=None if table.speed_unit is None else table.speed_unit.speed_unit,
+        rated_torque_unit_nm=table.rated_torque_unit.nm,
         faults=faults,
     )
 

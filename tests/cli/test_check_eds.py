@@ -26,7 +26,10 @@ def faulty(tmp_path: Path) -> Path:
 
 def test_shipped_eds_has_nothing_to_remark(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["check", "--eds", SHIPPED]) == 0
-    assert capsys.readouterr().out == f"{SHIPPED}: usable: nothing to remark\n"
+    *table, verdict = capsys.readouterr().out.splitlines()
+    assert verdict == f"{SHIPPED}: usable: nothing to remark"
+    assert not any("none:" in row for row in table)
+    assert f"{'torque offset':32} 0x60B2:00" in table
 
 
 def test_warnings_are_told_and_borne(capsys: pytest.CaptureFixture[str]) -> None:
@@ -34,9 +37,10 @@ def test_warnings_are_told_and_borne(capsys: pytest.CaptureFixture[str]) -> None
     printed = capsys.readouterr()
     *lines, verdict = printed.out.splitlines()
     assert verdict == f"{OTHER}: usable: 11 warnings, 2 notes"
-    assert len(lines) == 13
+    assert lines[13].startswith("controlword ")
     assert all(
-        re.match(rf"{re.escape(OTHER)}:\d+: (warning|note): \[?\w+.*: expected .*, found .*\.$", line) for line in lines
+        re.match(rf"{re.escape(OTHER)}:\d+: (warning|note): \[?\w+.*: expected .*, found .*\.$", line)
+        for line in lines[:13]
     )
     assert printed.err == ""
 
@@ -46,7 +50,7 @@ def test_error_is_told_with_its_line(faulty: Path, capsys: pytest.CaptureFixture
     printed = capsys.readouterr()
     line = faulty.read_text().split("\n").index("DefaultValue=fast") + 1
     assert f"{faulty}:{line}: error: [60A9] DefaultValue: expected a number of UNSIGNED32" in printed.out
-    assert f"error: EDS {faulty} is not usable: 2 errors, 1 warning: see above." in printed.err
+    assert f"error: EDS {faulty} is not usable: 1 error, 2 warnings: see above." in printed.err
 
 
 def test_json(faulty: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -85,9 +85,14 @@ DIFFERENCES = [
         device=(eds_default("1400sub1", "$NODEID+0x80000200"),),
     ),
     Mismatch("COB-ID SYNC 0x1005:00", "128", "129", device=(eds_default("1005", "0x81"),)),
-    Mismatch("abort connection option code 0x6007:00", "2", "3", device=(eds_default("6007", "3"),)),
-    Mismatch("quick stop option code 0x605A:00", "6", "2", device=(eds_default("605A", "2"),)),
-    Mismatch("fault reaction option code 0x605E:00", "0", "2", device=(eds_default("605E", "2"),)),
+    Mismatch("abort connection option code 0x6007:00", "1 (fault), 2", "0, no", device=(eds_default("6007", "0"),)),
+    Mismatch(
+        "quick stop option code 0x605A:00",
+        "5",
+        "2",
+        device=(eds_default("605A", "2"),),
+        host=((r"rig: # option_codes = .*", "option_codes = { quick_stop = 5 }"),),
+    ),
 ]
 
 
@@ -197,6 +202,18 @@ def test_unreachable_plc_is_named(
     printed = capsys.readouterr()
     assert ": plc: expected all there" in printed.err
     assert "127.0.0.1:9" in printed.out
+
+
+@pytest.mark.parametrize(("index", "code"), [("6007", 3), ("605A", 2), ("605E", 2)])
+def test_option_code_other_than_the_eds_s_default_is_the_drive_s_own(
+    index: str, code: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    each = Mismatch("", "", "", device=(eds_default(index, str(code)),))
+    with planted(tmp_path, each, monkeypatch) as command:
+        assert run(command) == 0
+    assert re.search(
+        rf"m1: .* 0x{index}:00 is {code}, the EDS has \d: the drive keeps its own", capsys.readouterr().out
+    )
 
 
 def test_drive_in_fault_agrees_but_is_noted(

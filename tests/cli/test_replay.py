@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 
 import pytest
@@ -16,6 +17,8 @@ from hil.recording.formats import read_table
 from hil.report.identification.read_back import identified
 from hil.rig.live import FORGETTING
 from hil.rig.trace import SUFFIXES
+from tests.drivers.maker_files import MAKERS
+from tests.drivers.maker_rig import written_rig
 from tests.estimator.identification.tracking.drives import Line, drives
 from tests.rig.serving import served
 
@@ -42,6 +45,22 @@ def test_recording_comes_back_from_its_trace(
     for name in MEASURED:
         assert one.columns[name].tolist() == other.columns[name].tolist(), name
     assert other.metadata["replayed_from"] == trace.name
+
+
+def test_trace_of_drives_that_get_one_sum_has_no_prbs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    eds, rig, again = tmp_path / "drive.eds", tmp_path / "rig.toml", tmp_path / "again.csv"
+    eds.write_text(MAKERS["yiyou"].text())
+    written_rig(eds, tmp_path)
+    trace = tmp_path / "bus.log"
+    frames = ("201#0F006400", "202#0F006400", "080#", "181#37020A0064000000", "182#37020A0064000000")
+    lines = [f"({0.01 * k + 0.001 * n:.6f}) can0 {frame}" for k in range(20) for n, frame in enumerate(frames)]
+    trace.write_text("\n".join(lines) + "\n")
+    assert run(["replay", str(trace), "--rig", str(rig), "--out", str(again)]) == 2
+    assert "base torque and PRBS as one sum (0x6071). For every cycle: --all." in capsys.readouterr().err
+    assert run(["replay", str(trace), "--rig", str(rig), "--out", str(again), "--all"]) == 0
+    table = read_table(again)
+    assert set(table.columns["torque_ref_nm"]) == {120.0}
+    assert all(math.isnan(value) for value in table.columns["prbs_nm"])
 
 
 def test_trace_of_a_run_that_fails_is_kept_whole(short_rig: Path, tmp_path: Path) -> None:

@@ -65,7 +65,7 @@ def test_a_vehicle_by_options(tmp_path: Path) -> None:
 
 
 def test_comments_stand_in_one_column() -> None:
-    text = rig_text(answers({}, simulated=True), "rig.toml", simulated=True)
+    text = rig_text(answers({}, simulated=True), Path("rig.toml"), simulated=True)
     columns = [line.index("  # ") + 2 for line in text.splitlines() if "  # " in line and not line.startswith("# opt")]
     assert len(columns) > 40
     assert set(columns) == {COMMENTS_AT}
@@ -83,7 +83,8 @@ def test_whatever_the_limit_the_file_holds_together(
 ) -> None:
     given = {"torque_limit_nm": repr(limit_nm), "rated_torque_nm": repr(limit_nm * rated)}
     found = answers(VEHICLE | given | {"speed_rad_s": repr(speed_rad_s), "name": name}, simulated=False)
-    document = tomllib.loads(rig_text(found, "rig.toml", simulated=False))  # refused if a rule across keys is broken
+    text = rig_text(found, Path("rig.toml"), simulated=False)  # refused if a rule across keys is broken
+    document = tomllib.loads(text)
     assert document["name"] == name.strip()
     assert document["inverters"]["m1"]["torque_limit_nm"] == limit_nm
     assert document["guard"]["sum_limit_nm"] <= 2.0 * limit_nm

@@ -44,7 +44,7 @@ class FakeDrive:
         self.node_id = node_id
         self.eds = EdsFile(eds_path, node_id)
         self.types: dict[tuple[int, int], IntegerType] = self.eds.types()
-        self.objects = {key: self.eds.default(*key) if self.eds.has_default(*key) else 0 for key in self.types}
+        self.objects = {key: self.eds.sheet.value(*key) or 0 for key in self.types}
         self.objects |= {(0x6076, 0): round(M1.rated_torque_nm * 1000), (0x6502, 0): 0x3FF, (0x6072, 0): 3000}
         self.state = PowerState.SWITCH_ON_DISABLED
         self.nmt = NmtState.PRE_OPERATIONAL

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from drivers.canopen.pdo_map import RPDO_COMMUNICATION, RPDO_MAPPING
+from drivers.capability.plan import plan_drive
 from drivers.datasheet.file import EdsFile
 from drivers.errors import ConfigMismatch
 from drivers.inverter.drive_settings import drive_settings
@@ -36,8 +36,7 @@ PDOMapping=0
 
 def given(settings: InverterSettings) -> dict[tuple[int, int], tuple[int, str]]:
     eds = EdsFile(settings.eds_path, settings.node_id)
-    rpdo = eds.pdo_carrying(RPDO_COMMUNICATION, RPDO_MAPPING, 0x6040)
-    listed = drive_settings(eds, settings, rpdo)
+    listed = drive_settings(plan_drive(eds.sheet), settings)
     return {(each.index, each.subindex): (each.value, each.source) for each in listed}
 
 
@@ -55,14 +54,20 @@ def test_the_drive_is_made_to_watch_its_host_in_three_ways() -> None:
     settings = given(replace(M1, rpdo_deadline_ms=150))
     assert settings[0x1016, 1] == (127 << 16 | 500, "rig file")
     assert settings[0x1400, 5] == (150, "rig file")
-    assert settings[0x6007, 0] == (2, "EDS")
+    assert (0x6007, 0) not in settings  # the third, as the drive has it
 
 
-def test_option_codes_are_the_rig_file_s_or_else_the_eds_s() -> None:
+def test_option_codes_are_the_rig_file_s_or_a_dcf_s_and_never_an_eds_s_default(tmp_path: Path) -> None:
     settings = given(replace(M1, option_codes={0x605A: 5, 0x6007: 1}))
     assert settings[0x605A, 0] == (5, "rig file")
     assert settings[0x6007, 0] == (1, "rig file")
-    assert settings[0x605E, 0] == (0, "EDS")
+    assert (0x605E, 0) not in settings
+    head = "[605E]\nParameterName=Fault reaction option code\nObjectType=0x7\n"
+    eds = changed_eds(tmp_path, (head, f"{head}ParameterValue=2\n"))
+    assert (0x605E, 0) not in given(replace(M1, eds_path=eds))
+    dcf = eds.rename(tmp_path / "changed.dcf")
+    assert given(replace(M1, eds_path=dcf))[0x605E, 0] == (2, "DCF")
+    assert given(replace(M1, eds_path=dcf, option_codes={0x605E: 1}))[0x605E, 0] == (1, "rig file")
 
 
 def test_torque_slope_is_written_in_per_mille_of_rated_torque_where_the_rig_file_gives_it() -> None:
@@ -87,20 +92,14 @@ def test_a_value_for_an_object_the_drive_lacks_is_refused(settings: InverterSett
     eds = changed_eds(
         tmp_path, ("[605A]", "[2F5A]"), ("[6087]", "[2F87]"), ("=0x605A", "=0x2F5A"), ("=0x6087", "=0x2F87")
     )
-    with pytest.raises(ConfigMismatch, match=r"the rig file gives a value for .* which EDS .* does not have"):
+    with pytest.raises(
+        ConfigMismatch, match=r"the rig file gives a value for .* which EDS .* does not have, or not to"
+    ):
         given(replace(settings, eds_path=eds))
 
 
-def test_node_guarding_is_refused_with_the_reason(tmp_path: Path) -> None:
-    eds = changed_eds(tmp_path, more=NODE_GUARDING.format(guard_ms=100, factor=3))
-    with pytest.raises(
-        ConfigMismatch, match=r"node guarding is on \(guard time 0x100C:00 is 100 ms.*remote frames.*hea"
-    ):
-        given(replace(M1, eds_path=eds))
-
-
-@pytest.mark.parametrize("factor", [0, ""], ids=["zero", "blank"])
-def test_node_guarding_that_is_off_stays_off(tmp_path: Path, factor: int | str) -> None:
+@pytest.mark.parametrize("factor", [3, 0, ""], ids=["on", "zero", "blank"])
+def test_node_guarding_is_switched_off(tmp_path: Path, factor: int | str) -> None:
     eds = changed_eds(tmp_path, more=NODE_GUARDING.format(guard_ms=100, factor=factor))
     settings = given(replace(M1, eds_path=eds))
     assert settings[0x100C, 0] == settings[0x100D, 0] == (0, "this program")
@@ -109,13 +108,17 @@ def test_node_guarding_that_is_off_stays_off(tmp_path: Path, factor: int | str) 
 def test_slope_and_codes_are_in_the_drive_after_configuring_and_in_the_list_before() -> None:
     settings = replace(M1, torque_slope_nm_per_s=300.0, option_codes={0x605A: 5})
     with bench(settings=settings) as rig:
-        found = [(each.what, each.expected, each.source) for each in rig.m1.check()]
-        assert found == [
-            ("quick stop option code 0x605A:00", "5", "rig file"),
-            ("torque slope 0x6087:00", "500", "rig file"),
+        assert rig.m1.check() == ()
+        assert rig.m1.remarks() == (
+            "quick stop option code 0x605A:00 is 6, a run gives it 5 (rig file)",
+            "torque slope 0x6087:00 is 100000, a run gives it 500 (rig file)",
+        )
+        rig.m1._sdo.download(0x605A, 0, 2)
+        assert [(each.what, each.expected, each.found) for each in rig.m1.check()] == [
+            ("quick stop option code 0x605A:00", "5", "2")
         ]
         rig.m1.configure()
-        assert rig.m1.check() == ()
+        assert rig.m1.check() == rig.m1.remarks() == ()
         assert rig.m1._sdo.upload(0x6087) == 500
         assert rig.m1._sdo.upload(0x1400, 5) == M1.rpdo_deadline_ms
 

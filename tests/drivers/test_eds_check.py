@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from drivers.capability.function import Function, Without
+from drivers.capability.table import TABLE
 from drivers.datasheet.check import EdsReport
-from drivers.datasheet.check.needs import CONFIGURED, NEEDS, Need
 from drivers.datasheet.finding import EdsFinding, Severity
 from tests.docs.pages import DOCS
 from tests.drivers.eds_bench import SHIPPED, E, N, W, checked, edited, line_of, without
@@ -36,18 +37,53 @@ def test_missing_mandatory_object_is_an_error(tmp_path: Path, index: str) -> Non
     assert places(report, Severity.WARNING) == [f"[MandatoryObjects] {int(index) - 999}"]
 
 
-@pytest.mark.parametrize("need", NEEDS, ids=lambda need: need.name)
-def test_drive_without_a_needed_object_is_no_drive_for_this_program(tmp_path: Path, need: Need) -> None:
-    index = f"{need.index:04X}"
+NEEDED = [row.function for row in TABLE.values() if row.without is Without.REFUSED]
+
+
+@pytest.mark.parametrize("function", NEEDED, ids=lambda each: each.value)
+def test_drive_without_a_needed_object_is_no_drive_for_this_program(tmp_path: Path, function: Function) -> None:
+    index = f"{TABLE[function].ways[0][0].index:04X}"
     report = checked(tmp_path, without(index))
     assert not report.usable
-    assert f"[{index}]" in places(report, Severity.ERROR)
+    (finding,) = (each for each in report.findings if each.place == f"[{index}]" and function.value in each.expected)
+    assert (finding.severity, finding.line) == (E, line_of(SHIPPED, "OptionalObjects")) or index == "1018"
 
 
 def test_missing_sub_index_that_is_needed_is_an_error_of_its_object(tmp_path: Path) -> None:
-    (finding,) = (each for each in checked(tmp_path, without("1016sub1")).findings if each.severity is E)
-    assert finding.line == line_of(SHIPPED, "1016")
-    assert "consumer heartbeat time 0x1016:01" in finding.expected
+    (finding,) = (each for each in checked(tmp_path, without("1018sub1")).findings if each.severity is E)
+    assert finding.line == line_of(SHIPPED, "1018")
+    assert "vendor-ID 0x1018:01" in finding.expected
+
+
+@pytest.mark.parametrize(
+    ("gone", "lines"),
+    [
+        ("60A9", ['speed_unit = { unit = "rpm" }']),
+        ("1016", ['accepted.heartbeat_consumer = { by = "NAME", why = "REASON" }']),
+        ("1400sub5", ['accepted.rpdo_deadline = { by = "NAME", why = "REASON" }']),
+        ("6007", ['accepted.abort_connection = { by = "NAME", why = "REASON" }']),
+        ("60B2", []),
+        ("603F", []),
+        ("6072", []),
+        ("6076", []),
+    ],
+)
+def test_what_the_rig_file_has_to_say_instead(tmp_path: Path, gone: str, lines: list[str]) -> None:
+    report = checked(tmp_path, without(gone))
+    assert report.usable
+    assert [line.text for line in report.lines] == lines
+
+
+def test_option_code_without_a_value_or_for_good_is_no_fault(tmp_path: Path) -> None:
+    """It is the drive's own: nothing is written."""
+    blank = edited("605A", "DefaultValue=6", "DefaultValue=")
+    assert checked(tmp_path, edited("605E", "AccessType=rw", "AccessType=const", text=blank)).findings == ()
+
+
+def test_constant_that_holds_the_value_wanted_is_no_fault(tmp_path: Path) -> None:
+    assert checked(tmp_path, edited("1005", "AccessType=rw", "AccessType=const")).findings == ()
+    text = edited("1005", "AccessType=rw", "AccessType=const", text=edited("1005", "0x00000080", "0x00000081"))
+    assert [each.severity for each in checked(tmp_path, text).findings if each.place.endswith("DefaultValue")] == [E]
 
 
 def test_list_entry_that_is_no_index(tmp_path: Path) -> None:
@@ -116,7 +152,7 @@ def test_compact_description(tmp_path: Path, keys: str, said: list[str]) -> None
 
 
 def test_sub_indices_of_a_variable_are_not_read(tmp_path: Path) -> None:
-    report = checked(tmp_path, edited("1016", "ObjectType=0x8", "ObjectType=0x7"))
+    report = checked(tmp_path, edited("1018", "ObjectType=0x9", "ObjectType=0x7"))
     assert any("since it has sub-indices" in each.expected and each.severity is E for each in report.findings)
 
 
@@ -171,8 +207,8 @@ def test_mapping_over_eight_bytes_of_objects_that_are_not_there_or_not_filled(tm
 @pytest.mark.parametrize(
     ("mapping", "allowed", "wanted"),
     [
-        ("1600", "1", ["alone in the RPDO"]),
-        ("1600", "0", ["a filler", "alone in the RPDO"]),
+        ("1600", "1", []),
+        ("1600", "0", ["a filler"]),
         ("1A00", "1", ["a filler"]),
     ],
 )
@@ -182,13 +218,14 @@ def test_filler_in_a_mapping(tmp_path: Path, mapping: str, allowed: str, wanted:
     text = edited(mapping, "SubNumber=4", "SubNumber=5", text=text)
     entry = "ObjectType=0x7\nDataType=0x0007\nAccessType=rw\nDefaultValue=0x00050008\n"
     text += f"\n[{mapping}sub4]\nParameterName=Filler\n{entry}"
-    said = [each.expected for each in checked(tmp_path, text).findings if "8 bytes" not in each.expected]
+    findings = [each for each in checked(tmp_path, text).findings if not each.advice.startswith("A run maps it")]
+    said = [each.expected for each in findings if "8 bytes" not in each.expected]
     assert len(said) == len(wanted)
     assert all(any(want in each for each in said) for want in wanted)
 
 
-def test_node_guarding_is_an_error(tmp_path: Path) -> None:
-    """The drivers refuse it too: it excludes the heartbeat."""
+def test_node_guarding_is_told_and_switched_off(tmp_path: Path) -> None:
+    """It excludes the heartbeat; where it can't be switched off that is an error."""
     described = "\n[{}]\nParameterName=x\nDataType={}\nAccessType=rw\nDefaultValue={}\n"
     listed = edited("OptionalObjects", "SupportedObjects=35", "SupportedObjects=37\n36=0x100C\n37=0x100D")
     off = listed + described.format("100C", 6, 0) + described.format("100D", 5, 0)
@@ -196,17 +233,25 @@ def test_node_guarding_is_an_error(tmp_path: Path) -> None:
     blank = listed + described.format("100C", 6, "") + described.format("100D", 5, "")
     assert checked(tmp_path, blank).usable
     on = listed + described.format("100C", 6, 100) + described.format("100D", 5, 3)
-    assert places(checked(tmp_path, on), Severity.ERROR) == ["[100C] DefaultValue"]
+    assert places(checked(tmp_path, on), W) == ["[100C] DefaultValue"]
+    assert places(
+        checked(tmp_path, on.replace("AccessType=rw\nDefaultValue=3", "AccessType=ro\nDefaultValue=3")), E
+    ) == ["[100C] DefaultValue"]
 
 
 @pytest.mark.parametrize("mapping", ["1600", "1A00"])
 def test_no_pdo_that_carries_what_is_needed(tmp_path: Path, mapping: str) -> None:
-    needed = {"1600": "0x60B20010", "1A00": "0x60770010"}[mapping]
+    """It is mapped by each run where it can be, and otherwise there is none."""
+    needed = {"1600": "0x60710010", "1A00": "0x60770010"}[mapping]
     text = SHIPPED.replace(f"DefaultValue={needed}", "DefaultValue=0x60780010")
-    errors = [each for each in checked(tmp_path, text).findings if each.severity is E]
+    (note,) = (each for each in checked(tmp_path, text).findings if each.place == f"[{mapping}]")
+    assert (note.severity, note.advice.startswith("A run maps it: [COB-ID 0x")) == (N, True)
+    locked = edited(f"{mapping}sub1", "AccessType=rw", "AccessType=ro", text=text)
+    errors = [each for each in checked(tmp_path, locked).findings if each.severity is E]
     (finding,) = (each for each in errors if each.place == f"[{mapping}]")
     assert "that maps 0x60" in finding.expected
     assert "0x6078:00 (16 bit)" in finding.found
+    assert f"0x{mapping}:01 can not be written" in finding.found
 
 
 def test_order_of_the_report_is_that_of_the_lines(tmp_path: Path) -> None:
@@ -221,12 +266,13 @@ def test_finding_reads_as_a_sentence() -> None:
     assert str(finding) == "[6071] DataType: expected an integer, found '9'. Correct it."
 
 
-def test_needed_objects_are_those_of_the_documentation() -> None:
-    """Every row of the table marked "yes" is checked for, and nothing else is."""
-    table = (DOCS / "supported-protocols.md").read_text().partition("| object | name | used for | needed |")[2]
+def test_objects_of_the_table_are_those_of_the_documentation() -> None:
+    """Each has its row, with what is done without it."""
+    table = (DOCS / "supported-protocols.md").read_text().partition("| object | name | used for | without |")[2]
     rows = [row.split("|") for row in table.partition("\n\n")[0].splitlines()[2:]]
-    needed = {index for row in rows if row[4].strip() == "yes" for index in re.findall(r"0x(\w{4})", row[1])}
-    pdos = {"1400", "1600", "1800", "1A00"}
-    assert needed - pdos == {f"{need.index:04X}" for need in NEEDS}
-    assert pdos <= needed
-    assert set(CONFIGURED).isdisjoint(need.index for need in NEEDS)
+    without = {index: row[4].strip() for row in rows for index in re.findall(r"0x(\w{4})", row[1])}
+    without |= {f"605{digit}": without["605A"] for digit in "BCD"}  # "0x605A to 0x605E"
+    for row in TABLE.values():
+        for part in (part for way in row.ways for part in way):
+            refused = without[f"{part.index:04X}"].startswith("refused")
+            assert refused is (row.without is Without.REFUSED) or part.index == 0x1018, f"0x{part.index:04X}"

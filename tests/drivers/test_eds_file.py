@@ -11,6 +11,8 @@ from canopen import import_od
 from canopen.objectdictionary import ObjectDictionary
 
 from drivers import resources
+from drivers.capability.carrier import TPDO, find_carrier
+from drivers.capability.plan import plan_drive
 from drivers.datasheet.check import check_eds
 from drivers.datasheet.file import EdsFile
 from drivers.errors import ConfigMismatch
@@ -67,14 +69,19 @@ def test_shipped_eds_is_read_as_another_reader_reads_it() -> None:
 
 
 def test_pdo_layouts_come_from_the_eds_with_the_node_id_put_in() -> None:
-    layout = EdsFile(None, 5).pdo_carrying(0x1800, 0x1A00, *FEEDBACK)
+    layout = plan_drive(EdsFile(None, 5).sheet).carrier(TPDO).layout
     assert (layout.cob_id, layout.transmission_type, layout.valid) == (0x185, 1, True)
     assert tuple(mapped.index for mapped in layout.objects) == FEEDBACK
 
 
 def test_changed_mapping_changes_the_layout(edited: Edited) -> None:
-    layout = edited("0x60770010", "0x60B20010").pdo_carrying(0x1800, 0x1A00, 0x6041, 0x60B2)
-    assert tuple(mapped.index for mapped in layout.objects) == (0x6041, 0x60B2, 0x606C)
+    search = find_carrier(edited("0x60770010", "0x60740010").sheet, TPDO, (0x6041, 0x606C))
+    assert search.carrier is not None
+    assert search.carrier.mapped_here  # 0x6074 is no object of it
+
+    search = find_carrier(edited("0x60770010", "0x60780010").sheet, TPDO, (0x6041, 0x6078))
+    assert search.carrier is not None
+    assert tuple(mapped.index for mapped in search.carrier.layout.objects) == (0x6041, 0x6078, 0x606C)
 
 
 def test_types_hold_every_object_with_its_type() -> None:
@@ -119,7 +126,7 @@ def test_empty_file_is_refused(tmp_path: Path) -> None:
 def test_file_with_another_ending_is_read(tmp_path: Path) -> None:
     path = tmp_path / "inverter.txt"
     path.write_text(SHIPPED.read_text())
-    assert EdsFile(path, 5).default(0x60A9) == 0xFDB44700
+    assert EdsFile(path, 5).sheet.value(0x60A9) == 0xFDB44700
 
 
 def test_object_that_is_not_in_the_eds_is_refused() -> None:
@@ -133,19 +140,21 @@ def test_object_that_is_no_integer_is_refused(edited: Edited) -> None:
         eds.integer_type(0x1000)
 
 
-def test_default_that_is_no_number_is_refused(edited: Edited) -> None:
-    with pytest.raises(ConfigMismatch, match="0x60A9:00 has no readable DefaultValue"):
-        edited("DefaultValue=0xFDB44700", "DefaultValue=fast").default(0x60A9)
+@pytest.mark.parametrize("written", ["fast", "0x1FDB44700", ""])
+def test_value_that_is_no_number_or_does_not_fit_is_none(edited: Edited, written: str) -> None:
+    assert edited("DefaultValue=0xFDB44700", f"DefaultValue={written}").sheet.value(0x60A9) is None
 
 
 def test_eds_without_a_pdo_for_the_objects_is_refused(edited: Edited) -> None:
-    with pytest.raises(ConfigMismatch, match=r"one PDO from 0x1800 on that maps .*0x6077.*found COB-ID 0x185"):
-        edited("0x60770010", "0x60B20010").pdo_carrying(0x1800, 0x1A00, *FEEDBACK)
-
-
-def test_default_that_does_not_fit_is_refused(edited: Edited) -> None:
-    with pytest.raises(ConfigMismatch, match="0x60A9:00 has no readable DefaultValue"):
-        edited("DefaultValue=0xFDB44700", "DefaultValue=0x1FDB44700").default(0x60A9)
+    """The mapping is another one, and can't be changed, for the transmission type is fixed."""
+    locked = (
+        "[1A00sub2]\nParameterName=Mapped object 2\nObjectType=0x7\nDataType=0x0007\nAccessType={}\nDefaultValue={}"
+    )
+    eds = edited(locked.format("rw", "0x60770010"), locked.format("ro", "0x60780010"))
+    with pytest.raises(
+        ConfigMismatch, match=r"one TPDO that maps .*0x6077.*found 0x1800: COB-ID 0x185.*0x1A00:02 can no"
+    ):
+        plan_drive(eds.sheet).carrier(TPDO)
 
 
 @pytest.mark.parametrize(
@@ -177,15 +186,15 @@ def test_spare_pdo_without_defaults_is_no_hindrance(edited: Edited) -> None:
     second = "[1800]\n" + second
     spare = second.replace(f"{blank}DefaultValue=3", f"{blank}DefaultValue=")
     moved = second.replace("[1800", "[1801").replace("[1A00", "[1A01")
-    layout = edited(second, spare + moved).pdo_carrying(0x1800, 0x1A00, *FEEDBACK)
-    assert layout.communication_index == 0x1801
+    carrier = plan_drive(edited(second, spare + moved).sheet).carrier(TPDO)
+    assert carrier.layout.communication_index == 0x1801
+    assert not carrier.mapped_here
 
 
-def test_why_no_pdo_will_do_is_told(edited: Edited) -> None:
+def test_pdo_without_a_transmission_type_is_mapped_anew(edited: Edited) -> None:
     head = "[1800sub2]\nParameterName=Transmission type\nObjectType=0x7\nDataType=0x0005\nAccessType=rw\n"
-    eds = edited(f"{head}DefaultValue=1\n", head)
-    with pytest.raises(ConfigMismatch, match=r"found .*0x1800:02 has no readable DefaultValue"):
-        eds.pdo_carrying(0x1800, 0x1A00, *FEEDBACK)
+    carrier = plan_drive(edited(f"{head}DefaultValue=1\n", head).sheet).carrier(TPDO)
+    assert (carrier.mapped_here, carrier.described, carrier.layout.transmission_type) == (True, None, 1)
 
 
 def test_data_file_that_is_not_shipped_is_refused() -> None:

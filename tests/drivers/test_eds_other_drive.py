@@ -13,20 +13,25 @@ from pathlib import Path
 import pytest
 from canopen import import_od
 
+from drivers.capability.carrier import RPDO, TPDO
+from drivers.capability.function import Function, Without
+from drivers.capability.plan import plan_drive
+from drivers.capability.speed_unit import SpeedUnit, SpeedUnitName
+from drivers.capability.table import TABLE
 from drivers.datasheet.check import check_eds
-from drivers.datasheet.check.needs import NEEDS, Need
 from drivers.datasheet.file import EdsFile
 from drivers.datasheet.finding import Severity
 from drivers.errors import ConfigMismatch
+from drivers.inverter.acceptance import Acceptance
 from drivers.inverter.cia402 import PowerState
 from drivers.inverter.inverter import Inverter
 from drivers.resources import data_file
 from hil.config.rig_file import read_rig
 from hil.rig.build import inverter_settings
-from hil.simulator.inverter_settings import FaultAtStep, InverterFaults, SimulatedInverter
+from hil.simulator.inverter_settings import SimulatedInverter
 from hil.simulator.plant import RigidPlant
-from tests.drivers.can_bench import M1, Bench, bench, guarded
-from tests.drivers.eds_bench import without
+from tests.drivers.can_bench import M1, SIMULATED_M1, Bench, bench, guarded
+from tests.drivers.eds_bench import SHIPPED, without
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 OTHER_EDS = EXAMPLES / "other_drive.eds"
@@ -74,8 +79,8 @@ def test_the_library_alone_would_lose_every_sub_index() -> None:
 
 def test_pdo_2_carries_torque_and_feedback() -> None:
     eds = EdsFile(OTHER_EDS, 11)
-    rpdo = eds.pdo_carrying(0x1400, 0x1600, 0x6040, 0x6071, 0x60B2)
-    tpdo = eds.pdo_carrying(0x1800, 0x1A00, 0x6041, 0x6077, 0x606C)
+    plan = plan_drive(eds.sheet)
+    rpdo, tpdo = plan.carrier(RPDO).layout, plan.carrier(TPDO).layout
     assert (rpdo.communication_index, rpdo.cob_id) == (0x1401, 0x300 + 11)
     assert (tpdo.communication_index, tpdo.cob_id) == (0x1801, 0x280 + 11)
 
@@ -113,14 +118,47 @@ def test_drive_is_refused_with_the_shipped_eds(other: Bench) -> None:
         assert rig.rig.torque_nm[0] == 0.0
 
 
-@pytest.mark.parametrize("need", NEEDS, ids=lambda need: need.name)
-def test_what_the_checker_calls_needed_the_driver_does_not_do_without(need: Need, tmp_path: Path) -> None:
+NEEDED = [row.function for row in TABLE.values() if row.without is Without.REFUSED]
+OPTIONAL = [row.function for row in TABLE.values() if row.without in (Without.DONE, Without.RIG_FILE)]
+ACCEPTED = {
+    name: Acceptance("a test", "simulated") for name in ("heartbeat_consumer", "rpdo_deadline", "abort_connection")
+}
+
+
+@pytest.mark.parametrize("function", NEEDED, ids=lambda each: each.value)
+def test_what_the_checker_calls_needed_the_driver_does_not_do_without(function: Function, tmp_path: Path) -> None:
     """An EDS without the object: this program stops at it, before there is torque, and names it."""
+    index = TABLE[function].ways[0][0].index
     eds = tmp_path / "poor.eds"
-    eds.write_text(without(f"{need.index:04X}"))
-    in_fault = InverterFaults(fault=FaultAtStep(0, 0x4310)) if need.index == 0x603F else InverterFaults()
-    with pytest.raises(ConfigMismatch, match=f"0x{need.index:04X}"), bench(in_fault) as rig:
+    eds.write_text(without(f"{index:04X}"))
+    assert not check_eds(eds).usable
+    with pytest.raises(ConfigMismatch, match=f"0x{index:04X}"), bench() as rig:
         whole_way(rig, eds)
+
+
+@pytest.mark.parametrize("function", OPTIONAL, ids=lambda each: each.value)
+def test_what_the_checker_can_do_without_the_driver_does_without(function: Function, tmp_path: Path) -> None:
+    """An EDS without any of the objects that give it, and a drive that does not have them: it runs all the same."""
+    text = SHIPPED
+    for part in (part for way in TABLE[function].ways for part in way):
+        section = f"{part.index:04X}sub{part.subindex}" if part.subindex else f"{part.index:04X}"
+        text = without(section, text) if f"[{section}]" in text else text
+    eds = tmp_path / "lacking.eds"
+    eds.write_text(text)
+    report = check_eds(eds)
+    assert report.usable
+    unit = SpeedUnit(SpeedUnitName.RPM, 1000.0)
+    settings = replace(M1, eds_path=eds, accepted=ACCEPTED, speed_unit=unit)
+    with bench(settings=settings, simulated=replace(SIMULATED_M1, eds_path=eds, speed_unit=unit)) as rig:
+        assert rig.m1.check() == ()
+        rig.m1.configure()
+        rig.m1.arm()
+        rig.cycle(guarded(120.0, 60.0))
+        feedback = rig.cycle(guarded(120.0, 60.0))
+        assert rig.rig.torque_nm[0] == pytest.approx(180.0)
+        assert feedback.state is PowerState.OPERATION_ENABLED
+        rig.m1.disarm()
+        assert rig.rig.torque_nm[0] == 0.0
 
 
 def whole_way(rig: Bench, eds: Path) -> None:

@@ -52,6 +52,7 @@ def test_sections_and_keys_have_the_lines_they_stand_in(tmp_path: Path, end: str
         ("[A]\nx=1\n\n[a]\ny=2\n", [("warning", 4, "a second one; the first is in line 1")]),
         ("[A]\nx=1\nX=1\n", [("warning", 3, "it again")]),
         ("[A]\nx=1\nX=2\n", [("error", 3, "it again with '2'")]),
+        ("[2100sub1]\nx=1\nX=2\n", [("warning", 3, "it again with '2'")]),
         (
             "[A]\nx=1\n[A]\nx=2\n",
             [("warning", 3, "a second one; the first is in line 1"), ("error", 4, "it again with '2'")],

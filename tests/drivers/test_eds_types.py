@@ -6,7 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from drivers.capability.carrier import RPDO
 from drivers.datasheet.finding import Severity
+from drivers.errors import ConfigMismatch
 from drivers.resources import data_file
 from drivers.scaling import IntegerType, TorqueScale
 from tests.drivers.eds_bench import E, W, checked, edited, line_of
@@ -40,7 +42,6 @@ def test_torque_read_without_its_sign_would_be_enormous() -> None:
         ("6077", "0x0003", "0x0006"),
         ("6077", "0x0003", "0x0004"),
         ("6071", "0x0003", "0x0006"),
-        ("60B2", "0x0003", "0x0006"),
         ("606C", "0x0004", "0x0007"),
         ("606C", "0x0004", "0x0003"),
         ("6061", "0x0002", "0x0005"),
@@ -55,6 +56,18 @@ def test_used_object_of_another_sign_or_width_is_an_error_of_the_check(
     assert not report.usable
     [finding] = [each for each in report.findings if each.place == f"[{index}] DataType" and each.severity is E]
     assert finding.line == line_of(text, index, "DataType")
+
+
+def test_torque_offset_without_a_sign_is_done_without(tmp_path: Path) -> None:
+    """Base torque and PRBS go into the target torque as a sum, so that nothing is read as another number."""
+    text = edited("60B2", "DataType=0x0003", "DataType=0x0006")
+    report = checked(tmp_path, text)
+    assert report.usable
+    [finding] = [each for each in report.findings if each.place == "[60B2] DataType"]
+    assert finding.severity is W
+    assert finding.line == line_of(text, "60B2", "DataType")
+    assert report.plan is not None
+    assert 0x60B2 not in {mapped.index for mapped in report.plan.carrier(RPDO).layout.objects}
 
 
 def test_max_torque_as_a_signed_number_means_the_same(tmp_path: Path) -> None:
@@ -96,9 +109,26 @@ def test_drive_that_counts_syncs_is_told_and_set_to_take_ours(tmp_path: Path) ->
     path = tmp_path / "drive.eds"
     path.write_text(with_counter(), encoding="utf-8")
     with on_bus(CountsSync, eds_path=path) as (drive, inverter, link):
-        [difference] = inverter.check()
-        assert str(difference).endswith("SYNC counter overflow 0x1019:00 is 10, expected 0 (this program)")
+        assert inverter.check() == ()
+        assert inverter.remarks() == ("SYNC counter overflow 0x1019:00 is 10, a run gives it 0 (this program)",)
         inverter.configure()
         assert drive.objects[0x1019, 0] == 0
         assert inverter.await_feedback(link.sync(), 5.0) is not None
         inverter.raise_if_faulted()
+
+
+def test_drive_that_counts_syncs_with_another_value_than_its_eds_is_a_difference(tmp_path: Path) -> None:
+    path = tmp_path / "drive.eds"
+    path.write_text(with_counter(), encoding="utf-8")
+    with on_bus(CountsSync, eds_path=path) as (drive, inverter, _):
+        drive.objects[0x1019, 0] = 5
+        [difference] = inverter.check()
+        assert str(difference).endswith("SYNC counter overflow 0x1019:00 is 5, expected 0 (this program)")
+
+
+def test_drive_that_counts_syncs_for_good_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "drive.eds"
+    path.write_text(with_counter("const"), encoding="utf-8")
+    with pytest.raises(ConfigMismatch, match=r"0x1019:00 that is 0 or can be written, found 10 for good"):
+        with on_bus(CountsSync, eds_path=path):
+            pass

@@ -99,9 +99,23 @@ def test_cob_id_that_the_drive_had_before_is_switched_off_as_it_is() -> None:
         assert drive.objects[0x1800, 1] == 0x180 + M1.node_id
 
 
-def test_pdo_of_29_bits_in_the_eds_is_refused(tmp_path: Path) -> None:
+def test_pdo_of_29_bits_in_the_eds_is_given_an_identifier_of_11(tmp_path: Path) -> None:
+    with on_bus(eds_path=with_bit_30(tmp_path, "$NODEID+0x20000180")) as (drive, inverter, _):
+        drive.objects[0x1800, 1] = 1 << 29 | 0x180 + M1.node_id
+        assert inverter.check() == ()
+        [remark] = inverter.remarks()
+        assert "(of 29 bits)" in remark
+        inverter.configure()
+        assert drive.objects[0x1800, 1] == 0x180 + M1.node_id
+
+
+def test_pdo_of_29_bits_for_good_is_refused(tmp_path: Path) -> None:
+    """Its lower 11 bits are those of the identifier it should have."""
     path = with_bit_30(tmp_path, "$NODEID+0x20000180")
-    with pytest.raises(ConfigMismatch, match=r"identifier of 29 bits \(bit 29 of 0x1800:01\), expected one of 11"):
+    text, before = path.read_text(encoding="utf-8"), "AccessType=rw\nDefaultValue=$NODEID+0x20000180"
+    assert text.count(before) == 1
+    path.write_text(text.replace(before, before.replace("=rw", "=ro")), encoding="utf-8")
+    with pytest.raises(ConfigMismatch, match=r"0x1800:01 can not be written and has not COB-ID 0x185, switched on"):
         with on_bus(eds_path=path):
             pass
 

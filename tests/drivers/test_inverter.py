@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 
 from drivers.canopen.can_link import CanLink
-from drivers.errors import CommandRefused, ConfigMismatch, DeviceTimeout, ProtocolViolation
+from drivers.errors import CommandRefused, DeviceTimeout, ProtocolViolation
 from drivers.inverter.cia402 import PowerState, TorqueMode
 from drivers.inverter.inverter import Inverter
 from drivers.resources import data_file
 from hil.simulator.plant import RigidPlant
-from tests.drivers.can_bench import HASTY_M1, M1, Bench, bench, frame, guarded, new_channel, repeat
+from tests.drivers.can_bench import HASTY_M1, M1, SIMULATED_M1, Bench, bench, frame, guarded, new_channel, repeat
 
 
 @pytest.fixture
@@ -146,16 +146,19 @@ def test_changed_mapping_in_the_eds_is_configured_and_used(tmp_path: Path) -> No
         assert rig.m1.check() == ()
 
 
-def test_eds_whose_rpdo_maps_more_than_the_command_is_refused(tmp_path: Path) -> None:
+def test_rpdo_that_maps_more_than_the_command_is_mapped_anew(tmp_path: Path) -> None:
     eds = tmp_path / "more.eds"
     text = data_file("inverter.eds").read_text()
     sub0, sub3 = "[1600sub0]\nParameterName=Number of mapped objects", "[1600sub3]"
     extra = "[1600sub4]\nParameterName=Mapped object 4\nDataType=0x7\nAccessType=rw\nDefaultValue=0x60600008\n\n"
     head, tail = text.split(sub0)
     eds.write_text(head + sub0 + tail.replace("DefaultValue=3", "DefaultValue=4", 1).replace(sub3, extra + sub3))
-    with CanLink.open(f"virtual:{new_channel()}") as link:
-        with pytest.raises(ConfigMismatch, match=r"RPDO maps 0x6060:00 \(8 bit\), which this program has no value for"):
-            Inverter(link, replace(M1, eds_path=eds))
+    with bench(settings=replace(M1, eds_path=eds), simulated=replace(SIMULATED_M1, eds_path=eds)) as rig:
+        (remark,) = rig.m1.remarks()
+        assert "0x6060:00 (8 bit)], a run gives it [COB-ID 0x205, transmission type 1, maps 0x6040:00" in remark
+        assert rig.m1.check() == ()
+        rig.m1.configure()
+        assert rig.m1.remarks() == ()
 
 
 def test_tpdo_of_another_length_is_a_violation(armed: Bench) -> None:

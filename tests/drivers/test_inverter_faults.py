@@ -96,15 +96,27 @@ def test_configuration_that_does_not_hold_is_refused(index: int) -> None:
             rig.m1.configure()
 
 
-def test_changed_option_code_is_found_and_set_back() -> None:
+def test_option_code_of_the_drive_s_own_is_kept_and_told() -> None:
+    with bench() as rig:
+        rig.m1._sdo.download(0x605A, 0, 2)
+        assert rig.m1.check() == ()
+        (remark,) = rig.m1.remarks()
+        assert remark.startswith("quick stop option code 0x605A:00 is 2, the EDS has 6: the drive keeps its own.")
+        rig.m1.configure()
+        assert rig.m1._sdo.upload(0x605A) == 2
+
+
+def test_drive_whose_own_code_leaves_the_torque_is_refused_until_the_rig_file_has_another() -> None:
     with bench() as rig:
         rig.m1._sdo.download(0x6007, 0, 0)
         [difference] = rig.m1.check()
-        assert str(difference) == (
-            "inverter m1 (node 5): abort connection option code 0x6007:00 is 0, expected 2 (EDS)"
-        )
+        assert difference.found == "0, no action: the torque would stay without the host"
+        with pytest.raises(ConfigMismatch, match=r"0x6007:00 is 0, no action.*option_codes = \{ abort_connection = 2"):
+            rig.m1.configure()
+    with bench(settings=replace(M1, option_codes={0x6007: 2})) as rig:
+        rig.m1._sdo.download(0x6007, 0, 0)
         rig.m1.configure()
-        assert rig.m1.check() == ()
+        assert rig.m1._sdo.upload(0x6007) == 2
 
 
 def test_fault_in_operation_is_raised_with_its_cause_and_takes_the_torque_away() -> None:

@@ -8,10 +8,11 @@ from pathlib import Path
 import pytest
 
 from drivers.errors import ConfigMismatch, DeviceFault
+from drivers.inverter.acceptance import Acceptance
 from drivers.inverter.cia402 import PowerState
-from drivers.resources import data_file
 from hil.simulator.inverter_settings import FaultAtStep, InverterFaults
-from tests.drivers.can_bench import M1, Bench, bench
+from tests.drivers.can_bench import M1, SIMULATED_M1, Bench, bench
+from tests.drivers.eds_bench import without
 
 PERIOD_S = 0.001
 QUICK = replace(M1, rpdo_deadline_ms=50)
@@ -75,15 +76,48 @@ def test_drive_that_does_not_notice_is_found(monkeypatch: pytest.MonkeyPatch) ->
     assert differences[0].expected == "an EMCY 0x81xx or 0x82xx within 50 ms, and READY TO SWITCH ON left"
 
 
-def test_drive_without_an_rpdo_deadline_is_said_to_have_none(tmp_path: Path) -> None:
-    eds = tmp_path / "no_deadline.eds"
-    text = data_file("inverter.eds").read_text()
-    start = text.index("[1400sub5]")
-    eds.write_text(text[:start] + text[text.index("\n[", start) + 1 :])
-    with bench(settings=replace(QUICK, eds_path=eds)) as rig:
-        [difference] = rig.m1.prove_stop(PERIOD_S)
-    assert difference.what == "stop without commands"
-    assert "none in the EDS" in difference.found
+@pytest.mark.parametrize(
+    ("gone", "name", "seen"),
+    [
+        ("1400sub5", "rpdo_deadline", "without commands and SYNC nothing happened within 50 ms"),
+        ("1016", "heartbeat_consumer", ""),
+    ],
+)
+def test_what_the_drive_lacks_is_refused_until_somebody_accepts_it_by_name(
+    gone: str, name: str, seen: str, tmp_path: Path
+) -> None:
+    eds = tmp_path / "lacking.eds"
+    eds.write_text(without(gone))
+    simulated = replace(SIMULATED_M1, eds_path=eds)
+    lacking = replace(QUICK, eds_path=eds)
+    with pytest.raises(ConfigMismatch, match=rf'lacks .*{name} .*accepted\.{name} = {{ by = "NAME", why = "REASON" }}'):
+        with bench(settings=lacking, simulated=simulated):
+            raise AssertionError("nothing is built without it")
+    accepted = {name: Acceptance("A. Nyone", "a relay of its own takes the power away")}
+    with bench(settings=replace(lacking, accepted=accepted), simulated=simulated) as rig:
+        assert rig.m1.prove_stop(PERIOD_S) == ()
+        protections = {each.name: each for each in rig.m1.protections()}
+    assert str(protections[name]).startswith(
+        f"{name}: not there, accepted by A. Nyone: a relay of its own takes the power away"
+    )
+    assert protections[name].proof == seen
+    other = {"rpdo_deadline": "heartbeat_consumer", "heartbeat_consumer": "rpdo_deadline"}[name]
+    assert protections[other].proof.startswith("proven: EMCY 0x8")
+
+
+def test_drive_that_stops_by_itself_without_a_deadline_is_told(tmp_path: Path) -> None:
+    """It has none of CiA 301, but a watchdog of its maker's."""
+    eds = tmp_path / "own.eds"
+    eds.write_text(without("1400sub5"))
+    settings = replace(QUICK, eds_path=eds, accepted={"rpdo_deadline": Acceptance("A. Nyone", "own watchdog")})
+    with bench(settings=settings, simulated=replace(SIMULATED_M1, eds_path=eds)) as rig:
+        node = rig.rig._m1
+        assert node is not None
+        rig.m1._send_rpdo = lambda command: node._device.fail(0xFF01)  # type: ignore[assignment]
+        assert rig.m1.prove_stop(PERIOD_S) == ()
+        [own] = [each for each in rig.m1.protections() if each.name == "drive_watchdog"]
+    assert own.proof.startswith("proven without commands and SYNC:")
+    assert "power state fault" in own.proof
 
 
 def test_drive_in_fault_is_not_proved() -> None:

@@ -9,16 +9,17 @@ import numpy as np
 import pytest
 
 from drivers.inverter.cia402 import STATUSWORD_STATE_BITS, Command, PowerState, TorqueMode, next_state, state_of
+from drivers.scaling import VelocityScale
 from hil.simulator.inverter_device import InverterDevice, ObjectRefused
 from hil.simulator.inverter_settings import FaultAtStep, InverterFaults, SimulatedInverter
 
-DEFAULTS = {0x60A9: 0xFDB44700, 0x6007: 2, 0x605A: 6, 0x605B: 0, 0x605C: 0, 0x605D: 1, 0x605E: 0}
+DEFAULTS = {0x6007: 2, 0x605A: 6, 0x605B: 0, 0x605C: 0, 0x605D: 1, 0x605E: 0}
 QUIET = SimulatedInverter(5, torque_noise_counts=0.0, speed_noise_rad_s=0.0)
 PERIOD_S = 0.01
 
 
 def device(settings: SimulatedInverter = QUIET, seed: int = 1) -> InverterDevice:
-    return InverterDevice(settings, DEFAULTS, seed)
+    return InverterDevice(settings, DEFAULTS, VelocityScale.from_object(0xFDB44700, "the device"), seed)
 
 
 def enabled(settings: SimulatedInverter = QUIET, mode: int = 10) -> InverterDevice:

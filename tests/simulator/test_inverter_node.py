@@ -107,9 +107,9 @@ def test_reset_node_boots_with_the_values_of_its_eds(armed: Bench) -> None:
     [
         (0x1A00, 0, 2, "0x08000022"),  # while the PDO is on
         (0x1A00, 1, 0x60770010, "0x08000022"),
-        (0x1800, 2, 0, "0x06090030"),
-        (0x1800, 2, 254, "0x06090030"),
-        (0x1400, 2, 255, "0x06090030"),
+        (0x1800, 1, 0x285, "0x06090030"),  # another identifier
+        (0x1800, 2, 241, "0x06090030"),  # reserved
+        (0x1400, 2, 252, "0x06090030"),  # at a remote frame
     ],
 )
 def test_pdo_that_is_on_is_not_changed(index: int, subindex: int, value: int, reason: str) -> None:

@@ -4,116 +4,81 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from drivers.canopen.pdo_map import (
-    COB_ID_INVALID,
-    RPDO_COMMUNICATION,
-    RPDO_MAPPING,
-    TPDO_COMMUNICATION,
-    TPDO_MAPPING,
-    PdoLayout,
-)
-from drivers.datasheet.check.context import SAMPLE_NODE_ID, EdsContext, at_file, at_key, at_section, hexadecimal
+from drivers.canopen.pdo_map import COB_ID_EXTENDED, COB_ID_INVALID
+from drivers.capability.carrier import RESERVED_COB_IDS, RPDO, TPDO, Carrier, CarrierSearch, Direction
+from drivers.capability.function import Function
+from drivers.capability.plan import COMMAND, FEEDBACK, wanted_names
+from drivers.datasheet.check.context import EdsContext, at_file, at_key, at_section, hexadecimal
 from drivers.datasheet.finding import EdsFinding, Severity
-from drivers.datasheet.objects import EdsEntry
-from drivers.datasheet.pdo import PdoSearch, find_pdo
-from drivers.errors import ConfigMismatch
-from drivers.inverter.pdos import COMMAND_OBJECTS, FEEDBACK_OBJECTS
-
-RPDO_BASES = (RPDO_COMMUNICATION, RPDO_MAPPING)
-TPDO_BASES = (TPDO_COMMUNICATION, TPDO_MAPPING)
-
-EVERY_SYNC = 1
-EVENT_DRIVEN = (254, 255)
-"""Transmission types (CiA 301, 7.5.2.35)."""
-
-
-def carrier_parameters(context: EdsContext) -> frozenset[int]:
-    """Give the indices of the parameters of the two PDOs, as far as the file has them."""
-    pdos = (_find(context, RPDO_BASES, COMMAND_OBJECTS), _find(context, TPDO_BASES, FEEDBACK_OBJECTS))
-    layouts = [search.layout for search in pdos if search.layout is not None]
-    return frozenset(index for each in layouts for index in (each.communication_index, each.mapping_index))
 
 
 def check_carriers(context: EdsContext) -> Iterator[EdsFinding]:
-    """Check that one RPDO and one TPDO carry what is needed, and can be configured."""
-    yield from _rpdo(context)
-    yield from _tpdo(context)
+    """Check that one RPDO and one TPDO carry what is needed, or can be made to."""
+    plan = context.plan
+    yield from _search(context, RPDO, COMMAND, plan.command)
+    yield from _search(context, TPDO, FEEDBACK, plan.feedback)
+    for index in plan.strangers:
+        entry = context.entry(index, 1)
+        if entry is not None:
+            expected = "an identifier by the node id ($NODEID+0x...), for two drives with this file send the same"
+            advice = "A run switches this PDO off."
+            yield at_key(Severity.WARNING, entry.section, entry.value_key, expected, "", advice)
 
 
-def _find(context: EdsContext, bases: tuple[int, int], indices: tuple[int, ...]) -> PdoSearch:
-    def default(index: int, subindex: int) -> int:
-        entry = context.entry(index, subindex)
-        value = None if entry is None else entry.default(SAMPLE_NODE_ID)
-        if value is None:
-            raise ConfigMismatch(f"{hexadecimal(index, subindex)} without a readable DefaultValue")
-        return value
-
-    return find_pdo(lambda index: index in context.objects, default, bases, indices)
-
-
-def _rpdo(context: EdsContext) -> Iterator[EdsFinding]:
-    search = _find(context, RPDO_BASES, COMMAND_OBJECTS)
-    if search.layout is None:
-        yield _no_pdo(context, "RPDO", RPDO_BASES, COMMAND_OBJECTS, search)
-        return
-    yield from _configurable(context, search.layout)
-    for n, mapped in enumerate(search.layout.objects, start=1):
-        entry = context.entry(search.layout.mapping_index, n)
-        if mapped.index not in COMMAND_OBJECTS and entry is not None:
-            expected = f"{_names(COMMAND_OBJECTS)} alone in the RPDO that carries the torque"
-            advice = "Take it out of the mapping in your copy of the EDS: there is no value for it."
-            yield at_key(Severity.ERROR, entry.section, "DefaultValue", expected, "", advice)
-    kind = context.entry(search.layout.communication_index, 2)
-    if search.layout.transmission_type in EVENT_DRIVEN and kind is not None:
-        advice = "Write 1 in your copy of the EDS to have it at SYNC."
-        expected = "0 to 240, so that torque takes effect at SYNC"
-        yield at_key(Severity.WARNING, kind.section, "DefaultValue", expected, "on arrival,", advice)
+def _search(
+    context: EdsContext, direction: Direction, functions: tuple[Function, ...], search: CarrierSearch
+) -> Iterator[EdsFinding]:
+    wanted = wanted_names(context.plan, functions)
+    if search.carrier is None:
+        yield _no_pdo(context, direction, wanted, search)
+    elif search.carrier.mapped_here:
+        yield from _mapped_here(context, direction, wanted, search.carrier)
+    else:
+        yield from _as_described(context, search.carrier)
 
 
-def _tpdo(context: EdsContext) -> Iterator[EdsFinding]:
-    search = _find(context, TPDO_BASES, FEEDBACK_OBJECTS)
-    if search.layout is None:
-        yield _no_pdo(context, "TPDO", TPDO_BASES, FEEDBACK_OBJECTS, search)
-        return
-    yield from _configurable(context, search.layout)
-    kind = context.entry(search.layout.communication_index, 2)
-    if search.layout.transmission_type != EVERY_SYNC and kind is not None:
-        advice = "Write 1 in your copy of the EDS: the drive is configured with it."
-        expected = f"{EVERY_SYNC}, feedback at every SYNC"
-        yield at_key(Severity.ERROR, kind.section, "DefaultValue", expected, "", advice)
+def _no_pdo(context: EdsContext, direction: Direction, wanted: str, search: CarrierSearch) -> EdsFinding:
+    expected = f"one {direction.name} that maps {wanted}, or that can be mapped"
+    found = "; ".join(search.others) or f"no {direction.name}"
+    advice = "Map them in one PDO in your copy of the EDS, if the drive can be configured so."
+    for index in (direction.mapping, direction.communication):
+        if index in context.objects:
+            return at_section(Severity.ERROR, context.objects[index].section, expected, found, advice)
+    listed = context.text.section("OptionalObjects")
+    place = f"[{direction.mapping:04X}]"
+    if listed is None:
+        return at_file(Severity.ERROR, place, expected, found, advice)
+    return EdsFinding(Severity.ERROR, listed.line, place, expected, found, advice)
 
 
-def _no_pdo(
-    context: EdsContext, name: str, bases: tuple[int, int], indices: tuple[int, ...], search: PdoSearch
-) -> EdsFinding:
-    expected = f"one {name} that maps {_names(indices)}"
-    found = "; ".join(search.others) or f"no {name}"
-    advice = "Map them in one PDO in your copy of the EDS; the drive is configured with it."
-    first = context.objects.get(bases[1])
-    if first is None:
-        return at_file(Severity.ERROR, f"[{bases[1]:04X}]", expected, found, advice)
-    return at_section(Severity.ERROR, first.section, expected, found, advice)
+def _mapped_here(context: EdsContext, direction: Direction, wanted: str, carrier: Carrier) -> Iterator[EdsFinding]:
+    section = context.objects[carrier.layout.mapping_index].section
+    found = "nothing that can be read" if carrier.described is None else f"[{carrier.described}]"
+    advice = f"A run maps it: [{carrier.layout}]."
+    yield at_section(Severity.NOTE, section, f"one {direction.name} that maps {wanted}", found, advice)
 
 
-def _configurable(context: EdsContext, layout: PdoLayout) -> Iterator[EdsFinding]:
-    """Find entries of a PDO that configuring writes and that the drive does not let be written."""
-    written = [(layout.communication_index, 1), (layout.communication_index, 2), (layout.mapping_index, 0)]
-    written += [(layout.mapping_index, n) for n in range(1, len(layout.objects) + 1)]
-    for entry in (context.entry(*each) for each in written):
-        if entry is not None and entry.access in ("ro", "const"):
-            expected = f"{_name(entry)} that can be written, for the PDO is configured"
-            advice = "A drive with a fixed PDO can't be used; look whether another PDO of it can be mapped."
-            yield at_key(Severity.ERROR, entry.section, "AccessType", expected, "", advice)
+def _as_described(context: EdsContext, carrier: Carrier) -> Iterator[EdsFinding]:
+    layout, described = carrier.layout, carrier.described
+    kind = context.entry(layout.communication_index, 2)
+    if kind is not None and described is not None and described.transmission_type != layout.transmission_type:
+        expected = f"{layout.transmission_type}, at every SYNC"
+        yield at_key(Severity.WARNING, kind.section, kind.value_key, expected, "", "A run gives it this value.")
     cob_id = context.entry(layout.communication_index, 1)
-    if not layout.valid and cob_id is not None:
+    value = None if cob_id is None else cob_id.value(context.node_id)
+    if cob_id is not None and value is not None and value & (COB_ID_EXTENDED | 0x7FF) != layout.cob_id:
+        if value & COB_ID_EXTENDED or any(value & 0x7FF in taken for taken in RESERVED_COB_IDS):
+            return  # said with the other PDOs
+        expected = f"$NODEID+0x{layout.cob_id - context.node_id:X}, for this is a constant"
+        yield at_key(Severity.WARNING, cob_id.section, cob_id.value_key, expected, "", "A run gives it this value.")
+    if cob_id is not None and described is not None and not described.valid:
         expected = f"a PDO that is switched on (0x{COB_ID_INVALID:08X} clear)"
-        advice = "It is switched on when the drive is configured; take the bit out to have hil check compare with that."
-        yield at_key(Severity.WARNING, cob_id.section, "DefaultValue", expected, "one switched off,", advice)
-
-
-def _name(entry: EdsEntry) -> str:
-    return hexadecimal(entry.index, entry.subindex)
-
-
-def _names(indices: tuple[int, ...]) -> str:
-    return ", ".join(map(hexadecimal, indices))
+        advice = "It is switched on when the drive is configured."
+        yield at_key(Severity.WARNING, cob_id.section, cob_id.value_key, expected, "one switched off,", advice)
+    for place in sorted(carrier.fixed):
+        entry = context.entry(*place)
+        if entry is not None:
+            expected = f"{hexadecimal(*place)} that can be written"
+            advice = "It is not written: the drive has to hold what stands here."
+            yield at_key(Severity.NOTE, entry.section, "AccessType", expected, "", advice)
+            return

@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
-from drivers.datasheet.check.carriers import carrier_parameters, check_carriers
-from drivers.datasheet.check.context import EdsContext, at_file
+from drivers.capability.plan import DrivePlan, plan_drive
+from drivers.datasheet.check.carriers import check_carriers
+from drivers.datasheet.check.context import SAMPLE_NODE_ID, EdsContext, at_file
 from drivers.datasheet.check.entries import check_entries
 from drivers.datasheet.check.lists import check_lists
 from drivers.datasheet.check.modes import check_modes
-from drivers.datasheet.check.needs import USED, check_needs
+from drivers.datasheet.check.needs import ALWAYS_USED, check_needs
 from drivers.datasheet.check.pdos import check_pdos
+from drivers.datasheet.check.rig_lines import RigLine, rig_lines
 from drivers.datasheet.check.sections import check_sections
 from drivers.datasheet.check.values import check_values
 from drivers.datasheet.finding import EdsFinding, Severity
-from drivers.datasheet.objects import read_objects
-from drivers.datasheet.text import ADVICE, EdsUnreadable, read_eds_text
+from drivers.datasheet.objects import EdsObject, objects_of_use, read_objects
+from drivers.datasheet.sheet import DataSheet, read_commissioning
+from drivers.datasheet.text import ADVICE, EdsText, EdsUnreadable, read_eds_text
 
 RULES = (check_sections, check_lists, check_entries, check_values, check_pdos, check_needs, check_modes, check_carriers)
 
@@ -31,10 +35,16 @@ class EdsReport:
         The file.
     findings
         In the order of the file's lines; what has no line comes first.
+    plan
+        What a drive with it has, and how it is used; None for a file that can't be read.
+    lines
+        What the rig file has to say of it.
     """
 
     path: Path
     findings: tuple[EdsFinding, ...]
+    plan: DrivePlan | None = None
+    lines: tuple[RigLine, ...] = ()
 
     @property
     def usable(self) -> bool:
@@ -56,11 +66,20 @@ def check_eds(path: Path) -> EdsReport:
     if not objects:
         none = at_file(Severity.ERROR, "file", "objects, in sections such as [1000]", "none", ADVICE)
         return EdsReport(path, (none,))
-    return EdsReport(path, _in_order(_findings(EdsContext(text, objects, frozenset()))))
+    context = _context(text, objects)
+    findings = _in_order(_findings(context))
+    return EdsReport(path, findings, context.plan, rig_lines(context.plan))
+
+
+def _context(text: EdsText, objects: Mapping[int, EdsObject]) -> EdsContext:
+    commissioning = read_commissioning(text)
+    node_id = None if commissioning is None else commissioning.node_id
+    plan = plan_drive(DataSheet(text.path, objects_of_use(objects), node_id or SAMPLE_NODE_ID, commissioning))
+    replaced = {carrier.layout.mapping_index for carrier in plan.carriers if carrier.mapped_here}
+    return EdsContext(text, objects, plan, (plan.used | ALWAYS_USED) - replaced)
 
 
 def _findings(context: EdsContext) -> tuple[EdsFinding, ...]:
-    context = replace(context, used=USED | carrier_parameters(context))
     return (*context.text.findings, *(finding for rule in RULES for finding in rule(context)))
 
 

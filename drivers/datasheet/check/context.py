@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from drivers.capability.plan import DrivePlan
 from drivers.datasheet.finding import EdsFinding, Severity
 from drivers.datasheet.objects import EdsEntry, EdsObject
 from drivers.datasheet.text import EdsSection, EdsText
 
 SAMPLE_NODE_ID = 127
-"""Node id put in for ``$NODEID``: the greatest, for it needs the most room."""
+"""Node id put in for ``$NODEID`` where the file is for none: the greatest, for it needs the most room."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,13 +22,21 @@ class EdsContext:
     ----------
     text, objects
         What it says.
+    plan
+        How a drive with it is used.
     used
         Objects this program reads or writes; what is wrong with another one is a warning at most.
     """
 
     text: EdsText
     objects: Mapping[int, EdsObject]
+    plan: DrivePlan
     used: frozenset[int]
+
+    @property
+    def node_id(self) -> int:
+        """What ``$NODEID`` stands for."""
+        return self.plan.sheet.node_id
 
     def severity(self, index: int) -> Severity:
         """How bad it is when an object is wrong."""

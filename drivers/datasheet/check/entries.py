@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from drivers.datasheet.check.context import SAMPLE_NODE_ID, EdsContext, at_key, at_section
+from drivers.datasheet.check.context import EdsContext, at_key, at_section
 from drivers.datasheet.finding import EdsFinding, Severity
 from drivers.datasheet.number import read_number
 from drivers.datasheet.objects import (
@@ -76,7 +76,7 @@ def _group(context: EdsContext, described: EdsObject, subs: int) -> Iterator[Eds
     if 0 not in described.entries:
         yield at_section(severity, section, "a sub-index 0, the highest one", "none", "Describe it.")
     else:
-        yield from _highest(described, described.entries[0])
+        yield from _highest(described, described.entries[0], context.node_id)
 
 
 def _compact(context: EdsContext, section: EdsSection) -> Iterator[EdsFinding]:
@@ -94,14 +94,14 @@ def _compact(context: EdsContext, section: EdsSection) -> Iterator[EdsFinding]:
         yield at_key(Severity.WARNING, names, "NrOfEntries", f"at most {count}, CompactSubObj", "", "Correct it.")
 
 
-def _highest(described: EdsObject, zero: EdsEntry) -> Iterator[EdsFinding]:
+def _highest(described: EdsObject, zero: EdsEntry, node_id: int) -> Iterator[EdsFinding]:
     """Compare sub-index 0 with the highest there is, where it is a constant and not a count that is set."""
     highest = max(n for n in described.entries if n != STRUCTURE)
-    value = zero.default(SAMPLE_NODE_ID)
+    value = zero.value(node_id)
     constant = zero.access in ("const", "ro") and described.index != PRE_DEFINED_ERROR_FIELD
     if value is not None and (value > highest or (constant and value != highest)):
         expected = f"{highest}, the highest sub-index described"
-        yield at_key(Severity.WARNING, zero.section, "DefaultValue", expected, "", "Correct one of the two.")
+        yield at_key(Severity.WARNING, zero.section, zero.value_key, expected, "", "Correct one of the two.")
 
 
 def _entry(context: EdsContext, entry: EdsEntry) -> Iterator[EdsFinding]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from drivers.datasheet.check.context import SAMPLE_NODE_ID, EdsContext, at_key
+from drivers.datasheet.check.context import EdsContext, at_key
 from drivers.datasheet.finding import EdsFinding, Severity
 from drivers.inverter.cia402 import TorqueMode
 from drivers.inverter.drive_settings import SYNC_COUNTER_OVERFLOW
@@ -20,20 +20,20 @@ def check_modes(context: EdsContext) -> Iterator[EdsFinding]:
 
 def _torque_mode(context: EdsContext) -> Iterator[EdsFinding]:
     entry = context.entry(SUPPORTED_MODES)
-    value = None if entry is None else entry.default(SAMPLE_NODE_ID)
+    value = None if entry is None else entry.value(context.node_id)
     if entry is None or not value:  # blank and 0 say nothing: the drive itself is asked
         return
     if not any(value & mode.support_bit for mode in TorqueMode):
         expected = f"a torque mode among the supported ones: {' or '.join(mode.title for mode in TorqueMode)}"
         advice = "Look into the drive's manual; a drive without one can't be used."
-        yield at_key(Severity.WARNING, entry.section, "DefaultValue", expected, "none in", advice)
+        yield at_key(Severity.WARNING, entry.section, entry.value_key, expected, "none in", advice)
 
 
 def _sync_counter(context: EdsContext) -> Iterator[EdsFinding]:
     entry = context.entry(SYNC_COUNTER_OVERFLOW)
-    if entry is None or not entry.default(SAMPLE_NODE_ID):
+    if entry is None or not entry.value(context.node_id):
         return
-    fixed = entry.access in ("ro", "const")
+    fixed = not entry.writable
     expected = "0: a SYNC without a counter, as the host sends it"
     advice = "The drive would take no SYNC." if fixed else "It is set to 0 when the drive is configured."
-    yield at_key(Severity.ERROR if fixed else Severity.WARNING, entry.section, "DefaultValue", expected, "", advice)
+    yield at_key(Severity.ERROR if fixed else Severity.WARNING, entry.section, entry.value_key, expected, "", advice)

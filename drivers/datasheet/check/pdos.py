@@ -3,76 +3,40 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
-from drivers.canopen.pdo_map import (
-    COB_ID_EXTENDED,
-    COB_ID_INVALID,
-    MAX_MAPPED,
-    MAX_PDO_BYTES,
-    RPDO_COMMUNICATION,
-    RPDO_MAPPING,
-    TPDO_COMMUNICATION,
-    TPDO_MAPPING,
-    MappedObject,
-)
-from drivers.datasheet.check.context import SAMPLE_NODE_ID, EdsContext, at_key, at_section, hexadecimal
+from drivers.canopen.pdo_map import COB_ID_EXTENDED, COB_ID_INVALID, MAX_MAPPED, MAX_PDO_BYTES, MappedObject
+from drivers.capability.carrier import FILLERS, PDO_NUMBERS, RESERVED_COB_IDS, RPDO, TPDO, Direction
+from drivers.datasheet.check.context import EdsContext, at_key, at_section, hexadecimal
 from drivers.datasheet.finding import EdsFinding, Severity
 from drivers.datasheet.number import read_number
 from drivers.datasheet.objects import EdsEntry, EdsObject
-from drivers.datasheet.pdo import PDO_NUMBERS
-
-RESERVED_COB_IDS = (
-    range(0x000, 0x080),
-    range(0x080, 0x081),
-    range(0x101, 0x181),
-    range(0x581, 0x600),
-    range(0x601, 0x680),
-    range(0x6E0, 0x700),
-    range(0x701, 0x800),
-)
-"""Identifiers that no PDO may have (CiA 301, table 38: restricted), and SYNC's."""
 
 MULTIPLEX = (0xFE, 0xFF)
 """Numbers of mapped objects that stand for a multiplexed PDO (CiA 301, 7.5.2.36)."""
 
-DUMMY_OBJECTS = range(1, 8)
-
-
-@dataclass(frozen=True, slots=True)
-class _Direction:
-    name: str
-    communication: int
-    mapping: int
-    access: tuple[str, ...]
-    count_key: str
-
-
-_DIRECTIONS = (
-    _Direction("RPDO", RPDO_COMMUNICATION, RPDO_MAPPING, ("wo", "rw", "rww"), "NrOfRXPDO"),
-    _Direction("TPDO", TPDO_COMMUNICATION, TPDO_MAPPING, ("ro", "rw", "rwr", "const"), "NrOfTXPDO"),
-)
+_DIRECTIONS = ((RPDO, "NrOfRXPDO"), (TPDO, "NrOfTXPDO"))
+"""Each direction, and the key of DeviceInfo that counts its PDOs."""
 
 
 def check_pdos(context: EdsContext) -> Iterator[EdsFinding]:
     """Check every PDO there is."""
-    for direction in _DIRECTIONS:
-        yield from _count(context, direction)
+    for direction, count_key in _DIRECTIONS:
+        yield from _count(context, direction, count_key)
         for n in PDO_NUMBERS:
             yield from _pair(context, direction, direction.communication + n, direction.mapping + n)
     yield from _same_cob_ids(context)
 
 
-def _count(context: EdsContext, direction: _Direction) -> Iterator[EdsFinding]:
+def _count(context: EdsContext, direction: Direction, count_key: str) -> Iterator[EdsFinding]:
     section = context.text.section("DeviceInfo")
     there = sum(direction.communication + n in context.objects for n in PDO_NUMBERS)
-    written = None if section is None else read_number(section.get(direction.count_key) or "")
+    written = None if section is None else read_number(section.get(count_key) or "")
     if section is not None and written is not None and written != there:
         expected = f"{there}, the {direction.name}s described"
-        yield at_key(Severity.WARNING, section, direction.count_key, expected, "", "Correct the count.")
+        yield at_key(Severity.WARNING, section, count_key, expected, "", "Correct the count.")
 
 
-def _pair(context: EdsContext, direction: _Direction, communication: int, mapping: int) -> Iterator[EdsFinding]:
+def _pair(context: EdsContext, direction: Direction, communication: int, mapping: int) -> Iterator[EdsFinding]:
     for one, other in ((communication, mapping), (mapping, communication)):
         if one in context.objects and other not in context.objects:
             expected = f"{hexadecimal(other)} beside it, for a {direction.name} has both"
@@ -86,22 +50,25 @@ def _pair(context: EdsContext, direction: _Direction, communication: int, mappin
 
 def _cob_id(context: EdsContext, communication: int) -> Iterator[EdsFinding]:
     entry = context.entry(communication, 1)
-    value = None if entry is None else entry.default(SAMPLE_NODE_ID)
+    value = None if entry is None else entry.value(context.node_id)
     if entry is None or value is None:
         return
-    severity = context.severity(communication)
-    if value & COB_ID_EXTENDED and (not value & COB_ID_INVALID or severity is Severity.ERROR):
+    given = {carrier.layout.communication_index: carrier.layout.cob_id for carrier in context.plan.carriers}
+    used, switched_on = communication in given, not value & COB_ID_INVALID
+    replaced = used and given[communication] != value & (COB_ID_EXTENDED | 0x7FF)
+    severity = Severity.WARNING if replaced else context.severity(communication)
+    if value & COB_ID_EXTENDED and (switched_on or used):
         expected = "an identifier of 11 bits (bit 29 clear)"
-        yield at_key(severity, entry.section, "DefaultValue", expected, "", "Give the PDO one.")
-    elif not value & COB_ID_INVALID and any(value & 0x7FF in taken for taken in RESERVED_COB_IDS):
+        yield at_key(severity, entry.section, entry.value_key, expected, "", "Give the PDO one.")
+    elif switched_on and any(value & 0x7FF in taken for taken in RESERVED_COB_IDS):
         expected = "an identifier a PDO may have, such as 0x181 to 0x57F (CiA 301)"
-        found = f"0x{value & 0x7FF:03X} for node {SAMPLE_NODE_ID} from"
-        yield at_key(severity, entry.section, "DefaultValue", expected, found, "Give the PDO another.")
+        found = f"0x{value & 0x7FF:03X} for node {context.node_id} from"
+        yield at_key(severity, entry.section, entry.value_key, expected, found, "Give the PDO another.")
 
 
-def _mapping(context: EdsContext, direction: _Direction, described: EdsObject) -> Iterator[EdsFinding]:
+def _mapping(context: EdsContext, direction: Direction, described: EdsObject) -> Iterator[EdsFinding]:
     zero = described.entries.get(0)
-    count = None if zero is None else zero.default(SAMPLE_NODE_ID)
+    count = None if zero is None else zero.value(context.node_id)
     if zero is None or not count or count in MULTIPLEX:
         return
     severity, bits = context.severity(described.index), 0
@@ -111,7 +78,7 @@ def _mapping(context: EdsContext, direction: _Direction, described: EdsObject) -
         return
     for n in range(1, count + 1):
         entry = described.entries.get(n)
-        value = None if entry is None else entry.default(SAMPLE_NODE_ID)
+        value = None if entry is None else entry.value(context.node_id)
         if entry is None or value is None:
             section = described.section if entry is None else entry.section
             expected = f"a mapped object in sub-index {n}, for sub-index 0 counts {count}"
@@ -126,9 +93,9 @@ def _mapping(context: EdsContext, direction: _Direction, described: EdsObject) -
 
 
 def _mapped(
-    context: EdsContext, direction: _Direction, entry: EdsEntry, mapped: MappedObject, severity: Severity
+    context: EdsContext, direction: Direction, entry: EdsEntry, mapped: MappedObject, severity: Severity
 ) -> Iterator[EdsFinding]:
-    if mapped.index in DUMMY_OBJECTS:
+    if mapped.index in FILLERS:
         yield from _dummy(context, direction, entry, mapped, severity)
         return
     name = hexadecimal(mapped.index, mapped.subindex)
@@ -136,38 +103,38 @@ def _mapped(
     advice = f"Correct this mapping or the description of {name}."
     if target is None or target.kind is None:
         expected = "the index, sub-index and length of an object described"
-        yield at_key(severity, entry.section, "DefaultValue", expected, f"{name}, which is not, in", advice)
+        yield at_key(severity, entry.section, entry.value_key, expected, f"{name}, which is not, in", advice)
         return
     line = f"line {target.section.line}"
     if target.kind.bits != mapped.length_bits:
         expected = f"{target.kind.bits} bit for {name} ({target.kind.name}, {line})"
         found = f"{mapped.length_bits} bit in"
-        yield at_key(severity, entry.section, "DefaultValue", expected, found, advice)
+        yield at_key(severity, entry.section, entry.value_key, expected, found, advice)
     if not target.mappable:
         expected = f"an object with PDOMapping=1; {name} ({line}) has not"
-        yield at_key(severity, entry.section, "DefaultValue", expected, "", advice)
+        yield at_key(severity, entry.section, entry.value_key, expected, "", advice)
     if target.access is not None and target.access not in direction.access:
         expected = f"an object a {direction.name} may carry; {name} ({line}) has AccessType {target.access}"
-        yield at_key(severity, entry.section, "DefaultValue", expected, "", advice)
+        yield at_key(severity, entry.section, entry.value_key, expected, "", advice)
 
 
 def _dummy(
-    context: EdsContext, direction: _Direction, entry: EdsEntry, mapped: MappedObject, severity: Severity
+    context: EdsContext, direction: Direction, entry: EdsEntry, mapped: MappedObject, severity: Severity
 ) -> Iterator[EdsFinding]:
     section = context.text.section("DummyUsage")
     key = f"Dummy{mapped.index:04d}"
     allowed = section is not None and read_number(section.get(key) or "0") == 1
     if direction.name != "RPDO" or not allowed:
         expected = f"a filler in an RPDO only, with {key}=1 under [DummyUsage]"
-        yield at_key(severity, entry.section, "DefaultValue", expected, "", "Take it out of the mapping.")
+        yield at_key(severity, entry.section, entry.value_key, expected, "", "Take it out of the mapping.")
 
 
 def _same_cob_ids(context: EdsContext) -> Iterator[EdsFinding]:
     seen: dict[int, EdsEntry] = {}
-    for direction in _DIRECTIONS:
+    for direction, _ in _DIRECTIONS:
         for n in PDO_NUMBERS:
             entry = context.entry(direction.communication + n, 1)
-            value = None if entry is None else entry.default(SAMPLE_NODE_ID)
+            value = None if entry is None else entry.value(context.node_id)
             if entry is None or value is None or value & COB_ID_INVALID:
                 continue
             first = seen.setdefault(value & 0x7FF, entry)
@@ -175,5 +142,5 @@ def _same_cob_ids(context: EdsContext) -> Iterator[EdsFinding]:
                 severity = context.severity(entry.index)
                 expected = f"another identifier than {hexadecimal(first.index)} (line {first.section.line})"
                 yield at_key(
-                    severity, entry.section, "DefaultValue", expected, "", "Switch one off, or give it another."
+                    severity, entry.section, entry.value_key, expected, "", "Switch one off, or give it another."
                 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from drivers.datasheet.check.context import SAMPLE_NODE_ID, EdsContext, at_file, at_key, at_section
+from drivers.datasheet.check.context import EdsContext, at_file, at_key, at_section
 from drivers.datasheet.finding import EdsFinding, Severity
 from drivers.datasheet.number import read_number
 from drivers.datasheet.objects import OBJECT_SECTION, SUB_SECTION
@@ -171,7 +171,7 @@ def _identity(context: EdsContext) -> Iterator[EdsFinding]:
     for key, subindex in _IDENTITY.items():
         entry = context.entry(0x1018, subindex)
         told = None if section is None else read_number(section.get(key) or "")
-        default = None if entry is None else entry.default(SAMPLE_NODE_ID)
+        default = None if entry is None else entry.value(context.node_id)
         if section is not None and entry is not None and None not in (told, default) and told != default:
             expected = f"0x{default:08X}, the default of 0x1018:{subindex:02X} (line {entry.section.line})"
             advice = "Correct one; the rig file says which drive it is."

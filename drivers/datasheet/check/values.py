@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from drivers.datasheet.check.context import SAMPLE_NODE_ID, EdsContext, at_key
+from drivers.datasheet.check.context import EdsContext, at_key
 from drivers.datasheet.dictionary import read_octets, read_real
 from drivers.datasheet.finding import EdsFinding, Severity
 from drivers.datasheet.number import octal_matters, read_formula, read_number
@@ -45,49 +45,49 @@ def _value(context: EdsContext, entry: EdsEntry, kind: DataType) -> Iterator[Eds
         return
     severity = context.severity(entry.index)
     expected = f"a number of {kind.name}, {kind.low} to {kind.high}"
-    if entry.default_text is not None:
-        if entry.default(SAMPLE_NODE_ID) is None and not octal_matters(entry.default_text):
+    if entry.value_text is not None:
+        if entry.value(context.node_id) is None and not octal_matters(entry.value_text):
             yield at_key(
-                severity, entry.section, "DefaultValue", expected, "", "Write one that fits, or leave it blank."
+                severity, entry.section, entry.value_key, expected, "", "Write one that fits, or leave it blank."
             )
         yield from _formula(entry)
     for key in _LIMITS:
-        if entry.section.get(key) is not None and entry.limit(key, SAMPLE_NODE_ID) is None:
+        if entry.section.get(key) is not None and entry.limit(key, context.node_id) is None:
             yield at_key(Severity.WARNING, entry.section, key, expected, "", "It is left out; correct it.")
     yield from _within_limits(context, entry)
 
 
 def _other_value(context: EdsContext, entry: EdsEntry, kind: DataType) -> Iterator[EdsFinding]:
-    text = entry.default_text
+    text = entry.value_text
     if text is None:
         return
     if kind.is_real and read_real(text) is None:
-        yield at_key(Severity.WARNING, entry.section, "DefaultValue", f"a number ({kind.name})", "", "Correct it.")
+        yield at_key(Severity.WARNING, entry.section, entry.value_key, f"a number ({kind.name})", "", "Correct it.")
     elif kind.code == OCTET_STRING and read_octets(text) is None:
         expected = "pairs of hexadecimal digits (OCTET_STRING)"
-        yield at_key(Severity.WARNING, entry.section, "DefaultValue", expected, "", "It is left out; correct it.")
+        yield at_key(Severity.WARNING, entry.section, entry.value_key, expected, "", "It is left out; correct it.")
 
 
 def _formula(entry: EdsEntry) -> Iterator[EdsFinding]:
-    formula = read_formula(entry.default_text or "")
+    formula = read_formula(entry.value_text or "")
     if formula is not None and formula.of_node_id and not formula.node_id_first:
         expected = f"$NODEID+0x{formula.constant:X}, the node id in front (CiA 306)"
-        yield at_key(Severity.WARNING, entry.section, "DefaultValue", expected, "", "Read so; turn it round.")
+        yield at_key(Severity.WARNING, entry.section, entry.value_key, expected, "", "Read so; turn it round.")
 
 
 def _within_limits(context: EdsContext, entry: EdsEntry) -> Iterator[EdsFinding]:
-    low, high = (entry.limit(key, SAMPLE_NODE_ID) for key in _LIMITS)
+    low, high = (entry.limit(key, context.node_id) for key in _LIMITS)
     if low is not None and high is not None and low > high:
         expected = f"at least LowLimit ({low})"
         yield at_key(Severity.WARNING, entry.section, "HighLimit", expected, "", "Correct one of the two.")
         return
-    default = entry.default(SAMPLE_NODE_ID)
-    formula = read_formula(entry.default_text or "")
+    default = entry.value(context.node_id)
+    formula = read_formula(entry.value_text or "")
     if default is None or formula is None or formula.of_node_id:
         return
     below, above = low is not None and default < low, high is not None and default > high
     if below or above:
         expected = f"at least LowLimit ({low})" if below else f"at most HighLimit ({high})"
         yield at_key(
-            context.severity(entry.index), entry.section, "DefaultValue", expected, "", "Correct one of the two."
+            context.severity(entry.index), entry.section, entry.value_key, expected, "", "Correct one of the two."
         )

@@ -34,7 +34,7 @@ def _do(job: Job) -> Outcome:
         _configure(job.rig)
         found = check_rig(job.rig, prove_stop=True)
         written = before - sum(len(each.differences) for each in found)
-    findings = [finding for each in found for finding in _findings(each)]
+    findings = [finding for each in found for finding in (*_findings(each), *_protections(each))]
     if written > 0:
         findings.append(stated("entries written by configuring", str(written)))
     return Outcome(findings)
@@ -45,6 +45,14 @@ def _configure(rig: Rig) -> None:
     with suppress(DriverError), open_devices(rig) as devices:
         devices.m1.configure()
         devices.m2.configure()
+
+
+def _protections(found: Found) -> list[Finding]:
+    """Keep what stands between a dead host and torque, and who accepted what is missing."""
+    return [
+        stated(f"{found.device} without its host: {each.name}", str(each).partition(": ")[2])
+        for each in found.protections
+    ]
 
 
 def _findings(found: Found) -> list[Finding]:

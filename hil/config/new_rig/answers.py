@@ -11,7 +11,9 @@ Ask = Callable[[Question, str, str], str]
 """Asks a person: the question, its default (empty: none), what was wrong with the answer before (empty: nothing)."""
 
 
-def answers(given: Mapping[str, str], simulated: bool, ask: Ask | None = None) -> Answers:
+def answers(
+    given: Mapping[str, str], simulated: bool, ask: Ask | None = None, known: Mapping[str, str] | None = None
+) -> Answers:
     """Return an answer to every question.
 
     Parameters
@@ -22,6 +24,8 @@ def answers(given: Mapping[str, str], simulated: bool, ask: Ask | None = None) -
         Whether the defaults are those of the simulated rig; on a vehicle some questions have none.
     ask
         Asks for what was not given, as often as it takes; None: nobody is there, and defaults stand.
+    known
+        Defaults by name of the question that a drive's data sheet has, over the usual ones.
 
     Raises
     ------
@@ -31,7 +35,7 @@ def answers(given: Mapping[str, str], simulated: bool, ask: Ask | None = None) -
     found: dict[str, Value] = {}
     faults: list[str] = []
     for question in QUESTIONS:
-        default = question.default(simulated)
+        default = (known or {}).get(question.name, question.default(simulated))
         if question.name not in given and ask is not None:
             if not faults:
                 found[question.name] = _asked(question, default, found, ask)

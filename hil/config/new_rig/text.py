@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 import tomllib
+from collections.abc import Iterator, Sequence
 from importlib.resources import files
 from pathlib import Path
 from string import Template
@@ -42,17 +43,26 @@ COMMENTS_AT: Final = 41
 HEXADECIMAL: Final = ("vendor_id", "product_code")
 
 
-def rig_text(answers: Answers, file_name: str, simulated: bool) -> str:
+OWN_EDS: Final = "# eds ="
+"""Beginning of the template's line that shows how to name an EDS."""
+
+HEARTBEAT: Final = "heartbeat_ms ="
+"""Beginning of the template's line of each inverter that what its data sheet makes necessary comes after."""
+
+
+def rig_text(answers: Answers, file: Path, simulated: bool, drive_lines: Sequence[str] = ()) -> str:
     """Return the file, checked as any rig file is.
 
     Parameters
     ----------
     answers
         To every question.
-    file_name
-        Name the file will have, for the commands its comments show.
+    file
+        Where the file will be, for the commands its comments show and the paths in it.
     simulated
         Whether the table for ``hil sim`` is kept.
+    drive_lines
+        Lines that the drives' data sheet makes necessary, for each inverter.
 
     Raises
     ------
@@ -62,10 +72,21 @@ def rig_text(answers: Answers, file_name: str, simulated: bool) -> str:
     template = (files("hil.config.new_rig") / "rig.toml").read_text(encoding="utf-8")
     if not simulated:
         template = template.partition("\n[simulation]")[0]
-    filled = _filled(answers, file_name)
-    text = "".join(_line(line, filled) + "\n" for line in template.splitlines())
-    validate(Rig, tomllib.loads(text), Path(file_name), RigFileError)
+    filled = _filled(answers, file.name)
+    lines = [_line(line, filled) for line in template.splitlines()]
+    text = "".join(f"{line}\n" for line in (_with_drive(lines, drive_lines) if drive_lines else lines))
+    validate(Rig, tomllib.loads(text), file, RigFileError)
     return text
+
+
+def _with_drive(lines: Sequence[str], drive_lines: Sequence[str]) -> Iterator[str]:
+    """Put the drive's own lines into both inverters' tables; a heartbeat of its own takes the place of the usual."""
+    own_heartbeat = any(line.startswith(HEARTBEAT) for line in drive_lines)
+    for line in lines:
+        if not (line.startswith(OWN_EDS) or (own_heartbeat and line.startswith(HEARTBEAT))):
+            yield line
+        if line.startswith(HEARTBEAT):
+            yield from drive_lines
 
 
 def _filled(answers: Answers, file_name: str) -> dict[str, str]:

@@ -82,10 +82,15 @@ def cut_short() -> Told:
     return told_of("hil identify run_1.parquet --out identified")
 
 
+_ENTRY = "[1A00sub2]\nParameterName=Mapped object 2\nObjectType=0x7\nDataType=0x0007\n"
+MAPPED = f"{_ENTRY}AccessType=rw\nDefaultValue=0x60770010"
+OTHER_FOR_GOOD = f"{_ENTRY}AccessType=ro\nDefaultValue=0x60780010"
+"""The TPDO's second object, and another one that can't be changed."""
+
 FILES = (
     Failure("rig_file", rig_file, quick=True),
-    Failure("missing_eds_object", partial(data_sheet, "\n[60B2]\n", "\n[60B3]\n"), quick=True),
-    Failure("wrong_pdo_map", partial(data_sheet, "DefaultValue=0x60B20010", "DefaultValue=0x60FF0020"), quick=True),
+    Failure("missing_eds_object", partial(data_sheet, "\n[6071]\n", "\n[60B3]\n"), quick=True),
+    Failure("wrong_pdo_map", partial(data_sheet, MAPPED, OTHER_FOR_GOOD), quick=True),
     Failure("unsigned_torque", unsigned_torque, quick=True),
     Failure("two_channels", two_channels, quick=True),
     Failure("limits_refused", limits_refused, quick=True),

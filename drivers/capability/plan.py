@@ -1,0 +1,141 @@
+"""What a drive has, put together: its abilities and the two PDOs that carry command and feedback. No bus."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+from drivers.capability.ability import Abilities, Ability, abilities
+from drivers.capability.carrier import RPDO, TPDO, Carrier, CarrierSearch, Direction, find_carrier, strangers
+from drivers.capability.function import Function, Part, Without
+from drivers.capability.table import EVENT_TIMER
+from drivers.datasheet.sheet import DataSheet
+from drivers.errors import ConfigMismatch
+from drivers.scaling import IntegerType
+
+COMMAND = (Function.CONTROLWORD, Function.TORQUE_TARGET, Function.TORQUE_OFFSET)
+FEEDBACK = (Function.STATUSWORD, Function.TORQUE_ACTUAL, Function.SPEED_ACTUAL)
+"""What the two PDOs carry, in the order in which this program maps it."""
+
+
+@dataclass(frozen=True, slots=True)
+class DrivePlan:
+    """How one drive is used.
+
+    Attributes
+    ----------
+    sheet
+        Its data sheet.
+    abilities
+        What it has of each function.
+    command, feedback
+        The search for the RPDO and for the TPDO.
+    """
+
+    sheet: DataSheet
+    abilities: Abilities
+    command: CarrierSearch
+    feedback: CarrierSearch
+
+    def has(self, function: Function) -> bool:
+        """Whether the drive has a function."""
+        return self.abilities[function].given
+
+    @property
+    def missing(self) -> tuple[Ability, ...]:
+        """Functions without which the drive can't be used, and which it does not have."""
+        rows = self.abilities.values()
+        return tuple(each for each in rows if not each.given and each.capability.without is Without.REFUSED)
+
+    @property
+    def carriers(self) -> tuple[Carrier, ...]:
+        """The PDOs found."""
+        return tuple(search.carrier for search in (self.command, self.feedback) if search.carrier is not None)
+
+    @property
+    def strangers(self) -> tuple[int, ...]:
+        """Communication parameters of PDOs that are to be switched off."""
+        return tuple(strangers(self.sheet, self.carriers))
+
+    @property
+    def used(self) -> frozenset[int]:
+        """Objects that are read or written, and those without which the drive can't be used."""
+        asked = [each for function, each in self.abilities.items() if function is not Function.TORQUE_SLOPE]
+        parts = {part.index for each in asked for part in each.parts}
+        parts |= {lacking.part.index for each in self.missing for lacking in each.shortcomings}
+        layouts = [carrier.layout for carrier in self.carriers]
+        return frozenset(
+            parts | {index for each in layouts for index in (each.communication_index, each.mapping_index)}
+        )
+
+    def carrier(self, direction: Direction) -> Carrier:
+        """Give the PDO of a direction.
+
+        Raises
+        ------
+        ConfigMismatch
+            If the drive has none, or lacks a function without which it can't be used.
+        """
+        if self.missing:
+            lacking = "; ".join(_lacking(each) for each in self.missing)
+            raise ConfigMismatch(
+                f"{self.sheet.kind} {self.sheet.path}: expected {lacking}. The drive can't be used. See: "
+                f"hil check --eds {self.sheet.path}"
+            )
+        search = self.command if direction is RPDO else self.feedback
+        if search.carrier is None:
+            functions = COMMAND if direction is RPDO else FEEDBACK
+            wanted = wanted_names(self, functions)
+            raise ConfigMismatch(
+                f"{self.sheet.kind} {self.sheet.path}: expected one {direction.name} that maps {wanted}"
+                f", or that can be mapped, found {'; '.join(search.others) or f'no {direction.name}'}. "
+                f"See: hil check --eds {self.sheet.path}"
+            )
+        return search.carrier
+
+
+def plan_drive(sheet: DataSheet) -> DrivePlan:
+    """Find how a drive can be used; what it lacks is in the plan."""
+    found = abilities(sheet)
+    command = find_carrier(sheet, RPDO, _indices(found, COMMAND))
+    if found[Function.TORQUE_OFFSET].given and command.carrier is None:  # the sum needs less room
+        found[Function.TORQUE_OFFSET] = replace(found[Function.TORQUE_OFFSET], parts=())
+        less = find_carrier(sheet, RPDO, _indices(found, COMMAND))
+        command = replace(less, others=less.others or command.others)
+    feedback = find_carrier(sheet, TPDO, _indices(found, FEEDBACK))
+    found[Function.RPDO_DEADLINE] = _deadline(sheet, found[Function.RPDO_DEADLINE], command)
+    return DrivePlan(sheet, found, command, feedback)
+
+
+def wanted_names(plan: DrivePlan, functions: tuple[Function, ...]) -> str:
+    """Name what a PDO has to carry: ``0x6041, 0x6077, 0x606C``."""
+    return ", ".join(f"0x{index:04X}" for index in _indices(plan.abilities, functions))
+
+
+def _indices(found: Abilities, functions: tuple[Function, ...]) -> list[int]:
+    return list(_each_index(found, functions))
+
+
+def _each_index(found: Abilities, functions: tuple[Function, ...]) -> Iterator[int]:
+    for function in functions:
+        ability = found[function]
+        if ability.given:
+            yield ability.parts[0].index
+        elif ability.capability.without is Without.REFUSED:
+            yield ability.capability.ways[0][0].index
+
+
+def _deadline(sheet: DataSheet, ability: Ability, command: CarrierSearch) -> Ability:
+    if command.carrier is None:
+        return ability
+    index = command.carrier.layout.communication_index
+    entry = sheet.entry(index, EVENT_TIMER)
+    there = (
+        entry is not None and entry.writable and entry.kind is not None and entry.kind.code == IntegerType.UNSIGNED16
+    )
+    return replace(ability, parts=(Part(index, EVENT_TIMER, (IntegerType.UNSIGNED16,), written=True),) if there else ())
+
+
+def _lacking(ability: Ability) -> str:
+    reasons = ", ".join(map(str, ability.shortcomings))
+    return f"{ability.capability.function.value} ({reasons})"

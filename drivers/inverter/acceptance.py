@@ -1,0 +1,29 @@
+"""What a drive lacks and somebody has accepted, by name, in the rig file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Acceptance:
+    """Who accepted it, and why.
+
+    Attributes
+    ----------
+    by
+        A person's name.
+    why
+        What stops the torque instead, or why it does not have to.
+    """
+
+    by: str
+    why: str
+
+    def __str__(self) -> str:
+        return f"accepted by {self.by}: {self.why}"
+
+
+def acceptance_line(name: str) -> str:
+    """Write the line of the rig file that accepts what is missing, to be filled in."""
+    return f'accepted.{name} = {{ by = "NAME", why = "REASON" }}'

@@ -1,0 +1,233 @@
+"""Every maker's drive by its data sheet: checked, a rig file written, simulated, driven; and mutants of each file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drivers.canopen.can_link import CanLink
+from drivers.canopen.pdo_map import COB_ID_INVALID
+from drivers.capability.carrier import RPDO
+from drivers.capability.plan import plan_drive
+from drivers.datasheet.check import check_eds
+from drivers.datasheet.file import EdsFile
+from drivers.errors import ConfigMismatch
+from drivers.inverter.inverter import Inverter
+from hil.cli.main import run as command
+from hil.config.rig_file import read_rig
+from hil.rig.build import inverter_settings, open_devices
+from tests.benchmarks.data_sheets import RAN, REFUSED, maker_files, mutant_verdicts, verdict
+from tests.drivers.maker_files import COMPLETE, MAKERS, U8, U32, Entry, Maker, pdo, pdos
+from tests.drivers.maker_rig import drive, written_rig
+from tests.real.conftest import real_recording
+from tests.rig.serving import changed, served
+
+SHORT = 40
+MUTANTS = 4
+
+
+def written(maker: Maker, folder: Path) -> Path:
+    path = folder / f"drive{maker.suffix}"
+    path.write_bytes(maker.text().encode("latin-1"))
+    return path
+
+
+@pytest.fixture(params=MAKERS.values(), ids=MAKERS.keys())
+def maker(request: pytest.FixtureRequest) -> Maker:
+    made: Maker = request.param
+    return made
+
+
+def test_usable_with_the_lines_that_are_printed(maker: Maker, tmp_path: Path) -> None:
+    report = check_eds(written(maker, tmp_path))
+    assert report.usable, [str(each) for each in report.findings]
+    assert tuple(line.key for line in report.lines) == maker.lines
+
+
+def test_driven_without_a_flag_and_with_its_prbs_apart(maker: Maker, tmp_path: Path) -> None:
+    driven = drive(written(maker, tmp_path), tmp_path, SHORT)
+    assert (driven.recorded, driven.flagged, driven.before, driven.after) == (SHORT, 0, (), ())
+    prbs = np.array(driven.samples.column("prbs_nm"))
+    reference = sum(np.array(driven.samples.column(f"torque_ref_{name}_nm")) for name in ("m1", "m2"))
+    torque = sum(np.array(driven.samples.column(f"torque_{name}_nm")) for name in ("m1", "m2"))
+    assert set(np.abs(prbs)) == {prbs.max()} != {0.0}
+    assert np.abs(torque - reference).max() < 8.0  # rounding of two drives, and 0.5 per mille of noise
+    assert np.abs(reference).max() > prbs.max()  # the base torque is beside it
+
+
+def test_mutants_run_or_are_refused_by_line(maker: Maker, tmp_path: Path) -> None:
+    eds = written(maker, tmp_path)
+    place = tmp_path / "mutant"
+    place.mkdir()
+    found = dict(mutant_verdicts(eds, place, MUTANTS, 1, SHORT))
+    assert {each: what for each, what in found.items() if what not in (RAN, REFUSED)} == {}
+
+
+def test_commands_of_a_new_user(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """What `hil check --eds` prints is pasted, and with it the rig file is read."""
+    eds = written(MAKERS["technosoft"], tmp_path)
+    rig = tmp_path / "rig.toml"
+    assert command(["rig", "new", str(rig), "--eds", str(eds), "--simulated", "--yes"]) == 0
+    capsys.readouterr()
+    assert command(["check", "--eds", str(eds)]) == 0
+    printed = capsys.readouterr().out.splitlines()
+    pasted = printed[printed.index("# under [inverters.m1] and [inverters.m2] of the rig file:") + 1 : -1]
+    assert printed[-1].startswith(f"{eds}: usable with the lines above")
+    usual = tmp_path / "usual.toml"
+    assert command(["rig", "new", str(usual), "--simulated", "--yes"]) == 0
+    text = usual.read_text().replace("heartbeat_ms = 100", 'heartbeat_ms = 100\neds = "drive.eds"')
+    text = text.replace('eds = "drive.eds"', "\n".join(('eds = "drive.eds"', *pasted)))
+    usual.write_text(text)
+    accepted = read_rig(usual).inverters.m1.accepted.by_name
+    assert set(accepted) == {"supported_modes", "heartbeat_consumer", "rpdo_deadline"}
+    assert str(accepted["rpdo_deadline"]) == "accepted by NAME: REASON"
+
+
+def test_on_a_vehicle_guesses_are_comments(tmp_path: Path) -> None:
+    eds, rig = written(MAKERS["technosoft"], tmp_path), tmp_path / "rig.toml"
+    options = "--plc 10.0.0.1:502 --product-code 1 --rated-torque-nm 10 --torque-limit-nm 5 --inertia-kg-m2 1"
+    arguments = ["rig", "new", str(rig), "--eds", str(eds), "--yes", "--speed-rad-s", "9", *options.split()]
+    assert command(arguments) == 0
+    table = read_rig(rig).inverters.m1
+    assert (table.accepted.by_name, table.speed_unit) == ({}, None)
+    assert table.option_codes.abort_connection == 2
+    assert rig.read_text().count("# accepted.rpdo_deadline = ") == 2
+
+
+def test_file_of_no_use_is_refused_with_its_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    eds = written(COMPLETE.but(0x6071), tmp_path)
+    rig = tmp_path / "rig.toml"
+    assert command(["rig", "new", str(rig), "--eds", str(eds), "--simulated", "--yes"]) == 2
+    assert "expected target torque 0x6071:00" in capsys.readouterr().err
+    assert not rig.exists()
+
+
+def test_dcf_gives_node_id_and_bit_rate(tmp_path: Path) -> None:
+    eds, rig = written(MAKERS["epos, commissioned"], tmp_path), tmp_path / "rig.toml"
+    options = "--plc 10.0.0.1:502 --vendor-id 1 --product-code 1 --rated-torque-nm 10 --torque-limit-nm 5"
+    more = ["--inertia-kg-m2", "1", "--speed-rad-s", "9"]
+    assert command(["rig", "new", str(rig), "--eds", str(eds), "--yes", *options.split(), *more]) == 0
+    read = read_rig(rig)
+    assert (read.inverters.m1.node_id, read.inverters.m2.node_id) == (1, 2)
+    assert read.can.url == "socketcan:can0?bitrate=250000"
+
+
+def test_dcf_device_and_rig_file_are_compared(tmp_path: Path) -> None:
+    """Rated torque and node id are not the DCF's; its option code is written, for somebody chose it."""
+    rig = written_rig(written(MAKERS["epos, commissioned"], tmp_path), tmp_path)
+    with served(rig) as (_, at), open_devices(at) as devices:
+        assert [str(each) for each in devices.m1.commissioned()] == [
+            "object 6076 0x6076:00: DCF 512871, device 600000, rig file 600000"
+        ]
+        assert [each.what for each in devices.m2.commissioned()] == ["node id", "object 6076 0x6076:00"]
+        devices.m1._sdo.download(0x6007, 0, 1)
+        assert [each.found for each in devices.m1.check()] == ["1"]
+        devices.m1.configure()
+        assert devices.m1._sdo.upload(0x6007) == 3
+
+
+def test_what_is_by_the_node_id_holds_for_every_node(tmp_path: Path) -> None:
+    path = written(MAKERS["epos, commissioned"], tmp_path)
+    for node_id in (1, 2):
+        sheet = EdsFile(path, node_id).sheet
+        assert sheet.value(0x1014) == 0x80 + node_id
+        assert plan_drive(sheet).carrier(RPDO).layout.cob_id == 0x200 + node_id
+        assert sheet.value(0x1400, 2) == 1
+
+
+def test_parameter_value_says_nothing_in_an_eds(tmp_path: Path) -> None:
+    sheet = EdsFile(written(MAKERS["e35"], tmp_path), 1).sheet
+    assert (sheet.value(0x100C), sheet.commissioned(0x100C), sheet.commissioning) == (None, None, None)
+
+
+def test_identifiers_of_another_node_are_replaced_and_the_others_switched_off(tmp_path: Path) -> None:
+    rig = written_rig(written(MAKERS["sevcon"], tmp_path), tmp_path)
+    with served(rig) as (_, at), open_devices(at) as devices:
+        for inverter in (devices.m1, devices.m2):
+            node, sdo = inverter.settings.node_id, inverter._sdo
+            assert sdo.upload(0x1801, 1) == 0x302
+            inverter.configure()
+            assert [sdo.upload(index, 1) for index in (0x1400, 0x1800)] == [0x200 + node, 0x180 + node]
+            assert sdo.upload(0x1801, 1) == 0x302 | COB_ID_INVALID
+            assert sdo.upload(0x1005) == 0x80
+            assert sdo.upload(0x1014) == 0x80 + node
+
+
+def test_fixed_mapping_that_the_drive_does_not_hold_is_refused(tmp_path: Path) -> None:
+    """The drive is of another firmware: its mapping is not the file's, and can't be changed."""
+    host = written_rig(written(MAKERS["fixed mapping"], tmp_path), tmp_path)
+    (tmp_path / "device").mkdir()
+    mapping = {**MAKERS["fixed mapping"].objects[0x1600], 3: Entry(U32, "const", "0x60FF0020")}  # type: ignore[dict-item]
+    other = written(MAKERS["fixed mapping"].having({0x1600: mapping}), tmp_path / "device")
+    with served(changed(host, {"inverters.m1": {"eds": other}})) as (_, at):
+        table = at.inverters.m1.model_copy(update={"eds": tmp_path / "drive.eds"})
+        with CanLink.open(at.can.url) as link:
+            m1 = Inverter(link, inverter_settings("m1", table))
+            assert [each.what for each in m1.check()] == ["PDO 0x1400/0x1600"]
+            with pytest.raises(ConfigMismatch, match=r"0x60FF:00 .* expected .*0x60B2:00 .* and can't be given it"):
+                m1.configure()
+
+
+def test_heartbeat_that_is_there_for_good_counts(tmp_path: Path) -> None:
+    slow = COMPLETE.having({0x1017: Entry(6, "const", "250")})
+    report = check_eds(written(slow, tmp_path))
+    assert "heartbeat_ms = 250" in [line.text for line in report.lines]
+    (tmp_path / "drive").mkdir()
+    assert drive(written(slow, tmp_path), tmp_path / "drive", SHORT).flagged == 0
+
+
+@pytest.mark.parametrize("room", [2, 3])
+def test_mapping_with_little_room_carries_the_sum(room: int, tmp_path: Path) -> None:
+    narrow = COMPLETE.having(pdos(0x1400, pdo("$NODEID+0x200", "255", "0x60400010", room=room))).but(0x1401, 0x1601)
+    path = written(narrow, tmp_path)
+    objects = plan_drive(EdsFile(path, 1).sheet).carrier(RPDO).layout.objects
+    assert [mapped.index for mapped in objects] == [0x6040, 0x6071, 0x60B2][:room]
+    assert drive(path, tmp_path, SHORT).flagged == 0
+
+
+def test_multiplexed_pdo_and_one_of_another_type_are_passed_over(tmp_path: Path) -> None:
+    odd = {**COMPLETE.objects[0x1600], 0: Entry(U8, default="0xFE")}  # type: ignore[dict-item]
+    typed = {**COMPLETE.objects[0x1A00], 0: Entry(U32, default="1")}  # type: ignore[dict-item]
+    path = written(COMPLETE.having({0x1600: odd, 0x1A00: typed}), tmp_path)
+    plan = plan_drive(EdsFile(path, 1).sheet)
+    assert [carrier.layout.mapping_index for carrier in plan.carriers] == [0x1600, 0x1A01]
+    assert drive(path, tmp_path, SHORT).flagged == 0
+
+
+@pytest.mark.parametrize("gone", [0x1601, 0x1401, 0x1801, 0x1A01])
+def test_pdo_parameter_without_the_other_is_no_hindrance(gone: int, tmp_path: Path) -> None:
+    """The library looks for the second wherever the first is."""
+    assert drive(written(COMPLETE.but(gone), tmp_path), tmp_path, SHORT).flagged == 0
+
+
+def test_offset_of_no_known_type_is_not_written_either(tmp_path: Path) -> None:
+    odd = COMPLETE.having({0x60B2: Entry(0x99, "rww", "0", 1)})
+    assert drive(written(odd, tmp_path), tmp_path, SHORT).flagged == 0
+
+
+def test_object_of_no_known_kind_is_no_hindrance(tmp_path: Path) -> None:
+    head = "[1601]\nParameterName=object 1601\nObjectType={}\n"
+    text = COMPLETE.text()
+    assert head.format("0x9") in text
+    path = tmp_path / "drive.eds"
+    path.write_text(text.replace(head.format("0x9"), head.format("-1")))
+    assert drive(path, tmp_path, SHORT).flagged == 0
+
+
+@pytest.mark.parametrize(
+    "name", ["elmo_gold.dcf", "epos4_50_15.dcf", "sevcon_gen4.eds", "technosoft_ipos.eds", "yiyou.eds"]
+)
+def test_makers_own_files_as_far_as_they_are_there(name: str, tmp_path: Path) -> None:
+    assert verdict(real_recording(f"eds/{name}"), tmp_path, SHORT) == RAN
+
+
+@pytest.mark.campaign
+@pytest.mark.timeout(3600)
+def test_every_file_of_the_folder_and_its_mutants(tmp_path: Path) -> None:
+    missed = {}
+    for eds in maker_files(real_recording("eds")):
+        found = {"": verdict(eds, tmp_path, 400)} | dict(mutant_verdicts(eds, tmp_path, 100, 1, 400))
+        missed |= {f"{eds.name} {each}": what for each, what in found.items() if what not in (RAN, REFUSED)}
+    assert missed == {}
