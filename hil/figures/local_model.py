@@ -83,11 +83,11 @@ class LocalModel:
             return np.empty(0)
         f = spectral.frequency_hz
         at = int(np.argmin(np.abs(f - mode.frequency_hz)))
-        inside = _stretch(spectral.coherence > COHERENT, at)
+        inside = unbroken(spectral.coherence > COHERENT, at)
         return f[inside]
 
 
-def _stretch(is_in: NDArray[np.bool_], at: int) -> NDArray[np.bool_]:
+def unbroken(is_in: NDArray[np.bool_], at: int) -> NDArray[np.bool_]:
     """Keep the unbroken stretch of True that holds an index, shape as given; all False where it is not True there."""
     kept = np.zeros_like(is_in)
     if is_in[at]:

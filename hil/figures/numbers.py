@@ -8,9 +8,12 @@ import numpy as np
 
 from estimator.identification.linear_model import ComplexArray
 from estimator.identification.modes.modes import Mode
-from hil.figures.local_model import LocalModel, decibels
+from hil.figures.local_model import LocalModel, decibels, unbroken
 
 NOT_KNOWN = float("nan")
+
+AGREEMENT_DB = 3.0
+"""On-line model and spectral estimate agree where they differ by no more: a factor of 1.4."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +31,9 @@ class Row:
     offline_db, spectral_db, reference_db
         Largest difference of the on-line frequency response from the off-line model's, the spectral estimate and the
         reference, in the band around the resonance where the coherence is above 0.9 [dB].
+    agrees_hz
+        Unbroken band around the resonance in which on-line model and spectral estimate agree within 3 dB [Hz]; None
+        where one of them is missing.
     fit_percent
         Of the off-line model in free run.
     status
@@ -43,6 +49,7 @@ class Row:
     reference_damping: float
     offline_db: float
     spectral_db: float
+    agrees_hz: tuple[float, float] | None
     reference_db: float
     fit_percent: float
     status: str
@@ -70,6 +77,7 @@ def row_of(model: LocalModel) -> Row:
         reference_damping=reference_damping,
         offline_db=offline_db,
         spectral_db=spectral_db,
+        agrees_hz=_agreement(model),
         reference_db=reference_db,
         fit_percent=found.batch.fit_percent,
         status=found.estimate.status.value,
@@ -92,6 +100,18 @@ def _differences_db(model: LocalModel) -> tuple[float, float, float]:
         _largest_db(online, seen),
         _largest_db(online, model.reference_response(f)),
     )
+
+
+def _agreement(model: LocalModel) -> tuple[float, float] | None:
+    """Return the unbroken band around the resonance in which on-line model and spectral estimate agree [Hz]."""
+    spectral, mode = model.found.spectral, model.found.online_resonance
+    if spectral is None or mode is None:
+        return None
+    f = spectral.frequency_hz[spectral.frequency_hz <= 0.5 / model.online.sample_time_s]
+    apart = np.abs(decibels(model.online.response(f)) - decibels(spectral.response[: f.size]))
+    at = int(np.argmin(np.abs(f - mode.frequency_hz)))
+    inside = f[unbroken(apart <= AGREEMENT_DB, at)]
+    return (float(inside[0]), float(inside[-1])) if inside.size else None
 
 
 def _largest_db(response: ComplexArray, other: ComplexArray | None) -> float:

@@ -1,6 +1,7 @@
-"""The thresholds of a verdict, as data: made by simulation over clean and dirty worlds, no other number decides.
+"""The thresholds of a verdict by likelihood, in one place; no other number decides.
 
-Made by ``python -m hil.proof.calibrate``; a first set, from few worlds (docs/diagnosis-engines.md says how many).
+Set by hand while about twenty simulated cases were looked at, not calibrated: docs/diagnosis-engines.md says so and what
+a calibration has to do. Until then this engine is not in charge of ``hil diagnose``.
 """
 
 TEMPERED = 4.0

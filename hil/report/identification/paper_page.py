@@ -94,6 +94,7 @@ def _numbers(rows: Sequence[Row]) -> str:
         "reference",
         "error",
         "to off line [dB]",
+        "agrees with the spectrum [Hz]",
         "fit",
         "status",
     )
@@ -109,6 +110,7 @@ def _numbers(rows: Sequence[Row]) -> str:
             shown(row.reference_damping),
             _percent(row.error("damping", "online")),
             shown(row.offline_db),
+            _band(row.agrees_hz),
             shown(row.fit_percent, "%"),
             row.status,
         )
@@ -116,10 +118,15 @@ def _numbers(rows: Sequence[Row]) -> str:
     ]
     note = (
         "Error: of the on-line estimate to the reference. To off line: largest difference of the two models' frequency "
-        "responses in the unbroken band around the resonance where the coherence is above 0.9. Fit: free run of the "
+        "responses in the unbroken band around the resonance where the coherence is above 0.9. Agrees: the unbroken "
+        "band around the resonance in which on-line model and spectral estimate differ by 3 dB at most. Fit: free run of the "
         "off-line model over the whole recording, after the high-pass."
     )
-    return html.table(headings, cells, numbers=range(1, 11)) + html.paragraph(note, "note")
+    return html.table(headings, cells, numbers=range(1, 12)) + html.paragraph(note, "note")
+
+
+def _band(band_hz: tuple[float, float] | None) -> str:
+    return "–" if band_hz is None else f"{band_hz[0]:.2g} to {band_hz[1]:.3g}"
 
 
 def _percent(share: float) -> str:
