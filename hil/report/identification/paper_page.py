@@ -119,8 +119,8 @@ def _numbers(rows: Sequence[Row]) -> str:
     note = (
         "Error: of the on-line estimate to the reference. To off line: largest difference of the two models' frequency "
         "responses in the unbroken band around the resonance where the coherence is above 0.9. Agrees: the unbroken "
-        "band around the resonance in which on-line model and spectral estimate differ by 3 dB at most. Fit: free run of the "
-        "off-line model over the whole recording, after the high-pass."
+        "band around the resonance in which on-line model and spectral estimate differ by 3 dB at most. Fit: free run "
+        "of the off-line model over the whole recording, after the high-pass."
     )
     return html.table(headings, cells, numbers=range(1, 12)) + html.paragraph(note, "note")
 
