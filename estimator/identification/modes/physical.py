@@ -234,15 +234,20 @@ def _checked(model: LinearModel, covariance: FloatArray, known: Mapping[str, Unc
 
 def _estimate(x: FloatArray, covariance: FloatArray, misfit: float) -> PhysicalEstimate:
     parameters = {
-        name: _parameter(name, UNITS[name], Uncertain(float(x[i]), float(np.sqrt(covariance[i, i]))), CURES[name])
+        name: _parameter(name, UNITS[name], _uncertain(name, float(x[i]), float(covariance[i, i])), CURES[name])
         for i, name in enumerate(NAMES)
     }
     sums = {}
     for name, (i, j) in SUMS.items():
         variance = covariance[i, i] + covariance[j, j] + 2.0 * covariance[i, j]
-        total = Uncertain(float(x[i] + x[j]), float(np.sqrt(max(variance, 0.0))))
+        total = _uncertain(name, float(x[i] + x[j]), float(variance))
         sums[name] = _parameter(name, UNITS[NAMES[i]], total, CURES[NAMES[j]])
     return PhysicalEstimate(MappingProxyType(parameters), MappingProxyType(sums), covariance, misfit)
+
+
+def _uncertain(name: str, value: float, variance: float) -> Uncertain:
+    """Return a parameter with its deviation; the response's coefficients hold inertias by their reciprocals."""
+    return Uncertain(value, float(np.sqrt(max(variance, 0.0))), is_reciprocal=name.startswith("J"))
 
 
 def _parameter(name: str, unit: str, estimate: Uncertain, cure: str) -> PhysicalParameter:

@@ -29,16 +29,28 @@ STEP = 0.01
 
 @dataclass(frozen=True, slots=True)
 class Uncertain:
-    """A number and its standard deviation; infinite where the data say nothing of it."""
+    """A number and its standard deviation; infinite where the data say nothing of it.
+
+    Attributes
+    ----------
+    value, std : float
+    is_reciprocal : bool
+        Whether its reciprocal is what the data determine linearly, as of an inertia: the interval is then one of the
+        reciprocal, and reaches further up than down.
+    """
 
     value: float
     std: float
+    is_reciprocal: bool = False
 
     @property
     def ci95(self) -> tuple[float, float]:
         """Interval that holds the truth with 95 % probability."""
         reach = QUANTILE * self.std
-        return self.value - reach, self.value + reach
+        if not self.is_reciprocal or self.value <= 0.0 or not math.isfinite(reach):
+            return self.value - reach, self.value + reach
+        share = reach / self.value
+        return self.value / (1.0 + share), self.value / (1.0 - share) if share < 1.0 else math.inf
 
     @property
     def is_determined(self) -> bool:

@@ -42,7 +42,7 @@ SILENT = Noise(0.0, 0.0, 0.0)
 def torque_reading(torque_nm: FloatArray, rng: np.random.Generator, noise: Noise = USUAL) -> FloatArray:
     """Return the inverter's torque actual value [Nm] for a true current torque."""
     noisy = torque_nm + rng.normal(0.0, noise.torque_nm, torque_nm.shape)
-    noisy += coloured(noise.torque_drift_nm, noise.torque_drift_hz, torque_nm.size, rng)
+    noisy += coloured(noise.torque_drift_nm, noise.torque_drift_hz, torque_nm.shape, rng)
     if noise.torque_quantum_nm <= 0.0:
         return noisy
     return np.round(noisy / noise.torque_quantum_nm) * noise.torque_quantum_nm
@@ -51,15 +51,15 @@ def torque_reading(torque_nm: FloatArray, rng: np.random.Generator, noise: Noise
 def speed_reading(speed_rad_s: FloatArray, rng: np.random.Generator, noise: Noise = USUAL) -> FloatArray:
     """Return the resolver's noisy speed [rad/s]."""
     white = rng.normal(0.0, noise.speed_rad_s, speed_rad_s.shape)
-    return speed_rad_s + white + coloured(noise.coloured_rad_s, noise.coloured_hz, speed_rad_s.size, rng)
+    return speed_rad_s + white + coloured(noise.coloured_rad_s, noise.coloured_hz, speed_rad_s.shape, rng)
 
 
-def coloured(size: float, corner_hz: float, count: int, rng: np.random.Generator) -> FloatArray:
-    """Return noise of first order, shape (N,), with its standard deviation and corner; none draws no numbers."""
+def coloured(size: float, corner_hz: float, shape: tuple[int, ...], rng: np.random.Generator) -> FloatArray:
+    """Return noise of first order along the first axis, with its standard deviation and corner; none draws no numbers."""
     if size == 0.0:
-        return np.zeros(count)
+        return np.zeros(shape)
     kept = float(np.exp(-2.0 * np.pi * corner_hz * PERIOD_S))
-    driven = rng.normal(0.0, size * np.sqrt(1.0 - kept**2), count)
-    driven[0] = rng.normal(0.0, size)
-    noise: FloatArray = lfilter([1.0], [1.0, -kept], driven)
+    driven = rng.normal(0.0, size * np.sqrt(1.0 - kept**2), shape)
+    driven[0] = rng.normal(0.0, size, shape[1:])
+    noise: FloatArray = lfilter([1.0], [1.0, -kept], driven, axis=0)
     return noise
