@@ -55,7 +55,7 @@ def speed_reading(speed_rad_s: FloatArray, rng: np.random.Generator, noise: Nois
 
 
 def coloured(size: float, corner_hz: float, shape: tuple[int, ...], rng: np.random.Generator) -> FloatArray:
-    """Return noise of first order along the first axis, with its standard deviation and corner; none draws no numbers."""
+    """Return noise of first order along the first axis, of a standard deviation and corner; none draws no numbers."""
     if size == 0.0:
         return np.zeros(shape)
     kept = float(np.exp(-2.0 * np.pi * corner_hz * PERIOD_S))

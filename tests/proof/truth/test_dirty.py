@@ -53,7 +53,7 @@ def test_an_unknown_strong_effect_is_refused() -> None:
 
 
 def test_coloured_noise_has_its_size_and_corner() -> None:
-    noise = coloured(0.3, 2.0, 400_000, np.random.default_rng(1))
+    noise = coloured(0.3, 2.0, (400_000,), np.random.default_rng(1))
     assert np.std(noise) == pytest.approx(0.3, rel=0.03)
     kept = float(noise[1:] @ noise[:-1] / (noise @ noise))
     assert kept == pytest.approx(np.exp(-2.0 * np.pi * 2.0 * 0.01), rel=0.01)
