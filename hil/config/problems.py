@@ -115,15 +115,13 @@ def read_toml(path: Path, error: type[FileProblem]) -> dict[str, Any]:
 
 
 def _content(path: Path) -> bytes:
-    """Read a file, no more of it than a person writes; a pipe or a device is none.
+    """Read a file, no more of it than a person writes.
 
     Raises
     ------
     OSError
         If it can't be read.
     """
-    if path.exists() and not path.is_file():
-        raise OSError(errno.EINVAL, "no file, but a folder, a pipe or a device")
     with path.open("rb") as file:
         content = file.read(LARGEST_BYTES + 1)
     if len(content) > LARGEST_BYTES:

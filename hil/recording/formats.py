@@ -58,7 +58,7 @@ def read_table(path: Path | str, hints: FormatHints | None = None) -> Table:
     """
     path = Path(path)
     known = _known(path)
-    _require_readable(path)
+    _require_readable(path, known)
     table = READER.table(path) if known.apart else known.read(path, hints or FormatHints())
     require_whole(table)
     return table
@@ -74,7 +74,7 @@ def read_metadata(path: Path | str) -> Mapping[str, str]:
     """
     path = Path(path)
     known = _known(path)
-    _require_readable(path)
+    _require_readable(path, known)
     return READER.metadata(path) if known.apart else metadata_of(known, path)
 
 
@@ -111,9 +111,9 @@ def _known(path: Path) -> Format:
     return known
 
 
-def _require_readable(path: Path) -> None:
+def _require_readable(path: Path, known: Format) -> None:
     try:
-        if path.exists() and not path.is_file():
+        if known.apart and path.exists() and not path.is_file():  # these are read from their end, and a pipe has none
             raise RecordingError(path, "expected a file, came a folder, a pipe or a device. Name a recording.")
         with path.open("rb"):
             pass

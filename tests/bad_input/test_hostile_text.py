@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import struct
 import tracemalloc
 import zlib
@@ -71,12 +70,10 @@ def test_whole_numbers_of_64_bit_are_read(tmp_path: Path) -> None:
     assert read_toml(tmp_path / "file.toml", RigFileError) == {"a": (1 << 63) - 1, "b": -(1 << 63), "c": [[True]]}
 
 
-@pytest.mark.parametrize("kind", ["pipe", "folder", "device", "large"])
-def test_what_is_no_file_of_a_person_is_refused_and_not_waited_for(tmp_path: Path, kind: str) -> None:
+@pytest.mark.parametrize("kind", ["folder", "device", "large"])
+def test_what_is_no_file_of_a_person_is_refused_and_not_read_to_its_end(tmp_path: Path, kind: str) -> None:
     path = Path("/dev/zero") if kind == "device" else tmp_path / "file.toml"
-    if kind == "pipe":
-        os.mkfifo(path)
-    elif kind == "folder":
+    if kind == "folder":
         path.mkdir()
     elif kind == "large":
         path.write_bytes(b"# comment\n" * (2 << 20))

@@ -43,9 +43,9 @@ def peak_bytes(path: Path) -> int:
         READER.end()
         print(sum(resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)))
     """
-    done = subprocess.run(
-        python("-c", textwrap.dedent(program)), capture_output=True, text=True, timeout=100, check=True
-    )
+    # By a shell that stays: a process that is forked from this one begins with this one's peak.
+    command = ["/bin/sh", "-c", '"$@"; exit $?', "sh", *python("-c", textwrap.dedent(program))]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=100, check=True)
     *said, peak = done.stdout.splitlines()
     assert any(str(path) in line for line in said), done.stdout
     return int(peak) * 1024
@@ -162,7 +162,7 @@ def test_content_in_another_file_is_refused(tmp_path: Path, kind: str) -> None:
         read_table(tmp_path / "run.h5")
 
 
-@pytest.mark.parametrize("suffix", sorted(FORMATS))
+@pytest.mark.parametrize("suffix", sorted(suffix for suffix, form in FORMATS.items() if form.apart))
 @pytest.mark.parametrize("read", [read_table, read_metadata])
 def test_a_pipe_is_refused_and_not_waited_for(tmp_path: Path, suffix: str, read: Callable[[Path], object]) -> None:
     path = tmp_path / f"pipe{suffix}"

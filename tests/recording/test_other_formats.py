@@ -107,7 +107,7 @@ def test_a_file_that_is_not_there_is_refused(tmp_path: Path, suffix: str) -> Non
 
 def test_a_folder_is_no_recording(tmp_path: Path) -> None:
     (tmp_path / "run.csv").mkdir()
-    with pytest.raises(RecordingError, match="came a folder"):
+    with pytest.raises(RecordingError, match="Is a directory"):
         read_table(tmp_path / "run.csv")
 
 
