@@ -10,6 +10,7 @@ from estimator.diagnosis.joined import joined
 from estimator.diagnosis.preconditions.clipped import without_clipped
 from estimator.diagnosis.preconditions.exciting import require_excitation, require_signals
 from estimator.diagnosis.preconditions.model_values import model_warnings
+from estimator.diagnosis.preconditions.room import require_room
 from estimator.diagnosis.preconditions.thinned import thinned
 from estimator.diagnosis.preconditions.together import require_together
 from estimator.diagnosis.preconditions.units import require_plausible_units
@@ -42,7 +43,7 @@ def prepare(records: Sequence[Record], model: DrivelineModel, holdout: Sequence[
     Raises
     ------
     BadShape
-        No recording, or recordings that do not belong together.
+        No recording, recordings that do not belong together, or more than fit into memory.
     BadModel
         A recorded output that the structure does not have.
     NotExciting
@@ -56,6 +57,7 @@ def prepare(records: Sequence[Record], model: DrivelineModel, holdout: Sequence[
         output_state(record, model.structure)
         require_signals(record)
     segments = cut(thinned(mended, model))
+    require_room(segments.records)
     training = segments.of(record.name for record in records)
     if not training:
         raise NotExciting(" ".join(segments.warnings), tuple(record.name for record in records))

@@ -7,8 +7,9 @@ import tracemalloc
 import numpy as np
 import pytest
 
+from estimator.diagnosis.preconditions.room import require_room
 from estimator.diagnosis.unnamed.orders import LONGEST_TRAVEL, peaks
-from estimator.errors import BadSetting
+from estimator.errors import BadSetting, BadShape
 from estimator.identification.identify import identify
 from estimator.signals.decimate import MOST_FACTOR, Decimator
 from estimator.signals.record import Record
@@ -32,6 +33,13 @@ def test_samples_far_too_fast_for_the_models_are_refused_without_a_filter_for_th
     assert tracemalloc.get_traced_memory()[1] < 1 << 24
     tracemalloc.stop()
     assert Decimator(0.02 / MOST_FACTOR, MOST_FACTOR).delay_samples > 0
+
+
+def test_more_recordings_than_a_fit_can_hold_are_refused() -> None:
+    """Fifty of 3000 rows took 7 GiB: each has unknowns of its own, and a fit every sample for every unknown."""
+    require_room([record(0.01)] * 30)
+    with pytest.raises(BadShape, match=r"50 recordings .* of 150000 samples in all: expected at most"):
+        require_room([record(0.01)] * 50)
 
 
 @pytest.mark.parametrize("travel_rad", [1e6, 1e9, 1e12])
