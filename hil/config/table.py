@@ -7,8 +7,6 @@ from typing import Annotated
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo
 
-from hil.inside import inside
-
 
 class Table(BaseModel):
     """A table of a file: a number is no text, an unknown key is a fault, nothing changes after reading."""
@@ -17,11 +15,14 @@ class Table(BaseModel):
 
 
 def _beside_the_file(value: object, info: ValidationInfo) -> Path:
-    """Resolve a path against the folder of the file it stands in, and see that it is there and leads nowhere else."""
+    """Resolve a path against the folder of the file it stands in, and see that it is there.
+
+    It may lie anywhere: who starts drives by a rig file is its author, and nothing is written to what it names.
+    """
     if not isinstance(value, str):
         raise ValueError("the path of a file, as text")
     folder = (info.context or {}).get("path", Path("file")).parent
-    path = inside(folder, value).resolve()
+    path = (folder / value).resolve()
     if not path.is_file():
         raise ValueError(f"an existing file, looked for {path}")
     return path
@@ -33,4 +34,4 @@ Text = Annotated[str, Field(min_length=1)]
 TcpPort = Annotated[int, Field(ge=1, le=65535)]
 Unsigned32 = Annotated[int, Field(ge=0, le=0xFFFF_FFFF)]
 ExistingFile = Annotated[Path, BeforeValidator(_beside_the_file)]
-"""A file in the folder of the file that names it, or below; read as an absolute path."""
+"""A file, relative to the folder of the file that names it; read as an absolute path."""

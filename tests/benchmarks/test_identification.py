@@ -90,7 +90,7 @@ def test_every_method_is_asked_about_a_bus_and_told_in_the_tables(judged: Judged
     assert all(answer.cpu_s > 0.0 for answer in judged.answers.values())
     best = judged.answers["this project: Box-Jenkins, 10 ms"]
     assert best.frequency_hz == pytest.approx(judged.truth["frequency"], rel=0.005)
-    assert set(judged.truth) == set(best.intervals)
+    assert set(judged.truth) <= set(best.intervals)  # and sums of parameters, whose truth follows
 
 
 def test_the_document_is_json_without_nan(judged: Judged) -> None:

@@ -315,8 +315,8 @@ class TestFilesItNames:
 
 
 @pytest.mark.parametrize("leads", ["absolute", "up", "link"])
-def test_a_file_outside_the_rigs_folder_is_refused(tmp_path: Path, leads: str) -> None:
-    """A rig file may be someone else's: what it names is in its own folder."""
+def test_a_file_outside_the_rigs_folder_is_read(tmp_path: Path, leads: str) -> None:
+    """A maker's EDS stays where it was installed; who drives by a rig file is its author."""
     outside, home = tmp_path / "other.eds", tmp_path / "rig"
     outside.write_bytes(data_file("inverter.eds").read_bytes())
     home.mkdir()
@@ -324,5 +324,4 @@ def test_a_file_outside_the_rigs_folder_is_refused(tmp_path: Path, leads: str) -
     named = {"absolute": str(outside), "up": "../other.eds", "link": "link.eds"}[leads]
     text = EXAMPLE.read_text("utf-8").replace("[inverters.m1]", f'[inverters.m1]\neds = "{named}"', 1)
     (home / "rig.toml").write_text(text, "utf-8")
-    with pytest.raises(RigFileError, match=r"inverters\.m1\.eds \| expected the name of a file inside .*/rig, none"):
-        read_rig(home / "rig.toml")
+    assert read_rig(home / "rig.toml").inverters["m1"].eds == outside.resolve()

@@ -24,8 +24,9 @@ from estimator.signals.record import FloatArray
 
 THIRD = 3
 
-MOST_DOUBLINGS = 60
-"""2^60 samples: a pole whose time constant is longer is no pole of a recording."""
+MOST_DOUBLINGS = 17
+"""2^17 samples, longer than most recordings: what a pole does beyond was not seen, and where many poles crowd together
+at 1, as those of fast recordings do, rounding may put one of them outside."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -91,7 +92,8 @@ def reduce_order(model: LinearModel, order: int, covariance: FloatArray | None =
 def _gramian(A: FloatArray, Q: FloatArray) -> FloatArray:
     """Return the sum of ``A^k Q (A^T)^k`` over k, by doubling (R. A. Smith, SIAM J. Applied Mathematics 16, 1968).
 
-    A solver of the Lyapunov equation divides by what a pole lacks to 1; this only adds, however slow the pole.
+    A solver of the Lyapunov equation divides by what a pole lacks to 1; this only adds, however slow the pole, over a
+    horizon of samples.
     """
     total, power = Q, A
     for _ in range(MOST_DOUBLINGS):
