@@ -324,4 +324,4 @@ def test_a_file_outside_the_rigs_folder_is_read(tmp_path: Path, leads: str) -> N
     named = {"absolute": str(outside), "up": "../other.eds", "link": "link.eds"}[leads]
     text = EXAMPLE.read_text("utf-8").replace("[inverters.m1]", f'[inverters.m1]\neds = "{named}"', 1)
     (home / "rig.toml").write_text(text, "utf-8")
-    assert read_rig(home / "rig.toml").inverters["m1"].eds == outside.resolve()
+    assert read_rig(home / "rig.toml").inverters.m1.eds == outside.resolve()
