@@ -21,7 +21,7 @@ def _beside_the_file(value: object, info: ValidationInfo) -> Path:
     """
     if not isinstance(value, str):
         raise ValueError("the path of a file, as text")
-    folder = (info.context or {}).get("path", Path("file")).parent
+    folder: Path = (info.context or {}).get("path", Path("file")).parent
     path = (folder / value).resolve()
     if not path.is_file():
         raise ValueError(f"an existing file, looked for {path}")

@@ -9,8 +9,8 @@ Time Series Analysis, chapter 11; L. Ljung, System Identification, 2nd ed., sect
 road, grade and the driver's slow changes are the noise's, and no pole of the driveline has to follow them. The
 covariance is that of the joint estimate, so that what feedback correlates, plant and noise, widens the intervals.
 
-On 60 simulated cruises of 22 s the resonance scattered 0.6 times and its damping a third as much as those of the
-output-error fit: noise that is strong below 1 Hz no longer drowns what the band around the resonance says.
+On 200 buses on a road, with a driver, the errors of frequency and damping were 0.24 and 0.38 times those of the
+output-error fit (``python -m tests.benchmarks.identification``); on quiet roads both are as good.
 """
 
 from __future__ import annotations

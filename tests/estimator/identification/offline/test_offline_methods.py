@@ -16,8 +16,10 @@ from estimator.identification.offline.box_jenkins import fit_box_jenkins
 from estimator.identification.offline.instrumental import fit_instrumental
 from estimator.identification.offline.linear_fit import LinearFit, Method
 from estimator.identification.offline.output_error import fit_output_error
-from estimator.signals.decimate import decimate
+from estimator.signals.decimate import decimate, high_passed
 from estimator.signals.record import Record
+from tests.benchmarks.buses.bus import draw_bus
+from tests.benchmarks.buses.drive import drive
 from tests.estimator.identification.closed_loop import controlled
 from tests.estimator.identification.driveline import cruise, true_resonance
 
@@ -90,13 +92,15 @@ def test_measured_outputs_in_the_regressor_bias_the_damping_and_the_others_do_no
 
 
 def test_the_noise_model_makes_more_of_the_same_data() -> None:
+    """On a road, with a driver, in frequency; every dozen of the benchmark's 200 buses has a ratio below 0.5."""
     errors: dict[Method, list[float]] = {Method.OUTPUT_ERROR: [], Method.BOX_JENKINS: []}
-    for seed in range(60, 66):
-        record = decimate(cruise(seed).record, 1)
+    for seed in range(60, 72):
+        bus = draw_bus(seed)
+        record, (frequency_hz, _) = high_passed(drive(bus)), bus.line.resonance()
         for method, values in errors.items():
-            values.append(mode_of(METHODS[method](record, THIRD)).damping.value / DAMPING - 1.0)
+            values.append(mode_of(METHODS[method](record, THIRD)).frequency_hz.value / frequency_hz - 1.0)
     scatter = {method: np.sqrt(np.mean(np.square(values))) for method, values in errors.items()}
-    assert scatter[Method.BOX_JENKINS] < 0.8 * scatter[Method.OUTPUT_ERROR]
+    assert scatter[Method.BOX_JENKINS] < 0.7 * scatter[Method.OUTPUT_ERROR]
 
 
 def test_intervals_of_the_noise_model_hold_the_truth() -> None:
