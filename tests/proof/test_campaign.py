@@ -18,6 +18,7 @@ from hil.proof.campaign.report import markdown, summary
 from hil.proof.campaign.statistics import Rate, columns, confusion, coverage
 from hil.proof.command import CommandFailed, run_hil
 from hil.proof.fresh import rms_over_floor
+from hil.proof.own_folder import MARK
 from hil.proof.truth.case import make_case
 
 DIAGNOSIS = {
@@ -66,7 +67,8 @@ def test_the_tool_sees_recordings_and_nominal_model_and_nothing_of_the_truth(too
     assert arguments == ["diagnose", "run_1.csv", "run_2.csv", "run_3.csv", "--model", "model.toml", "--out", "../out"]
     assert set(files) == {"run_1.csv", "run_2.csv", "run_3.csv", "model.toml"}
     assert "backlash" not in str(folder) + "".join(files.values())
-    assert [Path(path).name for path in sorted((tmp_path / "backlash" / "4").iterdir())] == ["case", "out", "sealed"]
+    made = sorted(path.name for path in (tmp_path / "backlash" / "4").iterdir())
+    assert made == [MARK, "case", "out", "sealed"]
     assert tool.truths == []
     assert (tmp_path / "backlash" / "4" / "sealed" / "truth.json").exists()
     assert truth["effect"] == "backlash"

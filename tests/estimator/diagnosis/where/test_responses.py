@@ -29,6 +29,6 @@ def test_a_softer_shaft_is_seen_in_the_response_and_the_true_one_is_not() -> Non
 
 def test_a_recording_without_unbroken_segments_has_no_response() -> None:
     rec = linear_record(TWO_MASS, drive_torque(1), START, sigma=SIGMA, seed=4)
-    okay = np.arange(rec.okay.size) % 100 != 0
+    okay = np.arange(rec.okay.size) % 100 >= 5  # gaps of 50 ms are too long to bridge, 0.95 s too short for a segment
     result = fit(make_problem(model(TWO_MASS), [replace(rec, okay=okay)], ()))
     assert responses(result, result) == {}
