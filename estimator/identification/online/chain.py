@@ -80,7 +80,7 @@ class OnlineChain:
     ) -> None:
         self.settings = settings
         self.L = None if L is None else L.copy()
-        factor = _factor(settings, sample_time_s)
+        factor = decimation_factor(settings, sample_time_s)
         self._decimator = Decimator(sample_time_s, factor, settings.high_pass_hz)
         made, watch = estimator(settings, L), watch or WatchSettings()
         self.orders, period_s, band_hz = made.orders, settings.sample_time_s, settings.band_hz
@@ -213,7 +213,14 @@ class OnlineChain:
         )
 
 
-def _factor(settings: Settings, sample_time_s: float) -> int:
+def decimation_factor(settings: Settings, sample_time_s: float) -> int:
+    """Return how many samples of a period [s] make one of the models'.
+
+    Raises
+    ------
+    BadSetting
+        If the models' period is no whole multiple of it.
+    """
     ratio = settings.sample_time_s / sample_time_s if sample_time_s > 0 else 0.0
     factor = round(ratio)
     if factor < 1 or abs(ratio - factor) > 1e-3 * ratio:

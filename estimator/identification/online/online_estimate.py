@@ -12,9 +12,7 @@ from estimator.identification.tracking.alarm import Alarm
 from estimator.identification.tracking.state import TrackingState
 from estimator.signals.record import FloatArray, IntArray
 
-NOT_EXCITED = (
-    "not excited: at the resonance the torque moves the output less than the noise does; switch the PRBS on or raise it"
-)
+NOT_EXCITED = "at the resonance the torque moves the output less than the noise does; switch the PRBS on or raise it"
 """What is wrong where the torque says nothing of the resonance, and what to do."""
 
 
