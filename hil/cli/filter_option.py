@@ -15,7 +15,7 @@ from hil.errors import UsageError
 
 if TYPE_CHECKING:
     from estimator.identification.identify import Settings
-    from estimator.signals.record import FloatArray
+    from hil.rig.live import OnlineSetup
 
 FilterOf = Annotated[
     Path | None,
@@ -30,7 +30,7 @@ FilterRun = Annotated[
 ]
 
 
-def with_filter(settings: Settings, path: Path | None, run: str | None) -> tuple[Settings, FloatArray | None]:
+def with_filter(settings: Settings, path: Path | None, run: str | None) -> OnlineSetup:
     """Return settings with what identified an earlier run, and its filter L; as they are without a file.
 
     Raises
@@ -40,11 +40,13 @@ def with_filter(settings: Settings, path: Path | None, run: str | None) -> tuple
     FileProblem
         If the file is wrong.
     """
+    from hil.rig.live import OnlineSetup
+
     if path is None:
         if run is not None:
             raise UsageError(f"--filter-run {run}: expected --filter FILE with it, came none")
-        return settings, None
+        return OnlineSetup(settings)
     from hil.report.identification.read_back import identified
 
     found = identified(path, run, settings.adaptation, "--filter-run")
-    return replace(found.settings, band_hz=settings.band_hz), found.L
+    return OnlineSetup(replace(found.settings, band_hz=settings.band_hz), found.L)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from hil.cli.filter_option import FilterOf, FilterRun, with_filter
 from hil.cli.trust_option import TrustLaws
 from hil.errors import RunAborted, UsageError
 
@@ -42,6 +43,8 @@ def monitor(
     channel: Annotated[
         str | None, typer.Option(metavar="NAME", help="Of a bus trace with --replay that has several: can0, 1.")
     ] = None,
+    filter_of: FilterOf = None,
+    filter_run: FilterRun = None,
     trust_laws: TrustLaws = False,
     speed: Annotated[float, typer.Option(min=0.01, max=1000.0, help="Of --replay, in multiples of real time.")] = 1.0,
     page: Annotated[str, typer.Option(help="First page: overview, model, resonance, bus or log.")] = "overview",
@@ -62,7 +65,7 @@ def monitor(
         raise UsageError(f"--snapshot {snapshot}: expected an existing folder, there is no {snapshot.parent}")
     _require_page(page)
     typer.echo("hil monitor: starting", err=True)
-    opening = _open(rig, replay, out, model, bus, modbus, simulate, speed, channel, trust_laws)
+    opening = _open(rig, replay, out, model, bus, modbus, simulate, speed, channel, trust_laws, filter_of, filter_run)
     with opening.source:  # its process starts up while this one does
         view = _view(opening, out, page, None if snapshot is None else (snapshot, after))
         view.run(headless=snapshot is not None, size=None if snapshot is None else screen)
@@ -80,20 +83,24 @@ def _open(
     speed: float,
     channel: str | None,
     trust_laws: bool,
+    filter_of: Path | None,
+    filter_run: str | None,
 ) -> Opening:
     from hil.config.rig_file import read_rig
     from hil.monitor.opening import open_recording, open_rig
     from hil.rig.addresses import with_addresses
+    from hil.rig.live import tracking_settings
 
     rig_file: Rig | None = None if rig is None else with_addresses(read_rig(rig), bus, modbus)
+    setup = with_filter(tracking_settings(), filter_of, filter_run)
     if replay is not None:
         if simulate:
             raise UsageError("hil monitor: expected --replay or --simulate, came both")
-        opening = open_recording(replay, rig_file, speed, model, trust_laws, channel)
+        opening = open_recording(replay, rig_file, speed, model, trust_laws, channel, setup)
     elif rig is None or rig_file is None:
         raise UsageError("hil monitor: expected RIG, a rig file to watch, or --replay REC; came neither")
     else:
-        opening = open_rig(rig, rig_file, out, simulate, model, trust_laws)
+        opening = open_rig(rig, rig_file, out, simulate, model, trust_laws, setup)
     return opening
 
 

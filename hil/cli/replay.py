@@ -94,6 +94,8 @@ def replay(
     if out is not None:
         typer.echo(f"{out}: {result['recorded']} samples, {result['flagged']} flagged")
     typer.echo(f"{recording}: {course.samples} samples in {took_s:.2f} s; {course.statement}")
+    if course.excitation:
+        typer.echo(f"  {course.excitation}")
     for statement in statements(course.summary()):
         typer.echo(f"  alarm: {statement}")
 

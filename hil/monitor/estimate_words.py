@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from estimator.identification.tracking.alarm import Alarm
+from estimator.identification.tracking.state import TrackingState
 from hil.monitor.snapshot import Estimation, Snapshot
 
 WIDEST_BAND = 0.5
@@ -14,6 +15,9 @@ FREQUENCY = "resonance_hz"
 """What an alarm calls a changed resonance; its unit says it where there is little room."""
 
 LIVE = "live"
+NOT_EXCITED = "NOT EXCITED"
+GOES_ON = (LIVE, NOT_EXCITED)
+"""What the title says while samples come in: that they are learnt from, or that they say nothing."""
 
 TOLD_SHARE = 0.01
 """Share of samples the estimate has to do without from which on it is told: a frame lost now and then is no news."""
@@ -26,7 +30,9 @@ def course(snapshot: Snapshot) -> str:
         return "of the last run" if estimation.model else ""
     if snapshot.headline.phase not in ("measure", ""):
         return "not measuring yet"
-    return f"STANDS STILL {snapshot.quality.standing_s:.1f} s" if snapshot.quality.stands_still else LIVE
+    if snapshot.quality.stands_still:
+        return f"STANDS STILL {snapshot.quality.standing_s:.1f} s"
+    return NOT_EXCITED if estimation.state is TrackingState.NOT_EXCITED else LIVE
 
 
 def condition(snapshot: Snapshot) -> str:
@@ -34,7 +40,7 @@ def condition(snapshot: Snapshot) -> str:
     estimation, quality = snapshot.estimation, snapshot.quality
     if estimation.live and quality.stands_still:
         return quality.why
-    if course(snapshot) == LIVE and quality.bad_share >= TOLD_SHARE:
+    if course(snapshot) in GOES_ON and quality.bad_share >= TOLD_SHARE:
         return f"{estimation.status}, {100.0 * quality.bad_share:.0f} % masked"
     return estimation.status
 
@@ -44,6 +50,12 @@ def alarm_line(alarm: Alarm) -> str:
     change = f"{alarm.before.value:.3g} -> {alarm.after.value:.3g}"
     named = f"{change} Hz" if alarm.quantity == FREQUENCY else f"{alarm.quantity} {change}"
     return named if alarm.settled else f"{named} …"
+
+
+def no_alarm(estimation: Estimation) -> str:
+    """Say that there is no alarm, and what the watch is doing while samples come in."""
+    doing = "" if estimation.state is None or not estimation.live else f", {estimation.state.words}"
+    return f"alarms    none{doing}"
 
 
 def nothing_yet(snapshot: Snapshot) -> str:

@@ -32,6 +32,7 @@ from hil.monitor.warm_up import run_once
 from hil.rig.addresses import with_addresses
 from hil.rig.build import Devices, open_devices
 from hil.rig.idle import Listening
+from hil.rig.live import USUAL, OnlineSetup
 from hil.rig.pacing import RealTimePacer, period_ns
 from hil.rig.realtime import real_time
 from hil.rig.stop import StopRequest, stop_on_signals
@@ -58,6 +59,8 @@ class Job:
         Whether the rig is simulated, in this very process.
     trust_laws
         Whether the code of its model's own laws may run.
+    setup
+        What estimates the runs.
     """
 
     rig_path: Path
@@ -65,6 +68,7 @@ class Job:
     out: Path
     simulate: bool = False
     trust_laws: bool = False
+    setup: OnlineSetup = USUAL
 
 
 class SessionStop(StopRequest):
@@ -132,7 +136,7 @@ class _Host:
 
     def serve(self) -> None:
         threading.Thread(target=self._take_orders, name="from the view", daemon=True).start()
-        run_once(self._job.rig.period_s)  # compiled before there is a cycle that it could keep waiting
+        run_once(self._job.rig.period_s, self._job.setup)  # compiled before there is a cycle that it could keep waiting
         with real_time() as grants, _rig(self._job) as rig:
             self._grants = grants
             while not self._stop.requested:
@@ -211,7 +215,7 @@ class _Host:
                 self._outbox.health(health.look(plc_health(devices.plc.latest, None), timing))
 
         with self._stop.of_run() as stop:
-            self._run = RecordedRun(self._job.rig_path, rig, self._job.out, name, self._outbox)
+            self._run = RecordedRun(self._job.rig_path, rig, self._job.out, name, self._outbox, self._job.setup)
             try:
                 grants = json.dumps(self._grants.as_json())
                 self._run.drive(devices, stop, timing, watch, {"pace": "real", "real_time": grants})

@@ -15,7 +15,7 @@ from estimator.identification.online.recursive import Status
 from estimator.identification.tracking.alarm import Alarm
 from hil.monitor.ring import Ring
 from hil.monitor.snapshot import ComplexArray, Estimation, History, Model
-from hil.rig.live import LiveEstimate, tracking_chain
+from hil.rig.live import USUAL, LiveEstimate, OnlineSetup, tracking_chain
 from hil.rig.sample import Sample
 
 HISTORY_EVERY_NS = 250_000_000
@@ -45,9 +45,14 @@ class LiveEstimation:
         Time between two samples [s].
     is_ready
         Whether the chain may be used already; samples wait until then.
+    setup
+        What estimates.
     """
 
-    def __init__(self, period_s: float, is_ready: Callable[[], bool] = lambda: True) -> None:
+    def __init__(
+        self, period_s: float, is_ready: Callable[[], bool] = lambda: True, setup: OnlineSetup = USUAL
+    ) -> None:
+        self._setup = setup
         self._is_ready = is_ready
         self._waiting: list[Sample] = []
         self._period_s = period_s
@@ -76,7 +81,7 @@ class LiveEstimation:
         self._trail.clear()
         self._live = True
         try:
-            self._live_estimate = LiveEstimate(tracking_chain(self._period_s))
+            self._live_estimate = LiveEstimate(tracking_chain(self._period_s, *self._setup))
         except EstimatorError as error:
             self._refused = str(error)
 
@@ -131,6 +136,7 @@ class LiveEstimation:
             history=self._shown_history(now_ns),
             model=self._shown_model(),
             alarms=tuple(self._alarms),
+            state=None if latest is None else latest.state,
         )
 
     def _status(self) -> str:
@@ -140,10 +146,11 @@ class LiveEstimation:
             if self._waiting:
                 return "the estimator is being compiled: once, and again after an update"
             return "waits for samples" if self._live else "no run yet"
-        estimate = self._latest.estimate
-        if estimate.status is Status.ESTIMATED and self._latest.resonance is None:
+        latest = self._latest
+        if latest.status is Status.ESTIMATED and latest.resonance is None:
             return "estimated, no resonance in the band"
-        return estimate.status.value + (f": {estimate.reason.message}" if estimate.reason.message else "")
+        word = latest.state.words if latest.status is Status.NOT_EXCITED else latest.status.value
+        return word + (f": {latest.reason}" if latest.reason else "")
 
     def _shown_history(self, now_ns: int) -> History:
         rows = self._history.rows()
@@ -151,6 +158,8 @@ class LiveEstimation:
 
     def _shown_model(self) -> Model | None:
         if self._latest is None or self._latest.estimate.status is Status.UNESTIMATED:
+            return None
+        if self._latest.status is Status.NOT_EXCITED and self._latest.resonance is None:  # a model of noise
             return None
         model = self._latest.model
         low, high = 0.5, 0.5 / model.sample_time_s

@@ -9,11 +9,12 @@ import numpy as np
 
 from hil.monitor.braille import Canvas
 from hil.monitor.estimate_words import (
-    LIVE,
+    GOES_ON,
     WIDEST_BAND,
     alarm_line,
     condition,
     course,
+    no_alarm,
     nothing_yet,
     resonance_in_words,
     with_interval,
@@ -105,7 +106,7 @@ def figures(snapshot: Snapshot, width: int, height: int) -> list[str]:
             f"damping   {with_interval(estimation.damping, estimation.damping_std, '', 4)}",
         ]
         label = f"{'status':10}"
-    last = f"ALARM {len(alarms)}: {alarm_line(alarms[-1])}" if alarms else "alarms    none"
+    last = f"ALARM {len(alarms)}: {alarm_line(alarms[-1])}" if alarms else no_alarm(estimation)
     status = textwrap.wrap(f"{label}{condition(snapshot)}", max(width, 8))
     room = max(1, height - 2 - len(values))
     lines = [title("estimate", course(snapshot), width), *values, *status[:room], last]
@@ -115,7 +116,7 @@ def figures(snapshot: Snapshot, width: int, height: int) -> list[str]:
 def standing(snapshot: Snapshot, width: int, height: int) -> list[str]:
     """Say whether the estimate goes on, and why not, for the pages that have only plots."""
     why = snapshot.quality.reasons
-    parts = (course(snapshot), condition(snapshot) + (f" ({why})" if course(snapshot) == LIVE and why else ""))
+    parts = (course(snapshot), condition(snapshot) + (f" ({why})" if course(snapshot) in GOES_ON and why else ""))
     return textwrap.wrap(f"estimate: {', '.join(part for part in parts if part)}", max(width, 8))[:height]
 
 

@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from drivers.errors import DriverError
+from estimator.identification.online.chain import decimation_factor
+from estimator.identification.online.regression import checked_filter
 from estimator.physics.twist import Shaft
 from hil.config.model_file import read_model
 from hil.config.rig_file import Rig
@@ -20,6 +22,7 @@ from hil.monitor.state import LiveState
 from hil.monitor.warm_up import WarmUp
 from hil.report.outputs import require_folder
 from hil.rig.dry_run import dry_run
+from hil.rig.live import USUAL, OnlineSetup
 from hil.rig.replay import replay
 from hil.rig.sample import Sample
 from hil.rig.trace import is_trace
@@ -37,12 +40,20 @@ class Opening:
 
 
 def open_rig(
-    rig_path: Path, rig: Rig, out: Path, simulate: bool, model: Path | None, trust_laws: bool = False
+    rig_path: Path,
+    rig: Rig,
+    out: Path,
+    simulate: bool,
+    model: Path | None,
+    trust_laws: bool = False,
+    setup: OnlineSetup = USUAL,
 ) -> Opening:
     """Prepare to watch a rig; nothing is connected before the source is entered.
 
     Raises
     ------
+    BadSetting, BadModel
+        If there is no on-line estimate with the filter of the setup.
     UsageError
         If a rig without ``[simulation]`` is to be simulated, or nothing can be written to the folder.
     ModelFileError
@@ -51,9 +62,10 @@ def open_rig(
     if simulate:
         required_simulation(rig)
     require_folder(out)
-    warm = WarmUp(rig.period_s)
-    state = LiveState(rig.name, rig.period_s, _shaft(model, rig, trust_laws), can_drive=True, is_ready=warm.is_done)
-    source = RigSource(Job(rig_path.absolute(), rig, out.absolute(), simulate, trust_laws))
+    _require_chain(rig.period_s, setup)
+    warm, shaft = WarmUp(rig.period_s, setup), _shaft(model, rig, trust_laws)
+    state = LiveState(rig.name, rig.period_s, shaft, can_drive=True, is_ready=warm.is_done, setup=setup)
+    source = RigSource(Job(rig_path.absolute(), rig, out.absolute(), simulate, trust_laws, setup))
     return Opening(source, state, tuple(Choice(name, _summary(rig, name, trust_laws)) for name in rig.experiments))
 
 
@@ -64,11 +76,14 @@ def open_recording(
     model: Path | None,
     trust_laws: bool = False,
     channel: str | None = None,
+    setup: OnlineSetup = USUAL,
 ) -> Opening:
     """Prepare to play a recording, or a bus trace with the rig file it is of.
 
     Raises
     ------
+    BadSetting, BadModel
+        As `open_rig`.
     UsageError
         If a bus trace comes without its rig file.
     RecordingError
@@ -87,9 +102,17 @@ def open_recording(
     if len(samples) < 2:
         raise RecordingError(path, f"expected samples to play, came {len(samples)}. Record again.")
     period_s = float(np.median(np.diff([sample.time_s for sample in samples])))
-    warm = WarmUp(period_s)
-    state = LiveState(path.name, period_s, _shaft(model, rig, trust_laws), can_drive=False, is_ready=warm.is_done)
+    _require_chain(period_s, setup)
+    warm, shaft = WarmUp(period_s, setup), _shaft(model, rig, trust_laws)
+    state = LiveState(path.name, period_s, shaft, can_drive=False, is_ready=warm.is_done, setup=setup)
     return Opening(ReplaySource(path.name, samples, speed, measured), state)
+
+
+def _require_chain(period_s: float, setup: OnlineSetup) -> None:
+    """Refuse a filter that was asked for and can't be used; without one, a run says why it has no estimate."""
+    if setup.L is not None:
+        decimation_factor(setup.settings, period_s)
+        checked_filter("oefo", setup.L)
 
 
 def _has_prbs(sample: Sample) -> bool:

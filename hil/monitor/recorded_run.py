@@ -18,7 +18,7 @@ from hil.recording.writer import RecordingWriter
 from hil.report.outputs import publish
 from hil.rig.build import Devices
 from hil.rig.experiments.base import Phase
-from hil.rig.live import LiveEstimate, tracking_chain
+from hil.rig.live import USUAL, LiveEstimate, OnlineSetup, tracking_chain
 from hil.rig.live_course import course_path
 from hil.rig.metadata import run_metadata
 from hil.rig.pacing import NS_PER_S, RealTimePacer, period_ns
@@ -53,9 +53,14 @@ class RecordedRun:
         Which experiment.
     outbox
         Told of every sample and of beginning and end.
+    setup
+        What estimates.
     """
 
-    def __init__(self, rig_path: Path, rig: Rig, out: Path, name: str, outbox: Outbox) -> None:
+    def __init__(
+        self, rig_path: Path, rig: Rig, out: Path, name: str, outbox: Outbox, setup: OnlineSetup = USUAL
+    ) -> None:
+        self._setup = setup
         self._rig_path = rig_path
         self._rig = rig
         self._name = name
@@ -137,7 +142,7 @@ class RecordedRun:
     def _estimate(self) -> LiveEstimate | None:
         """Make the estimate that is kept beside the recording, as `hil run` does; None where there can be none."""
         try:
-            return LiveEstimate(tracking_chain(self._rig.period_s))
+            return LiveEstimate(tracking_chain(self._rig.period_s, *self._setup))
         except EstimatorError:  # the view, which has the same chain, says why there is no estimate
             return None
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.identification.tracking.alarm import Alarm
+from estimator.identification.tracking.state import TrackingState
 from hil.monitor.messages import Health, Notice
 from hil.monitor.quality import Quality
 
@@ -141,6 +142,8 @@ class Estimation:
         The estimator's own word, and why.
     live
         Whether samples come in: else the figures are of the last run.
+    state
+        What the tracking is doing; None before the first estimate.
     """
 
     status: str
@@ -152,6 +155,7 @@ class Estimation:
     history: History
     model: Model | None
     alarms: tuple[Alarm, ...]
+    state: TrackingState | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

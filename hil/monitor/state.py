@@ -17,6 +17,7 @@ from hil.monitor.quality import QualityWatch
 from hil.monitor.ring import Ring
 from hil.monitor.snapshot import Activity, Headline, Signals, Snapshot
 from hil.rig.experiments.base import Phase
+from hil.rig.live import USUAL, OnlineSetup
 from hil.rig.sample import Sample
 
 WINDOWS_S = (1.0, 2.0, 5.0, 10.0, 20.0, 60.0)
@@ -49,6 +50,8 @@ class LiveState:
         Whether there is a rig that takes orders.
     is_ready
         Whether the estimator may be used already.
+    setup
+        What estimates.
     """
 
     def __init__(
@@ -58,13 +61,14 @@ class LiveState:
         shaft: Shaft | None,
         can_drive: bool,
         is_ready: Callable[[], bool] = lambda: True,
+        setup: OnlineSetup = USUAL,
     ) -> None:
         self._ring = Ring(math.ceil(WINDOWS_S[-1] / period_s), 6)
         self._window = FIRST_WINDOW
         self._model_shaft = shaft
         self._twist = None if shaft is None else TwistFilter(shaft, period_s)
         self._tuned_hz = math.nan
-        self._estimation = LiveEstimation(period_s, is_ready)
+        self._estimation = LiveEstimation(period_s, is_ready, setup)
         self._quality = QualityWatch(period_s)
         self._health: Health | None = None
         self._log: deque[Notice] = deque(maxlen=KEPT_NOTICES)

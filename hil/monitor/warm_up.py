@@ -12,7 +12,7 @@ import threading
 
 from estimator.errors import EstimatorError
 from hil.child import safe_path
-from hil.rig.live import tracking_chain
+from hil.rig.live import USUAL, OnlineSetup, tracking_chain
 
 SAMPLES = 64
 
@@ -27,10 +27,12 @@ class WarmUp:
     ----------
     period_s
         Time between two samples [s].
+    setup
+        What estimates; each structure of model has its own machine code.
     """
 
-    def __init__(self, period_s: float) -> None:
-        self._period_s = period_s
+    def __init__(self, period_s: float, setup: OnlineSetup = USUAL) -> None:
+        self._of = (period_s, setup)
         self._failed: Exception | None = None
         self._thread = threading.Thread(target=self._run, name="compiling", daemon=True)
         self._thread.start()
@@ -48,27 +50,27 @@ class WarmUp:
         return not self._thread.is_alive()
 
     def _run(self) -> None:
-        process = multiprocessing.get_context("spawn").Process(target=_compile, args=(self._period_s,), daemon=True)
+        process = multiprocessing.get_context("spawn").Process(target=_compile, args=self._of, daemon=True)
         with safe_path():
             process.start()
         process.join()
         try:
-            run_once(self._period_s)
+            run_once(*self._of)
         except Exception as error:  # noqa: BLE001 - raised where someone asks: a thread's own is lost
             self._failed = error
 
 
-def run_once(period_s: float) -> None:
+def run_once(period_s: float, setup: OnlineSetup = USUAL) -> None:
     """Run the chain on nothing; a period that has no chain has none to compile, and the view says so in a run."""
     try:
-        chain = tracking_chain(period_s)
+        chain = tracking_chain(period_s, *setup)
     except EstimatorError:
         return
     for number in range(SAMPLES):
         chain.push(number * period_s, 0.0, 0.0)
 
 
-def _compile(period_s: float) -> None:
+def _compile(period_s: float, setup: OnlineSetup) -> None:
     if hasattr(os, "nice"):
         os.nice(NICE)
-    run_once(period_s)
+    run_once(period_s, setup)

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from estimator.identification.identify import Settings
 from estimator.identification.online.adaptation import ConstantForgetting
@@ -32,6 +33,16 @@ def tracking_settings(sample_time_s: float = Settings().sample_time_s) -> Settin
     The paper's profile goes on learning until tr F has fallen to 0.01, for minutes, and is then slow to change.
     """
     return Settings(sample_time_s=sample_time_s, adaptation=ConstantForgetting(FORGETTING))
+
+
+class OnlineSetup(NamedTuple):
+    """What estimates on line: settings, and the observation filter of an earlier run (`tracking_chain`)."""
+
+    settings: Settings = tracking_settings()
+    L: FloatArray | None = None
+
+
+USUAL = OnlineSetup()
 
 
 def tracking_chain(period_s: float, settings: Settings | None = None, L: FloatArray | None = None) -> OnlineChain:

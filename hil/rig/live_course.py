@@ -5,8 +5,11 @@ from __future__ import annotations
 import json
 import math
 from array import array
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from estimator.identification.tracking.state import TrackingState
 
 if TYPE_CHECKING:  # the estimator takes half a second to import, and a run without an estimate has no use for it
     from estimator.identification.online.chain import OnlineChain
@@ -38,6 +41,7 @@ class Course:
         self.alarms: list[Alarm] = []
         self._settings, self._filter = chain.settings, chain.L
         self._columns = {name: array("d") for name in COLUMNS}
+        self._states: list[tuple[float, TrackingState]] = []
         self._last: OnlineEstimate | None = None
 
     def append(self, estimate: OnlineEstimate) -> None:
@@ -49,6 +53,7 @@ class Course:
             column.append(value)
         if estimate.alarm is not None:
             self.alarms.append(estimate.alarm)
+        self._enter(estimate.time_s, estimate.state)
         self._last = estimate
 
     def extend(self, block: OnlineTrajectory) -> None:
@@ -59,6 +64,15 @@ class Course:
         self.alarms.extend(block.alarms)
         if len(block):
             self._last = block[len(block) - 1]
+        codes = block.state.tolist()
+        for k, (before, code) in enumerate(pairwise((None, *codes))):
+            if code != before:
+                self._enter(float(block.time_s[k]), TrackingState(code))
+
+    def _enter(self, time_s: float, state: TrackingState) -> None:
+        """Keep when the tracking has come into another state."""
+        if not self._states or self._states[-1][1] is not state:
+            self._states.append((time_s, state))
 
     def summary(self) -> dict[str, Any]:
         """Return how it ended, and the alarms; JSON-able."""
@@ -78,6 +92,7 @@ class Course:
             "samples": self.samples,
             "estimates": len(self._columns["time_s"]),
             "final": None if self._last is None else _final(self._last),
+            "states": [{"from_s": time_s, "state": state.word} for time_s, state in self._states],
             "alarms": [alarm.as_json() for alarm in self.alarms],
         }
 
@@ -94,16 +109,30 @@ class Course:
             return "no estimate: the recording ended before the first one"
         return statement(self._last)
 
+    @property
+    def excitation(self) -> str:
+        """One line: for how long there was no excitation; empty where there always was."""
+        if self._last is None:
+            return ""
+        begun_s, ended_s = self._states[0][0], self._last.time_s
+        spans = pairwise((*self._states, (ended_s, TrackingState.STARTING)))
+        missing_s = sum(
+            until_s - from_s for (from_s, state), (until_s, _) in spans if state is TrackingState.NOT_EXCITED
+        )
+        return f"not excited for {missing_s:.1f} of {ended_s - begun_s:.1f} s: no alarm then" if missing_s else ""
+
 
 def statement(estimate: OnlineEstimate) -> str:
     """Say one estimate in a line."""
-    mode = estimate.resonance
+    mode, excited = estimate.resonance, estimate.state is not TrackingState.NOT_EXCITED
+    why = estimate.reason if excited else f"{estimate.state.words}: {estimate.reason}"
     if mode is None:
-        return f"resonance: {estimate.estimate.reason.message or 'no lightly damped mode in the band'}"
-    return (
+        return f"resonance: {why or 'no lightly damped mode in the band'}"
+    said = (
         f"resonance {mode.frequency_hz:.3f} Hz{_plus_minus(estimate.frequency_std_hz, 3)}, "
         f"damping {mode.damping:.4f}{_plus_minus(estimate.damping_std, 4)}"
     )
+    return said if excited else f"{said}; {why}"
 
 
 def _plus_minus(std: float, digits: int) -> str:
@@ -122,8 +151,9 @@ def _final(estimate: OnlineEstimate) -> dict[str, Any]:
         }
     return {
         "time_s": estimate.time_s,
-        "status": estimate.estimate.status.value,
-        "reason": estimate.estimate.reason.message,
+        "status": estimate.status.value,
+        "reason": estimate.reason,
+        "state": estimate.state.word,
         "theta": estimate.estimate.theta.tolist(),
         "resonance": resonance,
     }

@@ -5,11 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from estimator.identification.tracking.state import TrackingState
 from estimator.physics.twist import Shaft
 from hil.monitor.live_estimation import LiveEstimation
-from hil.rig.live import LiveEstimate, tracking_chain
+from hil.rig.live import LiveEstimate, OnlineSetup, tracking_chain, tracking_settings
 from hil.rig.sample import Sample, SampleFlag
 from hil.simulator.simulation_model import DEFAULT_BUS
+from tests.estimator.identification.tracking import roads
+from tests.estimator.identification.tracking.drives import drives
 from tests.monitor.fake_source import sample
 from tests.monitor.two_mass import PERIOD_S, driven
 
@@ -98,3 +101,39 @@ def test_a_period_the_models_have_no_multiple_of_is_told() -> None:
     live.take([sample(0)])
     assert "no estimate" in live.look(0).status
     assert "0.003" in live.look(0).status
+
+
+def test_without_excitation_the_estimate_is_held_and_says_so() -> None:
+    record = drives(5, 1, 60.0, prbs_nm=lambda time_s: 120.0 if time_s < 40.0 else 0.0)[0]
+    pairs = zip(record.total_torque_nm.tolist(), record.output.tolist(), strict=True)
+    rows = [sample(k, torque, speed) for k, (torque, speed) in enumerate(pairs)]
+    excited, live = fed(rows[:3900], 100), fed(rows, 100)
+    seen, before = live.look(rows[-1].t_ns), excited.look(rows[3899].t_ns)
+    assert (before.state, seen.state) == (TrackingState.WATCHING, TrackingState.NOT_EXCITED)
+    assert before.status == "estimated"
+    assert seen.status.startswith("not excited: ")
+    assert "PRBS" in seen.status
+    assert seen.resonance_hz == pytest.approx(before.resonance_hz, rel=0.005)
+    assert seen.resonance_std_hz > 1.5 * before.resonance_std_hz
+    assert seen.model is not None
+
+
+def test_a_model_of_noise_is_not_shown() -> None:
+    drive = roads.drive(5, 30.0, prbs_nm=lambda time_s: 0.0).record
+    pairs = zip(drive.total_torque_nm.tolist(), drive.output.tolist(), strict=True)
+    seen = fed([sample(k, torque, speed) for k, (torque, speed) in enumerate(pairs)], 100).look(0)
+    assert seen.state is TrackingState.NOT_EXCITED
+    assert np.isnan(seen.resonance_hz)
+    assert seen.model is None
+
+
+def test_the_filter_of_an_earlier_run_is_used(rows: list[Sample]) -> None:
+    setup = OnlineSetup(tracking_settings(), np.array([1.0, -0.92, 0.88]))
+    live, alone = LiveEstimation(PERIOD_S, setup=setup), LiveEstimate(tracking_chain(PERIOD_S, *setup))
+    live.begin()
+    live.take(rows)
+    for row in rows:
+        alone(row)
+    assert alone.latest is not None
+    assert alone.latest.resonance is not None
+    assert live.look(0).resonance_hz == alone.latest.resonance.frequency_hz != fed(rows, 100).look(0).resonance_hz

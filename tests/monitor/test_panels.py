@@ -10,6 +10,7 @@ import pytest
 
 from drivers.plc.types import ClutchState, DriveMode, PlcStatus, PlcWatchdog, PrbsSettings, PrbsSource
 from estimator.identification.tracking.alarm import Alarm, Level
+from estimator.identification.tracking.state import TrackingState
 from hil.monitor import bus_panels, head_panels, log_panel, model_panels, signal_panels
 from hil.monitor.messages import Began, Kind, NodeHealth, Notice, PlcHealth, Ready, Samples
 from hil.monitor.panel import Draw
@@ -118,6 +119,21 @@ def test_poles_and_zeros_are_letters_in_the_plane() -> None:
     text = "\n".join(model_panels.poles(snapshot(), 72, 19)[1:])
     assert text.count("x") == 3  # the pair shows once: it is the upper half
     assert text.count("o") == 1
+
+
+def test_without_excitation_the_estimate_says_so_in_words() -> None:
+    shown = snapshot()
+    reason = "not excited: switch the PRBS on"
+    estimation = replace(shown.estimation, state=TrackingState.NOT_EXCITED, status=reason, live=True, alarms=())
+    shown = replace(shown, estimation=estimation, headline=replace(shown.headline, phase="measure"))
+    title, *lines = model_panels.figures(shown, 60, 7)
+    assert "NOT EXCITED" in title
+    assert any(reason in line for line in lines)
+    assert lines[-1] == "alarms    none, not excited"
+    watching = replace(shown, estimation=replace(estimation, state=TrackingState.WATCHING, status="estimated"))
+    title, *lines = model_panels.figures(watching, 60, 7)
+    assert title.endswith("live")
+    assert lines[-1] == "alarms    none, watching"
 
 
 def test_an_alarm_says_what_changed_and_on_what_evidence() -> None:

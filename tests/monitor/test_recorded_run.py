@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 import multiprocessing
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import cast
+from typing import Protocol, cast
 
+import numpy as np
 import pytest
 
 from drivers.errors import DeviceTimeout
@@ -22,7 +23,7 @@ from hil.recording import read_record
 from hil.rig.build import Devices
 from hil.rig.drive import Observer, Recorder
 from hil.rig.experiments.base import Phase
-from hil.rig.live import tracking_settings
+from hil.rig.live import USUAL, OnlineSetup, tracking_settings
 from hil.rig.live_replay import Pace, play_record
 from hil.rig.sample import Sample
 from hil.rig.stop import StopRequest
@@ -61,14 +62,17 @@ class Told(Outbox):
         self.reports.append(report)
 
 
-Drive = Callable[[list[Sample], Path], Over]
+class Drive(Protocol):
+    """Runs a cruise of given cycles, recorded into a folder."""
+
+    def __call__(self, samples: list[Sample], out: Path, setup: OnlineSetup = USUAL) -> Over: ...
 
 
 @pytest.fixture
 def drive(rig_path: Path, monkeypatch: pytest.MonkeyPatch) -> Drive:
     """Run a cruise whose cycles are given, and end it as a drive that falls silent does."""
 
-    def run(samples: list[Sample], out: Path) -> Over:
+    def run(samples: list[Sample], out: Path, setup: OnlineSetup = USUAL) -> Over:
         def cycles(*arguments: object) -> None:
             recorder, observers = cast(Recorder, arguments[3]), cast("Sequence[Observer]", arguments[7])
             for row in samples:
@@ -79,7 +83,7 @@ def drive(rig_path: Path, monkeypatch: pytest.MonkeyPatch) -> Drive:
 
         monkeypatch.setattr(recorded_run, "run_plan", cycles)
         told = Told()
-        run = RecordedRun(rig_path, read_rig(rig_path), out, "cruise", told)
+        run = RecordedRun(rig_path, read_rig(rig_path), out, "cruise", told, setup)
         run.drive(cast(Devices, None), StopRequest(), RunTiming(10_000_000), lambda t_ns: None, {})
         assert not any(isinstance(report, Notice) for report in told.reports), told.reports
         return next(report for report in told.reports if isinstance(report, Over))
@@ -114,6 +118,21 @@ def test_what_is_kept_is_what_a_replay_gives(rows: list[Sample], drive: Drive, t
     record = read_record(Path(over.recording))
     play_record(record, tracking_settings(), Pace(), lambda course, time_s: None).write(again)
     assert again.read_bytes() == Path(over.recording).with_suffix(".online.json").read_bytes()
+
+
+def test_the_filter_of_an_earlier_run_is_that_of_the_replay_too(
+    rows: list[Sample], drive: Drive, tmp_path: Path
+) -> None:
+    setup = OnlineSetup(tracking_settings(), np.array([1.0, -0.92, 0.88]))
+    over = drive(rows[:1500], tmp_path, setup)
+    assert over.recording is not None
+    again = tmp_path / "again.json"
+    play_record(read_record(Path(over.recording)), setup.settings, Pace(), lambda course, time_s: None, setup.L).write(
+        again
+    )
+    kept = Path(over.recording).with_suffix(".online.json").read_bytes()
+    assert again.read_bytes() == kept
+    assert json.loads(kept)["settings"]["filter_L"] == [1.0, -0.92, 0.88]
 
 
 def test_a_run_without_a_sample_leaves_nothing(drive: Drive, tmp_path: Path) -> None:

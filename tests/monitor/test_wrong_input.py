@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -43,6 +44,13 @@ def test_a_rig_that_is_not_there(rig_path: Path, tmp_path: Path) -> None:
     assert not (tmp_path / "runs").exists()
 
 
+def identification(period_s: float, filter_l: list[float]) -> dict[str, object]:
+    """What of an identification.json an on-line estimate is made from."""
+    settings = {"na": 4, "nb": 4, "nk": 1, "sample_time_s": period_s, "high_pass_hz": 0.3}
+    recording = {"name": "run_1", "output": "speed", "filter_L": filter_l}
+    return {"schema": "hil.identification/1", "settings": settings, "recordings": [recording]}
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
@@ -54,6 +62,10 @@ def test_a_rig_that_is_not_there(rig_path: Path, tmp_path: Path) -> None:
         (("RIG", "--model", "one_mass.toml"), "two_mass"),
         (("RIG", "--out", "rig.toml"), "is a file"),
         (("RIG", "--modbus", "nowhere"), "HOST:PORT"),
+        (("RIG", "--filter-run", "run_1"), "expected --filter FILE with it"),
+        (("RIG", "--filter", "identification.json"), "expected identification.json"),
+        (("RIG", "--filter", "other_period.json"), "samples come every 0.01 s"),
+        (("RIG", "--filter", "unstable.json"), "root of magnitude 1.2"),
         (("NO_SIMULATION", "--simulate"), "[simulation]"),
     ],
 )
@@ -72,6 +84,8 @@ def test_wrong_use(
         "J_M = { value = 1.0, tolerance = 0.1 }\nb_M = { value = 0.1, tolerance = 0.1 }\n",
         encoding="utf-8",
     )
+    for name, period_s, filter_l in (("other_period", 0.015, [1.0, -0.5]), ("unstable", 0.02, [1.0, -1.2])):
+        Path(f"{name}.json").write_text(json.dumps(identification(period_s, filter_l)), encoding="utf-8")
     names = {"RIG": "rig.toml", "NO_SIMULATION": "real.toml"}
     assert run(["monitor", *(names.get(word, word) for word in arguments), *PICTURE]) == 2
     assert said in capsys.readouterr().err

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 
 from estimator.errors import BadSetting
+from estimator.signals.record import Record
 from hil.recording import RecordingWriter, read_record
 from hil.rig.build import open_devices
 from hil.rig.experiments.base import Phase
@@ -25,9 +27,9 @@ from tests.rig.observer import assert_disarmed
 from tests.rig.serving import Samples, fast, served
 
 
-def driven(flagged: tuple[int, ...] = ()) -> list[Sample]:
+def driven(flagged: tuple[int, ...] = (), record: Record | None = None) -> list[Sample]:
     """A drive as samples of a run; some flagged, their values beside the truth, as stand-ins have them."""
-    record = drives(21, 1, 16.0)[0]
+    record = record or drives(21, 1, 16.0)[0]
     samples = []
     for k, (t, (m1, m2), speed) in enumerate(
         zip(record.time_s.tolist(), record.torque_nm.tolist(), record.output.tolist(), strict=True)
@@ -88,6 +90,34 @@ def test_live_is_replay_to_the_bit(tmp_path: Path, suffix: str) -> None:
     assert live.latest is not None
     assert live.latest.resonance is not None
     assert (tmp_path / "live.json").read_bytes() == (tmp_path / "replay.json").read_bytes()
+
+
+def test_what_a_run_says_of_its_excitation_its_replay_says_too(tmp_path: Path) -> None:
+    drive = drives(23, 1, 75.0, prbs_nm=lambda time_s: 0.0 if 40.0 <= time_s < 60.0 else 120.0)[0]
+    live = LiveEstimate(tracking_chain(0.01))
+    for sample in driven(record=drive):
+        live(sample)
+    live.course.write(tmp_path / "live.json")
+    play_record(drive, tracking_settings(), Pace(), lambda course, time_s: None).write(tmp_path / "replay.json")
+    assert (tmp_path / "live.json").read_bytes() == (tmp_path / "replay.json").read_bytes()
+    document = json.loads((tmp_path / "live.json").read_text())
+    states = [entry["state"] for entry in document["states"]]
+    assert states == ["starting", "learning", "watching", "not_excited", "watching"]
+    off_s, on_s = (entry["from_s"] for entry in document["states"][3:])
+    assert 40.0 < off_s < 43.0
+    assert 59.0 < on_s < 62.0
+    assert document["alarms"] == []
+    assert (document["final"]["status"], document["final"]["state"]) == ("estimated", "watching")
+    assert live.course.excitation == f"not excited for {on_s - off_s:.1f} of 75.0 s: no alarm then"
+
+
+def test_an_estimate_without_excitation_says_so() -> None:
+    drive = drives(24, 1, 30.0, prbs_nm=lambda time_s: 0.0 if time_s >= 20.0 else 120.0)[0]
+    course = play_record(drive, tracking_settings(), Pace(), lambda course, time_s: None)
+    assert course.statement.startswith("resonance 8.")
+    assert "; not excited: at the resonance the torque moves the output less" in course.statement
+    assert course.summary()["final"]["status"] == "not_excited"
+    assert "PRBS" in course.summary()["final"]["reason"]
 
 
 def test_other_phases_are_not_estimated_from() -> None:

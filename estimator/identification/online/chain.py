@@ -5,6 +5,7 @@
     torque, output  ->  high-pass, low-pass, every M-th sample   (estimator.signals.decimate)
                     ->  recursive estimator                      (Oefo, or any other)
                     ->  poles, resonance, damping, how sure      (tracking.follow)
+                    ->  does the torque excite it?               (tracking.excitation)
                     ->  has the resonance changed?               (tracking.watch)
 
 One code for a sample and for a block: what a rig computed while driving comes out of its recording again, to the
@@ -25,11 +26,13 @@ from estimator.identification.online.oefo import Filtering, Oefo
 from estimator.identification.online.online_estimate import OnlineEstimate, OnlineTrajectory
 from estimator.identification.online.recursive import RecursiveEstimator
 from estimator.identification.tracking.follow import Follower
-from estimator.identification.tracking.watch import ChangeWatch, WatchSettings
+from estimator.identification.tracking.tracker import Tracker
+from estimator.identification.tracking.watch import ChangeWatch
+from estimator.identification.tracking.watch_settings import WatchSettings
 from estimator.signals.decimate import Decimated, Decimator
 from estimator.signals.record import BoolArray, FloatArray, Record
 
-VERSION = 1
+VERSION = 2
 """Of a saved state; goes up when a part changes its meaning."""
 
 EstimatorFactory = Callable[[Settings, FloatArray | None], RecursiveEstimator]
@@ -77,11 +80,16 @@ class OnlineChain:
     ) -> None:
         self.settings = settings
         self.L = None if L is None else L.copy()
-        factor = _factor(settings, sample_time_s)
+        factor = decimation_factor(settings, sample_time_s)
         self._decimator = Decimator(sample_time_s, factor, settings.high_pass_hz)
-        self._estimator = estimator(settings, L)
-        self._follower = Follower(self._estimator.orders, settings.sample_time_s, settings.band_hz)
-        self._watch = ChangeWatch(self._estimator.orders, settings.sample_time_s, watch)
+        made, watch = estimator(settings, L), watch or WatchSettings()
+        self.orders, period_s, band_hz = made.orders, settings.sample_time_s, settings.band_hz
+        self._watch_settings = watch
+        self._tracker = Tracker(
+            made,
+            Follower(self.orders, period_s, band_hz, watch.block_samples(period_s)),
+            ChangeWatch(self.orders, period_s, band_hz, watch),
+        )
         self._seen = 0
         self._factor = factor
         self._one = (np.zeros(1), np.zeros(1), np.zeros(1), np.zeros(1, dtype=np.bool_))
@@ -154,10 +162,9 @@ class OnlineChain:
 
         ``numpy.savez(path, **state)`` keeps it as it is; lists of the same numbers are restored as well.
         """
-        kept: dict[str, Any] = {"version": VERSION, "settings": repr((self.settings, self._watch.settings))}
-        for part, holder in self._parts.items():
-            kept |= {f"{part}.{name}": value for name, value in holder.state().items()}
-        return kept | {"seen": self._seen}
+        kept: dict[str, Any] = {"version": VERSION, "settings": repr((self.settings, self._watch_settings))}
+        kept |= {f"decimator.{name}": value for name, value in self._decimator.state().items()}
+        return kept | self._tracker.state() | {"seen": self._seen}
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Take up a saved state: what follows has the bits it would have had without the break.
@@ -176,14 +183,10 @@ class OnlineChain:
                 )
         if missing := sorted(own.keys() - state.keys()):
             raise BadSetting(f"on-line chain: the state has no {', '.join(missing)}, expected every part of one saved.")
-        for part, holder in self._parts.items():
-            holder.restore({name.removeprefix(f"{part}."): state[name] for name in own if name.startswith(f"{part}.")})
+        decimator = (name for name in own if name.startswith("decimator."))
+        self._decimator.restore({name.removeprefix("decimator."): state[name] for name in decimator})
+        self._tracker.restore(state)
         self._seen = int(np.asarray(state["seen"]))
-
-    @property
-    def _parts(self) -> dict[str, Any]:
-        parts = (self._decimator, self._estimator, self._follower, self._watch)
-        return dict(zip(("decimator", "estimator", "follower", "watch"), parts, strict=True))
 
     def _kept_times(self, time_s: FloatArray) -> FloatArray:
         """Pick the moments of the samples kept of the next block, the low-pass's delay taken out."""
@@ -192,25 +195,32 @@ class OnlineChain:
         return kept
 
     def _estimated(self, times: FloatArray, kept: Decimated) -> OnlineTrajectory:
-        estimates = self._estimator.run(kept.u, kept.y, kept.okay)
-        found = self._follower.run(kept.u, estimates)
-        watched = self._watch.run(times, kept.u, kept.y, estimates, found)
+        tracked = self._tracker.run(times, kept.u, kept.y, kept.okay)
+        found = tracked.found
         return OnlineTrajectory(
             time_s=times,
-            estimates=estimates,
+            estimates=tracked.estimates,
             frequency_hz=found.frequency_hz,
             damping=found.damping,
             height=found.height,
             frequency_std_hz=found.frequency_std_hz,
             damping_std=found.damping_std,
-            alarms=watched.alarms,
-            alarm_at=watched.alarm_at,
-            orders=self._estimator.orders,
+            state=tracked.state,
+            alarms=tracked.alarms,
+            alarm_at=tracked.alarm_at,
+            orders=self.orders,
             sample_time_s=self._decimator.sample_time_s,
         )
 
 
-def _factor(settings: Settings, sample_time_s: float) -> int:
+def decimation_factor(settings: Settings, sample_time_s: float) -> int:
+    """Return how many samples of a period [s] make one of the models'.
+
+    Raises
+    ------
+    BadSetting
+        If the models' period is no whole multiple of it.
+    """
     ratio = settings.sample_time_s / sample_time_s if sample_time_s > 0 else 0.0
     factor = round(ratio)
     if factor < 1 or abs(ratio - factor) > 1e-3 * ratio:

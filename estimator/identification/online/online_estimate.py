@@ -7,9 +7,13 @@ from dataclasses import dataclass
 
 from estimator.identification.linear_model import LinearModel, Orders
 from estimator.identification.modes.modes import Mode
-from estimator.identification.online.recursive import Estimate, Trajectory
+from estimator.identification.online.recursive import Estimate, Status, Trajectory
 from estimator.identification.tracking.alarm import Alarm
-from estimator.signals.record import FloatArray
+from estimator.identification.tracking.state import TrackingState
+from estimator.signals.record import FloatArray, IntArray
+
+NOT_EXCITED = "at the resonance the torque moves the output less than the noise does; switch the PRBS on or raise it"
+"""What is wrong where the torque says nothing of the resonance, and what to do."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,6 +32,8 @@ class OnlineEstimate:
         Dominant lightly damped mode; None where there is none, or the estimate is not to be used.
     frequency_std_hz, damping_std : float
         Standard deviations of its natural frequency [Hz] and damping ratio; NaN where not known.
+    state : TrackingState
+        What the tracking is doing.
     alarm : Alarm or None
         A change that was found at this sample.
     """
@@ -38,7 +44,18 @@ class OnlineEstimate:
     resonance: Mode | None
     frequency_std_hz: float
     damping_std: float
+    state: TrackingState
     alarm: Alarm | None = None
+
+    @property
+    def status(self) -> Status:
+        """Whether the estimate may be used: the estimator's own word, unless the torque says nothing of it."""
+        return Status.NOT_EXCITED if self.state is TrackingState.NOT_EXCITED else self.estimate.status
+
+    @property
+    def reason(self) -> str:
+        """What is wrong and what to do; empty where nothing is."""
+        return NOT_EXCITED if self.state is TrackingState.NOT_EXCITED else self.estimate.reason.message
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,6 +72,8 @@ class OnlineTrajectory:
         The resonance; NaN where there is none.
     frequency_std_hz, damping_std : ndarray, shape (n,)
         Standard deviations; NaN where not known.
+    state : ndarray of int, shape (n,)
+        Values of :class:`TrackingState`.
     alarms : tuple of Alarm
         Changes found in the block, in order of time.
     alarm_at : tuple of int
@@ -70,6 +89,7 @@ class OnlineTrajectory:
     height: FloatArray
     frequency_std_hz: FloatArray
     damping_std: FloatArray
+    state: IntArray
     alarms: tuple[Alarm, ...]
     alarm_at: tuple[int, ...]
     orders: Orders
@@ -91,6 +111,7 @@ class OnlineTrajectory:
             resonance=mode,
             frequency_std_hz=float(self.frequency_std_hz[k]),
             damping_std=float(self.damping_std[k]),
+            state=TrackingState(int(self.state[k])),
             alarm=dict(zip(self.alarm_at, self.alarms, strict=True)).get(k),
         )
 

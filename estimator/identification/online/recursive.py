@@ -28,6 +28,7 @@ class Status(Enum):
     UNESTIMATED = "unestimated"  # not yet: too few samples, or they do not determine it
     ESTIMATED = "estimated"
     INVALID = "invalid"  # there is one, and it is wrong
+    NOT_EXCITED = "not_excited"  # the present samples say nothing of it: a chain's word, not an estimator's
 
 
 class Reason(IntEnum):

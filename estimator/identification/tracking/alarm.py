@@ -23,6 +23,11 @@ class Level:
         return cls(value, (value - NORMAL_95 * std, value + NORMAL_95 * std))
 
     @property
+    def std(self) -> float:
+        """Standard deviation that the interval is of."""
+        return (self.ci95[1] - self.ci95[0]) / (2.0 * NORMAL_95)
+
+    @property
     def statement(self) -> str:
         """Value and interval, four significant digits."""
         return f"{self.value:.4g} ({self.ci95[0]:.4g} to {self.ci95[1]:.4g})"
@@ -53,8 +58,8 @@ class Alarm:
     before, after : Level
         Value before and since.
     settled : bool
-        False while the estimate is on its way: ``after`` is then where it has got to. The same alarm comes once more
-        when it has settled.
+        False while the estimate is on its way: ``after`` is then what the samples since the change say by themselves,
+        too little for a large one. The same alarm comes once more when it has settled.
     statistic, threshold : float
         The evidence, and what it had to exceed.
     false_alarms_per_hour : float

@@ -26,6 +26,9 @@ in theta right after the start. Before :data:`FEWEST` samples of a usable estima
 150 samples the first-order theory was too sure by a factor of 2.5, at 300 it was right within a quarter
 (``python -m tests.benchmarks.tracking``). Where the residual is a deterministic error of the model, repeated with
 every period of the PRBS, the deviations are too large by up to two: they take it for noise.
+
+Without excitation the deviations grow (:mod:`excitation`), up to those of a value that may be anywhere in the band in
+which the resonance is looked for.
 """
 
 from __future__ import annotations
@@ -39,8 +42,17 @@ import numpy as np
 from estimator.identification.linear_model import Orders
 from estimator.identification.modes.modes import LIGHTLY_DAMPED
 from estimator.identification.online.recursive import Trajectory
+from estimator.identification.tracking.excitation import CLOSES, OPENS, Excitation
+from estimator.identification.tracking.excitation_kernel import (
+    N_BLOCK,
+    N_LASTING,
+    N_MODE,
+    SAMPLES,
+    VERDICT,
+)
 from estimator.identification.tracking.follow_kernel import follow_block
-from estimator.signals.record import FloatArray
+from estimator.identification.tracking.sensitivity_kernel import N_THROUGH
+from estimator.signals.record import BoolArray, FloatArray
 
 MEMORY = 500
 """Kept samples over which the residual's density is averaged: 10 s at 20 ms, some thirty times the memory of a mode at
@@ -72,12 +84,15 @@ class Follower:
         Their sampling period [s].
     band_hz : tuple of float
         Where the resonance is looked for [Hz].
+    block : int
+        Samples of a block, at the end of which the excitation is judged.
     """
 
-    def __init__(self, orders: Orders, sample_time_s: float, band_hz: tuple[float, float]) -> None:
+    def __init__(self, orders: Orders, sample_time_s: float, band_hz: tuple[float, float], block: int) -> None:
         n = orders.n_parameters
+        self._block = block
         self._structure = np.array([orders.na, orders.nb, orders.nk])
-        self._numbers = np.array([sample_time_s, *band_hz, LIGHTLY_DAMPED, float(MEMORY), float(FEWEST)])
+        self._numbers = np.array([sample_time_s, *band_hz, LIGHTLY_DAMPED, MEMORY, FEWEST, block, OPENS, CLOSES])
         depth = max(orders.na, orders.nk + orders.nb, 2)
         self._live = {
             "before": np.zeros(n),
@@ -85,15 +100,45 @@ class Follower:
             "P": np.eye(n),  # forgotten with the estimator's own start value, whatever it is
             "past": np.zeros((4, depth)),
             "heard": np.zeros(6),
+            "mode": np.zeros(N_MODE),
+            "through": np.zeros(N_THROUGH),
+            "block": np.zeros(N_BLOCK),
+            "lasting": np.zeros(N_LASTING),
         }
         self._roots = np.zeros(orders.na, dtype=np.complex128)
-        self._work = np.zeros((6, max(n, 3)))
+        self._work = np.zeros((7, max(n, 3)))
 
-    def run(self, u: FloatArray, estimates: Trajectory) -> Followed:
-        """Follow the estimates of a block made from the inputs u, shape (n,); the block may have any length."""
+    @property
+    def excitation(self) -> Excitation:
+        """Verdict on the last whole block."""
+        return Excitation(int(self._live["lasting"][VERDICT]))
+
+    @property
+    def to_block_end(self) -> int:
+        """Samples until the next verdict, 1 or more."""
+        return self._block - int(self._live["block"][SAMPLES])
+
+    @property
+    def at_block_end(self) -> bool:
+        """Whether the last sample was the last of a block, so that the verdict is new."""
+        return self.to_block_end == self._block
+
+    def run(self, u: FloatArray, okay: BoolArray, estimates: Trajectory) -> Followed:
+        """Follow the estimates of a block, which may have any length.
+
+        Parameters
+        ----------
+        u : ndarray, shape (n,)
+            Inputs that they were made from.
+        okay : ndarray of bool, shape (n,)
+            Which samples are good, whether the estimator was held or not.
+        estimates : Trajectory
+            The estimates, length n.
+        """
         live, out = self._live, np.empty((len(estimates), 5))
         follow_block(
             u,
+            okay,
             estimates.theta,
             estimates.y_hat,
             estimates.e_prior,
@@ -106,6 +151,10 @@ class Follower:
             live["P"],
             live["past"],
             live["heard"],
+            live["mode"],
+            live["through"],
+            live["block"],
+            live["lasting"],
             self._work,
             self._roots,
             out,

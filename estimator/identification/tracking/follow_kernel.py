@@ -6,12 +6,20 @@ import numpy as np
 
 from estimator.compiled import compiled
 from estimator.identification.linear_model import ComplexArray
+from estimator.identification.tracking.excitation_kernel import (
+    SAMPLES,
+    end_block,
+    forgotten,
+    keep_mode,
+    take_torque,
+)
 from estimator.identification.tracking.pole_kernel import (
     DAMPING,
     FREQUENCY_HZ,
     HEIGHT,
     dominant,
     mode_gradient,
+    residue,
     squared,
 )
 from estimator.signals.record import BoolArray, FloatArray, IntArray
@@ -36,10 +44,12 @@ L_1, L_2, OTHERS = 0, 1, 2
 LEAST_DISTANCE = 0.1  # of the other poles: one that passes by the resonance, while the estimate moves, is no gain
 
 # Places in `numbers`.
-SAMPLE_TIME_S, LOWEST_HZ, HIGHEST_HZ, LARGEST_DAMPING, MEMORY, FEWEST = 0, 1, 2, 3, 4, 5
+SAMPLE_TIME_S, LOWEST_HZ, HIGHEST_HZ, LARGEST_DAMPING, MEMORY, FEWEST, BLOCK, OPENS, CLOSES = range(9)
 
 # Columns of `out`: those of a mode, then
 FREQUENCY_STD_HZ, DAMPING_STD = 3, 4
+
+UNIFORM = 12.0**-0.5  # standard deviation of a value that may lie anywhere in a range of 1
 
 USABLE = 0  # estimator.identification.online.recursive.Reason.NONE
 
@@ -129,8 +139,50 @@ def form(P: FloatArray, gradient: FloatArray) -> float:
 
 
 @compiled
+def follow_correction(
+    structure: IntArray,
+    pair: FloatArray,
+    past: FloatArray,
+    heard: FloatArray,
+    e: float,
+    step: FloatArray,
+    P: FloatArray,
+    work: FloatArray,
+) -> None:
+    """Follow the correction ``step`` of theta that was made for a prediction error e into P."""
+    n = step.shape[0]
+    psi, K, v = work[0, :n], work[1, :n], work[2, :n]
+    if heard[COUNT] > 0.0:
+        fill_gradient(structure, pair[OTHERS], past[Y_HAT_F], past[INPUT_F], psi)
+    else:
+        fill_gradient(structure, 1.0, past[Y_HAT], past[INPUT], psi)
+    for i in range(n):
+        K[i] = step[i] / e
+    spread(P, psi, K, heard[DENSITY], v)
+
+
+@compiled
+def deviations(
+    numbers: FloatArray,
+    roots: ComplexArray,
+    found: int,
+    P: FloatArray,
+    lasting: FloatArray,
+    frequency: FloatArray,
+    damping: FloatArray,
+    out: FloatArray,
+) -> None:
+    """Fill the standard deviations of a resonance, no larger than those of a value that may be anywhere."""
+    mode_gradient(roots, found, numbers[SAMPLE_TIME_S], frequency, damping)
+    wider, widest_hz = np.sqrt(forgotten(lasting)), UNIFORM * (numbers[HIGHEST_HZ] - numbers[LOWEST_HZ])
+    out[FREQUENCY_STD_HZ] = min(wider * form(P, frequency), widest_hz)
+    out[DAMPING_STD] = min(wider * form(P, damping), UNIFORM * numbers[LARGEST_DAMPING])
+
+
+@compiled
 def follow_block(
     u: FloatArray,
+    okay: BoolArray,
     theta: FloatArray,
     y_hat: FloatArray,
     e_prior: FloatArray,
@@ -143,6 +195,10 @@ def follow_block(
     P: FloatArray,
     past: FloatArray,
     heard: FloatArray,
+    last_mode: FloatArray,
+    through: FloatArray,
+    block: FloatArray,
+    lasting: FloatArray,
     work: FloatArray,
     roots: ComplexArray,
     out: FloatArray,
@@ -151,43 +207,43 @@ def follow_block(
 
     Parameters
     ----------
-    u, theta, y_hat, e_prior, used, reason
-        The block: input and trajectory.
-    before, pair, P, past, heard
-        State: theta of the last sample, shape (n,); shapes (3,), (n, n), (4, depth), (6,).
+    u, okay, theta, y_hat, e_prior, used, reason
+        The block: input, which samples are good, and trajectory.
+    before, pair, P, past, heard, last_mode, through, block, lasting
+        State: theta of the last sample, shape (n,); shapes (3,), (n, n), (4, depth), (6,); those of
+        :mod:`sensitivity_kernel` and :mod:`excitation_kernel`.
     work, roots
-        Room, shapes (6, n), (na,).
+        Room, shapes (7, n), (na,).
     out
         Filled, shape (N, 5).
     """
     na, n = structure[NA], theta.shape[1]
-    psi, K, v = work[0, :n], work[1, :n], work[2, :n]
-    frequency, damping, mode = work[3, :na], work[4, :na], work[5, :3]
+    step, frequency, damping, mode = work[3, :n], work[4, :na], work[5, :na], work[6, :3]
     band = numbers[LOWEST_HZ : LARGEST_DAMPING + 1]
     for t in range(u.shape[0]):
         shift_in(past[INPUT], u[t] if np.isfinite(u[t]) else past[INPUT, 0])
         shift_in(past[INPUT_F], through_pair(past[INPUT, 0], pair, past[INPUT_F]))
-        if heard[COUNT] > 0.0:
-            fill_gradient(structure, pair[OTHERS], past[Y_HAT_F], past[INPUT_F], psi)
-        else:
-            fill_gradient(structure, 1.0, past[Y_HAT], past[INPUT], psi)
         if used[t] and e_prior[t] != 0.0:
-            for i in range(n):
-                K[i] = (theta[t, i] - before[i]) / e_prior[t]
-            spread(P, psi, K, heard[DENSITY], v)
+            step[:] = theta[t] - before
+            follow_correction(structure, pair, past, heard, e_prior[t], step, P, work)
         before[:] = theta[t]
         found = -1
         if reason[t] == USABLE:
             found = dominant(theta[t], na, structure[NK], numbers[SAMPLE_TIME_S], band, roots, mode)
+        known = found >= 0 and heard[COUNT] >= numbers[FEWEST]
+        if known and mode[DAMPING] > 0.0 and squared(roots[found]) < 1.0:
+            rho = residue(theta[t, na:], structure[NK], roots, found)
+            keep_mode(mode[FREQUENCY_HZ], mode[DAMPING], roots[found], rho, last_mode)
+        take_torque(past[INPUT, 0], okay[t], heard[DENSITY], numbers[SAMPLE_TIME_S], last_mode, through, block)
+        out[t] = np.nan
         if found >= 0:
             take_pair(roots, found, pair)
             if used[t]:
                 hear(e_prior[t], roots[found], numbers[MEMORY], heard)
+            out[t, FREQUENCY_HZ], out[t, DAMPING], out[t, HEIGHT] = mode[0], mode[1], mode[2]
         shift_in(past[Y_HAT], y_hat[t])
         shift_in(past[Y_HAT_F], through_pair(y_hat[t], pair, past[Y_HAT_F]))
-        out[t] = np.nan
-        if found >= 0:
-            out[t, FREQUENCY_HZ], out[t, DAMPING], out[t, HEIGHT] = mode[0], mode[1], mode[2]
-        if found >= 0 and heard[COUNT] >= numbers[FEWEST]:
-            mode_gradient(roots, found, numbers[SAMPLE_TIME_S], frequency, damping)
-            out[t, FREQUENCY_STD_HZ], out[t, DAMPING_STD] = form(P, frequency), form(P, damping)
+        if known:
+            deviations(numbers, roots, found, P, lasting, frequency, damping, out[t])
+        if block[SAMPLES] == numbers[BLOCK]:
+            end_block(numbers[MEMORY], numbers[OPENS], numbers[CLOSES], block, lasting)

@@ -99,8 +99,8 @@ def continuous(z: complex, sample_time_s: float) -> complex:
 
 
 @inlined
-def height(b: FloatArray, nk: int, z: ComplexArray, i: int) -> float:
-    """Return |residue of B / A at pole i| / distance of the pole from the unit circle."""
+def residue(b: FloatArray, nk: int, z: ComplexArray, i: int) -> complex:
+    """Return what stands over 1 - z_i q^-1 in the partial fractions of B / A."""
     q = ratio(1.0 + 0.0j, z[i])
     numerator = 0.0 + 0.0j
     for j in range(b.shape[0] - 1, -1, -1):
@@ -110,7 +110,13 @@ def height(b: FloatArray, nk: int, z: ComplexArray, i: int) -> float:
     for j in range(z.shape[0]):
         if j != i:
             numerator = ratio(numerator, 1.0 - z[j] * q)
-    return float(np.sqrt(squared(numerator)) / max(1.0 - np.sqrt(squared(z[i])), 1e-12))
+    return complex(numerator.real, numerator.imag)
+
+
+@inlined
+def height(b: FloatArray, nk: int, z: ComplexArray, i: int) -> float:
+    """Return |residue of B / A at pole i| / distance of the pole from the unit circle."""
+    return float(np.sqrt(squared(residue(b, nk, z, i))) / max(1.0 - np.sqrt(squared(z[i])), 1e-12))
 
 
 @compiled

@@ -1,105 +1,85 @@
 """Change detection: has the resonance left where it was, at a stated rate of false alarms.
 
 A reference model, the estimate once it has settled, runs free beside the driveline. If the natural frequency moves by
-delta, its error is to first order ``e = w + psi delta``, with psi the gradient of the output over that frequency.
-With the reference's pair of poles ``1 + l_1 q^-1 + l_2 q^-2`` and the rest of A as it is::
+delta, its error is to first order ``e = w + psi delta``, with psi the sensitivity of the output to that frequency
+(:mod:`sensitivity_kernel`; e and psi are both taken in steps). Every second the samples come to one deviation::
 
-    psi(t) = - (dl_1/df q^-1 + dl_2/df q^-2) yhat(t) / (1 + l_1 q^-1 + l_2 q^-2)
+    d = sum psi e / sum psi^2
 
-Every second the samples come to one statistic, ``x = sum psi e / sqrt(sum psi^2)``, the score of that change with a
-variance that does not depend on the excitation (the local approach: M. Basseville, I. V. Nikiforov, Detection of
-Abrupt Changes, Prentice Hall 1993, chapter 8). A tracked parameter would tell the same later: the estimate takes
-seconds to move, the score has it in the first block.
+the score of that change over its information (the local approach: M. Basseville, I. V. Nikiforov, Detection of Abrupt
+Changes, Prentice Hall 1993, chapter 8). A tracked parameter would tell the same later: the estimate takes seconds to
+move, the score has it in the first block.
 
-A change smaller than :attr:`WatchSettings.smallest_change` counts as none: what it makes of x, ``delta sqrt(sum
-psi^2)``, is taken off first.
+A change smaller than :attr:`WatchSettings.smallest_change` counts as none: so much is taken off d first.
 
-No noise model is believed: mean and spread of x are those of :attr:`WatchSettings.reference_blocks` blocks seen before,
-a period of the PRBS and more, so that what the model lacks, which the PRBS repeats, is part of them. The threshold
-follows from the rate of false alarms (:mod:`threshold`).
+No noise model is believed: level and spread of d are those of :attr:`WatchSettings.reference_blocks` blocks seen
+before, a period of the PRBS and more, so that what the model lacks, which the PRBS repeats, is part of them
+(:mod:`baseline`). The threshold follows from the rate of false alarms (:mod:`threshold`).
 
-After an alarm the estimate is left to settle, tells the value after, and becomes the next reference. A slow change is
-found when it has become large against the scatter of one block.
+A block that is not excited is left out: the reference runs on, and with the excitation the watch is there again.
+
+After an alarm the estimate is left to settle, tells the value after, and becomes the next reference. The spread is
+known by then; a few blocks give the new level. So a drift that continues is alarmed again, each time it has moved by
+more than the smallest change.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from typing import Any
 
 import numpy as np
 
 from estimator.identification.linear_model import Orders
+from estimator.identification.modes.modes import LIGHTLY_DAMPED
 from estimator.identification.online.recursive import Trajectory
 from estimator.identification.tracking.alarm import Alarm, Level
-from estimator.identification.tracking.follow import Followed
-from estimator.identification.tracking.threshold import threshold_for
+from estimator.identification.tracking.baseline import Baseline, Spread, spread_of
+from estimator.identification.tracking.sensitivity_kernel import N_THROUGH
+from estimator.identification.tracking.state import TrackingState
 from estimator.identification.tracking.watch_kernel import (
-    CHANGED,
-    EVENT,
-    OUT_BEFORE_HZ,
-    OUT_BEFORE_STD_HZ,
-    OUT_SINCE,
-    PLACES,
-    STATISTIC,
+    ERROR_2,
+    GOOD,
+    N_MODE,
+    N_SCORE,
+    OUTPUT_2,
+    PSI_2,
+    PSI_E,
+    REFERENCE_HZ,
+    take_reference,
     watch_block,
 )
-from estimator.signals.record import FloatArray
-from estimator.signals.settings import Requirement, is_positive, require
+from estimator.identification.tracking.watch_settings import WatchSettings
+from estimator.signals.record import BoolArray, FloatArray
 
-HOUR_S = 3600.0
-
-
-@dataclass(frozen=True, slots=True)
-class WatchSettings:
-    """How a change is watched for.
-
-    Attributes
-    ----------
-    false_alarms_per_hour : float
-        So many an hour, at most, where the resonance does not move by more than ``smallest_change``.
-    smallest_change : float
-        A change up to this share of the resonance counts as none: 1 % is 2 % of the stiffness, and more than a
-        heavily laden bus makes of it.
-    block_s : float
-        Length of a block [s]: several times the memory of the mode, so that blocks are nearly independent.
-    reference_blocks : int
-        Blocks that mean and spread are learnt from: with one second each, a PRBS period of 1023 levels of 20 ms.
-    settling_s : float
-        How long the estimate is left to itself after an alarm [s]: four memories of a forgetting of 0.995 at 20 ms.
-    fewest_share : float
-        A block with a smaller share of usable samples is left out.
-    """
-
-    false_alarms_per_hour: float = 0.1
-    smallest_change: float = 0.01
-    block_s: float = 1.0
-    reference_blocks: int = 21
-    settling_s: float = 16.0
-    fewest_share: float = 0.8
-
-    def __post_init__(self) -> None:
-        share, blocks, smallest = self.fewest_share, self.reference_blocks, self.smallest_change
-        require(
-            "watch",
-            (
-                Requirement("smallest_change", smallest, 0 <= smallest < 1, "a share from 0 to 1"),
-                Requirement("block_s", self.block_s, is_positive(self.block_s), "a length above 0 s"),
-                Requirement("reference_blocks", blocks, blocks >= 3, "3 or more"),
-                Requirement("settling_s", self.settling_s, self.settling_s >= 0, "0 s or more"),
-                Requirement("fewest_share", share, 0 < share <= 1, "a share above 0 and at most 1"),
-            ),
-        )
+CANDIDATES = 5
+"""Estimates that the reference is chosen from, one a block: a single one may be of a bad moment, when a spare pair of
+poles passes by the resonance."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Watched:
-    """What was seen in a block: the alarms, at which kept sample each came, and the statistics, NaN between blocks."""
+@dataclass(slots=True)
+class _Memory:
+    """What the watch remembers of the blocks before, all numbers."""
 
-    alarms: tuple[Alarm, ...]
-    alarm_at: tuple[int, ...]
-    statistic: FloatArray
+    state: float = TrackingState.STARTING
+    unsettled: float = 0.0  # 1 from an alarm until the value after is told
+    waited: float = 0.0  # excited blocks since the estimate was left to settle
+    number: float = 0.0  # blocks since the reference was taken
+    learnt: float = 0.0  # ... that the level was learnt from
+    error_2: float = 0.0  # ... the squared steps of error and output in them
+    output_2: float = 0.0
+    side: float = 0.0  # of the last block, if it was beyond the threshold: -1, 0, 1
+    level_hz: float = 0.0
+    information: float = 0.0
+    spread_of_x: float = 0.0  # 0 before it is known
+    usual: float = 0.0
+    before_s: float = 0.0  # begin of the last block that was within the threshold, as was the one before
+    before_hz: float = 0.0  # the last alarm: the level before
+    before_std_hz: float = 0.0
+    found_s: float = 0.0
+    statistic: float = 0.0
+    threshold: float = 0.0
 
 
 class ChangeWatch:
@@ -111,7 +91,9 @@ class ChangeWatch:
         Structure of the models that will come.
     sample_time_s : float
         Their sampling period [s].
-    settings : WatchSettings, optional
+    band_hz : tuple of float
+        Where the resonance is looked for [Hz].
+    settings : WatchSettings
         How to watch.
 
     Raises
@@ -120,79 +102,200 @@ class ChangeWatch:
         If the rate of false alarms can't be kept by any threshold.
     """
 
-    def __init__(self, orders: Orders, sample_time_s: float, settings: WatchSettings | None = None) -> None:
-        self.settings = settings = settings or WatchSettings()
+    def __init__(
+        self, orders: Orders, sample_time_s: float, band_hz: tuple[float, float], settings: WatchSettings
+    ) -> None:
+        self.settings = settings
+        self.statistic = np.nan
         self._period_s = sample_time_s
-        block = max(round(settings.block_s / sample_time_s), 1)
-        per_hour, n_reference = HOUR_S / (block * sample_time_s), settings.reference_blocks
-        self.threshold = threshold_for(settings.false_alarms_per_hour, per_hour, n_reference)
-        self._block_s = block * sample_time_s
+        self._block = settings.block_samples(sample_time_s)
+        self._block_s = self._block * sample_time_s
+        for blocks in (settings.reference_blocks, settings.baseline_blocks):
+            settings.threshold(blocks, sample_time_s)  # refused now, and worked out
         self._structure = np.array([orders.na, orders.nb, orders.nk])
-        self._numbers = np.array(
-            [
-                sample_time_s,
-                block,
-                n_reference,
-                settings.settling_s / sample_time_s,
-                settings.fewest_share,
-                self.threshold,
-                settings.smallest_change,
-            ]
-        )
+        self._band = np.array([*band_hz, LIGHTLY_DAMPED])
+        self._memory = _Memory()
         self._live = {
-            "reference": np.zeros(orders.n_parameters),
-            "slope": np.zeros(4),
-            "past": np.zeros((3, max(orders.na, orders.nk + orders.nb, 2))),
-            "live": np.zeros(PLACES),
-            "alarm": np.full(6, np.nan),
+            "theta": np.zeros(orders.n_parameters),
+            "mode": np.zeros(N_MODE),
+            "through": np.zeros(N_THROUGH),
+            "past": np.zeros((2, max(orders.na, orders.nk + orders.nb))),
+            "score": np.zeros(N_SCORE),
+            "rows": np.zeros((max(settings.reference_blocks, settings.baseline_blocks), 3)),
+            "candidates": np.zeros((CANDIDATES, 1 + orders.n_parameters)),
         }
+        self._work, self._roots = np.zeros(3), np.zeros(orders.na, dtype=np.complex128)
+        self._take_reference(np.zeros(orders.n_parameters))  # compiled now; it has no mode, and is none
 
-    def run(self, time_s: FloatArray, u: FloatArray, y: FloatArray, estimates: Trajectory, found: Followed) -> Watched:
-        """Watch a block of kept samples, each array of shape (n,); the block may have any length."""
-        out, live = np.empty((len(estimates), 5)), self._live
+    @property
+    def doing(self) -> TrackingState:
+        """What the watch is doing."""
+        return TrackingState(int(self._memory.state))
+
+    def run(self, u: FloatArray, y: FloatArray, okay: BoolArray, estimates: Trajectory) -> None:
+        """Take samples of the present block, each array of shape (n,); they may not reach beyond its end."""
+        live = self._live
         watch_block(
             u,
             y,
-            estimates.used,
-            np.ascontiguousarray(estimates.theta),
+            okay,
             np.ascontiguousarray(estimates.y_hat),
-            np.column_stack([found.frequency_hz, found.frequency_std_hz, found.damping]),
             self._structure,
-            self._numbers,
-            live["reference"],
-            live["slope"],
+            live["theta"],
+            live["mode"],
+            live["through"],
             live["past"],
-            live["live"],
-            out,
+            live["score"],
         )
-        at = tuple(int(k) for k in np.flatnonzero(out[:, EVENT]))
-        return Watched(tuple(self._alarm(float(time_s[k]), out[k], found, k) for k in at), at, out[:, STATISTIC].copy())
 
-    def _alarm(self, time_s: float, row: FloatArray, found: Followed, k: int) -> Alarm:
-        """Write the record of a change, or once more when the estimate has settled."""
-        own = self._live["alarm"]
-        changed = row[EVENT] == CHANGED
-        if changed:
-            began_s = time_s - float(row[OUT_SINCE]) * self._period_s
-            own[:] = time_s, began_s, row[OUT_BEFORE_HZ], row[OUT_BEFORE_STD_HZ], row[STATISTIC], 0.0
-        found_s, began_s, before_hz, before_std_hz, statistic, _ = own.tolist()
+    def end_block(
+        self, time_s: float, theta: FloatArray, frequency: Level | None, damping: float, excited: bool
+    ) -> Alarm | None:
+        """End the present block.
+
+        Parameters
+        ----------
+        time_s : float
+            Moment of its last sample [s].
+        theta : ndarray, shape (na+nb,)
+            The estimate now.
+        frequency : Level or None
+            Its resonance [Hz]; None where it has none, or it is not known how sure it is.
+        damping : float
+            Its damping ratio; NaN where it has none.
+        excited : bool
+            Whether the block was excited.
+
+        Returns
+        -------
+        Alarm or None
+            A change that was found, or once more when the estimate has settled.
+        """
+        score = self._live["score"].tolist()
+        self._live["score"][:] = 0.0
+        self.statistic = np.nan
+        memory = self._memory
+        memory.number += 1.0
+        if memory.state in (TrackingState.STARTING, TrackingState.SETTLING):
+            return self._settle(theta, frequency, damping) if excited and frequency is not None else None
+        filled = memory.number > 1.0  # the first block is for the filters to fill
+        if not (filled and excited and score[GOOD] >= self.settings.fewest_share * self._block and score[PSI_2] > 0.0):
+            memory.side = 0.0
+            return None
+        deviation_hz, information = score[PSI_E] / score[PSI_2], score[PSI_2]
+        if memory.state == TrackingState.WATCHING:
+            return self._judge(time_s, deviation_hz, information)
+        memory.error_2 += score[ERROR_2]
+        memory.output_2 += score[OUTPUT_2]
+        self._learn(time_s, deviation_hz, information)
+        return None
+
+    def _settle(self, theta: FloatArray, frequency: Level, damping: float) -> Alarm | None:
+        """Wait until the estimate has settled, and take one of its last for reference: that of the median damping."""
+        memory, last = self._memory, self._live["candidates"]
+        last[int(memory.waited) % CANDIDATES] = damping, *theta
+        memory.waited += 1.0
+        needed_s = self.settings.settling_s if memory.unsettled else 0.0
+        if memory.waited < CANDIDATES or memory.waited * self._block_s < needed_s:
+            return None
+        self._take_reference(last[np.argsort(last[:, 0])[CANDIDATES // 2], 1:])
+        if self._live["mode"][REFERENCE_HZ] == 0.0:
+            return None
+        told, memory.unsettled = memory.unsettled, 0.0
+        memory.state, memory.side = TrackingState.LEARNING, 0.0
+        memory.number = memory.learnt = memory.error_2 = memory.output_2 = 0.0
+        return self._alarm(frequency, settled=True) if told else None
+
+    def _take_reference(self, theta: FloatArray) -> None:
+        live = self._live
+        live["theta"][:] = theta
+        take_reference(
+            live["theta"],
+            self._structure,
+            self._period_s,
+            self._band,
+            self._work,
+            self._roots,
+            live["mode"],
+            live["through"],
+        )
+
+    def _learn(self, time_s: float, deviation_hz: float, information: float) -> None:
+        """Take a block into what is usual; watch from the last one on."""
+        memory, rows = self._memory, self._live["rows"]
+        rows[int(memory.learnt)] = memory.number, deviation_hz, information
+        memory.learnt += 1.0
+        first = memory.spread_of_x == 0.0
+        if memory.learnt < (self.settings.reference_blocks if first else self.settings.baseline_blocks):
+            return
+        if memory.error_2 >= memory.output_2:  # it explains nothing: an estimate taken at a bad moment
+            memory.state = TrackingState.STARTING if first else TrackingState.SETTLING
+            return
+        number, deviations, weights = rows[: int(memory.learnt)].T
+        if first:
+            spread = spread_of(number, deviations, weights)
+            if not spread.of_x > 0.0:  # signals without any noise: there is no statistic of them
+                memory.learnt = 0.0
+                return
+            memory.spread_of_x, memory.usual = spread.of_x, spread.usual
+        level = Baseline.of(deviations, weights)
+        memory.level_hz, memory.information = level.level_hz, level.information
+        memory.state = TrackingState.WATCHING
+        memory.before_s = time_s - self._block_s
+
+    def _judge(self, time_s: float, deviation_hz: float, information: float) -> Alarm | None:
+        """Compare a block with what is usual."""
+        memory = self._memory
+        tolerated_hz = self.settings.smallest_change * float(self._live["mode"][REFERENCE_HZ])
+        level = Baseline(memory.level_hz, memory.information)
+        self.statistic = level.statistic(deviation_hz, information, tolerated_hz, self._spread)
+        threshold = self.settings.threshold(int(memory.learnt), self._period_s)
+        side = float(np.sign(self.statistic)) if abs(self.statistic) > threshold else 0.0
+        again = side != 0.0 and side == memory.side
+        if side == memory.side == 0.0:
+            memory.before_s = time_s - self._block_s
+        memory.side = side
+        if not again:
+            return None
+        memory.found_s, memory.statistic, memory.threshold = time_s, self.statistic, threshold
+        memory.state, memory.unsettled, memory.waited = TrackingState.SETTLING, 1.0, 0.0
+        before_std_hz = memory.spread_of_x / np.sqrt(memory.information)
+        before = self._by_score(memory.level_hz, float(before_std_hz))
+        memory.before_hz, memory.before_std_hz = before.value, before.std
+        alarm = self._alarm(self._by_score(deviation_hz, self._spread.variance(information) ** 0.5), settled=False)
+        self._take_reference(np.zeros_like(self._live["theta"]))
+        return alarm
+
+    def _by_score(self, deviation_hz: float, std_hz: float) -> Level:
+        """Return the resonance at a deviation from the reference's."""
+        return Level.of(float(self._live["mode"][REFERENCE_HZ]) + deviation_hz, std_hz)
+
+    @property
+    def _spread(self) -> Spread:
+        return Spread(self._memory.spread_of_x, self._memory.usual)
+
+    def _alarm(self, after: Level, settled: bool) -> Alarm:
+        """Write the record of the last change."""
+        memory = self._memory
         return Alarm(
-            time_s=found_s,
-            changed_between_s=(began_s, found_s - self._block_s),
+            time_s=memory.found_s,
+            changed_between_s=(memory.before_s, memory.found_s - self._block_s),
             quantity="resonance_hz",
-            before=Level.of(before_hz, before_std_hz),
-            after=Level.of(float(found.frequency_hz[k]), float(found.frequency_std_hz[k])),
-            settled=not changed,
-            statistic=statistic,
-            threshold=self.threshold,
+            before=Level.of(memory.before_hz, memory.before_std_hz),
+            after=after,
+            settled=settled,
+            statistic=memory.statistic,
+            threshold=memory.threshold,
             false_alarms_per_hour=self.settings.false_alarms_per_hour,
         )
 
     def state(self) -> dict[str, FloatArray]:
         """Return the state, copied."""
-        return {name: values.copy() for name, values in self._live.items()}
+        kept = {name: values.copy() for name, values in self._live.items()}
+        return kept | {"memory": np.array(astuple(self._memory), dtype=np.float64)}
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Go on from a state of a watch with the same settings."""
         for name, values in self._live.items():
             values[:] = state[name]
+        self._memory = _Memory(*np.asarray(state["memory"], dtype=np.float64).tolist())

@@ -32,6 +32,8 @@ def print_result(job: Job, summary: RunSummary, grants: RealTimeGrants, as_json:
         typer.echo(f"{job.trace}: every frame of the bus")
     if job.live is not None and summary.recorded:
         typer.echo(f"{course_path(job.out)}: {job.live.course.statement}")
+        if job.live.course.excitation:
+            typer.echo(f"  {job.live.course.excitation}")
         for statement in statements(job.live.course.summary()):
             typer.echo(f"  alarm: {statement}")
 

@@ -12,20 +12,22 @@ from estimator.identification.identify import Settings, identify
 from estimator.identification.online.adaptation import ConstantForgetting
 from estimator.identification.online.chain import OnlineChain
 from estimator.identification.online.online_estimate import OnlineTrajectory
-from estimator.identification.tracking.watch import WatchSettings
+from estimator.identification.tracking.state import TrackingState
+from estimator.identification.tracking.watch_settings import WatchSettings
 from estimator.signals.record import Record
 from tests.estimator.identification.driveline import Cruise
 from tests.estimator.identification.tracking.drives import Line, drives
 
 TRACKING = Settings(adaptation=ConstantForgetting(0.995))
 BEFORE_THE_CHANGE = 2400
-COLUMNS = ("time_s", "frequency_hz", "damping", "height", "frequency_std_hz", "damping_std")
+COLUMNS = ("time_s", "frequency_hz", "damping", "height", "frequency_std_hz", "damping_std", "state")
 
 
 @pytest.fixture(scope="module")
 def drive() -> Record:
-    """A drive with a change, missing samples, and a bad number."""
-    record = drives(3, 1, 60.0, (Line(), Line(50.0, k=3400.0)))[0]
+    """A drive with a change, missing samples, a bad number, and a PRBS that is off for a while."""
+    lines = (Line(), Line(50.0, k=3400.0))
+    record = drives(3, 1, 60.0, lines, prbs_nm=lambda time_s: 0.0 if 26.0 <= time_s < 34.0 else 120.0)[0]
     okay, output = record.okay.copy(), record.output.copy()
     okay[700:720] = False
     okay[2000] = False
@@ -58,6 +60,8 @@ def test_one_by_one_is_the_block_to_the_bit(drive: Record) -> None:
         assert one.model == other.model
         assert (one.frequency_std_hz == other.frequency_std_hz) or np.isnan(one.frequency_std_hz)
         assert one.alarm == other.alarm
+        assert one.state is other.state
+    assert {TrackingState.NOT_EXCITED, TrackingState.WATCHING, TrackingState.SETTLING} <= {one.state for one in pushed}
 
 
 @pytest.mark.parametrize("size", [7, 1000])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -65,8 +65,13 @@ def drives(
     lines: Sequence[Line] = (Line(),),
     noise_rad_s: float = 0.05,
     road_nm: float = 300.0,
+    prbs_nm: Callable[[float], float] = lambda time_s: PRBS_NM,
+    hold_nm_s_per_rad: float = 40.0,
 ) -> list[Record]:
-    """Simulate drives at a held speed: PRBS, wandering load, rough road (white load torque), noisy resolver."""
+    """Simulate drives at a held speed: PRBS, wandering load, rough road (white load torque), noisy resolver.
+
+    The speed is held without any lag: with the 40 Nm s/rad there are, torque follows the speed also without a PRBS.
+    """
     rng = np.random.default_rng(seed)
     n = round(duration_s / SAMPLE_TIME_S)
     sequence = np.repeat(2.0 * max_len_seq(10)[0] - 1.0, CLOCK_DIVIDER)
@@ -83,7 +88,9 @@ def drives(
         base += SAMPLE_TIME_S * 5.0 * slow
         wander = 0.9998 * wander + rng.normal(0.0, 0.5, number)
         load = 150.0 + wander + rng.normal(0.0, road_nm, number)
-        wanted = base + 40.0 * slow + PRBS_NM * sequence[(starts + t) % sequence.shape[0]]
+        wanted = (
+            base + hold_nm_s_per_rad * slow + prbs_nm(t * SAMPLE_TIME_S) * sequence[(starts + t) % sequence.shape[0]]
+        )
         torque[:, t] = np.round(wanted / TORQUE_STEP_NM) * TORQUE_STEP_NM
         speed[:, t] = x[:, 0]
         x = x @ Ad + np.column_stack([torque[:, t], load]) @ Bd

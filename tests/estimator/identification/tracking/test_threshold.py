@@ -16,21 +16,21 @@ def test_probability_is_that_of_a_trial(threshold: float, n: int) -> None:
     tau = (x[:, n:] - mean) / (std * np.sqrt(1 + 1 / n))
     pairs = (tau > threshold).all(axis=1) | (tau < -threshold).all(axis=1)
     scatter = np.sqrt(pairs.mean() / pairs.size)
-    assert false_pairs(threshold, n) == pytest.approx(pairs.mean(), abs=4 * scatter)
+    assert false_pairs(threshold, n, n - 1) == pytest.approx(pairs.mean(), abs=4 * scatter)
 
 
 def test_threshold_gives_the_rate_it_was_asked_for() -> None:
-    threshold = threshold_for(0.1, 3600.0, 21)
-    assert 3600.0 * false_pairs(threshold, 21) == pytest.approx(0.1, rel=1e-3)
-    assert threshold_for(0.01, 3600.0, 21) > threshold > threshold_for(0.1, 3600.0, 100)
+    threshold = threshold_for(0.1, 3600.0, 21, 20)
+    assert 3600.0 * false_pairs(threshold, 21, 20) == pytest.approx(0.1, rel=1e-3)
+    assert threshold_for(0.01, 3600.0, 21, 20) > threshold > threshold_for(0.1, 3600.0, 100, 99)
 
 
 @pytest.mark.parametrize("rate", [0.0, -1.0, 3600.0, float("nan")])
 def test_a_rate_no_threshold_has_is_refused(rate: float) -> None:
     with pytest.raises(BadSetting, match="false_alarms_per_hour"):
-        threshold_for(rate, 3600.0, 21)
+        threshold_for(rate, 3600.0, 21, 20)
 
 
 def test_a_reference_too_short_for_the_rate_is_refused() -> None:
     with pytest.raises(BadSetting, match="longer reference"):
-        threshold_for(1e-6, 3600.0, 3)
+        threshold_for(1e-6, 3600.0, 3, 2)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -14,9 +16,11 @@ from estimator.identification.identify import Settings
 from estimator.identification.online.adaptation import ConstantForgetting
 from estimator.identification.online.chain import OnlineChain
 from estimator.identification.online.online_estimate import OnlineTrajectory
-from estimator.identification.tracking.watch import WatchSettings
+from estimator.identification.tracking.state import TrackingState
+from estimator.identification.tracking.watch import ChangeWatch
+from estimator.identification.tracking.watch_settings import WatchSettings
 from estimator.signals.record import Record
-from tests.estimator.identification.tracking.drives import SAMPLE_TIME_S, Line, drives
+from tests.estimator.identification.tracking.drives import PRBS_NM, SAMPLE_TIME_S, Line, drives
 
 TRACKING = Settings(adaptation=ConstantForgetting(0.995))
 CHANGE_S = 50.0
@@ -44,6 +48,24 @@ def test_a_stiffness_drop_is_found_and_told(drop: float) -> None:
         assert f"{settled.time_s:.1f} s" in settled.statement
 
 
+@pytest.mark.parametrize("share_in_10_s", [0.01, -0.01, 0.03, -0.03])
+def test_a_drift_that_continues_is_alarmed_again(share_in_10_s: float) -> None:
+    """Of the stiffness; half of it of the resonance. Nothing larger than 4 % of it goes by without an alarm."""
+    begin_s, end_s = 40.0, 200.0
+    moments = np.arange(0.0, end_s, 1.0).tolist()
+    lines = [Line(t, k=4200.0 * (1.0 + share_in_10_s) ** (max(t - begin_s, 0.0) / 10.0)) for t in moments]
+    for record in drives(12, 4, end_s, lines):
+        alarms = play(record).alarms
+        found = [alarm for alarm in alarms if not alarm.settled]
+        assert found[0].time_s > begin_s
+        settled = [alarm.after.value for alarm in alarms if alarm.settled]
+        assert (np.sign(np.diff([Line().resonance[0], *settled])) == np.sign(share_in_10_s)).all()
+        told = [begin_s, *(alarm.time_s for alarm in found), end_s]
+        moved = np.diff(np.sqrt([lines[int(t) - 1].k for t in told])) / np.sqrt(4200.0)
+        assert len(found) >= 2
+        assert np.abs(moved).max() < 0.04 if abs(share_in_10_s) < 0.02 else np.abs(moved).max() < 0.09
+
+
 def test_payload_and_rough_road_are_no_alarm() -> None:
     """A third more load moves this resonance by 0.2 %, below the smallest change."""
     lines = (Line(), Line(CHANGE_S, J_L=130.0))
@@ -58,30 +80,70 @@ def test_a_masked_stretch_is_no_alarm() -> None:
     assert play(replace(record, okay=okay)).alarms == ()
 
 
-def test_false_alarms_come_no_more_often_than_stated() -> None:
+@pytest.mark.parametrize(
+    "prbs_nm",
+    [
+        lambda time_s: PRBS_NM,
+        lambda time_s: 0.25 * PRBS_NM,
+        lambda time_s: PRBS_NM if time_s % 60.0 < 30.0 else 0.0,
+        lambda time_s: PRBS_NM if time_s % 60.0 < 30.0 else 0.25 * PRBS_NM,
+    ],
+    ids=["on", "weak", "on and off", "strong and weak"],
+)
+def test_false_alarms_come_no_more_often_than_stated(prbs_nm: Callable[[float], float]) -> None:
     """With no change tolerated and a rate high enough to be counted; beyond the bound in one of 1000 trials."""
     stated, duration_s, number = 60.0, 300.0, 6
     watch = WatchSettings(stated, smallest_change=0.0)
-    came = sum(not alarm.settled for each in drives(8, number, duration_s) for alarm in play(each, watch).alarms)
-    assert came <= poisson.ppf(0.999, stated * duration_s * number / 3600.0)
+    courses = [play(each, watch) for each in drives(8, number, duration_s, prbs_nm=prbs_nm)]
+    watched_s = sum(float((course.state == TrackingState.WATCHING).sum()) * 0.02 for course in courses)
+    assert watched_s > 0.3 * duration_s * number
+    came = sum(not alarm.settled for course in courses for alarm in course.alarms)
+    assert came <= poisson.ppf(0.999, stated * watched_s / 3600.0)
 
 
 def test_a_statistic_is_standard_normal_where_nothing_changes() -> None:
-    """Scaled by a reference of 21 blocks it is Student's with 20 degrees: variance 20/18, over all references."""
+    """Scaled by a reference of 21 blocks it is Student's with 19 degrees: variance 19/17, over all references."""
     values = []
     for record in drives(9, 6, 180.0):
         chain = OnlineChain(TRACKING, SAMPLE_TIME_S, watch=WatchSettings(smallest_change=0.0))
-        kept = chain._decimator.run(chain.torque_of(record), record.output, record.okay)
-        estimates = chain._estimator.run(kept.u, kept.y, kept.okay)
-        found = chain._follower.run(kept.u, estimates)
-        seen = chain._watch.run(np.arange(kept.u.size) * 0.02, kept.u, kept.y, estimates, found).statistic
-        values.append(np.mean(np.square(seen[np.isfinite(seen)])))
+        seen = [watch.statistic for watch in watched_blocks(chain, record)]
+        values.append(np.nanmean(np.square(seen)))
     assert 0.5 < np.mean(values) < 2.0
+
+
+def watched_blocks(chain: OnlineChain, record: Record) -> Iterator[ChangeWatch]:
+    """Give the watch after each block of a drive."""
+    torque_nm = chain.torque_of(record)
+    for part in (slice(first, first + 100) for first in range(0, record.time_s.size, 100)):
+        chain.run_block(record.time_s[part], torque_nm[part], record.output[part], record.okay[part])
+        yield chain._tracker.watch
+
+
+def test_a_reference_that_explains_nothing_is_given_up() -> None:
+    chain, seen = OnlineChain(TRACKING, SAMPLE_TIME_S), []
+    for watch in watched_blocks(chain, drives(13, 1, 80.0)[0]):
+        seen.append(watch.doing)
+        if seen[-2:] == [TrackingState.STARTING, TrackingState.LEARNING] and seen.count(TrackingState.LEARNING) == 1:
+            watch._live["theta"][4:] *= -1.0
+    changes = [state for before, state in pairwise(seen) if state is not before]
+    assert changes == [
+        TrackingState.LEARNING,
+        TrackingState.STARTING,
+        TrackingState.LEARNING,
+        TrackingState.WATCHING,
+    ]
 
 
 @pytest.mark.parametrize(
     "wrong",
-    [{"block_s": 0.0}, {"reference_blocks": 2}, {"settling_s": -1.0}, {"fewest_share": 0.0}, {"smallest_change": 1.0}],
+    [
+        {"block_s": 0.0},
+        {"reference_blocks": 2},
+        {"baseline_blocks": 0},
+        {"settling_s": -1.0},
+        {"fewest_share": 0.0},
+        {"smallest_change": 1.0},
+    ],
 )
 def test_settings_that_make_no_sense_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(BadSetting, match=next(iter(wrong))):
