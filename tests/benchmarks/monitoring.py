@@ -143,8 +143,8 @@ def lines(hours: float, number: int) -> Iterator[str]:
         for share in (-0.05, -0.15, 0.15):
             found, longest_s, early = changed_while_off(world, share, number)
             yield (
-                f"{name}: stiffness {share:+.0%} while the PRBS is off: found {found} of {number}, {longest_s:.0f} s at "
-                f"most after it was on again; {early} alarmed before"
+                f"{name}: stiffness {share:+.0%} while the PRBS is off: found {found} of {number}, at most "
+                f"{longest_s:.0f} s after it was on again; {early} alarmed before"
             )
 
 
