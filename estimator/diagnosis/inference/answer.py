@@ -12,13 +12,14 @@ import numpy as np
 from estimator.diagnosis.assemble import augmented_model, load_torques, retuned_parameters
 from estimator.diagnosis.chain import mechanical, read_through
 from estimator.diagnosis.hypotheses import Progress, everything, open_hypotheses
+from estimator.diagnosis.inference.data_sheet import free_line
 from estimator.diagnosis.inference.disturbances import Size
 from estimator.diagnosis.inference.figures import FreeRuns, courses_of, effects_of, figures_of, free_runs
 from estimator.diagnosis.inference.free_run import Unseen
 from estimator.diagnosis.inference.likelihood import Hypothesis
 from estimator.diagnosis.inference.posterior import free_rms
 from estimator.diagnosis.inference.search import Search
-from estimator.diagnosis.inference.unnamed import Law, best_law, hunts_around, weighed_against
+from estimator.diagnosis.inference.unnamed import Law, beside_rival, best_law, hunts_around, weighed_against
 from estimator.diagnosis.inference.verdict import Decision, decide
 from estimator.diagnosis.inference.wording import statement
 from estimator.diagnosis.phrases import law_in_words
@@ -34,6 +35,7 @@ from estimator.diagnosis.result import (
     RejectedEffect,
     Remainder,
     Slight,
+    Stray,
     UnnamedLaw,
     UntestableEffect,
     Verdict,
@@ -88,7 +90,7 @@ def _said(
     values_of = decision.best.plain.values_of
     return Diagnosis(
         verdict=decision.verdict,
-        statement=statement(decision, effects, figures, blind, remainder),
+        statement=statement(decision, effects, figures, blind, remainder, seen.strays),
         mismatch=mismatch,
         effects=effects,
         rejected=_rejected(search, decision),
@@ -102,6 +104,7 @@ def _said(
         traces=courses_of(runs),
         discrepancy=_discrepancy(seen, line) if mismatch.detected else None,
         remainder=remainder,
+        strays=seen.strays,
         slight=tuple(Slight(each.name, each.share, values_of(each.name)) for each in decision.traces),
     )
 
@@ -118,12 +121,15 @@ class _Seen:
         The search for a law beside no effect at all; empty where it was not made.
     law : Law or None
         What is left beyond noise, as a law without a name.
+    strays : tuple of Stray
+        Nominal values that alone, beyond what they are trusted to, would leave nothing but noise.
     """
 
     decision: Decision
     believed: Hypothesis
     hunts: list[Hunt]
     law: Law | None
+    strays: tuple[Stray, ...] = ()
 
 
 def _looked_at(search: Search, decision: Decision, is_over: Callable[[], bool]) -> _Seen:
@@ -134,8 +140,12 @@ def _looked_at(search: Search, decision: Decision, is_over: Callable[[], bool]) 
         hunts = hunts_around(decision.nothing, LOOKING_ROUNDS if decision.named else LOCATING_ROUNDS)
         law = best_law(decision.nothing, hunts)
         decision = weighed_against(decision, law)
+    line = free_line(search) if decision.failed or decision.named else None
+    if line is not None:
+        decision = beside_rival(decision, line.score, lambda each: True)
     if decision.verdict not in (Verdict.EXPLAINED, Verdict.PARTLY_EXPLAINED):
-        return _Seen(replace(decision, named=()), decision.nothing, hunts, law)
+        strays = line.strays if line is not None and line.leaves_noise else ()
+        return _Seen(replace(decision, named=()), decision.nothing, hunts, law, strays)
     believed = _with_names_alone(search, decision)
     is_left = bool(decision.failed) and not is_over()
     left = best_law(believed, hunts_around(believed, LOOKING_ROUNDS)) if is_left else None
@@ -181,8 +191,9 @@ def _mismatch(seen: _Seen, effects: Sequence[FoundEffect]) -> Mismatch:
     if decision.verdict is Verdict.NO_MISMATCH:
         return Mismatch(False, None, {}, None, None, 1.0)
     nothing, noise = decision.nothing.plain, noise_of(decision.best)
-    law = None if seen.law is None else seen.law.element
-    element: Element | None = effects[0].element if effects else law
+    element: Element | None = None if seen.law is None else seen.law.element
+    if effects or seen.strays:
+        element = (effects or seen.strays)[0].element
     gained = max(decision.nothing.score - decision.best.score, 0.0)
     return Mismatch(
         detected=True,

@@ -9,7 +9,7 @@ elements.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -119,24 +119,29 @@ def weighed_against(decision: Decision, law: Law | None) -> Decision:
     """
     if law is None:
         return decision
-    share = _share_of_names(decision, law)
     gained, by_law = (decision.nothing.score - score for score in (decision.best.score, law.score))
     same = gained >= MOST_OF_IT * by_law
-    weighed = [
-        each if same and law.element in _elements(each) else replace(each, probability=each.probability * share)
-        for each in decision.named
-    ]
+    return beside_rival(decision, law.score, lambda each: not (same and law.element in _elements(each)))
+
+
+def beside_rival(decision: Decision, score: float, falls: Callable[[Belief], bool]) -> Decision:
+    """Return a decision in which a hypothesis of a score, without names, has its share of the probability.
+
+    ``falls`` tells which names it stands against. Those left with too little are doubted.
+    """
+    share = _share_of_names(decision, score)
+    weighed = [replace(each, probability=each.probability * share) if falls(each) else each for each in decision.named]
     named = tuple(each for each in weighed if each.probability >= LEAST_PROBABILITY)
     doubted = tuple(each for each in weighed if each not in named)
     verdict = Verdict.UNEXPLAINED if doubted and not named else decision.verdict
     return replace(decision, verdict=verdict, named=named, doubted=(*doubted, *decision.doubted))
 
 
-def _share_of_names(decision: Decision, law: Law) -> float:
+def _share_of_names(decision: Decision, score: float) -> float:
     """Return the probability of the best set of names, of the two."""
     n = decision.best.plain.residual.size
     tempered = TEMPERED + n * sum(test.value for test in decision.failed if test.is_share)
-    odds = 0.5 * (decision.best.score - law.score) / tempered
+    odds = 0.5 * (decision.best.score - score) / tempered
     return 1.0 / (1.0 + math.exp(min(odds, 700.0)))
 
 

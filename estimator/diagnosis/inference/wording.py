@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from estimator.diagnosis.inference.data_sheet import in_words
 from estimator.diagnosis.inference.verdict import Decision
 from estimator.diagnosis.phrases import PLACE_NAMES
-from estimator.diagnosis.result import Fit, FoundEffect, Remainder, UntestableEffect, Verdict
+from estimator.diagnosis.result import Fit, FoundEffect, Remainder, Stray, UntestableEffect, Verdict
 
 
 def statement(
@@ -15,10 +16,11 @@ def statement(
     fit: Fit,
     untestable: Sequence[UntestableEffect],
     remainder: Remainder | None,
+    strays: Sequence[Stray] = (),
 ) -> str:
     """Return one paragraph: verdict, figures, and what to do next."""
-    parts = [_headline(decision, effects, fit)]
-    if remainder is not None:
+    parts = [_wrong_values(fit, strays) if strays else _headline(decision, effects, fit)]
+    if remainder is not None and not strays:
         parts.append(_left(decision, remainder))
     if decision.traces:
         parts.append(f"Too small to count, but seen: {', '.join(each.name for each in decision.traces)}.")
@@ -31,6 +33,15 @@ def statement(
         parts.append(f"These recordings can't tell {names}; a {' or '.join(tests)} test would.")
     parts += [f"Without {entry.needs}, {entry.name} can't be told." for entry in untestable if entry.needs]
     return " ".join(parts)
+
+
+def _wrong_values(fit: Fit, strays: Sequence[Stray]) -> str:
+    left = f"{fit.retuned:.3g} {fit.unit} against a noise of {fit.noise_floor:.3g} {fit.unit}"
+    return (
+        f"Inside its tolerances the nominal model leaves {left}, but no physics need be missing: the same line "
+        f"explains the recordings to the noise with {in_words(strays)}. Check the data sheet, or widen the tolerance "
+        "where it is a guess, and diagnose again."
+    )
 
 
 def _left(decision: Decision, remainder: Remainder) -> str:
