@@ -8,16 +8,17 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from estimator.diagnosis.hypotheses import NOTHING, Effects, open_hypotheses, with_effect
+from estimator.diagnosis.inference.descent import extended
 from estimator.diagnosis.inference.disturbances import Limits, limits_for
 from estimator.diagnosis.inference.likelihood import Hypothesis, compared, fitted
-from estimator.diagnosis.inference.looks import screen
+from estimator.diagnosis.inference.looks import Answers, Look, screen
 from estimator.diagnosis.inherit import forgetting, inheriting, kept
 from estimator.diagnosis.noise import noise_floor
-from estimator.diagnosis.screening import Look, promising
+from estimator.diagnosis.screening import promising
 from estimator.diagnosis.trial import has_edge
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
-from estimator.physics.fit import FitResult
+from estimator.physics.fit import FitResult, not_fitted
 from estimator.physics.grid import Grid, grid_for
 from estimator.physics.layout import slot
 from estimator.physics.model import DrivelineModel
@@ -81,6 +82,7 @@ class Search:
     rivals: dict[str, float] = field(default_factory=dict)
     is_over: Callable[[], bool] = never
     stopped: bool = False
+    answers: Answers = field(default_factory=Answers)
     _limits: Limits | None = None
 
     @property
@@ -109,7 +111,8 @@ class Search:
         if NOTHING not in self.visited:
             own = tuple(own_unknowns(self.model.effects, record) for record in self.records)
             problem = self._problem(NOTHING, Release(nominal_unknowns(self.model), own))
-            self._keep(fitted(NOTHING, problem, start_vector(problem), self.limits.usual, self.limits, len(self.names)))
+            begun = not_fitted(problem, start_vector(problem))
+            self._keep(fitted(NOTHING, begun, self.limits.usual, self.limits, len(self.names)))
         return self.visited[NOTHING]
 
     def _best_addition(self, current: Hypothesis) -> Hypothesis | None:
@@ -149,7 +152,7 @@ class Search:
 
         Beside a ``rival`` those are worth it that promise nearly as much.
         """
-        view = screen(current, self.model)
+        view = screen(current, self.model, self.answers)
         contained = {special for have in current.effects for special in EFFECTS[have].contains}
         tried = [name for name in names if name != GRADE and name not in contained]
         looks = dict(zip(tried, concurrently(view.looks, tried), strict=True))
@@ -172,8 +175,8 @@ class Search:
         fits = []
         for look in looks:
             problem = self._extended(current, effects, inheriting(name, look.release, current.plain))
-            x = warm_start(problem, current.plain)
-            fits.append(compared(effects, problem, x, current, len(self.names)))
+            begun = extended(problem, warm_start(problem, current.plain), current.plain)
+            fits.append(compared(effects, begun, current, len(self.names)))
         best = min(fits, key=lambda each: each.score)
         self.rivals[name] = min(best.score, self.rivals.get(name, best.score))
         return best if self._is_plausible(best) else None
@@ -188,9 +191,8 @@ class Search:
     def finish(self, rough: Hypothesis, rival: Hypothesis) -> Hypothesis:
         """Take a fit as far as a comparison with a rival needs."""
         if rough.effects not in self.visited:
-            plain = rough.plain
             whole = fitted(
-                rough.effects, plain.problem, plain.x, rough.sizes, rough.limits, len(self.names), rival.minus_twice_log
+                rough.effects, rough.plain, rough.sizes, rough.limits, len(self.names), rival.minus_twice_log
             )
             self._keep(whole if self._is_plausible(whole) else rough)
         return self.visited[rough.effects]
@@ -236,18 +238,15 @@ class Search:
             if name != GRADE:
                 release = kept(plain, (effects - {GRADE}) | set(self.model.effects))
                 problem = self._problem(effects, release)
-                plain = forgetting(plain, name)
-                x = warm_start(problem, plain)
-            else:
-                problem, x = plain.problem, plain.x
+                plain = extended(problem, warm_start(problem, forgetting(plain, name)), plain)
             limits = self._limits_of(effects)
-            self._keep(fitted(effects, problem, x, current.sizes, limits, len(self.names), current.minus_twice_log))
+            self._keep(fitted(effects, plain, current.sizes, limits, len(self.names), current.minus_twice_log))
         return self.visited[effects]
 
     def exchanged(self, current: Hypothesis, name: str, other: str) -> Hypothesis | None:
         """Fit another effect in the place of one; None where no value is one."""
         base = self.without(current, name)
-        rough = self._added(base, other, promising(screen(base, self.model).looks(other)))
+        rough = self._added(base, other, promising(screen(base, self.model, self.answers).looks(other)))
         return None if rough is None else self.finish(rough, current)
 
     def _best_drop(self, current: Hypothesis) -> Hypothesis | None:
