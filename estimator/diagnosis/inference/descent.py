@@ -9,17 +9,19 @@ those of the plain errors: they hold under any weighting.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimator.diagnosis.inference.disturbances import Whitener
 from estimator.physics.bounded import least_of_quadratic, unbounded_first
 from estimator.physics.fit import FitResult
 from estimator.physics.jacobian import jacobian_at
 from estimator.physics.problem import Problem, bounds, outputs_at, residual_at
 from estimator.physics.starts import in_common
 from estimator.signals.record import FloatArray
+
+Weigh = Callable[[FloatArray], FloatArray]
 
 LITTLE = 0.2
 """Fall of the squared innovations, of variance 1, that changes no conclusion."""
@@ -46,22 +48,24 @@ class Effort:
     steps: int
 
 
-def extended(problem: Problem, x: FloatArray, warm: FitResult) -> FitResult:
+def extended(problem: Problem, x: FloatArray, warm: FitResult, anew: str = "") -> FitResult:
     """Return the free run of a problem at ``x`` with the derivative of a fit with which it has unknowns in common.
 
-    The columns of the others are found.
+    The columns of the others are found, and those of the parameters of an effect that is begun ``anew``.
     """
+    low, high = bounds(problem)
+    x = np.clip(x, low, high)
     outputs = outputs_at(problem, x)
     begun = FitResult(problem, x, outputs, residual_at(problem, outputs), None, False)
     if warm.derivative is None or warm.derivative.shape[0] != begun.residual.size:
         return begun
     columns, taken, ratio = in_common(problem, warm.problem)
     known = warm.derivative[:, taken].any(axis=0)  # what was held there, and is free here, is not known
+    known &= ~np.isin(columns, [i for i, shared in enumerate(problem.shared) if anew and shared.effect == anew])
     columns, taken, ratio = columns[known], taken[known], ratio[known]
     new = np.ones(x.size, dtype=bool)
     new[columns] = False
     derivative = jacobian_at(problem, x, outputs, new) if new.any() else np.zeros((begun.residual.size, x.size))
-    low, high = bounds(problem)
     derivative[:, columns] = warm.derivative[:, taken] * (ratio * (low < high)[columns])
     return replace(begun, derivative=derivative)
 
@@ -71,7 +75,7 @@ def light(fit: FitResult) -> FitResult:
     return fit if fit.derivative is None or fit.derivative.nbytes <= MUCH_BYTES else fit.light()
 
 
-def descended(begun: FitResult, weigh: Whitener, effort: Effort) -> FitResult:
+def descended(begun: FitResult, weigh: Weigh, effort: Effort) -> FitResult:
     """Return the unknowns at which the squared innovations under fixed disturbances are least.
 
     Parameters
@@ -89,7 +93,7 @@ def descended(begun: FitResult, weigh: Whitener, effort: Effort) -> FitResult:
 class _Descent:
     """One descent: where it is, its derivative, how it is damped, and what it may still spend."""
 
-    def __init__(self, begun: FitResult, weigh: Whitener, derivatives: int) -> None:
+    def __init__(self, begun: FitResult, weigh: Weigh, derivatives: int) -> None:
         self._problem, self._weigh, self._left = begun.problem, weigh, derivatives
         self._low, self._high = bounds(begun.problem)
         self._x = np.clip(begun.x, self._low, self._high)

@@ -17,7 +17,7 @@ import numpy as np
 
 from estimator.diagnosis.hypotheses import Effects
 from estimator.diagnosis.inference.descent import Effort, descended, extended, light
-from estimator.diagnosis.inference.disturbances import Limits, Whitener, estimate, line_of, starts, whitener
+from estimator.diagnosis.inference.disturbances import Limits, Size, Whitener, estimate, line_of, starts, whitener
 from estimator.diagnosis.inference.moments import moved
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import MOMENT_NAMES, FitResult
@@ -35,6 +35,9 @@ MOST_PASSES = 6
 
 THOROUGH, ROUGH = Effort(derivatives=6, steps=30), Effort(derivatives=1, steps=6)
 """What a pass may cost at most, and a first comparison."""
+
+FREE = Effort(derivatives=1, steps=6)
+"""What least squares of the free run may cost, from where the likelihood is greatest."""
 
 ROUNDS = 2
 """Steps of Fisher scoring in a pass."""
@@ -80,6 +83,17 @@ class Hypothesis:
         n = self.plain.residual.size
         freed = "road_grade" in self.effects
         return self.minus_twice_log + (self.unknowns + freed) * math.log(n) + 2.0 * self.choices
+
+    @cached_property
+    def free_squares(self) -> float:
+        """The squared free-run error, unknowns as they leave least of it.
+
+        A load that may walk far leaves the noise of the reading: the rest is what it did.
+        """
+        if "road_grade" in self.effects:
+            return self.plain.residual.size * float(np.sum(np.exp(2.0 * self.sizes[[Size.WHITE, Size.COLOURED]])))
+        rms = self.plain.rms
+        return descended(self.plain, lambda errors: errors / rms, FREE).squares
 
     @cached_property
     def filter(self) -> Whitener:

@@ -67,7 +67,8 @@ class _Weighted(Projector):
         return super().products(self._filter.part(self._firsts.index(rows.start), answers.T).T, rows)
 
     def promise(self, direction: FloatArray, low: float, high: float) -> tuple[float, float]:
-        return super().promise(self._filter(direction), low, high)
+        white = self._filter(direction)
+        return super().promise(white, low, high) if np.isfinite(white @ white) else (0.0, 0.0)
 
 
 class _Remembering(Screen):

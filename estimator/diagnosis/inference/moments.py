@@ -19,7 +19,7 @@ OFFSETS_S = np.concatenate([-OFFSETS_S[::-1], OFFSETS_S])
 WORTH_MOVING = 2.0
 """Fall of the squared innovations that moments elsewhere must bring."""
 
-MOVES = 4
+MOVES = 2
 
 
 def moved(result: FitResult, filtered: Whitener) -> FloatArray | None:

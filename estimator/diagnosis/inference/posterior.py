@@ -14,12 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimator.diagnosis.hypotheses import Effects
-from estimator.diagnosis.inference.disturbances import Size
-from estimator.diagnosis.inference.likelihood import Hypothesis, residuals
-from estimator.diagnosis.inference.search import GRADE
+from estimator.diagnosis.inference.likelihood import Hypothesis
 from estimator.physics.catalogue import EFFECTS
-from estimator.physics.jacobian import changes
-from estimator.physics.problem import own_part
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,12 +71,18 @@ def beliefs(
             Belief(
                 name,
                 _probability({name, *alike, *_same_law(name)}, visited, tempered),
-                (squares_of(without) - squares_of(best)) / squares_of(nothing),
+                share_of(without, best, nothing),
                 without.score - best.score,
                 alike,
             )
         )
     return tuple(sorted(found, key=lambda belief: -belief.share))
+
+
+def share_of(without: Hypothesis, best: Hypothesis, nothing: Hypothesis) -> float:
+    """Return the share of the re-tuned model's squared free-run error that goes with an effect."""
+    most = max(nothing.free_squares, without.free_squares)
+    return max(without.free_squares - best.free_squares, 0.0) / most
 
 
 def _same_law(name: str) -> set[str]:
@@ -89,25 +91,8 @@ def _same_law(name: str) -> set[str]:
 
 
 def free_rms(hypothesis: Hypothesis) -> float:
-    """Return the RMS of the free-run error, load torque and initial state as they leave least of it."""
-    return math.sqrt(max(squares_of(hypothesis), 0.0) / hypothesis.plain.residual.size)
-
-
-def squares_of(hypothesis: Hypothesis) -> float:
-    """Return the squared free-run error, each recording's load torque and initial state as they leave least of it.
-
-    A load that may walk far leaves the noise of the reading: the rest is what it did.
-    """
-    plain = hypothesis.plain
-    if GRADE in hypothesis.effects:
-        return plain.residual.size * float(np.sum(np.exp(2.0 * hypothesis.sizes[[Size.WHITE, Size.COLOURED]])))
-    left = 0.0
-    for i, error in enumerate(residuals(hypothesis, plain.residual)):
-        first = own_part(plain.problem, i).start
-        columns = np.arange(first, first + plain.problem.local[i].own_rows.start)
-        start = np.linalg.qr(changes(plain.problem, plain.x, i, columns, plain.outputs))[0]
-        left += float(error @ error) - float(np.sum((start.T @ error) ** 2))
-    return left
+    """Return the RMS of the free-run error, re-tuned to leave least of it."""
+    return math.sqrt(hypothesis.free_squares / hypothesis.plain.residual.size)
 
 
 def _alike(name: str, best: Hypothesis, visited: Mapping[Effects, Hypothesis], within: float) -> tuple[str, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -12,12 +13,12 @@ from estimator.diagnosis.inference.descent import extended
 from estimator.diagnosis.inference.disturbances import Limits, limits_for
 from estimator.diagnosis.inference.likelihood import Hypothesis, compared, fitted
 from estimator.diagnosis.inference.looks import Answers, Look, screen
-from estimator.diagnosis.inherit import forgetting, inheriting, kept
+from estimator.diagnosis.inherit import forgetting, inheriting, kept, line_values, placed
 from estimator.diagnosis.noise import noise_floor
 from estimator.diagnosis.screening import promising
 from estimator.diagnosis.trial import has_edge
 from estimator.physics.catalogue import EFFECTS
-from estimator.physics.effect import Element
+from estimator.physics.effect import Element, Span
 from estimator.physics.fit import FitResult, not_fitted
 from estimator.physics.grid import Grid, grid_for
 from estimator.physics.layout import slot
@@ -27,7 +28,7 @@ from estimator.physics.problem import Problem, make_problem, start_of, start_vec
 from estimator.physics.simulate import simulate
 from estimator.physics.starts import warm_start
 from estimator.physics.torque_path import shaft_torque
-from estimator.physics.unknowns import Release, nominal_unknowns, own_unknowns
+from estimator.physics.unknowns import Release, Shared, nominal_unknowns, own_unknowns, released
 from estimator.signals.record import BoolArray, Record
 
 BLIND = "speed_sign_blind"
@@ -44,10 +45,17 @@ SAME_PROMISE = 0.5
 """Share of what an effect promises that a look-alike must promise in its place."""
 
 NEARLY = 0.3
-"""Share of what an effect explains by which a look-alike's first few steps may be behind for it to be fitted."""
+"""Share of what an effect explains by which another's first few steps may be behind for it to be fitted to its end."""
 
-LEAST_THROUGH = 0.2
-"""Share of the torque's RMS that must get through the torque path: less switches the input off to explain nothing."""
+LEAST_THROUGH, PARTS = 0.2, 4
+"""Share of the torque's RMS that must get through the torque path in each of so many parts of a recording: less
+switches the input off to explain nothing."""
+
+LOOSE = 3.0
+"""Factor by which a nominal parameter that an effect changes may be beyond its tolerance: a line that is split in two
+equal springs has each twice as stiff as the whole."""
+
+ROUNDING = 1e-6
 
 MOST_EFFECTS = 8
 FINISHED = 2
@@ -83,6 +91,7 @@ class Search:
     is_over: Callable[[], bool] = never
     stopped: bool = False
     answers: Answers = field(default_factory=Answers)
+    _told: defaultdict[Effects, set[str]] = field(default_factory=lambda: defaultdict(set))
     _limits: Limits | None = None
 
     @property
@@ -118,10 +127,26 @@ class Search:
     def _best_addition(self, current: Hypothesis) -> Hypothesis | None:
         looks = self._looks(current, [name for name in self._open(current) if name not in current.effects])
         rough = concurrently(lambda name: self._added(current, name, looks[name]), list(looks))
-        found = [each for each in rough if each is not None]
+        found = [each for each in rough if each is not None] + self._retold(current)
         found.sort(key=lambda each: each.score)
-        finished = concurrently(lambda each: self.finish(each, current), found[:FINISHED])
+        near = [each for each in found[:FINISHED] if each.score <= found[0].score + NEARLY * _gain(found[0], current)]
+        finished = concurrently(lambda each: self.finish(each, current), near)
         return self._better(finished, current)
+
+    def _retold(self, current: Hypothesis) -> list[Hypothesis]:
+        """Fit the laws of a hypothesis' effects written other ways a few steps, each beside the same others once."""
+        fits = []
+        for name in sorted(current.effects - {GRADE} - self._told[current.effects]):
+            self._told[current.effects].add(name)
+            plain = current.plain
+            for other in EFFECTS[name].retold(self.model, self.records, plain.values_of(name), line_values(plain)):
+                begun = placed(forgetting(plain, name), other.line)
+                (release,) = released(name, self.model, self.records, [other.start])
+                alone = replace(release, own=((),) * len(self.records))
+                problem = self._extended(begun, current.effects, alone)
+                started = extended(problem, warm_start(problem, begun), plain, anew=name)
+                fits.append(compared(current.effects, started, current, len(self.names)))
+        return [each for each in fits if self._is_plausible(each)]
 
     def _open(self, current: Hypothesis) -> Sequence[str]:
         """Return the effects that can be told; behind a sensor blind for the sign reversals are the motion's own."""
@@ -161,7 +186,9 @@ class Search:
         if rival and rival != GRADE:
             least = max(least, SAME_PROMISE * view.looks(rival)[0].promise)
         loose = [name for name in order if EFFECTS[name].loosens]
-        worth = [name for name in order if looks[name][0].promise >= least][:MOST_FITS]
+        worth = [name for name in order if looks[name][0].promise >= least]
+        twins = {twin for name in worth for twin in EFFECTS[name].equivalent if precedes(name, twin)}
+        worth = [name for name in worth if name not in twins][:MOST_FITS]
         return {
             name: promising(looks[name])
             for name in dict.fromkeys([*worth, *(loose if not current.effects and not rival else [])])
@@ -174,10 +201,13 @@ class Search:
             return self.visited[effects]
         fits = []
         for look in looks:
-            problem = self._extended(current, effects, inheriting(name, look.release, current.plain))
+            problem = self._extended(current.plain, effects, inheriting(name, look.release, current.plain))
             begun = extended(problem, warm_start(problem, current.plain), current.plain)
             fits.append(compared(effects, begun, current, len(self.names)))
         best = min(fits, key=lambda each: each.score)
+        loose = self._loosened(best)
+        if loose is not None:
+            best = self._more_plausible(best, compared(effects, loose, current, len(self.names)))
         self.rivals[name] = min(best.score, self.rivals.get(name, best.score))
         return best if self._is_plausible(best) else None
 
@@ -189,13 +219,65 @@ class Search:
         return self.finish(replace(current, effects=effects, limits=self._limits_of(effects)), current)
 
     def finish(self, rough: Hypothesis, rival: Hypothesis) -> Hypothesis:
-        """Take a fit as far as a comparison with a rival needs."""
-        if rough.effects not in self.visited:
-            whole = fitted(
-                rough.effects, rough.plain, rough.sizes, rough.limits, len(self.names), rival.minus_twice_log
-            )
-            self._keep(whole if self._is_plausible(whole) else rough)
+        """Take a fit as far as a comparison with a rival needs; kept where it is the best of its set so far."""
+        known = self.visited.get(rough.effects)
+        if known is None or rough.score < known.score:
+            whole = self._fitted(rough, rough.plain, rival)
+            loose = self._loosened(whole)
+            if loose is not None:
+                whole = self._more_plausible(whole, self._fitted(whole, loose, rival))
+            whole = whole if self._is_plausible(whole) else rough
+            if known is None or whole.score < known.score:
+                self._keep(whole)
         return self.visited[rough.effects]
+
+    def _fitted(self, of: Hypothesis, begun: FitResult, rival: Hypothesis) -> Hypothesis:
+        return fitted(of.effects, begun, of.sizes, of.limits, len(self.names), rival.minus_twice_log)
+
+    def _more_plausible(self, one: Hypothesis, other: Hypothesis) -> Hypothesis:
+        """Return the better of two fits of a set, where both are plausible; else the one that is."""
+        return other if self._is_plausible(other) and (other.score < one.score or not self._is_plausible(one)) else one
+
+    def _loosened(self, hypothesis: Hypothesis) -> FitResult | None:
+        """Return a fit with nominal parameters that its effects change free beyond their tolerances, where one is at
+        its bound; None where none is.
+
+        Whether a data sheet's value is one that the line had at some moment is for `_is_plausible` to say.
+        """
+        plain = hypothesis.plain
+        wide = self._spans(hypothesis)
+        shared = tuple(
+            replace(each, low=each.low / LOOSE, high=each.high * LOOSE)
+            if pinned and not each.effect and each.name in wide and self._is_tight(each)
+            else each
+            for each, pinned in zip(plain.problem.shared, plain.pinned, strict=False)
+        )
+        if shared == plain.problem.shared:
+            return None
+        return replace(plain, problem=replace(plain.problem, shared=shared), converged=False)
+
+    def _is_tight(self, shared: Shared) -> bool:
+        tolerance = self.model.parameters[shared.name].tolerance
+        return shared.low < shared.high <= 1.0 + tolerance
+
+    def _spans(self, hypothesis: Hypothesis) -> dict[str, list[Span]]:
+        """Return where data sheets' values of nominal parameters may lie that the effects change, by name."""
+        plain, found = hypothesis.plain, dict[str, list[Span]]()
+        line = line_values(plain)
+        for name in hypothesis.effects - {GRADE}:
+            for parameter, spans in EFFECTS[name].described(self.model, plain.values_of(name), line).items():
+                found.setdefault(parameter, []).extend(spans)
+        return found
+
+    def _is_described(self, hypothesis: Hypothesis) -> bool:
+        """Tell whether every nominal value is, within its tolerance, one that the line had at some moment."""
+        line = line_values(hypothesis.plain)
+        for name, spans in self._spans(hypothesis).items():
+            given = self.model.parameters[name]
+            low, high = (given.value * (1.0 + sign * (given.tolerance + ROUNDING)) for sign in (-1.0, 1.0))
+            if not any(first <= high and low <= last for first, last in [*spans, (line[name], line[name])]):
+                return False
+        return True
 
     def _is_plausible(self, hypothesis: Hypothesis) -> bool:
         """Tell whether the values of every effect are a case of it."""
@@ -204,14 +286,15 @@ class Search:
         if any(EFFECTS[name].implausible(self.model, self.records, values[name]) for name in values):
             return False
         edges = all(has_edge(name, plain) for name in values if EFFECTS[name].event)
-        return edges and self._is_driven(plain) and not self._is_stuck(values)
+        return edges and self._is_driven(plain) and not self._is_stuck(values) and self._is_described(hypothesis)
 
     def _is_driven(self, plain: FitResult) -> bool:
-        """Tell whether the torque path lets a real part of the torque through in every recording."""
+        """Tell whether the torque path lets a real part of the torque through in every part of every recording."""
         for i, record in enumerate(self.records):
             torque = shaft_torque(record.torque_nm, record.time_s - record.time_s[0], plain.p_of(i))
-            if float(torque @ torque) < LEAST_THROUGH**2 * float(record.total_torque_nm @ record.total_torque_nm):
-                return False
+            for through, read in zip(*(np.array_split(u, PARTS) for u in (torque, record.total_torque_nm)), strict=True):
+                if float(through @ through) < LEAST_THROUGH**2 * float(read @ read):
+                    return False
         return True
 
     def _is_stuck(self, values: Mapping[str, Mapping[str, float]]) -> bool:
@@ -264,27 +347,47 @@ class Search:
         alike = [other for other in self.names if other not in current.effects and are_alike(name, other)]
         looks = self._looks(base, alike, name)
         rough = [self._added(base, other, looks[other]) for other in looks]
-        near = current.score + NEARLY * max(base.score - current.score, 0.0)
+        near = current.score + NEARLY * _gain(current, base)
         found = [each for each in rough if each is not None and each.score < near]
         return self.finish(min(found, key=lambda each: each.score), current) if found else None
 
-    def _extended(self, current: Hypothesis, effects: Effects, release: Release) -> Problem:
-        common = kept(current.plain, (effects - {GRADE}) | set(self.model.effects))
+    def _extended(self, warm: FitResult, effects: Effects, release: Release) -> Problem:
+        common = kept(warm, (effects - {GRADE}) | set(self.model.effects))
         own = tuple((*old, *mine) for old, mine in zip(common.own, release.own, strict=True))
         return self._problem(effects, Release((*common.shared, *release.shared), own))
 
     def _problem(self, effects: Effects, release: Release) -> Problem:
+        nominal = {each.name: each for each in nominal_unknowns(self.model) if not each.effect}
+        shared = [  # what an effect that is gone has loosened is tight again
+            nominal.get(each.name, each) if not each.effect and not self._is_loosened(each, effects) else each
+            for each in release.shared
+        ]
         return make_problem(
             self.model,
             self.records,
-            release.shared,
+            shared,
             own=release.own,
             use=self.use,
             grid=self.grid or grid_for(self.model, self.records),
         )
 
+    def _is_loosened(self, shared: Shared, effects: Effects) -> bool:
+        values = {name: dict.fromkeys((p.name for p in EFFECTS[name].parameters), 0.0) for name in effects - {GRADE}}
+        line = self.model.values()
+        return any(shared.name in EFFECTS[name].described(self.model, mine, line) for name, mine in values.items())
+
     def _keep(self, hypothesis: Hypothesis) -> None:
         self.visited[hypothesis.effects] = hypothesis
+
+
+def _gain(better: Hypothesis, than: Hypothesis) -> float:
+    return max(than.score - better.score, 0.0)
+
+
+def precedes(one: str, other: str) -> bool:
+    """Tell whether an effect comes before another in the catalogue: along the chain from command to sample."""
+    order = list(EFFECTS)
+    return order.index(one) < order.index(other)
 
 
 def are_alike(one: str, other: str) -> bool:

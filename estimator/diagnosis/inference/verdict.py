@@ -16,7 +16,7 @@ from estimator.diagnosis.inference.calibration import (
 )
 from estimator.diagnosis.inference.disturbances import Size
 from estimator.diagnosis.inference.likelihood import Hypothesis
-from estimator.diagnosis.inference.posterior import Belief, beliefs, free_rms, squares_of
+from estimator.diagnosis.inference.posterior import Belief, beliefs, free_rms, share_of
 from estimator.diagnosis.inference.remainder import Test, tests
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.result import Verdict
@@ -88,7 +88,7 @@ def _as_simple_as_will_do(search: Search, best: Hypothesis) -> Hypothesis:
             simpler = search.exchanged(best, name, special)
             if simpler is None:
                 continue
-            if squares_of(simpler) - squares_of(best) < LEAST_SHARE * squares_of(search.nothing()):
+            if share_of(simpler, best, search.nothing()) < LEAST_SHARE:
                 best = simpler
                 break
     return best
