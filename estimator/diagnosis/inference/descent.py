@@ -63,7 +63,7 @@ def extended(problem: Problem, x: FloatArray, warm: FitResult, anew: str = "") -
     known = warm.derivative[:, taken].any(axis=0)  # what was held there, and is free here, is not known
     known &= ~np.isin(columns, [i for i, shared in enumerate(problem.shared) if anew and shared.effect == anew])
     columns, taken, ratio = columns[known], taken[known], ratio[known]
-    new = np.ones(x.size, dtype=bool)
+    new = low < high
     new[columns] = False
     derivative = jacobian_at(problem, x, outputs, new) if new.any() else np.zeros((begun.residual.size, x.size))
     derivative[:, columns] = warm.derivative[:, taken] * (ratio * (low < high)[columns])

@@ -39,6 +39,10 @@ THOROUGH, ROUGH = Effort(derivatives=6, steps=30), Effort(derivatives=1, steps=6
 FREE = Effort(derivatives=1, steps=6)
 """What least squares of the free run may cost, from where the likelihood is greatest."""
 
+MOST_ROUGH, MUCH = 3, 0.05
+"""Such comparisons under disturbances of their own at most, and the fall of minus twice the log-likelihood per sample
+for the next."""
+
 ROUNDS = 2
 """Steps of Fisher scoring in a pass."""
 
@@ -148,16 +152,19 @@ def fitted(
 
 
 def compared(effects: Effects, begun: FitResult, parent: Hypothesis, hypotheses: int) -> Hypothesis:
-    """Fit a hypothesis a few steps under another's disturbances, to be compared with others like it.
+    """Fit a hypothesis a few steps from another's disturbances, to be compared with others like it.
 
-    Its disturbances would be smaller: with all of them in one proportion minus twice the log-likelihood falls by
-    ``n log(Q / Q')``, Q the squared innovations.
+    Where it explains much more, other disturbances weigh what is left, and it is fitted a few steps under those, too.
     """
-    plain = descended(begun, _whitener(begun, parent.sizes), ROUGH)
-    before, after = (float(np.sum(parent.filter(fit.residual) ** 2)) for fit in (parent.plain, plain))
-    fall = plain.residual.size * math.log(before / after)
-    choices = choices_of(effects, hypotheses)
-    return Hypothesis(effects, plain, parent.sizes, parent.limits, parent.minus_twice_log - fall, choices)
+    sizes, best = parent.sizes, parent.minus_twice_log
+    plain, now = begun, math.inf
+    for _ in range(MOST_ROUGH):
+        plain = descended(plain, _whitener(plain, sizes), ROUGH)
+        sizes, now = _disturbances(plain, sizes, parent.limits)
+        if now > best - MUCH * plain.residual.size:
+            break
+        best = now
+    return Hypothesis(effects, plain, sizes, parent.limits, now, choices_of(effects, hypotheses))
 
 
 def _disturbances(plain: FitResult, sizes: FloatArray, limits: Limits) -> tuple[FloatArray, float]:

@@ -75,6 +75,8 @@ class Search:
     ----------
     visited : dict of set of effects to Hypothesis
         Those that were fitted to their end.
+    path : list of Hypothesis
+        Each better than the one before, from the nominal model to the best.
     rivals : dict of str to float
         Best score of a set with each effect that was fitted at all.
     is_over : callable
@@ -87,10 +89,12 @@ class Search:
     names: Sequence[str]
     grid: Grid | None = None
     visited: dict[Effects, Hypothesis] = field(default_factory=dict)
+    path: list[Hypothesis] = field(default_factory=list)
     rivals: dict[str, float] = field(default_factory=dict)
     is_over: Callable[[], bool] = never
     stopped: bool = False
     answers: Answers = field(default_factory=Answers)
+    _lessened: set[tuple[Effects, str]] = field(default_factory=set)
     _told: defaultdict[Effects, set[str]] = field(default_factory=lambda: defaultdict(set))
     _limits: Limits | None = None
 
@@ -104,6 +108,7 @@ class Search:
     def run(self) -> Hypothesis:
         """Return the best set of effects found."""
         current = self.nothing()
+        self.path = [current]
         for _ in range(2 * MOST_EFFECTS):
             if self.is_over():
                 self.stopped = True
@@ -113,6 +118,7 @@ class Search:
             if better is None:
                 break
             current = better
+            self.path.append(current)
         return current
 
     def nothing(self) -> Hypothesis:
@@ -146,7 +152,7 @@ class Search:
                 problem = self._extended(begun, current.effects, alone)
                 started = extended(problem, warm_start(problem, begun), plain, anew=name)
                 fits.append(compared(current.effects, started, current, len(self.names)))
-        return [each for each in fits if self._is_plausible(each)]
+        return [each for each in fits if self.is_plausible(each)]
 
     def _open(self, current: Hypothesis) -> Sequence[str]:
         """Return the effects that can be told; behind a sensor blind for the sign reversals are the motion's own."""
@@ -169,8 +175,8 @@ class Search:
         return self._better([self._with_grade(current)], current)
 
     def _better(self, found: Sequence[Hypothesis], current: Hypothesis) -> Hypothesis | None:
-        best = min(found, key=lambda each: each.score, default=None)
-        return best if best is not None and best.score < current.score else None
+        better = [each for each in found if each.score < current.score and self.is_plausible(each)]
+        return min(better, key=lambda each: each.score, default=None)
 
     def _looks(self, current: Hypothesis, names: Sequence[str], rival: str = "") -> dict[str, list[Look]]:
         """Return the starts of the effects that are worth a fit, the most promising effect first.
@@ -194,22 +200,31 @@ class Search:
             for name in dict.fromkeys([*worth, *(loose if not current.effects and not rival else [])])
         }
 
-    def _added(self, current: Hypothesis, name: str, looks: Sequence[Look]) -> Hypothesis | None:
-        """Fit an effect on top of a hypothesis a few steps, from each of its starts; None where no value is one."""
+    def _added(
+        self, current: Hypothesis, name: str, looks: Sequence[Look], instead: Hypothesis | None = None
+    ) -> Hypothesis | None:
+        """Fit an effect on top of a hypothesis a few steps, from each of its starts; None where no value is one.
+
+        Where it takes the place of another effect, begun and weighted as the hypothesis with that one: ``instead``.
+        """
         effects = with_effect(current.effects, name)
         if effects in self.visited:
             return self.visited[effects]
+        rival = instead or current
+        warm = rival.plain
+        for gone in rival.effects - effects - {GRADE}:
+            warm = forgetting(warm, gone)
         fits = []
         for look in looks:
-            problem = self._extended(current.plain, effects, inheriting(name, look.release, current.plain))
-            begun = extended(problem, warm_start(problem, current.plain), current.plain)
-            fits.append(compared(effects, begun, current, len(self.names)))
+            problem = self._extended(warm, effects, inheriting(name, look.release, warm))
+            begun = extended(problem, warm_start(problem, warm), rival.plain)
+            fits.append(compared(effects, begun, rival, len(self.names)))
         best = min(fits, key=lambda each: each.score)
         loose = self._loosened(best)
         if loose is not None:
-            best = self._more_plausible(best, compared(effects, loose, current, len(self.names)))
+            best = self._more_plausible(best, compared(effects, loose, rival, len(self.names)))
         self.rivals[name] = min(best.score, self.rivals.get(name, best.score))
-        return best if self._is_plausible(best) else None
+        return best if self.is_plausible(best) else None
 
     def _limits_of(self, effects: Effects) -> Limits:
         return self.limits.freed() if GRADE in effects else self.limits
@@ -226,7 +241,7 @@ class Search:
             loose = self._loosened(whole)
             if loose is not None:
                 whole = self._more_plausible(whole, self._fitted(whole, loose, rival))
-            whole = whole if self._is_plausible(whole) else rough
+            whole = whole if self.is_plausible(whole) else rough
             if known is None or whole.score < known.score:
                 self._keep(whole)
         return self.visited[rough.effects]
@@ -236,13 +251,13 @@ class Search:
 
     def _more_plausible(self, one: Hypothesis, other: Hypothesis) -> Hypothesis:
         """Return the better of two fits of a set, where both are plausible; else the one that is."""
-        return other if self._is_plausible(other) and (other.score < one.score or not self._is_plausible(one)) else one
+        return other if self.is_plausible(other) and (other.score < one.score or not self.is_plausible(one)) else one
 
     def _loosened(self, hypothesis: Hypothesis) -> FitResult | None:
         """Return a fit with nominal parameters that its effects change free beyond their tolerances, where one is at
         its bound; None where none is.
 
-        Whether a data sheet's value is one that the line had at some moment is for `_is_plausible` to say.
+        Whether a data sheet's value is one that the line had at some moment is for `is_plausible` to say.
         """
         plain = hypothesis.plain
         wide = self._spans(hypothesis)
@@ -279,7 +294,7 @@ class Search:
                 return False
         return True
 
-    def _is_plausible(self, hypothesis: Hypothesis) -> bool:
+    def is_plausible(self, hypothesis: Hypothesis) -> bool:
         """Tell whether the values of every effect are a case of it."""
         plain = hypothesis.plain
         values = {name: plain.values_of(name) for name in hypothesis.effects - {GRADE}}
@@ -308,28 +323,40 @@ class Search:
             if parameter.dimension == "torque"
         )
 
+    @property
+    def plausible(self) -> dict[Effects, Hypothesis]:
+        """The sets that were fitted to their end whose values are all a case of their effect."""
+        return {effects: each for effects, each in self.visited.items() if self.is_plausible(each)}
+
     def is_resolved(self, hypothesis: Hypothesis, name: str) -> bool:
         """Tell whether an effect is large enough to be told from another way of sampling."""
         values = hypothesis.plain.values_of(name)
         return name == GRADE or not EFFECTS[name].unresolved(self.model, self.records, values)
 
     def without(self, current: Hypothesis, name: str) -> Hypothesis:
-        """Fit a hypothesis without one of its effects, the others begun where they are."""
-        effects = current.effects - {name}
-        if effects not in self.visited:
+        """Fit a hypothesis without one of its effects, the others begun where they are, once from each hypothesis.
+
+        The set may be known: from where it was begun before it may have ended in a poorer optimum.
+        """
+        effects, place = current.effects - {name}, (current.effects, name)
+        known = self.visited.get(effects)
+        if known is None or place not in self._lessened:
+            self._lessened.add(place)
             plain = current.plain
             if name != GRADE:
                 release = kept(plain, (effects - {GRADE}) | set(self.model.effects))
                 problem = self._problem(effects, release)
                 plain = extended(problem, warm_start(problem, forgetting(plain, name)), plain)
             limits = self._limits_of(effects)
-            self._keep(fitted(effects, plain, current.sizes, limits, len(self.names), current.minus_twice_log))
+            found = fitted(effects, plain, current.sizes, limits, len(self.names), current.minus_twice_log)
+            if known is None or found.score < known.score:
+                self._keep(found)
         return self.visited[effects]
 
     def exchanged(self, current: Hypothesis, name: str, other: str) -> Hypothesis | None:
         """Fit another effect in the place of one; None where no value is one."""
         base = self.without(current, name)
-        rough = self._added(base, other, promising(screen(base, self.model, self.answers).looks(other)))
+        rough = self._added(base, other, promising(screen(base, self.model, self.answers).looks(other)), current)
         return None if rough is None else self.finish(rough, current)
 
     def _best_drop(self, current: Hypothesis) -> Hypothesis | None:
@@ -346,7 +373,7 @@ class Search:
         base = self.without(current, name)
         alike = [other for other in self.names if other not in current.effects and are_alike(name, other)]
         looks = self._looks(base, alike, name)
-        rough = [self._added(base, other, looks[other]) for other in looks]
+        rough = [self._added(base, other, looks[other], current) for other in looks]
         near = current.score + NEARLY * _gain(current, base)
         found = [each for each in rough if each is not None and each.score < near]
         return self.finish(min(found, key=lambda each: each.score), current) if found else None
