@@ -4,10 +4,15 @@ Those that depend on what worlds are like are data (``thresholds.toml``), writte
 whose command the file holds.
 """
 
-import tomllib
-from importlib import resources
+from __future__ import annotations
 
-THRESHOLDS = tomllib.loads(resources.files(__package__).joinpath("thresholds.toml").read_text(encoding="utf-8"))
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+
+THRESHOLDS_FILE = Path(__file__).parent / "thresholds.toml"
+
+THRESHOLDS = tomllib.loads(THRESHOLDS_FILE.read_text(encoding="utf-8"))
 
 TEMPERED: float = THRESHOLDS["tempered"]
 """By which differences of scores are divided: laws of nature are written in other forms than the model's, and what
@@ -16,17 +21,24 @@ they leave takes part in every difference."""
 LEAST_PROBABILITY: float = THRESHOLDS["least_probability"]
 """Probability from which an effect is named."""
 
-MOST_PREDICTABLE: float = THRESHOLDS["most_predictable"]
-"""Share of the innovations' variance that their own past may foretell."""
 
-MOST_DEPENDENT: float = THRESHOLDS["most_dependent"]
-"""Share of it that torque, speed and angle may."""
+@dataclass(frozen=True, slots=True)
+class Limit:
+    """The most that a test may find in noise; ``is_share`` where it finds a share of the innovations' variance."""
 
-MOST_LINE: float = THRESHOLDS["most_line"]
-"""Power of a line in the spectrum of the innovations over their mean power: ``exp(-x)`` is the chance of one."""
+    most: float
+    is_share: bool = False
 
-MOST_CHANGE: float = THRESHOLDS["most_change"]
-"""Mean square of the innovations in a second over that of all."""
+
+TEST_LIMITS = {
+    "most_predictable": Limit(THRESHOLDS["most_predictable"], is_share=True),
+    "most_dependent": Limit(THRESHOLDS["most_dependent"], is_share=True),
+    "most_line": Limit(THRESHOLDS["most_line"]),
+    "most_change": Limit(THRESHOLDS["most_change"]),
+}
+"""What their own past may foretell of the innovations, and what torque, speed and angle may, beyond chance; the power
+of a line in their spectrum over their mean power; their mean square in a second, in standard deviations from that of
+all."""
 
 LEAST_SHARE = 0.01
 """Share of the re-tuned model's squared free-run error below which an effect is a trace (CONTRACT)."""

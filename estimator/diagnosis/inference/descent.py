@@ -108,9 +108,10 @@ class _Descent:
 
     def step(self) -> bool:
         """Take a step, and tell whether there may be another."""
-        if self._derivative is None and not self._find_derivative():
+        derivative = self._found_derivative()
+        if derivative is None:
             return False
-        white = self._weigh(self._derivative)
+        white = self._weigh(derivative)
         gradient, curvature = white.T @ self._innovations, white.T @ white
         while True:
             moved = self._moved(gradient, curvature)
@@ -129,6 +130,11 @@ class _Descent:
             if self._damping >= MOST_DAMPING:
                 self._converged = True
                 return False
+
+    def _found_derivative(self) -> FloatArray | None:
+        if self._derivative is None:
+            self._find_derivative()
+        return self._derivative
 
     def _find_derivative(self) -> bool:
         if self._left == 0:

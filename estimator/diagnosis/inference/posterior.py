@@ -137,9 +137,7 @@ def _alike(name: str, best: Hypothesis, visited: Mapping[Effects, Hypothesis], w
     return tuple(sorted((near | equivalent) - best.effects))
 
 
-def probability_of(
-    names: Collection[str], scores: Sequence[tuple[Collection[str], float]], tempered: float
-) -> float:
+def probability_of(names: Collection[str], scores: Sequence[tuple[Collection[str], float]], tempered: float) -> float:
     """Return the probability that one of some effects is there, over all sets that were fitted.
 
     Parameters

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -13,12 +13,11 @@ from estimator.diagnosis.inference.descent import extended
 from estimator.diagnosis.inference.disturbances import Limits, limits_for
 from estimator.diagnosis.inference.likelihood import Hypothesis, compared, fitted
 from estimator.diagnosis.inference.looks import Answers, Look, screen
+from estimator.diagnosis.inference.plausible import GRADE, is_plausible, loosened, may_be_loose
 from estimator.diagnosis.inherit import forgetting, inheriting, kept, line_values, placed
 from estimator.diagnosis.noise import noise_floor
 from estimator.diagnosis.screening import promising
-from estimator.diagnosis.trial import has_edge
 from estimator.physics.catalogue import EFFECTS
-from estimator.physics.effect import Element, Span
 from estimator.physics.fit import FitResult, not_fitted
 from estimator.physics.grid import Grid, grid_for
 from estimator.physics.layout import slot
@@ -27,14 +26,10 @@ from estimator.physics.parallel import concurrently
 from estimator.physics.problem import Problem, make_problem, start_of, start_vector
 from estimator.physics.simulate import simulate
 from estimator.physics.starts import warm_start
-from estimator.physics.torque_path import shaft_torque
-from estimator.physics.unknowns import Release, Shared, nominal_unknowns, own_unknowns, released
+from estimator.physics.unknowns import Release, nominal_unknowns, own_unknowns, released
 from estimator.signals.record import BoolArray, Record
 
 BLIND = "speed_sign_blind"
-GRADE = "road_grade"
-"""The effect that is no law: a load that walks further than any load does by itself."""
-
 MOST_FITS = 6
 """Effects that are fitted on top of a hypothesis, the most promising of a first look."""
 
@@ -46,16 +41,6 @@ SAME_PROMISE = 0.5
 
 NEARLY = 0.3
 """Share of what an effect explains by which another's first few steps may be behind for it to be fitted to its end."""
-
-LEAST_THROUGH, PARTS = 0.2, 4
-"""Share of the torque's RMS that must get through the torque path in each of so many parts of a recording: less
-switches the input off to explain nothing."""
-
-LOOSE = 3.0
-"""Factor by which a nominal parameter that an effect changes may be beyond its tolerance: a line that is split in two
-equal springs has each twice as stiff as the whole."""
-
-ROUNDING = 1e-6
 
 MOST_EFFECTS = 8
 FINISHED = 2
@@ -210,6 +195,9 @@ class Search:
         effects = with_effect(current.effects, name)
         if effects in self.visited:
             return self.visited[effects]
+        if self.is_over():
+            self.stopped = True
+            return None
         rival = instead or current
         warm = rival.plain
         for gone in rival.effects - effects - {GRADE}:
@@ -220,7 +208,7 @@ class Search:
             begun = extended(problem, warm_start(problem, warm), rival.plain)
             fits.append(compared(effects, begun, rival, len(self.names)))
         best = min(fits, key=lambda each: each.score)
-        loose = self._loosened(best)
+        loose = loosened(best, self.model)
         if loose is not None:
             best = self._more_plausible(best, compared(effects, loose, rival, len(self.names)))
         self.rivals[name] = min(best.score, self.rivals.get(name, best.score))
@@ -238,7 +226,7 @@ class Search:
         known = self.visited.get(rough.effects)
         if known is None or rough.score < known.score:
             whole = self._fitted(rough, rough.plain, rival)
-            loose = self._loosened(whole)
+            loose = loosened(whole, self.model)
             if loose is not None:
                 whole = self._more_plausible(whole, self._fitted(whole, loose, rival))
             whole = whole if self.is_plausible(whole) else rough
@@ -253,80 +241,14 @@ class Search:
         """Return the better of two fits of a set, where both are plausible; else the one that is."""
         return other if self.is_plausible(other) and (other.score < one.score or not self.is_plausible(one)) else one
 
-    def _loosened(self, hypothesis: Hypothesis) -> FitResult | None:
-        """Return a fit with nominal parameters that its effects change free beyond their tolerances, where one is at
-        its bound; None where none is.
-
-        Whether a data sheet's value is one that the line had at some moment is for `is_plausible` to say.
-        """
-        plain = hypothesis.plain
-        wide = self._spans(hypothesis)
-        shared = tuple(
-            replace(each, low=each.low / LOOSE, high=each.high * LOOSE)
-            if pinned and not each.effect and each.name in wide and self._is_tight(each)
-            else each
-            for each, pinned in zip(plain.problem.shared, plain.pinned, strict=False)
-        )
-        if shared == plain.problem.shared:
-            return None
-        return replace(plain, problem=replace(plain.problem, shared=shared), converged=False)
-
-    def _is_tight(self, shared: Shared) -> bool:
-        tolerance = self.model.parameters[shared.name].tolerance
-        return shared.low < shared.high <= 1.0 + tolerance
-
-    def _spans(self, hypothesis: Hypothesis) -> dict[str, list[Span]]:
-        """Return where data sheets' values of nominal parameters may lie that the effects change, by name."""
-        plain, found = hypothesis.plain, dict[str, list[Span]]()
-        line = line_values(plain)
-        for name in hypothesis.effects - {GRADE}:
-            for parameter, spans in EFFECTS[name].described(self.model, plain.values_of(name), line).items():
-                found.setdefault(parameter, []).extend(spans)
-        return found
-
-    def _is_described(self, hypothesis: Hypothesis) -> bool:
-        """Tell whether every nominal value is, within its tolerance, one that the line had at some moment."""
-        line = line_values(hypothesis.plain)
-        for name, spans in self._spans(hypothesis).items():
-            given = self.model.parameters[name]
-            low, high = (given.value * (1.0 + sign * (given.tolerance + ROUNDING)) for sign in (-1.0, 1.0))
-            if not any(first <= high and low <= last for first, last in [*spans, (line[name], line[name])]):
-                return False
-        return True
-
-    def is_plausible(self, hypothesis: Hypothesis) -> bool:
-        """Tell whether the values of every effect are a case of it."""
-        plain = hypothesis.plain
-        values = {name: plain.values_of(name) for name in hypothesis.effects - {GRADE}}
-        if any(EFFECTS[name].implausible(self.model, self.records, values[name]) for name in values):
-            return False
-        edges = all(has_edge(name, plain) for name in values if EFFECTS[name].event)
-        return edges and self._is_driven(plain) and not self._is_stuck(values) and self._is_described(hypothesis)
-
-    def _is_driven(self, plain: FitResult) -> bool:
-        """Tell whether the torque path lets a real part of the torque through in every part of every recording."""
-        for i, record in enumerate(self.records):
-            torque = shaft_torque(record.torque_nm, record.time_s - record.time_s[0], plain.p_of(i))
-            for through, read in zip(*(np.array_split(u, PARTS) for u in (torque, record.total_torque_nm)), strict=True):
-                if float(through @ through) < LEAST_THROUGH**2 * float(read @ read):
-                    return False
-        return True
-
-    def _is_stuck(self, values: Mapping[str, Mapping[str, float]]) -> bool:
-        """Tell whether a torque against the motion is above all torque that was applied."""
-        most = max(float(np.abs(record.total_torque_nm).max()) for record in self.records)
-        return any(
-            values[name].get(parameter.name, 0.0) > most
-            for name in values
-            if EFFECTS[name].element in (Element.MOTOR, Element.LOAD)
-            for parameter in EFFECTS[name].parameters
-            if parameter.dimension == "torque"
-        )
-
     @property
     def plausible(self) -> dict[Effects, Hypothesis]:
         """The sets that were fitted to their end whose values are all a case of their effect."""
         return {effects: each for effects, each in self.visited.items() if self.is_plausible(each)}
+
+    def is_plausible(self, hypothesis: Hypothesis) -> bool:
+        """Tell whether the values of every effect are a case of it."""
+        return is_plausible(hypothesis, self.model, self.records)
 
     def is_resolved(self, hypothesis: Hypothesis, name: str) -> bool:
         """Tell whether an effect is large enough to be told from another way of sampling."""
@@ -386,7 +308,7 @@ class Search:
     def _problem(self, effects: Effects, release: Release) -> Problem:
         nominal = {each.name: each for each in nominal_unknowns(self.model) if not each.effect}
         shared = [  # what an effect that is gone has loosened is tight again
-            nominal.get(each.name, each) if not each.effect and not self._is_loosened(each, effects) else each
+            nominal.get(each.name, each) if not each.effect and not may_be_loose(each, effects, self.model) else each
             for each in release.shared
         ]
         return make_problem(
@@ -397,11 +319,6 @@ class Search:
             use=self.use,
             grid=self.grid or grid_for(self.model, self.records),
         )
-
-    def _is_loosened(self, shared: Shared, effects: Effects) -> bool:
-        values = {name: dict.fromkeys((p.name for p in EFFECTS[name].parameters), 0.0) for name in effects - {GRADE}}
-        line = self.model.values()
-        return any(shared.name in EFFECTS[name].described(self.model, mine, line) for name, mine in values.items())
 
     def _keep(self, hypothesis: Hypothesis) -> None:
         self.visited[hypothesis.effects] = hypothesis

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from estimator.diagnosis.hypotheses import Effects
 from estimator.diagnosis.inference.calibration import (
     ALIKE_SHARE,
     ALIKE_WITHIN,
@@ -64,12 +65,15 @@ class Grounds:
     beliefs : tuple of Belief
         Of every effect of the best set that is large enough to be told from another way of sampling.
     tests : tuple of Test
+    scores : tuple of (set of effects, float)
+        Of all plausible sets that were fitted to their end.
     """
 
     best: Hypothesis
     nothing: Hypothesis
     beliefs: tuple[Belief, ...]
     tests: tuple[Test, ...]
+    scores: tuple[tuple[Effects, float], ...]
 
 
 def tempered_by(tests: Sequence[Test], samples: int, factor: float = TEMPERED) -> float:
@@ -86,7 +90,9 @@ def grounds(search: Search) -> Grounds:
     examined = tests(best)
     tempered = tempered_by(examined, best.plain.residual.size)
     found = beliefs(best, search.visited, search.plausible, shares(search.path), tempered, ALIKE_WITHIN, ALIKE_SHARE)
-    return Grounds(best, nothing, tuple(each for each in found if search.is_resolved(best, each.name)), examined)
+    resolved = tuple(each for each in found if search.is_resolved(best, each.name))
+    scores = tuple((effects, each.score) for effects, each in search.plausible.items())
+    return Grounds(best, nothing, resolved, examined, scores)
 
 
 def decide(search: Search, with_findings: bool = False) -> Decision:
