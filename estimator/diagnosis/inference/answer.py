@@ -43,6 +43,7 @@ from estimator.diagnosis.result import (
 from estimator.diagnosis.unnamed import Hunt
 from estimator.diagnosis.where import discrepancy, locate
 from estimator.physics.effect import Element, Untestable
+from estimator.physics.fit import not_fitted
 from estimator.physics.model import DrivelineModel
 from estimator.physics.steps import from_their_moment
 from estimator.signals.record import FloatArray
@@ -165,8 +166,7 @@ def _steps_from_their_moment(search: Search, believed: Hypothesis) -> Hypothesis
         return believed
     found = fitted(
         believed.effects,
-        turned.problem,
-        turned.x,
+        not_fitted(turned.problem, turned.x),
         believed.sizes,
         believed.limits,
         len(search.names),

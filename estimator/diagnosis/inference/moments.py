@@ -14,13 +14,12 @@ from estimator.signals.record import FloatArray
 
 OFFSETS_S = np.array([0.01, 0.02, 0.04, 0.08, 0.15, 0.3, 0.6, 1.2, 2.4])
 OFFSETS_S = np.concatenate([-OFFSETS_S[::-1], OFFSETS_S])
-"""Where else the error is looked at, around the moment a fit ended at; and at the recording's own end, however far."""
-
-MOVES = 4
-"""Moves of one event in one recording before the next fit."""
+"""Where else the likelihood is looked at, around the moment a fit ended at; and at the recording's own ends."""
 
 WORTH_MOVING = 2.0
 """Fall of the squared innovations that moments elsewhere must bring."""
+
+MOVES = 2
 
 
 def moved(result: FitResult, filtered: Whitener) -> FloatArray | None:
@@ -35,7 +34,7 @@ def moved(result: FitResult, filtered: Whitener) -> FloatArray | None:
 
 def _moved_in(result: FitResult, filtered: Whitener, index: int) -> FloatArray | None:
     basis, local = result.problem.local[index], result.local_of(index).copy()
-    ends = _movable(basis)
+    ends = _ends(basis)
     if not ends:
         return None
     taken_up = _initial_state(result, filtered, index)
@@ -59,17 +58,16 @@ def _moved_in(result: FitResult, filtered: Whitener, index: int) -> FloatArray |
 
 
 def _shifted(local: FloatArray, rows: list[int], offset_s: float) -> FloatArray:
-    """Return one recording's unknowns with some moments moved."""
     x = local.copy()
     x[rows] += offset_s
     return x
 
 
-def _movable(basis: LocalBasis) -> list[tuple[int, int]]:
-    """Return where beginning and end of each event that may move stand among a recording's unknowns."""
+def _ends(basis: LocalBasis) -> list[tuple[int, int]]:
+    """Return where beginning and end of each event stand among a recording's unknowns."""
     place = {(u.effect, u.name): row for row, u in enumerate(basis.own, start=basis.own_rows.start)}
-    free = {u.effect for u in basis.own if EFFECTS[u.effect].event and u.low < u.high}
-    return [(place[effect, "from_s"], place[effect, "to_s"]) for effect in sorted(free)]
+    movable = {u.effect for u in basis.own if EFFECTS[u.effect].event and u.low < u.high}
+    return [(place[effect, "from_s"], place[effect, "to_s"]) for effect in sorted(movable)]
 
 
 def _initial_state(result: FitResult, filtered: Whitener, index: int) -> FloatArray:
