@@ -42,9 +42,12 @@ SAME_PROMISE = 0.5
 NEARLY = 0.3
 """Share of what an effect explains by which another's first few steps may be behind for it to be fitted to its end."""
 
-MOST_EFFECTS = 8
 FINISHED = 2
 """Best of these that are fitted to their end."""
+
+MOST_EFFECTS = 8
+
+EVENTS = frozenset(name for name, entry in EFFECTS.items() if entry.event)
 
 
 def never() -> bool:
@@ -190,22 +193,24 @@ class Search:
     ) -> Hypothesis | None:
         """Fit an effect on top of a hypothesis a few steps, from each of its starts; None where no value is one.
 
-        Where it takes the place of another effect, begun and weighted as the hypothesis with that one: ``instead``.
+        Where it takes the place of another effect, begun and weighted as the hypothesis with that one: ``instead``. An
+        effect that is begun elsewhere is weighted so, too.
         """
         effects = with_effect(current.effects, name)
-        if effects in self.visited:
+        is_again = instead is not None and name in instead.effects
+        if effects in self.visited and not is_again:
             return self.visited[effects]
         if self.is_over():
             self.stopped = True
             return None
         rival = instead or current
-        warm = rival.plain
+        warm = current.plain if is_again else rival.plain
         for gone in rival.effects - effects - {GRADE}:
             warm = forgetting(warm, gone)
         fits = []
         for look in looks:
             problem = self._extended(warm, effects, inheriting(name, look.release, warm))
-            begun = extended(problem, warm_start(problem, warm), rival.plain)
+            begun = extended(problem, warm_start(problem, warm), current.plain if is_again else rival.plain)
             fits.append(compared(effects, begun, rival, len(self.names)))
         best = min(fits, key=lambda each: each.score)
         loose = loosened(best, self.model)
@@ -295,6 +300,8 @@ class Search:
         base = self.without(current, name)
         alike = [other for other in self.names if other not in current.effects and are_alike(name, other)]
         looks = self._looks(base, alike, name)
+        if name in EVENTS:  # in other stretches of the recordings
+            looks[name] = promising(screen(base, self.model, self.answers).looks(name))
         rough = [self._added(base, other, looks[other], current) for other in looks]
         near = current.score + NEARLY * _gain(current, base)
         found = [each for each in rough if each is not None and each.score < near]
