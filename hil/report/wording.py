@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from types import MappingProxyType
 
 from estimator.diagnosis.result import Diagnosis, Mismatch, Verdict
@@ -11,6 +10,7 @@ from estimator.physics.effect import Element
 from estimator.physics.model import Motion, unit
 from estimator.signals.record import OutputKind
 from hil.report.numbers import shown, shown_p, shown_times
+from hil.report.sentence import listed
 
 BADGES = MappingProxyType(
     {
@@ -98,11 +98,6 @@ def headline(diagnosis: Diagnosis) -> str:
 
 def _title(name: str) -> str:
     return EFFECTS[name].title if name in EFFECTS else name.replace("_", " ")
-
-
-def listed(words: Sequence[str]) -> str:
-    """Join words as in a sentence."""
-    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
 
 def location_rows(mismatch: Mismatch) -> list[tuple[str, str]]:
