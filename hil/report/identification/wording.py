@@ -9,6 +9,7 @@ import numpy as np
 
 from estimator.identification.best import SEEN, Verdict
 from estimator.identification.modes.propagate import Uncertain
+from estimator.identification.offline.validation import Validation
 from estimator.identification.online.recursive import Status
 from estimator.identification.study import Study
 from hil.figures.local_model import LocalModel
@@ -50,7 +51,7 @@ def verdict(each: Study) -> str:
         f, period_s = best.mode.frequency_hz.value, best.fit.model.sample_time_s
         text += (
             f" {1.0 / (f * period_s):.1f} samples in a period of {f:.3g} Hz are too few for its damping: record every "
-            f"{1e3 / (10.0 * f):.2g} ms."
+            f"{1e3 / (10.0 * f):.2g} ms. A mode above {0.5 / period_s:.3g} Hz would look the same, folded down to it."
         )
     elif best.band_hz[1] < LEAST_BAND_HZ:
         text += (
@@ -136,12 +137,16 @@ def warnings(studies: Sequence[Study]) -> list[str]:
                 "from elsewhere than from the torque, and a resonance of such a model is none to believe. Raise the "
                 "PRBS or record longer."
             )
-    if missed := [each.name for each in studies if not each.validation.independence.is_independent]:
+    missed = [each.name for each in studies if not _passed(each.validation) and not _passed(each.best.validation)]
+    if missed:
         told.append(
-            f"In {listed(missed)} the output-error model's residual still depends on the input: it misses a part of "
-            "the response. The best estimate has tests of its own."
+            f"In {listed(missed)} the residual still depends on the input: the models miss a part of the response."
         )
     return told
+
+
+def _passed(validation: Validation) -> bool:
+    return validation.independence.is_independent
 
 
 def _apart(each: Study) -> float:
