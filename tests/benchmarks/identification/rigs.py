@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
+from estimator.errors import BadModel
 from estimator.identification.best import best_estimate
 from estimator.identification.identify import identify
 from estimator.identification.linear_model import LinearModel, Orders
@@ -119,25 +120,28 @@ def estimates(truth: Truth) -> dict[str, tuple[Uncertain, float]]:
     if mode is None:
         nowhere = Uncertain(float("nan"), float("nan"))
         return {"resonance": (nowhere, truth.mode.frequency_hz), "damping": (nowhere, truth.mode.damping)}
-    found = physical_parameters(fit.model, fit.covariance)
-    both = {**found.parameters, **found.sums}
-    return {
+    modal = {
         "resonance": (mode.frequency_hz, truth.mode.frequency_hz),
         "damping": (mode.damping, truth.mode.damping),
-        **{name: (both[name].estimate, value) for name, value in truth.parameters.items()},
     }
+    try:
+        found = physical_parameters(fit.model, fit.covariance)
+    except BadModel:  # refused, and not counted: no interval is printed then
+        return modal
+    both = {**found.parameters, **found.sums}
+    return modal | {name: (both[name].estimate, value) for name, value in truth.parameters.items()}
 
 
 def coverage(truths: Iterator[Truth]) -> dict[str, tuple[Rate, float, float]]:
     """Return for each estimate how often its interval held the truth, its RMS error and its median stated deviation."""
     found = [estimates(truth) for truth in truths]
     rates = {}
-    for name in found[0]:
+    for name in dict.fromkeys(name for one in found for name in one):
         pairs = [one[name] for one in found if name in one]
         held = sum(estimate.covers(value) for estimate, value in pairs)
         error = np.sqrt(np.nanmean([(estimate.value / value - 1.0) ** 2 for estimate, value in pairs]))
         said = np.nanmedian([estimate.std / value for estimate, value in pairs])
-        rates[name] = (Rate(held, len(found)), float(error), float(said))
+        rates[name] = (Rate(held, len(pairs)), float(error), float(said))
     return rates
 
 
