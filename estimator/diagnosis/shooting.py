@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimator.diagnosis.segments import sliced
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult, fit
 from estimator.physics.kernel import slots, state_vector
@@ -23,6 +22,7 @@ from estimator.physics.parallel import concurrently
 from estimator.physics.problem import Problem, case_of, own_part, start_of, start_vector
 from estimator.physics.simulate import output_state, simulate_each
 from estimator.physics.start import Start
+from estimator.signals.part import sliced
 
 PERIODS = 8
 """Periods of the line's lowest mode that a stretch has: the error is smooth over a few bounces, and each stretch must

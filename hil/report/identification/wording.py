@@ -137,6 +137,13 @@ def warnings(studies: Sequence[Study]) -> list[str]:
                 "from elsewhere than from the torque, and a resonance of such a model is none to believe. Raise the "
                 "PRBS or record longer."
             )
+    for each in studies:
+        used_s, whole_s = (x.time_s.shape[0] * x.sample_time_s for x in (each.found.offline, each.found.data))
+        if used_s < 0.99 * whole_s:
+            told.append(
+                f"{each.name}: off line the first {used_s / 60.0:.0f} of {whole_s / 60.0:.0f} min are used. Cut the "
+                "recording for another part."
+            )
     missed = [each.name for each in studies if not _passed(each.validation) and not _passed(each.best.validation)]
     if missed:
         told.append(
