@@ -212,7 +212,7 @@ class Inverter:
         self._armed = True
 
     def command(self, torque: GuardedTorque) -> None:
-        """Send one RPDO; the drive puts it into effect at the next SYNC.
+        """Send the command; the drive puts it into effect at the next SYNC.
 
         Raises
         ------
@@ -228,10 +228,10 @@ class Inverter:
         counts = self._pdos.counts(torque)
         self._frozen.commanded(counts.total, self.latest)
         self._following.commanded(counts.total)
-        self._send_rpdo(Command.ENABLE_OPERATION, counts)
+        self._send_command(Command.ENABLE_OPERATION, counts)
 
     def await_feedback(self, after_ns: int, timeout_s: float) -> InverterFeedback | None:
-        """Wait for the TPDO received after ``after_ns``, the result of `CanLink.sync` [ns].
+        """Wait for the TPDOs received after ``after_ns``, the result of `CanLink.sync` [ns].
 
         Returns
         -------
@@ -251,12 +251,12 @@ class Inverter:
             If the drive does not follow.
         """
         self._armed = False
-        self._send_rpdo(Command.QUICK_STOP)  # overwrites the RPDO still waiting for SYNC
+        self._send_command(Command.QUICK_STOP)  # overwrites the RPDO still waiting for SYNC
         self._power.quick_stop(self._go_on_stopping)
 
     def _go_on_stopping(self) -> None:
         """Repeat the command with every SYNC, or the drive would take the host for dead before its ramp is over."""
-        self._send_rpdo(Command.QUICK_STOP)
+        self._send_command(Command.QUICK_STOP)
         self._link.sync()
 
     def prove_stop(self, period_s: float) -> tuple[Difference, ...]:
@@ -285,7 +285,7 @@ class Inverter:
             self._power,
             self._monitor,
             self.configure,
-            lambda: self._send_rpdo(Command.SHUTDOWN),
+            lambda: self._send_command(Command.SHUTDOWN),
         )
         differences = tuple(proof.run(self._given, period_s))
         self._proof = proof.seen
@@ -305,7 +305,7 @@ class Inverter:
         self._armed = False
         errors = _try_all(
             # Overwrites the RPDO still waiting for SYNC: it would enable the drive again.
-            lambda: self._send_rpdo(Command.DISABLE_VOLTAGE),
+            lambda: self._send_command(Command.DISABLE_VOLTAGE),
             self._power.zero_targets,
             self._power.disable_voltage,
         )
@@ -382,7 +382,8 @@ class Inverter:
 
     def _subscribe_feedback(self) -> FeedbackReceiver:
         receiver = self._pdos.receiver()
-        self._link.subscribe(self._pdos.feedback.layout.cob_id, receiver.on_frame)
+        for cob_id, take in receiver.subscriptions:
+            self._link.subscribe(cob_id, take)
         return receiver
 
     def _subscribe_monitor(self) -> NodeMonitor:
@@ -394,8 +395,9 @@ class Inverter:
     def _send_nmt(self, command: NmtCommand) -> None:
         self._link.send(NMT_COB_ID, nmt_frame(command, self.settings.node_id))
 
-    def _send_rpdo(self, command: Command, counts: TorqueCounts = NO_TORQUE) -> None:
-        self._link.send(self._pdos.command.layout.cob_id, self._pdos.pack(command, counts))
+    def _send_command(self, command: Command, counts: TorqueCounts = NO_TORQUE) -> None:
+        for cob_id, data in self._pdos.frames(command, counts):
+            self._link.send(cob_id, data)
 
 
 def _try_all(*steps: Callable[[], None]) -> list[DriverError]:

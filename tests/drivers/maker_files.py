@@ -228,6 +228,39 @@ FIXED = COMPLETE.having(
 )
 """A mapping that is right and can't be changed; the TPDO described as it is wanted."""
 
+
+def fixed(*entries: str) -> Described:
+    """Mapping parameter that can't be written."""
+    return {0: Entry(U8, "const", str(len(entries)))} | {n: Entry(U32, "const", e) for n, e in enumerate(entries, 1)}
+
+
+PREDEFINED = COMPLETE.but(0x1400, 0x1600, 0x60B2).having(
+    {
+        **pdos(0x1401, pdo("$NODEID+0x300", "255"), pdo("$NODEID+0x400", "255"), pdo("$NODEID+0x80000000", "255")),
+        0x1601: fixed("0x60400010", "0x60600008"),
+        0x1602: fixed("0x60400010", "0x60FF0020"),
+        0x1603: fixed("0x60400010", "0x60710010"),
+        **pdos(0x1800, *(pdo(f"$NODEID+0x{base:X}", "255") for base in (0x180, 0x280, 0x380, 0x80000480))),
+        0x1A00: fixed("0x60410010"),
+        0x1A01: fixed("0x60410010", "0x60610008"),
+        0x1A02: fixed("0x60410010", "0x606C0020"),
+        0x1A03: fixed("0x60410010", "0x60770010"),
+    }
+)
+"""CiA 402's own PDOs, mapped for good: the feedback is in two, and the TPDO of the torque is off."""
+
+APART = PREDEFINED.having(
+    {
+        **pdos(0x1403, pdo("$NODEID+0x500", "1"), pdo("0x80000000", "255")),
+        0x1603: fixed("0x60400010", "0x60600008"),
+        0x1604: fixed("0x60710010"),
+        0x1A00: fixed("0x60410010", "0x60640020"),
+        0x1A02: fixed("0x606C0020"),
+        0x1A03: fixed("0x60770010"),
+    }
+)
+"""Command in two RPDOs, one above the fourth without an identifier; feedback in three TPDOs."""
+
 SHOUTING = COMPLETE.but(habit=lambda text: text.upper().replace("0X", "0x"))
 """All in capitals."""
 
@@ -242,5 +275,7 @@ MAKERS: dict[str, Maker] = {
     "yiyou": YIYOU,
     "e35": E35,
     "fixed mapping": FIXED,
+    "pre-defined PDOs": PREDEFINED,
+    "each value apart": APART,
     "capitals": SHOUTING,
 }

@@ -249,7 +249,7 @@ def test_no_pdo_that_carries_what_is_needed(tmp_path: Path, mapping: str) -> Non
     locked = edited(f"{mapping}sub1", "AccessType=rw", "AccessType=ro", text=text)
     errors = [each for each in checked(tmp_path, locked).findings if each.severity is E]
     (finding,) = (each for each in errors if each.place == f"[{mapping}]")
-    assert "that maps 0x60" in finding.expected
+    assert "that map 0x60" in finding.expected
     assert "0x6078:00 (16 bit)" in finding.found
     assert f"0x{mapping}:01 can not be written" in finding.found
 

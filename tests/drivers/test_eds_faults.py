@@ -122,7 +122,7 @@ EDITS = [
         "1400sub1",
         "$NODEID+0x200",
         "$NODEID+0x600",
-        E,
+        W,
         "DefaultValue",
         "an identifier a PDO may have",
         "0x67F for node 127",

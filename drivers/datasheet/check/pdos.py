@@ -5,14 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from drivers.canopen.pdo_map import COB_ID_EXTENDED, COB_ID_INVALID, MAX_MAPPED, MAX_PDO_BYTES, MappedObject
-from drivers.capability.carrier import FILLERS, PDO_NUMBERS, RESERVED_COB_IDS, RPDO, TPDO, Direction
+from drivers.capability.carrier import FILLERS, MULTIPLEX, PDO_NUMBERS, RPDO, TPDO, Direction, is_reserved
 from drivers.datasheet.check.context import EdsContext, at_key, at_section, hexadecimal
 from drivers.datasheet.finding import EdsFinding, Severity
 from drivers.datasheet.number import read_number
 from drivers.datasheet.objects import EdsEntry, EdsObject
-
-MULTIPLEX = (0xFE, 0xFF)
-"""Numbers of mapped objects that stand for a multiplexed PDO (CiA 301, 7.5.2.36)."""
 
 _DIRECTIONS = ((RPDO, "NrOfRXPDO"), (TPDO, "NrOfTXPDO"))
 """Each direction, and the key of DeviceInfo that counts its PDOs."""
@@ -60,7 +57,7 @@ def _cob_id(context: EdsContext, communication: int) -> Iterator[EdsFinding]:
     if value & COB_ID_EXTENDED and (switched_on or used):
         expected = "an identifier of 11 bits (bit 29 clear)"
         yield at_key(severity, entry.section, entry.value_key, expected, "", "Give the PDO one.")
-    elif switched_on and any(value & 0x7FF in taken for taken in RESERVED_COB_IDS):
+    elif switched_on and is_reserved(value & 0x7FF):
         expected = "an identifier a PDO may have, such as 0x181 to 0x57F (CiA 301)"
         found = f"0x{value & 0x7FF:03X} for node {context.node_id} from"
         yield at_key(severity, entry.section, entry.value_key, expected, found, "Give the PDO another.")
