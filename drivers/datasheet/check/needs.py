@@ -20,10 +20,9 @@ from drivers.inverter.drive_settings import (
 )
 
 DEVICE_TYPE = 0x1000
-ERROR_REGISTER = 0x1001
 DRIVE_PROFILE = 402
 
-ALWAYS_USED = frozenset({DEVICE_TYPE, ERROR_REGISTER, *(index for index, _ in GUARDING)})
+ALWAYS_USED = frozenset(index for index, _ in GUARDING)
 """What counts of every drive, beside what the plan uses."""
 
 

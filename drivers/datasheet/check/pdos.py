@@ -11,6 +11,8 @@ from drivers.datasheet.finding import EdsFinding, Severity
 from drivers.datasheet.number import read_number
 from drivers.datasheet.objects import EdsEntry, EdsObject
 
+_AS_MAPPED = "The maker's own mapping counts."
+
 _DIRECTIONS = ((RPDO, "NrOfRXPDO"), (TPDO, "NrOfTXPDO"))
 """Each direction, and the key of DeviceInfo that counts its PDOs."""
 
@@ -109,10 +111,10 @@ def _mapped(
         yield at_key(severity, entry.section, entry.value_key, expected, found, advice)
     if not target.mappable:
         expected = f"an object with PDOMapping=1; {name} ({line}) has not"
-        yield at_key(severity, entry.section, entry.value_key, expected, "", advice)
+        yield at_key(Severity.WARNING, entry.section, entry.value_key, expected, "", f"{advice} {_AS_MAPPED}")
     if target.access is not None and target.access not in direction.access:
         expected = f"an object a {direction.name} may carry; {name} ({line}) has AccessType {target.access}"
-        yield at_key(severity, entry.section, entry.value_key, expected, "", advice)
+        yield at_key(Severity.WARNING, entry.section, entry.value_key, expected, "", f"{advice} {_AS_MAPPED}")
 
 
 def _dummy(
@@ -128,6 +130,7 @@ def _dummy(
 
 def _same_cob_ids(context: EdsContext) -> Iterator[EdsFinding]:
     seen: dict[int, EdsEntry] = {}
+    given = {carrier.layout.communication_index: carrier.layout.cob_id for carrier in context.plan.carriers}
     for direction, _ in _DIRECTIONS:
         for n in PDO_NUMBERS:
             entry = context.entry(direction.communication + n, 1)
@@ -136,7 +139,8 @@ def _same_cob_ids(context: EdsContext) -> Iterator[EdsFinding]:
                 continue
             first = seen.setdefault(value & 0x7FF, entry)
             if first is not entry:
-                severity = context.severity(entry.index)
+                both = {given.get(each.index) for each in (first, entry)}  # in a run; a third PDO is switched off
+                severity = Severity.ERROR if len(both) == 1 and None not in both else Severity.WARNING
                 expected = f"another identifier than {hexadecimal(first.index)} (line {first.section.line})"
                 yield at_key(
                     severity, entry.section, entry.value_key, expected, "", "Switch one off, or give it another."
