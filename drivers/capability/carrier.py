@@ -229,7 +229,7 @@ def map_here(
         raise Unusable(f"more than {MAX_PDO_BYTES} bytes for {', '.join(map(str, objects))}")
     for n in range(len(objects) + 1):
         entry = sheet.entry(mapping, n)
-        if entry is None or not entry.writable:
+        if entry is None or not entry.settable:
             raise Unusable(f"0x{mapping:04X}:{n:02X} {'is not there' if entry is None else 'can not be written'}")
     try:
         described = _described(sheet, direction, number)
@@ -264,6 +264,9 @@ def _carrier(
     entries = {place: sheet.entry(*place) for place in places}
     for place, entry in entries.items():
         _require_type(entry, place, communication)
+    unread = [place for place, entry in entries.items() if entry is not None and not entry.readable]
+    if unread:
+        raise Unusable(f"0x{unread[0][0]:04X}:{unread[0][1]:02X} can not be read")
     fixed = frozenset(place for place, entry in entries.items() if entry is None or not entry.writable)
     cob_id = cob_id_of(sheet, direction, number, taken)
     if cob_id is None or cob_id in taken:

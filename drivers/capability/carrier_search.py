@@ -78,7 +78,7 @@ def strangers(sheet: DataSheet, carriers: Sequence[Carrier]) -> Iterator[int]:
         for number in _numbers(sheet, direction):
             index = direction.communication + number
             entry, value = sheet.entry(index, 1), sheet.value(index, 1)
-            if index in used or entry is None or value is None or value & COB_ID_INVALID or not entry.writable:
+            if index in used or entry is None or value is None or value & COB_ID_INVALID or not entry.settable:
                 continue
             of_another = direction is TPDO and value & 0x7FF != cob_id_of(sheet, direction, number)
             if of_another or value & 0x7FF in taken:
@@ -167,7 +167,7 @@ def _held(sheet: DataSheet, direction: Direction, but: int) -> set[int]:
         for number in _numbers(sheet, each)
         if (each, number) != (direction, but)
         and (entry := sheet.entry(each.communication + number, 1)) is not None
-        and not entry.writable
+        and not entry.settable
         and (value := entry.value(sheet.node_id)) is not None
         and not value & COB_ID_INVALID
     }

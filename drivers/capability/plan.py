@@ -138,9 +138,12 @@ def _deadline(sheet: DataSheet, ability: Ability, command: CarrierSearch) -> Abi
         return ability
     entry = sheet.entry(index, EVENT_TIMER)
     there = (
-        entry is not None and entry.writable and entry.kind is not None and entry.kind.code == IntegerType.UNSIGNED16
+        entry is not None and entry.settable and entry.kind is not None and entry.kind.code == IntegerType.UNSIGNED16
     )
-    return replace(ability, parts=(Part(index, EVENT_TIMER, (IntegerType.UNSIGNED16,), written=True),) if there else ())
+    return replace(
+        ability,
+        parts=(Part(index, EVENT_TIMER, (IntegerType.UNSIGNED16,), written=True, read_back=True),) if there else (),
+    )
 
 
 def _lacking(ability: Ability) -> str:

@@ -152,7 +152,7 @@ EDITS = [
         "AccessType=ro",
         E,
         "AccessType",
-        "can be written for producer heartbeat time 0x1017:00",
+        "can be written and read for producer heartbeat time 0x1017:00",
         "'ro'",
     ),
     Fault(
