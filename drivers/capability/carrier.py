@@ -230,7 +230,8 @@ def map_here(
     for n in range(len(objects) + 1):
         entry = sheet.entry(mapping, n)
         if entry is None or not entry.settable:
-            raise Unusable(f"0x{mapping:04X}:{n:02X} {'is not there' if entry is None else 'can not be written'}")
+            lacking = "is not there" if entry is None else f"can not be {'read' if entry.writable else 'written'}"
+            raise Unusable(f"0x{mapping:04X}:{n:02X} {lacking}")
     try:
         described = _described(sheet, direction, number)
     except Unusable:
