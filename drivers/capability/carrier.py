@@ -13,6 +13,7 @@ from typing import Final
 
 from drivers.canopen.pdo_map import (
     COB_ID_EXTENDED,
+    COB_ID_NO_RTR,
     MAX_MAPPED,
     MAX_PDO_BYTES,
     RPDO_COMMUNICATION,
@@ -123,9 +124,8 @@ class Carrier:
 
     @property
     def mapping_is_fixed(self) -> bool:
-        """Whether the mapping can't be written, or the PDO not be switched off for it, as CiA 301 wants it."""
-        switched = (self.layout.communication_index, 1) not in self.fixed
-        return not switched or any(index == self.layout.mapping_index for index, _ in self.fixed)
+        """Whether the mapping can't be written."""
+        return any(index == self.layout.mapping_index for index, _ in self.fixed)
 
     def written(self, index: int, subindex: int) -> bool:
         """Whether an entry of its parameters is written when it is configured."""
@@ -272,10 +272,7 @@ def _carrier(
     cob_id = cob_id_of(sheet, direction, number, taken)
     if cob_id is None or cob_id in taken:
         raise Unusable(f"no identifier in 0x{communication:04X}:01, and no free one in the pre-defined connection set")
-    if mapped_here and (communication, 1) in fixed:
-        raise Unusable(f"0x{communication:04X}:01 can not be written, to switch it off while it is mapped")
-    held = described is not None and described.valid and not described.extended and described.cob_id == cob_id
-    if (communication, 1) in fixed and not held:
+    if (communication, 1) in fixed and sheet.value(communication, 1) not in (cob_id, cob_id | COB_ID_NO_RTR):
         raise Unusable(f"0x{communication:04X}:01 can not be written and has not COB-ID 0x{cob_id:03X}, switched on")
     layout = PdoLayout(
         communication,

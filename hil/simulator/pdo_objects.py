@@ -86,7 +86,9 @@ class PdoObjects:
                 raise ObjectRefused(VALUE_RANGE_EXCEEDED)
 
     def _check_mapping(self, direction: Direction, communication: int, mapping: int, subindex: int, value: int) -> None:
-        if not self._read(communication, 1) & COB_ID_INVALID:
+        cob_id = self._eds.sheet.entry(communication, 1)
+        can_be_switched_off = cob_id is not None and cob_id.writable  # else the number of objects, 0, does it
+        if can_be_switched_off and not self._read(communication, 1) & COB_ID_INVALID:
             raise ObjectRefused(WRONG_DEVICE_STATE)
         if subindex == 0:
             self._check_length(mapping, value)

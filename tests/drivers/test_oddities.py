@@ -21,6 +21,9 @@ def without_sections(pattern: str) -> Maker:
     return COMPLETE.but(habit=lambda text: re.sub(rf"(?ms)^\[({pattern})\]\n.*?(?=^\[)", "", text))
 
 
+FOR_GOOD = {0: Entry(U8, "ro", "2"), 1: Entry(U32, "const", "$NODEID+0x200"), 2: Entry(U8, default="255")}
+"""Communication parameter whose identifier can't be written, as in Elmo SimplIQ drives."""
+
 USABLE = {
     "spaces in formulas": COMPLETE.but(habit=lambda text: text.replace("$NODEID+", "$NODEID + ")),
     "commands that can only be written": COMPLETE.having(
@@ -46,17 +49,22 @@ USABLE = {
     "identifiers of 29 bits, all the same": COMPLETE.having(
         {**pdos(0x1400, pdo("0x20000201", "255")), **pdos(0x1800, pdo("0x20000201", "255"))}
     ).but(0x1401, 0x1601, 0x1801, 0x1A01),
+    "identifiers for good, and a blank mapping": COMPLETE.having(
+        {
+            0x1400: FOR_GOOD,
+            0x1800: FOR_GOOD | {1: Entry(U32, "ro", "$NODEID+0x40000180")},
+            0x1A00: {n: Entry(U32 if n else U8) for n in range(9)},
+        }
+    ),
     "no identifier, by the node id": COMPLETE.having(
         {**pdos(0x1400, pdo("$NODEID+0x80000000", "255")), **pdos(0x1800, pdo("$NODEID+0x80000000", "255"))}
     ),
 }
 
-FOR_GOOD = {0: Entry(U8, "ro", "2"), 1: Entry(U32, "const", "$NODEID+0x200"), 2: Entry(U8, default="255")}
-
 REFUSED = {
-    "mapping of a PDO that can't be switched off": (
-        COMPLETE.having({0x1400: FOR_GOOD}).but(0x1401, 0x1601),
-        "0x1400:01 can not be written, to switch it off",
+    "identifier of another node for good": (
+        COMPLETE.having({0x1400: FOR_GOOD | {1: Entry(U32, "const", "0x201")}}).but(0x1401, 0x1601),
+        "0x1400:01 can not be written and has not COB-ID 0x27F",
     ),
     "fixed command with a speed": (
         COMPLETE.having({0x1600: fixed("0x60400010", "0x60710010", "0x60FF0020")}).but(0x1401, 0x1601),
