@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
+
+PLACEHOLDERS: Final = ("NAME", "REASON")
+"""Of name and reason, in a line to be filled in."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,4 +30,11 @@ class Acceptance:
 
 def acceptance_line(name: str) -> str:
     """Write the line of the rig file that accepts what is missing, to be filled in."""
-    return f'accepted.{name} = {{ by = "NAME", why = "REASON" }}'
+    by, why = PLACEHOLDERS
+    return f'accepted.{name} = {{ by = "{by}", why = "{why}" }}'
+
+
+def is_filled_in(text: str) -> bool:
+    """Whether a person has written something: not blank or dots, and not what stands in the line to be filled in."""
+    words = text.strip(" .<>\"'").upper()
+    return any(map(str.isalnum, words)) and words not in PLACEHOLDERS

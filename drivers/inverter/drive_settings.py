@@ -136,7 +136,7 @@ def _no_sync_counter(plan: DrivePlan) -> Iterator[DriveSetting]:
     entry = plan.sheet.entry(SYNC_COUNTER_OVERFLOW)
     if entry is None:
         return
-    if entry.writable:
+    if entry.settable:
         yield DriveSetting(SYNC_COUNTER_OVERFLOW, 0, "SYNC counter overflow", 0, THIS_PROGRAM)
     elif value := plan.sheet.value(SYNC_COUNTER_OVERFLOW):
         raise ConfigMismatch(
@@ -158,7 +158,7 @@ def _no_node_guarding(plan: DrivePlan) -> Iterator[DriveSetting]:
     entries = [(plan.sheet.entry(index), name) for index, name in GUARDING]
     if all(entry is not None for entry, _ in entries):
         for entry, name in entries:
-            if entry is not None and entry.writable:
+            if entry is not None and entry.settable:
                 yield DriveSetting(entry.index, 0, f"{name} (heartbeat instead)", 0, THIS_PROGRAM)
 
 

@@ -32,7 +32,7 @@ TimeOut = Annotated[float, Field(ge=0.05, le=60.0)]
 
 
 class OptionCodesTable(Table):
-    """What the drive does by itself when something ends, where it is not to be the EDS's (CiA 402-2)."""
+    """What the drive does by itself when something ends (CiA 402-2): a DCF's choice or its own, unless given here."""
 
     abort_connection: Annotated[int, Field(ge=1, le=3)] | None = None
     quick_stop: OptionCode | None = None

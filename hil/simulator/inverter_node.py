@@ -41,6 +41,7 @@ _CONSUMER_HEARTBEAT_TIME = (0x1016, 1)
 _PRODUCER_HEARTBEAT_TIME = 0x1017
 _ERROR_BEHAVIOUR = (0x1029, 1)
 _EMCY_COB_ID = 0x1014
+MAX_TORQUE = 0x6072
 _PDO_LENGTH_ERROR = 0x8210
 """Error code of CiA 301."""
 
@@ -165,7 +166,10 @@ class InverterNode:
     def _defaults(self) -> dict[int, int]:
         """Power-on values of what the device holds, from the EDS where it has them."""
         described = {index: self._eds.sheet.value(index) for index in (*PARAMETERS, 0x6502)}
-        return {**PARAMETERS, **{index: value for index, value in described.items() if value is not None}}
+        known = {index: value for index, value in described.items() if value is not None}
+        if not known.get(MAX_TORQUE):
+            known.pop(MAX_TORQUE, None)  # a place left free: no drive is made to give no torque
+        return {**PARAMETERS, **known}
 
     def _velocity(self, settings: SimulatedInverter) -> VelocityScale:
         """Scale of its speed: its EDS's, else what the rig file states of it."""

@@ -80,7 +80,7 @@ def test_the_library_alone_would_lose_every_sub_index() -> None:
 def test_pdo_2_carries_torque_and_feedback() -> None:
     eds = EdsFile(OTHER_EDS, 11)
     plan = plan_drive(eds.sheet)
-    rpdo, tpdo = plan.carrier(RPDO).layout, plan.carrier(TPDO).layout
+    rpdo, tpdo = plan.pdos(RPDO)[0].layout, plan.pdos(TPDO)[0].layout
     assert (rpdo.communication_index, rpdo.cob_id) == (0x1401, 0x300 + 11)
     assert (tpdo.communication_index, tpdo.cob_id) == (0x1801, 0x280 + 11)
 

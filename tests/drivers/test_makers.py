@@ -17,6 +17,7 @@ from drivers.errors import ConfigMismatch
 from drivers.inverter.inverter import Inverter
 from hil.cli.main import run as command
 from hil.config.rig_file import read_rig
+from hil.errors import RigFileError
 from hil.rig.build import inverter_settings, open_devices
 from tests.benchmarks.data_sheets import RAN, REFUSED, maker_files, mutant_verdicts, verdict
 from tests.drivers.maker_files import COMPLETE, MAKERS, U8, U32, Entry, Maker, pdo, pdos
@@ -80,9 +81,12 @@ def test_commands_of_a_new_user(tmp_path: Path, capsys: pytest.CaptureFixture[st
     text = usual.read_text().replace("heartbeat_ms = 100", 'heartbeat_ms = 100\neds = "drive.eds"')
     text = text.replace('eds = "drive.eds"', "\n".join(('eds = "drive.eds"', *pasted)))
     usual.write_text(text)
+    with pytest.raises(RigFileError, match=r"accepted.heartbeat_consumer.by \| expected .* nobody has filled it in"):
+        read_rig(usual)
+    usual.write_text(text.replace('"NAME"', '"A. Nyone"').replace('"REASON"', '"a relay of its own"'))
     accepted = read_rig(usual).inverters.m1.accepted.by_name
     assert set(accepted) == {"supported_modes", "heartbeat_consumer", "rpdo_deadline"}
-    assert str(accepted["rpdo_deadline"]) == "accepted by NAME: REASON"
+    assert str(accepted["rpdo_deadline"]) == "accepted by A. Nyone: a relay of its own"
 
 
 def test_on_a_vehicle_guesses_are_comments(tmp_path: Path) -> None:
@@ -133,7 +137,7 @@ def test_what_is_by_the_node_id_holds_for_every_node(tmp_path: Path) -> None:
     for node_id in (1, 2):
         sheet = EdsFile(path, node_id).sheet
         assert sheet.value(0x1014) == 0x80 + node_id
-        assert plan_drive(sheet).carrier(RPDO).layout.cob_id == 0x200 + node_id
+        assert plan_drive(sheet).pdos(RPDO)[0].layout.cob_id == 0x200 + node_id
         assert sheet.value(0x1400, 2) == 1
 
 
@@ -182,7 +186,7 @@ def test_heartbeat_that_is_there_for_good_counts(tmp_path: Path) -> None:
 def test_mapping_with_little_room_carries_the_sum(room: int, tmp_path: Path) -> None:
     narrow = COMPLETE.having(pdos(0x1400, pdo("$NODEID+0x200", "255", "0x60400010", room=room))).but(0x1401, 0x1601)
     path = written(narrow, tmp_path)
-    objects = plan_drive(EdsFile(path, 1).sheet).carrier(RPDO).layout.objects
+    objects = plan_drive(EdsFile(path, 1).sheet).pdos(RPDO)[0].layout.objects
     assert [mapped.index for mapped in objects] == [0x6040, 0x6071, 0x60B2][:room]
     assert drive(path, tmp_path, SHORT).flagged == 0
 

@@ -113,7 +113,7 @@ def test_drive_that_stops_by_itself_without_a_deadline_is_told(tmp_path: Path) -
     with bench(settings=settings, simulated=replace(SIMULATED_M1, eds_path=eds)) as rig:
         node = rig.rig._m1
         assert node is not None
-        rig.m1._send_rpdo = lambda command: node._device.fail(0xFF01)  # type: ignore[assignment]
+        rig.m1._send_command = lambda command: node._device.fail(0xFF01)  # type: ignore[assignment]
         assert rig.m1.prove_stop(PERIOD_S) == ()
         [own] = [each for each in rig.m1.protections() if each.name == "drive_watchdog"]
     assert own.proof.startswith("proven without commands and SYNC:")
