@@ -12,18 +12,21 @@ class Silence:
     """The time since the last heartbeat of one node. Time is passed in; nothing here reads a clock.
 
     Overdue at one look is not enough: a program that was held up, or suspended, finds every heartbeat overdue and
-    those that came meanwhile unread. A heartbeat has ended where it is overdue still `GRACE_NS` after it was found so.
+    those that came meanwhile unread. A heartbeat has ended where it is still overdue ``grace_ns`` after it was found.
 
     Parameters
     ----------
     timeout_ns
         Longest time between two heartbeats [ns].
+    grace_ns
+        What is left for reading what came while the listener stood still [ns].
     """
 
-    __slots__ = ("_found_ns", "_last_ns", "_timeout_ns")
+    __slots__ = ("_found_ns", "_grace_ns", "_last_ns", "_timeout_ns")
 
-    def __init__(self, timeout_ns: int) -> None:
+    def __init__(self, timeout_ns: int, grace_ns: int = GRACE_NS) -> None:
         self._timeout_ns = timeout_ns
+        self._grace_ns = grace_ns
         self._last_ns: int | None = None
         self._found_ns: int | None = None
 
@@ -46,4 +49,4 @@ class Silence:
             return False
         if self._found_ns is None:
             self._found_ns = now_ns
-        return now_ns - self._found_ns >= GRACE_NS
+        return now_ns - self._found_ns >= self._grace_ns

@@ -77,6 +77,11 @@ class FeedbackReceiver:
         self._started = False
         self.latest: InverterFeedback | None = None
 
+    @property
+    def received(self) -> int:
+        """How many TPDOs have been taken; it never starts anew."""
+        return self._sequence
+
     def on_frame(self, data: bytes, t_ns: int) -> None:
         """Take one TPDO; before `start_anew` its mapping is unknown, and it is left alone.
 
