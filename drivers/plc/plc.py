@@ -190,16 +190,17 @@ class Plc:
             await asyncio.sleep(POLL_S)
 
     async def keep_beating(self, goes_on: Callable[[], bool]) -> None:
-        """Beat every `BEAT_EVERY_S` as long as ``goes_on`` says so; a beat under way is never broken off.
+        """Beat every `BEAT_EVERY_S` as long as ``goes_on`` says so, once at least; no beat is broken off.
 
         Raises
         ------
         BusDown, DeviceTimeout, ProtocolViolation, DeviceFault
             If a beat can't be written, or is not seen.
         """
+        await self.beat()
         while goes_on():
-            await self.beat()
             await asyncio.sleep(BEAT_EVERY_S)
+            await self.beat()
 
     async def read_status(self) -> PlcStatus:
         """Read everything the PLC reports.
