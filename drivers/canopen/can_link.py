@@ -194,6 +194,11 @@ class CanLink:
         else:
             self._producer = HeartbeatProducer(self.send, node_id, period_s, lambda: NmtState.OPERATIONAL)
 
+    def beat(self) -> None:
+        """Send one heartbeat of the host now: a consumer watches from the first it hears (CiA 301, object 1016h)."""
+        if self._producer is not None:
+            self._producer.beat()
+
     def stop_heartbeat(self) -> None:
         """Send no heartbeat any more, until `produce_heartbeat`; drives then take the host for dead."""
         if self._producer is not None:

@@ -131,6 +131,10 @@ class HeartbeatProducer:
                 return
             self._stop.wait(self.period_s)
 
+    def beat(self) -> None:
+        """Send one now, beside those of the period."""
+        self._send(self._cob_id, bytes((self._state(),)))
+
     def stop(self) -> None:
         """End the thread; no heartbeat is sent after this returns."""
         self._stop.set()

@@ -203,6 +203,7 @@ class Inverter:
         self._link.produce_heartbeat(self.settings.host_heartbeat_s, self.settings.host_node_id)
         for setting in self._given:
             self._sdo.download_confirmed(setting.index, setting.subindex, setting.value)
+        self._link.beat()  # the drive watches its host from now on, and not from some later heartbeat
         self._feedback.start_anew()
         self._monitor.forget_lost_host()
         self._monitor.await_state(

@@ -16,6 +16,9 @@ NS_PER_MS = 1_000_000
 GRACE_NS = 40 * NS_PER_MS
 """What this program, which is no drive, leaves for reading heartbeats that came while it was held up itself [ns]."""
 
+LONGEST_LOOK_NS = 15 * NS_PER_MS
+"""It looks every 10 ms: a longer time between two looks is one in which it was held up."""
+
 
 class HeartbeatConsumer:
     """Watches one heartbeat, from the first that comes; off by default.
@@ -33,7 +36,7 @@ class HeartbeatConsumer:
     def __init__(self, node_id: int = 0, timeout_ms: int = 0) -> None:
         self.cob_id = HEARTBEAT_COB_ID + node_id
         self._watches = timeout_ms > 0
-        self._silence = Silence(timeout_ms * NS_PER_MS, GRACE_NS)
+        self._silence = Silence(timeout_ms * NS_PER_MS, GRACE_NS, LONGEST_LOOK_NS)
 
     @classmethod
     def from_object(cls, value: int) -> Self:
