@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable
 
@@ -140,6 +141,7 @@ def test_short_and_seldom_is_no_fault_often_is() -> None:
 
 def test_a_drive_that_says_it_is_limited_may_give_less_and_no_more() -> None:
     assert compare([0.0] * 50, limited=True) is None
+    assert compare([-30.0] * 50, limited=True) is None
     assert compare([131.0] * 50, limited=True) == FAULT_AT - 1
     assert compare([-31.0] * 50, limited=True) == FAULT_AT - 1
 
@@ -194,3 +196,81 @@ def test_a_torque_nobody_asked_for_is_noticed_before_the_guard_is_enabled() -> N
     guard.check(TorqueRequest(0.0, 0.0, 0.0, 0.0), 0, FRESH)
     with pytest.raises(WrongTorque, match="expected 0 Nm as commanded"):
         guard.compare(0, Measured(51.0), Measured(0.0))
+
+
+def run_of(held: list[int], limits: ErrorLimits = LIMITS) -> int | None:
+    """Let a drive turn a square of 100 Nm round whose levels are held for so many cycles; samples until the fault."""
+    error = TorqueError(limits, PERIOD_S)
+    levels = [100.0 * (-1) ** k for k, length in enumerate(held) for _ in range(length)]
+    for cycle, level_nm in enumerate(levels):
+        error.commanded(level_nm, 0.0)
+        try:
+            error.compare(cycle * PERIOD_NS, Measured(-level_nm), Measured(0.0))
+        except WrongTorque:
+            return cycle + 1
+    return None
+
+
+def test_both_ways_of_sampling_have_to_fail_one_of_them_for_half_the_time() -> None:
+    """Levels of two cycles fail the first way alone, by one sample in two; the third cycle of a level fails both."""
+    most = round(LIMITS.time_s / PERIOD_S)
+    assert most == 12
+    assert run_of([2] * 200) is None
+    assert run_of([2] * 12 + [3] * 20) == 2 * 12 + 3 * (most // 2)
+
+
+def test_what_is_as_old_as_the_window_counts_no_more() -> None:
+    limits = ErrorLimits(30.0, 30.0, 1000.0, time_s=0.05, response_s=0.01)  # five samples within 125 ms
+    for last_ms, is_fault in ((124, True), (125, False)):
+        error = TorqueError(limits, PERIOD_S)
+        error.commanded(0.0, 0.0)
+        for t_ms in (0, 10, 20, 30):
+            error.compare(t_ms * MS, Measured(100.0), Measured(0.0))
+        if is_fault:
+            with pytest.raises(WrongTorque):
+                error.compare(last_ms * MS, Measured(100.0), Measured(0.0))
+        else:
+            error.compare(last_ms * MS, Measured(100.0), Measured(0.0))
+
+
+@pytest.mark.parametrize(("response_s", "late", "is_fault"), [(0.03, 4, False), (0.03, 6, True), (0.004, 2, False)])
+def test_a_drive_may_take_its_response_time_and_no_longer(response_s: float, late: int, is_fault: bool) -> None:
+    """A square of 100 Nm whose levels are held for seven cycles, followed so many cycles late."""
+    error = TorqueError(ErrorLimits(30.0, 30.0, 1000.0, 0.12, response_s), PERIOD_S)
+    course = [100.0 * (-1) ** (k // 7) for k in range(300)]
+
+    def follow() -> None:
+        for cycle, level_nm in enumerate(course):
+            error.commanded(level_nm, 0.0)
+            error.compare(cycle * PERIOD_NS, Measured(course[max(0, cycle - late)]), Measured(0.0))
+
+    if is_fault:
+        with pytest.raises(WrongTorque):
+            follow()
+    else:
+        follow()
+
+
+@pytest.mark.parametrize("old", ["m1", "m2"])
+def test_one_old_reading_makes_the_sum_an_old_one(old: str) -> None:
+    error = TorqueError(ErrorLimits(1000.0, 1000.0, 30.0, 0.12, 0.01), PERIOD_S)
+    for cycle in range(200):
+        error.commanded(60.0 * (-1) ** (cycle // 2), 0.0)
+        error.compare(cycle * PERIOD_NS, Measured(200.0, repeated=old == "m1"), Measured(200.0, repeated=old == "m2"))
+
+
+def test_the_message_has_the_commands_of_a_drive_that_samples_at_once() -> None:
+    error = TorqueError(ErrorLimits(30.0, 1000.0, 1000.0, 0.12, 0.01), PERIOD_S)
+
+    def ramp_up() -> None:
+        for cycle in range(20):
+            error.commanded(10.0 * cycle, 0.0)
+            error.compare(cycle * PERIOD_NS, Measured(500.0), Measured(0.0))
+
+    with pytest.raises(WrongTorque, match=r"is 500 Nm, expected 100 to 110 Nm as commanded, within 30 Nm"):
+        ramp_up()
+
+
+def test_a_reading_can_t_be_changed() -> None:
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        Measured(1.0).torque_nm = 2.0  # type: ignore[misc]

@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from drivers import torque_guard
 from drivers.errors import CommandRefused, ConfigMismatch
 from drivers.torque_guard import (
     ROUNDING_NM,
@@ -18,6 +19,7 @@ from drivers.torque_guard import (
     Evidence,
     GuardedTorque,
     GuardLimits,
+    Measured,
     TorqueGuard,
     TorqueRequest,
 )
@@ -318,6 +320,13 @@ def test_limits_and_requests_can_t_be_changed_afterwards() -> None:
         guard.limits = LIMITS  # type: ignore[misc]
     with pytest.raises(dataclasses.FrozenInstanceError):
         HOLD.base_m1_nm = 9999.0  # type: ignore[misc]
+
+
+@pytest.mark.parametrize(
+    "kind", [GuardLimits, ErrorLimits, Evidence, TorqueRequest, GuardedTorque, Measured, torque_guard._Past]
+)
+def test_what_the_guard_judges_by_can_t_be_changed(kind: type) -> None:
+    assert kind.__dataclass_params__.frozen
 
 
 def boundary_values(limit: float) -> list[float]:

@@ -96,7 +96,7 @@ def test_a_drive_watches_its_host_as_soon_as_it_is_configured() -> None:
         rig.m1.configure()
         rig.m1.arm()
         rig.m1.command(guarded(120.0))
-        rig.link.sync()
+        assert rig.m1.await_feedback(rig.link.sync(), 5.0) is not None
         assert rig.rig.torque_nm[0] == pytest.approx(120.0)
         rig.link.stop_heartbeat()
         now_ns = time.monotonic_ns() + LONG_NS

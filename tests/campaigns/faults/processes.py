@@ -96,7 +96,7 @@ KINDS: dict[str, Kind] = {
     "bus connection silent": Kind(lambda scene: scene.bus.swallow(), "no TPDO|CAN bus|heartbeat", by_themselves=True),
     "PLC connection cut": Kind(lambda scene: scene.plc.cut(), "PLC"),
     "PLC connection silent": Kind(lambda scene: scene.plc.swallow(), "PLC"),
-    "rig killed (SIGKILL)": Kind(lambda scene: scene.rig.kill(), "CAN bus|no TPDO"),
+    "rig killed (SIGKILL)": Kind(lambda scene: scene.rig.kill(), "CAN bus|no TPDO|PLC"),
 }
 
 

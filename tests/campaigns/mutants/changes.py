@@ -57,11 +57,12 @@ class Mutant:
 
 
 def mutants(source: str) -> Iterator[Mutant]:
-    """Make every mutant of a module's source; texts and annotations are left alone."""
+    """Make every mutant of a module's source; texts, types, and where a class keeps its attributes are left alone."""
     tree = ast.parse(source)
     seen: dict[str, int] = {}
+    slots = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.keyword) and node.arg == "slots"}
     for place, node in enumerate(ast.walk(tree)):
-        for new in _changed(node):
+        for new in _changed(node) if id(node) not in slots else ():
             mutated = copy.deepcopy(tree)
             target = list(ast.walk(mutated))[place]
             was = ast.unparse(node)
