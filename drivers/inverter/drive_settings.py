@@ -12,7 +12,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
-from drivers.canopen.can_link import HOST_NODE_ID
 from drivers.canopen.emcy import EMCY_COB_ID
 from drivers.canopen.sdo import object_name
 from drivers.capability.function import Function
@@ -189,7 +188,7 @@ def _deadline(plan: DrivePlan, settings: InverterSettings) -> Iterator[DriveSett
 
 def _heartbeats(plan: DrivePlan, settings: InverterSettings) -> Iterator[DriveSetting]:
     if plan.has(Function.HEARTBEAT_CONSUMER):
-        consumer = HOST_NODE_ID << 16 | settings.heartbeat_timeout_ms
+        consumer = settings.host_node_id << 16 | settings.host_timeout_ms
         yield DriveSetting(0x1016, 1, "consumer heartbeat time", consumer, RIG_FILE, watches_host=True)
     if plan.abilities[Function.HEARTBEAT_PRODUCER].writable(plan.sheet):
         period_ms = settings.heartbeat_ms

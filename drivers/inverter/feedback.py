@@ -79,10 +79,16 @@ class FeedbackReceiver:
             _place(self._codecs, index) for index in (0x6041, 0x6077, 0x606C)
         )
         self._received: list[tuple[tuple[int, ...], int] | None] = [None] * len(self._codecs)
+        self._counts = [0] * len(self._codecs)
         self._arrived = threading.Condition()
         self._sequence = 0
         self._started = False
         self.latest: InverterFeedback | None = None
+
+    @property
+    def received(self) -> int:
+        """How often all TPDOs have come; it never starts anew."""
+        return min(self._counts)
 
     @property
     def subscriptions(self) -> list[tuple[int, Callable[[bytes, int], None]]]:
@@ -100,6 +106,7 @@ class FeedbackReceiver:
         if not self._started:
             return
         self._received[part] = self._codecs[part].unpack(data), t_ns
+        self._counts[part] += 1
         received = [each for each in self._received if each is not None]
         if len(received) < len(self._codecs):
             return

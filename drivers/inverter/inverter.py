@@ -39,6 +39,9 @@ __all__ = ["Difference", "Inverter", "InverterFeedback", "InverterSettings"]
 
 NO_TORQUE: Final = TorqueCounts()
 
+SDO_REQUEST_COB_ID: Final = 0x600
+"""Plus the node id."""
+
 
 class Inverter:
     """One inverter on a link.
@@ -75,6 +78,9 @@ class Inverter:
         self._frozen = FrozenFeedback(self._where)
         self._following = FollowWatch(settings)
         self._armed = False
+        for cob_id in self._pdos.rpdos:
+            link.strangers.claim(cob_id, f"{self._where}: an RPDO")
+        link.strangers.claim(SDO_REQUEST_COB_ID + settings.node_id, f"{self._where}: an SDO request")
 
     @property
     def latest(self) -> InverterFeedback | None:
@@ -82,9 +88,20 @@ class Inverter:
         return self._feedback.latest
 
     @property
+    def received(self) -> int:
+        """How often all TPDOs have been received; it never starts anew."""
+        return self._feedback.received
+
+    @property
     def follows(self) -> bool:
         """Whether the drive has said, since `arm`, that it follows its target torque; True where it can't say."""
         return self._following.follows(self.latest)
+
+    @property
+    def admits_less(self) -> bool:
+        """Whether the last feedback says that the torque is less than asked for: limited, or not following."""
+        latest = self.latest
+        return latest is not None and (latest.limited or self._following.is_ignored(latest))
 
     def check(self) -> tuple[Difference, ...]:
         """Compare the device with rig file and EDS; reads objects, writes none.
@@ -179,9 +196,11 @@ class Inverter:
                 f"{'; '.join(map(str, differences))}. Correct the rig file, or connect the drive it describes."
             )
         set_up_pdos(self._sdo, self._plan, self._where)
-        self._link.produce_heartbeat(self.settings.heartbeat_ms / 1000.0)  # before the drive listens for it
+        # before the drive listens for it:
+        self._link.produce_heartbeat(self.settings.host_heartbeat_s, self.settings.host_node_id)
         for setting in self._given:
             self._sdo.download_confirmed(setting.index, setting.subindex, setting.value)
+        self._link.beat()  # the drive watches its host from now on, and not from some later heartbeat
         self._feedback.start_anew()
         self._monitor.forget_lost_host()
         self._monitor.await_state(
@@ -335,8 +354,11 @@ class Inverter:
             If its heartbeat is lost, or never came.
         BusDown, ProtocolViolation
             If the bus is gone, or a frame could not be read.
+        ForeignController
+            If somebody else commands the drives, while the link is watched for that.
         """
         self._link.raise_if_failed()
+        self._link.strangers.raise_if_seen()
         self._monitor.raise_if_unwell(time.monotonic_ns())
         self._frozen.raise_if_frozen()
         latest = self.latest

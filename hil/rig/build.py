@@ -46,8 +46,8 @@ def open_devices(rig: Rig) -> Iterator[Devices]:
         If the PLC does not answer.
     """
     with CanLink.open(rig.can.url) as link, PlcLoop() as loop:
-        m1 = Inverter(link, inverter_settings("m1", rig.inverters.m1))
-        m2 = Inverter(link, inverter_settings("m2", rig.inverters.m2))
+        m1 = Inverter(link, inverter_settings("m1", rig))
+        m2 = Inverter(link, inverter_settings("m2", rig))
         with connected_plc(rig.plc, loop) as plc:
             yield Devices(link, m1, m2, TorqueGuard(rig.guard_limits), loop, plc)
 
@@ -82,8 +82,9 @@ def plc_client(table: PlcTable) -> Plc:
     return Plc(table.host, table.port, register_map, security=security)
 
 
-def inverter_settings(name: str, table: InverterTable) -> InverterSettings:
-    """Give the settings of one inverter as the drivers take them."""
+def inverter_settings(name: str, rig: Rig) -> InverterSettings:
+    """Give the settings of one inverter, ``m1`` or ``m2``, as the drivers take them."""
+    table: InverterTable = getattr(rig.inverters, name)
     return InverterSettings(
         name=name,
         node_id=table.node_id,
@@ -94,7 +95,9 @@ def inverter_settings(name: str, table: InverterTable) -> InverterSettings:
         vendor_id=table.vendor_id,
         product_code=table.product_code,
         heartbeat_ms=table.heartbeat_ms,
-        rpdo_deadline_ms=table.rpdo_deadline_ms,
+        host_node_id=rig.host_node_id,
+        host_timeout_ms=table.host_timeout_ms,
+        rpdo_deadline_ms=rig.rpdo_deadline_ms(table),
         option_codes=table.option_codes.by_object,
         torque_slope_nm_per_s=table.torque_slope_nm_per_s,
         speed_unit=None if table.speed_unit is None else table.speed_unit.speed_unit,

@@ -186,8 +186,8 @@ def replay(path: Path, rig: Rig, whole: bool = False, channel: str | None = None
     """
     period = period_ns(rig.period_s)
     clock = _Clock(period, paced=_is_paced(path, period, channel))
-    m1 = _Station(inverter_settings("m1", rig.inverters.m1), SampleFlag.M1_STALE, SampleFlag.M1_LIMITED)
-    m2 = _Station(inverter_settings("m2", rig.inverters.m2), SampleFlag.M2_STALE, SampleFlag.M2_LIMITED)
+    m1 = _Station(inverter_settings("m1", rig), SampleFlag.M1_STALE, SampleFlag.M1_LIMITED)
+    m2 = _Station(inverter_settings("m2", rig), SampleFlag.M2_STALE, SampleFlag.M2_LIMITED)
     if not whole and not (m1.has_offset and m2.has_offset):
         raise RecordingError(
             path,

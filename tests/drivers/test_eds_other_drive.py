@@ -36,7 +36,7 @@ from tests.drivers.eds_bench import SHIPPED, without
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 OTHER_EDS = EXAMPLES / "other_drive.eds"
 OTHER = replace(
-    inverter_settings("m1", read_rig(EXAMPLES / "other_drive.toml").inverters.m1),
+    inverter_settings("m1", read_rig(EXAMPLES / "other_drive.toml")),
     sdo_timeout_s=M1.sdo_timeout_s,
 )
 SIMULATED = SimulatedInverter(OTHER.node_id, OTHER.rated_torque_nm, eds_path=OTHER_EDS)

@@ -166,9 +166,9 @@ def test_fixed_mapping_that_the_drive_does_not_hold_is_refused(tmp_path: Path) -
     mapping = {**MAKERS["fixed mapping"].objects[0x1600], 3: Entry(U32, "const", "0x60FF0020")}  # type: ignore[dict-item]
     other = written(MAKERS["fixed mapping"].having({0x1600: mapping}), tmp_path / "device")
     with served(changed(host, {"inverters.m1": {"eds": other}})) as (_, at):
-        table = at.inverters.m1.model_copy(update={"eds": tmp_path / "drive.eds"})
+        described = changed(at, {"inverters.m1": {"eds": tmp_path / "drive.eds"}})
         with CanLink.open(at.can.url) as link:
-            m1 = Inverter(link, inverter_settings("m1", table))
+            m1 = Inverter(link, inverter_settings("m1", described))
             assert [each.what for each in m1.check()] == ["PDO 0x1400/0x1600"]
             with pytest.raises(ConfigMismatch, match=r"0x60FF:00 .* expected .*0x60B2:00 .* and can't be given it"):
                 m1.configure()

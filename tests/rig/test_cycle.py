@@ -100,6 +100,8 @@ def test_guard_stands_between_request_and_inverter() -> None:
     with armed() as (devices, cycle):
         with pytest.raises(CommandRefused, match="while not enabled"):
             cycle.step(pacer.next(), TorqueRequest(1.0, 0.0, 0.0, 0.0), 0.0, SampleFlag.GOOD)
+        cycle.step(pacer.next(), NO_TORQUE, 0.0, SampleFlag.GOOD)
+        assert cycle.answered
         devices.guard.enable()
         cycle.step(pacer.next(), NO_TORQUE, 0.0, SampleFlag.GOOD)
         with pytest.raises(CommandRefused, match=r"base torque goes from 0 Nm to 100 Nm in 0\.01 s"):
