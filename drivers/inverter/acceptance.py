@@ -24,6 +24,11 @@ class Acceptance:
     by: str
     why: str
 
+    @property
+    def is_by_a_person(self) -> bool:
+        """Whether somebody filled in name and reason: a line that was only pasted is nobody's acceptance."""
+        return _is_filled_in(self.by) and _is_filled_in(self.why)
+
     def __str__(self) -> str:
         return f"accepted by {self.by}: {self.why}"
 
@@ -34,7 +39,7 @@ def acceptance_line(name: str) -> str:
     return f'accepted.{name} = {{ by = "{by}", why = "{why}" }}'
 
 
-def is_filled_in(text: str) -> bool:
+def _is_filled_in(text: str) -> bool:
     """Whether a person has written something: not blank or dots, and not what stands in the line to be filled in."""
     words = text.strip(" .<>\"'").upper()
     return any(map(str.isalnum, words)) and words not in PLACEHOLDERS

@@ -5,10 +5,10 @@ from __future__ import annotations
 from enum import Enum
 from typing import Annotated, Self
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import Field, model_validator
 
 from drivers.capability.speed_unit import SpeedUnit, SpeedUnitName
-from drivers.inverter.acceptance import Acceptance, is_filled_in
+from drivers.inverter.acceptance import Acceptance
 from hil.config.problems import Fault, refuse
 from hil.config.table import Positive, Table, Text
 
@@ -49,21 +49,11 @@ class RatedTorqueUnit(Enum):
         return {RatedTorqueUnit.MILLI: 1e-3, RatedTorqueUnit.MICRO: 1e-6}[self]
 
 
-def _by_a_person(text: str) -> str:
-    """See that a person filled in name or reason: a line that was only pasted is nobody's acceptance."""
-    if not is_filled_in(text):
-        raise ValueError("the name of who accepts it, and in words why; nobody has filled it in")
-    return text
-
-
-PersonsText = Annotated[Text, AfterValidator(_by_a_person)]
-
-
 class AcceptanceTable(Table):
     """Who accepted that it is missing, and why."""
 
-    by: PersonsText
-    why: PersonsText
+    by: Text
+    why: Text
 
     @property
     def acceptance(self) -> Acceptance:

@@ -17,7 +17,11 @@ from drivers.plc.register_map import load_register_map
 from drivers.resources import data_file
 from drivers.torque_guard import TorqueGuard
 from hil.config.rig_file import InverterTable, PlcTable, Rig
+from hil.errors import UsageError
 from hil.rig.plc_loop import PlcLoop
+from hil.simulator.loopback import is_simulated_bus
+
+NAMES = ("m1", "m2")
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +42,8 @@ def open_devices(rig: Rig) -> Iterator[Devices]:
 
     Raises
     ------
+    UsageError
+        If the bus may hold real drives, and nobody has filled in who accepts what they lack.
     BusDown
         If the CAN bus or the PLC's address is not there.
     ConfigMismatch
@@ -45,11 +51,26 @@ def open_devices(rig: Rig) -> Iterator[Devices]:
     DeviceTimeout
         If the PLC does not answer.
     """
+    _require_acceptances(rig)
     with CanLink.open(rig.can.url) as link, PlcLoop() as loop:
         m1 = Inverter(link, inverter_settings("m1", rig))
         m2 = Inverter(link, inverter_settings("m2", rig))
         with connected_plc(rig.plc, loop) as plc:
             yield Devices(link, m1, m2, TorqueGuard(rig.guard_limits), loop, plc)
+
+
+def _require_acceptances(rig: Rig) -> None:
+    """See that what real drives lack was accepted by a person; simulated ones hurt nobody."""
+    if is_simulated_bus(rig.can.url):
+        return
+    for name in NAMES:
+        table: InverterTable = getattr(rig.inverters, name)
+        for key, acceptance in table.accepted.by_name.items():
+            if not acceptance.is_by_a_person:
+                raise UsageError(
+                    f"rig {rig.name!r}, inverters.{name}.accepted.{key}: expected the name of who accepts it, and in "
+                    f"words why, came {acceptance.by!r}, {acceptance.why!r}. Nobody has filled it in."
+                )
 
 
 @contextmanager
