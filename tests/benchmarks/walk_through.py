@@ -25,9 +25,9 @@ from hil.rig.pacing import FreePacer, period_ns
 from hil.rig.plan import plan_run
 from hil.rig.session import run_plan
 from hil.rig.stop import StopRequest
-from hil.simulator.loopback import Address
+from hil.simulator.loopback import IN_PROCESS, Address
 from hil.simulator.plant_factory import plant_for
-from hil.simulator.rig_server import IN_PROCESS, RigServer, required_simulation
+from hil.simulator.rig_server import RigServer, required_simulation
 from hil.simulator.simulation_model import EffectSpec, simulation_model
 
 RIG_FILE = Path(__file__).resolve().parents[2] / "examples" / "rig.toml"
