@@ -33,7 +33,9 @@ TARGETS: dict[str, Target] = {
     ),
     "drivers.message_rate": Target(("tests/drivers/test_message_rate.py",)),
     "drivers.scaling": Target(("tests/drivers/test_scaling.py",)),
-    "drivers.inverter.cia402": Target(("tests/drivers/test_cia402.py",)),
+    "drivers.inverter.cia402": Target(
+        ("tests/drivers/test_cia402.py",), {"0 -> 1 #3": "a previous controlword of which bit 7 alone counts"}
+    ),
     "drivers.inverter.drive_settings": Target(
         (
             "tests/drivers/test_drive_settings.py",
