@@ -138,7 +138,7 @@ class Cycle:
             If this machine itself was late by as much.
         """
         self._refuse_if_unfit(tick)
-        evidence = Evidence(self._age_ns(tick.now_ns), permissive_age_ns, self._fastest_rad_s())
+        evidence = Evidence(self._age_ns(tick.now_ns), permissive_age_ns, self.fastest_rad_s)
         command_m1, command_m2 = self._guard.check(request, tick.due_ns, evidence)
         if self.timing.is_late(tick):
             flags |= SampleFlag.LATE
@@ -174,8 +174,9 @@ class Cycle:
             self._refuse_if_old(station, tick)
             station.rate.take(station.inverter.received)
 
-    def _fastest_rad_s(self) -> float:
-        """Give the speed furthest from standstill: both inverters turn one shaft; NaN before the first answer."""
+    @property
+    def fastest_rad_s(self) -> float:
+        """The reading furthest from standstill: both inverters turn one shaft; NaN before both answered [rad/s]."""
         speeds = (self._m1.speed_rad_s, self._m2.speed_rad_s)
         return math.nan if any(map(math.isnan, speeds)) else max(speeds, key=abs)
 

@@ -50,7 +50,7 @@ def test_another_hosts_heartbeat_is_none_of_ours() -> None:
     rig = small_rig()
     assert (rig.host_node_id, rig.monitor_node_id, rig.of_monitor.host_node_id) == (127, 126, 126)
     with served(rig) as (server, at), CanLink.open(server.bus_url) as monitor:
-        monitor.produce_heartbeat(0.001, rig.monitor_node_id)
+        monitor.produce_heartbeat(0.02, rig.monitor_node_id)
         assert run_once(at, Samples()).recorded > 0
 
 

@@ -33,7 +33,9 @@ TARGETS: dict[str, Target] = {
     ),
     "drivers.message_rate": Target(("tests/drivers/test_message_rate.py",)),
     "drivers.scaling": Target(("tests/drivers/test_scaling.py",)),
-    "drivers.inverter.cia402": Target(("tests/drivers/test_cia402.py",)),
+    "drivers.inverter.cia402": Target(
+        ("tests/drivers/test_cia402.py",), {"0 -> 1 #3": "a previous controlword of which bit 7 alone counts"}
+    ),
     "drivers.inverter.drive_settings": Target(
         (
             "tests/drivers/test_drive_settings.py",
@@ -41,8 +43,15 @@ TARGETS: dict[str, Target] = {
             "tests/drivers/test_makers.py",
         )
     ),
-    "drivers.canopen.heartbeat": Target(("tests/drivers/test_heartbeat.py",)),
-    "drivers.canopen.silence": Target(("tests/drivers/test_heartbeat.py",)),
+    "drivers.canopen.heartbeat": Target(
+        ("tests/drivers/test_heartbeat.py",),
+        {
+            "1000000.0 -> 1000001.0": "a millionth of a time in a message",
+            "1000000.0 -> 1000001.0 #2": "a millionth of a time in a message",
+            "True -> False": "whether a thread that hangs keeps the program from ending; it ends by its event",
+        },
+    ),
+    "drivers.canopen.silence": Target(("tests/drivers/test_silence.py",)),
     "drivers.canopen.strangers": Target(("tests/drivers/test_strangers.py",)),
     "hil.rig.catch_up": Target(("tests/rig/test_slept_through.py",)),
     "hil.config.guard_table": Target(("tests/config/test_rig_file.py", "tests/config/test_guard_table.py")),
