@@ -32,6 +32,9 @@ kernels: $(READY)
 # What takes too long for every change.
 campaign: $(READY)
 	$(BIN)/python -m pytest -n 2 -m campaign
+	$(BIN)/python -m tests.campaigns.faults
+	$(BIN)/python -m tests.campaigns.faults.processes
+	$(BIN)/python -m tests.campaigns.mutants
 
 # Speed as ratios to scipy, a bare C loop, raw python-can; growth with the length, memory: docs/benchmarks.md.
 bench: $(READY)

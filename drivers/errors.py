@@ -6,6 +6,8 @@
      +-- CommandRefused    (ValueError)       our mistake: the torque guard said no
      +-- ConfigMismatch                       rig file, EDS and device disagree
      +-- DeviceFault                          the device reports FAULT or EMCY
+     |    +-- WrongTorque                     its torque is not the one commanded
+     +-- ForeignController                    somebody else commands the devices
      +-- ProtocolViolation                    the device broke CiA 301, CiA 402 or Modbus
      +-- DeviceTimeout     (TimeoutError)     no answer in time
      +-- BusDown           (ConnectionError)  the bus itself is not there
@@ -40,6 +42,22 @@ class DeviceFault(DriverError):
     """The device reports a fault (CiA 402 FAULT state, EMCY, PLC permissive withdrawn).
 
     To do: read the cause in the message at the device, mend it, reset the fault, start again.
+    """
+
+
+class WrongTorque(DeviceFault):
+    """The torque actual value is not the torque commanded.
+
+    Examples: a drive set to another rated torque, a sign turned round, a torque that somebody else adds.
+    To do: compare the drive's scale, sign and limits with the rig file; look for another controller.
+    """
+
+
+class ForeignController(DriverError):
+    """Somebody else commands the devices of this program.
+
+    Examples: another master's SYNC or NMT command, an RPDO this program has not sent.
+    To do: end the other program, or unplug the other controller; two can't drive one shaft.
     """
 
 

@@ -9,7 +9,12 @@ Rules, all of them on every request; one broken rule refuses the pair of both in
 5. per inverter, the base part moves no faster than the rate limit;
 6. the sum of both inverters stays inside the sum limit: both act on one shaft (the paper's T_M1 + T_M2);
 7. the feedback behind the request is not older than its time-out;
-8. time runs forward.
+8. the PLC's permission is not older than its time-out;
+9. the speed is inside the speed limit;
+10. time runs forward.
+
+What comes back is looked at too (`TorqueGuard.compare`): a torque reading too far from the command, for too long, ends
+the torque as a refusal does (`drivers.torque_error`).
 
 A refusal disables the guard and forgets what was commanded, so the way back starts at zero torque. Nothing is
 ever clamped: a clamped PRBS is no PRBS, and a clamped torque is not the one the experiment recorded.
@@ -20,8 +25,9 @@ would let the base torque jump just as far. An amplitude limit bounds the same t
 +-prbs_limit can step by at most twice that. So in one cycle of ``dt`` seconds the torque of one inverter
 changes by at most ``rate_limit * dt + 2 * prbs_limit``, whatever is requested.
 
-Why the allowance of the rate limit does not grow without bound: a loop that stalls for a second must not come
-back with a second's worth of torque. ``dt`` counts up to the feedback time-out and no further.
+Why the allowance of the rate limit does not grow: a loop that stalls must not come back with a step. ``dt`` counts
+from the last command that was let through, up to one period and no further. So over any window of ``W`` seconds the
+base torque changes by at most ``rate_limit * W``, which is opendbc's limit of the rate over a window.
 
 No clock, bus or thread here: time comes in as nanoseconds of the caller's monotonic clock.
 """
@@ -33,13 +39,24 @@ from collections.abc import Iterator
 from dataclasses import InitVar, dataclass, fields
 from typing import Final
 
-from drivers.errors import CommandRefused, ConfigMismatch
+from drivers.errors import CommandRefused, WrongTorque
+from drivers.guard_limits import NS_PER_S, ErrorLimits, GuardLimits
+from drivers.torque_error import Measured, TorqueError
+
+__all__ = [
+    "ROUNDING_NM",
+    "ErrorLimits",
+    "Evidence",
+    "GuardLimits",
+    "GuardedTorque",
+    "Measured",
+    "TorqueGuard",
+    "TorqueRequest",
+]
 
 ROUNDING_NM: Final = 1e-6
 """Slack for rounding in sums and products [Nm]: far above the 1e-13 of a double near 1000 Nm, and far below
 the 0.1 % of rated torque an inverter resolves."""
-
-NS_PER_S: Final = 1_000_000_000
 
 
 class _Seal:
@@ -52,43 +69,22 @@ _SEAL: Final = _Seal()
 
 
 @dataclass(frozen=True, slots=True)
-class GuardLimits:
-    """The limits of one rig; there are no defaults.
+class Evidence:
+    """What a request is built on.
 
     Attributes
     ----------
-    torque_limit_m1_nm, torque_limit_m2_nm : float
-        Largest magnitude of base + PRBS torque of each inverter [Nm].
-    prbs_limit_nm : float
-        Largest magnitude of the PRBS part of one inverter [Nm]; its steps are at most twice this.
-    rate_limit_nm_per_s : float
-        Fastest change of the base torque of one inverter [Nm/s].
-    sum_limit_nm : float
-        Largest magnitude of the sum of both inverters, sign counted [Nm].
-    feedback_timeout_s : float
-        Oldest feedback a torque may be built on [s].
-
-    Raises
-    ------
-    ConfigMismatch
-        If a limit is not a finite number above zero; names all that are not.
+    feedback_age_ns
+        Age of the oldest feedback behind it [ns].
+    permissive_age_ns
+        Age of the PLC's permission [ns].
+    speed_rad_s
+        Motor speed, of all readings the one furthest from standstill [rad/s].
     """
 
-    torque_limit_m1_nm: float
-    torque_limit_m2_nm: float
-    prbs_limit_nm: float
-    rate_limit_nm_per_s: float
-    sum_limit_nm: float
-    feedback_timeout_s: float
-
-    def __post_init__(self) -> None:
-        values = {field.name: getattr(self, field.name) for field in fields(self)}
-        wrong = [f"{name} is {value}" for name, value in values.items() if not 0.0 < value < math.inf]
-        if wrong:
-            raise ConfigMismatch(
-                f"torque guard: expected every limit finite and above 0, but {', '.join(wrong)}. "
-                "Set the limits of this rig in [guard] and [inverters] of the rig file."
-            )
+    feedback_age_ns: int
+    permissive_age_ns: int
+    speed_rad_s: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,12 +165,13 @@ class TorqueGuard:
         The limits of the rig; they can't be changed later.
     """
 
-    __slots__ = ("_enabled", "_limits", "_past")
+    __slots__ = ("_enabled", "_error", "_limits", "_past")
 
     def __init__(self, limits: GuardLimits) -> None:
         self._limits = limits
         self._enabled = False
         self._past: _Past | None = None
+        self._error = TorqueError(limits.error, limits.period_s)
 
     @property
     def limits(self) -> GuardLimits:
@@ -207,7 +204,7 @@ class TorqueGuard:
         self._past = None
         return _ZERO, _ZERO
 
-    def check(self, request: TorqueRequest, now_ns: int, feedback_age_ns: int) -> tuple[GuardedTorque, GuardedTorque]:
+    def check(self, request: TorqueRequest, now_ns: int, evidence: Evidence) -> tuple[GuardedTorque, GuardedTorque]:
         """Turn a request into the commands of inverters m1 and m2, unchanged, or refuse both.
 
         Parameters
@@ -217,8 +214,8 @@ class TorqueGuard:
         now_ns : int
             Time of this request [ns]; it never runs backwards. The rate limit counts in it, so the time at which
             the cycle was due serves best: a cycle that began late is then no faster change.
-        feedback_age_ns : int
-            Age of the oldest feedback the request was built on [ns].
+        evidence : Evidence
+            What the request was built on.
 
         Returns
         -------
@@ -230,13 +227,14 @@ class TorqueGuard:
         CommandRefused
             Naming every broken rule with limit and value. The guard is then disabled and its history is zero.
         """
-        faults = tuple(self._faults(request, now_ns, feedback_age_ns))
+        faults = tuple(self._faults(request, now_ns, evidence))
         if faults:
             self.disable()
             raise CommandRefused(
                 f"torque guard: {'; '.join(faults)}. The guard is now disabled: send zero torque, mend the "
                 "cause, enable it again."
             )
+        self._error.commanded(request.total_m1_nm, request.total_m2_nm)
         if not self._enabled:
             return _ZERO, _ZERO
         self._past = _Past(now_ns, request.base_m1_nm, request.base_m2_nm)
@@ -245,7 +243,28 @@ class TorqueGuard:
             GuardedTorque(request.base_m2_nm, request.prbs_m2_nm, _SEAL),
         )
 
-    def _faults(self, request: TorqueRequest, now_ns: int, feedback_age_ns: int) -> Iterator[str]:
+    def compare(self, now_ns: int, m1: Measured | None, m2: Measured | None) -> None:
+        """Look at what came in answer to the last command.
+
+        Parameters
+        ----------
+        now_ns : int
+            Time of that command, as `check` got it [ns].
+        m1, m2 : Measured or None
+            Torque actual values; None where an inverter did not answer.
+
+        Raises
+        ------
+        WrongTorque
+            If a torque is too far from what was commanded, for too long. The guard is then disabled.
+        """
+        try:
+            self._error.compare(now_ns, m1, m2)
+        except WrongTorque:
+            self.disable()
+            raise
+
+    def _faults(self, request: TorqueRequest, now_ns: int, evidence: Evidence) -> Iterator[str]:
         """Name every broken rule; see the module's list."""
         if not_finite := tuple(_not_finite(request)):
             yield from not_finite  # no comparison below means anything with NaN in it
@@ -256,7 +275,7 @@ class TorqueGuard:
             return
         yield from _magnitude_faults(request, self._limits)
         yield from self._rate_faults(request, now_ns)
-        yield from _feedback_faults(feedback_age_ns, self._limits)
+        yield from _evidence_faults(evidence, self._limits)
 
     def _rate_faults(self, request: TorqueRequest, now_ns: int) -> Iterator[str]:
         past = self._past or _Past(now_ns, 0.0, 0.0)
@@ -267,7 +286,7 @@ class TorqueGuard:
                 "before: pass one monotonic clock"
             )
         rate = self._limits.rate_limit_nm_per_s
-        allowed_nm = rate * max(0.0, min(elapsed_s, self._limits.feedback_timeout_s))
+        allowed_nm = rate * max(0.0, min(elapsed_s, self._limits.period_s))
         parts = (("m1", request.base_m1_nm, past.base_m1_nm), ("m2", request.base_m2_nm, past.base_m2_nm))
         for inverter, base_nm, before_nm in parts:
             if not abs(base_nm - before_nm) <= allowed_nm + ROUNDING_NM:
@@ -301,12 +320,20 @@ def _magnitude_faults(request: TorqueRequest, limits: GuardLimits) -> Iterator[s
             yield f"{what} is {value_nm:g} Nm, expected at most {limit_nm:g} Nm either way ({name}): {cure}"
 
 
-def _feedback_faults(feedback_age_ns: int, limits: GuardLimits) -> Iterator[str]:
-    age_s = feedback_age_ns / NS_PER_S
-    if not 0.0 <= age_s <= limits.feedback_timeout_s:
+def _evidence_faults(evidence: Evidence, limits: GuardLimits) -> Iterator[str]:
+    """Rules 7, 8 and 9."""
+    ages = (
+        ("feedback", evidence.feedback_age_ns, "feedback_timeout_s", "an inverter that stopped answering SYNC"),
+        ("permission of the PLC", evidence.permissive_age_ns, "permissive_timeout_s", "a PLC that answers no more"),
+    )
+    for what, age_ns, name, look_for in ages:
+        age_s, limit_s = age_ns / NS_PER_S, getattr(limits, name)
+        if not 0.0 <= age_s <= limit_s:
+            yield f"{what} is {age_s:g} s old, expected between 0 s and {limit_s:g} s ({name}): look for {look_for}"
+    if not abs(evidence.speed_rad_s) <= limits.speed_limit_rad_s:
         yield (
-            f"feedback is {age_s:g} s old, expected between 0 s and {limits.feedback_timeout_s:g} s "
-            "(feedback_timeout_s): look for an inverter that stopped answering SYNC"
+            f"speed is {evidence.speed_rad_s:g} rad/s, expected at most {limits.speed_limit_rad_s:g} rad/s either way "
+            "(speed_limit_rad_s): lower the speed of the experiment"
         )
 
 

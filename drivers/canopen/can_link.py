@@ -22,17 +22,15 @@ from urllib.parse import parse_qsl, urlsplit
 import can
 import canopen
 
-from drivers.canopen.heartbeat import HeartbeatProducer, NmtState
+from drivers.canopen.heartbeat import HEARTBEAT_COB_ID, HOST_NODE_ID, NMT_COB_ID, HeartbeatProducer, NmtState
 from drivers.canopen.inline_bus import InlineBus
 from drivers.canopen.remote_bus import BoundedRemoteBus
+from drivers.canopen.strangers import Strangers
 from drivers.errors import BusDown, ProtocolViolation
 
 logging.getLogger("canopen").addHandler(logging.NullHandler())  # our errors say it; canopen would print it too
 
 SYNC_COB_ID = 0x080
-HOST_NODE_ID = 127
-"""Node id of the host's own heartbeat: the highest, so that it yields to every device."""
-
 FrameCallback = Callable[[bytes, int], None]
 """``callback(data, t_ns)``, called where frames are received; ``t_ns`` is the monotonic time of arrival."""
 
@@ -117,6 +115,7 @@ class CanLink:
         self._violation: ProtocolViolation | None = None
         self._producer: HeartbeatProducer | None = None
         self.network = _Network(bus, self._raise_if_down)
+        self.strangers = Strangers(self.subscribe)
         self._thread: threading.Thread | None = None
         if isinstance(bus, InlineBus):
             bus.receive_by(self._take)
@@ -178,10 +177,27 @@ class CanLink:
         self.network.send_message(SYNC_COB_ID, b"")
         return t_ns
 
-    def produce_heartbeat(self, period_s: float) -> None:
-        """Send the host's own heartbeat from now on, so that drives notice when the host is gone."""
-        if self._producer is None:
-            self._producer = HeartbeatProducer(self.send, HOST_NODE_ID, period_s, lambda: NmtState.OPERATIONAL)
+    def watch_strangers(self, host_node_id: int) -> None:
+        """Look out, from now on, for another controller: its SYNC, NMT commands, or this host's heartbeat."""
+        self.strangers.claim(SYNC_COB_ID, "SYNC")
+        self.strangers.claim(NMT_COB_ID, "an NMT command")
+        self.strangers.claim(HEARTBEAT_COB_ID + host_node_id, f"the heartbeat of the host, node {host_node_id}")
+        self.strangers.watch()
+
+    def produce_heartbeat(self, period_s: float, node_id: int = HOST_NODE_ID) -> None:
+        """Send the host's own heartbeat from now on, so that drives notice when the host is gone.
+
+        Asked for more than once, by each of several drives, the shortest period holds.
+        """
+        if self._producer is not None:
+            self._producer.period_s = min(self._producer.period_s, period_s)
+        else:
+            self._producer = HeartbeatProducer(self.send, node_id, period_s, lambda: NmtState.OPERATIONAL)
+
+    def beat(self) -> None:
+        """Send one heartbeat of the host now: a consumer watches from the first it hears (CiA 301, object 1016h)."""
+        if self._producer is not None:
+            self._producer.beat()
 
     def stop_heartbeat(self) -> None:
         """Send no heartbeat any more, until `produce_heartbeat`; drives then take the host for dead."""

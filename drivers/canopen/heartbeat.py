@@ -16,6 +16,10 @@ NMT_COB_ID = 0x000
 HEARTBEAT_COB_ID = 0x700
 """Plus the node id."""
 
+HOST_NODE_ID = 127
+"""Node id of the host's own heartbeat where the rig file has no other: the highest, so that it yields to every
+device."""
+
 
 class NmtState(IntEnum):
     """State of a node as its heartbeat gives it."""
@@ -113,7 +117,7 @@ class HeartbeatProducer:
     ) -> None:
         self._send = send
         self._cob_id = HEARTBEAT_COB_ID + node_id
-        self._period_s = period_s
+        self.period_s = period_s
         self._state = state
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name=f"heartbeat of node {node_id}", daemon=True)
@@ -125,7 +129,11 @@ class HeartbeatProducer:
                 self._send(self._cob_id, bytes((self._state(),)))
             except BusDown:  # whoever uses the bus gets the same error at the next call
                 return
-            self._stop.wait(self._period_s)
+            self._stop.wait(self.period_s)
+
+    def beat(self) -> None:
+        """Send one now, beside those of the period."""
+        self._send(self._cob_id, bytes((self._state(),)))
 
     def stop(self) -> None:
         """End the thread; no heartbeat is sent after this returns."""

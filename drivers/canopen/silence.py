@@ -12,29 +12,36 @@ class Silence:
     """The time since the last heartbeat of one node. Time is passed in; nothing here reads a clock.
 
     Overdue at one look is not enough: a program that was held up, or suspended, finds every heartbeat overdue and
-    those that came meanwhile unread. A heartbeat has ended where it is overdue still `GRACE_NS` after it was found so.
+    those that came meanwhile unread. A heartbeat has ended where it is still overdue after ``grace_ns`` of being awake.
 
     Parameters
     ----------
     timeout_ns
         Longest time between two heartbeats [ns].
+    grace_ns
+        What is left for reading what came while the listener stood still [ns].
+    longest_look_ns
+        Of the time between two looks so much counts as awake at most [ns]; None for all of it.
     """
 
-    __slots__ = ("_found_ns", "_last_ns", "_timeout_ns")
+    __slots__ = ("_awake_ns", "_grace_ns", "_last_ns", "_longest_look_ns", "_looked_ns", "_timeout_ns")
 
-    def __init__(self, timeout_ns: int) -> None:
+    def __init__(self, timeout_ns: int, grace_ns: int = GRACE_NS, longest_look_ns: int | None = None) -> None:
         self._timeout_ns = timeout_ns
+        self._grace_ns = grace_ns
+        self._longest_look_ns = grace_ns if longest_look_ns is None else longest_look_ns
+        self._awake_ns = 0
         self._last_ns: int | None = None
-        self._found_ns: int | None = None
+        self._looked_ns: int | None = None
 
     def beat(self, t_ns: int) -> None:
         """Take one heartbeat; the first begins the watch."""
         self._last_ns = t_ns
-        self._found_ns = None
+        self._looked_ns = None
 
     def end(self) -> None:
         """Wait for nothing, until the next heartbeat."""
-        self._last_ns = self._found_ns = None
+        self._last_ns = self._looked_ns = None
 
     def length_ns(self, now_ns: int) -> int:
         """Tell how long ago the last heartbeat was [ns]; 0 where none is waited for."""
@@ -44,6 +51,9 @@ class Silence:
         """Look at ``now_ns``, and tell whether the heartbeat has ended."""
         if self.length_ns(now_ns) <= self._timeout_ns:
             return False
-        if self._found_ns is None:
-            self._found_ns = now_ns
-        return now_ns - self._found_ns >= GRACE_NS
+        if self._looked_ns is None:
+            self._awake_ns = 0
+        else:
+            self._awake_ns += min(now_ns - self._looked_ns, self._longest_look_ns)
+        self._looked_ns = now_ns
+        return self._awake_ns >= self._grace_ns

@@ -62,9 +62,9 @@ class Ability:
         return bool(self.parts)
 
     def writable(self, sheet: DataSheet) -> bool:
-        """Whether its objects can be written."""
+        """Whether its objects can be written and read back."""
         entries = [sheet.entry(part.index, part.subindex) for part in self.parts]
-        return self.given and all(entry is not None and entry.writable for entry in entries)
+        return self.given and all(entry is not None and entry.settable for entry in entries)
 
 
 Abilities = Mapping[Function, Ability]
@@ -98,11 +98,12 @@ def _shortcomings(sheet: DataSheet, part: Part) -> Iterator[Shortcoming]:
 
 
 def _access(sheet: DataSheet, part: Part, entry: EdsEntry) -> Iterator[Shortcoming]:
-    if part.written and not entry.writable:
+    if part.written and not (entry.settable if part.read_back else entry.writable):
         value = entry.value(sheet.node_id)
         if entry.access is None or part.held is None or value not in part.held:
             found = "no access type" if entry.access is None else f"access type {entry.access}"
-            yield Shortcoming(part, entry, "AccessType", "one that can be written", found)
+            expected = f"one that can be written{' and read' if part.read_back else ''}"
+            yield Shortcoming(part, entry, "AccessType", expected, found)
     elif not part.written and not entry.readable:
         found = "no access type" if entry.access is None else f"access type {entry.access}"
         yield Shortcoming(part, entry, "AccessType", "one that can be read", found)

@@ -1,23 +1,20 @@
-"""Which PDO carries what: one that maps it, or else one that can be mapped by this program. No bus.
-
-A maker's own PDOs seldom carry torque command and feedback in one frame each. So the search goes on to the first PDO
-whose parameters can be written and whose mapping has room; the host maps it then at every configuration, in the order
-of CiA 301, 7.5.2.36.
+"""One PDO that carries what is wanted: as the data sheet maps it, or mapped by this program. No bus.
 
 An identifier that the data sheet gives by the node id is kept, and so is that of a DCF for this node. Any other is a
 constant, which two drives with the same file would both have: the PDO then gets its node's one of the pre-defined
-connection set.
+connection set, or of those above the fourth, which have none there, a free one of the first four.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Final
 
 from drivers.canopen.pdo_map import (
     COB_ID_EXTENDED,
-    COB_ID_INVALID,
+    COB_ID_NO_RTR,
+    MAX_MAPPED,
     MAX_PDO_BYTES,
     RPDO_COMMUNICATION,
     RPDO_MAPPING,
@@ -30,17 +27,19 @@ from drivers.canopen.pdo_map import (
 from drivers.datasheet.objects import EdsEntry
 from drivers.datasheet.sheet import DataSheet
 from drivers.datasheet.types import DATA_TYPES
-from drivers.errors import ConfigMismatch
 from drivers.scaling import IntegerType
 
 PDO_NUMBERS: Final = range(0x200)
 """Offsets of the up to 512 PDOs from 0x1400, 0x1600, 0x1800 and 0x1A00."""
 
+PREDEFINED: Final = 4
+"""PDOs of each direction that have an identifier in the pre-defined connection set (CiA 301, 7.3.5)."""
+
 FILLERS: Final = range(1, 8)
 """Indices by which an RPDO maps nothing, in the width of that data type (CiA 301, 7.4.7.1)."""
 
-MAX_OBJECTS: Final = 0x40
-"""Most objects of a mapping; greater counts stand for a multiplexed PDO (CiA 301, 7.5.2.36)."""
+MULTIPLEX: Final = (0xFE, 0xFF)
+"""Numbers of mapped objects that stand for a multiplexed PDO (CiA 301, 7.5.2.36)."""
 
 RESERVED_COB_IDS: Final = (
     range(0x000, 0x080),
@@ -52,6 +51,11 @@ RESERVED_COB_IDS: Final = (
     range(0x701, 0x800),
 )
 """Identifiers that no PDO may have (CiA 301, table 38: restricted), and SYNC's."""
+
+
+def is_reserved(cob_id: int) -> bool:
+    """Whether an identifier is none for a PDO."""
+    return any(cob_id in taken for taken in RESERVED_COB_IDS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,9 +83,9 @@ class Direction:
     first_cob_id: int
     types: range
 
-    def predefined(self, number: int) -> int | None:
-        """Give the identifier for node 0 in the pre-defined connection set; None beyond the fourth PDO."""
-        return self.first_cob_id + 0x100 * number if number < 4 else None
+    def predefined(self, number: int) -> int:
+        """Give the identifier that the pre-defined connection set has for node 0 and one of the first four PDOs."""
+        return self.first_cob_id + 0x100 * number
 
 
 RPDO: Final = Direction("RPDO", RPDO_COMMUNICATION, RPDO_MAPPING, ("wo", "rw", "rww"), 0x200, range(241))
@@ -114,9 +118,13 @@ class Carrier:
     mapped_here: bool
     fixed: frozenset[tuple[int, int]]
 
+    def carries(self, index: int) -> bool:
+        """Whether an object is mapped, by its index."""
+        return any((mapped.index, mapped.subindex) == (index, 0) for mapped in self.layout.objects)
+
     @property
     def mapping_is_fixed(self) -> bool:
-        """Whether the mapping can't be written, or not as CiA 301 wants it."""
+        """Whether the mapping can't be written."""
         return any(index == self.layout.mapping_index for index, _ in self.fixed)
 
     def written(self, index: int, subindex: int) -> bool:
@@ -126,80 +134,20 @@ class Carrier:
         return (index, subindex) not in self.fixed
 
 
-@dataclass(frozen=True, slots=True)
-class CarrierSearch:
-    """What a search came to: the PDO found, and those looked at before it, in words."""
-
-    carrier: Carrier | None
-    others: tuple[str, ...]
-
-
-class _Unusable(Exception):
+class Unusable(Exception):
     """A PDO that is none; the text says why."""
 
 
-def find_carrier(sheet: DataSheet, direction: Direction, wanted: Sequence[int]) -> CarrierSearch:
-    """Find the PDO that carries the objects ``wanted``, by index.
-
-    Parameters
-    ----------
-    sheet
-        The drive.
-    direction
-        Which way the objects go.
-    wanted
-        What is to be carried, by index, in the order in which this program would map it.
-    """
-    others = []
-    for number in _numbers(sheet, direction):
-        try:
-            return CarrierSearch(_as_described(sheet, direction, number, wanted), ())
-        except (_Unusable, ConfigMismatch) as reason:
-            others.append(f"0x{direction.communication + number:04X}: {reason}")
-    refusals = []
-    for number in _numbers(sheet, direction):
-        try:
-            return CarrierSearch(_mapped_here(sheet, direction, number, wanted), tuple(others))
-        except _Unusable as reason:
-            refusals.append(f"0x{direction.mapping + number:04X}: {reason}")
-    return CarrierSearch(None, (*others, *refusals))
-
-
-def cob_id_of(sheet: DataSheet, direction: Direction, number: int) -> int | None:
-    """Give the identifier a PDO has in a run; None if there is none for it."""
+def cob_id_of(sheet: DataSheet, direction: Direction, number: int, taken: Collection[int] = ()) -> int | None:
+    """Give the identifier a PDO has in a run; None if there is none for it but those ``taken``."""
     entry = sheet.entry(direction.communication + number, 1)
     value = None if entry is None else entry.value(sheet.node_id)
-    first = direction.predefined(number)
     own = entry is not None and (entry.node_relative or sheet.commissioned_node == sheet.node_id)
-    if own and value is not None and not value & COB_ID_EXTENDED:
+    if own and value is not None and not value & COB_ID_EXTENDED and not is_reserved(value & 0x7FF):
         return value & 0x7FF
-    return None if first is None else first + sheet.node_id
-
-
-def strangers(sheet: DataSheet, carriers: Sequence[Carrier]) -> Iterator[int]:
-    """Find other PDOs that would disturb, by the index of their communication parameter.
-
-    These are PDOs that are on with the identifier of one in use, and TPDOs with a constant one: two drives with the
-    same file would send it at the same moment.
-    """
-    used = {carrier.layout.communication_index for carrier in carriers}
-    taken = {carrier.layout.cob_id for carrier in carriers}
-    for direction in (RPDO, TPDO):
-        for number in _numbers(sheet, direction):
-            index = direction.communication + number
-            entry = sheet.entry(index, 1)
-            value = None if entry is None else entry.value(sheet.node_id)
-            if index in used or entry is None or value is None or value & COB_ID_INVALID or not entry.writable:
-                continue
-            of_another = direction is TPDO and value & 0x7FF != cob_id_of(sheet, direction, number)
-            if of_another or value & 0x7FF in taken:
-                yield index
-
-
-def _numbers(sheet: DataSheet, direction: Direction) -> Iterator[int]:
-    for number in PDO_NUMBERS:
-        if direction.communication + number in sheet.objects and direction.mapping + number in sheet.objects:
-            yield number
+    numbers = (number,) if number < PREDEFINED else range(PREDEFINED)
+    free = [direction.predefined(n) + sheet.node_id for n in numbers]
+    return next((cob_id for cob_id in free if cob_id not in taken), None)
 
 
 def _described(sheet: DataSheet, direction: Direction, number: int) -> PdoLayout:
@@ -207,68 +155,98 @@ def _described(sheet: DataSheet, direction: Direction, number: int) -> PdoLayout
 
     Raises
     ------
-    _Unusable
-        If it does not say it all, or it is a multiplexed PDO.
+    Unusable
+        If it does not say it all, or counts more objects than a PDO can map.
     """
 
     def read(index: int, subindex: int) -> int:
         value = sheet.value(index, subindex)
         if value is None:
-            raise _Unusable(f"0x{index:04X}:{subindex:02X} without a value that can be read")
-        if (index, subindex) == (mapping, 0) and value > MAX_OBJECTS:
-            raise _Unusable(f"0x{index:04X}:00 is {value}: a multiplexed PDO")
+            raise Unusable(f"0x{index:04X}:{subindex:02X} without a value that can be read")
+        if (index, subindex) == (mapping, 0) and value > MAX_MAPPED:
+            reason = "a multiplexed PDO" if value in MULTIPLEX else f"not allowed, at most {MAX_MAPPED} (CiA 301)"
+            raise Unusable(f"0x{index:04X}:00 is {value}: {reason}")
         return value
 
     mapping = direction.mapping + number
     return read_layout(read, direction.communication + number, mapping)
 
 
-def _as_described(sheet: DataSheet, direction: Direction, number: int, wanted: Sequence[int]) -> Carrier:
+def as_described(
+    sheet: DataSheet,
+    direction: Direction,
+    number: int,
+    wanted: Collection[int],
+    taken: Collection[int] = (),
+    also: Collection[int] = (),
+) -> Carrier:
+    """Take a PDO as the data sheet maps it: with one or more of the objects wanted.
+
+    Parameters
+    ----------
+    sheet, direction, number
+        The PDO.
+    wanted
+        What is wanted, by index; a TPDO may carry more.
+    taken
+        Identifiers that it can't have.
+    also
+        What an RPDO may carry more, by index.
+
+    Raises
+    ------
+    Unusable
+        If it does not, or can't be used.
+    """
     described = _described(sheet, direction, number)
     carried = {mapped.index for mapped in described.objects if mapped.subindex == 0}
-    more = {mapped.index for mapped in described.objects} - {*wanted, *FILLERS}
-    if not set(wanted) <= carried or (direction is RPDO and more):
-        raise _Unusable(str(described))
+    more = {mapped.index for mapped in described.objects} - {*wanted, *also, *FILLERS}
+    if not carried & {*wanted} or (direction is RPDO and more):
+        raise Unusable(str(described))
     for mapped in described.objects:
         _require_known(sheet, direction, mapped)
     if sum(mapped.length_bits for mapped in described.objects) > 8 * MAX_PDO_BYTES:
-        raise _Unusable(f"{described}: more than {MAX_PDO_BYTES} bytes")
-    return _carrier(sheet, direction, number, described.objects, described, mapped_here=False)
+        raise Unusable(f"{described}: more than {MAX_PDO_BYTES} bytes")
+    return _carrier(sheet, direction, number, described.objects, described, taken, mapped_here=False)
 
 
 def _require_known(sheet: DataSheet, direction: Direction, mapped: MappedObject) -> None:
     entry = sheet.entry(mapped.index, mapped.subindex)
     kind = DATA_TYPES.get(mapped.index) if mapped.index in FILLERS else None if entry is None else entry.kind
     if kind is None or not kind.is_integer or kind.bits != mapped.length_bits or mapped.length_bits not in (8, 16, 32):
-        raise _Unusable(f"maps {mapped}, expected an integer object of that length")
+        raise Unusable(f"maps {mapped}, expected an integer object of that length")
     if mapped.index in FILLERS and direction is TPDO:
-        raise _Unusable(f"maps {mapped}, a filler")
+        raise Unusable(f"maps {mapped}, a filler")
 
 
-def _mapped_here(sheet: DataSheet, direction: Direction, number: int, wanted: Sequence[int]) -> Carrier:
+def map_here(
+    sheet: DataSheet, direction: Direction, number: int, wanted: Sequence[int], taken: Collection[int] = ()
+) -> Carrier:
+    """Take a PDO and have it map all of the objects wanted; parameters and errors as `as_described`."""
     mapping = direction.mapping + number
     objects = tuple(_mappable(sheet, direction, index) for index in wanted)
     if sum(mapped.length_bits for mapped in objects) > 8 * MAX_PDO_BYTES:
-        raise _Unusable(f"more than {MAX_PDO_BYTES} bytes for {', '.join(map(str, objects))}")
+        raise Unusable(f"more than {MAX_PDO_BYTES} bytes for {', '.join(map(str, objects))}")
     for n in range(len(objects) + 1):
         entry = sheet.entry(mapping, n)
-        if entry is None or not entry.writable:
-            raise _Unusable(f"0x{mapping:04X}:{n:02X} {'is not there' if entry is None else 'can not be written'}")
+        if entry is None or not entry.settable:
+            lacking = "is not there" if entry is None else f"can not be {'read' if entry.writable else 'written'}"
+            raise Unusable(f"0x{mapping:04X}:{n:02X} {lacking}")
     try:
         described = _described(sheet, direction, number)
-    except _Unusable:
+    except Unusable:
         described = None
-    return _carrier(sheet, direction, number, objects, described, mapped_here=True)
+    return _carrier(sheet, direction, number, objects, described, taken, mapped_here=True)
 
 
 def _mappable(sheet: DataSheet, direction: Direction, index: int) -> MappedObject:
     entry = sheet.entry(index)
     if entry is None or entry.kind is None or entry.kind.bits is None:
-        raise _Unusable(f"0x{index:04X} is not there, or of no known type")
+        raise Unusable(f"0x{index:04X} is not there, or of no known type")
     if not entry.mappable:
-        raise _Unusable(f"0x{index:04X} has PDOMapping=0")
+        raise Unusable(f"0x{index:04X} has PDOMapping=0")
     if entry.access not in direction.access:
-        raise _Unusable(f"0x{index:04X} has AccessType {entry.access}, which no {direction.name} carries")
+        raise Unusable(f"0x{index:04X} has AccessType {entry.access}, which no {direction.name} carries")
     return MappedObject(index, 0, entry.kind.bits)
 
 
@@ -278,6 +256,7 @@ def _carrier(
     number: int,
     objects: tuple[MappedObject, ...],
     described: PdoLayout | None,
+    taken: Collection[int],
     *,
     mapped_here: bool,
 ) -> Carrier:
@@ -286,13 +265,15 @@ def _carrier(
     entries = {place: sheet.entry(*place) for place in places}
     for place, entry in entries.items():
         _require_type(entry, place, communication)
+    unread = [place for place, entry in entries.items() if entry is not None and not entry.readable]
+    if unread:
+        raise Unusable(f"0x{unread[0][0]:04X}:{unread[0][1]:02X} can not be read")
     fixed = frozenset(place for place, entry in entries.items() if entry is None or not entry.writable)
-    cob_id = cob_id_of(sheet, direction, number)
-    if cob_id is None:
-        raise _Unusable(f"no identifier in 0x{communication:04X}:01, and none in the pre-defined connection set")
-    held = described is not None and described.valid and not described.extended and described.cob_id == cob_id
-    if (communication, 1) in fixed and not held:
-        raise _Unusable(f"0x{communication:04X}:01 can not be written and has not COB-ID 0x{cob_id:03X}, switched on")
+    cob_id = cob_id_of(sheet, direction, number, taken)
+    if cob_id is None or cob_id in taken:
+        raise Unusable(f"no identifier in 0x{communication:04X}:01, and no free one in the pre-defined connection set")
+    if (communication, 1) in fixed and sheet.value(communication, 1) not in (cob_id, cob_id | COB_ID_NO_RTR):
+        raise Unusable(f"0x{communication:04X}:01 can not be written and has not COB-ID 0x{cob_id:03X}, switched on")
     layout = PdoLayout(
         communication,
         mapping,
@@ -312,7 +293,7 @@ def _require_type(entry: EdsEntry | None, place: tuple[int, int], communication:
     kind = IntegerType.UNSIGNED8 if small else IntegerType.UNSIGNED32
     if entry is None or entry.kind is None or entry.kind.code != kind:
         found = "is not there" if entry is None else "has another data type"
-        raise _Unusable(f"0x{index:04X}:{subindex:02X} {found}, expected {kind.name}")
+        raise Unusable(f"0x{index:04X}:{subindex:02X} {found}, expected {kind.name}")
 
 
 def _transmission_type(sheet: DataSheet, direction: Direction, communication: int) -> int:
@@ -325,4 +306,4 @@ def _transmission_type(sheet: DataSheet, direction: Direction, communication: in
         return EVERY_SYNC
     if direction is RPDO and value in EVENT_DRIVEN:
         return value  # on arrival: earlier than at SYNC, and all the same a command
-    raise _Unusable(f"0x{communication:04X}:02 is {value} and can not be written, expected {EVERY_SYNC}")
+    raise Unusable(f"0x{communication:04X}:02 is {value} and can not be written, expected {EVERY_SYNC}")

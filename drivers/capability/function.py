@@ -70,6 +70,8 @@ class Part:
         Data types it may have: one of another type says something else, or by another scale.
     written
         Whether it is written; else it is read.
+    read_back
+        Whether what is written is read back.
     carried
         Whether a PDO has to carry it: an RPDO what is written, a TPDO what is read.
     held
@@ -80,6 +82,7 @@ class Part:
     subindex: int
     kinds: tuple[IntegerType, ...]
     written: bool = False
+    read_back: bool = False
     carried: bool = False
     held: range | None = None
 

@@ -1,4 +1,4 @@
-"""What a drive has, put together: its abilities and the two PDOs that carry command and feedback. No bus."""
+"""What a drive has, put together: its abilities and the PDOs that carry command and feedback. No bus."""
 
 from __future__ import annotations
 
@@ -6,16 +6,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from drivers.capability.ability import Abilities, Ability, abilities
-from drivers.capability.carrier import RPDO, TPDO, Carrier, CarrierSearch, Direction, find_carrier, strangers
+from drivers.capability.carrier import RPDO, TPDO, Carrier, Direction
+from drivers.capability.carrier_search import CarrierSearch, find_carriers, strangers
 from drivers.capability.function import Function, Part, Without
-from drivers.capability.table import EVENT_TIMER
+from drivers.capability.table import EVENT_TIMER, TABLE
 from drivers.datasheet.sheet import DataSheet
 from drivers.errors import ConfigMismatch
 from drivers.scaling import IntegerType
 
 COMMAND = (Function.CONTROLWORD, Function.TORQUE_TARGET, Function.TORQUE_OFFSET)
 FEEDBACK = (Function.STATUSWORD, Function.TORQUE_ACTUAL, Function.SPEED_ACTUAL)
-"""What the two PDOs carry, in the order in which this program maps it."""
+"""What the PDOs of each direction carry, in the order in which this program maps it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +30,7 @@ class DrivePlan:
     abilities
         What it has of each function.
     command, feedback
-        The search for the RPDO and for the TPDO.
+        The search for RPDOs and for TPDOs.
     """
 
     sheet: DataSheet
@@ -50,7 +51,7 @@ class DrivePlan:
     @property
     def carriers(self) -> tuple[Carrier, ...]:
         """The PDOs found."""
-        return tuple(search.carrier for search in (self.command, self.feedback) if search.carrier is not None)
+        return (*self.command.carriers, *self.feedback.carriers)
 
     @property
     def strangers(self) -> tuple[int, ...]:
@@ -68,8 +69,8 @@ class DrivePlan:
             parts | {index for each in layouts for index in (each.communication_index, each.mapping_index)}
         )
 
-    def carrier(self, direction: Direction) -> Carrier:
-        """Give the PDO of a direction.
+    def pdos(self, direction: Direction) -> tuple[Carrier, ...]:
+        """Give the PDOs of a direction, one or more.
 
         Raises
         ------
@@ -83,26 +84,24 @@ class DrivePlan:
                 f"hil check --eds {self.sheet.path}"
             )
         search = self.command if direction is RPDO else self.feedback
-        if search.carrier is None:
+        if not search.carriers:
             functions = COMMAND if direction is RPDO else FEEDBACK
             wanted = wanted_names(self, functions)
             raise ConfigMismatch(
-                f"{self.sheet.kind} {self.sheet.path}: expected one {direction.name} that maps {wanted}"
+                f"{self.sheet.kind} {self.sheet.path}: expected one {direction.name} or several that map {wanted}"
                 f", or that can be mapped, found {'; '.join(search.others) or f'no {direction.name}'}. "
                 f"See: hil check --eds {self.sheet.path}"
             )
-        return search.carrier
+        return search.carriers
 
 
 def plan_drive(sheet: DataSheet) -> DrivePlan:
     """Find how a drive can be used; what it lacks is in the plan."""
     found = abilities(sheet)
-    command = find_carrier(sheet, RPDO, _indices(found, COMMAND))
-    if found[Function.TORQUE_OFFSET].given and command.carrier is None:  # the sum needs less room
+    command = find_carriers(sheet, RPDO, *_choices(found))
+    if not all(command.carries(part.index) for part in found[Function.TORQUE_OFFSET].parts):
         found[Function.TORQUE_OFFSET] = replace(found[Function.TORQUE_OFFSET], parts=())
-        less = find_carrier(sheet, RPDO, _indices(found, COMMAND))
-        command = replace(less, others=less.others or command.others)
-    feedback = find_carrier(sheet, TPDO, _indices(found, FEEDBACK))
+    feedback = find_carriers(sheet, TPDO, _indices(found, FEEDBACK))
     found[Function.RPDO_DEADLINE] = _deadline(sheet, found[Function.RPDO_DEADLINE], command)
     return DrivePlan(sheet, found, command, feedback)
 
@@ -110,6 +109,13 @@ def plan_drive(sheet: DataSheet) -> DrivePlan:
 def wanted_names(plan: DrivePlan, functions: tuple[Function, ...]) -> str:
     """Name what a PDO has to carry: ``0x6041, 0x6077, 0x606C``."""
     return ", ".join(f"0x{index:04X}" for index in _indices(plan.abilities, functions))
+
+
+def _choices(found: Abilities) -> Iterator[list[int]]:
+    """List what RPDOs may carry: with the torque offset, where there is one, or with the sum, which needs less room."""
+    if found[Function.TORQUE_OFFSET].given:
+        yield _indices(found, COMMAND)
+    yield _indices(found, tuple(each for each in COMMAND if each is not Function.TORQUE_OFFSET))
 
 
 def _indices(found: Abilities, functions: tuple[Function, ...]) -> list[int]:
@@ -126,14 +132,18 @@ def _each_index(found: Abilities, functions: tuple[Function, ...]) -> Iterator[i
 
 
 def _deadline(sheet: DataSheet, ability: Ability, command: CarrierSearch) -> Ability:
-    if command.carrier is None:
+    target = TABLE[Function.TORQUE_TARGET].ways[0][0].index
+    index = next((each.layout.communication_index for each in command.carriers if each.carries(target)), None)
+    if index is None:
         return ability
-    index = command.carrier.layout.communication_index
     entry = sheet.entry(index, EVENT_TIMER)
     there = (
-        entry is not None and entry.writable and entry.kind is not None and entry.kind.code == IntegerType.UNSIGNED16
+        entry is not None and entry.settable and entry.kind is not None and entry.kind.code == IntegerType.UNSIGNED16
     )
-    return replace(ability, parts=(Part(index, EVENT_TIMER, (IntegerType.UNSIGNED16,), written=True),) if there else ())
+    return replace(
+        ability,
+        parts=(Part(index, EVENT_TIMER, (IntegerType.UNSIGNED16,), written=True, read_back=True),) if there else (),
+    )
 
 
 def _lacking(ability: Ability) -> str:

@@ -26,10 +26,15 @@ EVENT_TIMER: Final = 5
 
 
 def _one(
-    index: int, *kinds: IntegerType, subindex: int = 0, written: bool = False, carried: bool = False
+    index: int,
+    *kinds: IntegerType,
+    subindex: int = 0,
+    written: bool = False,
+    read_back: bool = False,
+    carried: bool = False,
 ) -> tuple[tuple[Part, ...], ...]:
     """Write a single way of a single part."""
-    return ((Part(index, subindex, kinds, written, carried),),)
+    return ((Part(index, subindex, kinds, written, read_back, carried),),)
 
 
 NEVER_WITHOUT: Final = "the drive can't be used"
@@ -88,7 +93,9 @@ _ROWS: Final = (
         "a limit of the drive's own is seen in its feedback only",
         key="torque_limit_nm",
     ),
-    Capability(_F.TORQUE_SLOPE, _one(0x6087, _U32, _I32, written=True), _W.DONE, "the drive's own slope acts"),
+    Capability(
+        _F.TORQUE_SLOPE, _one(0x6087, _U32, _I32, written=True, read_back=True), _W.DONE, "the drive's own slope acts"
+    ),
     Capability(
         _F.ERROR_CODE,
         _one(0x603F, _U16),
@@ -106,13 +113,13 @@ _ROWS: Final = (
     ),
     Capability(
         _F.HEARTBEAT_PRODUCER,
-        ((Part(0x1017, 0, (_U16,), written=True, held=range(1, 0x10000)),),),
+        ((Part(0x1017, 0, (_U16,), written=True, read_back=True, held=range(1, 0x10000)),),),
         _W.REFUSED,
         NEVER_WITHOUT,
     ),
     Capability(
         _F.HEARTBEAT_CONSUMER,
-        _one(0x1016, _U32, subindex=1, written=True),
+        _one(0x1016, _U32, subindex=1, written=True, read_back=True),
         _W.ACCEPTED,
         "the drive does not notice that host, computer or cable is gone",
         "whatever else stops it then has to be known",
@@ -141,7 +148,7 @@ _ROWS: Final = (
     Capability(_F.FAULT_CODE, _one(0x605E, _I16), _W.DONE, _OWN_REACTION),
     Capability(
         _F.SYNC_ID,
-        ((Part(0x1005, 0, (_U32,), written=True, held=range(SYNC_COB_ID, SYNC_COB_ID + 1)),),),
+        ((Part(0x1005, 0, (_U32,), written=True, read_back=True, held=range(SYNC_COB_ID, SYNC_COB_ID + 1)),),),
         _W.DONE,
         f"SYNC has the identifier CiA 301 gives it, 0x{SYNC_COB_ID:03X}",
     ),

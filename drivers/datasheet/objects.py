@@ -108,6 +108,11 @@ class EdsEntry:
         return self.access is not None and self.access != "wo"
 
     @property
+    def settable(self) -> bool:
+        """Whether it may be written and read back."""
+        return self.writable and self.readable
+
+    @property
     def node_relative(self) -> bool:
         """Whether its value is given by the node id."""
         formula = read_formula(self.value_text or "")

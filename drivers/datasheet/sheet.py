@@ -5,10 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 from drivers.datasheet.number import read_number
 from drivers.datasheet.objects import EdsEntry, EdsObject
 from drivers.datasheet.text import EdsText
+
+NODE_IDS: Final = range(1, 128)
+BIT_RATES_KBIT_S: Final = range(10, 1001)
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,7 +24,7 @@ class Commissioning:
     node_id
         Its node id; None if it says none from 1 to 127.
     bit_rate_kbit_s
-        Bit rate of its bus [kbit/s]; None if it says none.
+        Bit rate of its bus [kbit/s]; None if it says none from 10 to 1000.
     node_name
         Its name there; empty without one.
     """
@@ -84,10 +88,9 @@ def read_commissioning(text: EdsText) -> Commissioning | None:
     section = text.commissioning
     if section is None:
         return Commissioning()
-    node_id = read_number(section.get("NodeID") or "")
-    rate = read_number(section.get("Baudrate") or "")
+    node_id, rate = (read_number(section.get(key) or "") for key in ("NodeID", "Baudrate"))
     return Commissioning(
-        node_id=node_id if node_id is not None and 1 <= node_id <= 127 else None,
-        bit_rate_kbit_s=rate or None,
+        node_id=node_id if node_id in NODE_IDS else None,
+        bit_rate_kbit_s=rate if rate in BIT_RATES_KBIT_S else None,
         node_name=section.get("NodeName") or "",
     )

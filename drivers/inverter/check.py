@@ -76,7 +76,7 @@ def configurable_differences(
             name = _pdo_name(carrier)
             yield Difference(settings.where, name, f"[{carrier.layout}]", f"[{found}]", plan.sheet.kind)
     for setting, value in _kept(sdo, given):
-        if value not in (setting.value, plan.sheet.value(setting.index, setting.subindex)):
+        if value != setting.value and not _as_told(plan, setting, value):
             yield Difference(settings.where, str(setting), str(setting.value), str(value), setting.source)
 
 
@@ -89,7 +89,7 @@ def remarks(
         if found != carrier.layout and (carrier.mapped_here or found == carrier.described):
             yield f"{_pdo_name(carrier)} has [{found}], a run gives it [{carrier.layout}]"
     for setting, value in _kept(sdo, given):
-        if value != setting.value and value == plan.sheet.value(setting.index, setting.subindex):
+        if value != setting.value and _as_told(plan, setting, value):
             yield f"{setting} is {value}, a run gives it {setting.value} ({setting.source})"
     for index, function in OPTION_CODES.items():
         described = plan.sheet.value(index)
@@ -100,6 +100,11 @@ def remarks(
                     f"{function.value} {object_name(index)} is {value}, the {plan.sheet.kind} has {described}: the "
                     "drive keeps its own. To set it: option_codes in the rig file"
                 )
+
+
+def _as_told(plan: DrivePlan, setting: DriveSetting, value: int) -> bool:
+    """Whether the drive has what its data sheet says, or that leaves it open."""
+    return plan.sheet.value(setting.index, setting.subindex) in (value, None)
 
 
 def _kept(sdo: SdoChannel, given: tuple[DriveSetting, ...]) -> Iterator[tuple[DriveSetting, int]]:

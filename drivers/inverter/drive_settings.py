@@ -12,7 +12,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
-from drivers.canopen.can_link import HOST_NODE_ID
 from drivers.canopen.emcy import EMCY_COB_ID
 from drivers.canopen.sdo import object_name
 from drivers.capability.function import Function
@@ -136,7 +135,7 @@ def _no_sync_counter(plan: DrivePlan) -> Iterator[DriveSetting]:
     entry = plan.sheet.entry(SYNC_COUNTER_OVERFLOW)
     if entry is None:
         return
-    if entry.writable:
+    if entry.settable:
         yield DriveSetting(SYNC_COUNTER_OVERFLOW, 0, "SYNC counter overflow", 0, THIS_PROGRAM)
     elif value := plan.sheet.value(SYNC_COUNTER_OVERFLOW):
         raise ConfigMismatch(
@@ -158,7 +157,7 @@ def _no_node_guarding(plan: DrivePlan) -> Iterator[DriveSetting]:
     entries = [(plan.sheet.entry(index), name) for index, name in GUARDING]
     if all(entry is not None for entry, _ in entries):
         for entry, name in entries:
-            if entry is not None and entry.writable:
+            if entry is not None and entry.settable:
                 yield DriveSetting(entry.index, 0, f"{name} (heartbeat instead)", 0, THIS_PROGRAM)
 
 
@@ -189,7 +188,7 @@ def _deadline(plan: DrivePlan, settings: InverterSettings) -> Iterator[DriveSett
 
 def _heartbeats(plan: DrivePlan, settings: InverterSettings) -> Iterator[DriveSetting]:
     if plan.has(Function.HEARTBEAT_CONSUMER):
-        consumer = HOST_NODE_ID << 16 | settings.heartbeat_timeout_ms
+        consumer = settings.host_node_id << 16 | settings.host_timeout_ms
         yield DriveSetting(0x1016, 1, "consumer heartbeat time", consumer, RIG_FILE, watches_host=True)
     if plan.abilities[Function.HEARTBEAT_PRODUCER].writable(plan.sheet):
         period_ms = settings.heartbeat_ms

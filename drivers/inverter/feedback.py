@@ -1,10 +1,16 @@
-"""An inverter's TPDO turned into feedback, and the waiting for it."""
+"""An inverter's TPDOs turned into feedback, and the waiting for it.
+
+Where several share the feedback it is as old as the oldest of them: who waits for what came after a SYNC gets it when
+all of that cycle are there.
+"""
 
 from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from drivers.canopen.pdo_map import PdoCodec
 from drivers.inverter.cia402 import PowerState, StatusBit, state_of
@@ -16,7 +22,7 @@ _LIMITED, _FOLLOWS = StatusBit.INTERNAL_LIMIT_ACTIVE.value, StatusBit.FOLLOWS_TA
 
 @dataclass(frozen=True, slots=True)
 class InverterFeedback:
-    """What an inverter reported in one TPDO.
+    """What an inverter reported in its TPDOs.
 
     Attributes
     ----------
@@ -27,9 +33,9 @@ class InverterFeedback:
     state
         Power state from the statusword, 0x6041.
     t_ns
-        Arrival on the host's monotonic clock [ns].
+        Arrival on the host's monotonic clock, of the TPDO that came first where there are several [ns].
     sequence
-        Counts the TPDOs received from this inverter, from 1.
+        Counts what was received from this inverter, from 1.
     torque_raw, speed_raw
         The counts on the bus, so that a wrong scale can be corrected later.
     limited
@@ -54,31 +60,43 @@ class FeedbackReceiver:
 
     Parameters
     ----------
-    codec
-        The TPDO's layout; it must carry 0x6041, 0x6077 and 0x606C.
+    codecs
+        The TPDOs' layouts; together they must carry 0x6041, 0x6077 and 0x606C.
     torque, velocity
         Scales of 0x6077 and 0x606C.
 
     Raises
     ------
     ConfigMismatch
-        If the TPDO lacks one of the objects.
+        If one of the objects is in none of them.
     """
 
-    def __init__(self, codec: PdoCodec, torque: TorqueScale, velocity: VelocityScale) -> None:
-        self._codec = codec
+    def __init__(self, codecs: Sequence[PdoCodec], torque: TorqueScale, velocity: VelocityScale) -> None:
+        self._codecs = tuple(codecs)
         self._torque = torque
         self._velocity = velocity
-        self._statusword_at = codec.position(0x6041)
-        self._torque_at = codec.position(0x6077)
-        self._speed_at = codec.position(0x606C)
+        self._statusword_at, self._torque_at, self._speed_at = (
+            _place(self._codecs, index) for index in (0x6041, 0x6077, 0x606C)
+        )
+        self._received: list[tuple[tuple[int, ...], int] | None] = [None] * len(self._codecs)
+        self._counts = [0] * len(self._codecs)
         self._arrived = threading.Condition()
         self._sequence = 0
         self._started = False
         self.latest: InverterFeedback | None = None
 
-    def on_frame(self, data: bytes, t_ns: int) -> None:
-        """Take one TPDO; before `start_anew` its mapping is unknown, and it is left alone.
+    @property
+    def received(self) -> int:
+        """How often all TPDOs have come; it never starts anew."""
+        return min(self._counts)
+
+    @property
+    def subscriptions(self) -> list[tuple[int, Callable[[bytes, int], None]]]:
+        """Identifier of each TPDO, and what takes its frames: data and arrival [ns]."""
+        return [(codec.layout.cob_id, partial(self.on_frame, n)) for n, codec in enumerate(self._codecs)]
+
+    def on_frame(self, part: int, data: bytes, t_ns: int) -> None:
+        """Take the TPDO of that number; before `start_anew` its mapping is unknown, and it is left alone.
 
         Raises
         ------
@@ -87,14 +105,19 @@ class FeedbackReceiver:
         """
         if not self._started:
             return
-        values = self._codec.unpack(data)
-        torque_raw, speed_raw = values[self._torque_at], values[self._speed_at]
-        statusword = values[self._statusword_at]
+        self._received[part] = self._codecs[part].unpack(data), t_ns
+        self._counts[part] += 1
+        received = [each for each in self._received if each is not None]
+        if len(received) < len(self._codecs):
+            return
+        statusword, torque_raw, speed_raw = (
+            received[n][0][at] for n, at in (self._statusword_at, self._torque_at, self._speed_at)
+        )
         feedback = InverterFeedback(
             torque_nm=self._torque.to_nm(torque_raw),
             speed_rad_s=self._velocity.to_rad_s(speed_raw),
             state=state_of(statusword),
-            t_ns=t_ns,
+            t_ns=min(arrival_ns for _, arrival_ns in received),
             sequence=self._sequence + 1,
             torque_raw=torque_raw,
             speed_raw=speed_raw,
@@ -110,6 +133,7 @@ class FeedbackReceiver:
         """Take frames from now on, and forget what came before: mapping or state were other than now."""
         with self._arrived:
             self._started = True
+            self._received = [None] * len(self._codecs)
             self.latest = None
 
     def await_after(self, after_ns: int, timeout_s: float) -> InverterFeedback | None:
@@ -123,3 +147,9 @@ class FeedbackReceiver:
                 if not self._arrived.wait(deadline - time.monotonic()):
                     return None
             return self.latest
+
+
+def _place(codecs: tuple[PdoCodec, ...], index: int) -> tuple[int, int]:
+    """Find an object: number of the TPDO, and place among its values."""
+    of = next((n for n, codec in enumerate(codecs) if index in codec.indices), 0)
+    return of, codecs[of].position(index)

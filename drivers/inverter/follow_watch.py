@@ -40,6 +40,10 @@ class FollowWatch:
         """Whether the drive has said that it follows since it was armed; True where it can't say."""
         return self._followed or not self._watches or (latest is not None and latest.follows)
 
+    def is_ignored(self, latest: InverterFeedback) -> bool:
+        """Whether feedback says that the target is not followed; False where the drive can't say."""
+        return self._watches and not latest.follows
+
     def start_anew(self) -> None:
         """Forget what was seen: the drive has been armed."""
         self._asked = False

@@ -17,10 +17,8 @@ from drivers.canopen.can_link import CanLink
 from drivers.canopen.emcy import EMCY_COB_ID
 from drivers.canopen.heartbeat import HEARTBEAT_COB_ID, NMT_COB_ID, NmtCommand, NmtState, nmt_frame
 from drivers.canopen.node_monitor import NodeMonitor
-from drivers.canopen.pdo_map import COB_ID_INVALID, COB_ID_NO_RTR, configuration_writes, read_layout
 from drivers.canopen.sdo import SdoChannel
 from drivers.canopen.sdo_node import SdoNode
-from drivers.capability.carrier import Carrier
 from drivers.errors import CommandRefused, ConfigMismatch, DriverError
 from drivers.inverter.check import Difference, configurable_differences, fixed_differences, remarks
 from drivers.inverter.cia402 import Command
@@ -29,6 +27,7 @@ from drivers.inverter.drive_settings import drive_settings
 from drivers.inverter.feedback import FeedbackReceiver, InverterFeedback
 from drivers.inverter.follow_watch import FollowWatch
 from drivers.inverter.frozen_feedback import FrozenFeedback
+from drivers.inverter.pdo_setup import set_up_pdos
 from drivers.inverter.pdos import TARGET_TORQUE, TORQUE_OFFSET, InverterPdos, TorqueCounts
 from drivers.inverter.power_control import PowerControl
 from drivers.inverter.protection import Protection, protections, require_protections
@@ -39,6 +38,9 @@ from drivers.torque_guard import GuardedTorque
 __all__ = ["Difference", "Inverter", "InverterFeedback", "InverterSettings"]
 
 NO_TORQUE: Final = TorqueCounts()
+
+SDO_REQUEST_COB_ID: Final = 0x600
+"""Plus the node id."""
 
 
 class Inverter:
@@ -76,6 +78,9 @@ class Inverter:
         self._frozen = FrozenFeedback(self._where)
         self._following = FollowWatch(settings)
         self._armed = False
+        for cob_id in self._pdos.rpdos:
+            link.strangers.claim(cob_id, f"{self._where}: an RPDO")
+        link.strangers.claim(SDO_REQUEST_COB_ID + settings.node_id, f"{self._where}: an SDO request")
 
     @property
     def latest(self) -> InverterFeedback | None:
@@ -83,9 +88,20 @@ class Inverter:
         return self._feedback.latest
 
     @property
+    def received(self) -> int:
+        """How often all TPDOs have been received; it never starts anew."""
+        return self._feedback.received
+
+    @property
     def follows(self) -> bool:
         """Whether the drive has said, since `arm`, that it follows its target torque; True where it can't say."""
         return self._following.follows(self.latest)
+
+    @property
+    def admits_less(self) -> bool:
+        """Whether the last feedback says that the torque is less than asked for: limited, or not following."""
+        latest = self.latest
+        return latest is not None and (latest.limited or self._following.is_ignored(latest))
 
     def check(self) -> tuple[Difference, ...]:
         """Compare the device with rig file and EDS; reads objects, writes none.
@@ -179,13 +195,12 @@ class Inverter:
             raise ConfigMismatch(
                 f"{'; '.join(map(str, differences))}. Correct the rig file, or connect the drive it describes."
             )
-        for index in self._plan.strangers:
-            self._switch_off(index)
-        for carrier in self._plan.carriers:
-            self._write_layout(carrier)
-        self._link.produce_heartbeat(self.settings.heartbeat_ms / 1000.0)  # before the drive listens for it
+        set_up_pdos(self._sdo, self._plan, self._where)
+        # before the drive listens for it:
+        self._link.produce_heartbeat(self.settings.host_heartbeat_s, self.settings.host_node_id)
         for setting in self._given:
             self._sdo.download_confirmed(setting.index, setting.subindex, setting.value)
+        self._link.beat()  # the drive watches its host from now on, and not from some later heartbeat
         self._feedback.start_anew()
         self._monitor.forget_lost_host()
         self._monitor.await_state(
@@ -212,7 +227,7 @@ class Inverter:
         self._armed = True
 
     def command(self, torque: GuardedTorque) -> None:
-        """Send one RPDO; the drive puts it into effect at the next SYNC.
+        """Send the command; the drive puts it into effect at the next SYNC.
 
         Raises
         ------
@@ -228,10 +243,10 @@ class Inverter:
         counts = self._pdos.counts(torque)
         self._frozen.commanded(counts.total, self.latest)
         self._following.commanded(counts.total)
-        self._send_rpdo(Command.ENABLE_OPERATION, counts)
+        self._send_command(Command.ENABLE_OPERATION, counts)
 
     def await_feedback(self, after_ns: int, timeout_s: float) -> InverterFeedback | None:
-        """Wait for the TPDO received after ``after_ns``, the result of `CanLink.sync` [ns].
+        """Wait for the TPDOs received after ``after_ns``, the result of `CanLink.sync` [ns].
 
         Returns
         -------
@@ -251,12 +266,12 @@ class Inverter:
             If the drive does not follow.
         """
         self._armed = False
-        self._send_rpdo(Command.QUICK_STOP)  # overwrites the RPDO still waiting for SYNC
+        self._send_command(Command.QUICK_STOP)  # overwrites the RPDO still waiting for SYNC
         self._power.quick_stop(self._go_on_stopping)
 
     def _go_on_stopping(self) -> None:
         """Repeat the command with every SYNC, or the drive would take the host for dead before its ramp is over."""
-        self._send_rpdo(Command.QUICK_STOP)
+        self._send_command(Command.QUICK_STOP)
         self._link.sync()
 
     def prove_stop(self, period_s: float) -> tuple[Difference, ...]:
@@ -285,7 +300,7 @@ class Inverter:
             self._power,
             self._monitor,
             self.configure,
-            lambda: self._send_rpdo(Command.SHUTDOWN),
+            lambda: self._send_command(Command.SHUTDOWN),
         )
         differences = tuple(proof.run(self._given, period_s))
         self._proof = proof.seen
@@ -305,7 +320,7 @@ class Inverter:
         self._armed = False
         errors = _try_all(
             # Overwrites the RPDO still waiting for SYNC: it would enable the drive again.
-            lambda: self._send_rpdo(Command.DISABLE_VOLTAGE),
+            lambda: self._send_command(Command.DISABLE_VOLTAGE),
             self._power.zero_targets,
             self._power.disable_voltage,
         )
@@ -339,8 +354,11 @@ class Inverter:
             If its heartbeat is lost, or never came.
         BusDown, ProtocolViolation
             If the bus is gone, or a frame could not be read.
+        ForeignController
+            If somebody else commands the drives, while the link is watched for that.
         """
         self._link.raise_if_failed()
+        self._link.strangers.raise_if_seen()
         self._monitor.raise_if_unwell(time.monotonic_ns())
         self._frozen.raise_if_frozen()
         latest = self.latest
@@ -359,30 +377,10 @@ class Inverter:
         emergency = self._monitor.emergency
         return None if emergency is None else emergency.code
 
-    def _write_layout(self, carrier: Carrier) -> None:
-        """Give a PDO its layout, but for what the drive holds for good."""
-        layout = carrier.layout
-        present = self._sdo.upload(layout.communication_index, 1)
-        for index, subindex, value in configuration_writes(layout, present):
-            if carrier.written(index, subindex):
-                is_cob_id = (index, subindex) == (layout.communication_index, 1)
-                self._sdo.download_confirmed(index, subindex, value, ignored=COB_ID_NO_RTR if is_cob_id else 0)
-        found = read_layout(self._sdo.upload, layout.communication_index, layout.mapping_index)
-        if found != layout:  # what is not written has to be there
-            raise ConfigMismatch(
-                f"{self._where}: PDO 0x{layout.communication_index:04X}/0x{layout.mapping_index:04X} has [{found}], "
-                f"expected [{layout}], and can't be given it. Use the EDS of the drive's firmware version."
-            )
-
-    def _switch_off(self, communication_index: int) -> None:
-        """Switch off a PDO that would disturb."""
-        present = self._sdo.upload(communication_index, 1)
-        if not present & COB_ID_INVALID:
-            self._sdo.download_confirmed(communication_index, 1, present | COB_ID_INVALID, ignored=COB_ID_NO_RTR)
-
     def _subscribe_feedback(self) -> FeedbackReceiver:
         receiver = self._pdos.receiver()
-        self._link.subscribe(self._pdos.feedback.layout.cob_id, receiver.on_frame)
+        for cob_id, take in receiver.subscriptions:
+            self._link.subscribe(cob_id, take)
         return receiver
 
     def _subscribe_monitor(self) -> NodeMonitor:
@@ -394,8 +392,9 @@ class Inverter:
     def _send_nmt(self, command: NmtCommand) -> None:
         self._link.send(NMT_COB_ID, nmt_frame(command, self.settings.node_id))
 
-    def _send_rpdo(self, command: Command, counts: TorqueCounts = NO_TORQUE) -> None:
-        self._link.send(self._pdos.command.layout.cob_id, self._pdos.pack(command, counts))
+    def _send_command(self, command: Command, counts: TorqueCounts = NO_TORQUE) -> None:
+        for cob_id, data in self._pdos.frames(command, counts):
+            self._link.send(cob_id, data)
 
 
 def _try_all(*steps: Callable[[], None]) -> list[DriverError]:

@@ -1,4 +1,4 @@
-"""The two PDOs of an inverter, found by the objects they carry. No bus, no clock.
+"""The PDOs of an inverter, found by the objects they carry. No bus, no clock.
 
 A run on the bus and the replay of a bus trace read the same frames by these.
 """
@@ -8,7 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from drivers.canopen.pdo_map import PdoCodec
-from drivers.capability.carrier import RPDO, TPDO, Carrier
+from drivers.capability.carrier import RPDO, TPDO, Direction
+from drivers.capability.carrier_search import MODES_OF_OPERATION
 from drivers.capability.plan import DrivePlan, plan_drive
 from drivers.capability.speed_unit import speed_scale
 from drivers.datasheet.file import EdsFile
@@ -21,26 +22,15 @@ from drivers.torque_guard import GuardedTorque
 CONTROLWORD, TARGET_TORQUE, TORQUE_OFFSET = 0x6040, 0x6071, 0x60B2
 
 
-def command_codec(eds: EdsFile, where: str) -> PdoCodec:
-    """Build packer and unpacker of the RPDO that carries the torque command in a run.
+def codecs(eds: EdsFile, direction: Direction, where: str) -> tuple[PdoCodec, ...]:
+    """Build packers and unpackers of the PDOs that carry torque command (RPDO) or feedback (TPDO) in a run.
 
     Raises
     ------
     ConfigMismatch
-        If there is none, and none can be mapped.
+        If there are none, and none can be mapped.
     """
-    return eds.codec(plan_drive(eds.sheet).carrier(RPDO).layout, where)
-
-
-def feedback_codec(eds: EdsFile, where: str) -> PdoCodec:
-    """Build packer and unpacker of the TPDO that carries the feedback in a run.
-
-    Raises
-    ------
-    ConfigMismatch
-        If there is none, and none can be mapped.
-    """
-    return eds.codec(plan_drive(eds.sheet).carrier(TPDO).layout, where)
+    return tuple(eds.codec(carrier.layout, where) for carrier in plan_drive(eds.sheet).pdos(direction))
 
 
 class InverterPdos:
@@ -59,8 +49,8 @@ class InverterPdos:
         What it has, and how it is used.
     velocity
         Scale of 0x606C.
-    command, feedback
-        Its RPDO and its TPDO.
+    rpdos
+        Identifiers of the RPDOs that carry the command.
 
     Raises
     ------
@@ -72,22 +62,22 @@ class InverterPdos:
         where = settings.where
         self.eds = EdsFile(settings.eds_path, settings.node_id)
         self.plan: DrivePlan = plan_drive(self.eds.sheet)
-        self.command: Carrier = self.plan.carrier(RPDO)
-        self.feedback: Carrier = self.plan.carrier(TPDO)
+        self._rpdos = codecs(self.eds, RPDO, where)
+        self._tpdos = codecs(self.eds, TPDO, where)
+        self.rpdos = tuple(codec.layout.cob_id for codec in self._rpdos)
         self.velocity: VelocityScale = speed_scale(self.plan, settings.speed_unit, where)
         self._torque = TorqueScale(settings.rated_torque_nm)
         self._where = where
-        self._rpdo: PdoCodec = command_codec(self.eds, where)
-        self._tpdo: PdoCodec = feedback_codec(self.eds, where)
+        self._mode = settings.mode.value
 
     @property
     def has_offset(self) -> bool:
         """Whether the PRBS goes into an object of its own."""
-        return TORQUE_OFFSET in self._rpdo.indices
+        return any(TORQUE_OFFSET in codec.indices for codec in self._rpdos)
 
     def receiver(self) -> FeedbackReceiver:
-        """Build what reads the TPDO's frames in SI units."""
-        return FeedbackReceiver(self._tpdo, self._torque, self.velocity)
+        """Build what reads the TPDOs' frames in SI units."""
+        return FeedbackReceiver(self._tpdos, self._torque, self.velocity)
 
     def counts(self, torque: GuardedTorque) -> TorqueCounts:
         """Turn a command into counts; base and PRBS are summed where the drive has one object for both.
@@ -103,12 +93,20 @@ class InverterPdos:
             )
         return TorqueCounts(self._torque.to_raw(torque.base_nm + torque.prbs_nm, self._where), 0)
 
-    def pack(self, command: Command, counts: TorqueCounts) -> bytes:
-        """Build the RPDO's frame; a filler is 0."""
-        values = {CONTROLWORD: command.value, TARGET_TORQUE: counts.target, TORQUE_OFFSET: counts.offset}
-        return self._rpdo.pack(tuple([values.get(index, 0) for index in self._rpdo.indices]))
+    def frames(self, command: Command, counts: TorqueCounts) -> list[tuple[int, bytes]]:
+        """Build the RPDOs' frames, each with its identifier; a filler is 0."""
+        values = {
+            CONTROLWORD: command.value,
+            TARGET_TORQUE: counts.target,
+            TORQUE_OFFSET: counts.offset,
+            MODES_OF_OPERATION: self._mode,
+        }
+        return [
+            (codec.layout.cob_id, codec.pack(tuple([values.get(index, 0) for index in codec.indices])))
+            for codec in self._rpdos
+        ]
 
-    def unpack(self, data: bytes) -> TorqueOnBus:
+    def unpack(self, cob_id: int, data: bytes) -> TorqueOnBus:
         """Read the torque of an RPDO's frame.
 
         Raises
@@ -116,11 +114,12 @@ class InverterPdos:
         ProtocolViolation
             If it has not the length of its mapping.
         """
-        values = dict(zip(self._rpdo.indices, self._rpdo.unpack(data), strict=True))
-        offset = values.get(TORQUE_OFFSET)
-        return TorqueOnBus(
-            self._torque.to_nm(values[TARGET_TORQUE]), None if offset is None else self._torque.to_nm(offset)
-        )
+        codec = self._rpdos[self.rpdos.index(cob_id)]
+        values = dict(zip(codec.indices, codec.unpack(data), strict=True))
+        return TorqueOnBus(*(self._nm(values.get(index)) for index in (TARGET_TORQUE, TORQUE_OFFSET)))
+
+    def _nm(self, counts: int | None) -> float | None:
+        return None if counts is None else self._torque.to_nm(counts)
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,7 +137,7 @@ class TorqueCounts:
 
 @dataclass(frozen=True, slots=True)
 class TorqueOnBus:
-    """Target torque and torque offset of a frame [Nm]; the offset is None where both are summed into the target."""
+    """Target torque and torque offset of a frame [Nm]; None what it does not carry."""
 
-    target_nm: float
+    target_nm: float | None
     offset_nm: float | None

@@ -113,7 +113,7 @@ def _protections(plan: DrivePlan, settings: InverterSettings) -> Iterator[Protec
     yield Protection(
         "heartbeat_consumer",
         "host, computer or cable gone",
-        f"{object_name(0x1016, 1)}, {settings.heartbeat_timeout_ms} ms" if watched[0] else "",
+        f"{object_name(0x1016, 1)}, {settings.host_timeout_ms} ms" if watched[0] else "",
         accepted.get("heartbeat_consumer"),
     )
     parts = plan.abilities[Function.RPDO_DEADLINE].parts

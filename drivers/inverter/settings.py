@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from drivers.canopen.heartbeat import HOST_NODE_ID
 from drivers.capability.speed_unit import SpeedUnit
 from drivers.inverter.acceptance import Acceptance
 from drivers.inverter.cia402 import TorqueMode
@@ -32,7 +33,11 @@ class InverterSettings:
     vendor_id, product_code
         Identity expected in object 0x1018; None for the EDS's.
     heartbeat_ms
-        Heartbeat period, of the drive and of the host [ms].
+        Heartbeat period of the drive [ms].
+    host_node_id
+        Node id of the host's own heartbeat, 1 to 127.
+    host_timeout_ms
+        Without the host's heartbeat for so long the drive takes the host for dead [ms].
     follow_bit
         Whether the drive says in bit 12 of its statusword that it follows the target torque (mode 10 only).
     rpdo_deadline_ms
@@ -64,8 +69,10 @@ class InverterSettings:
     vendor_id: int | None = None
     product_code: int | None = None
     heartbeat_ms: int = 100
+    host_node_id: int = HOST_NODE_ID
+    host_timeout_ms: int = 150
     follow_bit: bool = True
-    rpdo_deadline_ms: int = 200
+    rpdo_deadline_ms: int = 150
     option_codes: Mapping[int, int] = field(default_factory=dict)
     torque_slope_nm_per_s: float | None = None
     speed_unit: SpeedUnit | None = None
@@ -77,12 +84,17 @@ class InverterSettings:
 
     @property
     def heartbeat_timeout_ms(self) -> int:
-        """Without a heartbeat for so long the other side counts as lost [ms].
+        """Without a heartbeat for so long the drive counts as lost [ms].
 
-        Five periods, for a heartbeat has the bus's lowest priority; not below 0.5 s, for neither end is a
-        real-time system; not above the 16 bits of object 0x1016.
+        Five periods, for a heartbeat has the bus's lowest priority; not below 0.5 s, for the host is no real-time
+        system, and torque without answers ends sooner by the age of the feedback.
         """
         return min(max(5 * self.heartbeat_ms, 500), 0xFFFF)
+
+    @property
+    def host_heartbeat_s(self) -> float:
+        """Period of the host's heartbeat: a fifth of what the drive waits for it [s]."""
+        return self.host_timeout_ms / 5 / 1000.0
 
     @property
     def nmt_timeout_s(self) -> float:

@@ -3,6 +3,7 @@
 ::
 
     connect          open, then compare the identity registers with the map
+    greet            beat, then look for the permissive: a PLC that has lost its host withdraws it until the next beat
     read_status      one request per run of adjacent registers
     write            read back; what the registers then hold must be what was written
     PRBS             started with torques that have passed the torque guard and with nothing else
@@ -56,6 +57,9 @@ COUNTS: Final = 65536
 GENERATOR_OFF: Final = PrbsSettings(False, 0.0, 1, 1, PrbsSource.HOST)
 """The PLC's own generator stands still, whatever it was set to."""
 
+BEAT_EVERY_S: Final = 0.1
+"""Between two beats while nothing else asks the PLC for anything [s]."""
+
 POLL_S: Final = 0.01
 """Pause between two looks at a drive mode that is changing [s]: about one PLC cycle."""
 
@@ -75,6 +79,8 @@ class Plc:
         Time for a drive mode to take effect [s].
     beat_timeout_s : float
         Time the PLC may leave a beat unseen [s].
+    greeting_timeout_s : float
+        Time it may take from the first beat to the permissive [s].
     security : ClientSecurity or None
         How the connection is secured; None for plain Modbus TCP.
     clock_ns : callable
@@ -89,6 +95,7 @@ class Plc:
     __slots__ = (
         "_beat_timeout_s",
         "_clock_ns",
+        "_greeting_timeout_s",
         "_host_count",
         "_latest",
         "_link",
@@ -107,6 +114,7 @@ class Plc:
         timeout_s: float = 1.0,
         mode_timeout_s: float = 1.0,
         beat_timeout_s: float = 0.5,
+        greeting_timeout_s: float = 0.5,
         security: ClientSecurity | None = None,
         clock_ns: Callable[[], int] = time.monotonic_ns,
     ) -> None:
@@ -115,6 +123,7 @@ class Plc:
         self._map = register_map
         self._mode_timeout_s = mode_timeout_s
         self._beat_timeout_s = beat_timeout_s
+        self._greeting_timeout_s = greeting_timeout_s
         self._clock_ns = clock_ns
         self._host_count: int | None = None
         self._latest: PlcStatus | None = None
@@ -160,6 +169,38 @@ class Plc:
         """Disconnect; safe to call twice."""
         self._link.close()
         self._host_count = None
+
+    async def greet(self) -> PlcStatus:
+        """Beat until the PLC permits torque, for ``greeting_timeout_s`` at most, and give its status then.
+
+        A PLC that watches its host withdraws the permissive when the beats of one end, and gives it back with those of
+        the next: asked before its first beat, it would refuse every host after one that died.
+
+        Raises
+        ------
+        BusDown, DeviceTimeout, ProtocolViolation, DeviceFault
+            If it can't be read or written, or means nothing.
+        """
+        deadline_ns = self._clock_ns() + int(self._greeting_timeout_s * NS_PER_S)
+        while True:
+            await self.beat()
+            status = await self.read_status()
+            if status.permissive or self._clock_ns() >= deadline_ns:
+                return status
+            await asyncio.sleep(POLL_S)
+
+    async def keep_beating(self, goes_on: Callable[[], bool]) -> None:
+        """Beat every `BEAT_EVERY_S` as long as ``goes_on`` says so, once at least; no beat is broken off.
+
+        Raises
+        ------
+        BusDown, DeviceTimeout, ProtocolViolation, DeviceFault
+            If a beat can't be written, or is not seen.
+        """
+        await self.beat()
+        while goes_on():
+            await asyncio.sleep(BEAT_EVERY_S)
+            await self.beat()
 
     async def read_status(self) -> PlcStatus:
         """Read everything the PLC reports.

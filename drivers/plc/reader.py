@@ -1,7 +1,8 @@
 """Read a PLC that may go away and come back: for checking and monitoring, where nothing depends on one answer.
 
-A lost connection is made again, with pauses that double, and a bounded number of times. It only reads: what was to
-be written when a connection was lost, nobody knows to have arrived, so that writing again is a person's decision.
+A lost connection is made again, with pauses that double, and a bounded number of times. It only reads, but for the
+host's beat: what else was to be written when a connection was lost, nobody knows to have arrived, so that writing again
+is a person's decision.
 A run does not use this; there a lost PLC ends it (`hil.rig.plc_watch`).
 """
 
@@ -107,6 +108,16 @@ class PlcReader:
             At once: another attempt would find the same.
         """
         return await self._read(self._plc.read_status)
+
+    async def greet(self) -> PlcStatus:
+        """Beat and read the status, as `Plc.greet`; connect first as `read_status` does.
+
+        Raises
+        ------
+        BusDown, DeviceTimeout, ConfigMismatch, ProtocolViolation, DeviceFault
+            As `read_status`.
+        """
+        return await self._read(self._plc.greet)
 
     async def read_registers(self) -> tuple[Reading, ...]:
         """Read every register of the map, as `Plc.read_registers` gives them; connect first as `read_status` does.

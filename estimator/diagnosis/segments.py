@@ -9,13 +9,13 @@ gap as before it. Time goes on (``Record.began_s``), for laws over time.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
 from estimator.diagnosis.stretches import share_of, stretches
+from estimator.signals.part import sliced
 from estimator.signals.record import Record
 
 LONG_S = 1.0
@@ -140,14 +140,3 @@ def _told_of_stretches(record: Record, long: Sequence[slice], used: Sequence[sli
         f"recording {record.name}: {seen:.0f} s of its {whole:.0f} s are used, in {len(used)} stretches, each with its "
         "own initial state and constant load."
     )
-
-
-def sliced(record: Record, rows: slice, name: str | None = None) -> Record:
-    """Return a part of a recording as a recording of its own; laws over time count from where the whole began."""
-    parts: dict[str, Any] = {
-        field.name: values[rows]
-        for field in fields(record)
-        if isinstance(values := getattr(record, field.name), np.ndarray)  # each has a row per sample
-    }
-    began_s = float(record.time_s[0]) if record.began_s is None else record.began_s
-    return replace(record, name=record.name if name is None else name, began_s=began_s, **parts)

@@ -17,7 +17,7 @@ from estimator.identification.linear_model import Orders
 from estimator.identification.modes.cancellation import Cancellation
 from estimator.identification.modes.physical import RESPONDING
 from estimator.identification.modes.uncertainty import UncertainMode, pole_zero_map, uncertain_modes
-from estimator.identification.offline.blocks import block_of
+from estimator.identification.offline.blocks import block_of, first_part
 from estimator.identification.offline.box_jenkins import fit_of, solved
 from estimator.identification.offline.feedback import Feedback, judge_feedback
 from estimator.identification.offline.linear_fit import LinearFit
@@ -120,7 +120,7 @@ def best_estimate(record: Record, high_pass_hz: float = HIGH_PASS_HZ) -> BestEst
     Parameters
     ----------
     record : Record
-        As recorded; not changed.
+        As recorded; not changed. Of a long one the first part is used (:func:`blocks.first_part`).
     high_pass_hz : float
         Corner of the high-pass [Hz].
 
@@ -129,6 +129,7 @@ def best_estimate(record: Record, high_pass_hz: float = HIGH_PASS_HZ) -> BestEst
     NotExciting
         If the recording can't determine a third-order model.
     """
+    record = first_part(record)
     data = high_passed(record, high_pass_hz)
     rungs = [_rung(data, RESPONDING)]
     if not rungs[0].validation.independence.is_independent:

@@ -25,6 +25,7 @@ from estimator.errors import BadSetting, NotExciting
 from estimator.identification.excitation import SAMPLES_PER_PARAMETER
 from estimator.identification.linear_model import LinearModel, Orders
 from estimator.identification.modes.modes import Mode, continuous, resonance
+from estimator.identification.offline.blocks import first_part
 from estimator.identification.offline.output_error import OutputErrorFit, fit_output_error
 from estimator.identification.online.adaptation import Adaptation, DecreasingThenConstantTrace
 from estimator.identification.online.oefo import Oefo
@@ -108,13 +109,14 @@ class Settings:
         return factor
 
     def offline(self, record: Record) -> Record:
-        """Return a recording as the off-line models take it: high-passed, at their period.
+        """Return a recording as the off-line models take it: high-passed, at their period, a long one's first part.
 
         Raises
         ------
         BadSetting
             As :meth:`factor`.
         """
+        record = first_part(record)
         if self.offline_sample_time_s is None:
             return high_passed(record, self.high_pass_hz)
         factor = replace(self, sample_time_s=self.offline_sample_time_s).factor(record)

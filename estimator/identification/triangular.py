@@ -11,7 +11,10 @@ from __future__ import annotations
 import numpy as np
 
 from estimator.compiled import compiled
-from estimator.signals.record import FloatArray
+from estimator.signals.record import BoolArray, FloatArray
+
+ROWS = 65536
+"""Rows that are reduced at a time: half a megabyte each column."""
 
 
 @compiled
@@ -42,28 +45,37 @@ def _reduce(work: FloatArray) -> None:
         work[j, j + 1 :] = 0.0
 
 
-def triangular(A: FloatArray) -> FloatArray:
-    """Return R, upper triangular, with ``R^T R = A^T A``.
+def triangular(*columns: FloatArray, rows: BoolArray | None = None) -> FloatArray:
+    """Return R, upper triangular, with ``R^T R = A^T A``, A the columns side by side.
+
+    Rows are taken a part at a time, each below the R of those before (Golub and Van Loan, section 5.2): nothing as long
+    as A is copied.
 
     Parameters
     ----------
-    A : ndarray, shape (N, n)
+    *columns : ndarray, shape (N,) or (N, n)
         Not changed.
+    rows : ndarray, shape (N,), optional
+        Those that count.
 
     Returns
     -------
     ndarray, shape (min(N, n), n)
         Rows may have either sign.
     """
-    work = np.array(A.T, dtype=np.float64, order="C")
-    _reduce(work)
-    return np.ascontiguousarray(work[:, : min(A.shape)].T)
+    R, n_samples = np.zeros((0, sum(np.atleast_2d(column.T).shape[0] for column in columns))), columns[0].shape[0]
+    for first in range(0, n_samples, ROWS):
+        some = slice(first, first + ROWS)
+        part = np.column_stack([column[some] if rows is None else column[some][rows[some]] for column in columns])
+        work = np.ascontiguousarray(np.vstack([R, part]).T, dtype=np.float64)
+        _reduce(work)
+        R = np.ascontiguousarray(work[:, : min(work.shape)].T)
+    return R
 
 
 def solve_least_squares(A: FloatArray, b: FloatArray) -> FloatArray:
     """Return x of least ``|A x - b|``, shape (n,); of least norm where that leaves a choice."""
-    n = A.shape[1]
-    R = triangular(np.column_stack([A, b]))
+    n, R = A.shape[1], triangular(A, b)
     return np.asarray(np.linalg.lstsq(R[:n, :n], R[:n, n], rcond=None)[0], dtype=np.float64)
 
 

@@ -126,14 +126,16 @@ def _publish(
 ) -> None:
     from rich.console import Console
 
-    from hil.figures.experiments import beside
+    from hil.figures.local_model import LocalModel
     from hil.report.identification.document import FILE_NAME, identification_text
     from hil.report.identification.page import identification_page
     from hil.report.identification.terminal import compared_summary, summary
     from hil.report.identification.wording import verdict, warnings
     from hil.report.outputs import publish
 
-    models = [beside(record, each.found, model) for record, each in zip(records, studies, strict=True)]
+    models = [
+        LocalModel.with_expected(record, each.found, model) for record, each in zip(records, studies, strict=True)
+    ]
     nominal = models[0].reference_mode
     text = identification_text([each.found for each in studies], settings, nominal, studies, choice, compared)
     page = identification_page(models, studies, choice, compared)

@@ -33,8 +33,8 @@ def pacer_for(rig: Rig, pace: Pace) -> Pacer:
         If it is to be fast and the rig is none that is simulated on this machine.
     """
     from hil.rig.pacing import FreePacer, RealTimePacer, period_ns
-    from hil.simulator.loopback import bus_address
-    from hil.simulator.rig_server import IN_PROCESS, required_simulation
+    from hil.simulator.loopback import IN_PROCESS, bus_address
+    from hil.simulator.rig_server import required_simulation
 
     if pace is Pace.REAL:
         return RealTimePacer(period_ns(rig.period_s))

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivers.torque_guard import TorqueGuard
+from drivers.torque_guard import Evidence, TorqueGuard
 from estimator.physics.model import DrivelineModel, Parameter, Structure
 from estimator.physics.stepper import Stepper
 from estimator.signals.record import FloatArray
@@ -84,7 +84,7 @@ def predict(rig: Rig, name: str, model: DrivelineModel, speed_rad_s: float = 0.0
     guard = TorqueGuard(rig.guard_limits)
     guard.enable()
     pacer = FreePacer(period_ns(rig.period_s))
-    guard.check(plan.split.request(0.0, 0.0), pacer.next().due_ns, feedback_age_ns=0)
+    guard.check(plan.split.request(0.0, 0.0), pacer.next().due_ns, Evidence(0, 0, vehicle.speed_rad_s))
     m1, m2, speed, measured = Range(), Range(), Range(), Range()
     torque: list[float] = []
     course: list[float] = []
@@ -94,7 +94,7 @@ def predict(rig: Rig, name: str, model: DrivelineModel, speed_rad_s: float = 0.0
         base = plan.experiment.torque(cycles * rig.period_s, vehicle.speed_rad_s)
         phase, cycles = base.phase, cycles + 1
         request = plan.split.request(base.torque_nm, plan.prbs_nm(phase))
-        guard.check(request, tick.due_ns, feedback_age_ns=0)
+        guard.check(request, tick.due_ns, Evidence(0, 0, vehicle.speed_rad_s))
         if plan.plc_prbs is not None:  # not the host's to send, but there all the same
             request = plan.split.request(base.torque_nm, plan.expected_plc_prbs_nm(phase))
         m1.see(request.total_m1_nm)

@@ -25,7 +25,7 @@ from hil.rig.build import open_devices
 from hil.rig.dry_run import Range
 from hil.rig.experiments.base import Phase
 from hil.rig.metadata import run_metadata
-from hil.rig.pacing import Pacer
+from hil.rig.pacing import Pacer, disk_patience_s
 from hil.rig.plan import Plan, plan_run
 from hil.rig.realtime import RealTimeGrants
 from hil.rig.sample import Sample
@@ -198,7 +198,7 @@ class Runner:
             "pace": self.conditions.pace,
         }
         path.parent.mkdir(parents=True, exist_ok=True)
-        recorder = RecordingWriter(path, metadata)
+        recorder = RecordingWriter(path, metadata, disk_patience_s(pacer))
         with (
             stop_on_signals(stop),
             recorder,

@@ -23,6 +23,10 @@ def _mode_by_name(value: object) -> TorqueMode:
     return names[value]
 
 
+NodeId = Annotated[int, Field(ge=1, le=127)]
+"""Of CANopen."""
+
+
 OptionCode = Annotated[int, Field(ge=-32768, le=32767)]
 """INTEGER16; the negative codes are the maker's own."""
 
@@ -32,7 +36,7 @@ TimeOut = Annotated[float, Field(ge=0.05, le=60.0)]
 
 
 class OptionCodesTable(Table):
-    """What the drive does by itself when something ends, where it is not to be the EDS's (CiA 402-2)."""
+    """What the drive does by itself when something ends (CiA 402-2): a DCF's choice or its own, unless given here."""
 
     abort_connection: Annotated[int, Field(ge=1, le=3)] | None = None
     quick_stop: OptionCode | None = None
@@ -66,10 +70,11 @@ _NODE_GUARDING: Final = ("guard_time_ms", "life_time_factor", "node_guarding")
 class InverterTable(Table):
     """One inverter: where it is, what it must identify as, and what it may give.
 
-    ``eds`` is relative to the rig file; without it the shipped ``inverter.eds`` counts.
+    ``eds`` is relative to the rig file; without it the shipped ``inverter.eds`` counts. ``rpdo_deadline_ms`` is by
+    default what `hil.config.rig_file.Rig.rpdo_deadline_ms` has.
     """
 
-    node_id: Annotated[int, Field(ge=1, le=127)]
+    node_id: NodeId
     vendor_id: Unsigned32
     product_code: Unsigned32
     rated_torque_nm: Positive
@@ -80,7 +85,8 @@ class InverterTable(Table):
         WithJsonSchema({"enum": [mode.name.lower() for mode in TorqueMode], "type": "string"}),
     ]
     heartbeat_ms: Annotated[int, Field(ge=10, le=65535)]
-    rpdo_deadline_ms: Annotated[int, Field(ge=2, le=65535)] = 200
+    host_timeout_ms: Annotated[int, Field(ge=50, le=65535)] = 150
+    rpdo_deadline_ms: Annotated[int, Field(ge=2, le=65535)] | None = None
     option_codes: OptionCodesTable = OptionCodesTable()
     torque_slope_nm_per_s: Positive | None = None
     speed_unit: SpeedUnitTable | None = None

@@ -11,6 +11,7 @@ of each experiment against the limits of the torque guard: what the run would re
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 from enum import Enum
@@ -24,9 +25,10 @@ from drivers.errors import ConfigMismatch
 from drivers.plc.map_needs import require_usable
 from drivers.plc.register_map import RegisterMapError, load_register_map
 from drivers.plc.types import PrbsSource
-from drivers.torque_guard import GuardLimits
+from drivers.torque_guard import ErrorLimits, GuardLimits
 from hil.config.experiment_tables import EVEN_SHARE, AnyExperiment
-from hil.config.inverter_table import InvertersTable
+from hil.config.guard_table import GuardTable
+from hil.config.inverter_table import InvertersTable, NodeId
 from hil.config.inverter_table import InverterTable as InverterTable
 from hil.config.plc_tables import PlcTable as PlcTable
 from hil.config.plc_tables import SimulatedPlcSecurityTable
@@ -48,18 +50,15 @@ _PARTS_M1 = {PrbsTarget.BOTH: 0.5, PrbsTarget.M1: 1.0, PrbsTarget.M2: 0.0}
 
 
 class CanTable(Table):
-    """The CAN bus: ``url`` as the drivers read it."""
+    """The CAN bus: ``url`` as the drivers read it.
+
+    ``host_node_id`` is that of this program's own heartbeat, ``monitor_node_id`` that of `hil monitor`: by default the
+    two highest that no inverter has.
+    """
 
     url: Text
-
-
-class GuardTable(Table):
-    """Limits of the torque guard beside the torque limit of each inverter; see `drivers.torque_guard`."""
-
-    rate_limit_nm_per_s: Positive
-    prbs_limit_nm: Positive
-    sum_limit_nm: Positive
-    feedback_timeout_s: Positive
+    host_node_id: NodeId | None = None
+    monitor_node_id: NodeId | None = None
 
 
 class PrbsTable(Table):
@@ -130,6 +129,38 @@ class Rig(Table):
     simulation: SimulationTable | None = None
 
     @property
+    def host_node_id(self) -> int:
+        """Node id of the host's own heartbeat."""
+        given = self.can.host_node_id
+        return self._free_node_ids(self.can.monitor_node_id)[0] if given is None else given
+
+    @property
+    def monitor_node_id(self) -> int:
+        """Node id of the heartbeat of `hil monitor`."""
+        given = self.can.monitor_node_id
+        return self._free_node_ids(self.host_node_id)[0] if given is None else given
+
+    @property
+    def of_monitor(self) -> Self:
+        """The same rig for `hil monitor`, which is a host with a heartbeat of its own."""
+        return self.model_copy(
+            update={"can": self.can.model_copy(update={"host_node_id": self.monitor_node_id, "monitor_node_id": None})}
+        )
+
+    def rpdo_deadline_ms(self, table: InverterTable) -> int:
+        """Give the deadline of an inverter's RPDO: 150 ms where the rig file has none, at long periods two and a half.
+
+        With 150 ms for the host's heartbeat as well, and what a drive takes to look, a dead host means zero torque
+        within 0.25 s.
+        """
+        given = table.rpdo_deadline_ms
+        return max(150, math.ceil(2500.0 * self.period_s)) if given is None else given
+
+    def _free_node_ids(self, taken: int | None) -> list[int]:
+        used = {self.inverters.m1.node_id, self.inverters.m2.node_id, taken}
+        return [node_id for node_id in range(127, 0, -1) if node_id not in used]
+
+    @property
     def torque_limits(self) -> GuardLimits:
         """What this rig may be asked for in all, whoever asks."""
         return GuardLimits(
@@ -139,6 +170,10 @@ class Rig(Table):
             rate_limit_nm_per_s=self.guard.rate_limit_nm_per_s,
             sum_limit_nm=self.guard.sum_limit_nm,
             feedback_timeout_s=self.guard.feedback_timeout_s,
+            permissive_timeout_s=self.guard.permissive_timeout_s,
+            speed_limit_rad_s=math.inf if self.guard.speed_limit_rad_s is None else self.guard.speed_limit_rad_s,
+            period_s=self.period_s,
+            error=self.guard.error_limits(self.inverters, self.period_s),
         )
 
     @property
@@ -152,6 +187,17 @@ class Rig(Table):
             torque_limit_m1_nm=self.inverters.m1.torque_limit_nm - parts_nm["m1"],
             torque_limit_m2_nm=self.inverters.m2.torque_limit_nm - parts_nm["m2"],
             sum_limit_nm=self.guard.sum_limit_nm - self.prbs.amplitude_nm,
+            error=self._error_beside_prbs(parts_nm["m1"], parts_nm["m2"]),
+        )
+
+    def _error_beside_prbs(self, part_m1_nm: float, part_m2_nm: float) -> ErrorLimits:
+        """Let the torques be off by what the PLC adds without the host knowing when."""
+        error = self.torque_limits.error
+        return replace(
+            error,
+            m1_nm=error.m1_nm + part_m1_nm,
+            m2_nm=error.m2_nm + part_m2_nm,
+            sum_nm=error.sum_nm + self.prbs.amplitude_nm,
         )
 
     @model_validator(mode="after")
@@ -160,6 +206,7 @@ class Rig(Table):
             [
                 *self._guard_faults(),
                 *self._deadline_faults(),
+                *self._node_faults(),
                 *self._prbs_faults(),
                 *self._experiment_faults(),
                 *self._security_faults(),
@@ -183,9 +230,19 @@ class Rig(Table):
     def _deadline_faults(self) -> Iterator[Fault]:
         least_ms = 2000.0 * self.period_s
         for name, table in (("m1", self.inverters.m1), ("m2", self.inverters.m2)):
-            if table.rpdo_deadline_ms < least_ms:
+            if table.rpdo_deadline_ms is not None and table.rpdo_deadline_ms < least_ms:
                 expected = f"at least two periods ({least_ms:g}), or one RPDO that is late stops the drive"
                 yield Fault(f"inverters.{name}.rpdo_deadline_ms", expected, table.rpdo_deadline_ms)
+
+    def _node_faults(self) -> Iterator[Fault]:
+        """See that every node has an id of its own."""
+        used = [self.inverters.m1.node_id, self.inverters.m2.node_id]
+        for name in ("host_node_id", "monitor_node_id"):
+            node_id = getattr(self.can, name)
+            if node_id in used:
+                yield Fault(f"can.{name}", f"another node id than {', '.join(map(str, used))}", node_id)
+            elif node_id is not None:
+                used.append(node_id)
 
     def _security_faults(self) -> Iterator[Fault]:
         """See that the simulated PLC wants TLS if, and only if, the host speaks it."""

@@ -5,18 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from estimator.identification.identify import Identification, Settings, identify
-from estimator.physics.model import DrivelineModel, Structure
+from estimator.identification.identify import Settings, identify
+from estimator.physics.model import DrivelineModel
 from estimator.signals.record import Record
-from hil.figures.line import TwoMassLine
-from hil.figures.local_model import LocalModel, Reference
+from hil.figures.local_model import TRUTH, LocalModel, Reference
 from hil.figures.road.conditions import draw_conditions
 from hil.figures.road.drive import Driven, drive
 from hil.recording import read_record
 from hil.rig.drive import Progress
 from hil.rig.stop import StopRequest
-
-TRUTH, MODEL_FILE = "truth", "model file"
 
 
 def drive_all(
@@ -65,12 +62,4 @@ def recorded_models(
     records: Sequence[Record], settings: Settings, expected: DrivelineModel | None = None
 ) -> list[LocalModel]:
     """Identify from recordings; beside them what a two-mass model file expects."""
-    return [beside(record, identify(record, settings), expected) for record in records]
-
-
-def beside(record: Record, found: Identification, expected: DrivelineModel | None) -> LocalModel:
-    """Put what a model file expects beside what was identified; nothing where it is no two-mass drive."""
-    reference = None
-    if expected is not None and expected.structure is Structure.TWO_MASS:
-        reference = Reference(MODEL_FILE, TwoMassLine.of(expected.values()))
-    return LocalModel(record, found, reference)
+    return [LocalModel.with_expected(record, identify(record, settings), expected) for record in records]

@@ -11,6 +11,7 @@ from estimator.identification.identify import Identification
 from estimator.identification.linear_model import ComplexArray, LinearModel
 from estimator.identification.modes.modes import Mode
 from estimator.identification.modes.reduced import third_order
+from estimator.physics.model import DrivelineModel, Structure
 from estimator.signals.record import FloatArray, Record
 from hil.figures.line import TwoMassLine
 
@@ -18,6 +19,9 @@ COHERENT = 0.9
 """Coherence from which on a spectral estimate is held against a model."""
 
 HALF_TURN_DEG = 180.0
+
+TRUTH, MODEL_FILE = "truth", "model file"
+"""Names of what there is to compare with."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +49,13 @@ class LocalModel:
     record: Record
     found: Identification
     reference: Reference | None = None
+
+    @classmethod
+    def with_expected(cls, record: Record, found: Identification, expected: DrivelineModel | None) -> LocalModel:
+        """Compare with what a model file expects; with nothing where that is no two-mass drive."""
+        if expected is None or expected.structure is not Structure.TWO_MASS:
+            return cls(record, found)
+        return cls(record, found, Reference(MODEL_FILE, TwoMassLine.of(expected.values())))
 
     @property
     def name(self) -> str:

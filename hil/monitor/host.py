@@ -229,9 +229,9 @@ def _rig(job: Job) -> Iterator[Rig]:
     if not job.simulate:
         yield job.rig
         return
-    from hil.simulator.loopback import Address
+    from hil.simulator.loopback import IN_PROCESS, Address
     from hil.simulator.plant_factory import plant_for
-    from hil.simulator.rig_server import IN_PROCESS, RigServer
+    from hil.simulator.rig_server import RigServer
 
     plant = plant_for(job.rig, [], job.trust_laws)
     server = RigServer(plant, job.rig, f"{IN_PROCESS}monitor", Address("127.0.0.1", 0), real_time=True)

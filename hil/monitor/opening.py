@@ -65,7 +65,7 @@ def open_rig(
     _require_chain(rig.period_s, setup)
     warm, shaft = WarmUp(rig.period_s, setup), _shaft(model, rig, trust_laws)
     state = LiveState(rig.name, rig.period_s, shaft, can_drive=True, is_ready=warm.is_done, setup=setup)
-    source = RigSource(Job(rig_path.absolute(), rig, out.absolute(), simulate, trust_laws, setup))
+    source = RigSource(Job(rig_path.absolute(), rig.of_monitor, out.absolute(), simulate, trust_laws, setup))
     return Opening(source, state, tuple(Choice(name, _summary(rig, name, trust_laws)) for name in rig.experiments))
 
 

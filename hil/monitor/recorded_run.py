@@ -101,7 +101,7 @@ class RecordedRun:
         metadata
             What else the recording shall say of itself.
         """
-        recorder = RecordingWriter(self._path, {**run_metadata(self._rig_path, self._name), **metadata})
+        recorder = RecordingWriter(self._path, {**run_metadata(self._rig_path, self._name), **metadata}, 0.0)
         self._live = self._estimate()
         reason, stopped = None, False
         try:

@@ -1,10 +1,11 @@
 """A recording as it is made: every sample leaves the program at once, the file gets its name when whole.
 
 While the run goes on, rows stand in ``<stem>.part.csv`` beside the target, one line each, handed to the
-operating system line by line. When the run ends, in any way Python can still act on (end, error, Ctrl-C), the
-rows become the recording, in its own format. What a harder end leaves:
+operating system line by line by a thread of its own: whoever appends waits for no disk. What the disk has not taken
+yet waits in memory, `CAPACITY` samples at most. When the run ends, in any way Python can still act on (end, error,
+Ctrl-C), the rows become the recording, in its own format. What a harder end leaves:
 
-- killed process: the part file with every appended sample; it is a recording itself and can be read as it is;
+- killed process: the part file with every sample the disk has taken; it is a recording itself and can be read as it is;
 - power failure: the part file without what the operating system had not yet written (on Linux up to about
   30 s), perhaps with a torn last line, which readers refuse by its number.
 
@@ -29,11 +30,18 @@ from hil.recording.publish import write_table
 from hil.recording.samples import cells_of
 from hil.recording.sidecar import write_sidecar
 from hil.recording.table import Table
+from hil.recording.writing_thread import WritingThread
 from hil.rig.sample import Sample
 
 CSV = ".csv"
 
 LOGGER = logging.getLogger(__name__)
+
+CAPACITY = 20_000
+"""Samples that may wait for the disk: 200 s at 10 ms, some 10 MB."""
+
+DRAIN_S = 60.0
+"""Time the disk has for them when the run is over [s]."""
 
 HEADER = ",".join(columns.UNITS) + "\n"
 """First line of a part file."""
@@ -64,6 +72,8 @@ class RecordingWriter:
     metadata : mapping of str to str
         What the recording shall say of itself; more can be said until it is closed, by `describe`. CSV has no
         place for it: there it is in a file beside the recording (`hil.recording.sidecar`).
+    patience_s : float
+        How long `append` may wait for room where `CAPACITY` samples wait already [s]: 0 in a run on the wall clock.
 
     Raises
     ------
@@ -71,13 +81,15 @@ class RecordingWriter:
         On entry: if the name is taken, also by the part file of a run that was killed, or can't be written.
     """
 
-    def __init__(self, path: Path | str, metadata: Mapping[str, str] | None = None) -> None:
+    def __init__(
+        self, path: Path | str, metadata: Mapping[str, str] | None = None, patience_s: float = DRAIN_S
+    ) -> None:
         self.path = Path(path)
         self.part_path = self.path.with_name(f"{self.path.stem}.part{CSV}")
-        self.n_samples = 0
         self._metadata = dict(metadata or {})
         self._file: TextIO | None = None
-        self._torn = False
+        self._patience_s = patience_s
+        self._writing: WritingThread | None = None
 
     def __enter__(self) -> Self:
         writer_for(self.path)
@@ -103,6 +115,7 @@ class RecordingWriter:
                 self.path,
                 f"expected room for the recording, came: {error.strerror or error}. Make room, or choose another disk.",
             ) from error
+        self._writing = WritingThread(self._file, CAPACITY)
         return self
 
     def _opened(self) -> TextIO:
@@ -145,26 +158,36 @@ class RecordingWriter:
         """Have the recording say one thing more of itself, such as how the run went."""
         self._metadata[key] = value
 
+    @property
+    def n_samples(self) -> int:
+        """Samples the disk has taken."""
+        return 0 if self._writing is None else self._writing.n_written
+
     def append(self, sample: Sample) -> None:
-        """Write one sample.
+        """Hand over one sample to be written; waits for no disk.
 
         Raises
         ------
         RecordingError
-            If the writer is not open, or the disk does not take the sample.
+            If the writer is not open, or the disk has not taken a sample before this one, or too many wait for it.
         """
-        if self._file is None:
+        if self._file is None or self._writing is None:
             raise RecordingError(self.path, "expected an open writer, came one that is closed. Use it by 'with'.")
-        try:
-            self._file.write(_row(sample))
-        except OSError as error:
-            self._torn = True
+        self._raise_if_failed(self._writing)
+        if not self._writing.put(_row(sample), self._patience_s):
             raise RecordingError(
                 self.path,
-                f"expected room for sample {self.n_samples + 1}, came: {error.strerror}. Those before it are kept; "
-                "make room and run again.",
-            ) from error
-        self.n_samples += 1
+                f"expected a disk that takes samples as they come, came one for which {CAPACITY} wait. They are kept "
+                "if it takes them now; choose another disk.",
+            )
+
+    def _raise_if_failed(self, writing: WritingThread) -> None:
+        if writing.failed is not None:
+            raise RecordingError(
+                self.path,
+                f"expected room for sample {writing.n_written + 1}, came: {writing.failed.strerror}. Those before it "
+                "are kept; make room and run again.",
+            ) from writing.failed
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -176,26 +199,51 @@ class RecordingWriter:
             self.describe(
                 OUTCOME, "interrupted" if isinstance(error, KeyboardInterrupt) else str(error) or type(error).__name__
             )
-        self._close(self._file)
-        self._file = None
-        if self.n_samples == 0:
-            self.part_path.unlink()
-            return
+        file, self._file = self._file, None
         try:
-            self._publish()
-        except RecordingError as lost:
+            lost = self._closed(file)
+            if self.n_samples == 0:
+                self.part_path.unlink()
+            else:
+                self._publish()
+            if lost is not None:
+                raise lost
+        except RecordingError as failure:
             if error is None:
                 raise
-            error.add_note(str(lost))  # what ended the run comes first
+            error.add_note(str(failure))  # what ended the run comes first
 
-    def _close(self, file: TextIO) -> None:
+    def _closed(self, file: TextIO) -> RecordingError | None:
+        """Have the disk take what waits, and close the file; give what keeps the recording from being whole.
+
+        Raises
+        ------
+        RecordingError
+            If the disk hangs: the file is left to it.
+        """
+        writing = self._writing
+        if writing is None:
+            return None
+        drained = writing.finish(DRAIN_S)
+        if not drained:
+            raise RecordingError(
+                self.path,
+                f"expected a disk that takes the last {writing.n_waiting} samples within {DRAIN_S:g} s, came one that "
+                "does not: they are lost. Choose another disk.",
+            )
         try:
             file.close()
         except OSError:  # it tries once more to write what did not fit
-            if not self._torn:
+            if writing.failed is None:
                 raise
-        if self._torn:
-            self._cut_torn_line()
+        if writing.failed is None:
+            return None
+        self._cut_torn_line()
+        try:
+            self._raise_if_failed(writing)
+        except RecordingError as failure:
+            return failure
+        return None
 
     def _cut_torn_line(self) -> None:
         with self.part_path.open("rb+") as file:

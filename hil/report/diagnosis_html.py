@@ -30,7 +30,8 @@ from hil.report.figures import (
 )
 from hil.report.interval_bar import interval_bar
 from hil.report.numbers import p_statement, shown, shown_interval, shown_ratio, shown_times
-from hil.report.wording import BADGES, ELEMENTS, belief, headline, listed, quantity, torque_axis
+from hil.report.sentence import listed
+from hil.report.wording import BADGES, ELEMENTS, belief, headline, quantity, torque_axis
 
 MOST_DRAWN = 20
 """Recordings drawn at most; beyond, those with the largest error of the re-tuned model."""

@@ -8,6 +8,7 @@ from typing import Any
 import typer
 
 from drivers.capability.ability import Ability
+from drivers.capability.carrier import RPDO, TPDO
 from drivers.datasheet.check import EdsReport
 from drivers.datasheet.finding import EdsFinding, Severity
 
@@ -34,9 +35,10 @@ def _table(report: EdsReport) -> Iterator[str]:
     for ability in report.plan.abilities.values():
         row = ability.capability
         yield f"{row.function.value:32} {_by(ability) or f'none: {row.instead}{_cost(row.cost)}'}"
-    for direction, carrier in zip(("RPDO", "TPDO"), report.plan.carriers, strict=False):
-        how = "mapped by each run" if carrier.mapped_here else "as described"
-        yield f"{direction:32} 0x{carrier.layout.communication_index:04X}, {how}: {carrier.layout}"
+    for direction in (RPDO, TPDO):
+        for carrier in report.plan.pdos(direction):
+            how = "mapped by each run" if carrier.mapped_here else "as described"
+            yield f"{direction.name:32} 0x{carrier.layout.communication_index:04X}, {how}: {carrier.layout}"
     if report.lines:
         yield "# under [inverters.m1] and [inverters.m2] of the rig file:"
         yield from (f"{line.text}  # {line.reason}" for line in report.lines)

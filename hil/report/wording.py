@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from types import MappingProxyType
 
 from estimator.diagnosis.result import Diagnosis, FoundEffect, Mismatch, Verdict
@@ -12,6 +11,7 @@ from estimator.physics.effect import Element
 from estimator.physics.model import Motion, unit
 from estimator.signals.record import OutputKind
 from hil.report.numbers import shown, shown_p, shown_times
+from hil.report.sentence import listed
 
 BADGES = MappingProxyType(
     {
@@ -106,11 +106,6 @@ def belief(effect: FoundEffect) -> str:
 
 def _title(name: str) -> str:
     return EFFECTS[name].title if name in EFFECTS else name.replace("_", " ")
-
-
-def listed(words: Sequence[str]) -> str:
-    """Join words as in a sentence."""
-    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
 
 def location_rows(mismatch: Mismatch) -> list[tuple[str, str]]:

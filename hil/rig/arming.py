@@ -38,6 +38,7 @@ class ArmedDrives:
         self._stop = stop
 
     def __enter__(self) -> Self:
+        self._devices.link.watch_strangers(self._devices.m1.settings.host_node_id)
         try:
             for inverter in (self._devices.m1, self._devices.m2):
                 self._stop.raise_if_requested()
@@ -54,6 +55,7 @@ class ArmedDrives:
 
     def _disarm_all(self, error: BaseException | None) -> None:
         self._devices.guard.disable()
+        self._devices.link.strangers.end()
         # A head start only: what counts is that each drive then confirms it is disarmed.
         not_zeroed = _failures(self._zero_both)
         not_disarmed = self._disarm({"m1": self._devices.m1, "m2": self._devices.m2})

@@ -17,7 +17,11 @@ from drivers.plc.register_map import load_register_map
 from drivers.resources import data_file
 from drivers.torque_guard import TorqueGuard
 from hil.config.rig_file import InverterTable, PlcTable, Rig
+from hil.errors import UsageError
 from hil.rig.plc_loop import PlcLoop
+from hil.simulator.loopback import is_simulated_bus
+
+NAMES = ("m1", "m2")
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +42,8 @@ def open_devices(rig: Rig) -> Iterator[Devices]:
 
     Raises
     ------
+    UsageError
+        If the bus may hold real drives, and nobody has filled in who accepts what they lack.
     BusDown
         If the CAN bus or the PLC's address is not there.
     ConfigMismatch
@@ -45,11 +51,26 @@ def open_devices(rig: Rig) -> Iterator[Devices]:
     DeviceTimeout
         If the PLC does not answer.
     """
+    _require_acceptances(rig)
     with CanLink.open(rig.can.url) as link, PlcLoop() as loop:
-        m1 = Inverter(link, inverter_settings("m1", rig.inverters.m1))
-        m2 = Inverter(link, inverter_settings("m2", rig.inverters.m2))
+        m1 = Inverter(link, inverter_settings("m1", rig))
+        m2 = Inverter(link, inverter_settings("m2", rig))
         with connected_plc(rig.plc, loop) as plc:
             yield Devices(link, m1, m2, TorqueGuard(rig.guard_limits), loop, plc)
+
+
+def _require_acceptances(rig: Rig) -> None:
+    """See that what real drives lack was accepted by a person; simulated ones hurt nobody."""
+    if is_simulated_bus(rig.can.url):
+        return
+    for name in NAMES:
+        table: InverterTable = getattr(rig.inverters, name)
+        for key, acceptance in table.accepted.by_name.items():
+            if not acceptance.is_by_a_person:
+                raise UsageError(
+                    f"rig {rig.name!r}, inverters.{name}.accepted.{key}: expected the name of who accepts it, and in "
+                    f"words why, came {acceptance.by!r}, {acceptance.why!r}. Nobody has filled it in."
+                )
 
 
 @contextmanager
@@ -82,8 +103,9 @@ def plc_client(table: PlcTable) -> Plc:
     return Plc(table.host, table.port, register_map, security=security)
 
 
-def inverter_settings(name: str, table: InverterTable) -> InverterSettings:
-    """Give the settings of one inverter as the drivers take them."""
+def inverter_settings(name: str, rig: Rig) -> InverterSettings:
+    """Give the settings of one inverter, ``m1`` or ``m2``, as the drivers take them."""
+    table: InverterTable = getattr(rig.inverters, name)
     return InverterSettings(
         name=name,
         node_id=table.node_id,
@@ -94,7 +116,9 @@ def inverter_settings(name: str, table: InverterTable) -> InverterSettings:
         vendor_id=table.vendor_id,
         product_code=table.product_code,
         heartbeat_ms=table.heartbeat_ms,
-        rpdo_deadline_ms=table.rpdo_deadline_ms,
+        host_node_id=rig.host_node_id,
+        host_timeout_ms=table.host_timeout_ms,
+        rpdo_deadline_ms=rig.rpdo_deadline_ms(table),
         option_codes=table.option_codes.by_object,
         torque_slope_nm_per_s=table.torque_slope_nm_per_s,
         speed_unit=None if table.speed_unit is None else table.speed_unit.speed_unit,

@@ -13,7 +13,7 @@ from drivers.canopen.can_link import CanLink
 from drivers.datasheet.check import check_eds
 from drivers.datasheet.file import EdsFile
 from drivers.datasheet.finding import Severity
-from drivers.errors import DriverError
+from drivers.errors import DeviceFault, DriverError, ProtocolViolation
 from drivers.inverter.check import Difference
 from drivers.inverter.commissioned import CommissionedValue
 from drivers.inverter.inverter import Inverter
@@ -110,18 +110,18 @@ def _can(rig: Rig, prove_stop: bool) -> tuple[Finding, ...]:
         bus = Finding("can", rig.can.url, Verdict.AGREES)
         return (
             bus,
-            *(_inverter(link, name, table, prove_stop, rig.period_s, rig.can.url) for name, table in tables.items()),
+            *(_inverter(link, name, rig, prove_stop) for name in tables),
         )
 
 
-def _inverter(
-    link: CanLink, name: str, table: InverterTable, prove_stop: bool, period_s: float, can_url: str
-) -> Finding:
+def _inverter(link: CanLink, name: str, rig: Rig, prove_stop: bool) -> Finding:
+    table: InverterTable = getattr(rig.inverters, name)
+
     def compare() -> Finding:
-        inverter = Inverter(link, inverter_settings(name, table))
+        inverter = Inverter(link, inverter_settings(name, rig))
         differences, fault = inverter.check(), inverter.fault()
         if prove_stop and not differences and fault is None:
-            differences = inverter.prove_stop(period_s)
+            differences = inverter.prove_stop(rig.period_s)
         verdict = Verdict.DIFFERS if differences else Verdict.AGREES
         notes = (*_eds_note(table.eds), *(() if fault is None else (fault,)))
         return Finding(
@@ -131,7 +131,7 @@ def _inverter(
             differences,
             notes,
             inverter.remarks(),
-            (*_rate(table, can_url), *inverter.commissioned()),
+            (*_rate(table, rig.can.url), *inverter.commissioned()),
             inverter.protections(),
         )
 
@@ -164,7 +164,7 @@ def _node(table: InverterTable) -> str:
 
 def _plc(table: PlcTable) -> Finding:
     def compare() -> Finding:
-        registers, status = asyncio.run(_asked(table))
+        registers, status, refusals = asyncio.run(_asked(table))
         differences = tuple(
             Difference(
                 "plc",
@@ -176,7 +176,7 @@ def _plc(table: PlcTable) -> Finding:
             for each in registers
             if each.problem is not None
         )
-        notes = () if status is None else tuple(reasons_against(status, NO_NEEDS))
+        notes = (*refusals, *(() if status is None else reasons_against(status, NO_NEEDS)))
         return Finding(
             "plc",
             address,
@@ -190,13 +190,20 @@ def _plc(table: PlcTable) -> Finding:
     return _or_failed("plc", address, compare)
 
 
-async def _asked(table: PlcTable) -> tuple[tuple[Reading, ...], PlcStatus | None]:
-    """Read every register, and the status where they can be believed."""
+async def _asked(table: PlcTable) -> tuple[tuple[Reading, ...], PlcStatus | None, tuple[str, ...]]:
+    """Read every register, and the status where they can be believed: after a beat, as a run does.
+
+    A PLC that lets this host only read says so; that is the third.
+    """
     async with PlcReader(plc_client(table), PLC_BACKOFF) as reader:
         registers = await reader.read_registers()
         if any(each.problem is not None for each in registers):
-            return registers, None
-        return registers, await reader.read_status()
+            return registers, None, ()
+        try:
+            return registers, await reader.greet(), ()
+        except (DeviceFault, ProtocolViolation) as refusal:
+            status = await reader.read_status()
+            return registers, status, (f"the host's beat is not taken, so that no run is possible: {refusal}",)
 
 
 def _or_failed(device: str, address: str, compare: Callable[[], Finding]) -> Finding:

@@ -8,12 +8,13 @@ torque may change by so much per cycle. Only `CanLink.sync` stamps host time, wh
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from drivers.canopen.can_link import CanLink
 from drivers.errors import DeviceTimeout
 from drivers.inverter.inverter import Inverter, InverterFeedback
-from drivers.torque_guard import TorqueGuard, TorqueRequest
+from drivers.message_rate import MessageRate
+from drivers.torque_guard import Evidence, Measured, TorqueGuard, TorqueRequest
 from hil.errors import RunAborted
 from hil.rig.pacing import NS_PER_S, Tick
 from hil.rig.sample import Sample, SampleFlag
@@ -31,11 +32,21 @@ class _Station:
     torque_nm: float = math.nan
     speed_rad_s: float = math.nan
     answered_ns: int | None = None
+    measured: Measured | None = None
+    raw: tuple[int, int] | None = None
+    rate: MessageRate = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.rate = MessageRate(self.inverter.settings.where)
 
     def take(self, feedback: InverterFeedback | None, now_ns: int) -> SampleFlag:
         """Keep an answer, or flag that there is none; flag a torque that a limit of the drive holds back."""
+        self.measured = None
         if feedback is None:
             return self.stale
+        raw = (feedback.torque_raw, feedback.speed_raw)
+        self.measured = Measured(feedback.torque_nm, self.inverter.admits_less, raw == self.raw)
+        self.raw = raw
         self.torque_nm = feedback.torque_nm
         self.speed_rad_s = feedback.speed_rad_s
         self.answered_ns = now_ns
@@ -87,11 +98,19 @@ class Cycle:
         return self._m1.speed_rad_s
 
     @property
+    def largest_step_nm(self) -> float:
+        """Largest change of one inverter's base torque from one cycle to the next [Nm]."""
+        limits = self._guard.limits
+        return limits.rate_limit_nm_per_s * limits.period_s
+
+    @property
     def answered(self) -> bool:
         """Whether both inverters have answered at least once, and follow their target torques."""
         return all(each.answered_ns is not None and each.inverter.follows for each in (self._m1, self._m2))
 
-    def step(self, tick: Tick, request: TorqueRequest, time_s: float, flags: SampleFlag) -> Sample:
+    def step(
+        self, tick: Tick, request: TorqueRequest, time_s: float, flags: SampleFlag, permissive_age_ns: int = 0
+    ) -> Sample:
         """Run one cycle.
 
         Parameters
@@ -104,20 +123,23 @@ class Cycle:
             Time of the sample in the recording [s].
         flags
             What is already known against the sample.
+        permissive_age_ns
+            Age of the PLC's permission; 0 where no PLC is asked [ns].
 
         Raises
         ------
         CommandRefused
             If the guard refuses the request.
         DeviceFault
-            If an inverter reports a fault.
+            If an inverter reports a fault, gives another torque than it is commanded, or answers too often.
         DeviceTimeout
             If an inverter has not answered for as long as the guard's feedback time-out.
         RunAborted
             If this machine itself was late by as much.
         """
         self._refuse_if_unfit(tick)
-        command_m1, command_m2 = self._guard.check(request, tick.due_ns, self._age_ns(tick.now_ns))
+        evidence = Evidence(self._age_ns(tick.now_ns), permissive_age_ns, self.fastest_rad_s)
+        command_m1, command_m2 = self._guard.check(request, tick.due_ns, evidence)
         if self.timing.is_late(tick):
             flags |= SampleFlag.LATE
         self._m1.inverter.command(command_m1)
@@ -125,6 +147,7 @@ class Cycle:
         sync_ns = self._link.sync()
         self.timing.begin(tick, sync_ns)
         flags |= self._await_answers(sync_ns, tick.now_ns)
+        self._guard.compare(tick.due_ns, self._m1.measured, self._m2.measured)
         return self._sample(tick, request, time_s, sync_ns, flags)
 
     def _await_answers(self, sync_ns: int, now_ns: int) -> SampleFlag:
@@ -149,6 +172,28 @@ class Cycle:
         for station in (self._m1, self._m2):
             station.inverter.raise_if_faulted()
             self._refuse_if_old(station, tick)
+            station.rate.take(station.inverter.received)
+
+    @property
+    def fastest_rad_s(self) -> float:
+        """The reading furthest from standstill: both inverters turn one shaft; NaN before both answered [rad/s]."""
+        speeds = (self._m1.speed_rad_s, self._m2.speed_rad_s)
+        return math.nan if any(map(math.isnan, speeds)) else max(speeds, key=abs)
+
+    def refuse_if_overslept(self, tick: Tick) -> None:
+        """See that this machine was not late by as much as feedback may be old: then nothing else is to blame.
+
+        Raises
+        ------
+        RunAborted
+            If it was.
+        """
+        timeout_s = self._guard.limits.feedback_timeout_s
+        if tick.late_ns > max(self.timing.period_ns, timeout_s * NS_PER_S):
+            raise RunAborted(
+                f"cycle {tick.cycle} began {tick.late_ns / NS_PER_S:.3f} s late, expected at most {timeout_s:g} s "
+                "(feedback_timeout_s). This machine was too busy, or the program was suspended: close other programs."
+            )
 
     def _refuse_if_old(self, station: _Station, tick: Tick) -> None:
         timeout_s = self._guard.limits.feedback_timeout_s

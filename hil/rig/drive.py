@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
+from hil.rig.catch_up import CatchUp
 from hil.rig.cycle import Cycle
 from hil.rig.excitation import NO_TORQUE
 from hil.rig.experiments.base import Phase
@@ -101,12 +102,14 @@ class Drive:
     progress: Progress
     observers: Sequence[Observer] = ()
     _summary: RunSummary = field(init=False)
+    _catch_up: CatchUp = field(init=False)
     _phase: Phase = Phase.APPROACH
     _phase_from: int = 0
     _last: Sample | None = None
 
     def __post_init__(self) -> None:
         self._summary = RunSummary(self.cycle.timing)
+        self._catch_up = CatchUp(self.cycle.largest_step_nm / self.plan.split.largest_base_share)
 
     def wake_up(self) -> None:
         """Cycle at zero torque until both inverters have answered; the cycle itself ends a wait in vain."""
@@ -133,9 +136,10 @@ class Drive:
         if base.phase is not self._phase:
             self._phase, self._phase_from = base.phase, tick.cycle
         time_s = self._seconds(tick.cycle - self._phase_from)
-        request = self.plan.split.request(base.torque_nm, self.plan.prbs_nm(base.phase))
+        base_nm = self._catch_up.torque_nm(tick.cycle, base.torque_nm)
+        request = self.plan.split.request(base_nm, self.plan.prbs_nm(base.phase))
         self.prbs.follow(tick, base.phase, self.watch.status)
-        sample = self.cycle.step(tick, request, time_s, flags)
+        sample = self.cycle.step(tick, request, time_s, flags, self.watch.status.age_ns(tick.now_ns))
         if self.plan.plc_prbs is not None:
             sample = replace(sample, prbs_nm=self.prbs.known_nm(self.watch.news))
         if base.phase is Phase.MEASURE:
@@ -154,7 +158,8 @@ class Drive:
         tick = self.pacer.next()
         self._summary.cycles += 1
         self._summary.most_late_ns = max(self._summary.most_late_ns, tick.late_ns)
-        return tick, self.watch.look(tick, self.cycle.speed_rad_s)
+        self.cycle.refuse_if_overslept(tick)  # first: whatever looks wrong after a stall is its consequence
+        return tick, self.watch.look(tick, self.cycle.fastest_rad_s)
 
     def _record(self, sample: Sample) -> None:
         if self._last is not None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from drivers.torque_guard import TorqueGuard, TorqueRequest
+from drivers.torque_guard import Evidence, TorqueGuard, TorqueRequest
 from hil.config.rig_file import Rig
 from hil.rig.experiments.base import Phase
 from hil.rig.pacing import FreePacer, period_ns
@@ -88,14 +88,14 @@ def dry_run(rig: Rig, name: str, trust_laws: bool = False) -> Prediction:
     guard = TorqueGuard(rig.guard_limits)
     guard.enable()
     pacer = FreePacer(period_ns(rig.period_s))
-    guard.check(plan.split.request(0.0, 0.0), pacer.next().due_ns, feedback_age_ns=0)
+    guard.check(plan.split.request(0.0, 0.0), pacer.next().due_ns, Evidence(0, 0, 0.0))
     speed_rad_s, phase = 0.0, Phase.APPROACH
     while phase is not Phase.DONE:
         tick = pacer.next()
         base = plan.experiment.torque((tick.cycle - 1) * rig.period_s, speed_rad_s)
         phase = base.phase
         request = plan.split.request(base.torque_nm, plan.prbs_nm(phase))
-        guard.check(request, tick.due_ns, feedback_age_ns=0)
+        guard.check(request, tick.due_ns, Evidence(0, 0, speed_rad_s))
         if plan.plc_prbs is not None:  # not the host's to send, but there all the same
             request = plan.split.request(base.torque_nm, plan.expected_plc_prbs_nm(phase))
         _note(prediction, phase, request, speed_rad_s)

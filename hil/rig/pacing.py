@@ -72,6 +72,15 @@ class Pacer(Protocol):
         ...
 
 
+DISK_PATIENCE_S = 60.0
+"""How long a run without a clock may wait for the disk [s]."""
+
+
+def disk_patience_s(pacer: Pacer) -> float:
+    """How long a cycle may wait for the disk [s]: not at all where it waits for nothing."""
+    return 0.0 if pacer.poll_patience_s == 0.0 else DISK_PATIENCE_S
+
+
 class RealTimePacer:
     """An absolute schedule on the monotonic clock: a late cycle does not delay those after it.
 

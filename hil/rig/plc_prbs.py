@@ -20,10 +20,10 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import Self
 
-from drivers.errors import BusDown, DriverError
+from drivers.errors import BusDown, DriverError, WrongTorque
 from drivers.plc.plc import GENERATOR_OFF, Plc
 from drivers.plc.types import PlcStatus, PrbsSettings
-from drivers.torque_guard import GuardedTorque, GuardLimits, TorqueGuard
+from drivers.torque_guard import Evidence, GuardedTorque, GuardLimits, TorqueGuard
 from hil.errors import RunAborted
 from hil.rig.excitation import Split
 from hil.rig.experiments.base import Phase
@@ -60,7 +60,7 @@ def guarded_prbs(limits: GuardLimits, split: Split, amplitude_nm: float) -> tupl
     """
     guard = TorqueGuard(limits)
     guard.enable()
-    return guard.check(split.request(0.0, amplitude_nm), now_ns=0, feedback_age_ns=0)
+    return guard.check(split.request(0.0, amplitude_nm), now_ns=0, evidence=Evidence(0, 0, 0.0))
 
 
 class PlcPrbs:
@@ -80,8 +80,8 @@ class PlcPrbs:
     Raises
     ------
     RunAborted
-        On exit, if the generator was ordered and can't be confirmed off; in place of the error that ended the
-        block, which it names.
+        On exit, if the generator was ordered and can't be confirmed off, or somebody else has set it and it was its
+        torque that ended the block; in place of the error that ended the block, which it names.
     """
 
     def __init__(self, loop: PlcLoop, plc: Plc, order: PlcPrbsOrder | None, patience_s: float) -> None:
@@ -100,8 +100,21 @@ class PlcPrbs:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self._order is None:
-            return
+        others = self._set_by_others() if isinstance(error, WrongTorque) else None
+        if self._order is not None:
+            self._switch_off(error)
+        if others is not None:
+            raise RunAborted(f"{others} What ended the run: {error}") from error
+
+    def _set_by_others(self) -> str | None:
+        """Ask, with the drives disarmed, whether a torque nobody commanded is the generator's."""
+        try:
+            status = self._loop.call(self._plc.read_status())
+        except DriverError:  # it can't be asked: what ended the run stands
+            return None
+        return self._wrong_setting(status)
+
+    def _switch_off(self, error: BaseException | None) -> None:
         try:
             self._loop.call(_switched_off(self._plc))
         except DriverError as failure:
@@ -152,12 +165,17 @@ class PlcPrbs:
         self._change, self._since_ns = None, tick.now_ns
 
     def _judge(self, status: PlcStatus) -> None:
+        if wrong := self._wrong_setting(status):
+            raise RunAborted(wrong)
+
+    def _wrong_setting(self, status: PlcStatus) -> str | None:
         as_told = status.prbs == self._holds if self._holds.enabled else not status.prbs.enabled
-        if not as_told:
-            raise RunAborted(
-                f"PLC: its own PRBS generator is set to {_shown(status.prbs)}, expected {_shown(self._holds)}. The run "
-                "was ended at zero torque; look for another host that writes there."
-            )
+        if as_told:
+            return None
+        return (
+            f"PLC: its own PRBS generator is set to {_shown(status.prbs)}, expected {_shown(self._holds)}. The run "
+            "was ended at zero torque; look for another host that writes there."
+        )
 
 
 async def _told(plc: Plc, order: PlcPrbsOrder | None) -> PrbsSettings:

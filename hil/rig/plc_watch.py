@@ -72,7 +72,7 @@ class PlcWatch:
         tick
             The present cycle.
         speed_rad_s
-            Latest motor speed [rad/s].
+            Latest motor speed, of both inverters' readings the one further from standstill [rad/s].
 
         Raises
         ------

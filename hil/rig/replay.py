@@ -1,6 +1,6 @@
 """From a bus trace back to the samples: the frames through the drivers' decoding, SYNC by SYNC.
 
-One SYNC is one cycle. Its command is what the last RPDOs before it carried, its answer the TPDO that came after it
+One SYNC is one cycle. Its command is what the last RPDOs before it carried, its answer the TPDOs that came after it
 in time. So torque and speed are those the run recorded, to the bit; the references are what was on the bus, whole
 per mille of the rated torque, and the flags what the bus can tell: answers and cycles that were missing or late.
 
@@ -14,10 +14,11 @@ import itertools
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from statistics import median
 
-from drivers.canopen.can_link import SYNC_COB_ID
+from drivers.canopen.can_link import SYNC_COB_ID, FrameCallback
 from drivers.errors import ProtocolViolation
 from drivers.inverter.pdos import InverterPdos
 from drivers.inverter.settings import InverterSettings
@@ -45,12 +46,12 @@ class _Station:
     def __init__(self, settings: InverterSettings, stale: SampleFlag, limited: SampleFlag) -> None:
         self._pdos = InverterPdos(settings)
         self._receiver = self._pdos.receiver()
-        self._receiver.start_anew()
         self._stale, self._limited = stale, limited
         self._answered = False
         self._remark = SampleFlag.GOOD
-        self.rpdo_cob_id, self.tpdo_cob_id = self._pdos.command.layout.cob_id, self._pdos.feedback.layout.cob_id
-        self._next = (0.0, 0.0)
+        self.commands = {cob_id: partial(self._take_command, cob_id) for cob_id in self._pdos.rpdos}
+        self.answers = {cob_id: partial(self._take_answer, take) for cob_id, take in self._receiver.subscriptions}
+        self._target_nm, self._offset_nm = 0.0, 0.0 if self.has_offset else math.nan
         self.torque_ref_nm, self.prbs_nm = 0.0, 0.0
         self.torque_nm, self.speed_rad_s = math.nan, math.nan
         self.cycles_old = 0
@@ -60,19 +61,21 @@ class _Station:
         """Whether base torque and PRBS can be told apart."""
         return self._pdos.has_offset
 
-    def take_command(self, data: bytes) -> None:
-        torque = self._pdos.unpack(data)
-        if torque.offset_nm is None:  # the sum is all that was on the bus
-            self._next = (torque.target_nm, math.nan)
-        else:
-            self._next = (torque.target_nm + torque.offset_nm, torque.offset_nm)
+    def _take_command(self, cob_id: int, data: bytes) -> None:
+        torque = self._pdos.unpack(cob_id, data)
+        self._target_nm = self._target_nm if torque.target_nm is None else torque.target_nm
+        self._offset_nm = self._offset_nm if torque.offset_nm is None else torque.offset_nm
 
     def begin(self) -> None:
-        self.torque_ref_nm, self.prbs_nm = self._next
+        self._receiver.start_anew()  # what several TPDOs share is all of this cycle
+        if self.has_offset:
+            self.torque_ref_nm, self.prbs_nm = self._target_nm + self._offset_nm, self._offset_nm
+        else:  # the sum is all that was on the bus
+            self.torque_ref_nm, self.prbs_nm = self._target_nm, math.nan
         self._answered = False
 
-    def take_answer(self, data: bytes, t_ns: int) -> None:
-        self._receiver.on_frame(data, t_ns)
+    def _take_answer(self, take: FrameCallback, data: bytes, t_ns: int) -> None:
+        take(data, t_ns)
         feedback = self._receiver.latest
         if feedback is not None and not self._answered:
             self.torque_nm, self.speed_rad_s = feedback.torque_nm, feedback.speed_rad_s
@@ -120,16 +123,15 @@ class _Reader:
     _flags: SampleFlag = field(default=SampleFlag.GOOD)
 
     def samples(self, frames: Iterable[Frame]) -> Iterator[Sample]:
-        commands = {station.rpdo_cob_id: station for station in (self.m1, self.m2)}
-        answers = {station.tpdo_cob_id: station for station in (self.m1, self.m2)}
+        commands, answers = {**self.m1.commands, **self.m2.commands}, {**self.m1.answers, **self.m2.answers}
         for cob_id, data, t_ns in frames:
             if cob_id == SYNC_COB_ID:
                 yield from self._end()
                 self._begin(t_ns)
             elif cob_id in commands:
-                commands[cob_id].take_command(data)
+                commands[cob_id](data)
             elif cob_id in answers and self._sync_ns is not None and self.clock.in_time(t_ns - self._sync_ns):
-                answers[cob_id].take_answer(data, t_ns)
+                answers[cob_id](data, t_ns)
         yield from self._end()
 
     def _begin(self, sync_ns: int) -> None:
@@ -184,8 +186,8 @@ def replay(path: Path, rig: Rig, whole: bool = False, channel: str | None = None
     """
     period = period_ns(rig.period_s)
     clock = _Clock(period, paced=_is_paced(path, period, channel))
-    m1 = _Station(inverter_settings("m1", rig.inverters.m1), SampleFlag.M1_STALE, SampleFlag.M1_LIMITED)
-    m2 = _Station(inverter_settings("m2", rig.inverters.m2), SampleFlag.M2_STALE, SampleFlag.M2_LIMITED)
+    m1 = _Station(inverter_settings("m1", rig), SampleFlag.M1_STALE, SampleFlag.M1_LIMITED)
+    m2 = _Station(inverter_settings("m2", rig), SampleFlag.M2_STALE, SampleFlag.M2_LIMITED)
     if not whole and not (m1.has_offset and m2.has_offset):
         raise RecordingError(
             path,

@@ -2,7 +2,8 @@
 
 ::
 
-    prepare      configure both inverters, set the PLC's generator off, see that the vehicle is fit
+    fit          beat, so that the PLC knows its host; set its generator off, see that the vehicle is fit
+    configure    both inverters; the host goes on beating
     arm          both drives, each step confirmed
     wake up      zero torque until both have answered a SYNC; then the guard is enabled
     drive        the experiment, cycle by cycle; its measured part goes to the recording
@@ -20,6 +21,7 @@ from hil.rig.build import Devices
 from hil.rig.cycle import Cycle
 from hil.rig.drive import Drive, Observer, Progress, Recorder, RunSummary
 from hil.rig.fitness import reasons_against
+from hil.rig.host_beat import HostBeat
 from hil.rig.pacing import Pacer
 from hil.rig.plan import Plan
 from hil.rig.plc_prbs import PlcPrbs
@@ -69,24 +71,31 @@ def run_plan(
     KeyboardInterrupt
         If `stop` was requested.
     """
-    before = _prepare(devices, plan, stop)
-    prbs = PlcPrbs(devices.plc_loop, devices.plc, plan.plc_prbs, pacer.poll_patience_s)
-    with prbs, ArmedDrives(devices, stop):
-        period_ns, patience_s = pacer.period_ns, pacer.answer_timeout_s
-        cycle = Cycle(devices.link, devices.m1, devices.m2, devices.guard, period_ns, patience_s, timing)
-        watch = PlcWatch(devices.plc_loop, devices.plc, before, plan.needs, pacer.poll_patience_s)
-        drive = Drive(plan, cycle, watch, prbs, pacer, recorder, stop, progress, observers)
-        drive.wake_up()
-        devices.guard.enable()
-        return drive.run()
+    before = _fit(devices, plan)
+    with HostBeat(devices.plc_loop, devices.plc) as beat:
+        _configure(devices, stop)
+        prbs = PlcPrbs(devices.plc_loop, devices.plc, plan.plc_prbs, pacer.poll_patience_s)
+        with prbs, ArmedDrives(devices, stop):
+            period_ns, patience_s = pacer.period_ns, pacer.answer_timeout_s
+            cycle = Cycle(devices.link, devices.m1, devices.m2, devices.guard, period_ns, patience_s, timing)
+            watch = PlcWatch(devices.plc_loop, devices.plc, before, plan.needs, pacer.poll_patience_s)
+            drive = Drive(plan, cycle, watch, prbs, pacer, recorder, stop, progress, observers)
+            beat.hand_over()
+            drive.wake_up()
+            devices.guard.enable()
+            return drive.run()
 
 
-def _prepare(devices: Devices, plan: Plan, stop: StopRequest) -> PlcStatus:
-    for inverter in (devices.m1, devices.m2):
-        stop.raise_if_requested()
-        inverter.configure()
+def _fit(devices: Devices, plan: Plan) -> PlcStatus:
+    """Have the PLC's own generator off, and the vehicle fit for the run."""
     devices.plc_loop.call(devices.plc.stop_prbs())
-    status = devices.plc_loop.call(devices.plc.read_status())
+    status = devices.plc_loop.call(devices.plc.greet())
     if reasons := list(reasons_against(status, plan.needs)):
         raise RunAborted(f"PLC: {'; '.join(reasons)}. Nothing was armed; bring the vehicle into that state first.")
     return status
+
+
+def _configure(devices: Devices, stop: StopRequest) -> None:
+    for inverter in (devices.m1, devices.m2):
+        stop.raise_if_requested()
+        inverter.configure()

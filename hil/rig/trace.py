@@ -25,6 +25,9 @@ READABLE = (*SUFFIXES, ".trc")
 
 WRITE_EVERY_S = 0.05
 
+MOST_WAITING = 200_000
+"""Frames that may wait for the disk: over a minute of a full bus at 500 kbit/s."""
+
 NS_PER_S = 1_000_000_000
 
 
@@ -64,7 +67,10 @@ class BusTrace:
 
     def take(self, message: can.Message, t_ns: int) -> None:
         """Take one frame, sent or received at ``t_ns`` of the monotonic clock; it belongs to the trace from now on."""
-        self._frames.append((message, t_ns))
+        if len(self._frames) < MOST_WAITING:
+            self._frames.append((message, t_ns))
+        elif self._failed is None:
+            self._failed = OSError(f"{MOST_WAITING} frames wait for the disk")
 
     def raise_if_failed(self) -> None:
         """Tell that the disk does not take the frames.

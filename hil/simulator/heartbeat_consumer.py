@@ -1,6 +1,6 @@
 """What a simulated node does with the host's heartbeat (CiA 301, object 1016h): notice that it has ended.
 
-Time is passed in; nothing here reads a clock. The node asks with the frames it takes and before each heartbeat of its
+Time is passed in; nothing here reads a clock. The node asks with the frames it takes and by a clock of its
 own.
 """
 
@@ -12,6 +12,12 @@ from drivers.canopen.heartbeat import HEARTBEAT_COB_ID
 from drivers.canopen.silence import Silence
 
 NS_PER_MS = 1_000_000
+
+GRACE_NS = 40 * NS_PER_MS
+"""What this program, which is no drive, leaves for reading heartbeats that came while it was held up itself [ns]."""
+
+LONGEST_LOOK_NS = 15 * NS_PER_MS
+"""It looks every 10 ms: a longer time between two looks is one in which it was held up."""
 
 
 class HeartbeatConsumer:
@@ -30,7 +36,7 @@ class HeartbeatConsumer:
     def __init__(self, node_id: int = 0, timeout_ms: int = 0) -> None:
         self.cob_id = HEARTBEAT_COB_ID + node_id
         self._watches = timeout_ms > 0
-        self._silence = Silence(timeout_ms * NS_PER_MS)
+        self._silence = Silence(timeout_ms * NS_PER_MS, GRACE_NS, LONGEST_LOOK_NS)
 
     @classmethod
     def from_object(cls, value: int) -> Self:

@@ -303,7 +303,8 @@ class InverterDevice:
             self._ramp = self._parameters[0x6071]
             self._follows = True
         added = round(self.added_nm * 1000.0 / self._settings.rated_torque_nm)
-        return self._within_limits(round(self._ramp) + self._parameters[0x60B2] + added, speed_rad_s)
+        wanted = self._within_limits(round(self._ramp) + self._parameters[0x60B2] + added, speed_rad_s)
+        return self._settings.faults.wrong_torque.given(wanted, self._steps)
 
     @property
     def _ignores_target(self) -> bool:

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from hil.simulator.fault_kind import Kind, Moment
 from hil.simulator.fault_sizes import error_code, index, number
-from hil.simulator.inverter_settings import FaultAtStep, InverterFaults
+from hil.simulator.inverter_settings import FaultAtStep, InverterFaults, WrongTorque
 
 OVERCURRENT: Final = 0x2310
 """EMCY error code of CiA 402: continuous over current at the output."""
@@ -62,6 +62,16 @@ INVERTER_KINDS: Final[Mapping[str, Kind[InverterFaults]]] = MappingProxyType(
         "bus_off": Kind(True, _set(bus_off_at_step=_step)),
         "stale_pdo": Kind(True, _set(stale_from_step=_step)),
         "ignores_target": Kind(True, _set(ignores_target_from_step=_step)),
+        "torque_gain": Kind(
+            True,
+            _set(wrong_torque=lambda when: WrongTorque(when.step, gain=when.size)),
+            number("FACTOR", -10.0, 10.0, "times the torque asked for"),
+        ),
+        "torque_offset": Kind(
+            True,
+            _set(wrong_torque=lambda when: WrongTorque(when.step, offset_permille=when.size)),
+            number("PERMILLE", -1e3, 1e3, "of rated torque"),
+        ),
         "stale_share": Kind(False, _set(stale_share=_size), number("SHARE", 0.0, 1.0, "of the PDOs")),
         "fault": Kind(True, _set(fault=_error), error_code(OVERCURRENT)),
         "emcy": Kind(True, _set(emcy=_error), error_code()),

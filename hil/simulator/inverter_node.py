@@ -4,8 +4,8 @@ NMT is done here, for the library's slave sends no boot-up message after a reset
 the bus. PDOs follow the configured mapping, identifiers and transmission types, from those of the EDS on. An event is a
 changed value; values change at SYNC, for that is when simulated time goes on.
 
-It looks for its host (`hil.simulator.host_watch`) at every frame it takes and before each heartbeat of its own, so
-that it also notices when nothing comes any more.
+It looks for its host (`hil.simulator.host_watch`) at every frame it takes and, once it is told to watch the host's
+heartbeat, by a clock of its own, so that it also notices when nothing comes any more.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from drivers.canopen.pdo_map import COB_ID_INVALID
 from drivers.capability.plan import plan_drive
 from drivers.capability.speed_unit import described_scale, speed_scale
 from drivers.datasheet.file import EdsFile
+from drivers.errors import BusDown
 from drivers.scaling import IntegerType, VelocityScale
 from hil.simulator.heartbeat_consumer import HeartbeatConsumer
 from hil.simulator.host_watch import HEARTBEAT_ERROR, RPDO_TIMEOUT, HostWatch
@@ -35,14 +36,19 @@ from hil.simulator.inverter_settings import SimulatedInverter
 from hil.simulator.object_server import ObjectServer
 from hil.simulator.pdo_frame import PdoFrame
 from hil.simulator.pdo_objects import ACYCLIC, EVENT_DRIVEN, PdoObjects
+from hil.simulator.ticker import Ticker
 
 _SDO_REQUEST_COB_ID = 0x600
 _CONSUMER_HEARTBEAT_TIME = (0x1016, 1)
 _PRODUCER_HEARTBEAT_TIME = 0x1017
 _ERROR_BEHAVIOUR = (0x1029, 1)
 _EMCY_COB_ID = 0x1014
+MAX_TORQUE = 0x6072
 _PDO_LENGTH_ERROR = 0x8210
 """Error code of CiA 301."""
+
+LOOK_EVERY_S = 0.01
+"""How often it looks for its host where no frame comes [s]."""
 
 _STALE_STREAM = 1
 """Of a node's random numbers: the reading noise has one of its own."""
@@ -83,6 +89,7 @@ class InverterNode:
         link.network.add_node(self._server)
         self._pdo_objects = PdoObjects(self._eds, self._value)
         self._producer: HeartbeatProducer | None = None
+        self._looking: Ticker | None = None
         self._rpdos: dict[int, PdoFrame] = {}
         self._tpdos: tuple[PdoFrame, ...] = ()
         self._pending: dict[int, bytes] = {}
@@ -154,8 +161,10 @@ class InverterNode:
                 self._send_if_due(tpdo)
 
     def close(self) -> None:
-        """End the heartbeat; the link is its owner's to close."""
+        """End heartbeat and watch; the link is its owner's to close."""
         self._stop_heartbeat()
+        if self._looking is not None:
+            self._looking.stop()
 
     @property
     def _dead(self) -> bool:
@@ -165,7 +174,10 @@ class InverterNode:
     def _defaults(self) -> dict[int, int]:
         """Power-on values of what the device holds, from the EDS where it has them."""
         described = {index: self._eds.sheet.value(index) for index in (*PARAMETERS, 0x6502)}
-        return {**PARAMETERS, **{index: value for index, value in described.items() if value is not None}}
+        known = {index: value for index, value in described.items() if value is not None}
+        if not known.get(MAX_TORQUE):
+            known.pop(MAX_TORQUE, None)  # a place left free: no drive is made to give no torque
+        return {**PARAMETERS, **known}
 
     def _velocity(self, settings: SimulatedInverter) -> VelocityScale:
         """Scale of its speed: its EDS's, else what the rig file states of it."""
@@ -342,6 +354,8 @@ class InverterNode:
         elif (index, subindex) == _CONSUMER_HEARTBEAT_TIME:
             self._host.heartbeat = HeartbeatConsumer.from_object(value)
             self._hear(self._host.heartbeat.cob_id, self._on_heartbeat)
+            if self._looking is None:
+                self._looking = Ticker(LOOK_EVERY_S, self._look_by_the_clock, f"host watch of node {self._node_id}")
 
     def _source(self, index: int, subindex: int) -> Callable[[], int]:
         return self._device.reader(index) or partial(self._value, index, subindex)
@@ -355,16 +369,17 @@ class InverterNode:
     def _start_heartbeat(self, period_s: float) -> None:
         self._stop_heartbeat()
         if period_s > 0.0:
-            self._producer = HeartbeatProducer(self._link.send, self._node_id, period_s, self._before_heartbeat)
+            self._producer = HeartbeatProducer(self._link.send, self._node_id, period_s, lambda: self._state)
 
-    def _before_heartbeat(self) -> NmtState:
-        """Look for the host, in the heartbeat's own thread, unless a frame is being taken: then that has looked."""
-        if self._lock.acquire(blocking=False):  # whoever ends the heartbeat holds it and waits for this thread
+    def _look_by_the_clock(self) -> None:
+        """Look for the host, in a thread of its own, unless a frame is being taken: then that has looked."""
+        if self._lock.acquire(blocking=False):
             try:
                 self.look_for_host(time.monotonic_ns())
+            except BusDown:  # the rig is being closed
+                return
             finally:
                 self._lock.release()
-        return self._state
 
     def _stop_heartbeat(self) -> None:
         if self._producer is not None:

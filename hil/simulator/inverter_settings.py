@@ -27,6 +27,31 @@ class FaultAtStep:
 
 
 @dataclass(frozen=True, slots=True)
+class WrongTorque:
+    """A drive that gives another torque than it is asked for, and reports what it gives, from one step on.
+
+    Attributes
+    ----------
+    step
+        Counts the SYNCs from 1; None for never.
+    gain
+        It gives so many times what it is asked for; -1 is the other way round.
+    offset_permille
+        And so much more [per mille of rated].
+    """
+
+    step: int | None = None
+    gain: float = 1.0
+    offset_permille: float = 0.0
+
+    def given(self, wanted_permille: float, step: int) -> float:
+        """Torque it gives at a step [per mille of rated]."""
+        if self.step is None or step < self.step:
+            return wanted_permille
+        return self.gain * wanted_permille + self.offset_permille
+
+
+@dataclass(frozen=True, slots=True)
 class InverterFaults:
     """What is wrong with a simulated inverter; by default nothing. Steps count the SYNCs; 0 is power-on.
 
@@ -46,6 +71,8 @@ class InverterFaults:
         Share of TPDOs that repeat what the one before them said, at random: a drive too slow for its SYNC.
     ignores_target_from_step
         It ignores the target torque from this step on, in operation, and says so in bit 12 of its statusword.
+    wrong_torque
+        It gives another torque than it is asked for.
     fault
         A fault it meets.
     emcy
@@ -74,6 +101,7 @@ class InverterFaults:
     stale_from_step: int | None = None
     stale_share: float = 0.0
     ignores_target_from_step: int | None = None
+    wrong_torque: WrongTorque = field(default_factory=WrongTorque)
     fault: FaultAtStep | None = None
     emcy: FaultAtStep | None = None
     brown_out_at_step: int | None = None

@@ -12,6 +12,13 @@ from urllib.parse import urlsplit
 
 from hil.errors import UsageError
 
+IN_PROCESS = "virtual:"
+"""Beginning of the bus URLs that are served inside this process only."""
+
+SOCKETCAN = "socketcan:vcan"
+"""Beginning of the bus URLs of the Linux kernel's virtual buses. A simulated drive on a real one could answer in the
+place of a drive that carries torque."""
+
 
 @dataclass(frozen=True, slots=True)
 class Address:
@@ -59,6 +66,17 @@ def bus_address(url: str) -> Address:
     if urlsplit(url).scheme != "ws":
         raise UsageError(f"bus {url!r}: expected {expected}. Give it with --bus or in [can] of the rig file.")
     return _on_this_machine(_read(url, url, expected), url)
+
+
+def is_simulated_bus(url: str) -> bool:
+    """Tell whether a bus can hold simulated drives only: one that a simulated rig may be served at."""
+    if url.startswith((IN_PROCESS, SOCKETCAN)):
+        return True
+    try:
+        bus_address(url)
+    except UsageError:
+        return False
+    return True
 
 
 def _read(url: str, text: str, expected: str) -> Address:

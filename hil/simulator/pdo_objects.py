@@ -4,8 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from drivers.canopen.pdo_map import COB_ID_INVALID, MAX_PDO_BYTES, MappedObject, PdoLayout, ReadObject, read_layout
-from drivers.capability.carrier import FILLERS, MAX_OBJECTS, PDO_NUMBERS, RESERVED_COB_IDS, RPDO, TPDO, Direction
+from drivers.canopen.pdo_map import (
+    COB_ID_INVALID,
+    MAX_MAPPED,
+    MAX_PDO_BYTES,
+    MappedObject,
+    PdoLayout,
+    ReadObject,
+    read_layout,
+)
+from drivers.capability.carrier import FILLERS, PDO_NUMBERS, RPDO, TPDO, Direction, is_reserved
 from drivers.capability.table import EVENT_TIMER
 from drivers.datasheet.file import EdsFile
 from drivers.datasheet.types import DATA_TYPES
@@ -78,7 +86,9 @@ class PdoObjects:
                 raise ObjectRefused(VALUE_RANGE_EXCEEDED)
 
     def _check_mapping(self, direction: Direction, communication: int, mapping: int, subindex: int, value: int) -> None:
-        if not self._read(communication, 1) & COB_ID_INVALID:
+        cob_id = self._eds.sheet.entry(communication, 1)
+        can_be_switched_off = cob_id is not None and cob_id.writable  # else the number of objects, 0, does it
+        if can_be_switched_off and not self._read(communication, 1) & COB_ID_INVALID:
             raise ObjectRefused(WRONG_DEVICE_STATE)
         if subindex == 0:
             self._check_length(mapping, value)
@@ -106,11 +116,10 @@ class PdoObjects:
             communication, mapping = direction.communication + number, direction.mapping + number
             if not (self._there(communication, 1) and self._there(mapping, 0)):
                 continue
-            if self._read(mapping, 0) > MAX_OBJECTS:  # a multiplexed PDO
+            if self._read(mapping, 0) > MAX_MAPPED:  # a multiplexed PDO, or none
                 continue
             frame = self._frame(read_layout(self._read_or_nothing, communication, mapping))
-            reserved = any(frame.layout.cob_id in taken for taken in RESERVED_COB_IDS)
-            usable = frame.layout.valid and not frame.layout.extended and not reserved
+            usable = frame.layout.valid and not frame.layout.extended and not is_reserved(frame.layout.cob_id)
             if usable and frame.layout.objects and frame.fits:
                 yield frame
 

@@ -24,20 +24,12 @@ from hil.simulator.bus_faults import BusFaults
 from hil.simulator.can_bridge import CanBridge
 from hil.simulator.faulty_wire import FaultyWire
 from hil.simulator.inverter_settings import InverterFaults, SimulatedInverter
-from hil.simulator.loopback import Address, bus_address
+from hil.simulator.loopback import IN_PROCESS, SOCKETCAN, Address, bus_address
 from hil.simulator.plant import Plant
 from hil.simulator.plc_access import PlcSecurity
 from hil.simulator.plc_device import PlcDevice, PlcFaults, PlcSetup
 from hil.simulator.plc_server import PlcServer
 from hil.simulator.simulated_rig import SimulatedRig
-
-IN_PROCESS = "virtual:"
-"""Beginning of the bus URLs that are served inside this process only."""
-
-SOCKETCAN = "socketcan:vcan"
-"""Beginning of the bus URLs of the Linux kernel's virtual buses. A simulated drive on a real one could answer in the
-place of a drive that carries torque."""
-
 
 HOST_TIMEOUT_S = 1.0
 """Simulated time without a beat of the host after which the PLC permits no torque [s]: ten of the host's polls."""

@@ -228,8 +228,8 @@ def test_drive_in_fault_agrees_but_is_noted(
 def test_rigs_own_eds_with_errors_is_noted(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    unmappable = (r"(?s)(\[60B2\]\n(?:(?!\[).)*?PDOMapping=)1", r"\g<1>0")
-    with planted(tmp_path, Mismatch("", "", "", host=(unmappable,)), monkeypatch) as command:
+    unreadable = (r"(?s)(\[605A\]\n(?:(?!\[).)*?DefaultValue=)\d+", r"\g<1>six")
+    with planted(tmp_path, Mismatch("", "", "", host=(unreadable,)), monkeypatch) as command:
         run(command)
     out = capsys.readouterr().out
     assert "m1.eds has errors (1). See: hil check --eds" in out

@@ -65,7 +65,7 @@ def test_drives_of_a_host_that_dies_leave_operation(
 def quick_rig(short_rig: Path) -> Path:
     """The short rig with drives that miss their host's commands soon."""
     text = short_rig.read_text(encoding="utf-8")
-    short_rig.write_text(text.replace("# rpdo_deadline_ms = 200 ", "rpdo_deadline_ms = 50 "), encoding="utf-8")
+    short_rig.write_text(text.replace("# rpdo_deadline_ms = 150 ", "rpdo_deadline_ms = 50 "), encoding="utf-8")
     assert read_rig(short_rig).inverters.m1.rpdo_deadline_ms == 50
     return short_rig
 

@@ -14,9 +14,11 @@ from estimator.identification.compare import Compared
 from estimator.identification.identify import identify
 from estimator.identification.linear_model import LinearModel
 from estimator.identification.online.recursive import Status
+from estimator.signals.prbs import prbs_nm
 from hil.cli.main import run
 from hil.recording import read_record
 from hil.report.identification.terminal import compared_summary
+from tests.benchmarks.buses.line import Line
 from tests.estimator.identification.driveline import cruise, true_resonance
 
 MODEL = """schema = "hil.model/1"
@@ -279,3 +281,28 @@ def test_a_file_in_place_of_the_folder_is_refused(recordings: list[Path], tmp_pa
     (tmp_path / "out").write_text("mine")
     assert run(arguments(recordings[:1], tmp_path / "out")) == 2
     assert (tmp_path / "out").read_text() == "mine"
+
+
+def stiff_line(path: Path) -> Path:
+    """Write 20 s of a line at 65 Hz, sampled every 10 ms as it would be: the exact motion under held torque."""
+    line, rng = Line(1.6, 100.0, 262_000.0, 30.0, 0.35, 0.9), np.random.default_rng(0)
+    step, by_torque = line.held(0.01)
+    n = 2000
+    torque, x = 75.0 + prbs_nm(n, 60.0), np.array([0.0, 0.0, 60.0, 60.0])
+    speed = np.zeros(n)
+    for i in range(n):
+        speed[i] = x[2]
+        x = step @ x + by_torque @ (torque[i], 0.0)
+    rows = np.column_stack([0.01 * np.arange(n), 0.5 * torque, 0.5 * torque, speed + 0.02 * rng.normal(size=n)])
+    np.savetxt(path, rows, delimiter=",", header="time_s,torque_m1_nm,torque_m2_nm,speed_rad_s", comments="")
+    return path
+
+
+def test_a_mode_beyond_half_the_sampling_rate_may_have_been_folded(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = stiff_line(tmp_path / "stiff.csv")
+    assert run(["identify", str(path), "--out", str(tmp_path / "out")]) == 0
+    words = " ".join(capsys.readouterr().out.split())
+    assert "are too few for its damping: record every" in words
+    assert "A mode above 50 Hz would look the same" in words

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import pytest
 from drivers.inverter.cia402 import TorqueMode
 from drivers.plc.types import PrbsSource
 from drivers.resources import data_file
-from drivers.torque_guard import GuardLimits
+from drivers.torque_guard import ErrorLimits, GuardLimits
 from hil.config.experiment_tables import CruiseTable, ReversalTable, TipTable
 from hil.config.rig_file import PrbsTarget, read_rig
 from hil.errors import RigFileError
@@ -60,7 +61,9 @@ class TestTheExample:
         assert rig.simulation.speed_noise_rad_s == 0.05
 
     def test_its_guard_limits(self) -> None:
-        assert read_rig(EXAMPLE).guard_limits == GuardLimits(400.0, 400.0, 120.0, 2000.0, 700.0, 0.2)
+        error = ErrorLimits(m1_nm=30.0, m2_nm=30.0, sum_nm=math.hypot(30.0, 30.0), time_s=0.12, response_s=0.01)
+        expected = GuardLimits(400.0, 400.0, 120.0, 2000.0, 700.0, 0.2, 1.0, math.inf, 0.01, error)
+        assert read_rig(EXAMPLE).guard_limits == expected
 
     def test_it_has_one_experiment_of_each_kind(self) -> None:
         kinds = {name: type(table) for name, table in read_rig(EXAMPLE).experiments.items()}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -12,7 +13,7 @@ import can
 
 from drivers.canopen.can_link import CanLink
 from drivers.inverter.inverter import Inverter, InverterFeedback, InverterSettings
-from drivers.torque_guard import GuardedTorque, GuardLimits, TorqueGuard, TorqueRequest
+from drivers.torque_guard import ErrorLimits, Evidence, GuardedTorque, GuardLimits, TorqueGuard, TorqueRequest
 from hil.simulator.inverter_settings import InverterFaults, SimulatedInverter
 from hil.simulator.plant import Plant, RigidPlant
 from hil.simulator.simulated_rig import SimulatedRig
@@ -47,13 +48,22 @@ def new_channel() -> str:
     return f"test-{next(_channels)}"
 
 
+FRESH = Evidence(0, 0, 0.0)
+
+
+def guard_limits(torque_nm: float, rate_nm_per_s: float = 1.0) -> GuardLimits:
+    """Limits of which all torques have one size."""
+    error = ErrorLimits(torque_nm, torque_nm, torque_nm, 1.0, 1.0)
+    return GuardLimits(torque_nm, torque_nm, torque_nm, rate_nm_per_s, torque_nm, 1.0, 1.0, math.inf, 1.0, error)
+
+
 def guarded(base_nm: float, prbs_nm: float = 0.0) -> GuardedTorque:
     """A torque that has passed a guard which allows nearly everything."""
-    guard = TorqueGuard(GuardLimits(1e9, 1e9, 1e9, 1e12, 1e9, 1.0))
+    guard = TorqueGuard(guard_limits(1e9, 1e12))
     guard.enable()
-    guard.check(TorqueRequest(0.0, 0.0, 0.0, 0.0), now_ns=0, feedback_age_ns=0)
+    guard.check(TorqueRequest(0.0, 0.0, 0.0, 0.0), now_ns=0, evidence=FRESH)
     request = TorqueRequest(base_nm, prbs_nm, 0.0, 0.0)
-    return guard.check(request, now_ns=1_000_000_000, feedback_age_ns=0)[0]
+    return guard.check(request, now_ns=1_000_000_000, evidence=FRESH)[0]
 
 
 @dataclass(frozen=True, slots=True)

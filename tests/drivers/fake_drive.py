@@ -7,17 +7,20 @@ habit is a method that a test's subclass replaces. It lives on a virtual bus, in
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from drivers.canopen.can_link import CanLink
 from drivers.canopen.heartbeat import HeartbeatProducer, NmtState
+from drivers.canopen.pdo_map import PdoCodec
+from drivers.capability.carrier import RPDO, TPDO
 from drivers.datasheet.file import EdsFile
 from drivers.inverter.cia402 import STATUSWORD_STATE_BITS, PowerState, StatusBit, command_of, next_state
 from drivers.inverter.inverter import Inverter, InverterSettings
-from drivers.inverter.pdos import command_codec, feedback_codec
+from drivers.inverter.pdos import codecs
 from drivers.scaling import IntegerType
 from tests.drivers.can_bench import M1, new_channel
 
@@ -52,13 +55,14 @@ class FakeDrive:
         self.requests: list[bytes] = []
         self.controlword = 0
         self.torque = 0
-        self.pending: bytes | None = None
-        self.rpdo, self.tpdo = command_codec(self.eds, "fake"), feedback_codec(self.eds, "fake")
+        self.pending: dict[int, int] = {}
+        self.rpdos, self.tpdos = (codecs(self.eds, direction, "fake") for direction in (RPDO, TPDO))
         self.producer: HeartbeatProducer | None = None
         link.subscribe(0x600 + node_id, lambda data, t_ns: self.take_sdo(data))
         link.subscribe(0x000, lambda data, t_ns: self.take_nmt(data[0]))
         link.subscribe(0x080, lambda data, t_ns: self.take_sync(data))
-        link.subscribe(self.rpdo.layout.cob_id, lambda data, t_ns: self.take_rpdo(data))
+        for codec in self.rpdos:
+            link.subscribe(codec.layout.cob_id, partial(self.take_rpdo, codec))
 
     # habits
 
@@ -84,15 +88,19 @@ class FakeDrive:
     def torque_of(self, target: int, offset: int) -> int:
         return target + offset
 
+    def tpdos_sent(self) -> Sequence[PdoCodec]:
+        """Which TPDOs go out at a SYNC, and in which order."""
+        return self.tpdos
+
     def take_sync(self, data: bytes) -> None:
         if self.nmt is not NmtState.OPERATIONAL:
             return
-        if self.pending is not None:
-            values = dict(zip(self.rpdo.indices, self.rpdo.unpack(self.pending), strict=True))
-            self.control(values[0x6040])
+        if self.pending:
+            self.control(self.pending[0x6040])
             enabled = self.state is PowerState.OPERATION_ENABLED
-            self.torque = self.torque_of(values[0x6071], values[0x60B2]) if enabled else 0
-        self.link.send(self.tpdo.layout.cob_id, self.tpdo.pack(tuple(self.read(i, 0) for i in self.tpdo.indices)))
+            self.torque = self.torque_of(self.pending[0x6071], self.pending.get(0x60B2, 0)) if enabled else 0
+        for codec in self.tpdos_sent():
+            self.link.send(codec.layout.cob_id, codec.pack(tuple(self.read(i, 0) for i in codec.indices)))
 
     # what every drive does
 
@@ -104,8 +112,8 @@ class FakeDrive:
         self.state = next_state(self.state, command_of(controlword, self.controlword))
         self.controlword = controlword
 
-    def take_rpdo(self, data: bytes) -> None:
-        self.pending = data
+    def take_rpdo(self, codec: PdoCodec, data: bytes, t_ns: int) -> None:
+        self.pending |= dict(zip(codec.indices, codec.unpack(data), strict=True))
 
     def take_sdo(self, request: bytes) -> None:
         self.requests.append(request)

@@ -228,6 +228,89 @@ FIXED = COMPLETE.having(
 )
 """A mapping that is right and can't be changed; the TPDO described as it is wanted."""
 
+
+def fixed(*entries: str) -> Described:
+    """Mapping parameter that can't be written."""
+    return {0: Entry(U8, "const", str(len(entries)))} | {n: Entry(U32, "const", e) for n, e in enumerate(entries, 1)}
+
+
+PREDEFINED = COMPLETE.but(0x1400, 0x1600, 0x60B2).having(
+    {
+        **pdos(0x1401, pdo("$NODEID+0x300", "255"), pdo("$NODEID+0x400", "255"), pdo("$NODEID+0x80000000", "255")),
+        0x1601: fixed("0x60400010", "0x60600008"),
+        0x1602: fixed("0x60400010", "0x60FF0020"),
+        0x1603: fixed("0x60400010", "0x60710010"),
+        **pdos(0x1800, *(pdo(f"$NODEID+0x{base:X}", "255") for base in (0x180, 0x280, 0x380, 0x80000480))),
+        0x1A00: fixed("0x60410010"),
+        0x1A01: fixed("0x60410010", "0x60610008"),
+        0x1A02: fixed("0x60410010", "0x606C0020"),
+        0x1A03: fixed("0x60410010", "0x60770010"),
+    }
+)
+"""CiA 402's own PDOs, mapped for good: the feedback is in two, and the TPDO of the torque is off."""
+
+APART = PREDEFINED.having(
+    {
+        **pdos(0x1403, pdo("$NODEID+0x500", "1"), pdo("0x80000000", "255")),
+        0x1603: fixed("0x60400010", "0x60600008"),
+        0x1604: fixed("0x60710010"),
+        0x1A00: fixed("0x60410010", "0x60640020"),
+        0x1A02: fixed("0x606C0020"),
+        0x1A03: fixed("0x60770010"),
+    }
+)
+"""Command in two RPDOs, one above the fourth without an identifier; feedback in three TPDOs."""
+
+
+def for_good(cob_id: str, kind: str) -> Described:
+    """Communication parameter whose identifier can't be written, commissioned for every SYNC."""
+    return {0: Entry(U8, "ro", "2"), 1: Entry(U32, "ro", cob_id), 2: Entry(U8, default=kind, parameter="1")}
+
+
+SIMPLIQ = COMPLETE.but(
+    0x60A9,
+    0x60B2,
+    suffix=".dcf",
+    header=COMPLETE.header + "[DeviceComissioning]\nBaudrate=125\nNetNumber=0\nLSS_SerialNumber=0\n\n",
+    lines=("speed_unit", "accepted.rpdo_deadline"),
+).having(
+    {
+        0x1005: Entry(U32, "ro", "0x80"),
+        0x1017: Entry(U16, default="0x0", parameter="100"),
+        0x6007: Entry(I16),
+        0x6072: Entry(U16),
+        0x608B: Entry(I8),
+        0x608C: Entry(U8),
+        0x1400: for_good("$NODEID+0x200", "0xff"),
+        0x1401: for_good("$NODEID+0x300", "0xfe"),
+        0x1800: for_good("$NODEID+0x40000180", "0xff"),
+        0x1801: for_good("$NODEID+0x40000280", "0xfe"),
+        0x1A01: {0: Entry(U8, parameter="1"), 1: Entry(U32, parameter="0x606c0020"), 2: Entry(U32), 3: Entry(U32)},
+    }
+)
+"""Identifiers for good and mappings that can be set: the number of mapped objects, 0, switches a PDO off."""
+
+SAMPLE = COMPLETE.but(
+    0x1005,
+    0x1014,
+    0x1016,
+    0x60A9,
+    0x60B2,
+    lines=("speed_unit", "option_codes.abort_connection", "accepted.heartbeat_consumer", "accepted.rpdo_deadline"),
+).having(
+    {
+        0x1000: Entry(U32, "const", "0x00000000"),
+        0x6007: Entry(I16, default="0x0000"),
+        0x6072: Entry(U16, default="0x0000"),
+        0x608B: Entry(I8, default="0x00"),
+        0x608C: Entry(U8),
+        0x6502: Entry(U32, "ro"),
+        **pdos(0x1400, pdo("$NODEID+0x200", "0xFE", count="0x0"), pdo("$NODEID+0x300", "0xFE", count="0x0")),
+        **pdos(0x1800, pdo("$NODEID+0x180", "0xFE", "0x0", count="0x0"), pdo("$NODEID+0x280", "0xFE", count="0x0")),
+    }
+)
+"""A sample of CiA 402 with most values 0: max torque, abort connection option code, mappings."""
+
 SHOUTING = COMPLETE.but(habit=lambda text: text.upper().replace("0X", "0x"))
 """All in capitals."""
 
@@ -242,5 +325,9 @@ MAKERS: dict[str, Maker] = {
     "yiyou": YIYOU,
     "e35": E35,
     "fixed mapping": FIXED,
+    "pre-defined PDOs": PREDEFINED,
+    "each value apart": APART,
+    "simpliq": SIMPLIQ,
+    "sample": SAMPLE,
     "capitals": SHOUTING,
 }

@@ -12,7 +12,8 @@ import pytest
 from can.interfaces.virtual import VirtualBus
 from can_remote import RemoteServer
 
-from drivers.canopen.can_link import HOST_NODE_ID, CanLink
+from drivers.canopen.can_link import CanLink
+from drivers.canopen.heartbeat import HOST_NODE_ID
 from drivers.canopen.remote_bus import BoundedRemoteBus
 from drivers.errors import BusDown, ProtocolViolation
 from hil.simulator.can_bridge import CanBridge

@@ -15,6 +15,7 @@ from drivers.inverter.cia402 import (
     TOWARDS_OPERATION,
     Command,
     PowerState,
+    StatusBit,
     TorqueMode,
     command_of,
     next_state,
@@ -124,3 +125,35 @@ def test_every_command_survives_its_controlword(command: Command) -> None:
 def test_modes_name_themselves_and_their_support_bit() -> None:
     assert TorqueMode(10).title == "10 (cyclic synchronous torque)"
     assert (TorqueMode.PROFILE_TORQUE.support_bit, TorqueMode(10).support_bit) == (1 << 3, 1 << 9)
+
+
+def test_bits_of_the_statusword_beside_the_state_are_those_of_the_standard() -> None:
+    """CiA 402-2, object 6041h; bit 12 as in cyclic synchronous torque mode."""
+    assert {bit.name: bit.value for bit in StatusBit} == {
+        "VOLTAGE_ENABLED": 0x0010,
+        "WARNING": 0x0080,
+        "REMOTE": 0x0200,
+        "INTERNAL_LIMIT_ACTIVE": 0x0800,
+        "FOLLOWS_TARGET": 0x1000,
+    }
+
+
+def test_words_of_the_commands_are_those_of_the_standard() -> None:
+    """CiA 402-2, table "Command coding", don't-care bits 0 but for those that every state allows to be 1."""
+    assert {command.name: command.value for command in Command} == {
+        "DISABLE_VOLTAGE": 0x0000,
+        "QUICK_STOP": 0x0002,
+        "SHUTDOWN": 0x0006,
+        "SWITCH_ON": 0x0007,
+        "ENABLE_OPERATION": 0x000F,
+        "FAULT_RESET": 0x0080,
+    }
+
+
+def test_a_controlword_without_one_before_it_may_be_a_reset() -> None:
+    assert command_of(0x0080) is Command.FAULT_RESET
+
+
+def test_a_code_of_no_state_is_told_by_its_own_bits() -> None:
+    with pytest.raises(ProtocolViolation, match=r"0x6041 is 0xFF10: .* came 0x00\.|0x6041 is 0xFF2A: .* came 0x2A\."):
+        state_of(0xFF2A)

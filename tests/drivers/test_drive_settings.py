@@ -52,7 +52,7 @@ def changed_eds(folder: Path, *changes: tuple[str, str], more: str = "") -> Path
 
 def test_the_drive_is_made_to_watch_its_host_in_three_ways() -> None:
     settings = given(replace(M1, rpdo_deadline_ms=150))
-    assert settings[0x1016, 1] == (127 << 16 | 500, "rig file")
+    assert settings[0x1016, 1] == (127 << 16 | 150, "rig file")
     assert settings[0x1400, 5] == (150, "rig file")
     assert (0x6007, 0) not in settings  # the third, as the drive has it
 

@@ -113,8 +113,8 @@ EDITS = [
     ),
     Fault("1003sub0", "HighLimit=4", "HighLimit=256", W, "HighLimit", "UNSIGNED8, 0 to 255", "'256'"),
     Fault("6007", "LowLimit=0", "LowLimit=4", W, "HighLimit", "at least LowLimit (4)", "'3'"),
-    Fault("6007", "DefaultValue=2", "DefaultValue=4", E, "DefaultValue", "at most HighLimit (3)", "'4'"),
-    Fault("6007", "DefaultValue=2", "DefaultValue=-1", E, "DefaultValue", "at least LowLimit (0)", "'-1'"),
+    Fault("6007", "DefaultValue=2", "DefaultValue=4", W, "DefaultValue", "at most HighLimit (3)", "'4'"),
+    Fault("6007", "DefaultValue=2", "DefaultValue=-1", W, "DefaultValue", "at least LowLimit (0)", "'-1'"),
     Fault("1029sub1", "DefaultValue=0", "DefaultValue=3", W, "DefaultValue", "at most HighLimit (2)", "'3'"),
     # PDOs
     Fault("1400sub1", "$NODEID+0x200", "0x20000200", W, "DefaultValue", "11 bits", "'0x20000200'"),
@@ -122,7 +122,7 @@ EDITS = [
         "1400sub1",
         "$NODEID+0x200",
         "$NODEID+0x600",
-        E,
+        W,
         "DefaultValue",
         "an identifier a PDO may have",
         "0x67F for node 127",
@@ -141,9 +141,9 @@ EDITS = [
     ),
     Fault("1A00sub2", "0x60770010", "0x60770008", W, "DefaultValue", "16 bit for 0x6077:00 (INTEGER16", "8 bit in"),
     Fault(
-        "6077", "PDOMapping=1", "PDOMapping=0", E, "[1A00sub2] DefaultValue", "PDOMapping=1; 0x6077:00", "'0x60770010'"
+        "6077", "PDOMapping=1", "PDOMapping=0", W, "[1A00sub2] DefaultValue", "PDOMapping=1; 0x6077:00", "'0x60770010'"
     ),
-    Fault("6071", "AccessType=rw", "AccessType=rwr", E, "[1600sub2] DefaultValue", "a RPDO may carry", "'0x60710010'"),
+    Fault("6071", "AccessType=rw", "AccessType=rwr", W, "[1600sub2] DefaultValue", "a RPDO may carry", "'0x60710010'"),
     # needs
     Fault("1000", "0x00020192", "0x00020191", W, "DefaultValue", "profile 402", "401 in '0x00020191'"),
     Fault(
@@ -152,7 +152,7 @@ EDITS = [
         "AccessType=ro",
         E,
         "AccessType",
-        "can be written for producer heartbeat time 0x1017:00",
+        "can be written and read for producer heartbeat time 0x1017:00",
         "'ro'",
     ),
     Fault(

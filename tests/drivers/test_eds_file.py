@@ -11,7 +11,8 @@ from canopen import import_od
 from canopen.objectdictionary import ObjectDictionary
 
 from drivers import resources
-from drivers.capability.carrier import TPDO, find_carrier
+from drivers.capability.carrier import TPDO
+from drivers.capability.carrier_search import find_carriers
 from drivers.capability.plan import plan_drive
 from drivers.datasheet.check import check_eds
 from drivers.datasheet.file import EdsFile
@@ -69,19 +70,19 @@ def test_shipped_eds_is_read_as_another_reader_reads_it() -> None:
 
 
 def test_pdo_layouts_come_from_the_eds_with_the_node_id_put_in() -> None:
-    layout = plan_drive(EdsFile(None, 5).sheet).carrier(TPDO).layout
+    layout = plan_drive(EdsFile(None, 5).sheet).pdos(TPDO)[0].layout
     assert (layout.cob_id, layout.transmission_type, layout.valid) == (0x185, 1, True)
     assert tuple(mapped.index for mapped in layout.objects) == FEEDBACK
 
 
 def test_changed_mapping_changes_the_layout(edited: Edited) -> None:
-    search = find_carrier(edited("0x60770010", "0x60740010").sheet, TPDO, (0x6041, 0x606C))
-    assert search.carrier is not None
-    assert search.carrier.mapped_here  # 0x6074 is no object of it
+    search = find_carriers(edited("0x60770010", "0x60740010").sheet, TPDO, (0x6041, 0x606C))
+    (carrier,) = search.carriers
+    assert carrier.mapped_here  # 0x6074 is no object of it
 
-    search = find_carrier(edited("0x60770010", "0x60780010").sheet, TPDO, (0x6041, 0x6078))
-    assert search.carrier is not None
-    assert tuple(mapped.index for mapped in search.carrier.layout.objects) == (0x6041, 0x6078, 0x606C)
+    search = find_carriers(edited("0x60770010", "0x60780010").sheet, TPDO, (0x6041, 0x6078))
+    (carrier,) = search.carriers
+    assert tuple(mapped.index for mapped in carrier.layout.objects) == (0x6041, 0x6078, 0x606C)
 
 
 def test_types_hold_every_object_with_its_type() -> None:
@@ -152,9 +153,9 @@ def test_eds_without_a_pdo_for_the_objects_is_refused(edited: Edited) -> None:
     )
     eds = edited(locked.format("rw", "0x60770010"), locked.format("ro", "0x60780010"))
     with pytest.raises(
-        ConfigMismatch, match=r"one TPDO that maps .*0x6077.*found 0x1800: COB-ID 0x185.*0x1A00:02 can no"
+        ConfigMismatch, match=r"one TPDO or several that map .*0x6077.*found 0x1800: COB-ID 0x185.*0x1A00:02 can no"
     ):
-        plan_drive(eds.sheet).carrier(TPDO)
+        plan_drive(eds.sheet).pdos(TPDO)[0]
 
 
 @pytest.mark.parametrize(
@@ -186,14 +187,14 @@ def test_spare_pdo_without_defaults_is_no_hindrance(edited: Edited) -> None:
     second = "[1800]\n" + second
     spare = second.replace(f"{blank}DefaultValue=3", f"{blank}DefaultValue=")
     moved = second.replace("[1800", "[1801").replace("[1A00", "[1A01")
-    carrier = plan_drive(edited(second, spare + moved).sheet).carrier(TPDO)
+    carrier = plan_drive(edited(second, spare + moved).sheet).pdos(TPDO)[0]
     assert carrier.layout.communication_index == 0x1801
     assert not carrier.mapped_here
 
 
 def test_pdo_without_a_transmission_type_is_mapped_anew(edited: Edited) -> None:
     head = "[1800sub2]\nParameterName=Transmission type\nObjectType=0x7\nDataType=0x0005\nAccessType=rw\n"
-    carrier = plan_drive(edited(f"{head}DefaultValue=1\n", head).sheet).carrier(TPDO)
+    carrier = plan_drive(edited(f"{head}DefaultValue=1\n", head).sheet).pdos(TPDO)[0]
     assert (carrier.mapped_here, carrier.described, carrier.layout.transmission_type) == (True, None, 1)
 
 

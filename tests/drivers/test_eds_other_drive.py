@@ -36,7 +36,7 @@ from tests.drivers.eds_bench import SHIPPED, without
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 OTHER_EDS = EXAMPLES / "other_drive.eds"
 OTHER = replace(
-    inverter_settings("m1", read_rig(EXAMPLES / "other_drive.toml").inverters.m1),
+    inverter_settings("m1", read_rig(EXAMPLES / "other_drive.toml")),
     sdo_timeout_s=M1.sdo_timeout_s,
 )
 SIMULATED = SimulatedInverter(OTHER.node_id, OTHER.rated_torque_nm, eds_path=OTHER_EDS)
@@ -80,7 +80,7 @@ def test_the_library_alone_would_lose_every_sub_index() -> None:
 def test_pdo_2_carries_torque_and_feedback() -> None:
     eds = EdsFile(OTHER_EDS, 11)
     plan = plan_drive(eds.sheet)
-    rpdo, tpdo = plan.carrier(RPDO).layout, plan.carrier(TPDO).layout
+    rpdo, tpdo = plan.pdos(RPDO)[0].layout, plan.pdos(TPDO)[0].layout
     assert (rpdo.communication_index, rpdo.cob_id) == (0x1401, 0x300 + 11)
     assert (tpdo.communication_index, tpdo.cob_id) == (0x1801, 0x280 + 11)
 

@@ -67,7 +67,7 @@ def test_torque_offset_without_a_sign_is_done_without(tmp_path: Path) -> None:
     assert finding.severity is W
     assert finding.line == line_of(text, "60B2", "DataType")
     assert report.plan is not None
-    assert 0x60B2 not in {mapped.index for mapped in report.plan.carrier(RPDO).layout.objects}
+    assert 0x60B2 not in {mapped.index for mapped in report.plan.pdos(RPDO)[0].layout.objects}
 
 
 def test_max_torque_as_a_signed_number_means_the_same(tmp_path: Path) -> None:

@@ -6,7 +6,16 @@ import threading
 
 import pytest
 
-from drivers.canopen.heartbeat import HeartbeatMonitor, HeartbeatProducer, NmtCommand, NmtState, nmt_frame
+from drivers.canopen.heartbeat import (
+    HEARTBEAT_COB_ID,
+    HOST_NODE_ID,
+    NMT_COB_ID,
+    HeartbeatMonitor,
+    HeartbeatProducer,
+    NmtCommand,
+    NmtState,
+    nmt_frame,
+)
 from drivers.canopen.node_monitor import NodeMonitor
 from drivers.canopen.silence import GRACE_NS
 from drivers.errors import BusDown, DeviceFault, DeviceTimeout, ProtocolViolation
@@ -145,3 +154,36 @@ def test_the_first_emergency_stays_until_it_is_reset() -> None:
         monitor.raise_if_unwell(0)
     monitor.on_emergency(bytes(8), 0)
     monitor.raise_if_unwell(0)
+
+
+def test_identifiers_and_codes_are_those_of_cia_301() -> None:
+    """Tables "NMT node control" and "heartbeat protocol"; the predefined connection set."""
+    assert (NMT_COB_ID, HEARTBEAT_COB_ID, HOST_NODE_ID) == (0x000, 0x700, 127)
+    assert {command.name: command.value for command in NmtCommand} == {
+        "START": 1,
+        "STOP": 2,
+        "ENTER_PRE_OPERATIONAL": 128,
+        "RESET_NODE": 129,
+        "RESET_COMMUNICATION": 130,
+    }
+    assert {state.name: state.value for state in NmtState} == {
+        "INITIALISING": 0,
+        "STOPPED": 4,
+        "OPERATIONAL": 5,
+        "PRE_OPERATIONAL": 127,
+    }
+
+
+def test_a_heartbeat_may_be_sent_between_two() -> None:
+    sent: list[tuple[int, bytes]] = []
+    began = threading.Event()
+
+    def send(cob_id: int, data: bytes) -> None:
+        sent.append((cob_id, data))
+        began.set()
+
+    producer = HeartbeatProducer(send, 9, period_s=3600.0, state=lambda: NmtState.OPERATIONAL)
+    assert began.wait(20.0)
+    producer.beat()
+    producer.stop()
+    assert sent == [(0x709, b"\x05"), (0x709, b"\x05")]

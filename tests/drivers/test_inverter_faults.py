@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
 from drivers.errors import BusDown, ConfigMismatch, DeviceFault, DeviceTimeout
 from drivers.inverter.cia402 import PowerState, TorqueMode
+from drivers.resources import data_file
 from hil.simulator.inverter_settings import FaultAtStep, InverterFaults
 from tests.drivers.can_bench import M1, SIMULATED_M1, Bench, bench, frame, guarded
 
@@ -90,10 +92,19 @@ def test_state_machine_that_does_not_follow_is_refused_with_both_states() -> Non
 
 
 @pytest.mark.parametrize("index", [0x1400, 0x1600, 0x1800, 0x1A00, 0x1016, 0x1017])
-def test_configuration_that_does_not_hold_is_refused(index: int) -> None:
-    with bench(InverterFaults(ignored_writes=frozenset({index}))) as rig:
+def test_configuration_that_does_not_hold_is_refused(index: int, tmp_path: Path) -> None:
+    eds = tmp_path / "drive.eds"
+    eds.write_text(data_file("inverter.eds").read_text().replace("\nDefaultValue=3", "\nDefaultValue=1"))
+    faults, simulated = InverterFaults(ignored_writes=frozenset({index})), replace(SIMULATED_M1, eds_path=eds)
+    with bench(faults, settings=replace(M1, eds_path=eds), simulated=simulated) as rig:
         with pytest.raises(ConfigMismatch, match=rf"object 0x{index:04X}:.. reads .* after writing"):
             rig.m1.configure()
+
+
+@pytest.mark.parametrize("index", [0x1600, 0x1A00])
+def test_mapping_that_is_right_is_left_alone(index: int) -> None:
+    with bench(InverterFaults(ignored_writes=frozenset({index}))) as rig:
+        rig.m1.configure()
 
 
 def test_option_code_of_the_drive_s_own_is_kept_and_told() -> None:

@@ -80,9 +80,11 @@ def test_commands_of_a_new_user(tmp_path: Path, capsys: pytest.CaptureFixture[st
     text = usual.read_text().replace("heartbeat_ms = 100", 'heartbeat_ms = 100\neds = "drive.eds"')
     text = text.replace('eds = "drive.eds"', "\n".join(('eds = "drive.eds"', *pasted)))
     usual.write_text(text)
+    assert not read_rig(usual).inverters.m1.accepted.by_name["rpdo_deadline"].is_by_a_person
+    usual.write_text(text.replace('"NAME"', '"A. Nyone"').replace('"REASON"', '"a relay of its own"'))
     accepted = read_rig(usual).inverters.m1.accepted.by_name
     assert set(accepted) == {"supported_modes", "heartbeat_consumer", "rpdo_deadline"}
-    assert str(accepted["rpdo_deadline"]) == "accepted by NAME: REASON"
+    assert str(accepted["rpdo_deadline"]) == "accepted by A. Nyone: a relay of its own"
 
 
 def test_on_a_vehicle_guesses_are_comments(tmp_path: Path) -> None:
@@ -133,7 +135,7 @@ def test_what_is_by_the_node_id_holds_for_every_node(tmp_path: Path) -> None:
     for node_id in (1, 2):
         sheet = EdsFile(path, node_id).sheet
         assert sheet.value(0x1014) == 0x80 + node_id
-        assert plan_drive(sheet).carrier(RPDO).layout.cob_id == 0x200 + node_id
+        assert plan_drive(sheet).pdos(RPDO)[0].layout.cob_id == 0x200 + node_id
         assert sheet.value(0x1400, 2) == 1
 
 
@@ -162,9 +164,9 @@ def test_fixed_mapping_that_the_drive_does_not_hold_is_refused(tmp_path: Path) -
     mapping = {**MAKERS["fixed mapping"].objects[0x1600], 3: Entry(U32, "const", "0x60FF0020")}  # type: ignore[dict-item]
     other = written(MAKERS["fixed mapping"].having({0x1600: mapping}), tmp_path / "device")
     with served(changed(host, {"inverters.m1": {"eds": other}})) as (_, at):
-        table = at.inverters.m1.model_copy(update={"eds": tmp_path / "drive.eds"})
+        described = changed(at, {"inverters.m1": {"eds": tmp_path / "drive.eds"}})
         with CanLink.open(at.can.url) as link:
-            m1 = Inverter(link, inverter_settings("m1", table))
+            m1 = Inverter(link, inverter_settings("m1", described))
             assert [each.what for each in m1.check()] == ["PDO 0x1400/0x1600"]
             with pytest.raises(ConfigMismatch, match=r"0x60FF:00 .* expected .*0x60B2:00 .* and can't be given it"):
                 m1.configure()
@@ -182,7 +184,7 @@ def test_heartbeat_that_is_there_for_good_counts(tmp_path: Path) -> None:
 def test_mapping_with_little_room_carries_the_sum(room: int, tmp_path: Path) -> None:
     narrow = COMPLETE.having(pdos(0x1400, pdo("$NODEID+0x200", "255", "0x60400010", room=room))).but(0x1401, 0x1601)
     path = written(narrow, tmp_path)
-    objects = plan_drive(EdsFile(path, 1).sheet).carrier(RPDO).layout.objects
+    objects = plan_drive(EdsFile(path, 1).sheet).pdos(RPDO)[0].layout.objects
     assert [mapped.index for mapped in objects] == [0x6040, 0x6071, 0x60B2][:room]
     assert drive(path, tmp_path, SHORT).flagged == 0
 

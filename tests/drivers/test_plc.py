@@ -22,9 +22,10 @@ from drivers.plc.plc import GENERATOR_OFF, Plc
 from drivers.plc.register_map import RegisterMap, load_register_map
 from drivers.plc.types import ClutchState, DriveMode, PlcWatchdog, PrbsSettings, PrbsSource
 from drivers.resources import data_file
-from drivers.torque_guard import GuardedTorque, GuardLimits, TorqueGuard, TorqueRequest
+from drivers.torque_guard import GuardedTorque, TorqueGuard, TorqueRequest
 from hil.simulator.plc_device import PlcDevice, PlcFaults, PlcSetup
 from hil.simulator.plc_server import ServedPlc, serve_plc
+from tests.drivers.can_bench import FRESH, guard_limits
 
 MAP = load_register_map(data_file("plc.toml"))
 SETTINGS = PrbsSettings(True, 60.5, 3, 77, PrbsSource.PLC)
@@ -51,9 +52,9 @@ class ImpatientClock(Clock):
 
 def allowed(amplitude_nm: float) -> tuple[GuardedTorque, GuardedTorque]:
     """A PRBS that a guard has let through, shared evenly."""
-    guard = TorqueGuard(GuardLimits(1e6, 1e6, 1e6, 1.0, 1e6, 1.0))
+    guard = TorqueGuard(guard_limits(1e6))
     guard.enable()
-    return guard.check(TorqueRequest(0.0, amplitude_nm / 2, 0.0, amplitude_nm / 2), 0, 0)
+    return guard.check(TorqueRequest(0.0, amplitude_nm / 2, 0.0, amplitude_nm / 2), 0, FRESH)
 
 
 async def start(plc: Plc, settings: PrbsSettings = SETTINGS) -> PrbsSettings:

@@ -12,7 +12,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 
 OPENING = """
-from drivers.torque_guard import GuardedTorque, TorqueGuard, TorqueRequest
+from drivers.torque_guard import Evidence, GuardedTorque, TorqueGuard, TorqueRequest
 
 def send(torque: GuardedTorque) -> None: ...
 
@@ -42,7 +42,7 @@ def type_check(line: str, folder: Path, cache: Path) -> str:
 
 
 def test_what_the_guard_returns_type_checks(tmp_path: Path, cache: Path) -> None:
-    assert "Success" in type_check("send(guard.check(request, 0, 0)[0])", tmp_path, cache)
+    assert "Success" in type_check("send(guard.check(request, 0, Evidence(0, 0, 0.0))[0])", tmp_path, cache)
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import time
 from pathlib import Path
 
 import pytest
@@ -91,6 +92,8 @@ def test_a_killed_run_leaves_every_appended_row_readable(tmp_path: Path, suffix:
     with writer:
         for k in range(12):
             writer.append(sample(k))
+        while writer.n_samples < 12:  # the disk takes them in a thread of its own
+            time.sleep(0.001)
         # Seen from outside at this moment, as after a kill: no flush, no close.
         check(tmp_path / "run.part.csv", 12)
         assert not writer.path.exists()

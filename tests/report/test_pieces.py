@@ -24,7 +24,8 @@ from hil.report.figures import LONGEST_STRETCHES, input_lines, stretches_for
 from hil.report.numbers import p_statement, shown, shown_interval, shown_p, shown_ratio
 from hil.report.outputs import publish, require_folder
 from hil.report.page import table
-from hil.report.wording import listed, simulated_column
+from hil.report.sentence import listed
+from hil.report.wording import simulated_column
 
 NAN = float("nan")
 

@@ -30,6 +30,8 @@ DURATION_S = 1.0
 ANY_PORT = Address("127.0.0.1", 0)
 
 CHANGES = {
+    "inverters.m1": {"host_timeout_ms": 1000},  # a test machine may be busy
+    "inverters.m2": {"host_timeout_ms": 1000},
     "vehicle": {"inertia_kg_m2": INERTIA_KG_M2},
     "experiments.cruise": {"duration_s": DURATION_S, "speed_rad_s": 0.4, "approach_timeout_s": 20.0},
     "experiments.reversal": {"duration_s": DURATION_S, "turning_speed_rad_s": 2.0, "swing_nm": 200.0},

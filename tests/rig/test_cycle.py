@@ -100,6 +100,8 @@ def test_guard_stands_between_request_and_inverter() -> None:
     with armed() as (devices, cycle):
         with pytest.raises(CommandRefused, match="while not enabled"):
             cycle.step(pacer.next(), TorqueRequest(1.0, 0.0, 0.0, 0.0), 0.0, SampleFlag.GOOD)
+        cycle.step(pacer.next(), NO_TORQUE, 0.0, SampleFlag.GOOD)
+        assert cycle.answered
         devices.guard.enable()
         cycle.step(pacer.next(), NO_TORQUE, 0.0, SampleFlag.GOOD)
         with pytest.raises(CommandRefused, match=r"base torque goes from 0 Nm to 100 Nm in 0\.01 s"):
@@ -119,3 +121,17 @@ def test_host_that_stalls_blames_itself() -> None:
         cycle.step(Tick(0, 0, 0), NO_TORQUE, 0.0, SampleFlag.GOOD)
         with pytest.raises(RunAborted, match=r"cycle 1 began 0\.200 s late.*machine was too busy"):
             cycle.step(Tick(1, PERIOD_NS, 200 * MS), NO_TORQUE, 0.0, SampleFlag.GOOD)
+
+
+def test_the_speed_compared_with_limits_is_the_faster_of_both_readings() -> None:
+    pacer = FreePacer(PERIOD_NS)
+    with armed(syncs=2) as (_, cycle):
+        assert math.isnan(cycle.fastest_rad_s)
+        for _ in range(2):
+            cycle.step(pacer.next(), NO_TORQUE, 0.0, SampleFlag.GOOD)
+        assert cycle.answered
+        for m1, m2, fastest in ((1.0, -5.0, -5.0), (-5.0, 1.0, -5.0), (3.0, 2.0, 3.0)):
+            cycle._m1.speed_rad_s, cycle._m2.speed_rad_s = m1, m2
+            assert cycle.fastest_rad_s == fastest
+        cycle._m2.speed_rad_s = math.nan
+        assert math.isnan(cycle.fastest_rad_s)

@@ -2,6 +2,12 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
+import pytest
+
+from hil.errors import RunAborted
+from hil.rig.catch_up import CatchUp
 from hil.rig.drive import SLEPT_THROUGH
 from hil.rig.pacing import FreePacer, Tick
 from hil.rig.sample import SampleFlag
@@ -13,18 +19,19 @@ GAP_AFTER = 250
 
 
 class SleepyPacer:
-    """Simulated time with one gap: three cycles after ``GAP_AFTER`` are left out, as in sleep."""
+    """Simulated time with one gap: some cycles after ``GAP_AFTER`` are left out, as in sleep."""
 
-    def __init__(self, pacer: FreePacer) -> None:
+    def __init__(self, pacer: FreePacer, gap: int = 3) -> None:
         self._pacer = pacer
+        self._gap = gap
         self.period_ns = pacer.period_ns
         self.answer_timeout_s = pacer.answer_timeout_s
         self.poll_patience_s = pacer.poll_patience_s
 
     def next(self) -> Tick:
         tick = self._pacer.next()
-        gap = 3 if tick.cycle > GAP_AFTER else 0
-        late_ns = gap * self.period_ns if tick.cycle == GAP_AFTER else 0
+        gap = self._gap if tick.cycle > GAP_AFTER else 0
+        late_ns = self._gap * self.period_ns if tick.cycle == GAP_AFTER else 0
         return Tick(tick.cycle + gap, tick.due_ns + gap * self.period_ns, late_ns)
 
 
@@ -41,3 +48,35 @@ def test_missing_cycles_become_flagged_rows() -> None:
     assert {row.speed_rad_s for row in stand_ins} == {last_real.speed_rad_s}
     assert {row.torque_ref_nm for row in stand_ins} == {last_real.torque_ref_nm}
     assert summary.flagged == len([row for row in samples.rows if row.flags is not SampleFlag.GOOD])
+
+
+def test_a_stall_of_this_machine_is_this_machines_fault() -> None:
+    """After two seconds the PLC's last answer is old as well; it is not to blame."""
+    with served() as (server, rig):
+        with pytest.raises(RunAborted, match=r"cycle 250 began 2\.000 s late, .* This machine was too busy"):
+            run_once(rig, Samples(), experiment="reversal", pacer=SleepyPacer(fast(rig), gap=200))
+        assert_disarmed(server.bus_url, 1, 2)
+
+
+@pytest.mark.parametrize("gap_after", range(210, 290, 10))
+def test_after_missing_cycles_the_torque_goes_on_from_what_the_drives_hold(
+    gap_after: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The plan has gone on for 15 cycles at up to 2000 Nm/s, 0.65 of it on m1; the torque has not."""
+    monkeypatch.setattr("tests.rig.test_slept_through.GAP_AFTER", gap_after)
+    samples = Samples()
+    with served() as (_, rig):
+        run_once(rig, samples, experiment="reversal", pacer=SleepyPacer(fast(rig), gap=15))
+    driven = [row for row in samples.rows if row.flags is not SLEPT_THROUGH]
+    assert len(driven) < len(samples.rows)
+    largest_nm = rig.guard.rate_limit_nm_per_s * rig.period_s + rig.prbs.amplitude_nm
+    steps_nm = [abs(b.torque_ref_m1_nm - a.torque_ref_m1_nm) for a, b in pairwise(driven)]
+    assert max(steps_nm) <= largest_nm + 1e-6
+
+
+def test_catching_up_takes_as_many_cycles_as_the_rate_wants() -> None:
+    catch_up = CatchUp(most_nm=20.0)
+    planned = {0: 0.0, 1: 10.0, 2: 500.0, 5: 70.0, 6: 75.0, 7: 80.0, 8: 85.0, 9: 500.0}
+    asked = [catch_up.torque_nm(cycle, torque_nm) for cycle, torque_nm in planned.items()]
+    assert asked[:3] == [0.0, 10.0, 500.0], "a plan that is too fast by itself is for the guard"
+    assert asked[3:] == [480.0, 460.0, 440.0, 420.0, 440.0]

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from drivers.canopen.pdo_map import COB_ID_EXTENDED, COB_ID_INVALID
-from drivers.capability.carrier import RESERVED_COB_IDS, RPDO, TPDO, Carrier, CarrierSearch, Direction
+from drivers.capability.carrier import RPDO, TPDO, Carrier, Direction, is_reserved
+from drivers.capability.carrier_search import CarrierSearch
 from drivers.capability.function import Function
 from drivers.capability.plan import COMMAND, FEEDBACK, wanted_names
 from drivers.datasheet.check.context import EdsContext, at_file, at_key, at_section, hexadecimal
@@ -13,7 +14,7 @@ from drivers.datasheet.finding import EdsFinding, Severity
 
 
 def check_carriers(context: EdsContext) -> Iterator[EdsFinding]:
-    """Check that one RPDO and one TPDO carry what is needed, or can be made to."""
+    """Check that RPDOs and TPDOs carry what is needed, or can be made to."""
     plan = context.plan
     yield from _search(context, RPDO, COMMAND, plan.command)
     yield from _search(context, TPDO, FEEDBACK, plan.feedback)
@@ -29,16 +30,17 @@ def _search(
     context: EdsContext, direction: Direction, functions: tuple[Function, ...], search: CarrierSearch
 ) -> Iterator[EdsFinding]:
     wanted = wanted_names(context.plan, functions)
-    if search.carrier is None:
+    if not search.carriers:
         yield _no_pdo(context, direction, wanted, search)
-    elif search.carrier.mapped_here:
-        yield from _mapped_here(context, direction, wanted, search.carrier)
-    else:
-        yield from _as_described(context, search.carrier)
+    for carrier in search.carriers:
+        if carrier.mapped_here:
+            yield from _mapped_here(context, direction, wanted, carrier)
+        else:
+            yield from _as_described(context, carrier)
 
 
 def _no_pdo(context: EdsContext, direction: Direction, wanted: str, search: CarrierSearch) -> EdsFinding:
-    expected = f"one {direction.name} that maps {wanted}, or that can be mapped"
+    expected = f"one {direction.name} or several that map {wanted}, or that can be mapped"
     found = "; ".join(search.others) or f"no {direction.name}"
     advice = "Map them in one PDO in your copy of the EDS, if the drive can be configured so."
     for index in (direction.mapping, direction.communication):
@@ -67,7 +69,7 @@ def _as_described(context: EdsContext, carrier: Carrier) -> Iterator[EdsFinding]
     cob_id = context.entry(layout.communication_index, 1)
     value = None if cob_id is None else cob_id.value(context.node_id)
     if cob_id is not None and value is not None and value & (COB_ID_EXTENDED | 0x7FF) != layout.cob_id:
-        if value & COB_ID_EXTENDED or any(value & 0x7FF in taken for taken in RESERVED_COB_IDS):
+        if value & COB_ID_EXTENDED or is_reserved(value & 0x7FF):
             return  # said with the other PDOs
         expected = f"$NODEID+0x{layout.cob_id - context.node_id:X}, for this is a constant"
         yield at_key(Severity.WARNING, cob_id.section, cob_id.value_key, expected, "", "A run gives it this value.")

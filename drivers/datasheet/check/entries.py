@@ -56,7 +56,7 @@ def _object(context: EdsContext, described: EdsObject, subs: int) -> Iterator[Ed
         yield from _group(context, described, subs)
     elif subs:
         expected = "ObjectType 0x8 (ARRAY) or 0x9 (RECORD), since it has sub-indices"
-        yield at_key(severity, section, "ObjectType", expected, "", "Correct it; the sub-indices are not read.")
+        yield at_key(Severity.WARNING, section, "ObjectType", expected, "", "Correct it; the sub-indices are not read.")
     elif read_number(section.get("SubNumber") or "0"):
         expected = "no sub-indices of an object that is no ARRAY or RECORD"
         yield at_key(Severity.WARNING, section, "SubNumber", expected, "", "Take it out, or correct ObjectType.")
@@ -74,7 +74,7 @@ def _group(context: EdsContext, described: EdsObject, subs: int) -> Iterator[Eds
         expected = f"{subs}, the sub-indices described"
         yield at_key(Severity.WARNING, section, "SubNumber", expected, found, "Correct it; all described are read.")
     if 0 not in described.entries:
-        yield at_section(severity, section, "a sub-index 0, the highest one", "none", "Describe it.")
+        yield at_section(Severity.WARNING, section, "a sub-index 0, the highest one", "none", "Describe it.")
     else:
         yield from _highest(described, described.entries[0], context.node_id)
 

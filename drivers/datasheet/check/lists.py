@@ -43,9 +43,8 @@ def check_lists(context: EdsContext) -> Iterator[EdsFinding]:
     for index in MANDATORY:
         if index not in context.objects:
             name = f"[{index:04X}]"
-            yield at_file(
-                context.severity(index), name, "this object, mandatory by CiA 301", "none", "Take the maker's file."
-            )
+            advice = "Take the maker's file."
+            yield at_file(Severity.WARNING, name, "this object, mandatory by CiA 301", "none", advice)
     yield from _not_listed(context, listed)
     yield from _orphans(context)
 

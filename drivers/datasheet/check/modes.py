@@ -33,7 +33,7 @@ def _sync_counter(context: EdsContext) -> Iterator[EdsFinding]:
     entry = context.entry(SYNC_COUNTER_OVERFLOW)
     if entry is None or not entry.value(context.node_id):
         return
-    fixed = not entry.writable
+    fixed = not entry.settable
     expected = "0: a SYNC without a counter, as the host sends it"
     advice = "The drive would take no SYNC." if fixed else "It is set to 0 when the drive is configured."
     yield at_key(Severity.ERROR if fixed else Severity.WARNING, entry.section, entry.value_key, expected, "", advice)

@@ -20,10 +20,9 @@ from drivers.inverter.drive_settings import (
 )
 
 DEVICE_TYPE = 0x1000
-ERROR_REGISTER = 0x1001
 DRIVE_PROFILE = 402
 
-ALWAYS_USED = frozenset({DEVICE_TYPE, ERROR_REGISTER, *(index for index, _ in GUARDING)})
+ALWAYS_USED = frozenset(index for index, _ in GUARDING)
 """What counts of every drive, beside what the plan uses."""
 
 
@@ -109,7 +108,7 @@ def _node_guarding(context: EdsContext) -> Iterator[EdsFinding]:
     entries = [entry for entry in (context.entry(index) for index, _ in GUARDING) if entry is not None]
     on = [entry for entry in entries if entry.value(context.node_id)]
     if len(on) == len(GUARDING):
-        severity = Severity.WARNING if all(entry.writable for entry in on) else Severity.ERROR
+        severity = Severity.WARNING if all(entry.settable for entry in on) else Severity.ERROR
         expected = "0: node guarding off, for the heartbeat takes its place"
         yield at_key(severity, on[0].section, on[0].value_key, expected, "", "A run writes 0 here and in 0x100D.")
 
@@ -133,7 +132,7 @@ def _emcy(context: EdsContext) -> Iterator[EdsFinding]:
     value = None if emcy is None else emcy.value(context.node_id)
     if emcy is not None and value is not None and value != EMCY_COB_ID + context.node_id:
         advice = "An emergency is not heard at another; faults are still seen in the statusword. Set it at the drive."
-        if not context.plan.has(Function.ERROR_CODE) and emcy.writable:
+        if not context.plan.has(Function.ERROR_CODE) and emcy.settable:
             advice = "A run gives it this value, for the cause of a fault is known by EMCY alone."
         expected = f"$NODEID+0x{EMCY_COB_ID:X}"
         yield at_key(Severity.WARNING, emcy.section, emcy.value_key, expected, "", advice)

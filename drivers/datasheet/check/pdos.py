@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from drivers.canopen.pdo_map import COB_ID_EXTENDED, COB_ID_INVALID, MAX_MAPPED, MAX_PDO_BYTES, MappedObject
-from drivers.capability.carrier import FILLERS, PDO_NUMBERS, RESERVED_COB_IDS, RPDO, TPDO, Direction
+from drivers.capability.carrier import FILLERS, MULTIPLEX, PDO_NUMBERS, RPDO, TPDO, Direction, is_reserved
 from drivers.datasheet.check.context import EdsContext, at_key, at_section, hexadecimal
 from drivers.datasheet.finding import EdsFinding, Severity
 from drivers.datasheet.number import read_number
 from drivers.datasheet.objects import EdsEntry, EdsObject
 
-MULTIPLEX = (0xFE, 0xFF)
-"""Numbers of mapped objects that stand for a multiplexed PDO (CiA 301, 7.5.2.36)."""
+_AS_MAPPED = "The maker's own mapping counts."
 
 _DIRECTIONS = ((RPDO, "NrOfRXPDO"), (TPDO, "NrOfTXPDO"))
 """Each direction, and the key of DeviceInfo that counts its PDOs."""
@@ -60,7 +59,7 @@ def _cob_id(context: EdsContext, communication: int) -> Iterator[EdsFinding]:
     if value & COB_ID_EXTENDED and (switched_on or used):
         expected = "an identifier of 11 bits (bit 29 clear)"
         yield at_key(severity, entry.section, entry.value_key, expected, "", "Give the PDO one.")
-    elif switched_on and any(value & 0x7FF in taken for taken in RESERVED_COB_IDS):
+    elif switched_on and is_reserved(value & 0x7FF):
         expected = "an identifier a PDO may have, such as 0x181 to 0x57F (CiA 301)"
         found = f"0x{value & 0x7FF:03X} for node {context.node_id} from"
         yield at_key(severity, entry.section, entry.value_key, expected, found, "Give the PDO another.")
@@ -112,10 +111,10 @@ def _mapped(
         yield at_key(severity, entry.section, entry.value_key, expected, found, advice)
     if not target.mappable:
         expected = f"an object with PDOMapping=1; {name} ({line}) has not"
-        yield at_key(severity, entry.section, entry.value_key, expected, "", advice)
+        yield at_key(Severity.WARNING, entry.section, entry.value_key, expected, "", f"{advice} {_AS_MAPPED}")
     if target.access is not None and target.access not in direction.access:
         expected = f"an object a {direction.name} may carry; {name} ({line}) has AccessType {target.access}"
-        yield at_key(severity, entry.section, entry.value_key, expected, "", advice)
+        yield at_key(Severity.WARNING, entry.section, entry.value_key, expected, "", f"{advice} {_AS_MAPPED}")
 
 
 def _dummy(
@@ -131,6 +130,7 @@ def _dummy(
 
 def _same_cob_ids(context: EdsContext) -> Iterator[EdsFinding]:
     seen: dict[int, EdsEntry] = {}
+    given = {carrier.layout.communication_index: carrier.layout.cob_id for carrier in context.plan.carriers}
     for direction, _ in _DIRECTIONS:
         for n in PDO_NUMBERS:
             entry = context.entry(direction.communication + n, 1)
@@ -139,7 +139,8 @@ def _same_cob_ids(context: EdsContext) -> Iterator[EdsFinding]:
                 continue
             first = seen.setdefault(value & 0x7FF, entry)
             if first is not entry:
-                severity = context.severity(entry.index)
+                both = {given.get(each.index) for each in (first, entry)}  # in a run; a third PDO is switched off
+                severity = Severity.ERROR if len(both) == 1 and None not in both else Severity.WARNING
                 expected = f"another identifier than {hexadecimal(first.index)} (line {first.section.line})"
                 yield at_key(
                     severity, entry.section, entry.value_key, expected, "", "Switch one off, or give it another."

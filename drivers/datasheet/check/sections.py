@@ -9,6 +9,7 @@ from drivers.datasheet.check.context import EdsContext, at_file, at_key, at_sect
 from drivers.datasheet.finding import EdsFinding, Severity
 from drivers.datasheet.number import read_number
 from drivers.datasheet.objects import OBJECT_SECTION, SUB_SECTION
+from drivers.datasheet.sheet import BIT_RATES_KBIT_S, NODE_IDS
 from drivers.datasheet.text import EdsSection
 
 BAUD_RATES = (10, 20, 50, 125, 250, 500, 800, 1000)
@@ -69,6 +70,7 @@ def check_sections(context: EdsContext) -> Iterator[EdsFinding]:
     yield from _device_info(context.text.section("DeviceInfo"))
     yield from _identity(context)
     yield from _comments(context.text.section("Comments"))
+    yield from _commissioning(context.text.commissioning)
 
 
 def _known(section: EdsSection) -> Iterator[EdsFinding]:
@@ -131,6 +133,15 @@ def _device_info(section: EdsSection | None) -> Iterator[EdsFinding]:
         advice = "If the drive's mapping is fixed, configuring it will be refused; ask its maker."
         expected = "8, so that objects can be mapped byte by byte"
         yield at_key(Severity.WARNING, section, "Granularity", expected, "no mapping,", advice)
+
+
+def _commissioning(section: EdsSection | None) -> Iterator[EdsFinding]:
+    """Check what a DCF says of its node; what can't be read says nothing."""
+    for key, allowed, unit in (("NodeID", NODE_IDS, ""), ("Baudrate", BIT_RATES_KBIT_S, " kbit/s")):
+        written = None if section is None else section.get(key)
+        if section is not None and written and read_number(written) not in allowed:
+            expected = f"a number from {allowed[0]} to {allowed[-1]}{unit} (CiA 306)"
+            yield at_key(Severity.WARNING, section, key, expected, "", "It is left out; correct it.")
 
 
 def _number(section: EdsSection, key: str, most: int) -> Iterator[EdsFinding]:

@@ -88,6 +88,4 @@ def _within_limits(context: EdsContext, entry: EdsEntry) -> Iterator[EdsFinding]
     below, above = low is not None and default < low, high is not None and default > high
     if below or above:
         expected = f"at least LowLimit ({low})" if below else f"at most HighLimit ({high})"
-        yield at_key(
-            context.severity(entry.index), entry.section, entry.value_key, expected, "", "Correct one of the two."
-        )
+        yield at_key(Severity.WARNING, entry.section, entry.value_key, expected, "", "Correct one of the two.")

@@ -10,10 +10,22 @@ import math
 
 import numpy as np
 
-from estimator.signals.record import BoolArray, FloatArray
+from estimator.signals.part import sliced
+from estimator.signals.record import BoolArray, FloatArray, Record
 
 RASTER_S = 0.01
 """Longest block [s]: its means see up to 50 Hz, the upper end of the paper's band for driveline resonances."""
+
+
+MOST = 60_000
+"""Blocks that off-line models are fitted to, ten minutes at 10 ms: they know a resonance to a few parts in 100,000, and
+a longer recording is of a driveline that warms meanwhile. Each costs 6 kilobytes."""
+
+
+def first_part(record: Record) -> Record:
+    """Return the part of a recording that off-line models are fitted to: the first MOST blocks."""
+    most = MOST * block_of(record.sample_time_s)
+    return record if record.time_s.shape[0] <= most else sliced(record, slice(0, most))
 
 
 def block_of(sample_time_s: float) -> int:

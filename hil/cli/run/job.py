@@ -21,7 +21,7 @@ from hil.rig.build import open_devices
 from hil.rig.drive import RunSummary
 from hil.rig.experiments.base import Phase
 from hil.rig.live_course import course_path
-from hil.rig.pacing import Pacer
+from hil.rig.pacing import Pacer, disk_patience_s
 from hil.rig.plan import plan_run
 from hil.rig.realtime import RealTimeGrants
 from hil.rig.session import run_plan
@@ -58,7 +58,9 @@ def record(job: Job, grants: RealTimeGrants) -> RunSummary:
     """
     plan = plan_run(job.rig, job.experiment)
     stop, timing = StopRequest(), RunTiming(job.pacer.period_ns)
-    recorder = RecordingWriter(job.out, {**job.metadata, "real_time": json.dumps(grants.as_json())})
+    recorder = RecordingWriter(
+        job.out, {**job.metadata, "real_time": json.dumps(grants.as_json())}, disk_patience_s(job.pacer)
+    )
     observers = () if job.live is None else (job.live,)
     ended_by = COMPLETE
     try:

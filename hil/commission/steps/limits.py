@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from drivers.errors import CommandRefused
-from drivers.torque_guard import NS_PER_S, GuardLimits, TorqueGuard, TorqueRequest
+from drivers.guard_limits import NS_PER_S
+from drivers.torque_guard import Evidence, GuardLimits, TorqueGuard, TorqueRequest
 from hil.commission.finding import Finding
 from hil.commission.order import Order
 from hil.commission.predict import rigid_model
@@ -23,8 +24,8 @@ from hil.rig.plan import plan_run
 BEYOND = 1.001
 """A probe is so many times its limit: by less than any drive resolves."""
 
-RAMP_S = 0.01
-"""A probe of magnitudes is reached by steps of a period that the rate limit allows."""
+FRESH = Evidence(0, 0, 0.0)
+"""Feedback and permission of this moment, at rest."""
 
 DEFECT = "Connect nothing; this is a defect of the program: report it"
 
@@ -37,8 +38,8 @@ class Probe:
     limit: str
     at: TorqueRequest
     beyond: TorqueRequest
-    age_at_ns: int = 0
-    age_beyond_ns: int = 0
+    evidence_at: Evidence = FRESH
+    evidence_beyond: Evidence = FRESH
 
 
 def _about(job: Job) -> str:
@@ -69,9 +70,22 @@ def _probes(limits: GuardLimits) -> Iterator[Probe]:
         if limits.prbs_limit_nm <= min(limit_nm, limits.sum_limit_nm):
             at, beyond = (_prbs(name, factor * limits.prbs_limit_nm) for factor in (1.0, BEYOND))
             yield Probe(f"PRBS of {name}", f"{limits.prbs_limit_nm:g} Nm", at, beyond)
-    old_ns = round(limits.feedback_timeout_s * NS_PER_S)
-    late = round(BEYOND * old_ns)
-    yield Probe("age of the feedback", f"{limits.feedback_timeout_s:g} s", NO_TORQUE, NO_TORQUE, old_ns, late)
+    yield from _evidence_probes(limits)
+
+
+def _evidence_probes(limits: GuardLimits) -> Iterator[Probe]:
+    ages = (
+        ("age of the feedback", "feedback_age_ns", limits.feedback_timeout_s),
+        ("age of the PLC's permission", "permissive_age_ns", limits.permissive_timeout_s),
+    )
+    for what, name, limit_s in ages:
+        old_ns = round(limit_s * NS_PER_S)
+        at, beyond = replace(FRESH, **{name: old_ns}), replace(FRESH, **{name: round(BEYOND * old_ns)})
+        yield Probe(what, f"{limit_s:g} s", NO_TORQUE, NO_TORQUE, at, beyond)
+    limit_rad_s = limits.speed_limit_rad_s
+    if math.isfinite(limit_rad_s):
+        at, beyond = (replace(FRESH, speed_rad_s=factor * limit_rad_s) for factor in (1.0, BEYOND))
+        yield Probe("speed", f"{limit_rad_s:g} rad/s", NO_TORQUE, NO_TORQUE, at, beyond)
 
 
 def _base(name: str, torque_nm: float) -> TorqueRequest:
@@ -83,25 +97,25 @@ def _prbs(name: str, torque_nm: float) -> TorqueRequest:
 
 
 def _probed(limits: GuardLimits, probe: Probe) -> Finding:
-    passes = _passes(limits, probe.at, probe.age_at_ns)
-    refuses = not _passes(limits, probe.beyond, probe.age_beyond_ns)
+    passes = _passes(limits, probe.at, probe.evidence_at)
+    refuses = not _passes(limits, probe.beyond, probe.evidence_beyond)
     measured = f"{'passes' if passes else 'refused'} at it, {'refused' if refuses else 'passes'} 0.1 % beyond"
     expected = f"passes at {probe.limit}, refused beyond"
     return Finding(f"guard: {probe.what}", expected, measured, passes and refuses, DEFECT, True)
 
 
-def _passes(limits: GuardLimits, request: TorqueRequest, age_ns: int) -> bool:
+def _passes(limits: GuardLimits, request: TorqueRequest, evidence: Evidence) -> bool:
     """Ask a fresh guard, led up to the request as slowly as its rate limit wants."""
     guard = TorqueGuard(limits)
     guard.enable()
     largest = max(abs(request.base_m1_nm), abs(request.base_m2_nm))
-    steps = max(1, math.ceil(largest / (limits.rate_limit_nm_per_s * min(RAMP_S, limits.feedback_timeout_s))))
-    period_ns = round(min(RAMP_S, limits.feedback_timeout_s) * NS_PER_S)
+    steps = max(1, math.ceil(largest / (limits.rate_limit_nm_per_s * limits.period_s)))
+    period_ns = round(limits.period_s * NS_PER_S)
     try:
         for i in range(steps + 1):
             share = i / steps
             part = TorqueRequest(share * request.base_m1_nm, 0.0, share * request.base_m2_nm, 0.0)
-            guard.check(part if i < steps else request, i * period_ns, age_ns)
+            guard.check(part if i < steps else request, i * period_ns, evidence)
     except CommandRefused:
         return False
     return True
@@ -109,15 +123,14 @@ def _passes(limits: GuardLimits, request: TorqueRequest, age_ns: int) -> bool:
 
 def _rate(limits: GuardLimits) -> Finding:
     """See that a base torque one period after zero passes as far as the rate limit allows, and no further."""
-    period_s = min(RAMP_S, limits.feedback_timeout_s)
-    allowed_nm = limits.rate_limit_nm_per_s * period_s
+    allowed_nm = limits.rate_limit_nm_per_s * limits.period_s
 
     def jumps(torque_nm: float) -> bool:
         guard = TorqueGuard(limits)
         guard.enable()
-        guard.check(NO_TORQUE, 0, 0)
+        guard.check(NO_TORQUE, 0, FRESH)
         try:
-            guard.check(_base("m1", torque_nm), round(period_s * NS_PER_S), 0)
+            guard.check(_base("m1", torque_nm), round(limits.period_s * NS_PER_S), FRESH)
         except CommandRefused:
             return False
         return True
@@ -131,7 +144,7 @@ def _rate(limits: GuardLimits) -> Finding:
 def _silent(limits: GuardLimits) -> Finding:
     guard = TorqueGuard(limits)
     try:
-        guard.check(_base("m1", 1.0), 0, 0)
+        guard.check(_base("m1", 1.0), 0, FRESH)
     except CommandRefused:
         measured, within = "refused", True
     else:

@@ -103,7 +103,7 @@ def _simulated(plan: DrivePlan) -> dict[str, str]:
     """Keep a simulated rig within the max torque the drives are simulated with, and its cruise within that torque."""
     usual_nm, rated_nm = (float(BY_NAME[name].simulated) for name in ("torque_limit_nm", "rated_torque_nm"))
     values = [plan.sheet.value(part.index) for part in plan.abilities[Function.MAXIMUM_TORQUE].parts]
-    known = [abs(value) for value in values if value is not None]
+    known = [abs(value) for value in values if value]  # 0 is a place left free
     limit_nm = min(usual_nm, *(value * rated_nm / 1000.0 for value in known)) if known else usual_nm
     speed = float(BY_NAME["speed_rad_s"].simulated) * limit_nm / usual_nm
     return {"product_code": "0", "torque_limit_nm": f"{limit_nm:g}", "speed_rad_s": f"{speed:g}"}

@@ -30,8 +30,8 @@ from hil.rig.pacing import FreePacer, period_ns
 from hil.rig.plan import Plan, plan_run
 from hil.rig.session import run_plan
 from hil.rig.stop import StopRequest
-from hil.simulator.loopback import Address
-from hil.simulator.rig_server import IN_PROCESS, RigServer, required_simulation
+from hil.simulator.loopback import IN_PROCESS, Address
+from hil.simulator.rig_server import RigServer, required_simulation
 from hil.simulator.simulation_model import simulation_model
 
 RIG_FILE = Path(__file__).with_name("paper_rig.toml")

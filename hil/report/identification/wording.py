@@ -9,11 +9,12 @@ import numpy as np
 
 from estimator.identification.best import SEEN, Verdict
 from estimator.identification.modes.propagate import Uncertain
+from estimator.identification.offline.validation import Validation
 from estimator.identification.online.recursive import Status
 from estimator.identification.study import Study
 from hil.figures.local_model import LocalModel
 from hil.report.numbers import shown
-from hil.report.wording import listed
+from hil.report.sentence import listed
 
 FAR_APART = 0.03
 """On-line and off-line frequency further apart than this share are worth a warning: docs/identification.md."""
@@ -50,7 +51,7 @@ def verdict(each: Study) -> str:
         f, period_s = best.mode.frequency_hz.value, best.fit.model.sample_time_s
         text += (
             f" {1.0 / (f * period_s):.1f} samples in a period of {f:.3g} Hz are too few for its damping: record every "
-            f"{1e3 / (10.0 * f):.2g} ms."
+            f"{1e3 / (10.0 * f):.2g} ms. A mode above {0.5 / period_s:.3g} Hz would look the same, folded down to it."
         )
     elif best.band_hz[1] < LEAST_BAND_HZ:
         text += (
@@ -136,12 +137,23 @@ def warnings(studies: Sequence[Study]) -> list[str]:
                 "from elsewhere than from the torque, and a resonance of such a model is none to believe. Raise the "
                 "PRBS or record longer."
             )
-    if missed := [each.name for each in studies if not each.validation.independence.is_independent]:
+    for each in studies:
+        used_s, whole_s = (x.time_s.shape[0] * x.sample_time_s for x in (each.found.offline, each.found.data))
+        if used_s < 0.99 * whole_s:
+            told.append(
+                f"{each.name}: off line the first {used_s / 60.0:.0f} of {whole_s / 60.0:.0f} min are used. Cut the "
+                "recording for another part."
+            )
+    missed = [each.name for each in studies if not _passed(each.validation) and not _passed(each.best.validation)]
+    if missed:
         told.append(
-            f"In {listed(missed)} the output-error model's residual still depends on the input: it misses a part of "
-            "the response. The best estimate has tests of its own."
+            f"In {listed(missed)} the residual still depends on the input: the models miss a part of the response."
         )
     return told
+
+
+def _passed(validation: Validation) -> bool:
+    return validation.independence.is_independent
 
 
 def _apart(each: Study) -> float:

@@ -1,12 +1,13 @@
 """How right the identified models are, over many buses, beside other tools.
 
-``python -m tests.benchmarks.identification [buses] [clean] [healthy] [accuracy] [coverage] [truth] [--buses N] ...``
+``python -m tests.benchmarks.identification [buses] [clean] [healthy] [accuracy] [coverage] [truth] [paper]
+[--buses N] ...``
 
 ``buses``     buses of the benchmarks' own on rough roads, with a driver: every method of ours and of the peers on the
               same data; errors, and how often printed intervals held the truth (by default)
 ``clean``     the same without road and driver
 ``healthy``   ten clean recordings, and the same ten on the road: how many pass the residual test of their own model
-``accuracy``, ``coverage``, ``truth``   the drivelines of the tests and of the proof (``rigs.py``)
+``accuracy``, ``coverage``, ``truth``, ``paper``   the drivelines of the tests and of the proof (``rigs.py``)
 """
 
 from __future__ import annotations
@@ -49,6 +50,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "accuracy": lambda _: rigs.accuracy(),
         "coverage": lambda options: rigs.coverage_table(options.buses, rigs.cruises),
         "truth": lambda options: rigs.truth_part(options.buses),
+        "paper": lambda options: rigs.coverage_table(options.buses, rigs.paper_rig),
     }
     parser = argparse.ArgumentParser(
         prog="python -m tests.benchmarks.identification", description="How right the identified models are."

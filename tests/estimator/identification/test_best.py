@@ -78,10 +78,10 @@ def test_buses_on_which_other_minima_are_near(seed: int) -> None:
 
 
 def test_healthy_recordings_pass_their_own_residual_tests() -> None:
-    """A test at 95 % fails on one in twenty; of four, three or more with a probability of 0.05 %."""
-    found = [best_estimate(drive(draw_bus(seed), world=CLEAN)) for seed in range(5000, 5004)]
-    assert sum(best.validation.independence.is_independent for best in found) >= 3
-    assert sum(best.verdict is Verdict.GOOD for best in found) >= 2
+    """A test at 95 % fails on one in twenty: on three or more of ten with a probability of 1.2 %."""
+    found = [best_estimate(drive(draw_bus(seed), world=CLEAN)) for seed in range(5000, 5010)]
+    assert sum(best.validation.independence.is_independent for best in found) >= 8
+    assert sum(best.verdict is Verdict.GOOD for best in found) >= 6  # tests of linearity and feedback fail, too
     assert all(best.linearity.is_linear for best in found)
 
 

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from estimator.identification.triangular import singular_values, solve_least_squares, triangular
+from estimator.identification.triangular import ROWS, singular_values, solve_least_squares, triangular
 
 
 @pytest.mark.parametrize("shape", [(200, 7), (7, 7), (3, 7), (50, 1), (1, 1)])
@@ -36,3 +36,12 @@ def test_the_matrix_is_not_changed() -> None:
     before = A.copy()
     triangular(A)
     assert np.array_equal(A, before)
+
+
+def test_a_matrix_longer_than_what_is_reduced_at_a_time_and_its_rows_that_count() -> None:
+    A, b = (np.random.default_rng(4).normal(size=shape) for shape in ((2 * ROWS + 9, 3), 2 * ROWS + 9))
+    rows = np.arange(b.size) % 7 != 0
+    R = triangular(A, b, rows=rows)
+    both = np.column_stack([A, b])[rows]
+    np.testing.assert_allclose(R.T @ R, both.T @ both, rtol=1e-9, atol=1e-7)
+    np.testing.assert_allclose(solve_least_squares(A, b), np.linalg.lstsq(A, b, rcond=None)[0], rtol=1e-9)

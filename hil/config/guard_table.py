@@ -1,0 +1,65 @@
+"""The table ``[guard]`` of a rig file: what may be asked of the drives, and how far what comes back may be from it."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Final
+
+from pydantic import Field
+
+from drivers.inverter.cia402 import TorqueMode
+from drivers.torque_guard import ErrorLimits
+from hil.config.inverter_table import InvertersTable, InverterTable
+from hil.config.table import Positive, Table
+
+ERROR_SHARE: Final = 0.05
+"""Of the rated torque: how far a torque reading may be from its command where the rig file says nothing. A torque
+reading comes from the currents the drive controls, so that it follows the command within the resolution of both, here
+0.1 % each; the accuracy of the torque on the shaft, some 5 % of rated for traction drives, is not seen in it."""
+
+LEAST_RESPONSE_S: Final = 0.01
+"""Time in which a current loop follows [s]: some milliseconds."""
+
+
+class GuardTable(Table):
+    """Limits of the torque guard beside the torque limit of each inverter; see `drivers.torque_guard`.
+
+    ``torque_error_nm`` is that of one inverter, by default 5 % of its rated torque; ``torque_error_sum_nm`` that of
+    both together, by default the root of the sum of both squares. ``torque_response_s`` is the time in which a drive
+    follows its command: by default one period, 10 ms at least, and what its torque slope needs for a step of the PRBS.
+    """
+
+    rate_limit_nm_per_s: Positive
+    prbs_limit_nm: Positive
+    sum_limit_nm: Positive
+    feedback_timeout_s: Positive
+    permissive_timeout_s: Positive = 1.0
+    speed_limit_rad_s: Positive | None = None
+    torque_error_nm: Positive | None = None
+    torque_error_sum_nm: Positive | None = None
+    torque_error_time_s: Annotated[float, Field(gt=0, le=1)] = 0.12
+    torque_response_s: Annotated[float, Field(gt=0, le=10)] | None = None
+
+    def error_limits(self, inverters: InvertersTable, period_s: float) -> ErrorLimits:
+        """Give the limits of what comes back, with the defaults of these inverters."""
+        m1_nm, m2_nm = (
+            ERROR_SHARE * table.rated_torque_nm if self.torque_error_nm is None else self.torque_error_nm
+            for table in (inverters.m1, inverters.m2)
+        )
+        both_nm = math.hypot(m1_nm, m2_nm) if self.torque_error_sum_nm is None else self.torque_error_sum_nm
+        slowest_s = max(self._ramp_s(inverters.m1), self._ramp_s(inverters.m2))
+        response_s = max(LEAST_RESPONSE_S, period_s) + slowest_s
+        return ErrorLimits(
+            m1_nm=m1_nm,
+            m2_nm=m2_nm,
+            sum_nm=both_nm,
+            time_s=self.torque_error_time_s,
+            response_s=response_s if self.torque_response_s is None else self.torque_response_s,
+        )
+
+    def _ramp_s(self, inverter: InverterTable) -> float:
+        """Time a step of the PRBS takes on the drive's own slope [s]."""
+        slope = inverter.torque_slope_nm_per_s
+        if inverter.mode is not TorqueMode.PROFILE_TORQUE or slope is None:
+            return 0.0
+        return 2.0 * self.prbs_limit_nm / slope

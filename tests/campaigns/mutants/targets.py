@@ -1,0 +1,58 @@
+"""What is mutated, by which tests a mutant has to be found, and the mutants that no test can find.
+
+A mutant that lives is listed with the reason why it does no harm; another one is a fault of the tests.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class Target:
+    """One module, its tests, and its mutants that may live, by change, with the reason."""
+
+    tests: tuple[str, ...]
+    equivalent: dict[str, str] = field(default_factory=dict)
+
+
+_SLACK = "differs where a torque is beyond its limit by the slack for rounding to the last bit"
+
+TARGETS: dict[str, Target] = {
+    "drivers.torque_guard": Target(
+        ("tests/drivers/test_torque_guard.py", "tests/drivers/test_torque_error.py"),
+        {
+            "abs(value_nm) <= limit_nm + ROUNDING_NM -> abs(value_nm) < limit_nm + ROUNDING_NM": _SLACK,
+            "abs(base_nm - before_nm) <= allowed_nm + ROUNDING_NM -> abs(base_nm - before_nm) < allowed_nm + "
+            "ROUNDING_NM": _SLACK,
+        },
+    ),
+    "drivers.guard_limits": Target(("tests/drivers/test_torque_guard.py", "tests/drivers/test_torque_error.py")),
+    "drivers.torque_error": Target(
+        ("tests/drivers/test_torque_error.py",), {"3 -> 4": "a fourth pair of counters, which nobody asks"}
+    ),
+    "drivers.message_rate": Target(("tests/drivers/test_message_rate.py",)),
+    "drivers.scaling": Target(("tests/drivers/test_scaling.py",)),
+    "drivers.inverter.cia402": Target(
+        ("tests/drivers/test_cia402.py",), {"0 -> 1 #3": "a previous controlword of which bit 7 alone counts"}
+    ),
+    "drivers.inverter.drive_settings": Target(
+        (
+            "tests/drivers/test_drive_settings.py",
+            "tests/drivers/test_eds_other_drive.py",
+            "tests/drivers/test_makers.py",
+        )
+    ),
+    "drivers.canopen.heartbeat": Target(
+        ("tests/drivers/test_heartbeat.py",),
+        {
+            "1000000.0 -> 1000001.0": "a millionth of a time in a message",
+            "1000000.0 -> 1000001.0 #2": "a millionth of a time in a message",
+            "True -> False": "whether a thread that hangs keeps the program from ending; it ends by its event",
+        },
+    ),
+    "drivers.canopen.silence": Target(("tests/drivers/test_silence.py",)),
+    "drivers.canopen.strangers": Target(("tests/drivers/test_strangers.py",)),
+    "hil.rig.catch_up": Target(("tests/rig/test_slept_through.py",)),
+    "hil.config.guard_table": Target(("tests/config/test_rig_file.py", "tests/config/test_guard_table.py")),
+}

@@ -1,0 +1,61 @@
+"""The campaign of faults in short: each fault once, at a moment and in an experiment drawn with a fixed seed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from hil.config.rig_file import Rig
+from tests.campaigns.faults.__main__ import draw, lengths, report
+from tests.campaigns.faults.kinds import KINDS, UNTOUCHED
+from tests.campaigns.faults.one_run import Outcome, run_with
+from tests.campaigns.faults.processes import KINDS as PROCESS_KINDS
+from tests.campaigns.faults.processes import run_one
+from tests.campaigns.faults.rig import campaign_rig
+
+SEED = 7
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("faults")
+
+
+@pytest.fixture(scope="module")
+def rig(folder: Path) -> Rig:
+    return campaign_rig(folder)
+
+
+@pytest.fixture(scope="module")
+def steps(rig: Rig, folder: Path) -> dict[str, int]:
+    return lengths(rig, folder)
+
+
+@pytest.mark.parametrize("number", range(len(KINDS)), ids=list(KINDS))
+def test_a_fault_at_a_random_moment(number: int, rig: Rig, steps: dict[str, int], folder: Path) -> None:
+    kind, experiment, at_s = draw(number, SEED, steps, rig.period_s)
+    outcome = run_with(rig, experiment, KINDS[kind], at_s, folder, steps[experiment])
+    assert outcome.problems == [], f"{kind} at {at_s} s of {experiment}"
+
+
+def test_the_campaign_notices_a_wrong_end(rig: Rig, steps: dict[str, int], folder: Path) -> None:
+    """A fault that is taken for nothing, for another cause, and not seen at all."""
+    fault, other = KINDS["drive in fault"], KINDS["clutch closes"]
+    assert "said" in run_with(rig, "tip", UNTOUCHED.__class__(fault.spec, other.cause), 0.5, folder).problems[0]
+    missed = run_with(rig, "rest", UNTOUCHED.__class__("", fault.cause), 0.1, folder, steps["rest"])
+    assert missed.problems == [f"went to its end with the fault at SYNC 10 of {steps['rest']}"]
+
+
+def test_the_table_says_how_many_were_wrong(capsys: pytest.CaptureFixture[str]) -> None:
+    outcomes = {"drive hangs": [Outcome("said", 0.11), Outcome("said", 0.21, problems=["torque"]), Outcome()]}
+    assert report(outcomes) == 1
+    assert "| drive hangs | 3 | 2 | 0.21 | 1 |" in capsys.readouterr().out
+    assert report({"drive hangs": [Outcome()]}) == 0
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("kind", PROCESS_KINDS)
+def test_a_fault_of_a_real_process(kind: str, tmp_path: Path) -> None:
+    campaign_rig(tmp_path, by_the_clock=True)
+    assert run_one(PROCESS_KINDS[kind], tmp_path / "rig.toml", "cruise", 0.5, real_time=True).problems == []

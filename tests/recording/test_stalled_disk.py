@@ -1,0 +1,105 @@
+"""A disk that stalls: whoever appends does not wait, nothing is lost, and what waits is bounded."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+from typing import TextIO
+
+import pytest
+
+from hil.errors import RecordingError
+from hil.recording import RecordingWriter, read_table, writer
+from hil.recording.writing_thread import WritingThread
+from tests.recording.test_writer import sample
+
+
+class Disk:
+    """A disk that stalls until it goes on."""
+
+    def __init__(self) -> None:
+        self.goes_on = threading.Event()
+        self.began = threading.Event()
+        self.closed = threading.Event()
+
+
+class StalledFile:
+    """A file on it."""
+
+    def __init__(self, file: TextIO, disk: Disk) -> None:
+        self._file = file
+        self._disk = disk
+
+    def write(self, line: str) -> int:
+        self._disk.began.set()
+        assert self._disk.goes_on.wait(60.0)
+        return self._file.write(line)
+
+    def close(self) -> None:
+        self._file.close()
+        self._disk.closed.set()
+
+
+@pytest.fixture
+def disk(monkeypatch: pytest.MonkeyPatch) -> Disk:
+    stalled = Disk()
+    monkeypatch.setattr(
+        writer, "WritingThread", lambda file, capacity: WritingThread(StalledFile(file, stalled), capacity)
+    )
+    return stalled
+
+
+def test_who_appends_does_not_wait_and_nothing_is_lost(tmp_path: Path, disk: Disk) -> None:
+    with RecordingWriter(tmp_path / "run.csv", patience_s=0.0) as recorder:
+        for k in range(500):
+            recorder.append(sample(k))  # the disk takes none of them: waiting for it would never end
+        assert disk.began.wait(60.0)
+        assert recorder.n_samples == 0
+        disk.goes_on.set()
+    assert recorder.n_samples == 500
+    assert read_table(tmp_path / "run.csv").n_rows == 500
+
+
+def test_when_too_many_wait_the_run_ends_and_keeps_them(
+    tmp_path: Path, disk: Disk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(writer, "CAPACITY", 20)
+    appended = 0
+
+    def run() -> None:
+        nonlocal appended
+        with RecordingWriter(tmp_path / "run.csv", patience_s=0.0) as recorder:
+            try:
+                for k in range(100):
+                    recorder.append(sample(k))
+                    appended += 1
+                    assert disk.began.wait(60.0)
+            finally:
+                disk.goes_on.set()
+
+    with pytest.raises(RecordingError, match="one for which 20 wait"):
+        run()
+    assert appended == 21  # one is being written, twenty wait
+    assert read_table(tmp_path / "run.csv").n_rows == appended
+
+
+def test_a_run_without_a_clock_waits_for_room(tmp_path: Path, disk: Disk, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(writer, "CAPACITY", 1)
+    with RecordingWriter(tmp_path / "run.csv", patience_s=60.0) as recorder:
+        recorder.append(sample(0))
+        assert disk.began.wait(60.0)
+        recorder.append(sample(1))
+        threading.Timer(0.01, disk.goes_on.set).start()
+        recorder.append(sample(2))
+    assert read_table(tmp_path / "run.csv").n_rows == 3
+
+
+def test_a_disk_that_hangs_for_good_does_not_hang_the_program(
+    tmp_path: Path, disk: Disk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(writer, "DRAIN_S", 0.01)
+    with pytest.raises(RecordingError, match=r"the last \d+ samples within 0.01 s, came one that does not"):
+        with RecordingWriter(tmp_path / "run.csv") as recorder:
+            recorder.append(sample(0))
+    disk.goes_on.set()
+    assert disk.closed.wait(60.0)

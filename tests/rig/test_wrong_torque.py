@@ -1,0 +1,71 @@
+"""Drives that give another torque than they are asked for, from the moment on or from the start: told, and ended."""
+
+from __future__ import annotations
+
+import pytest
+
+from drivers.errors import CommandRefused, WrongTorque
+from hil.rig.sample import SampleFlag
+from hil.simulator.fault_spec import rig_faults
+from tests.rig.observer import assert_disarmed
+from tests.rig.serving import Samples, changed, run_once, served, small_rig
+
+FROM_S = 4.3
+"""In the middle of the measured part."""
+
+NOTICED_S = 0.3
+
+TOGETHER = "both inverters: torque actual value"
+
+
+@pytest.mark.parametrize(
+    ("faults", "named"),
+    [
+        (["m1.torque_gain@{}=2"], "inverter m1: torque actual value"),
+        (["m2.torque_gain@{}=0"], "inverter m2: torque actual value"),
+        (["m1.torque_gain@{}=-1"], "m1"),
+        (["m2.torque_offset@{}=100"], "inverter m2: torque actual value"),
+        (["m1.torque_offset@{}=45", "m2.torque_offset@{}=45"], TOGETHER),
+    ],
+)
+def test_a_wrong_torque_ends_the_run_in_time(faults: list[str], named: str) -> None:
+    rig = small_rig()
+    specs = [each.format(FROM_S) for each in faults]
+    seen: list[float] = []
+    with served(rig, rig_faults(specs, rig.period_s)) as (server, at):
+        with pytest.raises(WrongTorque, match=named):
+            run_once(at, Samples(), progress=lambda phase, time_s: seen.append(server.plc.values()["plc_count"]))
+        assert_disarmed(server.bus_url, 1, 2)
+        assert server.torque_nm == (0.0, 0.0)
+        assert float(server.plc.values()["plc_count"]) * rig.period_s <= FROM_S + NOTICED_S
+
+
+def test_a_torque_nobody_asked_for_ends_it_before_the_guard_is_enabled() -> None:
+    rig = small_rig()
+    samples = Samples()
+    with served(rig, rig_faults(["m1.torque_offset@0=800"], rig.period_s)) as (server, at):
+        with pytest.raises(WrongTorque, match=r"inverter m1: .* is 47\d\.\d Nm, expected"):
+            run_once(at, samples)
+        assert_disarmed(server.bus_url, 1, 2)
+    assert samples.rows == []
+
+
+@pytest.mark.parametrize(
+    "fault", ["m1.weak_cooling=5", "m2.stale_share=0.3", "m1.coarse_torque=10", "m2.clock_drift=200"]
+)
+def test_what_a_healthy_drive_does_is_recorded(fault: str) -> None:
+    """A drive that says it is limited, is slow, coarse, or samples by a clock of its own."""
+    rig = small_rig()
+    samples = Samples()
+    with served(rig, rig_faults([fault], rig.period_s)) as (_, at):
+        assert run_once(at, samples).recorded > 0
+    if "weak" in fault:
+        assert any(row.flags & SampleFlag.M1_LIMITED for row in samples.rows)
+
+
+def test_the_rig_file_limits_the_speed() -> None:
+    rig = changed(small_rig(), {"guard": {"speed_limit_rad_s": 0.2}})
+    with served(rig) as (server, at):
+        with pytest.raises(CommandRefused, match=r"speed is .* at most 0\.2 rad/s either way \(speed_limit_rad_s\)"):
+            run_once(at, Samples())
+        assert_disarmed(server.bus_url, 1, 2)
