@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import shlex
 import sys
 import time
@@ -161,9 +162,9 @@ def calibrated(worlds: Sequence[World]) -> Thresholds:
 
 def _most_probable(surprise: Callable[[float], float]) -> float:
     def posterior(log: float) -> float:
-        return surprise(float(np.exp(log))) + 0.5 * ((log - np.log(USUAL_DIVISOR)) / DIVISOR_SPREAD) ** 2
+        return surprise(math.exp(log)) + 0.5 * ((log - math.log(USUAL_DIVISOR)) / DIVISOR_SPREAD) ** 2
 
-    return float(np.exp(minimize_scalar(posterior, bounds=(0.0, np.log(MOST_DIVISOR))).x))
+    return math.exp(minimize_scalar(posterior, bounds=(0.0, math.log(MOST_DIVISOR))).x)
 
 
 def _surprise(worlds: Sequence[World], thresholds: Thresholds) -> float:
