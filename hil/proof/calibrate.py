@@ -164,7 +164,7 @@ def _most_probable(surprise: Callable[[float], float]) -> float:
     def posterior(log: float) -> float:
         return surprise(math.exp(log)) + 0.5 * ((log - math.log(USUAL_DIVISOR)) / DIVISOR_SPREAD) ** 2
 
-    return float(np.exp(minimize_scalar(posterior, bounds=(0.0, np.log(MOST_DIVISOR))).x))
+    return math.exp(minimize_scalar(posterior, bounds=(0.0, math.log(MOST_DIVISOR))).x)
 
 
 def _surprise(worlds: Sequence[World], thresholds: Thresholds) -> float:

@@ -185,14 +185,13 @@ def _whitener(plain: FitResult, sizes: FloatArray) -> Whitener:
 
 def _with_moments(plain: FitResult, sizes: FloatArray) -> FitResult:
     """Return a fit with moments of events where the innovations are least, and fitted from there."""
-    problem = plain.problem
-    if not _has_moments(problem):
+    if not _has_moments(plain.problem):
         return plain
     for _ in range(2):
-        x = moved(plain, _whitener(plain, sizes))
-        if x is None:
+        found = moved(plain, _whitener(plain, sizes))
+        if found is None:
             break
-        plain = descended(extended(problem, x, plain), _whitener(plain, sizes), THOROUGH)
+        plain = descended(extended(*found, plain), _whitener(plain, sizes), THOROUGH)
     return plain
 
 

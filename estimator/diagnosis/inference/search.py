@@ -47,8 +47,6 @@ FINISHED = 2
 
 MOST_EFFECTS = 8
 
-EVENTS = frozenset(name for name, entry in EFFECTS.items() if entry.event)
-
 
 def never() -> bool:
     """Leave a search all the time it needs."""
@@ -121,26 +119,44 @@ class Search:
     def _best_addition(self, current: Hypothesis) -> Hypothesis | None:
         looks = self._looks(current, [name for name in self._open(current) if name not in current.effects])
         rough = concurrently(lambda name: self._added(current, name, looks[name]), list(looks))
-        found = [each for each in rough if each is not None] + self._retold(current)
+        found = [each for each in rough if each is not None] + self._begun_anew(current)
         found.sort(key=lambda each: each.score)
         near = [each for each in found[:FINISHED] if each.score <= found[0].score + NEARLY * _gain(found[0], current)]
         finished = concurrently(lambda each: self.finish(each, current), near)
         return self._better(finished, current)
 
-    def _retold(self, current: Hypothesis) -> list[Hypothesis]:
-        """Fit the laws of a hypothesis' effects written other ways a few steps, each beside the same others once."""
-        fits = []
+    def _begun_anew(self, current: Hypothesis) -> list[Hypothesis]:
+        """Fit a hypothesis' effects from other starts a few steps, each beside the same others once.
+
+        Laws are written other ways, events looked for in other stretches of the recordings.
+        """
+        fits: list[Hypothesis | None] = []
         for name in sorted(current.effects - {GRADE} - self._told[current.effects]):
             self._told[current.effects].add(name)
-            plain = current.plain
-            for other in EFFECTS[name].retold(self.model, self.records, plain.values_of(name), line_values(plain)):
-                begun = placed(forgetting(plain, name), other.line)
-                (release,) = released(name, self.model, self.records, [other.start])
-                alone = replace(release, own=((),) * len(self.records))
-                problem = self._extended(begun, current.effects, alone)
-                started = extended(problem, warm_start(problem, begun), plain, anew=name)
-                fits.append(compared(current.effects, started, current, len(self.names)))
-        return [each for each in fits if self.is_plausible(each)]
+            fits += self._retold(current, name)
+            if EFFECTS[name].event:
+                fits.append(self._elsewhere(current, name))
+        return [each for each in fits if each is not None and self.is_plausible(each)]
+
+    def _retold(self, current: Hypothesis, name: str) -> list[Hypothesis]:
+        """Fit a law written other ways."""
+        fits, plain = [], current.plain
+        for other in EFFECTS[name].retold(self.model, self.records, plain.values_of(name), line_values(plain)):
+            begun = placed(forgetting(plain, name), other.line)
+            (release,) = released(name, self.model, self.records, [other.start])
+            alone = replace(release, own=((),) * len(self.records))
+            problem = self._extended(begun, current.effects, alone)
+            started = extended(problem, warm_start(problem, begun), plain, anew=name)
+            fits.append(compared(current.effects, started, current, len(self.names)))
+        return fits
+
+    def _elsewhere(self, current: Hypothesis, name: str) -> Hypothesis | None:
+        """Fit an event where a look at the same hypothesis without it, the rest as it is, sees it."""
+        plain, effects = current.plain, current.effects - {name}
+        problem = self._problem(effects, kept(plain, (effects - {GRADE}) | set(self.model.effects)))
+        without = extended(problem, warm_start(problem, forgetting(plain, name)), plain)
+        base = replace(current, effects=effects, plain=replace(without, converged=without.derivative is not None))
+        return self._added(base, name, promising(screen(base, self.model, self.answers).looks(name)), current)
 
     def _open(self, current: Hypothesis) -> Sequence[str]:
         """Return the effects that can be told; behind a sensor blind for the sign reversals are the motion's own."""
@@ -300,8 +316,6 @@ class Search:
         base = self.without(current, name)
         alike = [other for other in self.names if other not in current.effects and are_alike(name, other)]
         looks = self._looks(base, alike, name)
-        if name in EVENTS:  # in other stretches of the recordings
-            looks[name] = promising(screen(base, self.model, self.answers).looks(name))
         rough = [self._added(base, other, looks[other], current) for other in looks]
         near = current.score + NEARLY * _gain(current, base)
         found = [each for each in rough if each is not None and each.score < near]
