@@ -138,11 +138,17 @@ def beside_rival(decision: Decision, score: float, falls: Callable[[Belief], boo
 
 
 def _share_of_names(decision: Decision, score: float) -> float:
-    """Return the probability of the best set of names, of the two."""
+    """Return the probability of the best set of names, of the two.
+
+    A law of size zero is no law, and values at their bounds are the nominal line: what a rival has of the probability
+    is what it has beyond the nominal model, which has had its share of the posterior already.
+    """
     n = decision.best.plain.residual.size
     tempered = TEMPERED + n * sum(test.value for test in decision.failed if test.is_share)
-    odds = 0.5 * (decision.best.score - score) / tempered
-    return 1.0 / (1.0 + math.exp(min(odds, 700.0)))
+    rival, nominal = (
+        math.exp(min(0.5 * (decision.best.score - each) / tempered, 700.0)) for each in (score, decision.nothing.score)
+    )
+    return 1.0 / (1.0 + max(rival - nominal, 0.0))
 
 
 def _elements(belief: Belief) -> set[Element]:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis.hypotheses import everything, open_hypotheses
+from estimator.diagnosis.inference import remainder
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.inference.unnamed import Law, best_law, hunts_around, weighed_against
 from estimator.diagnosis.inference.verdict import Decision, decide
@@ -91,3 +92,12 @@ def test_as_probable_as_the_name_it_takes_half_of_the_probability(friction: Deci
     (weighed,) = weighed_against(friction, law(friction, Element.SHAFT, 0.0)).doubted
     (before,) = friction.named
     assert weighed == replace(before, probability=pytest.approx(0.5 * before.probability))
+
+
+def test_what_is_no_better_than_the_nominal_model_takes_nothing(friction: Decision) -> None:
+    """However little differences of scores count where much is left: the posterior has counted that already."""
+    doubtful = replace(friction, failed=(remainder.Test("foretold by its own past", 0.5, 0.03, is_share=True),))
+    for better in (0.0, -5.0):
+        rival = Law(Element.SHAFT, (("T", 1.0),), friction.nothing.score - better, 0.1)
+        (weighed,) = weighed_against(doubtful, rival).named
+        assert weighed.probability == pytest.approx(friction.named[0].probability)
