@@ -54,6 +54,12 @@ def diagnose(
         list[Path] | None,
         typer.Option(HOLDOUT, metavar="REC...", help="Recordings kept back to judge the explanation on."),
     ] = None,
+    budget_s: Annotated[
+        float,
+        typer.Option(
+            "--budget-s", min=0.0, metavar="S", help="Time after which the best explanation so far is the answer [s]."
+        ),
+    ] = 30.0,
     trust_laws: TrustLaws = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print diagnosis.json instead of the summary.")] = False,
 ) -> None:
@@ -79,7 +85,7 @@ def diagnose(
     records = read_records([*recordings, *(holdout or ())], file.signals, file.on_bench)
     training, kept_back = records[: len(recordings)], records[len(recordings) :]
     with progress_bar() as progress:
-        diagnosis = diagnose_records(training, file.model, kept_back, progress)
+        diagnosis = diagnose_records(training, file.model, kept_back, progress, budget_s)
     text = diagnosis_text(diagnosis)
     try:
         publish(

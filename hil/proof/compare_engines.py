@@ -18,8 +18,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from estimator.diagnosis.diagnose import diagnose as by_rules
-from estimator.diagnosis.inference.diagnose import diagnose as by_likelihood
+from estimator.diagnosis.by_rules import diagnose as by_rules
+from estimator.diagnosis.diagnose import diagnose as by_likelihood
 from estimator.diagnosis.result import Diagnosis
 from estimator.errors import EstimatorError
 from hil.config.model_file import read_model_for_recordings

@@ -22,7 +22,7 @@ def listed(
     since: Annotated[str, typer.Option(metavar="DATE", help="Begun on that day (UTC) or later, 2026-11-21.")] = "",
     until: Annotated[str, typer.Option(metavar="DATE", help="Begun on that day (UTC) or earlier.")] = "",
     rig: Annotated[str, typer.Option(help="Name of the rig, or the beginning of its file's SHA-256.")] = "",
-    verdict: Annotated[str, typer.Option(help="explained, unexplained or no_mismatch.")] = "",
+    verdict: Annotated[str, typer.Option(help="explained, partly_explained, unexplained or no_mismatch.")] = "",
     text: Annotated[str, typer.Option(help="In notes, rig file, results, names.")] = "",
     store: Folder = HERE,
     as_json: AsJson = False,

@@ -81,7 +81,7 @@ def attempt(study: Study, bounds: Mapping[str, Any], multiple: float, out: Path,
         "distance": bounds["distances"][f"{multiple:g}"],
         "alpha": study.alpha,
         "samples": study.samples,
-        "found": row["outcome"] in FOUND and row["verdict"] == "explained",
+        "found": row["outcome"] in FOUND and row["verdict"] in ("explained", "partly_explained"),
     }
 
 

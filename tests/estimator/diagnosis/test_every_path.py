@@ -16,7 +16,7 @@ import pyarrow
 import pyarrow.parquet
 import pytest
 
-from estimator.diagnosis.inference.diagnose import diagnose
+from estimator.diagnosis.diagnose import diagnose
 from estimator.physics.grid import grid_for
 from estimator.physics.layout import flat_values
 from estimator.physics.model import Structure

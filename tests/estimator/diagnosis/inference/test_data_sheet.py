@@ -6,9 +6,9 @@ from collections.abc import Mapping
 
 import pytest
 
+from estimator.diagnosis.diagnose import diagnose
 from estimator.diagnosis.hypotheses import everything, open_hypotheses
 from estimator.diagnosis.inference.data_sheet import FREELY, free_line, in_words
-from estimator.diagnosis.inference.diagnose import diagnose
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.result import Stray, Verdict
 from estimator.physics.effect import Element

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from estimator.diagnosis.inference.diagnose import diagnose
+from estimator.diagnosis.diagnose import diagnose
 from estimator.diagnosis.result import Verdict
 from estimator.physics.effect import Element
 from hil.report.diagnosis_json import diagnosis_json
