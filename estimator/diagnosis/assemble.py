@@ -11,7 +11,6 @@ import numpy as np
 
 from estimator.diagnosis.chain import Chain
 from estimator.diagnosis.evidence import gain_from_squares
-from estimator.diagnosis.holdout import Examiner
 from estimator.diagnosis.inherit import line_values
 from estimator.diagnosis.intervals import (
     Z95,
@@ -21,8 +20,6 @@ from estimator.diagnosis.intervals import (
     trusted,
 )
 from estimator.diagnosis.result import Estimated, Evidence, FoundEffect, Interval, Profile, Retuned
-from estimator.diagnosis.selection import Selection
-from estimator.diagnosis.trial import Trial
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effects import road_grade
 from estimator.physics.fit import FitResult
@@ -35,41 +32,6 @@ from estimator.signals.record import FloatArray
 
 PROFILE_POINTS_S = 1.0
 """A profile is reported every second."""
-
-
-def found_effects(selection: Selection, model: DrivelineModel, examiner: Examiner) -> tuple[FoundEffect, ...]:
-    """Return the chosen effects, strongest first, with values and intervals of the final fit."""
-    cov = reported_covariance(selection.result)
-    trials = sorted(selection.accepted.values(), key=lambda trial: -trial.gain.delta_bic)
-    return tuple(_found(trial, selection, cov, model, examiner) for trial in trials)
-
-
-def _found(
-    trial: Trial, selection: Selection, cov: FloatArray, model: DrivelineModel, examiner: Examiner
-) -> FoundEffect:
-    entry = EFFECTS[trial.name]
-    nulls = {parameter.name: parameter.null for parameter in entry.parameters}
-    twins = selection.lookalikes.get(trial.name, ())
-    profiles = profiles_of(selection.result, cov, model) if entry.profile else {}
-    parameters = (
-        profile_size(selection.result, cov, model)
-        if entry.profile
-        else parameters_of(trial.name, selection.result, cov, model)
-    )
-    held = trial.holdout
-    if held is None:
-        without = examiner.compare(selection.retuned, frozenset(), selection.result, selection.chosen)
-        held = without
-    return FoundEffect(
-        name=entry.name,
-        element=entry.element,
-        statement=entry.sentence(nulls | {name: p.value for name, p in parameters.items()}, model.motion),
-        parameters=parameters,
-        time_s=moments_in(trial.name, selection.result) if entry.event else {},
-        indistinguishable_from=twins,
-        evidence=Evidence(trial.gain.delta_bic, held.before, held.after, trial.p_value),
-        profiles=profiles,
-    )
 
 
 def moments_in(name: str, result: FitResult) -> dict[str, tuple[Interval, ...]]:

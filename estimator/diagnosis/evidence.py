@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
-from estimator.diagnosis.noise import unpredictable
 from estimator.physics.fit import FitResult
 from estimator.signals.correlation import effective_samples
 from estimator.signals.record import FloatArray
@@ -43,40 +42,6 @@ def residuals_by_record(result: FitResult) -> list[FloatArray]:
     """Split a fit's stacked residual into one array per recording."""
     sizes = np.cumsum([int(use.sum()) for use in result.problem.use])[:-1]
     return list(np.split(result.residual, sizes))
-
-
-def noise_level(result: FitResult, floor: float) -> float:
-    """Return the lower of two estimates of the noise: of the reading, and of what no past predicts of a fit's error."""
-    return min(floor, unpredictable(residuals_by_record(result)))
-
-
-def gain(smaller: FitResult, larger: FitResult) -> Gain:
-    """Compare two nested fits of the same samples."""
-    return gain_from_squares(
-        float(smaller.residual @ smaller.residual),
-        float(larger.residual @ larger.residual),
-        max(larger.free_count - smaller.free_count, 1),
-        larger.free_count,
-        residuals_by_record(larger),
-    )
-
-
-def information(smaller: FitResult, larger: FitResult, n: float) -> float:
-    """Return the BIC that the larger of two fits gains, with a number of independent samples given.
-
-    Rivals are ranked with one n for all: how correlated a rival's error is must not decide.
-    """
-    ratio = smaller.squares / max(larger.squares, np.finfo(float).tiny)
-    return n * math.log(ratio) - (larger.free_count - smaller.free_count) * math.log(n)
-
-
-def delta_bic_with(gained: Gain, before_rms: float, after_rms: float, n: float) -> float:
-    """Return a gain's ``delta_bic`` as it would be with ``n`` independent samples; unknowns and choices cost the same.
-
-    The RMS are those without and with what gains, in one unit.
-    """
-    fall = 2.0 * math.log(before_rms / after_rms)
-    return n * fall - price(gained, before_rms, after_rms) * math.log(n)
 
 
 def price(gained: Gain, before_rms: float, after_rms: float) -> float:

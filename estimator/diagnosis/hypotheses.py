@@ -8,15 +8,12 @@ import numpy as np
 
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Untestable
-from estimator.physics.fit import FitResult
 from estimator.physics.model import DrivelineModel, Motion
 from estimator.signals.record import BoolArray, Record
 
 Effects = frozenset[str]
 NOTHING: Effects = frozenset()
 
-MOST_BENDING = 2
-"""Effects that bend to imitate others, at one element, that can be told beside each other."""
 
 Progress = Callable[[str, float], None]
 """Called with what is being done and the share of the work behind it; raise from it to cancel."""
@@ -29,29 +26,6 @@ def silent(_message: str, _share: float) -> None:
 def with_effect(effects: Effects, name: str) -> Effects:
     """Add an effect to a set; it replaces the special cases of itself."""
     return (effects - set(EFFECTS[name].contains)) | {name}
-
-
-def flexible(names: Effects) -> Effects:
-    """Return the effects whose course or moments every recording has of its own: they bend to imitate others."""
-    return frozenset(name for name in names if EFFECTS[name].profile or EFFECTS[name].event)
-
-
-def crowding(chosen: Effects) -> Effects:
-    """Return the effects that bend of which there are as many at their element as can be told.
-
-    A load profile, a brake and a payload follow, between them, whatever happens to a load.
-    """
-    places = [EFFECTS[name].element for name in flexible(chosen)]
-    return frozenset(
-        name for name in flexible(frozenset(EFFECTS)) if places.count(EFFECTS[name].element) >= MOST_BENDING
-    )
-
-
-def effects_of(result: FitResult) -> Effects:
-    """Return the effects that a fit had released."""
-    shared = {unknown.effect for unknown in result.problem.shared if unknown.effect}
-    profiles = {name for name in EFFECTS if EFFECTS[name].profile and result.problem.local[0].profile.size}
-    return frozenset(shared | profiles)
 
 
 def open_hypotheses(model: DrivelineModel, records: Sequence[Record]) -> tuple[tuple[str, ...], dict[str, Untestable]]:

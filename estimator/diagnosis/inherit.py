@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from dataclasses import replace
 
 from estimator.physics.catalogue import EFFECTS
@@ -52,12 +52,3 @@ def forgetting(result: FitResult, name: str) -> FitResult:
 def line_values(result: FitResult) -> dict[str, float]:
     """Return the values of the line's own parameters in a fit, those that it may not change among them."""
     return {name: float(result.p[slot("", name)]) for name in result.problem.grid.structure.parameter_names}
-
-
-def placed(result: FitResult, line: Mapping[str, float]) -> FitResult:
-    """Return a fit with some of the line's own parameters elsewhere, within what they are trusted to."""
-    x = result.x.copy()
-    for i, shared in enumerate(result.problem.shared):
-        if not shared.effect and shared.name in line:
-            x[i] = min(max(line[shared.name] / shared.scale, shared.low), shared.high)
-    return replace(result, x=x)

@@ -120,3 +120,23 @@ def _complement(
                 unknown = replace(unknown, low=first, high=last)
         own.append(unknown)
     return replace(basis, own=tuple(own)), local
+
+
+PART_SEEN = 0.1
+"""Share of the time in which an event acts that must be in recordings where it begins or ends. A brake all through one
+recording is dry friction, which others that do not reverse hide; half a second of it in one of them is chance."""
+
+
+def has_edge(name: str, result: FitResult) -> bool:
+    """Tell whether an event begins or ends inside a recording.
+
+    Where it would be another effect if it acted all along, not a glimpse of it counts, beside whole recordings.
+    """
+    acting = [
+        (to_s - from_s, inside(record, from_s) or inside(record, to_s))
+        for record, (from_s, to_s) in zip(result.problem.records, moments_of(result, name), strict=True)
+        if to_s > from_s
+    ]
+    seen_s = sum(length_s for length_s, edged in acting if edged)
+    least = PART_SEEN if EFFECTS[name].permanent else 0.0
+    return seen_s > least * sum(length_s for length_s, _ in acting)

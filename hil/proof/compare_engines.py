@@ -18,7 +18,6 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from estimator.diagnosis.by_rules import diagnose as by_rules
 from estimator.diagnosis.diagnose import diagnose as by_likelihood
 from estimator.diagnosis.result import Diagnosis
 from estimator.errors import EstimatorError
@@ -32,7 +31,7 @@ from hil.proof.truth.registry import EFFECTS
 from hil.recording import read_records
 from hil.report.diagnosis_json import diagnosis_json
 
-ENGINES: dict[str, Callable[..., Diagnosis]] = {"rules": by_rules, "likelihood": by_likelihood}
+ENGINES: dict[str, Callable[..., Diagnosis]] = {"likelihood": by_likelihood}
 
 NOTHING = "none"
 KINDS = [name for name, effect in EFFECTS.items() if effect.catalogued and name != NOTHING]

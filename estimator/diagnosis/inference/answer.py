@@ -16,7 +16,7 @@ from estimator.diagnosis.inference.data_sheet import free_line
 from estimator.diagnosis.inference.disturbances import Size
 from estimator.diagnosis.inference.figures import FreeRuns, courses_of, effects_of, figures_of, free_runs
 from estimator.diagnosis.inference.free_run import Unseen
-from estimator.diagnosis.inference.likelihood import Hypothesis
+from estimator.diagnosis.inference.likelihood import SAME, Hypothesis, fitted
 from estimator.diagnosis.inference.posterior import free_rms
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.inference.unnamed import Law, beside_rival, best_law, hunts_around, weighed_against
@@ -44,6 +44,7 @@ from estimator.diagnosis.unnamed import Hunt
 from estimator.diagnosis.where import discrepancy, locate
 from estimator.physics.effect import Element, Untestable
 from estimator.physics.model import DrivelineModel
+from estimator.physics.steps import from_their_moment
 from estimator.signals.record import FloatArray
 
 SMALLEST_P = 1e-300
@@ -157,7 +158,24 @@ def _with_names_alone(search: Search, decision: Decision) -> Hypothesis:
     believed = decision.best
     for name in sorted(decision.best.effects - {each.name for each in decision.named}):
         believed = search.without(believed, name)
-    return believed
+    return _steps_from_their_moment(search, believed)
+
+
+def _steps_from_their_moment(search: Search, believed: Hypothesis) -> Hypothesis:
+    """Return a hypothesis with steps of payload or stiffness that begin inside recordings, where it is as probable."""
+    turned = from_their_moment(believed.plain, search.model)
+    if turned is believed.plain:
+        return believed
+    found = fitted(
+        believed.effects,
+        turned.problem,
+        turned.x,
+        believed.sizes,
+        believed.limits,
+        len(search.names),
+        believed.minus_twice_log,
+    )
+    return found if found.score <= believed.score + SAME else believed
 
 
 def _stopped(search: Search, budget_s: float) -> str:

@@ -1,6 +1,6 @@
 """The thresholds of a verdict by likelihood, in one place; no other number decides.
 
-Set by hand while about twenty simulated cases were looked at, not calibrated: docs/diagnosis-engines.md says so and
+Set by hand while about twenty simulated cases were looked at, not calibrated: docs/diagnosis.md says so and
 what a calibration has to do. Until then this engine is not in charge of ``hil diagnose``.
 """
 

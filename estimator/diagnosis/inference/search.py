@@ -14,7 +14,6 @@ from estimator.diagnosis.inference.looks import screen
 from estimator.diagnosis.inherit import forgetting, inheriting, kept
 from estimator.diagnosis.noise import noise_floor
 from estimator.diagnosis.screening import Look, promising
-from estimator.diagnosis.trial import has_edge
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
@@ -25,6 +24,7 @@ from estimator.physics.parallel import concurrently
 from estimator.physics.problem import Problem, make_problem, start_of, start_vector
 from estimator.physics.simulate import simulate
 from estimator.physics.starts import warm_start
+from estimator.physics.steps import has_edge
 from estimator.physics.torque_path import shaft_torque
 from estimator.physics.unknowns import Release, nominal_unknowns, own_unknowns
 from estimator.signals.record import BoolArray, Record

@@ -18,10 +18,10 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from estimator.diagnosis.assemble import augmented_model
-from estimator.diagnosis.bench import Bench
 from estimator.diagnosis.chain import mechanical
-from estimator.diagnosis.hypotheses import NOTHING, everything
 from estimator.diagnosis.preconditions import prepare
+from estimator.physics.fit import fit, make_problem
+from estimator.physics.unknowns import nominal_unknowns
 from estimator.signals.record import FloatArray, Record
 from hil.config.model_file import ModelFile, read_model, read_model_for_recordings, write_model
 from hil.proof.command import run_hil
@@ -117,7 +117,8 @@ def _write_retuned(place: Path, shown: list[Path], out: Path) -> None:
     file = read_model_for_recordings(place / "model.toml")
     with threadpool_limits(1, user_api="blas"):
         ready = prepare(read_records(shown, file.signals, file.on_bench), file.model)
-        result = Bench(mechanical(file.model), ready.records, everything(ready.records)).fit(NOTHING)
+        line = mechanical(file.model)
+        result = fit(make_problem(line, ready.records, nominal_unknowns(line)))
     write_model(out / "retuned.toml", augmented_model(result, file.model, ()), file.signals, file.laws)
 
 

@@ -3,23 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimator.diagnosis.bench import Bench
 from estimator.diagnosis.hypotheses import everything
 from estimator.physics.grid import grid_for
 from estimator.physics.layout import flat_values
+from estimator.physics.model import DrivelineModel
 from estimator.physics.simulate import simulate
 from estimator.physics.start import Start
-from estimator.signals.record import FloatArray
+from estimator.signals.record import BoolArray, FloatArray, Record
 from tests.estimator.diagnosis.planted import SIGMA, drive_torque
 from tests.estimator.physics.bench import TWO_MASS, model, random_steps, record
 
 SEEDS = (3, 4)
 DRIVES = tuple(drive_torque(seed) for seed in SEEDS)
 SHAKES = tuple(random_steps(1500, seed, hold=3) for seed in SEEDS)
+
+
+@dataclass(frozen=True)
+class Bench:
+    """A nominal model, recordings, and which of their samples count."""
+
+    model: DrivelineModel
+    records: Sequence[Record]
+
+    @property
+    def use(self) -> list[BoolArray]:
+        """Every good sample."""
+        return everything(self.records)
 
 
 def bench_with(name: str, values: Mapping[str, float], torques_nm: Sequence[FloatArray] = DRIVES) -> Bench:
@@ -30,4 +43,4 @@ def bench_with(name: str, values: Mapping[str, float], torques_nm: Sequence[Floa
         output = simulate(grid_for(line, [silent]), silent, true, Start(5.0, 0.0, 2.0))
         noise = SIGMA * np.random.default_rng(seed).standard_normal(output.size)
         records.append(replace(silent, output=output + noise))
-    return Bench(line, records, everything(records))
+    return Bench(line, records)

@@ -12,28 +12,28 @@ from estimator.diagnosis.acquisition import Finding, Sized
 from estimator.diagnosis.assemble import (
     acquired_effects,
     augmented_model,
-    found_effects,
     load_torques,
+    moments_in,
     parameters_of,
+    profile_size,
+    profiles_of,
     retuned_parameters,
 )
-from estimator.diagnosis.bench import Bench
 from estimator.diagnosis.chain import Chain
-from estimator.diagnosis.holdout import Examiner
-from estimator.diagnosis.hypotheses import NOTHING, Effects, everything
+from estimator.diagnosis.diagnose import diagnose
+from estimator.diagnosis.hypotheses import NOTHING, everything
 from estimator.diagnosis.intervals import Z95, interval, interval_both_ways, reported_covariance
-from estimator.diagnosis.result import FoundEffect
-from estimator.diagnosis.selection import Jury, Selection, Selector
-from estimator.diagnosis.weight import Weight
-from estimator.physics.catalogue import effect_problems
+from estimator.diagnosis.result import Evidence, FoundEffect
+from estimator.physics.catalogue import EFFECTS, effect_problems
 from estimator.physics.effect import Element
+from estimator.physics.fit import FitResult
 from estimator.physics.free_run import free_run
 from estimator.physics.model import EffectValue, Motion
 from estimator.physics.start import Start
 from estimator.physics.unknowns import Shared
 from estimator.signals.correlation import effective_samples
 from estimator.signals.record import FloatArray, Record
-from tests.estimator.diagnosis.outcome import outcome
+from tests.estimator.diagnosis.plain import Bench
 from tests.estimator.diagnosis.planted import SIGMA, drive_torque, rubbing
 from tests.estimator.diagnosis.regression import regression
 from tests.estimator.physics.bench import ONE_MASS, SAMPLE_TIME_S, linear_record, model, random_steps, record, scaled
@@ -64,38 +64,32 @@ def hilly() -> list[Record]:
     ]
 
 
-def assembled(records: list[Record], *names: str) -> tuple[Selection, Examiner]:
-    """A selection of these effects, each judged in the final set."""
-    chosen: Effects = frozenset(names)
-    bench, examiner = Bench(LINE, records, everything(records)), Examiner(LINE, records, ())
-    retuned = bench.fit(NOTHING)
-    result = retuned
+def assembled(records: list[Record], *names: str) -> FitResult:
+    """A fit of these effects, one after the other."""
+    bench = Bench(LINE, records, everything(records))
+    result = bench.fit(NOTHING)
     for count in range(1, len(names) + 1):
         result = bench.fit(frozenset(names[:count]), result)
-    jury = Jury(bench, examiner, names, Weight(SIGMA))
-    trials = {}
-    for name in names:
-        without = bench.fit(chosen - {name}, result)
-        trials[name] = jury.examined(jury.trial(name, chosen, without, result), without)
-    return outcome(retuned, chosen, result, trials=trials), examiner
+    return result
+
+
+def effect_of(name: str, result: FitResult, motion: Motion = Motion.ROTATION) -> FoundEffect:
+    """The effect of a fit as a diagnosis has it; evidence plays no part here."""
+    line = model(NOMINAL, motion=motion)
+    parameters = parameters_of(name, result, reported_covariance(result), line)
+    moments = moments_in(name, result) if EFFECTS[name].event else {}
+    nothing = Evidence(0.0, 1.0, 1.0, 1.0)
+    return FoundEffect(name, EFFECTS[name].element, "", parameters, moments, (), nothing)
 
 
 @pytest.fixture(scope="module")
-def rubbed() -> tuple[Selection, Examiner]:
+def rubbed() -> FitResult:
     return assembled(rubbing(lambda speed: FRICTION_NM), COULOMB)
 
 
 @pytest.fixture(scope="module")
-def friction(rubbed: tuple[Selection, Examiner]) -> FoundEffect:
-    (found,) = found_effects(rubbed[0], LINE, rubbed[1])
-    return found
-
-
-@pytest.fixture(scope="module")
-def road() -> FoundEffect:
-    selection, examiner = assembled(hilly(), "road_grade")
-    (found,) = found_effects(selection, LINE, examiner)
-    return found
+def friction(rubbed: FitResult) -> FoundEffect:
+    return effect_of(COULOMB, rubbed)
 
 
 @pytest.mark.parametrize("wrong", ["gain_m1", "gain_m2"])
@@ -108,12 +102,12 @@ def test_whichever_inverter_is_wrong_the_intervals_hold_the_line(wrong: str) -> 
         true = read @ np.where(np.array(["gain_m1", "gain_m2"]) == wrong, gain, 1.0)
         record = linear_record(ONE_MASS, true, Start(5.0, 0.0, 2.0), sigma=SIGMA, seed=seed, name=f"run_{seed}")
         records.append(replace(record, torque_nm=read))
-    selection, examiner = assembled(records, "inverter_gain_mismatch")
-    (found,) = found_effects(selection, LINE, examiner)
+    result = assembled(records, "inverter_gain_mismatch")
+    found = effect_of("inverter_gain_mismatch", result)
     (told,) = found.parameters
     other_way = 1.0 / found.parameters[told].value
     assert (found.parameters[told].value if told == wrong else other_way) == pytest.approx(gain, rel=0.01)
-    for name, parameter in retuned_parameters(selection.result, LINE, whole=True).items():
+    for name, parameter in retuned_parameters(result, LINE, whole=True).items():
         low, high = parameter.ci95
         assert low <= ONE_MASS[name] <= high
         assert high / low >= 1.0 / gain - 0.01
@@ -127,7 +121,7 @@ def test_the_other_way_is_as_uncertain_as_the_factor_between_both() -> None:
         read = np.column_stack([share * torque + other, (1.0 - share) * torque - other])
         record = linear_record(ONE_MASS, read @ [1.0, 0.9], Start(5.0, 0.0, 2.0), sigma=SIGMA, seed=seed)
         records.append(replace(record, torque_nm=read, name=f"run_{seed}"))
-    result = assembled(records, "inverter_gain_mismatch")[0].result
+    result = assembled(records, "inverter_gain_mismatch")
     names = [(shared.effect, shared.name) for shared in result.problem.shared]
     (gain,) = (i for i, s in enumerate(result.problem.shared) if s.effect and s.low < s.high)
     inertia, cov = names.index(("", "J_M")), reported_covariance(result)
@@ -160,7 +154,7 @@ def test_whichever_clock_is_right_the_intervals_hold_the_line() -> None:
     """The fit keeps to the speed's: by it an inertia is off by the rate, many times what the noise leaves open."""
     rate = 0.002
     records = [by_another_clock(ONE_MASS, seed, rate) for seed in (1, 2)]
-    result = assembled(records, "clock_drift")[0].result
+    result = assembled(records, "clock_drift")
     assert result.value("clock_drift", "rate") == pytest.approx(rate, rel=0.02)
     inertia = retuned_parameters(result, LINE, whole=True)["J_M"]
     assert inertia.value == pytest.approx(ONE_MASS["J_M"] / (1.0 + rate), rel=2e-4)
@@ -176,64 +170,37 @@ class TestAnEffect:
         assert found.ci95[0] < found.value < found.ci95[1]
         assert found.ci95[1] - found.ci95[0] < 0.1 * FRICTION_NM
 
-    def test_it_is_said_in_words(self, friction: FoundEffect) -> None:
-        assert f"dry friction of {friction.parameters['friction_nm'].value:.3g} Nm" in friction.statement
-
-    def test_its_evidence_is_its_trials(self, friction: FoundEffect, rubbed: tuple[Selection, Examiner]) -> None:
-        trial = rubbed[0].accepted[COULOMB]
-        assert trial.holdout is not None
-        assert friction.evidence.delta_bic == trial.gain.delta_bic
-        assert friction.evidence.p_value == trial.p_value
-        assert friction.evidence.holdout_rms_before == trial.holdout.before
-        assert friction.evidence.holdout_rms_after == trial.holdout.after
-
-    def test_without_a_trial_on_unseen_data_the_whole_set_is_examined(self, rubbed: tuple[Selection, Examiner]) -> None:
-        selection, examiner = rubbed
-        bare = replace(selection, accepted={COULOMB: replace(selection.accepted[COULOMB], holdout=None)})
-        (found,) = found_effects(bare, LINE, examiner)
-        assert found.evidence.holdout_rms_before > 2.0 * found.evidence.holdout_rms_after > 0.0
-
-    def test_units_of_a_translation_are_newtons(self, rubbed: tuple[Selection, Examiner]) -> None:
-        (found,) = found_effects(rubbed[0], model(NOMINAL, motion=Motion.TRANSLATION), rubbed[1])
+    def test_units_of_a_translation_are_newtons(self, rubbed: FitResult) -> None:
+        found = effect_of(COULOMB, rubbed, Motion.TRANSLATION)
         assert found.parameters["friction_nm"].unit == "N"
-
-    def test_the_strongest_comes_first_with_its_twins(self) -> None:
-        late = [
-            replace(rec, torque_nm=np.vstack([rec.torque_nm[1:], rec.torque_nm[-1:]]))
-            for rec in rubbing(lambda speed: FRICTION_NM)
-        ]
-        selection, examiner = assembled(late, "actuator_lag", COULOMB)
-        selection = replace(selection, lookalikes={"actuator_lag": ("speed_filter",)})
-        found = found_effects(selection, LINE, examiner)
-        assert [effect.name for effect in found] == [COULOMB, "actuator_lag"]
-        assert found[0].evidence.delta_bic > found[1].evidence.delta_bic
-        assert found[1].indistinguishable_from == ("speed_filter",)
 
 
 class TestAProfile:
-    def test_each_recording_has_its_own_over_time(self, road: FoundEffect) -> None:
-        assert set(road.profiles) == {"run_1", "run_2"}
-        for profile in road.profiles.values():
+    @pytest.fixture(scope="class")
+    def road(self) -> FitResult:
+        return assembled(hilly(), "road_grade")
+
+    def test_each_recording_has_its_own_over_time(self, road: FitResult) -> None:
+        profiles = profiles_of(road, reported_covariance(road), LINE)
+        assert set(profiles) == {"run_1", "run_2"}
+        for profile in profiles.values():
             assert profile.unit == "Nm"
             np.testing.assert_allclose(profile.time_s, np.arange(12.0))
             assert profile.value.mean() == pytest.approx(0.0, abs=1e-9)
 
-    def test_it_is_the_road_that_was_driven_within_its_band(self, road: FoundEffect) -> None:
+    def test_it_is_the_road_that_was_driven_within_its_band(self, road: FitResult) -> None:
         inside = []
-        for profile in road.profiles.values():
+        for profile in profiles_of(road, reported_covariance(road), LINE).values():
             true = hill(profile.time_s)
             assert np.max(np.abs(profile.value - true)[1:-1]) < 3.0
             inside += list((profile.low <= true) & (true <= profile.high))
         assert np.mean(inside) > 0.6  # a spline of 2 s knots follows a 6 s wave to about its noise
 
-    def test_its_size_is_the_rms_of_the_profile(self, road: FoundEffect) -> None:
-        found = road.parameters["grade_rms_nm"]
+    def test_its_size_is_the_rms_of_the_profile(self, road: FitResult) -> None:
+        found = profile_size(road, reported_covariance(road), LINE)["grade_rms_nm"]
         assert found.value == pytest.approx(25.0 / np.sqrt(2.0), rel=0.1)
         assert 0.0 <= found.ci95[0] < found.value < found.ci95[1]
         assert found.unit == "Nm"
-
-
-BRAKED_S = {"run_1": (2.0, 5.0), "run_2": (6.0, 9.5), "run_3": (0.0, 0.0)}
 
 
 @pytest.fixture(scope="module")
@@ -242,20 +209,13 @@ def brake() -> FoundEffect:
     time_s, records = np.arange(1200) * 0.01, []
     for seed, (name, (begin, end)) in enumerate(BRAKED_S.items(), start=1):
         load = np.where((time_s >= begin) & (time_s < end), FRICTION_NM, 0.0)
-        rec = linear_record(
-            ONE_MASS,
-            random_steps(1200, seed, mean_nm=90.0),
-            Start(5.0, 0.0, 20.0),
-            sigma=SIGMA,
-            seed=seed,
-            name=name,
-            extra_load_nm=load,
-        )
+        torque, start = random_steps(1200, seed, mean_nm=90.0), Start(5.0, 0.0, 20.0)
+        rec = linear_record(ONE_MASS, torque, start, sigma=SIGMA, seed=seed, name=name, extra_load_nm=load)
         records.append(replace(rec, time_s=rec.time_s + 100.0))
-    bench, examiner = Bench(LINE, records, everything(records)), Examiner(LINE, records, ())
-    selection = Selector(Jury(bench, examiner, ["brake_drag"], Weight(SIGMA)), lambda message, share: None).run()
-    (found,) = found_effects(selection, LINE, examiner)
-    return found
+    return next(each for each in diagnose(records, LINE).effects if each.name == "brake_drag")
+
+
+BRAKED_S = {"run_1": (2.0, 5.0), "run_2": (6.0, 9.5), "run_3": (0.0, 0.0)}
 
 
 class TestAnEvent:
@@ -272,9 +232,6 @@ class TestAnEvent:
         assert list(brake.parameters) == ["brake_nm"]
         low, high = brake.parameters["brake_nm"].ci95
         assert low < FRICTION_NM < high
-
-    def test_what_is_no_event_has_none(self, friction: FoundEffect) -> None:
-        assert friction.time_s == {}
 
 
 class TestAcquired:
@@ -311,8 +268,8 @@ class TestAcquired:
 
 
 class TestParameters:
-    def test_before_and_after_with_interval_and_unit(self, rubbed: tuple[Selection, Examiner]) -> None:
-        parameters = retuned_parameters(rubbed[0].result, LINE, whole=True)
+    def test_before_and_after_with_interval_and_unit(self, rubbed: FitResult) -> None:
+        parameters = retuned_parameters(rubbed, LINE, whole=True)
         assert list(parameters) == ["J_M", "b_M"]
         inertia = parameters["J_M"]
         assert (inertia.nominal, inertia.unit) == (NOMINAL["J_M"], "kg m^2")
@@ -320,9 +277,9 @@ class TestParameters:
         assert inertia.ci95[0] < inertia.value < inertia.ci95[1]
 
     def test_without_the_whole_physics_no_interval_is_narrower_than_the_trust(
-        self, rubbed: tuple[Selection, Examiner]
+        self,
     ) -> None:
-        retuned = rubbed[0].retuned
+        retuned = assembled(rubbing(lambda speed: FRICTION_NM))
         told = {whole: retuned_parameters(retuned, LINE, whole)["J_M"] for whole in (True, False)}
         assert told[False].value == told[True].value
         tolerance = LINE.parameters["J_M"].tolerance
@@ -337,8 +294,8 @@ class TestParameters:
             assert parameter.value == parameter.nominal == ONE_MASS[name]
             assert parameter.ci95 == (ONE_MASS[name], ONE_MASS[name])
 
-    def test_each_recording_has_its_load_torque(self, rubbed: tuple[Selection, Examiner]) -> None:
-        torques = load_torques(rubbed[0].result, LINE)
+    def test_each_recording_has_its_load_torque(self, rubbed: FitResult) -> None:
+        torques = load_torques(rubbed, LINE)
         assert list(torques) == ["run_1", "run_2"]
         for torque in torques.values():
             assert torque.value == pytest.approx(5.0, abs=0.5)
@@ -347,27 +304,25 @@ class TestParameters:
 
 
 class TestAugmentedModel:
-    def test_it_has_the_new_values_and_the_effect(
-        self, rubbed: tuple[Selection, Examiner], friction: FoundEffect
-    ) -> None:
-        found = augmented_model(rubbed[0].result, LINE, [friction])
+    def test_it_has_the_new_values_and_the_effect(self, rubbed: FitResult, friction: FoundEffect) -> None:
+        found = augmented_model(rubbed, LINE, [friction])
         assert found.values()["J_M"] == pytest.approx(ONE_MASS["J_M"], rel=0.01)
         assert found.parameters["J_M"].tolerance == LINE.parameters["J_M"].tolerance
         estimate = friction.parameters["friction_nm"]
         assert found.effects == {COULOMB: {"friction_nm": EffectValue(estimate.value, estimate.ci95)}}
 
-    def test_it_simulates_what_was_found(self, rubbed: tuple[Selection, Examiner], friction: FoundEffect) -> None:
+    def test_it_simulates_what_was_found(self, rubbed: FitResult, friction: FoundEffect) -> None:
         """On a recording it has not seen the error is the noise."""
-        found = augmented_model(rubbed[0].result, LINE, [friction])
+        found = augmented_model(rubbed, LINE, [friction])
         (unseen,) = rubbing(lambda speed: FRICTION_NM, seeds=(9,))
         assert free_run(found, unseen).rms < 1.3 * SIGMA
         assert free_run(LINE, unseen).rms > 3.0 * SIGMA
 
-    def test_effects_that_the_model_had_stay(self, rubbed: tuple[Selection, Examiner], friction: FoundEffect) -> None:
+    def test_effects_that_the_model_had_stay(self, rubbed: FitResult, friction: FoundEffect) -> None:
         having = model(NOMINAL, effects={"transport_delay": {"delay_s": 0.01}})
-        found = augmented_model(rubbed[0].result, having, [friction])
+        found = augmented_model(rubbed, having, [friction])
         assert set(found.effects) == {"transport_delay", COULOMB}
-        assert augmented_model(rubbed[0].result, having, []).effects == having.effects
+        assert augmented_model(rubbed, having, []).effects == having.effects
 
 
 def test_a_held_value_is_told_at_its_null_where_a_model_file_needs_it() -> None:

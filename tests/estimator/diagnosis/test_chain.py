@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis.assemble import rms_of
-from estimator.diagnosis.bench import Bench
 from estimator.diagnosis.chain import Chain, mechanical, read_through, replay
 from estimator.diagnosis.hypotheses import NOTHING, everything
 from estimator.physics.catalogue import EFFECTS
@@ -19,6 +18,7 @@ from estimator.physics.layout import slot
 from estimator.physics.model import DrivelineModel, EffectValue, Parameter, Structure
 from estimator.signals.record import Record
 from tests.estimator.diagnosis.acquisition.bench import NOISE, SAMPLES, Line, drives, periodic_rows, random_rows, stale
+from tests.estimator.diagnosis.plain import Bench
 
 EVERY = 7
 STALE = periodic_rows(EVERY)

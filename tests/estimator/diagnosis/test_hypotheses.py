@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
-from estimator.diagnosis.hypotheses import crowding, everything, open_hypotheses, with_effect
+from estimator.diagnosis.hypotheses import everything, open_hypotheses, with_effect
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
 from estimator.physics.model import Motion, Structure
@@ -81,17 +80,3 @@ class TestOpenHypotheses:
         sliding = model(ONE_MASS, motion=Motion.TRANSLATION)
         testable, untestable = open_hypotheses(sliding, [self.REVERSAL])
         assert not [name for name in {*testable, *untestable} if EFFECTS[name].phases]
-
-
-@pytest.mark.parametrize(
-    ("chosen", "crowded"),
-    [
-        ("road_grade", ""),
-        ("road_grade generator_coupled stiffness_change", ""),
-        ("road_grade coulomb_friction_load", ""),
-        ("road_grade brake_drag", "road_grade brake_drag inertia_change"),
-    ],
-)
-def test_what_bends_may_not_come_in_threes_at_one_place(chosen: str, crowded: str) -> None:
-    """A brake that grabs again and again was put together from a grade, a brake and a payload."""
-    assert crowding(frozenset(chosen.split())) == frozenset(crowded.split())

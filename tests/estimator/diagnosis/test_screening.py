@@ -9,7 +9,6 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from estimator.diagnosis.bench import Bench
 from estimator.diagnosis.hypotheses import NOTHING, everything
 from estimator.diagnosis.screening import Look, Screen, promising
 from estimator.physics.effect import Element
@@ -18,6 +17,7 @@ from estimator.physics.model import DrivelineModel
 from estimator.physics.start import Start
 from estimator.physics.unknowns import Release, Shared
 from estimator.signals.record import Record
+from tests.estimator.diagnosis.plain import Bench
 from tests.estimator.diagnosis.planted import SIGMA, TIGHT, disturbed, drive_torque, quiet, rubbing
 from tests.estimator.physics.bench import (
     ONE_MASS,

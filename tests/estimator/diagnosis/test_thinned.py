@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.bench import Bench
 from estimator.diagnosis.hypotheses import NOTHING, everything
 from estimator.diagnosis.preconditions.thinned import LONGEST_S, factor_for, thinned
 from estimator.diagnosis.stretches import MOST_SAMPLES
@@ -15,6 +14,7 @@ from estimator.physics.grid import grid_for
 from estimator.physics.layout import flat
 from estimator.physics.simulate import simulate
 from estimator.physics.start import Start
+from tests.estimator.diagnosis.plain import Bench
 from tests.estimator.physics.bench import TWO_MASS, model, random_steps, record
 
 LINE = model(TWO_MASS)

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.bench import Bench
 from estimator.diagnosis.hypotheses import everything, open_hypotheses
 from estimator.diagnosis.inference.posterior import free_rms
 from estimator.diagnosis.inference.remainder import tests as examined
@@ -17,7 +16,7 @@ from estimator.diagnosis.inference.verdict import Decision, decide
 from estimator.diagnosis.result import Verdict
 from estimator.physics.model import EffectValue
 from estimator.signals.record import Record
-from tests.estimator.diagnosis.one_effect import bench_with
+from tests.estimator.diagnosis.one_effect import Bench, bench_with
 from tests.estimator.diagnosis.planted import SIGMA
 
 PLAIN = ("quadratic_friction", {"quadratic_nm_s2": 1e-9})

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.bench import Bench
 from estimator.diagnosis.hypotheses import NOTHING, everything
 from estimator.diagnosis.unnamed import ROUNDS, hunts_of, scene
 from estimator.diagnosis.where.discrepancy import discrepancy, effects_added, without_effect
@@ -15,6 +14,7 @@ from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
 from estimator.physics.model import Motion
 from estimator.physics.problem import outputs_at
+from tests.estimator.diagnosis.plain import Bench
 from tests.estimator.diagnosis.planted import SIGMA, nominal_fit, recordings, rubbing
 from tests.estimator.physics.bench import ONE_MASS, model
 
