@@ -8,11 +8,14 @@ from threadpoolctl import threadpool_limits
 
 from estimator.diagnosis.first_use import COMPILING, compile_kernels, is_first_use
 from estimator.diagnosis.hypotheses import Progress, silent
-from estimator.diagnosis.inference.answer import BUDGET_S, answer
+from estimator.diagnosis.inference.answer import answer
 from estimator.diagnosis.preconditions import prepare
 from estimator.diagnosis.result import Diagnosis
 from estimator.physics.model import DrivelineModel
 from estimator.signals.record import Record
+
+BUDGET_S = 30.0
+"""Time after which the best set of effects so far is the answer [s]."""
 
 
 def diagnose(
@@ -20,7 +23,7 @@ def diagnose(
     model: DrivelineModel,
     holdout: Sequence[Record] = (),
     progress: Progress = silent,
-    budget_s: float = BUDGET_S,
+    budget_s: float | None = None,
 ) -> Diagnosis:
     """Find out whether physics is missing from a model, where, which, and how large it is.
 
@@ -37,9 +40,9 @@ def diagnose(
         are kept out of one more fit. They take no part in the decision: the likelihood counts each unknown's price.
     progress : callable, optional
         Called with a message and the share of work done; an exception it raises cancels the diagnosis.
-    budget_s : float
+    budget_s : float, optional
         Time [s] after which no further set of effects is tried: the best so far is the answer, with a warning that
-        says what was not tried.
+        says what was not tried. By default ``BUDGET_S``.
 
     Returns
     -------
@@ -62,7 +65,7 @@ def diagnose(
     with threadpool_limits(1, user_api="blas"):  # on tall, thin matrices more threads only wait for each other
         progress("checking the recordings", 0.0)
         ready = prepare(records, model, holdout)
-        return ready.finished(answer(ready, model, progress, budget_s))
+        return ready.finished(answer(ready, model, progress, BUDGET_S if budget_s is None else budget_s))
 
 
 def _telling(progress: Progress) -> Progress:

@@ -55,11 +55,14 @@ def diagnose(
         typer.Option(HOLDOUT, metavar="REC...", help="Recordings kept back to judge the explanation on."),
     ] = None,
     budget_s: Annotated[
-        float,
+        float | None,
         typer.Option(
-            "--budget-s", min=0.0, metavar="S", help="Time after which the best explanation so far is the answer [s]."
+            "--budget-s",
+            min=0.0,
+            metavar="S",
+            help="Time after which the best so far is the answer [s]; 30 by default.",
         ),
-    ] = 30.0,
+    ] = None,
     trust_laws: TrustLaws = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print diagnosis.json instead of the summary.")] = False,
 ) -> None:

@@ -12,7 +12,8 @@ from pydantic import BaseModel
 from drivers.inverter.drive_settings import OPTION_CODES
 from drivers.plc.map_needs import USED
 from estimator.diagnosis import holdout
-from estimator.diagnosis.inference import answer, calibration, search, unnamed
+from estimator.diagnosis.diagnose import BUDGET_S
+from estimator.diagnosis.inference import calibration, search, unnamed
 from estimator.diagnosis.where import locate
 from estimator.physics import own_law
 from hil.cli.main import ExitStatus
@@ -93,7 +94,7 @@ def test_the_thresholds_of_a_verdict_are_those_of_the_code() -> None:
         f"blocks of {holdout.BLOCK_S:g} s every {holdout.EVERY_S:g} s",
         f"over {locate.WINDOW_S:g} s",
         f"central {locate.CENTRAL:.0%}".replace("%", " %"),
-        f"({answer.BUDGET_S:g} s)",
+        f"({BUDGET_S:g} s)",
         f"whose share is below {calibration.LEAST_SHARE:g}",
     ):
         assert said in page

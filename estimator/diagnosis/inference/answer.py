@@ -49,15 +49,12 @@ from estimator.signals.record import FloatArray
 
 SMALLEST_P = 1e-300
 
-BUDGET_S = 30.0
-"""Time after which no further change of the best set is tried [s]."""
-
 LOCATING_ROUNDS, LOOKING_ROUNDS = 6, 2
 """Rounds of the search for a law without a name: where nothing is named it locates the mismatch, else it says what is
 left."""
 
 
-def answer(ready: Prepared, model: DrivelineModel, progress: Progress, budget_s: float = BUDGET_S) -> Diagnosis:
+def answer(ready: Prepared, model: DrivelineModel, progress: Progress, budget_s: float) -> Diagnosis:
     """Return the diagnosis of recordings that are fit for one; after ``budget_s`` of the best set of effects so far."""
     began = time.perf_counter()
 

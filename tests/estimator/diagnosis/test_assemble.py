@@ -175,11 +175,12 @@ class TestAnEffect:
         assert found.parameters["friction_nm"].unit == "N"
 
 
-class TestAProfile:
-    @pytest.fixture(scope="class")
-    def road(self) -> FitResult:
-        return assembled(hilly(), "road_grade")
+@pytest.fixture(scope="module")
+def road() -> FitResult:
+    return assembled(hilly(), "road_grade")
 
+
+class TestAProfile:
     def test_each_recording_has_its_own_over_time(self, road: FitResult) -> None:
         profiles = profiles_of(road, reported_covariance(road), LINE)
         assert set(profiles) == {"run_1", "run_2"}

@@ -64,7 +64,7 @@ def test_a_diagnosis_says_at_every_stage_that_it_compiles(first: bool, monkeypat
     assert [stage.split(" (")[0] for stage in stages[:3]] == (
         ["preparing", "compiling itself", "checking the recordings"]
         if first
-        else ["checking the recordings", "comparing hypotheses", "comparing hypotheses"]
+        else ["checking the recordings", "comparing hypotheses", "simulating what was found"]
     )
     assert {COMPILING in stage for stage in stages} == {first}
     assert not is_first_use()

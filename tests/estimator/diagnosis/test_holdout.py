@@ -35,6 +35,8 @@ class TestBlocks:
         assert out.mean() == pytest.approx(BLOCK_S / EVERY_S, abs=0.01)
         assert not out[:50].any()
         assert not out[-50:].any()
+        short = blocks(record(np.zeros(100), np.zeros(100)))
+        assert short.mean() == pytest.approx(BLOCK_S / EVERY_S, abs=0.05)
         assert BLOCK_S < KNOT_SPACING_S  # so that the profile on both sides can predict it
 
 
