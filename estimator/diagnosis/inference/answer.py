@@ -230,17 +230,28 @@ def _discrepancy(seen: _Seen, line: DrivelineModel) -> Discrepancy:
 
 
 def _rejected(search: Search, decision: Decision) -> tuple[RejectedEffect, ...]:
-    """Return what else was fitted, and by how much the best set with it is less probable than the best of all."""
+    """Return the rivals that were fitted, the nearest first, and then those that were looked at only.
+
+    ``delta_bic`` is by how much the best set with a rival is less probable than the best of all; of one that was not
+    fitted, as if it gained nothing. A rough fit can seem more probable than it is.
+    """
     named = {each.name for each in (*decision.named, *decision.traces)}
-    return tuple(
+    best, nothing = decision.best.score, decision.nothing.score
+    fitted = [
         RejectedEffect(
             name,
             "the recordings are less probable with it in the place of, or beside, what was chosen",
-            decision.best.score - score if name not in decision.best.effects else 0.0,
+            min(best - score, 0.0) if name not in decision.best.effects else 0.0,
         )
         for name, score in sorted(search.rivals.items(), key=lambda item: item[1])
         if name not in named
-    )
+    ]
+    looked_at = [
+        RejectedEffect(name, "a first look at the innovations promises too little for a fit", best - nothing)
+        for name in search.names
+        if name not in named and name not in search.rivals and name not in decision.best.effects
+    ]
+    return (*fitted, *looked_at)
 
 
 def _remainder(seen: _Seen) -> Remainder | None:

@@ -7,6 +7,7 @@ import pytest
 
 from estimator.diagnosis.diagnose import diagnose
 from estimator.diagnosis.result import Verdict
+from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
 from hil.report.diagnosis_json import diagnosis_json
 from tests.estimator.diagnosis.one_effect import bench_with
@@ -31,6 +32,11 @@ def test_a_named_effect_has_its_share_and_probability_and_the_model_has_it() -> 
     assert content["remainder"] is None
     assert content["traces"] == []
     assert content["mismatch"]["element"] == "motor"
+    rejected = [rival["name"] for rival in content["rejected"]]
+    told = ["coulomb_friction_motor", *rejected, *(entry["name"] for entry in content["untestable"])]
+    can_be = [n for n, entry in EFFECTS.items() if bench.model.structure in entry.structures and not entry.recognised]
+    assert sorted(told) == sorted(can_be)
+    assert all(rival["delta_bic"] <= 0.0 for rival in content["rejected"])
 
 
 def test_nothing_missing_is_told_with_the_noise() -> None:
