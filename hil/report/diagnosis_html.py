@@ -30,7 +30,7 @@ from hil.report.figures import (
 )
 from hil.report.interval_bar import interval_bar
 from hil.report.numbers import p_statement, shown, shown_interval, shown_ratio, shown_times
-from hil.report.wording import BADGES, ELEMENTS, headline, listed, quantity, torque_axis
+from hil.report.wording import BADGES, ELEMENTS, belief, headline, listed, quantity, torque_axis
 
 MOST_DRAWN = 20
 """Recordings drawn at most; beyond, those with the largest error of the re-tuned model."""
@@ -152,8 +152,8 @@ def _unnamed(diagnosis: Diagnosis, law: UnnamedLaw) -> str:
     return html.section(
         "A law without a name",
         html.paragraph(
-            f"At the {ELEMENTS[law.element]} these terms follow the mismatch best; to first order they bring the error "
-            f"from {shown(law.rms_before, unit)} to {shown(law.rms_after, unit)}. It is a description, not a cause."
+            f"At the {ELEMENTS[law.element]} these terms follow the mismatch best; with them the error falls from "
+            f"{shown(law.rms_before, unit)} to {shown(law.rms_after, unit)}. It is a description, not a cause."
         ),
         html.table(("term", "coefficient, or RMS where it has several"), rows, numbers=(1,)),
         *_pictures_at(diagnosis, law.element),
@@ -180,8 +180,8 @@ def _effect(diagnosis: Diagnosis, effect: FoundEffect) -> list[str]:
     pieces += law_pictures(diagnosis, effect.name)
     pieces.append(
         html.paragraph(
-            f"Evidence: information criterion better by {shown(evidence.delta_bic)}; error on unseen data "
-            f"{shown(evidence.holdout_rms_before)} → {shown(evidence.holdout_rms_after)}; "
+            f"{belief(effect)}Evidence: information criterion better by {shown(evidence.delta_bic)}; error on unseen "
+            f"data {shown(evidence.holdout_rms_before)} → {shown(evidence.holdout_rms_after)}; "
             f"{p_statement(evidence.p_value)}."
         )
     )

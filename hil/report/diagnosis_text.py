@@ -12,7 +12,7 @@ from rich.text import Text
 
 from estimator.diagnosis.result import Diagnosis, Verdict
 from hil.report.numbers import shown, shown_interval, shown_ratio
-from hil.report.wording import BADGES, ELEMENTS, headline
+from hil.report.wording import BADGES, ELEMENTS, belief, headline
 
 _COLOURS = MappingProxyType(
     {
@@ -37,6 +37,8 @@ def diagnosis_summary(diagnosis: Diagnosis) -> RenderableType:
     ]
     if diagnosis.effects:
         pieces.append(_effects_table(diagnosis))
+    told = [(effect.name, belief(effect).rstrip()) for effect in diagnosis.effects]
+    pieces += [Text(f"{name}: {said}") for name, said in told if said]
     pieces.append(_parameter_table(diagnosis))
     pieces += [Text(f"rejected: {rival.name}: {rival.reason}") for rival in diagnosis.rejected[:MOST_RIVALS]]
     if len(diagnosis.rejected) > MOST_RIVALS:

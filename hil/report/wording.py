@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from types import MappingProxyType
 
-from estimator.diagnosis.result import Diagnosis, Mismatch, Verdict
+from estimator.diagnosis.result import Diagnosis, FoundEffect, Mismatch, Verdict
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
 from estimator.physics.model import Motion, unit
@@ -94,6 +95,13 @@ def headline(diagnosis: Diagnosis) -> str:
     if diagnosis.strays:
         return f"Further from nominal than trusted: {listed([stray.name for stray in diagnosis.strays])}"
     return "Something is missing that no entry of the catalogue explains"
+
+
+def belief(effect: FoundEffect) -> str:
+    """Say how much of the mismatch goes with an effect and how probable it is; "" where that is not known."""
+    if not (math.isfinite(effect.share) and math.isfinite(effect.probability)):
+        return ""
+    return f"{effect.share:.0%} of the squared error goes with it; probability {effect.probability:.3g}. "
 
 
 def _title(name: str) -> str:

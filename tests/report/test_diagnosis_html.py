@@ -219,3 +219,9 @@ def test_a_law_without_a_name_is_shown(diagnosis):
     assert "A law without a name" in page
     assert "w_L |w_L|" in page
     assert "A law without a name" not in diagnosis_page(diagnosis)
+
+
+def test_share_and_probability_of_an_effect_are_shown(diagnosis: Diagnosis) -> None:
+    page = diagnosis_page(diagnosis)
+    assert page.count("% of the squared error goes with it") == 1
+    assert "94% of the squared error goes with it; probability 0.999. Evidence:" in page
