@@ -26,7 +26,7 @@ from estimator.physics.fit import FitResult
 from estimator.physics.layout import LOAD, slot
 from estimator.physics.model import DrivelineModel, EffectValue, parameter_unit, unit
 from estimator.physics.problem import local_part
-from estimator.physics.steps import moments_of
+from estimator.physics.steps import inside, moments_of
 from estimator.physics.unknowns import LOAD_TORQUE
 from estimator.signals.record import FloatArray
 
@@ -35,11 +35,15 @@ PROFILE_POINTS_S = 1.0
 
 
 def moments_in(name: str, result: FitResult) -> dict[str, tuple[Interval, ...]]:
-    """Return when an event lasts in each recording that has it, on the recording's own time [s]."""
+    """Return when an event lasts in each recording that has it, on the recording's own time [s].
+
+    One that would be another effect if it always acted is no event in a recording through which it does.
+    """
     found: dict[str, tuple[Interval, ...]] = {}
     for record, (from_s, to_s) in zip(result.problem.records, moments_of(result, name), strict=True):
         began = float(record.time_s[0] - record.since_start_s[0])
-        if to_s - from_s > record.sample_time_s:
+        is_seen = not EFFECTS[name].permanent or inside(record, from_s) or inside(record, to_s)
+        if is_seen and to_s - from_s > record.sample_time_s:
             found[record.name] = ((began + from_s, began + to_s),)
     return found
 
