@@ -7,7 +7,6 @@ from itertools import pairwise
 import pytest
 
 from hil.errors import RunAborted
-from hil.rig.catch_up import CatchUp
 from hil.rig.drive import SLEPT_THROUGH
 from hil.rig.pacing import FreePacer, Tick
 from hil.rig.sample import SampleFlag
@@ -72,11 +71,3 @@ def test_after_missing_cycles_the_torque_goes_on_from_what_the_drives_hold(
     largest_nm = rig.guard.rate_limit_nm_per_s * rig.period_s + rig.prbs.amplitude_nm
     steps_nm = [abs(b.torque_ref_m1_nm - a.torque_ref_m1_nm) for a, b in pairwise(driven)]
     assert max(steps_nm) <= largest_nm + 1e-6
-
-
-def test_catching_up_takes_as_many_cycles_as_the_rate_wants() -> None:
-    catch_up = CatchUp(most_nm=20.0)
-    planned = {0: 0.0, 1: 10.0, 2: 500.0, 5: 70.0, 6: 75.0, 7: 80.0, 8: 85.0, 9: 500.0}
-    asked = [catch_up.torque_nm(cycle, torque_nm) for cycle, torque_nm in planned.items()]
-    assert asked[:3] == [0.0, 10.0, 500.0], "a plan that is too fast by itself is for the guard"
-    assert asked[3:] == [480.0, 460.0, 440.0, 420.0, 440.0]

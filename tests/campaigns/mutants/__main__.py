@@ -18,7 +18,7 @@ from importlib.machinery import ModuleSpec
 from pathlib import Path
 from types import ModuleType
 
-from tests.campaigns.mutants.changes import Mutant, mutants
+from tests.campaigns.mutants.changes import mutants
 from tests.campaigns.mutants.targets import TARGETS, Target
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -90,14 +90,14 @@ def _try(module: str, source: str, tests: Sequence[str]) -> int:
     return int(pytest.main([*arguments, *tests]))
 
 
-def survivors(module: str, target: Target, every: int = 1, offset: int = 0) -> tuple[int, list[Mutant]]:
-    """Try mutants of one module; give how many were tried, and those that live and are not listed."""
-    chosen = list(mutants(source_of(module).read_text("utf-8")))[offset::every]
-    living = [
-        mutant
-        for mutant in chosen
-        if mutant.change not in target.equivalent and lives(module, mutant.source, target.tests)
-    ]
+def survivors(module: str, target: Target, every: int = 1) -> tuple[int, int]:
+    """Try mutants of one module; give how many there were, and how many live and are not listed, each printed."""
+    chosen = list(mutants(source_of(module).read_text("utf-8")))[::every]
+    living = 0
+    for mutant in chosen:
+        if mutant.change not in target.equivalent and lives(module, mutant.source, target.tests):
+            living += 1
+            print(f"{source_of(module).relative_to(ROOT)}:{mutant.line}: {mutant.change}", flush=True)
     return len(chosen), living
 
 
@@ -115,10 +115,8 @@ def main(arguments: list[str] | None = None) -> int:
         if not lives(module, source_of(module).read_text("utf-8"), target.tests):
             raise SystemExit(f"{module}: its tests fail without a change, so that they show nothing")
         count, living = survivors(module, target, asked.every)
-        tried, found = tried + count, found + len(living)
-        for mutant in living:
-            print(f"{source_of(module).relative_to(ROOT)}:{mutant.line}: {mutant.change}", flush=True)
-        print(f"{module}: {count} mutants, {len(living)} live unlisted, {len(target.equivalent)} listed", flush=True)
+        tried, found = tried + count, found + living
+        print(f"{module}: {count} mutants, {living} live unlisted, {len(target.equivalent)} listed", flush=True)
     print(f"{tried} mutants, {found} live unlisted")
     return int(found > 0)
 

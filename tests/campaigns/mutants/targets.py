@@ -51,8 +51,12 @@ TARGETS: dict[str, Target] = {
             "True -> False": "whether a thread that hangs keeps the program from ending; it ends by its event",
         },
     ),
-    "drivers.canopen.silence": Target(("tests/drivers/test_silence.py",)),
+    "drivers.canopen.silence": Target(
+        ("tests/drivers/test_silence.py",), {"0 -> 1": "a value before the first look, which sets it"}
+    ),
     "drivers.canopen.strangers": Target(("tests/drivers/test_strangers.py",)),
-    "hil.rig.catch_up": Target(("tests/rig/test_slept_through.py",)),
+    "hil.rig.catch_up": Target(
+        ("tests/rig/test_catch_up.py",), {"0.0 -> 1.0": "what is held before the first cycle, which sets it"}
+    ),
     "hil.config.guard_table": Target(("tests/config/test_rig_file.py", "tests/config/test_guard_table.py")),
 }
