@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -25,6 +26,7 @@ from estimator.diagnosis.trial import Trial
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effects import road_grade
 from estimator.physics.fit import FitResult
+from estimator.physics.layout import LOAD, slot
 from estimator.physics.model import DrivelineModel, EffectValue, parameter_unit, unit
 from estimator.physics.problem import local_part
 from estimator.physics.steps import moments_of
@@ -197,7 +199,7 @@ def retuned_parameters(result: FitResult, model: DrivelineModel, whole: bool) ->
             interval_both_ways(result, cov, i) if whole else trusted(result, i),
         )
         for i, shared in enumerate(result.problem.shared)
-        if not shared.effect
+        if not shared.effect and shared.name in model.parameters
     }
     parameters = {}
     for name, parameter in model.parameters.items():
@@ -207,17 +209,20 @@ def retuned_parameters(result: FitResult, model: DrivelineModel, whole: bool) ->
 
 
 def load_torques(result: FitResult, model: DrivelineModel) -> dict[str, Estimated]:
-    """Return the constant load torque of each recording (translation: the offset force), by name."""
+    """Return the constant load torque of each recording (translation: the offset force), by name.
+
+    One that all recordings share, or that the model gives, is every recording's.
+    """
     cov = reported_covariance(result)
     torques = {}
     first = len(result.problem.shared)
+    shared = {unknown.name: (k, unknown.scale) for k, unknown in enumerate(result.problem.shared) if not unknown.effect}
     for i, (record, basis) in enumerate(zip(result.problem.records, result.problem.local, strict=True)):
-        value = local_part(result.problem, result.x, i)[LOAD_TORQUE] * basis.scale[LOAD_TORQUE]
-        index = first + LOAD_TORQUE
-        spread = Z95 * float(np.sqrt(max(cov[index, index], 0.0))) * float(basis.scale[LOAD_TORQUE])
-        torques[record.name] = Estimated(
-            float(value), (float(value - spread), float(value + spread)), unit("torque", model.motion)
-        )
+        own = local_part(result.problem, result.x, i)[LOAD_TORQUE] * basis.scale[LOAD_TORQUE]
+        value = float(own + result.p[slot("", LOAD)])
+        index, scale = shared.get(LOAD, (first + LOAD_TORQUE, float(basis.scale[LOAD_TORQUE])))
+        spread = Z95 * math.sqrt(max(float(cov[index, index]), 0.0)) * scale
+        torques[record.name] = Estimated(value, (value - spread, value + spread), unit("torque", model.motion))
         first += basis.guess.size
     return torques
 

@@ -23,7 +23,7 @@ from estimator.diagnosis.chain import Chain, mechanical, read_through
 from estimator.diagnosis.evidence import Gain, gain, information, noise_level, residuals_by_record
 from estimator.diagnosis.first_use import COMPILING, compile_kernels, is_first_use
 from estimator.diagnosis.holdout import Examiner, foreign_outputs
-from estimator.diagnosis.hypotheses import NOTHING, Progress, effects_of, everything
+from estimator.diagnosis.hypotheses import NOTHING, Progress, effects_of, everything, silent
 from estimator.diagnosis.judgement import Judgement, judge
 from estimator.diagnosis.preconditions import prepare
 from estimator.diagnosis.result import (
@@ -51,15 +51,11 @@ from estimator.physics.problem import make_problem
 from estimator.signals.record import FloatArray, OutputKind, Record
 
 
-def _silent(_message: str, _share: float) -> None:
-    """Report nothing."""
-
-
 def diagnose(
     records: Sequence[Record],
     model: DrivelineModel,
     holdout: Sequence[Record] = (),
-    progress: Progress = _silent,
+    progress: Progress = silent,
 ) -> Diagnosis:
     """Find out whether physics is missing from a model, where, which, and how large it is.
 

@@ -23,6 +23,9 @@ from estimator.signals.record import BoolArray, FloatArray, Record
 BLOCK_S, EVERY_S = 0.6, 2.0
 """Blocks kept out for a profile: shorter than its knot spacing, so that its neighbours predict it."""
 
+FEWEST_BLOCKS = 3
+"""Blocks of a recording at least: it may be shorter than one of these."""
+
 
 @dataclass(frozen=True, slots=True)
 class HoldOut:
@@ -40,10 +43,16 @@ class HoldOut:
 
 
 def blocks(record: Record) -> BoolArray:
-    """Return which samples are kept out: blocks all along, none at the very ends; shape (N,)."""
-    phase = np.mod(record.time_s - record.time_s[0], EVERY_S)
-    middle = 0.5 * (EVERY_S - BLOCK_S)
-    inside: BoolArray = (phase >= middle) & (phase < middle + BLOCK_S)
+    """Return which samples are kept out: blocks all along, none at the very ends; shape (N,).
+
+    A recording too short for as many has shorter ones, closer together.
+    """
+    since_s = record.time_s - record.time_s[0]
+    scale = min(1.0, float(since_s[-1]) / (FEWEST_BLOCKS * EVERY_S))
+    every_s, block_s = scale * EVERY_S, scale * BLOCK_S
+    phase = np.mod(since_s, every_s)
+    middle = 0.5 * (every_s - block_s)
+    inside: BoolArray = (phase >= middle) & (phase < middle + block_s)
     return inside
 
 

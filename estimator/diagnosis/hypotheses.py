@@ -22,6 +22,10 @@ Progress = Callable[[str, float], None]
 """Called with what is being done and the share of the work behind it; raise from it to cancel."""
 
 
+def silent(_message: str, _share: float) -> None:
+    """Report nothing."""
+
+
 def with_effect(effects: Effects, name: str) -> Effects:
     """Add an effect to a set; it replaces the special cases of itself."""
     return (effects - set(EFFECTS[name].contains)) | {name}

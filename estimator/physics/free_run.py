@@ -11,7 +11,7 @@ from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult, fit
 from estimator.physics.grid import Grid
 from estimator.physics.inputs import Case
-from estimator.physics.layout import slot
+from estimator.physics.layout import LOAD, slot
 from estimator.physics.model import DrivelineModel
 from estimator.physics.own_scan import cells, scan, waves
 from estimator.physics.problem import Problem, make_problem, start_of, start_vector
@@ -55,7 +55,9 @@ def free_run(model: DrivelineModel, record: Record) -> FreeRun:
     profile = any(EFFECTS[name].profile for name in model.effects)
     problem = make_problem(model, [record], (), profile=profile)
     result = settle(problem)
-    return FreeRun(result.outputs[0], result.rms, start_of(problem, result.x, 0))
+    start = start_of(problem, result.x, 0)
+    whole = replace(start, load_torque_nm=start.load_torque_nm + float(problem.p[slot("", LOAD)]))
+    return FreeRun(result.outputs[0], result.rms, whole)
 
 
 def settle(problem: Problem) -> FitResult:

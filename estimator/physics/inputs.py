@@ -9,6 +9,7 @@ from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 
+from estimator.physics.layout import LOAD, slot
 from estimator.physics.start import Start, initial_states
 from estimator.physics.torque_path import path_of, recorded_shaft_torque
 from estimator.signals.record import FloatArray, IntArray, Record
@@ -63,7 +64,7 @@ def inputs_of(records: Sequence[Record], of: Sequence[int], cases: Sequence[Case
     for i, case in zip(of, cases, strict=True):
         record, start, extra_nm = records[i], case.start, case.extra_load_nm
         torques.add((i, path_of(case.p)), partial(recorded_shaft_torque, record, case.p))
-        loads.add((i, start.load_torque_nm, id(extra_nm)), partial(load_of, case, record))
+        loads.add((i, start.load_torque_nm + _common(case), id(extra_nm)), partial(load_of, case, record))
     torque, fed_by = torques.found()
     load, loaded_by = loads.found()
     p, starts = np.array([case.p for case in cases]), [case.start for case in cases]
@@ -73,7 +74,12 @@ def inputs_of(records: Sequence[Record], of: Sequence[int], cases: Sequence[Case
 def load_of(case: Case, record: Record) -> FloatArray:
     """Return the load torque of a case over time, shape (N,) [Nm]."""
     extra_nm = 0.0 if case.extra_load_nm is None else case.extra_load_nm
-    return np.broadcast_to(case.start.load_torque_nm + extra_nm, record.time_s.shape)
+    return np.broadcast_to(case.start.load_torque_nm + _common(case) + extra_nm, record.time_s.shape)
+
+
+def _common(case: Case) -> float:
+    """Return the constant load torque that is not the recording's own [Nm]."""
+    return float(case.p[slot("", LOAD)])
 
 
 class _Rows(Generic[Key]):

@@ -8,7 +8,7 @@ import numpy as np
 
 from estimator.physics.catalogue import BUILT_IN, EFFECTS
 from estimator.physics.effect import Effect
-from estimator.physics.model import DrivelineModel, Structure
+from estimator.physics.model import DrivelineModel, Load, Structure
 from estimator.signals.record import FloatArray
 
 NOMINAL = Structure.THREE_MASS.parameter_names
@@ -20,6 +20,12 @@ for _name in NOMINAL:
 for _entry in BUILT_IN.values():
     for _parameter in _entry.parameters:
         _SLOTS[_entry.name, _parameter.name] = len(_SLOTS)
+
+LOAD = "load"
+"""Name of the constant load torque that is not a recording's own, beside the nominal parameters; last of all, since no
+kernel reads it (``inputs``)."""
+
+_SLOTS["", LOAD] = len(_SLOTS)
 
 SIZE = len(_SLOTS)
 """Length of the flat vector, without a user's own laws."""
@@ -43,7 +49,8 @@ def slot(effect: str, parameter: str) -> int:
 
 def flat(model: DrivelineModel) -> FloatArray:
     """Return the kernel's parameter vector of a model, shape (SIZE,): its values, every other effect at null."""
-    return flat_values(model.values(), {name: {k: v.value for k, v in e.items()} for name, e in model.effects.items()})
+    nominal = model.values() if isinstance(model.load, Load) else {**model.values(), LOAD: model.load}
+    return flat_values(nominal, {name: {k: v.value for k, v in e.items()} for name, e in model.effects.items()})
 
 
 def flat_values(nominal: Mapping[str, float], effects: Mapping[str, Mapping[str, float]]) -> FloatArray:

@@ -10,7 +10,8 @@ Equations of motion, reflected to the motor shaft (translation: read kg, N, m, N
 
     joint      T = k phi + c dphi/dt - T_0: the twist phi is imposed, the torque T is measured
 
-``T_0`` is the constant load torque; it and the initial state are unknown in every recording.
+``T_0`` is the constant load torque; it and the initial state are unknown in every recording, unless the model says that
+recordings share it, or what it is.
 """
 
 from __future__ import annotations
@@ -111,6 +112,13 @@ def parameter_unit(name: str, motion: Motion) -> str:
     return unit(parameter_dimension(name), motion)
 
 
+class Load(Enum):
+    """Whose the constant load torque is, where its size is unknown; the value is the word in the model file."""
+
+    OWN = "own"
+    SHARED = "shared"
+
+
 @dataclass(frozen=True, slots=True)
 class Parameter:
     """A nominal value [SI] and the relative tolerance within which re-tuning it is no missing physics."""
@@ -143,6 +151,8 @@ class DrivelineModel:
         Physics beyond the nominal model; empty for a nominal one.
     gear_ratio : float or None
         Motor turns per wheel turn.
+    load : Load or float
+        The constant load torque: unknown, of each recording or of all of them together, or its value [Nm].
 
     Raises
     ------
@@ -155,9 +165,12 @@ class DrivelineModel:
     motion: Motion = Motion.ROTATION
     effects: Mapping[str, Mapping[str, EffectValue]] = field(default_factory=dict)
     gear_ratio: float | None = None
+    load: Load | float = Load.OWN
 
     def __post_init__(self) -> None:
         problems = [*self._parameter_problems(), *self._effect_problems()]
+        if not isinstance(self.load, Load) and not math.isfinite(self.load):
+            problems.append(f"load.constant: expected 'own', 'shared' or a finite number, came {self.load}")
         if problems:
             raise BadModel("\n".join(problems))
 

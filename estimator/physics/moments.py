@@ -101,7 +101,7 @@ def moved(result: FitResult) -> tuple[Problem, FloatArray] | None:
 def _moved_in(result: FitResult, index: int) -> FloatArray | None:
     """Return one recording's unknowns with moments moved; None where none is better elsewhere."""
     basis, local = result.problem.local[index], result.local_of(index).copy()
-    ends = _ends(basis)
+    ends = movable(basis)
     if not ends:
         return None
     misfit = _Misfit(result, index)
@@ -113,8 +113,8 @@ def _moved_in(result: FitResult, index: int) -> FloatArray | None:
         own_end = {begin: first, end: last}
         moves = [[row] for row in may_move] + ([may_move] if len(may_move) > 1 else [])
         for _ in range(MOVES):
-            tried = [_shifted(local, rows, offset) for rows in moves for offset in OFFSETS_S]
-            tried += [_shifted(local, [row], own_end[row] - local[row]) for row in may_move]
+            tried = [shifted(local, rows, offset) for rows in moves for offset in OFFSETS_S]
+            tried += [shifted(local, [row], own_end[row] - local[row]) for row in may_move]
             tried = [local, *(x for x in tried if first <= x[begin] < x[end] <= max(last, local[end]))]
             squares = misfit.squares(tried)
             if squares.min() >= best:
@@ -124,17 +124,18 @@ def _moved_in(result: FitResult, index: int) -> FloatArray | None:
     return local if best < began - least else None
 
 
-def _shifted(local: FloatArray, rows: list[int], offset_s: float) -> FloatArray:
+def shifted(local: FloatArray, rows: list[int], offset_s: float) -> FloatArray:
+    """Return one recording's unknowns with some moments moved."""
     x = local.copy()
     x[rows] += offset_s
     return x
 
 
-def _ends(basis: LocalBasis) -> list[tuple[int, int]]:
+def movable(basis: LocalBasis) -> list[tuple[int, int]]:
     """Return where beginning and end of each event that may move stand among a recording's unknowns."""
     place = {(u.effect, u.name): row for row, u in enumerate(basis.own, start=basis.own_rows.start)}
-    movable = {u.effect for u in basis.own if EFFECTS[u.effect].event and u.low < u.high}
-    return [(place[effect, "from_s"], place[effect, "to_s"]) for effect in sorted(movable)]
+    free = {u.effect for u in basis.own if EFFECTS[u.effect].event and u.low < u.high}
+    return [(place[effect, "from_s"], place[effect, "to_s"]) for effect in sorted(free)]
 
 
 def _around(basis: LocalBasis, local: FloatArray, record: Record) -> LocalBasis:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from estimator.physics.model import DrivelineModel, Load
 from estimator.signals.once import once
 from estimator.signals.record import FloatArray, OutputKind, Record
 
@@ -70,6 +71,17 @@ def reverses(record: Record) -> bool:
     speed = measured_speed(record)
     threshold = 0.01 * float(np.nanpercentile(np.abs(speed), 99))
     return bool(np.sum(speed > threshold) >= 10 and np.sum(speed < -threshold) >= 10)
+
+
+def turns(model: DrivelineModel, records: Sequence[Record]) -> bool:
+    """Tell whether the speed's sign can be told from a constant load torque.
+
+    In a recording with both signs; in several of one sign each, where they share the load; in any, where it is known.
+    """
+    if not isinstance(model.load, Load) or any(reverses(record) for record in records):
+        return True
+    signs = {bool(np.nanmean(measured_speed(record)) > 0.0) for record in records}
+    return model.load is Load.SHARED and len(signs) == 2
 
 
 def torque_reverses(record: Record) -> bool:

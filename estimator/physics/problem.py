@@ -13,11 +13,11 @@ import numpy as np
 
 from estimator.physics.grid import Grid, grid_for
 from estimator.physics.inputs import Case
-from estimator.physics.layout import flat
-from estimator.physics.model import DrivelineModel
+from estimator.physics.layout import LOAD, flat, slot
+from estimator.physics.model import DrivelineModel, Load
 from estimator.physics.simulate import simulate_each, simulate_records
 from estimator.physics.start import Start
-from estimator.physics.unknowns import LocalBasis, Shared, local_basis, own_unknowns
+from estimator.physics.unknowns import LocalBasis, Shared, local_basis, own_unknowns, shared_load
 from estimator.signals.once import once
 from estimator.signals.record import BoolArray, FloatArray, Record
 
@@ -57,17 +57,24 @@ def make_problem(
 ) -> Problem:
     """Set up a fit of ``shared`` and every recording's own unknowns, from a model's values and effects.
 
-    ``own`` holds the own parameters of effects for each recording; by default those of the model's effects.
+    ``own`` holds the own parameters of effects for each recording; by default those of the model's effects. A constant
+    load torque that all recordings share is an unknown beside ``shared``; of one recording it is its own.
     """
     if own is None:
         own = [own_unknowns(model.effects, record) for record in records]
+    if model.load is Load.SHARED and len(records) > 1 and not any(unknown.slot == slot("", LOAD) for unknown in shared):
+        shared = (*shared, shared_load(model, records))
+    has_own_load = model.load is Load.OWN or (model.load is Load.SHARED and len(records) == 1)
     effects = frozenset(model.effects) | {unknown.effect for unknown in shared}
     return Problem(
         grid or grid_for(model, records),
         tuple(records),
         flat(model),
         tuple(shared),
-        tuple(local_basis(model, record, profile, mine, effects) for record, mine in zip(records, own, strict=True)),
+        tuple(
+            local_basis(model, record, profile, mine, effects, has_own_load)
+            for record, mine in zip(records, own, strict=True)
+        ),
         tuple(record.okay for record in records) if use is None else tuple(use),
     )
 
@@ -112,7 +119,7 @@ def outputs_at(problem: Problem, x: FloatArray) -> tuple[FloatArray, ...]:
 
 
 def start_of(problem: Problem, x: FloatArray, index: int) -> Start:
-    """Return load torque and initial state of one recording."""
+    """Return load torque, as far as it is its own, and initial state of one recording."""
     return problem.local[index].start(local_part(problem, x, index))
 
 

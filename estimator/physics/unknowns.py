@@ -14,7 +14,7 @@ from estimator.physics import effect
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Effect, EffectParameter, Held, Within
 from estimator.physics.effects import road_grade
-from estimator.physics.layout import slot
+from estimator.physics.layout import LOAD, slot
 from estimator.physics.model import DrivelineModel, Structure, natural_frequencies_rad_s
 from estimator.physics.motion import measured_speed, speed_scale, torque_scale
 from estimator.physics.simulate import motor_angle
@@ -241,16 +241,20 @@ def local_basis(
     profile: bool,
     own: tuple[Shared, ...] = (),
     effects: frozenset[str] = frozenset(),
+    has_own_load: bool = True,
 ) -> LocalBasis:
-    """Set up the unknowns of one recording under some effects, with a start read off its first samples."""
+    """Set up the unknowns of one recording under some effects, with a start read off its first samples.
+
+    Without a load torque of its own that is held at 0: what the model or all recordings have comes on top.
+    """
     if model.structure is Structure.JOINT:
-        return _joint_basis(record, own, effects)
+        return _joint_basis(record, own, effects, has_own_load)
     speed = measured_speed(record)
     v_scale, t_scale = speed_scale([record]), torque_scale([record])
     first = speed[np.flatnonzero(np.isfinite(speed))[:3]].mean()
     load = _mean_load(model, record, speed)
     has_angle = record.kind is OutputKind.POSITION
-    scale, guess = [0.1 * t_scale, 0.1 * v_scale], [load, first]
+    scale, guess = [0.1 * t_scale, 0.1 * v_scale], [load if has_own_load else 0.0, first]
     if has_angle:
         y = record.output[record.okay]
         scale.append(max(0.01 * float(np.ptp(y)), np.finfo(float).tiny))
@@ -265,16 +269,27 @@ def local_basis(
     count = shape.shape[0]
     all_scales = np.array(scale + [1.0] * len(own) + [0.05 * t_scale] * count)
     all_guesses = np.array(guess + [unknown.start for unknown in own] + [0.0] * count)
-    return LocalBasis(model.structure, has_angle, all_scales, all_guesses / all_scales, own, shape)
+    held = () if has_own_load else (LOAD_TORQUE,)
+    return LocalBasis(model.structure, has_angle, all_scales, all_guesses / all_scales, own, shape, held)
 
 
-def _joint_basis(record: Record, own: tuple[Shared, ...], effects: frozenset[str]) -> LocalBasis:
+def shared_load(model: DrivelineModel, records: Sequence[Record]) -> Shared:
+    """Return the constant load torque that all recordings share as an unknown."""
+    scale = 0.1 * torque_scale(records)
+    guesses = (
+        0.0 if record.imposed is not None else _mean_load(model, record, measured_speed(record)) for record in records
+    )
+    return Shared("", LOAD, scale, -np.inf, np.inf, sum(guesses) / len(records) / scale)
+
+
+def _joint_basis(record: Record, own: tuple[Shared, ...], effects: frozenset[str], has_own_load: bool) -> LocalBasis:
     """Set up the constant torque of a joint, its twist at the start and its preload, none until a fit knows better."""
     held = (*(() if effects & TELLS_REST else (TWIST,)), *(() if "backlash" in effects else (PRELOAD,)))
     twist = max(0.1 * float(np.ptp(motor_angle(record))), np.finfo(float).tiny)
     torque = 0.1 * torque_scale([record])
     scale = np.array([torque, twist, torque, *[1.0] * len(own)])
-    load = -float(record.output[record.okay].mean())
+    held = held if has_own_load else (LOAD_TORQUE, *held)
+    load = -float(record.output[record.okay].mean()) if has_own_load else 0.0
     guess = np.array([load, 0.0, 0.0, *(unknown.start for unknown in own)])
     nothing = np.empty((0, record.time_s.size))
     return LocalBasis(Structure.JOINT, False, scale, guess / scale, own, nothing, held)

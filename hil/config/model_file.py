@@ -20,7 +20,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from tomlkit.items import InlineTable, Table
 
 from estimator.errors import BadModel
-from estimator.physics.model import DrivelineModel, EffectValue, Motion, Parameter, Structure, parameter_unit
+from estimator.physics.model import DrivelineModel, EffectValue, Load, Motion, Parameter, Structure, parameter_unit
 from hil.config.file_schema import FileKind, schema_line
 from hil.config.laws import LawTable, install_laws, moved
 from hil.config.problems import Fault, problem_lines, read_toml, refuse
@@ -71,6 +71,10 @@ class _Geometry(_Strict):
     gear_ratio: float = Field(gt=0)
 
 
+class _Load(_Strict):
+    constant: Literal["own", "shared"] | float = "own"
+
+
 class ModelDocument(_Strict):
     """The file's tables, before the model is made of them."""
 
@@ -79,6 +83,7 @@ class ModelDocument(_Strict):
     motion: Annotated[Motion, Field(strict=False)] = Motion.ROTATION
     parameters: dict[str, _ParameterEntry]
     geometry: _Geometry | None = None
+    load: _Load | None = None
     effects: dict[str, dict[str, _EffectEntry]] = {}
     laws: dict[str, LawTable] = {}
     signals: SignalsConfig | None = None
@@ -204,7 +209,14 @@ def _model(content: Mapping[str, Any], without: Collection[str] = ()) -> Driveli
             if name not in without
         },
         gear_ratio=_number(content.get("geometry"), "gear_ratio", None),
+        load=_load(content.get("load")),
     )
+
+
+def _load(table: object) -> Load | float:
+    """Return whose the constant load torque is, or what it is."""
+    given = _number(table, "constant", None)
+    return _member(Load, _table(table).get("constant")) or Load.OWN if given is None else given
 
 
 def _member(kind: type[Kind], value: object) -> Kind | None:
@@ -243,6 +255,9 @@ def _as_toml(model: DrivelineModel, signals: SignalsConfig | None, laws: Mapping
     document["parameters"] = parameters
     if model.gear_ratio is not None:
         document["geometry"] = {"gear_ratio": float(model.gear_ratio)}
+    if model.load is not Load.OWN:
+        constant = model.load.value if isinstance(model.load, Load) else float(model.load)
+        document["load"] = {"constant": constant}
     if model.effects:
         document["effects"] = _effects_table(model)
     if laws:

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from estimator.physics.catalogue import EFFECTS
-from estimator.physics.model import DrivelineModel, EffectValue, Motion, Parameter, Structure
+from estimator.physics.model import DrivelineModel, EffectValue, Load, Motion, Parameter, Structure
 from estimator.signals.record import Location, OutputKind
 from hil.config.model_file import read_model, read_model_for_recordings, write_model
 from hil.errors import ModelFileError
@@ -65,6 +65,20 @@ def test_a_nominal_file_becomes_a_model(tmp_path: Path) -> None:
     assert file.model.effects == {}
     assert file.model.parameters["k"] == Parameter(4200.0, 0.2)
     assert list(file.model.values()) == ["J_M", "J_L", "k", "c", "b_M", "b_L"]
+
+
+@pytest.mark.parametrize(
+    ("table", "load"),
+    [
+        ("", Load.OWN),
+        ("[load]", Load.OWN),
+        ('[load]\nconstant = "own"', Load.OWN),
+        ('[load]\nconstant = "shared"', Load.SHARED),
+        ("[load]\nconstant = -3", -3.0),
+    ],
+)
+def test_the_constant_load_is_own_shared_or_a_number(tmp_path: Path, table: str, load: Load | float) -> None:
+    assert read_model(write(tmp_path, f"{ONE_MASS}\n{table}\n")).model.load == load
 
 
 def test_signals_say_how_a_recording_is_read(tmp_path: Path) -> None:
@@ -166,6 +180,9 @@ def test_a_wrong_line_is_refused_by_its_key(tmp_path: Path, line: str, said: str
         ("k = { value = 1, tolerance = 0 }", "parameters.k: unknown, one_mass has J_M, b_M"),
         ("[geometry]\ngear_ratio = 0", "geometry.gear_ratio | expected greater than 0 | came 0"),
         ("[geometry]\nratio = 5", "geometry.gear_ratio | expected this key"),
+        ('[load]\nconstant = "everyone\'s"', "load.constant | expected"),
+        ("[load]\nconstant = nan", "load.constant | expected"),
+        ("[load]\nconst = 5", "load.const | expected one of the known keys (constant)"),
         ("[geometries]", "geometries | expected one of the known keys (schema, structure,"),
         ("[effects.gremlins]\nsize = { value = 1 }", "effects.gremlins: unknown effect, expected one of"),
         (
@@ -277,6 +294,7 @@ def models(draw: st.DrawFn) -> DrivelineModel:
             for name in chosen
         },
         gear_ratio=draw(st.none() | finite),
+        load=draw(st.sampled_from(Load) | finite),
     )
 
 

@@ -112,7 +112,7 @@ def fitted(
     best: Hypothesis | None = None
     passes: list[float] = []
     while best is None or len(passes) < MOST_PASSES:
-        plain = _with_moments(_weighted(plain, sizes, ITERATIONS), sizes)
+        plain = _with_moments(weighted(plain, sizes, ITERATIONS), sizes)
         begun = [sizes] if passes else starts(sizes, limits)
         sizes, now = min((_disturbances(plain, each, limits) for each in begun), key=lambda found: found[1])
         enough = SAME if math.isnan(rival) else max(SAME, DIGITS * abs(now - rival))
@@ -131,7 +131,7 @@ def compared(effects: Effects, problem: Problem, x: FloatArray, parent: Hypothes
     Its disturbances would be smaller: with all of them in one proportion minus twice the log-likelihood falls by
     ``n log(Q / Q')``, Q the squared innovations.
     """
-    plain = _weighted(not_fitted(problem, x), parent.sizes, ROUGH)
+    plain = weighted(not_fitted(problem, x), parent.sizes, ROUGH)
     before, after = (float(np.sum(parent.filter(fit.residual) ** 2)) for fit in (parent.plain, plain))
     fall = plain.residual.size * math.log(before / after)
     choices = choices_of(effects, hypotheses)
@@ -143,7 +143,7 @@ def _disturbances(plain: FitResult, sizes: FloatArray, limits: Limits) -> tuple[
     return estimate(line_of(plain), plain.residual, sizes, limits, period_s, problem.use, ROUNDS)
 
 
-def _weighted(plain: FitResult, sizes: FloatArray, iterations: int) -> FitResult:
+def weighted(plain: FitResult, sizes: FloatArray, iterations: int) -> FitResult:
     """Return a fit whose innovations under fixed disturbances are least."""
     problem = plain.problem
     low, high = bounds(problem)
@@ -180,7 +180,7 @@ def _with_moments(plain: FitResult, sizes: FloatArray) -> FitResult:
         x = moved(plain, filtered)
         if x is None:
             break
-        plain = _weighted(not_fitted(problem, x), sizes, ITERATIONS)
+        plain = weighted(not_fitted(problem, x), sizes, ITERATIONS)
     return plain
 
 

@@ -76,7 +76,7 @@ def _dependent(best: Hypothesis, whole: FloatArray) -> float:
     problem = best.plain.problem
     torque, speed, angle = (
         np.concatenate([signal(record)[use] for record, use in zip(problem.records, problem.use, strict=True)])
-        for signal in (lambda r: r.total_torque_nm, lambda r: np.nan_to_num(measured_speed(r)), motor_angle)
+        for signal in (_driven_by, lambda r: np.nan_to_num(measured_speed(r)), motor_angle)
     )
     columns = [np.ones(whole.size)]
     for signal in (torque, speed):
@@ -86,6 +86,11 @@ def _dependent(best: Hypothesis, whole: FloatArray) -> float:
     basis = np.linalg.qr(np.column_stack(columns))[0]
     explained = float(np.sum((basis.T @ whole) ** 2)) / float(whole @ whole)
     return explained - len(columns) / whole.size
+
+
+def _driven_by(record: Record) -> FloatArray:
+    """Return what drives a line: its torque; of a joint, whose torque is what is read, the imposed motion."""
+    return record.total_torque_nm if record.imposed is None else record.imposed
 
 
 def _line(error: FloatArray) -> float:

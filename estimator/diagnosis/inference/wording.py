@@ -4,20 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from estimator.diagnosis.inference.data_sheet import in_words
 from estimator.diagnosis.inference.verdict import Decision
-from estimator.diagnosis.result import Fit, FoundEffect, UntestableEffect, Verdict
+from estimator.diagnosis.phrases import PLACE_NAMES
+from estimator.diagnosis.result import Fit, FoundEffect, Remainder, Stray, UntestableEffect, Verdict
 
 
 def statement(
-    decision: Decision, effects: Sequence[FoundEffect], fit: Fit, untestable: Sequence[UntestableEffect]
+    decision: Decision,
+    effects: Sequence[FoundEffect],
+    fit: Fit,
+    untestable: Sequence[UntestableEffect],
+    remainder: Remainder | None,
+    strays: Sequence[Stray] = (),
 ) -> str:
     """Return one paragraph: verdict, figures, and what to do next."""
-    parts = [_headline(decision, effects, fit)]
-    if decision.failed:
-        parts.append(
-            f"What is left, {decision.times_noise:.2g} times the reading's noise, is more than noise and drift: it is "
-            f"{', '.join(test.name for test in decision.failed)}."
-        )
+    parts = [_wrong_values(fit, strays) if strays else _headline(decision, effects, fit)]
+    if remainder is not None and not strays:
+        parts.append(_left(decision, remainder))
     if decision.traces:
         parts.append(f"Too small to count, but seen: {', '.join(each.name for each in decision.traces)}.")
     twins = sorted({twin for effect in effects for twin in effect.indistinguishable_from})
@@ -29,6 +33,25 @@ def statement(
         parts.append(f"These recordings can't tell {names}; a {' or '.join(tests)} test would.")
     parts += [f"Without {entry.needs}, {entry.name} can't be told." for entry in untestable if entry.needs]
     return " ".join(parts)
+
+
+def _wrong_values(fit: Fit, strays: Sequence[Stray]) -> str:
+    left = f"{fit.retuned:.3g} {fit.unit} against a noise of {fit.noise_floor:.3g} {fit.unit}"
+    return (
+        f"Inside its tolerances the nominal model leaves {left}, but no physics need be missing: the same line "
+        f"explains the recordings to the noise with {in_words(strays)}. Check the data sheet, or widen the tolerance "
+        "where it is a guess, and diagnose again."
+    )
+
+
+def _left(decision: Decision, remainder: Remainder) -> str:
+    law = ""
+    if remainder.element is not None:
+        law = f", and looks most like {remainder.law} at the {PLACE_NAMES[remainder.element]}"
+    return (
+        f"What is left, {remainder.times_noise:.2g} times the reading's noise, is more than noise and drift: it is "
+        f"{', '.join(test.name for test in decision.failed)}{law}."
+    )
 
 
 def _headline(decision: Decision, effects: Sequence[FoundEffect], fit: Fit) -> str:
@@ -43,7 +66,8 @@ def _headline(decision: Decision, effects: Sequence[FoundEffect], fit: Fit) -> s
         part = "part of it" if decision.verdict is Verdict.PARTLY_EXPLAINED else "all of it"
         return (
             f"The model leaves something out, and this explains {part}: {found}. The free-run error falls from "
-            f"{fit.retuned:.3g} to {fit.augmented:.3g} {fit.unit}."
+            f"{fit.retuned:.3g} to {fit.augmented:.3g} {fit.unit}, on samples not used for the fit from "
+            f"{fit.holdout_retuned:.3g} to {fit.holdout_augmented:.3g} {fit.unit}."
         )
     return (
         f"There is a mismatch that no entry of the catalogue explains: the re-tuned nominal model leaves "

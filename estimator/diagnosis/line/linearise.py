@@ -11,7 +11,7 @@ from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
 from estimator.physics.kernel import slots, state_vector
 from estimator.physics.kernel.line import is_bristled_at_load, is_bristled_at_motor
-from estimator.physics.layout import slot
+from estimator.physics.layout import LOAD, slot
 from estimator.physics.model import Structure, natural_frequencies_rad_s
 from estimator.physics.motion import speed_scale, torque_scale
 from estimator.physics.problem import start_of
@@ -69,7 +69,7 @@ def tangent(result: FitResult, index: int, length: int) -> Tangent:
         _setting(result, record, angle),
         Nudges(np.array(states), NUDGE * scale, NUDGE * torque_scale([record])),
         torque,
-        _load(result, index, start.load_torque_nm),
+        _load(result, index, start.load_torque_nm + float(p[slot("", LOAD)])),
         p,
         direct,
         initial_state(start, torque[0], angle[0], p),

@@ -10,10 +10,12 @@ from estimator.diagnosis.joined import joined
 from estimator.diagnosis.preconditions.clipped import without_clipped
 from estimator.diagnosis.preconditions.exciting import require_excitation, require_signals
 from estimator.diagnosis.preconditions.model_values import model_warnings
+from estimator.diagnosis.preconditions.not_read import without_not_read
 from estimator.diagnosis.preconditions.room import require_room
 from estimator.diagnosis.preconditions.thinned import thinned
 from estimator.diagnosis.preconditions.together import require_together
 from estimator.diagnosis.preconditions.units import require_plausible_units
+from estimator.diagnosis.preconditions.wrapped import unwrapped
 from estimator.diagnosis.result import Diagnosis
 from estimator.diagnosis.segments import Cut, cut
 from estimator.errors import NotExciting
@@ -37,6 +39,16 @@ class Prepared:
         return replace(whole, warnings=(*self.warnings, *whole.warnings))
 
 
+def _as_moved(records: Sequence[Record]) -> tuple[list[Record], list[str]]:
+    """Return recordings without what no sensor has read, and what there is to say of it."""
+    warnings: list[str] = []
+    mended = list(records)
+    for mend in (unwrapped, without_clipped, without_not_read):
+        mended, said = mend(mended)
+        warnings += said
+    return mended, warnings
+
+
 def prepare(records: Sequence[Record], model: DrivelineModel, holdout: Sequence[Record] = ()) -> Prepared:
     """Check and mend recordings before anything is fitted.
 
@@ -52,7 +64,7 @@ def prepare(records: Sequence[Record], model: DrivelineModel, holdout: Sequence[
         Torque, output or time that is off by a factor or in sign.
     """
     require_together([*records, *holdout] if records else records)
-    mended, warnings = without_clipped([*records, *holdout])
+    mended, warnings = _as_moved([*records, *holdout])
     for record in mended:
         output_state(record, model.structure)
         require_signals(record)

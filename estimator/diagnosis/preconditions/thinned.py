@@ -24,6 +24,9 @@ LONGEST_S = 0.01
 LONGEST_OF_RIGID_S = 0.02
 """The same where a likelihood of the samples is formed: on a millisecond's grid only an encoder's steps are seen."""
 
+FEWEST_KEPT = 200
+"""Samples of the shortest recording that are kept in any case: fewer do not carry a model with a dozen unknowns."""
+
 PER_PERIOD = 12.0
 """Samples kept per period of the line's fastest mode, at least; and one in `LONGEST_S`."""
 
@@ -36,8 +39,13 @@ def thinned(records: Sequence[Record], model: DrivelineModel) -> list[Record]:
 
 
 def as_slow_as_needed(records: Sequence[Record], model: DrivelineModel) -> list[Record]:
-    """Return recordings with no more samples than the line can answer to: between them only the sensor is seen."""
-    return [_thin(record, factor_for(record.sample_time_s, model, LONGEST_OF_RIGID_S)) for record in records]
+    """Return recordings with no more samples than the line can answer to: between them only the sensor is seen.
+
+    Of a short one enough are kept for a model and its noise.
+    """
+    shortest = min(record.okay.size for record in records)
+    factor = min(factor_for(records[0].sample_time_s, model, LONGEST_OF_RIGID_S), max(shortest // FEWEST_KEPT, 1))
+    return [_thin(record, factor) for record in records]
 
 
 def factor_for(sample_time_s: float, model: DrivelineModel, longest_s: float = LONGEST_S) -> int:

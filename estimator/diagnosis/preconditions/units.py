@@ -2,20 +2,23 @@
 
 A fit would put all of a wrong unit into its parameters and what is left into effects, and a verdict on it would be
 about the unit. An inertia far outside its tolerance is believed where the motion follows from the torque by it; then it
-is no missing physics but a factor.
+is no missing physics but a factor. A torque that stops at a limit or is lost over time is no factor, and left to the
+diagnosis.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
+
+import numpy as np
 
 from estimator.diagnosis.preconditions.factors import known_factors
 from estimator.diagnosis.preconditions.inertia import Inertia, fitted_inertia
 from estimator.errors import BadModel, Implausible
 from estimator.physics.grid import grid_for
 from estimator.physics.model import DrivelineModel, Motion, parameter_unit
-from estimator.signals.record import OutputKind, Record
+from estimator.signals.record import FloatArray, OutputKind, Record
 
 BEYOND = 2.5
 """Factor beyond an inertia's tolerance that is implausible: payloads, derating and closed clutches are less, the
@@ -29,6 +32,12 @@ CLEARLY = 0.5
 
 NAMED = 2
 """Known factors that a message names."""
+
+LIMITS = (0.7, 0.5, 0.35, 0.25, 0.15, 0.1, 0.07, 0.05)
+"""Limits of a torque that are tried, in its largest reading: what is read beyond is not there."""
+
+DEPTHS, TIMES = (0.5, 0.8, 0.95), (0.05, 0.3, 1.0)
+"""Losses of a torque over time that are tried, and their time constants in the recording's length."""
 
 UNKNOWN = "No common unit is off by this; is one of several torques counted with the wrong sign?"
 
@@ -49,7 +58,7 @@ def require_plausible_units(records: Sequence[Record], model: DrivelineModel) ->
         if found is not None and _is_plausible(found, line):
             continue
         _ask_for_more_than_a_factor(record, line, found)
-        if found is not None:
+        if found is not None and not _is_of_the_torque_path(record, line, found):
             raise Implausible(_statement(record, line, found))
 
 
@@ -75,6 +84,32 @@ def _ask_for_more_than_a_factor(record: Record, line: DrivelineModel, found: Ine
                 f"input {i + 1} turned round. All torques count positive in the direction of the speed: give that "
                 "column a negative scale in [signals]."
             )
+
+
+def _is_of_the_torque_path(record: Record, line: DrivelineModel, found: Inertia) -> bool:
+    """Tell whether a torque that stops at a limit, or is lost over time, explains more than a factor does.
+
+    Either makes an inertia look too large, and is an entry of the catalogue: not to be refused but to be found.
+    """
+    if found.ratio < 0.0:
+        return False
+    others = (_inertia(replace(record, torque_nm=torque), line) for torque in _lessened(record))
+    rest = CLEARLY * (1.0 - found.share)
+    return any(each is not None and _is_plausible(each, line) and 1.0 - each.share < rest for each in others)
+
+
+def _lessened(record: Record) -> Iterable[FloatArray]:
+    """Yield the torques that a path with limits, or with a loss over time, would let through, shape (N, M)."""
+    read, count = record.torque_nm, record.torque_nm.shape[1]
+    most = np.abs(read).max(axis=0)
+    for share in LIMITS:
+        for inputs in [range(count), *([i] for i in range(count if count > 1 else 0))]:
+            limit = np.where(np.isin(np.arange(count), list(inputs)), share * most, np.inf)
+            yield np.clip(read, -limit, limit)
+    since = record.since_start_s[:, np.newaxis]
+    for depth in DEPTHS:
+        for time in TIMES:
+            yield read * (1.0 - depth * (1.0 - np.exp(-since / (time * since[-1]))))
 
 
 def _inertia(record: Record, line: DrivelineModel) -> Inertia | None:

@@ -3,7 +3,7 @@
 from estimator.diagnosis.unnamed.hunt import Hunt
 from estimator.diagnosis.unnamed.laws import LAGS
 from estimator.diagnosis.unnamed.look_again import without_law
-from estimator.diagnosis.unnamed.scene import Scene, scene
+from estimator.diagnosis.unnamed.scene import Filter, Scene, scene
 from estimator.diagnosis.unnamed.search import (
     ROUNDS,
     UnnamedLaw,
@@ -18,6 +18,7 @@ from estimator.diagnosis.unnamed.search import (
 __all__ = [
     "LAGS",
     "ROUNDS",
+    "Filter",
     "Hunt",
     "Scene",
     "UnnamedLaw",

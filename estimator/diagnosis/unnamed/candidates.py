@@ -75,8 +75,8 @@ def answers(view: Scene, element: Element, laws: Sequence[Sequence[Columns]]) ->
         return np.zeros((0, sum(int(line.rows.sum()) for line in view.cut)))
 
     def part(i: int) -> FloatArray:
-        line = view.cut[i]
-        return _answers_of(line, element, np.concatenate([columns[i].T for columns in laws]))[:, line.rows]
+        functions = np.concatenate([columns[i].T for columns in laws])
+        return view.rows(i, _answers_of(view.cut[i], element, functions).T).T
 
     return np.hstack(concurrently(part, range(len(view.cut))))
 

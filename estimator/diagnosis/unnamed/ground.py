@@ -50,13 +50,12 @@ def ground_of(view: Scene) -> Ground:
     result = view.result
     jacobian = jacobian_at(result.problem, result.x, result.outputs)
     row, parts = 0, []
-    for line, use in zip(view.cut, result.problem.use, strict=True):
+    for i, (line, use) in enumerate(zip(view.cut, result.problem.use, strict=True)):
         count, full = int(use.sum()), np.zeros(use.size)
-        part = np.empty((int(line.rows.sum()), result.x.size))
+        part = np.empty((line.size, result.x.size))
         for j in range(result.x.size):
             full[use] = jacobian[row : row + count, j]
-            part[:, j] = block_mean_of(full, use, line.length)[0][line.rows]
+            part[:, j] = block_mean_of(full, use, line.length)[0]
         row += count
-        parts.append(part)
-    error = np.concatenate([line.error[line.rows] for line in view.cut])
-    return Ground(view.cut, np.vstack(parts), error, result.pinned)
+        parts.append(view.rows(i, part))
+    return Ground(view.cut, np.vstack(parts), np.concatenate(view.errors), result.pinned)

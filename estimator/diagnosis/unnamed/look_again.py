@@ -7,6 +7,7 @@ the simulation better is shortened (Gauss-Newton over the model's unknowns and t
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -44,7 +45,7 @@ def again(hunt: Hunt) -> Hunt:
         x = np.clip(before.x + share * step, *bounds(before.problem))
         extra = extra_of(hunt.view, hunt.element, weights)
         moved = replace(before, x=x, outputs=tuple(extra.outputs(before, [x], i)[0] for i in range(len(weights))))
-        if _squares(moved) < _squares(before):
+        if _squares(hunt.view, moved) < _squares(hunt.view, before):
             return _looked(hunt, moved, extra, weights, cost(hunt, terms, terms_of(hunt, terms, coefficients)))
     return _given_up(hunt)
 
@@ -53,9 +54,8 @@ def _given_up(hunt: Hunt) -> Hunt:
     """Return a hunt that goes no further; a law that was only promised, and not simulated, is none."""
     if any(w.any() for w in hunt.weights):
         return replace(hunt, stuck=True)
-    error = np.concatenate([line.error[line.rows] for line in hunt.view.cut])
-    mean_square, errors = float(error @ error) / error.size, hunt.ground.split(error)
-    return replace(hunt, stuck=True, law=NO_LAW, mean_square=mean_square, errors=errors)
+    errors = hunt.view.errors
+    return replace(hunt, stuck=True, law=NO_LAW, mean_square=_mean_square(errors), errors=errors)
 
 
 def without_law(hunt: Hunt) -> FitResult:
@@ -68,10 +68,10 @@ def without_law(hunt: Hunt) -> FitResult:
 def _looked(hunt: Hunt, moved: FitResult, extra: Extra, weights: list[FloatArray], law: Found) -> Hunt:
     """Look at the error of a simulation with a law, and choose among the forms again."""
     cut = lines(moved, extra.forces, hunt.view.cut[0].length)  # in which the law found is written
-    view = Scene(moved, cut, hunt.view.explanations)
+    view = replace(hunt.view, result=moved, cut=cut)
     known = answers(view, hunt.element, [[w[:, np.newaxis] for w in weights]])[0]
-    error = np.concatenate([line.error[line.rows] for line in view.cut])
-    ground = Ground(view.cut, _jacobian(view, extra), error + known, moved.pinned)
+    errors = view.errors
+    ground = Ground(view.cut, _jacobian(view, extra), np.concatenate(errors) + known, moved.pinned)
     path = pursue(candidates(view, hunt.element, hunt.forms), ground)
     return replace(
         hunt,
@@ -80,15 +80,24 @@ def _looked(hunt: Hunt, moved: FitResult, extra: Extra, weights: list[FloatArray
         path=path,
         weights=weights,
         law=law,
-        mean_square=float(error @ error) / error.size,
-        errors=ground.split(error),
+        mean_square=_mean_square(errors),
+        errors=errors,
     )
 
 
-def _squares(result: FitResult) -> float:
-    """Return the sum of squares of the error of simulated outputs."""
-    left = residual_at(result.problem, result.outputs)
-    return float(left @ left)
+def _mean_square(errors: Sequence[FloatArray]) -> float:
+    return sum(float(error @ error) for error in errors) / sum(error.size for error in errors)
+
+
+def _squares(view: Scene, result: FitResult) -> float:
+    """Return the sum of squares of the error of simulated outputs, whitened where the view is."""
+    if view.filter is None:
+        left = residual_at(result.problem, result.outputs)
+        return float(left @ left)
+    problem = result.problem
+    pairs = zip(problem.records, problem.use, result.outputs, strict=True)
+    errors = [(record.output - output)[use, np.newaxis] for record, use, output in pairs]
+    return sum(float(np.sum(view.filter.part(i, error) ** 2)) for i, error in enumerate(errors))
 
 
 def _jacobian(view: Scene, extra: Extra) -> FloatArray:
@@ -102,10 +111,10 @@ def _jacobian(view: Scene, extra: Extra) -> FloatArray:
         mine = np.concatenate([shared, np.arange(x.size)[own_part(problem, i)]])
         points = x + steps[mine, None] * np.eye(x.size)[mine]
         changes = (extra.outputs(view.result, points, i) - view.result.outputs[i]) / steps[mine, None]
-        found = np.zeros((int(view.cut[i].rows.sum()), x.size))
+        found = np.zeros((view.cut[i].size, x.size))
         for j, change in zip(mine, changes, strict=True):
-            found[:, j] = block_mean_of(change, problem.use[i], view.cut[i].length)[0][view.cut[i].rows]
-        return found
+            found[:, j] = block_mean_of(change, problem.use[i], view.cut[i].length)[0]
+        return view.rows(i, found)
 
     return np.vstack(concurrently(part, range(len(view.cut))))
 

@@ -93,7 +93,7 @@ def judged(view: Scene, hunts: Sequence[Hunt]) -> list[UnnamedLaw]:
     """Return what each hunt has found, weighed with one number of independent samples."""
     best = min(hunts, key=lambda hunt: hunt.mean_square)
     n = max(effective_samples(best.errors), best.ground.unknowns + MOST_COEFFICIENTS + 2.0)
-    before = sum(float(line.error[line.rows] @ line.error[line.rows]) for line in view.cut)
+    before = sum(float(error @ error) for error in view.errors)
     return [_law(hunt, n, before / best.ground.error.size) for hunt in hunts]
 
 

@@ -9,9 +9,9 @@ import numpy as np
 
 from estimator.diagnosis.evidence import VERY_STRONG
 from estimator.diagnosis.intervals import Z95
-from estimator.diagnosis.line import Explanation, Input, Line, explain_all, lines
+from estimator.diagnosis.line import Explanation, Input, Line, lines
 from estimator.diagnosis.result import Course, Discrepancy, Equivalent, LawPicture, RankedLaw
-from estimator.diagnosis.unnamed import ROUNDS, Hunt, Scene, UnnamedLaw, hunts_of, judged, without_law
+from estimator.diagnosis.unnamed import ROUNDS, Filter, Hunt, Scene, UnnamedLaw, hunts_of, judged, scene, without_law
 from estimator.diagnosis.where.axes import input_unit
 from estimator.diagnosis.where.picture import picture
 from estimator.diagnosis.where.responses import responses
@@ -29,6 +29,7 @@ def discrepancy(
     motion: model.Motion = model.Motion.ROTATION,
     rounds: int | None = None,
     begun: Sequence[Hunt] = (),
+    whitening: Filter | None = None,
 ) -> Discrepancy:
     """Look at what a re-tuned model lacks, with the effects found or, where there are none, with laws without a name.
 
@@ -46,13 +47,14 @@ def discrepancy(
         Rounds of the search for laws without a name; by default all (``ROUNDS``) where nothing is named, else one.
     begun : sequence of Hunt, optional
         What the first of them have found in ``retuned``, where there were any.
+    whitening : Filter, optional
+        By which laws are weighed; by default errors count as they are.
 
     Returns
     -------
     Discrepancy
     """
-    cut = lines(retuned)
-    view = Scene(retuned, cut, explain_all(retuned, cut, floor))
+    view = scene(retuned, floor, whitening)
     named = effects_added(retuned, final)
     hunts = hunts_of(view, rounds or (1 if named else ROUNDS), begun)
     laws = sorted(judged(view, hunts), key=lambda law: -law.gain.delta_bic)

@@ -11,6 +11,7 @@ from estimator.diagnosis.intervals import Z95
 from estimator.diagnosis.result import Response
 from estimator.diagnosis.where.spectrum import SEGMENT
 from estimator.errors import NotExciting
+from estimator.identification.offline.blocks import block_of
 from estimator.identification.spectral.welch import SpectralEstimate, spectral_estimate
 from estimator.physics.fit import FitResult
 from estimator.physics.model import Structure
@@ -18,6 +19,9 @@ from estimator.signals.record import FloatArray, Record
 
 COHERENT = 0.5
 """Share of the output's power that the torque must explain before a response is compared there."""
+
+FEWEST_BLOCKS = 8
+"""Blocks of samples that a segment holds at least (``spectral_estimate``)."""
 
 
 def responses(before: FitResult, after: FitResult) -> dict[str, Response]:
@@ -31,11 +35,12 @@ def responses(before: FitResult, after: FitResult) -> dict[str, Response]:
     if before.problem.grid.structure is Structure.JOINT:
         return found
     for record, first, second in zip(before.problem.records, before.outputs, after.outputs, strict=True):
+        segment = max(SEGMENT, FEWEST_BLOCKS * block_of(record.sample_time_s))
         try:
-            measured = spectral_estimate(_differenced(record, record.output), SEGMENT)
+            measured = spectral_estimate(_differenced(record, record.output), segment)
         except NotExciting:  # not this recording: it is too short, or masked throughout
             continue
-        simulated = [spectral_estimate(_differenced(record, output), SEGMENT) for output in (first, second)]
+        simulated = [spectral_estimate(_differenced(record, output), segment) for output in (first, second)]
         found[record.name] = _response(measured, *simulated)
     return found
 

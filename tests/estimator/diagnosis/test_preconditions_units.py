@@ -166,3 +166,26 @@ def test_the_nearest_known_factor_comes_first(ratio: float, first: str) -> None:
 
 def test_nothing_known_is_close() -> None:
     assert known_factors(25.0) == []
+
+
+def lessened(change: Callable[[FloatArray], FloatArray], values: dict[str, float]) -> Record:
+    """A recording whose torque is read in full, and acts as changed."""
+    read = 3.0 * random_steps(SAMPLES, seed=3) * np.abs(np.sin(np.arange(SAMPLES) / 300.0))
+    record = linear_record(values, change(read), Start(0.0, 0.0, 3.0, 0.0, 3.0), sigma=0.02)
+    return replace(record, torque_nm=read[:, np.newaxis])
+
+
+OF_THE_TORQUE_PATH: dict[str, Callable[[FloatArray], FloatArray]] = {
+    "a fifth": lambda torque: np.clip(torque, -60.0, 60.0),
+    "a tenth": lambda torque: np.clip(torque, -30.0, 30.0),
+    "a loss of nine tenths": lambda torque: torque * (1.0 - 0.9 * (1.0 - np.exp(-np.arange(SAMPLES) / 500.0))),
+}
+
+
+@pytest.mark.parametrize("name", OF_THE_TORQUE_PATH)
+def test_what_a_torque_path_does_is_not_refused_as_a_unit(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    line, record = model(TWO_MASS), lessened(OF_THE_TORQUE_PATH[name], TWO_MASS)
+    require_plausible_units([record], line)
+    monkeypatch.setattr("estimator.diagnosis.preconditions.units._lessened", lambda record: ())
+    with pytest.raises(Implausible):
+        require_plausible_units([record], line)

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from estimator.diagnosis.inference.diagnose import diagnose
 from estimator.diagnosis.result import Verdict
+from estimator.physics.effect import Element
 from hil.report.diagnosis_json import diagnosis_json
 from tests.estimator.diagnosis.one_effect import bench_with
-from tests.estimator.diagnosis.planted import SIGMA
+from tests.estimator.diagnosis.planted import SIGMA, TIGHT, recordings
+from tests.estimator.physics.bench import TWO_MASS
+from tests.estimator.physics.bench import model as line_of
 
 
 def test_a_named_effect_has_its_share_and_probability_and_the_model_has_it() -> None:
@@ -36,3 +40,54 @@ def test_nothing_missing_is_told_with_the_noise() -> None:
     assert content["effects"] == []
     assert content["mismatch"]["detected"] is False
     assert content["fit"]["noise_floor"] == pytest.approx(SIGMA, rel=0.05)
+
+
+def test_recordings_kept_out_of_the_fit_are_simulated_with_what_was_found() -> None:
+    bench = bench_with("coulomb_friction_motor", {"friction_nm": 8.0})
+    answer = diagnose(bench.records[:1], bench.model, bench.records[1:])
+    assert [(trace.name, trace.holdout) for trace in answer.traces] == [("run_3", False), ("run_4", True)]
+    unseen = answer.traces[1]
+    assert float(np.sqrt(np.mean((unseen.augmented - unseen.measured) ** 2))) == pytest.approx(SIGMA, rel=0.1)
+    assert answer.fit.holdout_augmented == pytest.approx(SIGMA, rel=0.1)
+    assert answer.fit.holdout_retuned > 5.0 * SIGMA
+    evidence = answer.effects[0].evidence
+    assert (evidence.holdout_rms_before, evidence.holdout_rms_after) == (
+        answer.fit.holdout_retuned,
+        answer.fit.holdout_augmented,
+    )
+    assert "on samples not used for the fit from" in answer.statement
+
+
+def test_without_recordings_kept_out_blocks_of_the_others_are() -> None:
+    """A law of noise alone would leave less on fitted samples than on others."""
+    bench = bench_with("coulomb_friction_motor", {"friction_nm": 8.0})
+    answer = diagnose(bench.records, bench.model)
+    assert answer.fit.holdout_augmented != answer.fit.augmented
+    assert answer.fit.holdout_augmented == pytest.approx(SIGMA, rel=0.1)
+
+
+def test_a_law_of_no_entry_is_located_and_described_without_a_name() -> None:
+    """A shaft that stiffens with speed: no entry of the catalogue does."""
+    stiffening = recordings(Element.SHAFT, lambda m: m.twist * np.abs(m.speed), 60.0)
+    answer = diagnose(stiffening, line_of(TWO_MASS, TIGHT))
+    assert answer.verdict is Verdict.UNEXPLAINED
+    assert answer.unnamed is not None
+    assert answer.unnamed.element is answer.mismatch.element is Element.SHAFT
+    name, coefficient = answer.unnamed.terms[0]
+    assert (name, coefficient) == ("twist |w_M|", pytest.approx(60.0, rel=0.15))
+    assert answer.unnamed.rms_before == answer.fit.retuned
+    assert answer.unnamed.rms_after < 0.5 * answer.unnamed.rms_before
+    assert answer.remainder is not None
+    assert answer.remainder.element is Element.SHAFT
+    assert "twist |w_M|" in answer.remainder.law
+    assert "twist |w_M|" in answer.statement
+
+
+def test_when_its_time_is_up_the_answer_says_what_was_not_tried() -> None:
+    bench = bench_with("coulomb_friction_motor", {"friction_nm": 8.0})
+    answer = diagnose(bench.records, bench.model, budget_s=0.0)
+    assert answer.verdict is Verdict.UNEXPLAINED
+    assert answer.effects == ()
+    (warning,) = answer.warnings
+    assert "ended after its 0 s" in warning
+    assert "coulomb_friction_motor" in warning.split("no fit was made of")[1]

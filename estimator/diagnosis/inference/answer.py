@@ -1,0 +1,250 @@
+"""The answer: from recordings that are fit for a diagnosis to what it says of them."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from estimator.diagnosis.assemble import augmented_model, load_torques, retuned_parameters
+from estimator.diagnosis.chain import mechanical, read_through
+from estimator.diagnosis.hypotheses import Progress, everything, open_hypotheses
+from estimator.diagnosis.inference.data_sheet import free_line
+from estimator.diagnosis.inference.disturbances import Size
+from estimator.diagnosis.inference.figures import FreeRuns, courses_of, effects_of, figures_of, free_runs
+from estimator.diagnosis.inference.free_run import Unseen
+from estimator.diagnosis.inference.likelihood import Hypothesis
+from estimator.diagnosis.inference.posterior import free_rms
+from estimator.diagnosis.inference.search import Search
+from estimator.diagnosis.inference.unnamed import Law, beside_rival, best_law, hunts_around, weighed_against
+from estimator.diagnosis.inference.verdict import Decision, decide
+from estimator.diagnosis.inference.wording import statement
+from estimator.diagnosis.phrases import law_in_words
+from estimator.diagnosis.preconditions import Prepared
+from estimator.diagnosis.preconditions.thinned import as_slow_as_needed
+from estimator.diagnosis.result import (
+    Diagnosis,
+    Discrepancy,
+    Fit,
+    FoundEffect,
+    Interval,
+    Mismatch,
+    RejectedEffect,
+    Remainder,
+    Slight,
+    Stray,
+    UnnamedLaw,
+    UntestableEffect,
+    Verdict,
+)
+from estimator.diagnosis.unnamed import Hunt
+from estimator.diagnosis.where import discrepancy, locate
+from estimator.physics.effect import Element, Untestable
+from estimator.physics.model import DrivelineModel
+from estimator.signals.record import FloatArray
+
+SMALLEST_P = 1e-300
+
+BUDGET_S = 30.0
+"""Time after which no further change of the best set is tried [s]."""
+
+LOCATING_ROUNDS, LOOKING_ROUNDS = 6, 2
+"""Rounds of the search for a law without a name: where nothing is named it locates the mismatch, else it says what is
+left."""
+
+
+def answer(ready: Prepared, model: DrivelineModel, progress: Progress, budget_s: float = BUDGET_S) -> Diagnosis:
+    """Return the diagnosis of recordings that are fit for one; after ``budget_s`` of the best set of effects so far."""
+    began = time.perf_counter()
+
+    def is_over() -> bool:
+        spent_s = time.perf_counter() - began
+        progress("comparing hypotheses", min(0.1 + 0.7 * spent_s / max(budget_s, spent_s, 1e-9), 0.8))
+        return spent_s >= budget_s
+
+    line, chain = mechanical(model), read_through(ready.records)
+    names, untestable = open_hypotheses(line, chain.records)
+    fitted_to = as_slow_as_needed(chain.records, line)
+    search = Search(line, fitted_to, everything(fitted_to), names, is_over=is_over)
+    decision = decide(search, with_findings=bool(chain.findings))
+    seen = _looked_at(search, decision, is_over)
+    progress("simulating what was found", 0.9)
+    unseen = Unseen(line, read_through(ready.holdout).records)
+    runs = free_runs(seen.decision.nothing, seen.believed, chain, unseen)
+    said = _said(seen, runs, search, untestable, model)
+    progress("done", 1.0)
+    warnings = (_stopped(search, budget_s),) if search.stopped else ()
+    return replace(said, warnings=warnings, timing_s={"total": time.perf_counter() - began})
+
+
+def _said(
+    seen: _Seen, runs: FreeRuns, search: Search, untestable: Mapping[str, Untestable], model: DrivelineModel
+) -> Diagnosis:
+    decision, believed, line = seen.decision, seen.believed, search.model
+    figures, effects = figures_of(runs, noise_of(decision.best)), effects_of(runs, decision)
+    blind = tuple(UntestableEffect(n, u.reason, u.suggested_test, u.needs) for n, u in untestable.items())
+    mismatch, remainder = _mismatch(seen, effects), _remainder(seen)
+    values_of = decision.best.plain.values_of
+    return Diagnosis(
+        verdict=decision.verdict,
+        statement=statement(decision, effects, figures, blind, remainder, seen.strays),
+        mismatch=mismatch,
+        effects=effects,
+        rejected=_rejected(search, decision),
+        untestable=blind,
+        unnamed=_unnamed(seen, figures),
+        fit=figures,
+        parameters=retuned_parameters(believed.white, line, decision.verdict is not Verdict.UNEXPLAINED),
+        load_torque=load_torques(believed.white, line),
+        timing_s={},
+        augmented=augmented_model(believed.plain, model, effects),
+        traces=courses_of(runs),
+        discrepancy=_discrepancy(seen, line) if mismatch.detected else None,
+        remainder=remainder,
+        strays=seen.strays,
+        slight=tuple(Slight(each.name, each.share, values_of(each.name)) for each in decision.traces),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Seen:
+    """A decision, and the laws without a name around it.
+
+    Attributes
+    ----------
+    believed : Hypothesis
+        What the answer is of, and the augmented model holds: the effects that are named, and no others.
+    hunts : list of Hunt
+        The search for a law beside no effect at all; empty where it was not made.
+    law : Law or None
+        What is left beyond noise, as a law without a name.
+    strays : tuple of Stray
+        Nominal values that alone, beyond what they are trusted to, would leave nothing but noise.
+    """
+
+    decision: Decision
+    believed: Hypothesis
+    hunts: list[Hunt]
+    law: Law | None
+    strays: tuple[Stray, ...] = ()
+
+
+def _looked_at(search: Search, decision: Decision, is_over: Callable[[], bool]) -> _Seen:
+    """Weigh the names against a law without one, and look for the law of what is left, while there is time."""
+    hunts: list[Hunt] = []
+    law: Law | None = None
+    if (decision.failed or decision.named) and not is_over():
+        hunts = hunts_around(decision.nothing, LOOKING_ROUNDS if decision.named else LOCATING_ROUNDS)
+        law = best_law(decision.nothing, hunts)
+        decision = weighed_against(decision, law)
+    line = free_line(search) if decision.failed or decision.named else None
+    if line is not None:
+        decision = beside_rival(decision, line.score, lambda each: True)
+    if decision.verdict not in (Verdict.EXPLAINED, Verdict.PARTLY_EXPLAINED):
+        strays = line.strays if line is not None and line.leaves_noise else ()
+        return _Seen(replace(decision, named=()), decision.nothing, hunts, law, strays)
+    believed = _with_names_alone(search, decision)
+    is_left = bool(decision.failed) and not is_over()
+    left = best_law(believed, hunts_around(believed, LOOKING_ROUNDS)) if is_left else None
+    return _Seen(decision, believed, hunts, left)
+
+
+def _with_names_alone(search: Search, decision: Decision) -> Hypothesis:
+    """Return the best set without what is doubted in it or no more than a trace."""
+    believed = decision.best
+    for name in sorted(decision.best.effects - {each.name for each in decision.named}):
+        believed = search.without(believed, name)
+    return believed
+
+
+def _stopped(search: Search, budget_s: float) -> str:
+    untried = sorted({*search.names} - {*search.rivals} - {name for effects in search.visited for name in effects})
+    fitted = f"; no fit was made of {', '.join(untried)}" if untried else ""
+    return (
+        f"the search ended after its {budget_s:g} s with the best set of effects so far: not tried were further "
+        f"effects on top of it, and look-alikes in the place of those named{fitted}. Give it more time (--budget-s), "
+        "or fewer or shorter recordings."
+    )
+
+
+def noise_of(hypothesis: Hypothesis) -> float:
+    """Return the reading's noise, white and coloured [unit of the output]."""
+    return float(np.hypot(*np.exp(hypothesis.sizes[[Size.WHITE, Size.COLOURED]])))
+
+
+def _errors(hypothesis: Hypothesis) -> list[FloatArray]:
+    """Return the free-run error per recording, 0 where a sample is missing."""
+    plain = hypothesis.plain
+    return [np.where(r.okay, r.output - out, 0.0) for r, out in zip(plain.problem.records, plain.outputs, strict=True)]
+
+
+def _band_hz(hypothesis: Hypothesis, noise: float) -> Interval | None:
+    periods = [record.sample_time_s for record in hypothesis.plain.problem.records]
+    return locate.band_hz(_errors(hypothesis), periods, noise)
+
+
+def _mismatch(seen: _Seen, effects: Sequence[FoundEffect]) -> Mismatch:
+    decision = seen.decision
+    if decision.verdict is Verdict.NO_MISMATCH:
+        return Mismatch(False, None, {}, None, None, 1.0)
+    nothing, noise = decision.nothing.plain, noise_of(decision.best)
+    element: Element | None = None if seen.law is None else seen.law.element
+    if effects or seen.strays:
+        element = (effects or seen.strays)[0].element
+    gained = max(decision.nothing.score - decision.best.score, 0.0)
+    return Mismatch(
+        detected=True,
+        element=element,
+        time_s=locate.intervals(nothing, noise),
+        band_hz=_band_hz(decision.nothing, noise),
+        region=None if element is None else locate.region(nothing, element, noise),
+        p_value=max(math.exp(-0.5 * gained), SMALLEST_P),
+    )
+
+
+def _discrepancy(seen: _Seen, line: DrivelineModel) -> Discrepancy:
+    """Return the mismatch as the report draws it."""
+    nothing = seen.decision.nothing
+    noise = noise_of(seen.decision.best)
+    return discrepancy(
+        nothing.plain, seen.believed.plain, noise, line.motion, rounds=1, begun=seen.hunts, whitening=nothing.filter
+    )
+
+
+def _rejected(search: Search, decision: Decision) -> tuple[RejectedEffect, ...]:
+    """Return what else was fitted, and by how much the best set with it is less probable than the best of all."""
+    named = {each.name for each in (*decision.named, *decision.traces)}
+    return tuple(
+        RejectedEffect(
+            name,
+            "the recordings are less probable with it in the place of, or beside, what was chosen",
+            decision.best.score - score if name not in decision.best.effects else 0.0,
+        )
+        for name, score in sorted(search.rivals.items(), key=lambda item: item[1])
+        if name not in named
+    )
+
+
+def _remainder(seen: _Seen) -> Remainder | None:
+    """Return what is left beyond noise and drift; None where nothing is."""
+    decision, believed, law = seen.decision, seen.believed, seen.law
+    if not decision.failed:
+        return None
+    noise, left = noise_of(decision.best), free_rms(believed)
+    said = law_in_words(law.terms) if law is not None else "; ".join(test.name for test in decision.failed)
+    return Remainder(
+        share=max(left**2 - noise**2, 0.0) / free_rms(decision.nothing) ** 2,
+        times_noise=left / noise,
+        element=None if law is None else law.element,
+        band_hz=_band_hz(believed, noise),
+        law=said,
+    )
+
+
+def _unnamed(seen: _Seen, figures: Fit) -> UnnamedLaw | None:
+    if seen.decision.verdict is not Verdict.UNEXPLAINED or seen.law is None:
+        return None
+    return UnnamedLaw(seen.law.element, seen.law.terms, figures.retuned, seen.law.rms)

@@ -1,0 +1,87 @@
+"""A wrong data sheet as a hypothesis: the nominal line, its values beyond what they are trusted to, and no effect.
+
+Where re-tuning ends at a bound, some effect follows a part of what a wrong value leaves, or two do: they must make the
+recordings more probable than the line itself does with its values free.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from estimator.diagnosis.hypotheses import NOTHING
+from estimator.diagnosis.inference.likelihood import Hypothesis, covariance, fitted
+from estimator.diagnosis.inference.remainder import tests
+from estimator.diagnosis.inference.search import Search
+from estimator.diagnosis.result import Stray
+
+FREELY = 3.0
+"""Factor, either way, within which a nominal parameter is looked for: beyond it a value is no slip of a data sheet, and
+the integration's steps, chosen for the nominal line, would not follow."""
+
+CLEARLY = 3.0
+"""Standard errors by which a value must lie beyond what it is trusted to."""
+
+
+@dataclass(frozen=True, slots=True)
+class FreeLine:
+    """The nominal line with its values free.
+
+    Attributes
+    ----------
+    score : float
+        That of a hypothesis (``likelihood``), the choice of what is wrong among the line's values paid for.
+    leaves_noise : bool
+        Whether what it leaves passes for noise: then no physics need be missing.
+    strays : tuple of Stray
+        What clearly left its tolerance, the clearest first; at least one.
+    """
+
+    score: float
+    leaves_noise: bool
+    strays: tuple[Stray, ...]
+
+
+def free_line(search: Search) -> FreeLine | None:
+    """Fit the nominal line beyond its tolerances; None where these hold nothing back."""
+    nothing = search.nothing().plain
+    shared = nothing.problem.shared
+    trusted = [not s.effect and np.isfinite(s.low) and s.low < s.high for s in shared]
+    if not any(free and at_bound for free, at_bound in zip(trusted, nothing.pinned, strict=False)):
+        return None
+    freed = tuple(
+        replace(s, low=1.0 / FREELY, high=FREELY) if free else s for s, free in zip(shared, trusted, strict=True)
+    )
+    problem = replace(nothing.problem, shared=freed)
+    sizes, hypotheses = search.nothing().sizes, len(search.names)
+    found = fitted(NOTHING, problem, nothing.x, sizes, search.limits, hypotheses, search.nothing().minus_twice_log)
+    strays = _strays(search.nothing(), found)
+    if not strays:
+        return None
+    chosen = math.log(math.comb(sum(trusted), len(strays)))
+    return FreeLine(found.score + 2.0 * chosen, not any(test.failed for test in tests(found)), strays)
+
+
+def _strays(nothing: Hypothesis, found: Hypothesis) -> tuple[Stray, ...]:
+    spread = np.sqrt(np.maximum(np.diag(covariance(found)), 0.0))
+    clear = []
+    for i, trusted in enumerate(nothing.plain.problem.shared):
+        ratio = float(found.plain.x[i])
+        by = max(trusted.low - ratio, ratio - trusted.high)
+        if not trusted.effect and trusted.low < trusted.high and by > CLEARLY * spread[i]:
+            sureness = by / max(float(spread[i]), np.finfo(float).tiny)
+            clear.append((sureness, Stray(trusted.name, ratio, trusted.high - 1.0)))
+    return tuple(stray for _, stray in sorted(clear, key=lambda each: -each[0]))
+
+
+def in_words(strays: Sequence[Stray]) -> str:
+    """Say which values are how far from nominal, and how far they are trusted to be."""
+    said = []
+    for stray in strays:
+        side = "above" if stray.ratio > 1.0 else "below"
+        away, trusted = 100.0 * abs(stray.ratio - 1.0), 100.0 * stray.tolerance
+        said.append(f"{stray.name} {away:.2g} % {side} its nominal value (trusted to {trusted:.2g} %)")
+    return " and ".join(said)

@@ -1,0 +1,102 @@
+"""What a diagnosis says in figures: free runs of what is believed, at the recordings' own rate, and their errors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from estimator.diagnosis.assemble import acquired_effects, rms_of
+from estimator.diagnosis.chain import Chain
+from estimator.diagnosis.holdout import foreign_outputs
+from estimator.diagnosis.hypotheses import NOTHING, everything
+from estimator.diagnosis.inference.effects import found_effects
+from estimator.diagnosis.inference.free_run import Unseen, on_recordings
+from estimator.diagnosis.inference.likelihood import Hypothesis
+from estimator.diagnosis.inference.verdict import Decision
+from estimator.diagnosis.result import Fit, FoundEffect, Trace
+from estimator.physics.fit import FitResult, fit
+from estimator.physics.model import unit
+from estimator.physics.problem import make_problem
+from estimator.signals.record import FloatArray, OutputKind, Record
+
+DIMENSIONS = {OutputKind.SPEED: "speed", OutputKind.POSITION: "angle", OutputKind.FORCE: "torque"}
+
+
+@dataclass(frozen=True, slots=True)
+class FreeRuns:
+    """Free runs before and after, on the recordings at their own rate.
+
+    Attributes
+    ----------
+    retuned, final : FitResult
+        The nominal model, re-tuned; with the effects that are believed.
+    held_before, held_after : float
+        RMS of their errors on samples that no fit has seen [unit of the output].
+    """
+
+    chain: Chain
+    unseen: Unseen
+    believed: Hypothesis
+    retuned: FitResult
+    final: FitResult
+    held_before: float
+    held_after: float
+
+
+def free_runs(nothing: Hypothesis, believed: Hypothesis, chain: Chain, unseen: Unseen) -> FreeRuns:
+    """Simulate the re-tuned nominal model and what is believed, which may be the same."""
+    retuned = on_recordings(nothing, unseen.line, chain.records)
+    held_before = unseen.rms(nothing, retuned)
+    if believed is nothing:
+        return FreeRuns(chain, unseen, believed, retuned, retuned, held_before, held_before)
+    final = on_recordings(believed, unseen.line, chain.records)
+    return FreeRuns(chain, unseen, believed, retuned, final, held_before, unseen.rms(believed, final))
+
+
+def figures_of(runs: FreeRuns, noise: float) -> Fit:
+    """Return the errors of free runs of the recordings as they were read, faults of the acquisition and all."""
+    chain, line, retuned = runs.chain, runs.unseen.line, runs.retuned
+    as_read = fit(replace(retuned.problem, records=chain.raw), retuned.x) if chain.findings else retuned
+    return Fit(
+        unit=unit(DIMENSIONS[chain.raw[0].kind], line.motion),
+        nominal=fit(make_problem(line, chain.raw, (), grid=retuned.problem.grid)).rms,
+        retuned=as_read.rms,
+        augmented=rms_of(chain.errors(runs.final.outputs)),
+        holdout_retuned=runs.held_before,
+        holdout_augmented=runs.held_after,
+        noise_floor=noise,
+    )
+
+
+def effects_of(runs: FreeRuns, decision: Decision) -> tuple[FoundEffect, ...]:
+    """Return the effects that are named, the weightiest first, and the faults of the acquisition."""
+    found = found_effects(replace(decision, best=runs.believed), runs.unseen.line) if decision.named else ()
+    held = {"holdout_rms_before": runs.held_before, "holdout_rms_after": runs.held_after}
+    named = tuple(replace(each, evidence=replace(each.evidence, **held)) for each in found)
+    before = [(out - raw.output)[raw.okay] for out, raw in zip(runs.final.outputs, runs.chain.raw, strict=True)]
+    return (*named, *acquired_effects(runs.chain, before, runs.chain.errors(runs.final.outputs)))
+
+
+def courses_of(runs: FreeRuns) -> tuple[Trace, ...]:
+    """Return the simulations of every recording, for plots; those kept out of the fit last."""
+    line, kept_out, grid = runs.unseen.line, runs.unseen.records, runs.retuned.problem.grid
+
+    def nominal(records: Sequence[Record]) -> tuple[FloatArray, ...]:
+        return fit(make_problem(line, records, (), grid=grid)).outputs
+
+    outputs = (nominal(runs.chain.records), runs.retuned.outputs, runs.final.outputs)
+    traces = [_trace(record, each, False) for record, *each in zip(runs.chain.raw, *outputs, strict=True)]
+    if kept_out:
+        use = everything(kept_out)
+        outputs = (
+            nominal(kept_out),
+            foreign_outputs(runs.retuned, line, kept_out, use, NOTHING),
+            foreign_outputs(runs.final, line, kept_out, use, runs.believed.effects),
+        )
+        traces += [_trace(record, each, True) for record, *each in zip(kept_out, *outputs, strict=True)]
+    return tuple(traces)
+
+
+def _trace(r: Record, runs: Sequence[FloatArray], holdout: bool) -> Trace:
+    nominal, retuned, augmented = runs
+    return Trace(r.name, r.time_s, r.torque_nm, r.output, r.okay, nominal, retuned, augmented, holdout)

@@ -1,0 +1,88 @@
+"""The free run of a hypothesis as ``hil simulate`` makes it, and its error on samples that no fit has seen.
+
+The likelihood weighs errors by their innovations; the figures of a diagnosis are of the free run itself. So what is a
+recording's own (initial state, load torque, the course of a grade) is estimated anew, by least squares; all else is as
+the likelihood has it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from estimator.diagnosis.holdout import blocks, foreign_outputs
+from estimator.diagnosis.inference.likelihood import ITERATIONS, Hypothesis, weighted
+from estimator.diagnosis.inference.search import GRADE
+from estimator.physics.fit import FitResult, fit
+from estimator.physics.model import DrivelineModel
+from estimator.physics.problem import Problem, make_problem, parameters
+from estimator.physics.starts import warm_start
+from estimator.physics.unknowns import LocalBasis
+from estimator.signals.record import BoolArray, FloatArray, Record
+
+
+def on_recordings(
+    hypothesis: Hypothesis, line: DrivelineModel, records: Sequence[Record], use: Sequence[BoolArray] | None = None
+) -> FitResult:
+    """Return the free run of a hypothesis on recordings it was fitted to, at their own rate.
+
+    ``use`` are the samples from which a recording's own is estimated; by default all good ones.
+    """
+    of = hypothesis.plain.problem
+    own = [basis.own for basis in of.local]
+    problem = make_problem(line, records, of.shared, own=own, profile=GRADE in hypothesis.effects, use=use)
+    return _with_own(problem, warm_start(problem, hypothesis.plain))
+
+
+def _with_own(problem: Problem, x: FloatArray) -> FitResult:
+    """Estimate initial states, load torques and courses; phases and moments stay where they are."""
+    count = len(problem.shared)
+    held = tuple(_held(basis, x_i) for basis, x_i in zip(problem.local, _parts(problem, x), strict=True))
+    alone = replace(problem, p=parameters(problem, x), shared=(), local=held)
+    own = fit(alone, x[count:], ITERATIONS)
+    return FitResult(problem, np.concatenate([x[:count], own.x]), own.outputs, own.residual, None, own.converged)
+
+
+def _parts(problem: Problem, x: FloatArray) -> list[FloatArray]:
+    ends = np.cumsum([basis.guess.size for basis in problem.local])[:-1]
+    return list(np.split(x[len(problem.shared) :], ends))
+
+
+def _held(basis: LocalBasis, x: FloatArray) -> LocalBasis:
+    values = (float(value) for value in x[basis.own_rows])
+    own = tuple(replace(u, low=v, high=v, start=v) for u, v in zip(basis.own, values, strict=True))
+    return replace(basis, own=own)
+
+
+@dataclass(frozen=True, slots=True)
+class Unseen:
+    """The samples that judge: those of recordings kept out of the fit, else blocks of the recordings themselves.
+
+    Attributes
+    ----------
+    line : DrivelineModel
+    records : sequence of Record
+        Kept out of every fit; empty where there are none.
+    """
+
+    line: DrivelineModel
+    records: Sequence[Record]
+
+    def rms(self, hypothesis: Hypothesis, whole: FitResult) -> float:
+        """Return the RMS of a hypothesis' free-run error in blocks of 0.6 s every 2 s [unit of the output].
+
+        What is between the blocks tells what is a recording's own. Without recordings kept out the hypothesis is
+        fitted once more to what is between them; ``whole`` is its free run with the values of the whole fit.
+        """
+        records = self.records or hypothesis.plain.problem.records
+        between = [record.okay & ~blocks(record) for record in records]
+        if self.records:
+            outputs = foreign_outputs(whole, self.line, self.records, between, hypothesis.effects)
+        else:
+            problem = replace(hypothesis.plain.problem, use=tuple(between))
+            plain = weighted(replace(hypothesis.plain, problem=problem), hypothesis.sizes, ITERATIONS)
+            outputs = on_recordings(replace(hypothesis, plain=plain), self.line, records, between).outputs
+        errors = [(o - r.output)[r.okay & blocks(r)] for o, r in zip(outputs, records, strict=True)]
+        return float(np.sqrt(np.mean(np.concatenate(errors) ** 2)))

@@ -1,0 +1,156 @@
+"""A law without a name as a hypothesis: found by regression on innovations, scored as every other.
+
+Around a set of effects the best law of each element is looked for on columns that the hypothesis' own filter has
+whitened (``estimator.diagnosis.unnamed``), the law in the simulation; then the disturbances are estimated anew. It pays
+as an effect does: each coefficient is an unknown, and each term was chosen among so many forms, at one of so many
+elements.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from estimator.diagnosis.inference.calibration import LEAST_PROBABILITY, TEMPERED
+from estimator.diagnosis.inference.disturbances import Size, estimate, line_of
+from estimator.diagnosis.inference.likelihood import ROUNDS, Hypothesis
+from estimator.diagnosis.inference.posterior import Belief
+from estimator.diagnosis.inference.verdict import Decision
+from estimator.diagnosis.result import Verdict
+from estimator.diagnosis.unnamed import Hunt, hunts_of, scene
+from estimator.physics.catalogue import EFFECTS
+from estimator.physics.effect import Element
+from estimator.physics.jacobian import changes
+from estimator.physics.problem import outputs_at, own_part
+
+
+@dataclass(frozen=True, slots=True)
+class Law:
+    """The law without a name that makes the recordings most probable beside a set of effects.
+
+    Attributes
+    ----------
+    element : Element
+    terms : tuple of (str, float)
+        Functions of what happens in the line, each with its coefficient.
+    score : float
+        That of the hypothesis with the law (``likelihood``).
+    rms : float
+        RMS of the free-run error with it [unit of the output].
+    """
+
+    element: Element
+    terms: tuple[tuple[str, float], ...]
+    score: float
+    rms: float
+
+
+def hunts_around(hypothesis: Hypothesis, rounds: int) -> list[Hunt]:
+    """Look for the best law at every element beside a hypothesis."""
+    noise = float(np.hypot(*np.exp(hypothesis.sizes[[Size.WHITE, Size.COLOURED]])))
+    return hunts_of(scene(hypothesis.plain, noise, hypothesis.filter), rounds)
+
+
+def best_law(hypothesis: Hypothesis, hunts: Sequence[Hunt]) -> Law | None:
+    """Return the law with which the recordings are most probable; None where they are more probable without one."""
+    white = hypothesis.filter(hypothesis.plain.residual)
+    before = float(white @ white) / white.size
+    laws = [_scored(hypothesis, hunt, before, math.log(len(hunts))) for hunt in hunts if hunt.law.terms]
+    best = min(laws, key=lambda law: law.score, default=None)
+    return best if best is not None and best.score < hypothesis.score else None
+
+
+def _scored(hypothesis: Hypothesis, hunt: Hunt, before: float, places: float) -> Law:
+    """Return a law with its score: that of its innovations, or with disturbances estimated anew where it is simulated.
+
+    With all disturbances in one proportion minus twice the log-likelihood falls by ``n log(Q / Q')``, Q the squared
+    innovations; estimated anew it falls further.
+    """
+    n = hypothesis.plain.residual.size
+    score = hypothesis.score - hunt.law.information(before, hunt.mean_square, n) + 2.0 * places
+    is_simulated = any(weights.any() for weights in hunt.weights)
+    if is_simulated:
+        paid = hunt.law.coefficients * math.log(n) + 2.0 * (hunt.law.choices + places)
+        own = hypothesis.score - hypothesis.minus_twice_log
+        score = min(score, _minus_twice_log(hypothesis, hunt) + own + paid)
+    return Law(hunt.element, hunt.law.terms, score, _rms(hunt))
+
+
+def _minus_twice_log(hypothesis: Hypothesis, hunt: Hunt) -> float:
+    result = hunt.view.result
+    error = np.concatenate(
+        [
+            (out - record.output)[use]
+            for out, record, use in zip(result.outputs, result.problem.records, result.problem.use, strict=True)
+        ]
+    )
+    period_s, use = result.problem.records[0].sample_time_s, result.problem.use
+    return estimate(line_of(result), error, hypothesis.sizes, hypothesis.limits, period_s, use, ROUNDS)[1]
+
+
+def _rms(hunt: Hunt) -> float:
+    """Return the RMS of the error with a law, each recording's load torque and initial state as they leave least."""
+    result = hunt.view.result
+    problem, without = result.problem, outputs_at(result.problem, result.x)
+    left = count = 0.0
+    for i, (record, use, out) in enumerate(zip(problem.records, problem.use, result.outputs, strict=True)):
+        first = own_part(problem, i).start
+        columns = np.arange(first, first + problem.local[i].own_rows.start)
+        start = np.linalg.qr(changes(problem, result.x, i, columns, without))[0]
+        error = (out - record.output)[use]
+        left += float(error @ error) - float(np.sum((start.T @ error) ** 2))
+        count += error.size
+    return math.sqrt(max(left, 0.0) / count)
+
+
+MOST_OF_IT = 0.5
+"""Share of what a law without a name gains that names at its place must gain, to be the same law in other words."""
+
+
+def weighed_against(decision: Decision, law: Law | None) -> Decision:
+    """Return a decision in which a law without a name has its share of the probability.
+
+    ``law`` is the best beside no effect at all. In as far as it makes the recordings more probable than the best set of
+    names, what these explain is there, and they are not. At its own place a law without a name is a name's law in
+    another form, where the names gain most of what it gains.
+    """
+    if law is None:
+        return decision
+    gained, by_law = (decision.nothing.score - score for score in (decision.best.score, law.score))
+    same = gained >= MOST_OF_IT * by_law
+    return beside_rival(decision, law.score, lambda each: not (same and law.element in _elements(each)))
+
+
+def beside_rival(decision: Decision, score: float, falls: Callable[[Belief], bool]) -> Decision:
+    """Return a decision in which a hypothesis of a score, without names, has its share of the probability.
+
+    ``falls`` tells which names it stands against. Those left with too little are doubted.
+    """
+    share = _share_of_names(decision, score)
+    weighed = [replace(each, probability=each.probability * share) if falls(each) else each for each in decision.named]
+    named = tuple(each for each in weighed if each.probability >= LEAST_PROBABILITY)
+    doubted = tuple(each for each in weighed if each not in named)
+    verdict = Verdict.UNEXPLAINED if doubted and not named else decision.verdict
+    return replace(decision, verdict=verdict, named=named, doubted=(*doubted, *decision.doubted))
+
+
+def _share_of_names(decision: Decision, score: float) -> float:
+    """Return the probability of the best set of names, of the two.
+
+    A law of size zero is no law, and values at their bounds are the nominal line: what a rival has of the probability
+    is what it has beyond the nominal model, which has had its share of the posterior already.
+    """
+    n = decision.best.plain.residual.size
+    tempered = TEMPERED + n * sum(test.value for test in decision.failed if test.is_share)
+    rival, nominal = (
+        math.exp(min(0.5 * (decision.best.score - each) / tempered, 700.0)) for each in (score, decision.nothing.score)
+    )
+    return 1.0 / (1.0 + max(rival - nominal, 0.0))
+
+
+def _elements(belief: Belief) -> set[Element]:
+    """Return where an effect acts, or one that it can't be told from."""
+    return {EFFECTS[name].element for name in (belief.name, *belief.alike)}

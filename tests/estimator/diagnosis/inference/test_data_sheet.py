@@ -1,0 +1,69 @@
+"""A wrong data sheet is no missing physics: values beyond their tolerances are a hypothesis without an effect."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import pytest
+
+from estimator.diagnosis.hypotheses import everything, open_hypotheses
+from estimator.diagnosis.inference.data_sheet import FREELY, free_line, in_words
+from estimator.diagnosis.inference.diagnose import diagnose
+from estimator.diagnosis.inference.search import Search
+from estimator.diagnosis.result import Stray, Verdict
+from estimator.physics.effect import Element
+from estimator.physics.model import DrivelineModel
+from tests.estimator.diagnosis.planted import quiet
+from tests.estimator.physics.bench import TWO_MASS, model
+
+
+def off_by(factors: Mapping[str, float], tolerance: float) -> DrivelineModel:
+    """A nominal model whose true values are these factors times its own."""
+    return model({name: value / factors.get(name, 1.0) for name, value in TWO_MASS.items()}, tolerance)
+
+
+def searched(factors: Mapping[str, float], tolerance: float = 0.1) -> Search:
+    line, records = off_by(factors, tolerance), quiet()
+    return Search(line, records, everything(records), open_hypotheses(line, records)[0])
+
+
+@pytest.mark.parametrize(
+    ("name", "factor", "element"),
+    [("k", 1.3, Element.SHAFT), ("J_M", 0.8, Element.MOTOR), ("J_L", 1.25, Element.LOAD)],
+)
+def test_what_left_its_tolerance_is_given_with_its_size_and_place(name: str, factor: float, element: Element) -> None:
+    search = searched({name: factor})
+    line = free_line(search)
+    assert line is not None
+    (stray,) = line.strays
+    assert (stray.name, stray.element, stray.tolerance) == (name, element, pytest.approx(0.1))
+    assert stray.ratio == pytest.approx(factor, rel=0.03)
+    assert line.leaves_noise
+    assert line.score < search.nothing().score
+
+
+def test_inside_its_tolerances_nothing_is_beyond() -> None:
+    assert free_line(searched({"k": 1.08})) is None
+
+
+def test_no_value_is_sought_that_is_no_slip_of_a_data_sheet() -> None:
+    line = free_line(searched({"k": 2.0 * FREELY}))
+    assert line is not None
+    assert max(stray.ratio for stray in line.strays) <= FREELY
+    assert not line.leaves_noise
+
+
+def test_a_stray_is_said_with_its_tolerance() -> None:
+    said = in_words([Stray("k", 1.166, 0.04), Stray("J_L", 0.9, 0.05)])
+    assert said == (
+        "k 17 % above its nominal value (trusted to 4 %) and J_L 10 % below its nominal value (trusted to 5 %)"
+    )
+
+
+def test_a_wrong_stiffness_is_no_missing_physics() -> None:
+    found = diagnose(quiet(), off_by({"k": 1.3}, 0.05))
+    assert [stray.name for stray in found.strays] == ["k"]
+    assert (found.verdict, found.effects) == (Verdict.UNEXPLAINED, ())
+    assert found.mismatch.element is Element.SHAFT
+    assert "no physics need be missing" in found.statement
+    assert "k 30 % above its nominal value (trusted to 5 %)" in found.statement
