@@ -127,6 +127,8 @@ class Retelling:
 
 
 Retold = Callable[[DrivelineModel, Sequence[Record], Mapping[str, float], Mapping[str, float]], list[Retelling]]
+Span = tuple[float, float]
+Spans = Callable[[DrivelineModel, Mapping[str, float], Mapping[str, float]], Mapping[str, tuple[Span, ...]]]
 Starts = Callable[[DrivelineModel, Sequence[Record]], list[Start]]
 Testable = Callable[[DrivelineModel, Sequence[Record]], Untestable | None]
 
@@ -156,6 +158,13 @@ def never_retold(
 ) -> list[Retelling]:
     """Know no other way to write the law."""
     return []
+
+
+def as_described(
+    _model: DrivelineModel, _values: Mapping[str, float], _line: Mapping[str, float]
+) -> Mapping[str, tuple[Span, ...]]:
+    """Leave every nominal parameter what its data sheet says."""
+    return {}
 
 
 def nothing_derived(_values: Mapping[str, float], _nominal: Mapping[str, float]) -> Mapping[str, float]:
@@ -269,6 +278,10 @@ class Effect:
         is fitted whatever a first look along its size promises: the look does not move them with it.
     loosened_by : str
         The parameter of its own that moves them. Once it is fitted, the rest of the effect is looked for again.
+    described : callable
+        Model, values of the effect and of the line to the spans in which a data sheet's value of a nominal parameter
+        may lie, where the effect changes or splits what the parameter stands for: friction that warms is described
+        somewhere between cold and warm.
     implausible : callable
         Model, records and parameter values to the reason why such values are no case of this effect, or "".
     unresolved : callable
@@ -316,6 +329,7 @@ class Effect:
     decisive: tuple[str, ...] = ()
     loosens: frozenset[str] = frozenset()
     loosened_by: str = ""
+    described: Spans = as_described
     implausible: Callable[[DrivelineModel, Sequence[Record], Mapping[str, float]], str] = always_plausible
     unresolved: Callable[[DrivelineModel, Sequence[Record], Mapping[str, float]], str] = always_plausible
     rescaled: Callable[[Mapping[str, float]], Mapping[str, float]] = told_one_way

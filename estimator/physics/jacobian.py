@@ -50,13 +50,16 @@ class _Moved:
         return _Moved(self.of[rows], self.columns[rows])
 
 
-def jacobian_at(problem: Problem, x: FloatArray, outputs: Sequence[FloatArray]) -> FloatArray:
+def jacobian_at(
+    problem: Problem, x: FloatArray, outputs: Sequence[FloatArray], among: BoolArray | None = None
+) -> FloatArray:
     """Return the derivative of the errors by the scaled unknowns, shape (R, U), by differences inside the bounds.
 
-    It is 0 by what can't change.
+    It is 0 by what can't change, and by what is not ``among`` those asked for, shape (U,).
     """
     low, high = bounds(problem)
-    moving = [np.flatnonzero(_moves(problem, low < high, i)) for i in range(len(problem.records))]
+    wanted = (low < high) if among is None else (low < high) & among
+    moving = [np.flatnonzero(_moves(problem, wanted, i)) for i in range(len(problem.records))]
     around = _Around(problem, x, outputs)
     parts = _together(problem, moving) if around.is_one else _apart(moving)
     found = np.zeros((x.size, around.firsts[-1]))

@@ -8,7 +8,7 @@ late, and what it takes from the amplitude, ``1 - (1/2 - s) (tau w)^2``: nothing
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 from estimator.compiled import compiled
@@ -26,6 +26,10 @@ SHAPE = EffectParameter(
     "s: 0 of first order, 1/4 two equal poles, 1/2 Butterworth's, which is nearly a delay",
     True,
 )
+
+SLOWEST_S = 0.1
+"""Longest time constant [s] of a current loop or of a sensor's filter, or delay of a bus: a drive is of no use with
+one. What a fit finds beyond it stands for something else that is slow."""
 
 EQUAL_POLES = 1e-6
 """Half the distance of two poles, times the step, below which they are one."""
@@ -90,3 +94,14 @@ def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...
 def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
     """Return a start below and one above a sampling period, with two equal poles."""
     return [(0.3, 0.25), (2.0, 0.25)]
+
+
+def quick_enough(key: str) -> Callable[[DrivelineModel, Sequence[Record], Mapping[str, float]], str]:
+    """Return a check that a time is one of a torque path or a sensor."""
+
+    def check(_model: DrivelineModel, _records: Sequence[Record], values: Mapping[str, float]) -> str:
+        if values[key] <= SLOWEST_S:
+            return ""
+        return f"{values[key]:.2g} s are longer than any current loop, filter or bus takes"
+
+    return check

@@ -57,12 +57,12 @@ def _begun(problem: Problem, warm: FitResult | None, iterations: int) -> FitResu
 def warm_start(problem: Problem, warm: FitResult) -> FloatArray:
     """Return scaled unknowns, shape (U,): where a fit left them, and those that it lacks where a fit starts."""
     x = start_vector(problem)
-    columns, taken, ratio = _common(problem, warm.problem)
+    columns, taken, ratio = in_common(problem, warm.problem)
     x[columns] = warm.x[taken] / ratio
     return x
 
 
-def _common(problem: Problem, other: Problem) -> tuple[IntArray, IntArray, FloatArray]:
+def in_common(problem: Problem, other: Problem) -> tuple[IntArray, IntArray, FloatArray]:
     """Return where the unknowns that two problems have in common stand in each, and the ratio of their scales."""
     place = {name: column for column, name in enumerate(_names(other))}
     pairs = [(column, place[name]) for column, name in enumerate(_names(problem)) if name in place]

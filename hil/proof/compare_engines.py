@@ -22,6 +22,8 @@ from estimator.diagnosis.diagnose import diagnose as by_rules
 from estimator.diagnosis.inference.diagnose import diagnose as by_likelihood
 from estimator.diagnosis.result import Diagnosis
 from estimator.errors import EstimatorError
+from estimator.physics.model import DrivelineModel
+from estimator.signals.record import Record
 from hil.config.model_file import read_model_for_recordings
 from hil.proof.campaign.kinds import parse_seeds
 from hil.proof.make_case import write_shown
@@ -58,8 +60,10 @@ def case_of(which: str, seed: int) -> tuple[Case, dict[str, dict[str, float]], s
     return *make_dirty(strong, seed, knows(seed)), strong
 
 
-def answered(which: str, seed: int, engine: str) -> Row:
-    """Return the row of a case: what is there, what was named, and how long it took."""
+def shown_case(
+    which: str, seed: int
+) -> tuple[Sequence[Record], DrivelineModel, Case, dict[str, dict[str, float]], str]:
+    """Return recordings and model of a case as a tool gets them, the case, what its model knows, what is strong."""
     case, known, strong = case_of(which, seed)
     tolerance = NOMINAL_TOLERANCE if knows(seed) is Known.OFF else 0.0
     with tempfile.TemporaryDirectory(prefix="hil-case-") as place:
@@ -69,11 +73,17 @@ def answered(which: str, seed: int, engine: str) -> Row:
             model.write("".join(_stated(name, sizes, tolerance) for name, sizes in known.items()))
         file = read_model_for_recordings(shown / "model.toml")
         records = read_records(sorted(shown.glob("run_*.csv")), file.signals, file.on_bench)
+    return records, file.model, case, known, strong
+
+
+def answered(which: str, seed: int, engine: str) -> Row:
+    """Return the row of a case: what is there, what was named, and how long it took."""
+    records, model, case, known, strong = shown_case(which, seed)
     hidden = [name for name in case.specimen.sizes if name != NOTHING and name not in known]
     row: Row = {"set": which, "seed": seed, "engine": engine, "strong": strong, "hidden": hidden}
     began = time.perf_counter()
     try:
-        answer = diagnosis_json(ENGINES[engine](records, file.model))
+        answer = diagnosis_json(ENGINES[engine](records, model))
     except EstimatorError as error:
         return row | {"verdict": "refused", "named": [], "false": [], "fault": str(error)}
     claims = {effect["name"]: {effect["name"], *effect["indistinguishable_from"]} for effect in answer["effects"]}

@@ -17,6 +17,7 @@ from estimator.diagnosis.inference.likelihood import Hypothesis, covariance, fit
 from estimator.diagnosis.inference.remainder import tests
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.result import Stray
+from estimator.physics.fit import not_fitted
 
 FREELY = 3.0
 """Factor, either way, within which a nominal parameter is looked for: beyond it a value is no slip of a data sheet, and
@@ -57,7 +58,8 @@ def free_line(search: Search) -> FreeLine | None:
     )
     problem = replace(nothing.problem, shared=freed)
     sizes, hypotheses = search.nothing().sizes, len(search.names)
-    found = fitted(NOTHING, problem, nothing.x, sizes, search.limits, hypotheses, search.nothing().minus_twice_log)
+    begun = not_fitted(problem, nothing.x)
+    found = fitted(NOTHING, begun, sizes, search.limits, hypotheses, search.nothing().minus_twice_log)
     strays = _strays(search.nothing(), found)
     if not strays:
         return None

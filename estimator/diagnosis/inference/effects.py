@@ -7,8 +7,8 @@ from functools import partial
 
 from estimator.diagnosis.assemble import moments_in, parameters_of, profile_size, profiles_of
 from estimator.diagnosis.inference.likelihood import covariance
+from estimator.diagnosis.inference.plausible import GRADE
 from estimator.diagnosis.inference.posterior import Belief, free_rms
-from estimator.diagnosis.inference.search import GRADE
 from estimator.diagnosis.inference.verdict import Decision
 from estimator.diagnosis.intervals import reported_covariance
 from estimator.diagnosis.result import Evidence, FoundEffect

@@ -13,14 +13,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimator.diagnosis.holdout import blocks, foreign_outputs
-from estimator.diagnosis.inference.likelihood import ITERATIONS, Hypothesis, weighted
-from estimator.diagnosis.inference.search import GRADE
+from estimator.diagnosis.inference.likelihood import Hypothesis, refitted
+from estimator.diagnosis.inference.plausible import GRADE
 from estimator.physics.fit import FitResult, fit
 from estimator.physics.model import DrivelineModel
 from estimator.physics.problem import Problem, make_problem, parameters
 from estimator.physics.starts import warm_start
 from estimator.physics.unknowns import LocalBasis
 from estimator.signals.record import BoolArray, FloatArray, Record
+
+ITERATIONS = 8
+"""Jacobians that what is a recording's own gets: of a linear line it is found in one."""
 
 
 def on_recordings(
@@ -82,7 +85,7 @@ class Unseen:
             outputs = foreign_outputs(whole, self.line, self.records, between, hypothesis.effects)
         else:
             problem = replace(hypothesis.plain.problem, use=tuple(between))
-            plain = weighted(replace(hypothesis.plain, problem=problem), hypothesis.sizes, ITERATIONS)
+            plain = refitted(hypothesis, problem)
             outputs = on_recordings(replace(hypothesis, plain=plain), self.line, records, between).outputs
         errors = [(o - r.output)[r.okay & blocks(r)] for o, r in zip(outputs, records, strict=True)]
         return float(np.sqrt(np.mean(np.concatenate(errors) ** 2)))

@@ -16,13 +16,13 @@ from functools import cached_property
 import numpy as np
 
 from estimator.diagnosis.hypotheses import Effects
-from estimator.diagnosis.inference.disturbances import Limits, Whitener, estimate, line_of, starts, whitener
+from estimator.diagnosis.inference.descent import Effort, descended, extended, light
+from estimator.diagnosis.inference.disturbances import Limits, Size, Whitener, estimate, line_of, starts, whitener
 from estimator.diagnosis.inference.moments import moved
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import MOMENT_NAMES, FitResult, not_fitted
 from estimator.physics.jacobian import jacobian_at
-from estimator.physics.least_squares import minimise
-from estimator.physics.problem import Problem, bounds, outputs_at, residual_at
+from estimator.physics.problem import Problem, bounds
 from estimator.signals.record import FloatArray
 
 SAME = 1.0
@@ -33,8 +33,21 @@ DIGITS = 0.02
 
 MOST_PASSES = 6
 
-ITERATIONS, ROUGH, ROUNDS = 8, 4, 2
-"""Jacobians of a pass at most; of a first comparison; steps of Fisher scoring in a pass."""
+THOROUGH, ROUGH = Effort(derivatives=6, steps=30), Effort(derivatives=1, steps=6)
+"""What a pass may cost at most, and a first comparison."""
+
+FREE = Effort(derivatives=1, steps=6)
+"""What least squares of the free run may cost, from where the likelihood is greatest."""
+
+MOST_ROUGH, MUCH = 3, 0.05
+"""Such comparisons under disturbances of their own at most, and the fall of minus twice the log-likelihood per sample
+for the next."""
+
+ROUNDS = 2
+"""Steps of Fisher scoring in a pass."""
+
+WITH_MOMENTS = 1
+"""Passes in which moments of events are looked for elsewhere."""
 
 
 @dataclass(frozen=True)
@@ -76,16 +89,28 @@ class Hypothesis:
         return self.minus_twice_log + (self.unknowns + freed) * math.log(n) + 2.0 * self.choices
 
     @cached_property
+    def free_squares(self) -> float:
+        """The squared free-run error, unknowns as they leave least of it.
+
+        A load that may walk far leaves the noise of the reading: the rest is what it did.
+        """
+        if "road_grade" in self.effects:
+            return self.plain.residual.size * float(np.sum(np.exp(2.0 * self.sizes[[Size.WHITE, Size.COLOURED]])))
+        rms = self.plain.rms
+        return descended(self.plain, lambda errors: errors / rms, FREE).squares
+
+    @cached_property
     def filter(self) -> Whitener:
         """The filter that whitens errors under the hypothesis' own disturbances."""
-        problem = self.plain.problem
-        return whitener(line_of(self.plain), self.sizes, problem.records[0].sample_time_s, problem.use)
+        return _whitener(self.plain, self.sizes)
 
     @cached_property
     def white(self) -> FitResult:
         """The fit with its errors and their derivative as innovations: independent, of variance 1."""
-        derivative = jacobian_at(self.plain.problem, self.plain.x, self.plain.outputs)
-        return replace(self.plain, residual=self.filter(self.plain.residual), derivative=self.filter(derivative))
+        plain = self.plain
+        known = plain.derivative if plain.converged else None
+        derivative = jacobian_at(plain.problem, plain.x, plain.outputs) if known is None else known
+        return replace(plain, residual=self.filter(plain.residual), derivative=self.filter(derivative))
 
 
 def choices_of(effects: Effects, hypotheses: int) -> float:
@@ -96,25 +121,26 @@ def choices_of(effects: Effects, hypotheses: int) -> float:
 
 def fitted(
     effects: Effects,
-    problem: Problem,
-    x: FloatArray,
+    begun: FitResult,
     sizes: FloatArray,
     limits: Limits,
     hypotheses: int,
     rival: float = math.nan,
 ) -> Hypothesis:
-    """Fit a hypothesis from unknowns ``x`` and disturbances ``sizes``.
+    """Fit a hypothesis from a free run and disturbances ``sizes``.
 
     ``rival`` is minus twice the log-likelihood of the hypothesis it will be compared with: the farther from it, the
     less the last digits matter. Without one it is fitted to its end.
     """
-    plain, choices = not_fitted(problem, x), choices_of(effects, hypotheses)
+    plain, choices = begun, choices_of(effects, hypotheses)
     best: Hypothesis | None = None
     passes: list[float] = []
     while best is None or len(passes) < MOST_PASSES:
-        plain = _with_moments(weighted(plain, sizes, ITERATIONS), sizes)
-        begun = [sizes] if passes else starts(sizes, limits)
-        sizes, now = min((_disturbances(plain, each, limits) for each in begun), key=lambda found: found[1])
+        plain = descended(plain, _whitener(plain, sizes), THOROUGH)
+        if len(passes) < WITH_MOMENTS:
+            plain = _with_moments(plain, sizes)
+        tried = [sizes] if passes else starts(sizes, limits)
+        sizes, now = min((_disturbances(plain, each, limits) for each in tried), key=lambda found: found[1])
         enough = SAME if math.isnan(rival) else max(SAME, DIGITS * abs(now - rival))
         last = best is not None and now > best.minus_twice_log - enough
         if best is None or now < best.minus_twice_log:
@@ -122,20 +148,29 @@ def fitted(
         if last:
             break
         passes.append(now)
-    return best
+    return replace(best, plain=light(best.plain))
 
 
-def compared(effects: Effects, problem: Problem, x: FloatArray, parent: Hypothesis, hypotheses: int) -> Hypothesis:
-    """Fit a hypothesis a few steps under another's disturbances, to be compared with others like it.
+def compared(effects: Effects, begun: FitResult, parent: Hypothesis, hypotheses: int) -> Hypothesis:
+    """Fit a hypothesis a few steps from another's disturbances, to be compared with others like it.
 
-    Its disturbances would be smaller: with all of them in one proportion minus twice the log-likelihood falls by
-    ``n log(Q / Q')``, Q the squared innovations.
+    Where it explains much more, other disturbances weigh what is left, and it is fitted a few steps under those, too.
     """
-    plain = weighted(not_fitted(problem, x), parent.sizes, ROUGH)
-    before, after = (float(np.sum(parent.filter(fit.residual) ** 2)) for fit in (parent.plain, plain))
-    fall = plain.residual.size * math.log(before / after)
-    choices = choices_of(effects, hypotheses)
-    return Hypothesis(effects, plain, parent.sizes, parent.limits, parent.minus_twice_log - fall, choices)
+    sizes, best = parent.sizes, parent.minus_twice_log
+    plain, now = begun, math.inf
+    for _ in range(MOST_ROUGH):
+        plain = descended(plain, _whitener(plain, sizes), ROUGH)
+        sizes, now = _disturbances(plain, sizes, parent.limits)
+        if now > best - MUCH * plain.residual.size:
+            break
+        best = now
+    return Hypothesis(effects, plain, sizes, parent.limits, now, choices_of(effects, hypotheses))
+
+
+def refitted(hypothesis: Hypothesis, problem: Problem) -> FitResult:
+    """Return the fit of a hypothesis to other samples of the same recordings, its disturbances as they are."""
+    begun = not_fitted(problem, hypothesis.plain.x)
+    return descended(begun, _whitener(begun, hypothesis.sizes), THOROUGH)
 
 
 def _disturbances(plain: FitResult, sizes: FloatArray, limits: Limits) -> tuple[FloatArray, float]:
@@ -143,44 +178,20 @@ def _disturbances(plain: FitResult, sizes: FloatArray, limits: Limits) -> tuple[
     return estimate(line_of(plain), plain.residual, sizes, limits, period_s, problem.use, ROUNDS)
 
 
-def weighted(plain: FitResult, sizes: FloatArray, iterations: int) -> FitResult:
-    """Return a fit whose innovations under fixed disturbances are least."""
+def _whitener(plain: FitResult, sizes: FloatArray) -> Whitener:
     problem = plain.problem
-    low, high = bounds(problem)
-    filtered = whitener(line_of(plain), sizes, problem.records[0].sample_time_s, problem.use)
-    seen: dict[bytes, tuple[FloatArray, ...]] = {plain.x.tobytes(): plain.outputs}
-
-    def outputs(x: FloatArray) -> tuple[FloatArray, ...]:
-        key = x.tobytes()
-        if key not in seen:
-            seen.clear()
-            seen[key] = outputs_at(problem, x)
-        return seen[key]
-
-    solution = minimise(
-        lambda x: filtered(residual_at(problem, outputs(x))),
-        lambda x: filtered(jacobian_at(problem, x, outputs(x))),
-        plain.x,
-        low,
-        high,
-        iterations,
-        smooth=not _has_moments(problem),
-    )
-    found = outputs(solution.x)
-    return FitResult(problem, solution.x, found, residual_at(problem, found), None, solution.converged)
+    return whitener(line_of(plain), sizes, problem.records[0].sample_time_s, problem.use)
 
 
 def _with_moments(plain: FitResult, sizes: FloatArray) -> FitResult:
     """Return a fit with moments of events where the innovations are least, and fitted from there."""
-    problem = plain.problem
-    if not _has_moments(problem):
+    if not _has_moments(plain.problem):
         return plain
-    for _ in range(3):
-        filtered = whitener(line_of(plain), sizes, problem.records[0].sample_time_s, problem.use)
-        x = moved(plain, filtered)
-        if x is None:
+    for _ in range(2):
+        found = moved(plain, _whitener(plain, sizes))
+        if found is None:
             break
-        plain = weighted(not_fitted(problem, x), sizes, ITERATIONS)
+        plain = descended(extended(*found, plain), _whitener(plain, sizes), THOROUGH)
     return plain
 
 

@@ -1,13 +1,56 @@
-"""Which effects are worth a fit, and from where: a score test of each, under the hypothesis' own weighting."""
+"""Which effects are worth a fit, and from where: a score test of each, under the hypothesis' own weighting.
+
+How an effect moves the output hardly depends on what else is in a hypothesis as long as the motion is the same: the
+simulations that tell are made once and used around every hypothesis near enough.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
 
 from estimator.diagnosis.inference.disturbances import Whitener
 from estimator.diagnosis.inference.likelihood import Hypothesis
 from estimator.diagnosis.screening import Look, Screen
+from estimator.physics.fit import FitResult
 from estimator.physics.model import DrivelineModel
+from estimator.physics.own_scan import Simulate
 from estimator.physics.projector import Projector
 from estimator.signals.record import FloatArray
+
+SAME_MOTION = 0.02
+"""RMS by which two motions may differ, over what the output moves, for effects to move the output alike in both."""
+
+ROOM_BYTES = 2**27
+"""Room that answers may take."""
+
+
+@dataclass
+class Answers:
+    """Changes of the output, by what was changed, around some motions."""
+
+    around: list[tuple[FitResult, list[dict[bytes, FloatArray]]]] = field(default_factory=list)
+
+    def near(self, fit: FitResult) -> list[dict[bytes, FloatArray]]:
+        """Return what is known of each recording around a motion like that of a fit."""
+        for other, known in self.around:
+            if _difference(fit, other) < SAME_MOTION:
+                return known
+        self.around.append((fit, [{} for _ in fit.outputs]))
+        return self.around[-1][1]
+
+    def is_full(self) -> bool:
+        """Tell whether the answers take all the room there is for them."""
+        each = (known for _, all_known in self.around for known in all_known)
+        return sum(len(known) * next(iter(known.values())).nbytes for known in each if known) > ROOM_BYTES
+
+
+def _difference(fit: FitResult, other: FitResult) -> float:
+    pairs = zip(fit.outputs, other.outputs, strict=True)
+    squares = sum(float(np.sum((mine - its) ** 2)) for mine, its in pairs)
+    return float(np.sqrt(squares / sum(float(np.sum((out - out.mean()) ** 2)) for out in fit.outputs)))
 
 
 class _Weighted(Projector):
@@ -24,12 +67,43 @@ class _Weighted(Projector):
         return super().products(self._filter.part(self._firsts.index(rows.start), answers.T).T, rows)
 
     def promise(self, direction: FloatArray, low: float, high: float) -> tuple[float, float]:
-        return super().promise(self._filter(direction), low, high)
+        white = self._filter(direction)
+        return super().promise(white, low, high) if np.isfinite(white @ white) else (0.0, 0.0)
 
 
-def screen(hypothesis: Hypothesis, model: DrivelineModel) -> Screen:
+class _Remembering(Screen):
+    """Looks at effects around a hypothesis with answers found around others where these will do."""
+
+    def __init__(self, hypothesis: Hypothesis, model: DrivelineModel, answers: Answers) -> None:
+        super().__init__(hypothesis.white, model, _Weighted(hypothesis))
+        self._known = answers.near(hypothesis.plain)
+        self._keeps = not answers.is_full()
+
+    def _runner(self, index: int) -> Simulate:
+        simulate, known = super()._runner(index), self._known[index]
+        base, still = self._result.p_of(index), self._output(index)
+
+        def run(parameters: Sequence[FloatArray], alike_s: FloatArray | None = None) -> FloatArray:
+            keys = [_changed(base, p) for p in parameters]
+            if all(key in known for key in keys):
+                return np.array([still + known[key] for key in keys])
+            found = simulate(parameters, alike_s)
+            if self._keeps:
+                known.update((key, (out - still).astype(np.float32)) for key, out in zip(keys, found, strict=True))
+            return found
+
+        return run
+
+
+def _changed(base: FloatArray, p: FloatArray) -> bytes:
+    """Return what was changed of a parameter vector: places and values."""
+    places = np.flatnonzero(p != base)
+    return places.tobytes() + p[places].tobytes()
+
+
+def screen(hypothesis: Hypothesis, model: DrivelineModel, answers: Answers) -> Screen:
     """Return a first look at effects around a hypothesis; promises are falls of the squared innovations."""
-    return Screen(hypothesis.white, model, _Weighted(hypothesis))
+    return _Remembering(hypothesis, model, answers)
 
 
-__all__ = ["Look", "screen"]
+__all__ = ["Answers", "Look", "screen"]

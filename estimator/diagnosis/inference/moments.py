@@ -2,32 +2,59 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from estimator.diagnosis.inference.disturbances import Whitener
+from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult
 from estimator.physics.jacobian import changes
-from estimator.physics.moments import MOVES, OFFSETS_S, movable, shifted
-from estimator.physics.problem import own_part, simulated_each
-from estimator.signals.record import FloatArray
+from estimator.physics.problem import Problem, own_part, simulated_each
+from estimator.physics.unknowns import LocalBasis
+from estimator.signals.record import FloatArray, Record
+
+OFFSETS_S = np.array([0.01, 0.02, 0.04, 0.08, 0.15, 0.3, 0.6, 1.2, 2.4])
+OFFSETS_S = np.concatenate([-OFFSETS_S[::-1], OFFSETS_S])
+"""Where else the likelihood is looked at, around the moment a fit ended at; and at the recording's own ends."""
 
 WORTH_MOVING = 2.0
 """Fall of the squared innovations that moments elsewhere must bring."""
 
+MOVES = 4
 
-def moved(result: FitResult, filtered: Whitener) -> FloatArray | None:
-    """Return the unknowns with moments where the innovations are less; None where they are nowhere."""
-    x, better = result.x.copy(), False
-    for i in range(len(result.problem.records)):
+
+def moved(result: FitResult, filtered: Whitener) -> tuple[Problem, FloatArray] | None:
+    """Return a problem and its unknowns with moments where the innovations are less; None where they are nowhere.
+
+    A fit may move them from there as far as it could before.
+    """
+    problem, x, better = result.problem, result.x.copy(), False
+    bases = list(problem.local)
+    for i, basis in enumerate(problem.local):
         local = _moved_in(result, filtered, i)
         if local is not None:
-            x[own_part(result.problem, i)], better = local, True
-    return x if better else None
+            x[own_part(problem, i)], better = local, True
+            bases[i] = _around(basis, local, problem.records[i])
+    return (replace(problem, local=tuple(bases)), x) if better else None
+
+
+def _around(basis: LocalBasis, local: FloatArray, record: Record) -> LocalBasis:
+    """Return a basis with the bounds of movable moments as wide as before, around where they are."""
+    first, last = (float(each) for each in record.since_start_s[[0, -1]])
+    last += record.sample_time_s
+    own = []
+    for row, unknown in enumerate(basis.own, start=basis.own_rows.start):
+        if EFFECTS[unknown.effect].event and unknown.low < unknown.high:
+            at, reach = float(local[row]), 0.5 * (unknown.high - unknown.low)
+            unknown = replace(unknown, start=at, low=max(first, at - reach), high=min(last, at + reach))
+        own.append(unknown)
+    return replace(basis, own=tuple(own))
 
 
 def _moved_in(result: FitResult, filtered: Whitener, index: int) -> FloatArray | None:
     basis, local = result.problem.local[index], result.local_of(index).copy()
-    ends = movable(basis)
+    ends = _ends(basis)
     if not ends:
         return None
     taken_up = _initial_state(result, filtered, index)
@@ -37,10 +64,9 @@ def _moved_in(result: FitResult, filtered: Whitener, index: int) -> FloatArray |
         may_move = [row for row in (begin, end) if basis.low[row] < basis.high[row]]
         sets = [[row] for row in may_move] + ([may_move] if len(may_move) > 1 else [])
         for _ in range(MOVES):
-            tried = [shifted(local, rows, offset) for rows in sets for offset in OFFSETS_S]
-            tried += [shifted(local, [row], {begin: first, end: last}[row] - local[row]) for row in may_move]
+            tried = [_shifted(local, rows, offset) for rows in sets for offset in OFFSETS_S]
+            tried += [_shifted(local, [row], {begin: first, end: last}[row] - local[row]) for row in may_move]
             tried = [each for each in tried if first <= each[begin] <= each[end] <= max(last, local[end])]
-            tried = [each for each in tried if np.all(each >= basis.low) and np.all(each <= basis.high)]
             if not tried:
                 break
             squares = _squares(result, filtered, index, taken_up, tried)
@@ -48,6 +74,19 @@ def _moved_in(result: FitResult, filtered: Whitener, index: int) -> FloatArray |
                 break
             best, local = float(squares.min()), tried[int(squares.argmin())]
     return local if best < began - WORTH_MOVING else None
+
+
+def _shifted(local: FloatArray, rows: list[int], offset_s: float) -> FloatArray:
+    x = local.copy()
+    x[rows] += offset_s
+    return x
+
+
+def _ends(basis: LocalBasis) -> list[tuple[int, int]]:
+    """Return where beginning and end of each event stand among a recording's unknowns."""
+    place = {(u.effect, u.name): row for row, u in enumerate(basis.own, start=basis.own_rows.start)}
+    movable = {u.effect for u in basis.own if EFFECTS[u.effect].event and u.low < u.high}
+    return [(place[effect, "from_s"], place[effect, "to_s"]) for effect in sorted(movable)]
 
 
 def _initial_state(result: FitResult, filtered: Whitener, index: int) -> FloatArray:

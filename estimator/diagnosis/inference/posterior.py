@@ -8,18 +8,15 @@ and by what the best set leaves that is no noise (``remainder``).
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from estimator.diagnosis.hypotheses import Effects
-from estimator.diagnosis.inference.disturbances import Size
-from estimator.diagnosis.inference.likelihood import Hypothesis, residuals
-from estimator.diagnosis.inference.search import GRADE
+from estimator.diagnosis.inference.likelihood import Hypothesis
 from estimator.physics.catalogue import EFFECTS
-from estimator.physics.jacobian import changes
-from estimator.physics.problem import own_part
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +25,8 @@ class Belief:
 
     Attributes
     ----------
+    names : frozenset of str
+        The effect, those it can't be told from, and those that hold it or are one of it.
     probability : float
         Of this effect or one of those it can't be told from.
     share : float
@@ -39,6 +38,7 @@ class Belief:
     """
 
     name: str
+    names: frozenset[str]
     probability: float
     share: float
     score: float
@@ -48,7 +48,8 @@ class Belief:
 def beliefs(
     best: Hypothesis,
     visited: Mapping[Effects, Hypothesis],
-    nothing: Hypothesis,
+    plausible: Mapping[Effects, Hypothesis],
+    share: Mapping[str, float],
     tempered: float,
     alike_within: float,
     alike_share: float,
@@ -59,6 +60,10 @@ def beliefs(
     ----------
     visited : mapping of set to Hypothesis
         All that were fitted to their end, the sets without each effect of the best among them.
+    plausible : mapping of set to Hypothesis
+        Those among them whose values are all a case of their effect.
+    share : mapping of str to float
+        Of each effect of the best set (``shares``).
     tempered : float
         By which differences of scores are divided.
     alike_within : float
@@ -67,20 +72,47 @@ def beliefs(
         The same over what the effect itself explains.
     """
     found = []
+    scores = [(effects, each.score) for effects, each in plausible.items()]
     for name in sorted(best.effects):
         without = visited[best.effects - {name}]
         within = max(alike_within, alike_share * (without.score - best.score))
-        alike = _alike(name, best, visited, within)
+        alike = _alike(name, best, plausible, within)
+        names = frozenset({name, *alike, *_same_law(name)})
         found.append(
             Belief(
                 name,
-                _probability({name, *alike, *_same_law(name)}, visited, tempered),
-                (squares_of(without) - squares_of(best)) / squares_of(nothing),
+                names,
+                probability_of(names, scores, tempered),
+                max(share[name], 0.0),
                 without.score - best.score,
                 alike,
             )
         )
     return tuple(sorted(found, key=lambda belief: -belief.share))
+
+
+def fall(one: Hypothesis, other: Hypothesis, nothing: Hypothesis) -> float:
+    """Return by how much less another set leaves than one, as a share of the re-tuned model's squared error."""
+    return (one.free_squares - other.free_squares) / nothing.free_squares
+
+
+def shares(path: Sequence[Hypothesis]) -> dict[str, float]:
+    """Return the share of the re-tuned model's squared free-run error that goes with each effect of the last set.
+
+    Along the way from the nominal model to the best set, each effect has what is left less from where it was added. One
+    that takes another's place has its share, too; what a step without a new effect changes all have in proportion.
+    Together they are what the last set explains.
+    """
+    found: dict[str, float] = {}
+    for one, other in pairwise(path):
+        gone = sum(found.pop(name) for name in one.effects - other.effects)
+        change, new = fall(one, other, path[0]) + gone, other.effects - one.effects
+        among = new or other.effects
+        whole = sum(found.values())
+        for name in among:
+            part = 1.0 / len(among) if new or whole <= 0.0 else found[name] / whole
+            found[name] = found.get(name, 0.0) + part * change
+    return found
 
 
 def _same_law(name: str) -> set[str]:
@@ -89,25 +121,8 @@ def _same_law(name: str) -> set[str]:
 
 
 def free_rms(hypothesis: Hypothesis) -> float:
-    """Return the RMS of the free-run error, load torque and initial state as they leave least of it."""
-    return math.sqrt(max(squares_of(hypothesis), 0.0) / hypothesis.plain.residual.size)
-
-
-def squares_of(hypothesis: Hypothesis) -> float:
-    """Return the squared free-run error, each recording's load torque and initial state as they leave least of it.
-
-    A load that may walk far leaves the noise of the reading: the rest is what it did.
-    """
-    plain = hypothesis.plain
-    if GRADE in hypothesis.effects:
-        return plain.residual.size * float(np.sum(np.exp(2.0 * hypothesis.sizes[[Size.WHITE, Size.COLOURED]])))
-    left = 0.0
-    for i, error in enumerate(residuals(hypothesis, plain.residual)):
-        first = own_part(plain.problem, i).start
-        columns = np.arange(first, first + plain.problem.local[i].own_rows.start)
-        start = np.linalg.qr(changes(plain.problem, plain.x, i, columns, plain.outputs))[0]
-        left += float(error @ error) - float(np.sum((start.T @ error) ** 2))
-    return left
+    """Return the RMS of the free-run error, re-tuned to leave least of it."""
+    return math.sqrt(hypothesis.free_squares / hypothesis.plain.residual.size)
 
 
 def _alike(name: str, best: Hypothesis, visited: Mapping[Effects, Hypothesis], within: float) -> tuple[str, ...]:
@@ -122,9 +137,16 @@ def _alike(name: str, best: Hypothesis, visited: Mapping[Effects, Hypothesis], w
     return tuple(sorted((near | equivalent) - best.effects))
 
 
-def _probability(names: set[str], visited: Mapping[Effects, Hypothesis], tempered: float) -> float:
-    """Return the probability that one of some effects is there, over all sets that were fitted."""
-    scores = np.array([each.score for each in visited.values()])
-    weights = np.exp(-0.5 * (scores - scores.min()) / tempered)
-    there = np.array([bool(effects & names) for effects in visited])
+def probability_of(names: Collection[str], scores: Sequence[tuple[Collection[str], float]], tempered: float) -> float:
+    """Return the probability that one of some effects is there, over all sets that were fitted.
+
+    Parameters
+    ----------
+    scores : sequence of (set of effects, float)
+    tempered : float
+        By which differences of scores are divided.
+    """
+    values = np.array([score for _, score in scores])
+    weights = np.exp(-0.5 * (values - values.min()) / tempered)
+    there = np.array([any(name in names for name in effects) for effects, _ in scores])
     return float(weights[there].sum() / weights.sum())

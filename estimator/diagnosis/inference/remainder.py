@@ -6,21 +6,30 @@ not change over time; and the disturbances that made them so are within what suc
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from estimator.diagnosis.inference.calibration import MOST_CHANGE, MOST_DEPENDENT, MOST_LINE, MOST_PREDICTABLE
+from estimator.diagnosis.inference.calibration import TEST_LIMITS
 from estimator.diagnosis.inference.disturbances import Size
 from estimator.diagnosis.inference.likelihood import Hypothesis, residuals
-from estimator.diagnosis.noise import unpredictable
+from estimator.diagnosis.noise import PREDICTOR_ORDER, unpredictable
 from estimator.physics.motion import measured_speed
 from estimator.physics.simulate import motor_angle
 from estimator.signals.record import FloatArray, Record
 
 BINS = 12
 """Bins of torque and of speed, of equal count."""
+
+COLUMNS = {"most_predictable": PREDICTOR_ORDER, "most_dependent": 2 * BINS + 3}
+"""How many signals a share of the innovations is sought in: past samples; bins, waves in the angle, and a mean."""
+
+FEWEST = 50
+
+CHANCE = 4.0
+"""Standard deviations of what noise shows by chance that a share may be beyond its limit."""
 
 CHANGE_S = 1.0
 EDGE = 0.02
@@ -39,12 +48,14 @@ class Test:
 
     ``is_share`` where the value is the share of the error's variance that is no noise: information about the laws, in
     the units of a score over the number of samples, that no hypothesis has found. Differences of scores count by it.
+    ``key`` is the limit's name where it is calibrated.
     """
 
     name: str
     value: float
     most: float
     is_share: bool = False
+    key: str = ""
 
     @property
     def failed(self) -> bool:
@@ -58,13 +69,27 @@ def tests(best: Hypothesis) -> tuple[Test, ...]:
     errors = residuals(best, best.white.residual)
     whole = np.concatenate(errors)
     power = float(whole @ whole) / whole.size
-    return (
-        Test("foretold by its own past", 1.0 - unpredictable(errors) ** 2 / power, MOST_PREDICTABLE, True),
-        Test("dependent on torque, speed or angle", _dependent(best, whole), MOST_DEPENDENT, True),
-        Test("a line in its spectrum", max(_line(each) for each in errors), MOST_LINE),
-        Test("changing over time", _change(errors, problem.records) / power, MOST_CHANGE),
-        *(Test(name, float(best.sizes[size] > best.limits.high[size] - EDGE), 0.5) for size, name in _bounded(best)),
+    limited = (
+        ("most_predictable", "foretold by its own past", 1.0 - unpredictable(errors) ** 2 / power),
+        ("most_dependent", "dependent on torque, speed or angle", _dependent(best, whole)),
+        ("most_line", "a line in its spectrum", max(_line(each) for each in errors)),
+        ("most_change", "changing over time", _change(errors, problem.records, power)),
     )
+    bounded = (
+        Test(name, float(best.sizes[size] > best.limits.high[size] - EDGE), 0.5) for size, name in _bounded(best)
+    )
+    return (
+        *(
+            Test(name, value, TEST_LIMITS[key].most + chance(key, whole.size), TEST_LIMITS[key].is_share, key)
+            for key, name, value in limited
+        ),
+        *bounded,
+    )
+
+
+def chance(key: str, samples: int) -> float:
+    """Return how large a share of so many samples' variance a test finds in noise by chance; 0 where it is no share."""
+    return CHANCE * math.sqrt(2.0 * COLUMNS[key]) / samples if key in COLUMNS else 0.0
 
 
 def _bounded(best: Hypothesis) -> list[tuple[Size, str]]:
@@ -99,12 +124,11 @@ def _line(error: FloatArray) -> float:
     return float(power.max() / power.mean())
 
 
-def _change(errors: Sequence[FloatArray], records: Sequence[Record]) -> float:
-    """Return the largest mean square over a second."""
+def _change(errors: Sequence[FloatArray], records: Sequence[Record], power: float) -> float:
+    """Return the largest mean square over a second, or 50 samples, less the mean of all, in standard deviations."""
     found = 0.0
     for error, record in zip(errors, records, strict=True):
-        length = max(1, min(round(CHANGE_S / record.sample_time_s), error.size))
-        length = max(length, min(50, error.size))
+        length = max(1, min(max(round(CHANGE_S / record.sample_time_s), FEWEST), error.size))
         squares = (error[: error.size // length * length] ** 2).reshape(-1, length).mean(axis=1)
-        found = max(found, float(squares.max()))
+        found = max(found, (float(squares.max()) / power - 1.0) * math.sqrt(0.5 * length))
     return found

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from estimator.diagnosis.hypotheses import NOTHING, Effects, open_hypotheses, with_effect
+from estimator.diagnosis.inference.descent import extended
 from estimator.diagnosis.inference.disturbances import Limits, limits_for
 from estimator.diagnosis.inference.likelihood import Hypothesis, compared, fitted
-from estimator.diagnosis.inference.looks import screen
-from estimator.diagnosis.inherit import forgetting, inheriting, kept
+from estimator.diagnosis.inference.looks import Answers, Look, screen
+from estimator.diagnosis.inference.plausible import GRADE, is_plausible, loosened, may_be_loose
+from estimator.diagnosis.inherit import forgetting, inheriting, kept, line_values, placed
 from estimator.diagnosis.noise import noise_floor
-from estimator.diagnosis.screening import Look, promising
-from estimator.diagnosis.trial import has_edge
+from estimator.diagnosis.screening import promising
 from estimator.physics.catalogue import EFFECTS
-from estimator.physics.effect import Element
-from estimator.physics.fit import FitResult
+from estimator.physics.fit import FitResult, not_fitted
 from estimator.physics.grid import Grid, grid_for
 from estimator.physics.layout import slot
 from estimator.physics.model import DrivelineModel
@@ -25,14 +26,10 @@ from estimator.physics.parallel import concurrently
 from estimator.physics.problem import Problem, make_problem, start_of, start_vector
 from estimator.physics.simulate import simulate
 from estimator.physics.starts import warm_start
-from estimator.physics.torque_path import shaft_torque
-from estimator.physics.unknowns import Release, nominal_unknowns, own_unknowns
+from estimator.physics.unknowns import Release, nominal_unknowns, own_unknowns, released
 from estimator.signals.record import BoolArray, Record
 
 BLIND = "speed_sign_blind"
-GRADE = "road_grade"
-"""The effect that is no law: a load that walks further than any load does by itself."""
-
 MOST_FITS = 6
 """Effects that are fitted on top of a hypothesis, the most promising of a first look."""
 
@@ -43,14 +40,12 @@ SAME_PROMISE = 0.5
 """Share of what an effect promises that a look-alike must promise in its place."""
 
 NEARLY = 0.3
-"""Share of what an effect explains by which a look-alike's first few steps may be behind for it to be fitted."""
+"""Share of what an effect explains by which another's first few steps may be behind for it to be fitted to its end."""
 
-LEAST_THROUGH = 0.2
-"""Share of the torque's RMS that must get through the torque path: less switches the input off to explain nothing."""
-
-MOST_EFFECTS = 8
 FINISHED = 2
 """Best of these that are fitted to their end."""
+
+MOST_EFFECTS = 8
 
 
 def never() -> bool:
@@ -66,6 +61,8 @@ class Search:
     ----------
     visited : dict of set of effects to Hypothesis
         Those that were fitted to their end.
+    path : list of Hypothesis
+        Each better than the one before, from the nominal model to the best.
     rivals : dict of str to float
         Best score of a set with each effect that was fitted at all.
     is_over : callable
@@ -78,9 +75,13 @@ class Search:
     names: Sequence[str]
     grid: Grid | None = None
     visited: dict[Effects, Hypothesis] = field(default_factory=dict)
+    path: list[Hypothesis] = field(default_factory=list)
     rivals: dict[str, float] = field(default_factory=dict)
     is_over: Callable[[], bool] = never
     stopped: bool = False
+    answers: Answers = field(default_factory=Answers)
+    _lessened: set[tuple[Effects, str]] = field(default_factory=set)
+    _told: defaultdict[Effects, set[str]] = field(default_factory=lambda: defaultdict(set))
     _limits: Limits | None = None
 
     @property
@@ -93,6 +94,7 @@ class Search:
     def run(self) -> Hypothesis:
         """Return the best set of effects found."""
         current = self.nothing()
+        self.path = [current]
         for _ in range(2 * MOST_EFFECTS):
             if self.is_over():
                 self.stopped = True
@@ -102,6 +104,7 @@ class Search:
             if better is None:
                 break
             current = better
+            self.path.append(current)
         return current
 
     def nothing(self) -> Hypothesis:
@@ -109,16 +112,51 @@ class Search:
         if NOTHING not in self.visited:
             own = tuple(own_unknowns(self.model.effects, record) for record in self.records)
             problem = self._problem(NOTHING, Release(nominal_unknowns(self.model), own))
-            self._keep(fitted(NOTHING, problem, start_vector(problem), self.limits.usual, self.limits, len(self.names)))
+            begun = not_fitted(problem, start_vector(problem))
+            self._keep(fitted(NOTHING, begun, self.limits.usual, self.limits, len(self.names)))
         return self.visited[NOTHING]
 
     def _best_addition(self, current: Hypothesis) -> Hypothesis | None:
         looks = self._looks(current, [name for name in self._open(current) if name not in current.effects])
         rough = concurrently(lambda name: self._added(current, name, looks[name]), list(looks))
-        found = [each for each in rough if each is not None]
+        found = [each for each in rough if each is not None] + self._begun_anew(current)
         found.sort(key=lambda each: each.score)
-        finished = concurrently(lambda each: self.finish(each, current), found[:FINISHED])
+        near = [each for each in found[:FINISHED] if each.score <= found[0].score + NEARLY * _gain(found[0], current)]
+        finished = concurrently(lambda each: self.finish(each, current), near)
         return self._better(finished, current)
+
+    def _begun_anew(self, current: Hypothesis) -> list[Hypothesis]:
+        """Fit a hypothesis' effects from other starts a few steps, each beside the same others once.
+
+        Laws are written other ways, events looked for in other stretches of the recordings.
+        """
+        fits: list[Hypothesis | None] = []
+        for name in sorted(current.effects - {GRADE} - self._told[current.effects]):
+            self._told[current.effects].add(name)
+            fits += self._retold(current, name)
+            if EFFECTS[name].event:
+                fits.append(self._elsewhere(current, name))
+        return [each for each in fits if each is not None and self.is_plausible(each)]
+
+    def _retold(self, current: Hypothesis, name: str) -> list[Hypothesis]:
+        """Fit a law written other ways."""
+        fits, plain = [], current.plain
+        for other in EFFECTS[name].retold(self.model, self.records, plain.values_of(name), line_values(plain)):
+            begun = placed(forgetting(plain, name), other.line)
+            (release,) = released(name, self.model, self.records, [other.start])
+            alone = replace(release, own=((),) * len(self.records))
+            problem = self._extended(begun, current.effects, alone)
+            started = extended(problem, warm_start(problem, begun), plain, anew=name)
+            fits.append(compared(current.effects, started, current, len(self.names)))
+        return fits
+
+    def _elsewhere(self, current: Hypothesis, name: str) -> Hypothesis | None:
+        """Fit an event where a look at the same hypothesis without it, the rest as it is, sees it."""
+        plain, effects = current.plain, current.effects - {name}
+        problem = self._problem(effects, kept(plain, (effects - {GRADE}) | set(self.model.effects)))
+        without = extended(problem, warm_start(problem, forgetting(plain, name)), plain)
+        base = replace(current, effects=effects, plain=replace(without, converged=without.derivative is not None))
+        return self._added(base, name, promising(screen(base, self.model, self.answers).looks(name)), current)
 
     def _open(self, current: Hypothesis) -> Sequence[str]:
         """Return the effects that can be told; behind a sensor blind for the sign reversals are the motion's own."""
@@ -141,15 +179,15 @@ class Search:
         return self._better([self._with_grade(current)], current)
 
     def _better(self, found: Sequence[Hypothesis], current: Hypothesis) -> Hypothesis | None:
-        best = min(found, key=lambda each: each.score, default=None)
-        return best if best is not None and best.score < current.score else None
+        better = [each for each in found if each.score < current.score and self.is_plausible(each)]
+        return min(better, key=lambda each: each.score, default=None)
 
     def _looks(self, current: Hypothesis, names: Sequence[str], rival: str = "") -> dict[str, list[Look]]:
         """Return the starts of the effects that are worth a fit, the most promising effect first.
 
         Beside a ``rival`` those are worth it that promise nearly as much.
         """
-        view = screen(current, self.model)
+        view = screen(current, self.model, self.answers)
         contained = {special for have in current.effects for special in EFFECTS[have].contains}
         tried = [name for name in names if name != GRADE and name not in contained]
         looks = dict(zip(tried, concurrently(view.looks, tried), strict=True))
@@ -158,25 +196,44 @@ class Search:
         if rival and rival != GRADE:
             least = max(least, SAME_PROMISE * view.looks(rival)[0].promise)
         loose = [name for name in order if EFFECTS[name].loosens]
-        worth = [name for name in order if looks[name][0].promise >= least][:MOST_FITS]
+        worth = [name for name in order if looks[name][0].promise >= least]
+        twins = {twin for name in worth for twin in EFFECTS[name].equivalent if precedes(name, twin)}
+        worth = [name for name in worth if name not in twins][:MOST_FITS]
         return {
             name: promising(looks[name])
             for name in dict.fromkeys([*worth, *(loose if not current.effects and not rival else [])])
         }
 
-    def _added(self, current: Hypothesis, name: str, looks: Sequence[Look]) -> Hypothesis | None:
-        """Fit an effect on top of a hypothesis a few steps, from each of its starts; None where no value is one."""
+    def _added(
+        self, current: Hypothesis, name: str, looks: Sequence[Look], instead: Hypothesis | None = None
+    ) -> Hypothesis | None:
+        """Fit an effect on top of a hypothesis a few steps, from each of its starts; None where no value is one.
+
+        Where it takes the place of another effect, begun and weighted as the hypothesis with that one: ``instead``. An
+        effect that is begun elsewhere is weighted so, too.
+        """
         effects = with_effect(current.effects, name)
-        if effects in self.visited:
+        is_again = instead is not None and name in instead.effects
+        if effects in self.visited and not is_again:
             return self.visited[effects]
+        if self.is_over():
+            self.stopped = True
+            return None
+        rival = instead or current
+        warm = current.plain if is_again else rival.plain
+        for gone in rival.effects - effects - {GRADE}:
+            warm = forgetting(warm, gone)
         fits = []
         for look in looks:
-            problem = self._extended(current, effects, inheriting(name, look.release, current.plain))
-            x = warm_start(problem, current.plain)
-            fits.append(compared(effects, problem, x, current, len(self.names)))
+            problem = self._extended(warm, effects, inheriting(name, look.release, warm))
+            begun = extended(problem, warm_start(problem, warm), current.plain if is_again else rival.plain)
+            fits.append(compared(effects, begun, rival, len(self.names)))
         best = min(fits, key=lambda each: each.score)
+        loose = loosened(best, self.model)
+        if loose is not None:
+            best = self._more_plausible(best, compared(effects, loose, rival, len(self.names)))
         self.rivals[name] = min(best.score, self.rivals.get(name, best.score))
-        return best if self._is_plausible(best) else None
+        return best if self.is_plausible(best) else None
 
     def _limits_of(self, effects: Effects) -> Limits:
         return self.limits.freed() if GRADE in effects else self.limits
@@ -186,42 +243,33 @@ class Search:
         return self.finish(replace(current, effects=effects, limits=self._limits_of(effects)), current)
 
     def finish(self, rough: Hypothesis, rival: Hypothesis) -> Hypothesis:
-        """Take a fit as far as a comparison with a rival needs."""
-        if rough.effects not in self.visited:
-            plain = rough.plain
-            whole = fitted(
-                rough.effects, plain.problem, plain.x, rough.sizes, rough.limits, len(self.names), rival.minus_twice_log
-            )
-            self._keep(whole if self._is_plausible(whole) else rough)
+        """Take a fit as far as a comparison with a rival needs; kept where it is the best of its set so far."""
+        known = self.visited.get(rough.effects)
+        if known is None or rough.score < known.score:
+            whole = self._fitted(rough, rough.plain, rival)
+            loose = loosened(whole, self.model)
+            if loose is not None:
+                whole = self._more_plausible(whole, self._fitted(whole, loose, rival))
+            whole = whole if self.is_plausible(whole) else rough
+            if known is None or whole.score < known.score:
+                self._keep(whole)
         return self.visited[rough.effects]
 
-    def _is_plausible(self, hypothesis: Hypothesis) -> bool:
+    def _fitted(self, of: Hypothesis, begun: FitResult, rival: Hypothesis) -> Hypothesis:
+        return fitted(of.effects, begun, of.sizes, of.limits, len(self.names), rival.minus_twice_log)
+
+    def _more_plausible(self, one: Hypothesis, other: Hypothesis) -> Hypothesis:
+        """Return the better of two fits of a set, where both are plausible; else the one that is."""
+        return other if self.is_plausible(other) and (other.score < one.score or not self.is_plausible(one)) else one
+
+    @property
+    def plausible(self) -> dict[Effects, Hypothesis]:
+        """The sets that were fitted to their end whose values are all a case of their effect."""
+        return {effects: each for effects, each in self.visited.items() if self.is_plausible(each)}
+
+    def is_plausible(self, hypothesis: Hypothesis) -> bool:
         """Tell whether the values of every effect are a case of it."""
-        plain = hypothesis.plain
-        values = {name: plain.values_of(name) for name in hypothesis.effects - {GRADE}}
-        if any(EFFECTS[name].implausible(self.model, self.records, values[name]) for name in values):
-            return False
-        edges = all(has_edge(name, plain) for name in values if EFFECTS[name].event)
-        return edges and self._is_driven(plain) and not self._is_stuck(values)
-
-    def _is_driven(self, plain: FitResult) -> bool:
-        """Tell whether the torque path lets a real part of the torque through in every recording."""
-        for i, record in enumerate(self.records):
-            torque = shaft_torque(record.torque_nm, record.time_s - record.time_s[0], plain.p_of(i))
-            if float(torque @ torque) < LEAST_THROUGH**2 * float(record.total_torque_nm @ record.total_torque_nm):
-                return False
-        return True
-
-    def _is_stuck(self, values: Mapping[str, Mapping[str, float]]) -> bool:
-        """Tell whether a torque against the motion is above all torque that was applied."""
-        most = max(float(np.abs(record.total_torque_nm).max()) for record in self.records)
-        return any(
-            values[name].get(parameter.name, 0.0) > most
-            for name in values
-            if EFFECTS[name].element in (Element.MOTOR, Element.LOAD)
-            for parameter in EFFECTS[name].parameters
-            if parameter.dimension == "torque"
-        )
+        return is_plausible(hypothesis, self.model, self.records)
 
     def is_resolved(self, hypothesis: Hypothesis, name: str) -> bool:
         """Tell whether an effect is large enough to be told from another way of sampling."""
@@ -229,25 +277,29 @@ class Search:
         return name == GRADE or not EFFECTS[name].unresolved(self.model, self.records, values)
 
     def without(self, current: Hypothesis, name: str) -> Hypothesis:
-        """Fit a hypothesis without one of its effects, the others begun where they are."""
-        effects = current.effects - {name}
-        if effects not in self.visited:
+        """Fit a hypothesis without one of its effects, the others begun where they are, once from each hypothesis.
+
+        The set may be known: from where it was begun before it may have ended in a poorer optimum.
+        """
+        effects, place = current.effects - {name}, (current.effects, name)
+        known = self.visited.get(effects)
+        if known is None or place not in self._lessened:
+            self._lessened.add(place)
             plain = current.plain
             if name != GRADE:
                 release = kept(plain, (effects - {GRADE}) | set(self.model.effects))
                 problem = self._problem(effects, release)
-                plain = forgetting(plain, name)
-                x = warm_start(problem, plain)
-            else:
-                problem, x = plain.problem, plain.x
+                plain = extended(problem, warm_start(problem, forgetting(plain, name)), plain)
             limits = self._limits_of(effects)
-            self._keep(fitted(effects, problem, x, current.sizes, limits, len(self.names), current.minus_twice_log))
+            found = fitted(effects, plain, current.sizes, limits, len(self.names), current.minus_twice_log)
+            if known is None or found.score < known.score:
+                self._keep(found)
         return self.visited[effects]
 
     def exchanged(self, current: Hypothesis, name: str, other: str) -> Hypothesis | None:
         """Fit another effect in the place of one; None where no value is one."""
         base = self.without(current, name)
-        rough = self._added(base, other, promising(screen(base, self.model).looks(other)))
+        rough = self._added(base, other, promising(screen(base, self.model, self.answers).looks(other)), current)
         return None if rough is None else self.finish(rough, current)
 
     def _best_drop(self, current: Hypothesis) -> Hypothesis | None:
@@ -264,21 +316,26 @@ class Search:
         base = self.without(current, name)
         alike = [other for other in self.names if other not in current.effects and are_alike(name, other)]
         looks = self._looks(base, alike, name)
-        rough = [self._added(base, other, looks[other]) for other in looks]
-        near = current.score + NEARLY * max(base.score - current.score, 0.0)
+        rough = [self._added(base, other, looks[other], current) for other in looks]
+        near = current.score + NEARLY * _gain(current, base)
         found = [each for each in rough if each is not None and each.score < near]
         return self.finish(min(found, key=lambda each: each.score), current) if found else None
 
-    def _extended(self, current: Hypothesis, effects: Effects, release: Release) -> Problem:
-        common = kept(current.plain, (effects - {GRADE}) | set(self.model.effects))
+    def _extended(self, warm: FitResult, effects: Effects, release: Release) -> Problem:
+        common = kept(warm, (effects - {GRADE}) | set(self.model.effects))
         own = tuple((*old, *mine) for old, mine in zip(common.own, release.own, strict=True))
         return self._problem(effects, Release((*common.shared, *release.shared), own))
 
     def _problem(self, effects: Effects, release: Release) -> Problem:
+        nominal = {each.name: each for each in nominal_unknowns(self.model) if not each.effect}
+        shared = [  # what an effect that is gone has loosened is tight again
+            nominal.get(each.name, each) if not each.effect and not may_be_loose(each, effects, self.model) else each
+            for each in release.shared
+        ]
         return make_problem(
             self.model,
             self.records,
-            release.shared,
+            shared,
             own=release.own,
             use=self.use,
             grid=self.grid or grid_for(self.model, self.records),
@@ -286,6 +343,16 @@ class Search:
 
     def _keep(self, hypothesis: Hypothesis) -> None:
         self.visited[hypothesis.effects] = hypothesis
+
+
+def _gain(better: Hypothesis, than: Hypothesis) -> float:
+    return max(than.score - better.score, 0.0)
+
+
+def precedes(one: str, other: str) -> bool:
+    """Tell whether an effect comes before another in the catalogue: along the chain from command to sample."""
+    order = list(EFFECTS)
+    return order.index(one) < order.index(other)
 
 
 def are_alike(one: str, other: str) -> bool:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from estimator.diagnosis.hypotheses import Effects
 from estimator.diagnosis.inference.calibration import (
     ALIKE_SHARE,
     ALIKE_WITHIN,
@@ -16,7 +18,7 @@ from estimator.diagnosis.inference.calibration import (
 )
 from estimator.diagnosis.inference.disturbances import Size
 from estimator.diagnosis.inference.likelihood import Hypothesis
-from estimator.diagnosis.inference.posterior import Belief, beliefs, free_rms, squares_of
+from estimator.diagnosis.inference.posterior import Belief, beliefs, fall, free_rms, shares
 from estimator.diagnosis.inference.remainder import Test, tests
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.result import Verdict
@@ -52,17 +54,54 @@ class Decision:
     times_noise: float
 
 
-def decide(search: Search, with_findings: bool = False) -> Decision:
-    """Search, and decide; ``with_findings`` where faults of the acquisition were recognised and compensated."""
+@dataclass(frozen=True, slots=True)
+class Grounds:
+    """What a decision rests on, before any threshold is applied.
+
+    Attributes
+    ----------
+    best, nothing : Hypothesis
+        The best set of effects, and the re-tuned model.
+    beliefs : tuple of Belief
+        Of every effect of the best set that is large enough to be told from another way of sampling.
+    tests : tuple of Test
+    scores : tuple of (set of effects, float)
+        Of all plausible sets that were fitted to their end.
+    """
+
+    best: Hypothesis
+    nothing: Hypothesis
+    beliefs: tuple[Belief, ...]
+    tests: tuple[Test, ...]
+    scores: tuple[tuple[Effects, float], ...]
+
+
+def tempered_by(tests: Sequence[Test], samples: int, factor: float = TEMPERED) -> float:
+    """Return by which differences of scores are divided: more where a test finds information that no law has used."""
+    return factor + samples * sum(test.value for test in tests if test.is_share and test.failed)
+
+
+def grounds(search: Search) -> Grounds:
+    """Search, and return what there is to decide on."""
     nothing = search.nothing()
     best = _as_simple_as_will_do(search, search.run())
     for name in best.effects:
         search.without(best, name)
-    failed = tuple(test for test in tests(best) if test.failed)
-    tempered = TEMPERED + best.plain.residual.size * sum(test.value for test in failed if test.is_share)
-    found = beliefs(best, search.visited, nothing, tempered, ALIKE_WITHIN, ALIKE_SHARE)
-    established = [each for each in found if each.probability >= LEAST_PROBABILITY]
-    named = tuple(each for each in established if each.share >= LEAST_SHARE and search.is_resolved(best, each.name))
+    examined = tests(best)
+    tempered = tempered_by(examined, best.plain.residual.size)
+    found = beliefs(best, search.visited, search.plausible, shares(search.path), tempered, ALIKE_WITHIN, ALIKE_SHARE)
+    resolved = tuple(each for each in found if search.is_resolved(best, each.name))
+    scores = tuple((effects, each.score) for effects, each in search.plausible.items())
+    return Grounds(best, nothing, resolved, examined, scores)
+
+
+def decide(search: Search, with_findings: bool = False) -> Decision:
+    """Search, and decide; ``with_findings`` where faults of the acquisition were recognised and compensated."""
+    ground = grounds(search)
+    best, nothing = ground.best, ground.nothing
+    failed = tuple(test for test in ground.tests if test.failed)
+    established = [each for each in ground.beliefs if each.probability >= LEAST_PROBABILITY]
+    named = tuple(each for each in established if each.share >= LEAST_SHARE)
     noise = float(np.hypot(*np.exp(best.sizes[[Size.WHITE, Size.COLOURED]])))
     left = max(free_rms(best) ** 2 - noise**2, 0.0) / free_rms(nothing) ** 2
     return Decision(
@@ -71,7 +110,7 @@ def decide(search: Search, with_findings: bool = False) -> Decision:
         nothing,
         named,
         tuple(each for each in established if each not in named),
-        tuple(each for each in found if each.probability < LEAST_PROBABILITY),
+        tuple(each for each in ground.beliefs if each.probability < LEAST_PROBABILITY),
         failed,
         left,
         free_rms(best) / noise,
@@ -88,8 +127,9 @@ def _as_simple_as_will_do(search: Search, best: Hypothesis) -> Hypothesis:
             simpler = search.exchanged(best, name, special)
             if simpler is None:
                 continue
-            if squares_of(simpler) - squares_of(best) < LEAST_SHARE * squares_of(search.nothing()):
+            if fall(simpler, best, search.nothing()) < LEAST_SHARE:
                 best = simpler
+                search.path.append(best)
                 break
     return best
 

@@ -68,6 +68,7 @@ EFFECT = Effect(
     scales=low_pass.scales,
     starts=low_pass.starts,
     sentence=sentence,
+    implausible=low_pass.quick_enough("time_constant_s"),
     unresolved=long_enough("time_constant_s"),
     linear=True,
 )

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from estimator.compiled import compiled
-from estimator.physics.effect import WITH_SHAFT, Effect, EffectParameter, Element, Held, Retelling, Start, Within
+from estimator.physics.effect import WITH_SHAFT, Effect, EffectParameter, Element, Held, Retelling, Span, Start, Within
 from estimator.physics.model import DrivelineModel, Motion, natural_frequencies_rad_s, unit
 from estimator.signals.record import Record
 
@@ -91,7 +91,7 @@ def retold(
     low = max(stiffness / (trusted.value * (1.0 + trusted.tolerance)), SOFTEST)
     high = min(stiffness / (trusted.value * max(1.0 - trusted.tolerance, SOFTEST)), STIFFEST)
     if low >= high:
-        return []
+        low, high = SOFTEST, STIFFEST
     *_, usual, tenth, _ = scales(model, records)
     share = 0.5 * (low + high)
     own, branch = float(natural_frequencies_rad_s(model.values())[0]), 2.0 * math.pi * values["frequency_hz"]
@@ -109,6 +109,16 @@ def retold(
         return Retelling((*shaped, *((size, none) if at_motor else (none, size))), {"k": stiffness / share, **lighter})
 
     return [retelling(before, at_motor=True), retelling(behind, at_motor=False)]
+
+
+def described(
+    model: DrivelineModel, values: Mapping[str, float], line: Mapping[str, float]
+) -> Mapping[str, tuple[Span, ...]]:
+    """Return the shaft's stiffness and that of the whole line, any damping, and the inertias with the further one."""
+    more = within(values) or values["inertia_kg_m2"]
+    whole = line["k"] * values["line_share"]
+    inertias = {name: ((line[name], line[name] + more),) for name in ("J_M", "J_L")}
+    return {"k": ((whole, line["k"]),), "c": ((0.0, math.inf),), **inertias}
 
 
 def sentence(values: Mapping[str, float], motion: Motion) -> str:
@@ -177,6 +187,7 @@ EFFECT = Effect(
     decisive=("inertia_kg_m2", "line_share", "between_kg_m2", "behind_kg_m2"),
     loosens=frozenset({"k", "c"}),  # a spring in the line softens it by s and lowers its damping by s^2
     loosened_by="line_share",
+    described=described,
     implausible=implausible,
     retold=retold,
     derived=derived,

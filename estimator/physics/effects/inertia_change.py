@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from estimator.physics.effect import EVERY_LINE, MOMENTS, Effect, EffectParameter, Element, Start, Step
+from estimator.physics.effect import EVERY_LINE, MOMENTS, Effect, EffectParameter, Element, Span, Start, Step
 from estimator.physics.model import DrivelineModel, Motion, load_inertia, unit
 from estimator.signals.record import Record
 
@@ -17,6 +17,15 @@ def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...
 def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
     """Return a lighter and a heavier load."""
     return [(-1.0,), (1.0,)]
+
+
+def described(
+    model: DrivelineModel, values: Mapping[str, float], line: Mapping[str, float]
+) -> Mapping[str, tuple[Span, ...]]:
+    """Return the load's inertia before and after."""
+    name = load_inertia(model)
+    before, after = line[name], line[name] + values["change_kg_m2"]
+    return {name: ((before, before), (after, after))}
 
 
 def sentence(values: Mapping[str, float], motion: Motion) -> str:
@@ -44,4 +53,5 @@ EFFECT = Effect(
     scales=scales,
     starts=starts,
     sentence=sentence,
+    described=described,
 )

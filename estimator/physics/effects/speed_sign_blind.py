@@ -14,6 +14,9 @@ from estimator.signals.record import OutputKind, Record
 STANDSTILL = 0.05
 """Share of its top speed below which a recording comes to standstill between two samples."""
 
+LEAST_SHARE = 0.5
+"""Share of the magnitude from which a sensor's own motion has no sign left."""
+
 
 def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
     """Return 1: the share is one number."""
@@ -37,6 +40,13 @@ def sentence(values: Mapping[str, float], motion: Motion) -> str:
     return f"the sensor reads the magnitude of the speed (share {values['share']:.2g})"
 
 
+def implausible(model: DrivelineModel, records: Sequence[Record], values: Mapping[str, float]) -> str:
+    """Object to a sensor that tells the sign of most of the speed: what differs with the sign is something else."""
+    if values["share"] >= LEAST_SHARE:
+        return ""
+    return f"a sensor that reads {values['share']:.2g} of the speed without its sign is not blind for it"
+
+
 EFFECT = Effect(
     name="speed_sign_blind",
     element=Element.SPEED_SENSOR,
@@ -54,4 +64,5 @@ EFFECT = Effect(
     starts=starts,
     testable=testable,
     sentence=sentence,
+    implausible=implausible,
 )

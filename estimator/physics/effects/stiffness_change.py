@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from estimator.physics.effect import MOMENTS, WITH_SPRING, Effect, EffectParameter, Element, Start, Step
+from estimator.physics.effect import MOMENTS, WITH_SPRING, Effect, EffectParameter, Element, Span, Start, Step
 from estimator.physics.model import DrivelineModel, Motion
 from estimator.signals.record import Record
 
@@ -17,6 +17,14 @@ def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...
 def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
     """Return a softer and a stiffer shaft."""
     return [(-0.2,), (0.2,)]
+
+
+def described(
+    model: DrivelineModel, values: Mapping[str, float], line: Mapping[str, float]
+) -> Mapping[str, tuple[Span, ...]]:
+    """Return the stiffness before and after."""
+    before, after = line["k"], line["k"] * (1.0 + values["change"])
+    return {"k": ((before, before), (after, after))}
 
 
 def sentence(values: Mapping[str, float], motion: Motion) -> str:
@@ -44,4 +52,5 @@ EFFECT = Effect(
     scales=scales,
     starts=starts,
     sentence=sentence,
+    described=described,
 )

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from estimator.compiled import compiled
+from estimator.physics import low_pass
 from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start, long_enough
 from estimator.physics.model import DrivelineModel, Motion
 from estimator.signals.record import FloatArray, Record
@@ -67,6 +68,7 @@ EFFECT = Effect(
     scales=scales,
     starts=starts,
     sentence=sentence,
+    implausible=low_pass.quick_enough("delay_s"),
     unresolved=long_enough("delay_s"),
     linear=True,
 )

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from estimator.abreast import every
 from estimator.compiled import compiled
-from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start
+from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Span, Start
 from estimator.physics.model import DrivelineModel, Motion, unit
 from estimator.physics.motion import longest_s, speed_scale, torque_scale
 from estimator.signals.record import Record
@@ -29,6 +29,14 @@ def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...
 def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
     """Return a decay within the recording and one that goes on beyond it."""
     return [(1.0, 0.3), (2.0, 1.5)]
+
+
+def described(
+    model: DrivelineModel, values: Mapping[str, float], line: Mapping[str, float]
+) -> Mapping[str, tuple[Span, ...]]:
+    """Return the friction from warm to cold."""
+    name = "b_L" if "b_L" in line else "b_M"
+    return {name: ((line[name], line[name] + values["cold_nm_s"]),)}
 
 
 def sentence(values: Mapping[str, float], motion: Motion) -> str:
@@ -57,4 +65,5 @@ EFFECT = Effect(
     scales=scales,
     starts=starts,
     sentence=sentence,
+    described=described,
 )

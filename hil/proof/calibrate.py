@@ -1,0 +1,256 @@
+"""``python -m hil.proof.calibrate --seeds A..B --judge C..D --out DIR``: thresholds of a verdict, by simulation.
+
+Every world is searched once; what its decision rests on is kept in ``DIR/SET_SEED.json``: scores of all sets of effects
+that were fitted, shares, tests of what is left. The thresholds follow from these, again and again without another
+search: limits of the tests from worlds of which all is explained, the divisor of scores by likelihood of what is there,
+the least probability from the share of names that may be false. Other seeds judge them. ``--write`` puts them where
+the decision reads them, with this command.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import shlex
+import sys
+import time
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from estimator.diagnosis.chain import mechanical, read_through
+from estimator.diagnosis.hypotheses import everything, open_hypotheses
+from estimator.diagnosis.inference.calibration import LEAST_SHARE, TEST_LIMITS, THRESHOLDS_FILE
+from estimator.diagnosis.inference.posterior import probability_of
+from estimator.diagnosis.inference.remainder import chance
+from estimator.diagnosis.inference.search import Search
+from estimator.diagnosis.inference.verdict import grounds
+from estimator.diagnosis.preconditions import prepare
+from estimator.diagnosis.preconditions.thinned import as_slow_as_needed
+from estimator.errors import EstimatorError
+from hil.proof.campaign.kinds import parse_seeds
+from hil.proof.compare_engines import NOTHING, shown_case
+
+SETS = ("clean", "dirty", "quiet")
+
+MOST_FALSE = 0.01
+"""Share of named effects that may not be there."""
+
+MOST_REFUSED = 0.01
+"""Share of worlds of which all is explained that one test may refuse."""
+
+BELIEVED = 0.9
+"""Probability below which nothing is told as found, however well it went in simulated worlds."""
+
+USUAL_DIVISOR, DIVISOR_SPREAD, MOST_DIVISOR = 4.0, 0.5, 100.0
+"""Prior of the divisor of scores, log-normal, and its bound: a few hundred worlds of one simulator with hardly a false
+effect among them do not tell how far other worlds are from the laws."""
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """An effect of the best set: the names it stands for, and its share of the re-tuned model's squared error."""
+
+    name: str
+    names: list[str]
+    share: float
+
+
+@dataclass(frozen=True, slots=True)
+class World:
+    """A world that was searched: what is in it, and what its decision rests on."""
+
+    which: str
+    seed: int
+    strong: str
+    there: list[str]
+    claims: list[Claim]
+    scores: list[tuple[list[str], float]]
+    tests: dict[str, float]
+    samples: int
+    cpu_s: float
+
+    def is_there(self, claim: Claim) -> bool:
+        """Tell whether an effect, or one it can't be told from, is in the world or known to the model file."""
+        return bool({*claim.names} & {*self.there})
+
+    @property
+    def is_explained(self) -> bool:
+        """Whether the best set holds what is strong, and nothing that is not there."""
+        strong = self.strong == NOTHING or any(self.strong in claim.names for claim in self.claims)
+        return strong and all(map(self.is_there, self.claims))
+
+    def beyond_chance(self, key: str) -> float:
+        """Return what a test found, less what it finds in noise by chance."""
+        return self.tests[key] - chance(key, self.samples)
+
+    def probability(self, claim: Claim, thresholds: Thresholds) -> float:
+        """Return the probability of an effect under some thresholds."""
+        shares = (key for key, limit in TEST_LIMITS.items() if limit.is_share)
+        failed = (key for key in shares if self.beyond_chance(key) > thresholds.limits[key])
+        lost = sum(self.tests[key] for key in failed)
+        return probability_of(claim.names, self.scores, thresholds.divisor + self.samples * lost)
+
+    def named(self, thresholds: Thresholds) -> list[Claim]:
+        """Return the effects that are named under some thresholds."""
+        least = thresholds.least_probability
+        weighty = [claim for claim in self.claims if claim.share >= LEAST_SHARE]
+        return [claim for claim in weighty if self.probability(claim, thresholds) >= least]
+
+
+@dataclass(frozen=True, slots=True)
+class Thresholds:
+    """What a decision is made by: limits of the tests, divisor of scores, least probability."""
+
+    limits: dict[str, float]
+    divisor: float = 1.0
+    least_probability: float = 0.0
+
+
+def searched(which: str, seed: int) -> World | None:
+    """Search a world; None where its recordings are refused."""
+    began = time.process_time()
+    records, model, case, known, strong = shown_case(which, seed)
+    try:
+        ready = prepare(records, model)
+    except EstimatorError:
+        return None
+    line, chain = mechanical(model), read_through(ready.records)
+    thin = as_slow_as_needed(chain.records, line)
+    found = grounds(Search(line, thin, everything(thin), open_hypotheses(line, chain.records)[0]))
+    recognised = {finding.name for finding in chain.findings}
+    there = {name for name in case.specimen.sizes if name != NOTHING} - recognised
+    return World(
+        which,
+        seed,
+        NOTHING if strong in recognised else strong,
+        sorted(there | {*known}),
+        [Claim(each.name, sorted(each.names), each.share) for each in found.beliefs],
+        [(sorted(effects), score) for effects, score in found.scores],
+        {test.key: test.value for test in found.tests if test.key},
+        found.best.plain.residual.size,
+        round(time.process_time() - began, 2),
+    )
+
+
+def kept(place: Path, which: str, seed: int) -> World | None:
+    """Return a world from its file, which is written where there is none yet."""
+    path = place / f"{which}_{seed}.json"
+    if not path.exists():
+        world = searched(which, seed)
+        path.write_text(json.dumps(None if world is None else asdict(world)), encoding="utf-8")
+        sys.stdout.write(f"{which} {seed}: {'refused' if world is None else f'{world.cpu_s:.1f} s'}\n")
+        sys.stdout.flush()
+    entry = json.loads(path.read_text(encoding="utf-8"))
+    return None if entry is None else World(**{**entry, "claims": [Claim(**claim) for claim in entry["claims"]]})
+
+
+def calibrated(worlds: Sequence[World]) -> Thresholds:
+    """Return the thresholds that follow from some worlds."""
+    explained = [world for world in worlds if world.is_explained]
+    limits = {
+        key: max(float(np.quantile([world.beyond_chance(key) for world in explained], 1.0 - MOST_REFUSED)), 0.0)
+        for key in TEST_LIMITS
+    }
+    divisor = _most_probable(lambda divisor: _surprise(worlds, Thresholds(limits, divisor)))
+    return Thresholds(limits, divisor, _least_probability(worlds, Thresholds(limits, divisor)))
+
+
+def _most_probable(surprise: Callable[[float], float]) -> float:
+    def posterior(log: float) -> float:
+        return surprise(math.exp(log)) + 0.5 * ((log - math.log(USUAL_DIVISOR)) / DIVISOR_SPREAD) ** 2
+
+    return math.exp(minimize_scalar(posterior, bounds=(0.0, math.log(MOST_DIVISOR))).x)
+
+
+def _surprise(worlds: Sequence[World], thresholds: Thresholds) -> float:
+    """Return minus the log-likelihood of what is there and what is not, by the probabilities that are stated."""
+    total = 0.0
+    for world in worlds:
+        for claim in world.claims:
+            p = min(max(world.probability(claim, thresholds), 1e-6), 1.0 - 1e-6)
+            total -= float(np.log(p if world.is_there(claim) else 1.0 - p))
+    return total
+
+
+def _least_probability(worlds: Sequence[World], thresholds: Thresholds) -> float:
+    """Return the least probability above which no more names are false than may be; not below `BELIEVED`."""
+    weighty = [(world, claim) for world in worlds for claim in world.claims if claim.share >= LEAST_SHARE]
+    stated = sorted(((w.probability(c, thresholds), w.is_there(c)) for w, c in weighty), reverse=True)
+    false = np.cumsum([not there for _, there in stated])
+    allowed = np.flatnonzero(false <= MOST_FALSE * np.arange(1, false.size + 1))
+    if not allowed.size:
+        return 1.0
+    return BELIEVED if allowed[-1] == false.size - 1 else max(BELIEVED, stated[int(allowed[-1])][0])
+
+
+def table(worlds: Sequence[World], thresholds: Thresholds) -> str:
+    """Return what thresholds lead to, as a table in Markdown."""
+    lines = [
+        "| set | worlds | strong named | names | of them false | worlds without a false name | CPU median, most [s] |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for which in SETS:
+        mine = [(world, world.named(thresholds)) for world in worlds if world.which == which]
+        if mine:
+            strong = [(w, named) for w, named in mine if w.strong != NOTHING]
+            right = sum(any(w.strong in claim.names for claim in named) for w, named in strong)
+            false = [sum(not w.is_there(claim) for claim in named) for w, named in mine]
+            times = sorted(world.cpu_s for world, _ in mine)
+            lines.append(
+                f"| {which} | {len(mine)} | {right} of {len(strong)} | {sum(len(named) for _, named in mine)} | "
+                f"{sum(false)} | {sum(not count for count in false)} | {times[len(times) // 2]:.1f}, {times[-1]:.1f} |"
+            )
+    return "\n".join(lines) + "\n"
+
+
+def written(thresholds: Thresholds, command: str) -> str:
+    """Return the thresholds as the file that the decision reads."""
+    lines = [
+        "# Thresholds of a verdict by likelihood, from simulated worlds (docs/diagnosis-engines.md); written by",
+        f"# {command}",
+        f"tempered = {thresholds.divisor:.3g}",
+        f"least_probability = {thresholds.least_probability:.4g}",
+        *(f"{key} = {limit:.3g}" for key, limit in thresholds.limits.items()),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m hil.proof.calibrate", description="Calibrate the thresholds of a verdict on simulated worlds."
+    )
+    parser.add_argument("--sets", default=",".join(SETS), help=f"of {', '.join(SETS)} (default: all)")
+    parser.add_argument("--seeds", required=True, type=parse_seeds, help="A..B: the worlds that calibrate")
+    parser.add_argument("--judge", type=parse_seeds, default=range(0), help="C..D: the worlds that judge")
+    parser.add_argument("--out", required=True, type=Path, help="folder for what was found in each world")
+    parser.add_argument("--write", action="store_true", help="put the thresholds where the decision reads them")
+    return parser
+
+
+def _worlds(place: Path, sets: Collection[str], seeds: range) -> list[World]:
+    found = [kept(place, which, seed) for seed in seeds for which in SETS if which in sets]
+    return [world for world in found if world is not None]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Search what worlds have not been searched, calibrate and judge; return the exit status."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    options = _parser().parse_args(given)
+    options.out.mkdir(parents=True, exist_ok=True)
+    sets = options.sets.split(",")
+    thresholds = calibrated(_worlds(options.out, sets, options.seeds))
+    text = written(thresholds, shlex.join(["python", "-m", "hil.proof.calibrate", *given]))
+    sys.stdout.write(text)
+    if options.write:
+        THRESHOLDS_FILE.write_text(text, encoding="utf-8")
+    sys.stdout.write(table(_worlds(options.out, sets, options.judge or options.seeds), thresholds))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
