@@ -133,7 +133,7 @@ def _sync(plan: DrivePlan) -> Iterator[DriveSetting]:
 def _no_sync_counter(plan: DrivePlan) -> Iterator[DriveSetting]:
     """Switch the SYNC counter off: the host sends none, and a drive that counts takes no other (CiA 301, 7.5.2.22)."""
     entry = plan.sheet.entry(SYNC_COUNTER_OVERFLOW)
-    if entry is None:
+    if entry is None or entry.kind is None or not entry.kind.is_integer:  # of no type that can be written: not there
         return
     if entry.settable:
         yield DriveSetting(SYNC_COUNTER_OVERFLOW, 0, "SYNC counter overflow", 0, THIS_PROGRAM)

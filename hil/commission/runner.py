@@ -25,7 +25,7 @@ from hil.rig.build import open_devices
 from hil.rig.dry_run import Range
 from hil.rig.experiments.base import Phase
 from hil.rig.metadata import run_metadata
-from hil.rig.pacing import Pacer, disk_patience_s
+from hil.rig.pacing import Pacer, disk_patience_s, heartbeat_patience_ms
 from hil.rig.plan import Plan, plan_run
 from hil.rig.realtime import RealTimeGrants
 from hil.rig.sample import Sample
@@ -204,7 +204,7 @@ class Runner:
             recorder,
             self.conditions.scheduling() as grants,
             self.conditions.progress(plan) as progress,
-            open_devices(rig) as devices,
+            open_devices(rig, heartbeat_patience_ms(pacer)) as devices,
         ):
             recorder.describe("real_time", json.dumps(grants.as_json()))
             try:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from drivers.canopen.can_link import CanLink
 from drivers.inverter.inverter import Inverter
@@ -37,8 +37,14 @@ class Devices:
 
 
 @contextmanager
-def open_devices(rig: Rig) -> Iterator[Devices]:
+def open_devices(rig: Rig, least_host_timeout_ms: int = 0) -> Iterator[Devices]:
     """Open bus and PLC of a rig; both are closed at the end of the block. No device is changed.
+
+    Parameters
+    ----------
+    least_host_timeout_ms
+        The drives, when they are configured, are told to wait for the host's heartbeat at least so long [ms]; see
+        `hil.rig.pacing.heartbeat_patience_ms`.
 
     Raises
     ------
@@ -53,10 +59,13 @@ def open_devices(rig: Rig) -> Iterator[Devices]:
     """
     _require_acceptances(rig)
     with CanLink.open(rig.can.url) as link, PlcLoop() as loop:
-        m1 = Inverter(link, inverter_settings("m1", rig))
-        m2 = Inverter(link, inverter_settings("m2", rig))
+        m1, m2 = (Inverter(link, _watching(inverter_settings(name, rig), least_host_timeout_ms)) for name in NAMES)
         with connected_plc(rig.plc, loop) as plc:
             yield Devices(link, m1, m2, TorqueGuard(rig.guard_limits), loop, plc)
+
+
+def _watching(settings: InverterSettings, least_ms: int) -> InverterSettings:
+    return replace(settings, host_timeout_ms=max(settings.host_timeout_ms, least_ms))
 
 
 def _require_acceptances(rig: Rig) -> None:

@@ -81,6 +81,16 @@ def disk_patience_s(pacer: Pacer) -> float:
     return 0.0 if pacer.poll_patience_s == 0.0 else DISK_PATIENCE_S
 
 
+FREE_HEARTBEAT_MS = 1000
+"""How long the drives wait for the heartbeat of a host without a clock [ms]: it uses a processor up, and its heartbeat,
+which is of the wall clock, has to share that."""
+
+
+def heartbeat_patience_ms(pacer: Pacer) -> int:
+    """How long the drives wait for the host's heartbeat at least [ms]: as the rig file has it where a clock is kept."""
+    return 0 if pacer.poll_patience_s == 0.0 else FREE_HEARTBEAT_MS
+
+
 class RealTimePacer:
     """An absolute schedule on the monotonic clock: a late cycle does not delay those after it.
 

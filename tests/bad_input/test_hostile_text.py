@@ -162,7 +162,14 @@ BAD_BLF = {
 }
 
 
-@pytest.mark.parametrize("make", BAD_BLF.values(), ids=BAD_BLF)
+SLOW = ("many containers",)
+"""Half a minute under a trace of the memory."""
+
+
+@pytest.mark.parametrize(
+    "make",
+    [pytest.param(make, id=name, marks=[pytest.mark.campaign] * (name in SLOW)) for name, make in BAD_BLF.items()],
+)
 def test_a_blf_that_unpacks_to_much_or_never_ends_is_refused(
     blf: Callable[[bytes], Path], make: Callable[[], bytes]
 ) -> None:

@@ -128,6 +128,7 @@ def test_wilsons_interval() -> None:
     assert Rate(0, 0).text == "none"
 
 
+@pytest.mark.campaign  # as test_best does, by the benchmark's own way
 def test_healthy_recordings_pass_the_residual_test_of_their_own_model() -> None:
     assert len(list(recordings())) == COUNT
     assert passed(CLEAN, at_10_ms) == COUNT

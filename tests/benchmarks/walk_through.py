@@ -21,7 +21,7 @@ from hil.recording.signals import read_record
 from hil.recording.writer import RecordingWriter
 from hil.rig.addresses import with_addresses
 from hil.rig.build import open_devices
-from hil.rig.pacing import FreePacer, period_ns
+from hil.rig.pacing import FreePacer, heartbeat_patience_ms, period_ns
 from hil.rig.plan import plan_run
 from hil.rig.session import run_plan
 from hil.rig.stop import StopRequest
@@ -50,8 +50,9 @@ def walk(seed: int, recording: Path, effect: str = GAP, experiment: str = "cruis
     plant = plant_for(rig, [EffectSpec.parse(effect)], False)
     with RigServer(plant, rig, address, Address("127.0.0.1", 0), seed=seed) as server:
         served = with_addresses(rig, server.bus_url, str(server.modbus))
-        with RecordingWriter(recording, {}) as recorder, open_devices(served) as devices:
-            pacer = FreePacer(period_ns(rig.period_s))
+        pacer = FreePacer(period_ns(rig.period_s))
+        opened = open_devices(served, heartbeat_patience_ms(pacer))
+        with RecordingWriter(recording, {}) as recorder, opened as devices:
             run_plan(devices, plan_run(served, experiment), pacer, recorder, StopRequest(), lambda phase, time_s: None)
     return best_estimate(read_record(recording))
 

@@ -74,6 +74,7 @@ def short_rig(tmp_path: Path) -> Path:
         ("feedback_timeout_s = 0.2", "feedback_timeout_s = 1.0"),  # a test machine may be busy
         ("turning_speed_rad_s = 6.0", "turning_speed_rad_s = 0.5"),
         ("# host_timeout_ms = 150 ", "host_timeout_ms = 1000 "),
+        ("node_id = 2\n", "node_id = 2\nhost_timeout_ms = 1000\n"),
         ('kind = "reversal"\nduration_s = 30.0', 'kind = "reversal"\nduration_s = 3.0'),
     ):
         assert text.count(before) == 1

@@ -11,6 +11,7 @@ from hil.config.new_rig.drive import new_drive
 from hil.config.new_rig.text import rig_text
 from hil.config.rig_file import Rig, read_rig
 from hil.rig.build import open_devices
+from hil.rig.pacing import FREE_HEARTBEAT_MS
 from tests.rig.serving import Samples, changed, run, served
 
 SAMPLES = 400
@@ -48,7 +49,7 @@ def drive(eds: Path, folder: Path, samples: int = SAMPLES) -> Driven:
         "simulation": {"speed_noise_rad_s": 0.0, "torque_noise_permille": 0.5},
     }
     kept = Samples()
-    with served(changed(rig, quick)) as (_, at), open_devices(at) as devices:
+    with served(changed(rig, quick)) as (_, at), open_devices(at, FREE_HEARTBEAT_MS) as devices:
         before = (*devices.m1.check(), *devices.m2.check())
         summary = run(at, devices, kept)
         after = (*devices.m1.check(), *devices.m2.check())

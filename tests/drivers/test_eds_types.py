@@ -132,3 +132,13 @@ def test_drive_that_counts_syncs_for_good_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ConfigMismatch, match=r"0x1019:00 that is 0 or can be written, found 10 for good"):
         with on_bus(CountsSync, eds_path=path):
             pass
+
+
+@pytest.mark.parametrize("data_type", ["", "byte", "0x0009"])
+def test_sync_counter_without_an_integer_type_is_as_none(data_type: str, tmp_path: Path) -> None:
+    path = tmp_path / "drive.eds"
+    before, after = with_counter().split("[1019]")
+    path.write_text(f"{before}[1019]{after.replace('DataType=0x0005', f'DataType={data_type}', 1)}", encoding="utf-8")
+    with on_bus(FakeDrive, eds_path=path) as (_, inverter, link):
+        inverter.configure()
+        assert inverter.await_feedback(link.sync(), 5.0) is not None

@@ -17,7 +17,7 @@ from hil.proof.wire.sealed_process import sealed_process
 from hil.proof.wire.sealed_rig import RIG_FILE
 from hil.rig.addresses import with_addresses
 from hil.rig.build import open_devices
-from hil.rig.pacing import FreePacer, period_ns
+from hil.rig.pacing import FreePacer, heartbeat_patience_ms, period_ns
 from hil.rig.plan import plan_run
 from hil.rig.session import run_plan
 from hil.rig.stop import StopRequest
@@ -61,8 +61,8 @@ def test_torque_moves_the_hidden_driveline():
         short = rig.experiments["reversal"].model_copy(update={"duration_s": 2.0})
         rig = rig.model_copy(update={"experiments": {"short": short}})
         samples = []
-        with open_devices(rig) as devices:
-            pacer = FreePacer(period_ns(rig.period_s))
+        pacer = FreePacer(period_ns(rig.period_s))
+        with open_devices(rig, heartbeat_patience_ms(pacer)) as devices:
             run_plan(devices, plan_run(rig, "short"), pacer, _List(samples), StopRequest(), lambda *_: None)
     assert len(samples) == 200
     assert max(sample.speed_rad_s for sample in samples) > 2.0

@@ -73,7 +73,7 @@ def test_fault_in_a_run_ends_it_with_its_reason_and_both_drives_disarmed(
     ("fault", "error", "named"),
     [
         ("m1.lacks=0x6072", ConfigMismatch, r"inverter m1.*object 0x6072:00 refused.*Object does not exist"),
-        ("m2.locks=0x1A00", ConfigMismatch, r"inverter m2.*object 0x1A00:00 refused.*read only"),
+        ("m2.locks=0x1016", ConfigMismatch, r"inverter m2.*object 0x1016:01 refused.*read only"),
         ("m2.forgets=0x1016", ConfigMismatch, r"inverter m2.*object 0x1016:01 reads 0 .*after writing"),
         ("bus.lose=1:0x581", DeviceTimeout, "inverter m1.*no SDO answer"),
     ],

@@ -7,7 +7,9 @@ import time
 
 import pytest
 
-from hil.rig.pacing import FreePacer, RealTimePacer, Tick
+from hil.rig.build import open_devices
+from hil.rig.pacing import FREE_HEARTBEAT_MS, FreePacer, RealTimePacer, Tick, heartbeat_patience_ms
+from tests.rig.serving import changed, served, small_rig
 
 MS = 1_000_000
 
@@ -50,3 +52,14 @@ def test_cycles_the_host_slept_through_are_left_out_not_caught_up() -> None:
 def test_answer_timeout_is_positive_and_period_is_kept(pacer: FreePacer | RealTimePacer) -> None:
     assert pacer.period_ns == 10 * MS
     assert pacer.answer_timeout_s > 0.0
+
+
+def test_drives_wait_longer_for_a_host_that_keeps_no_clock() -> None:
+    """Its heartbeat is of the wall clock, and its cycles use a processor up."""
+    assert heartbeat_patience_ms(RealTimePacer(10 * MS)) == 0
+    free = heartbeat_patience_ms(FreePacer(10 * MS))
+    rig = changed(small_rig(), {"inverters.m1": {"host_timeout_ms": 150}})
+    with served(rig) as (_, at), open_devices(at, free) as devices:
+        assert devices.m1.settings.host_timeout_ms == FREE_HEARTBEAT_MS
+    with served(rig) as (_, at), open_devices(at) as devices:
+        assert devices.m1.settings.host_timeout_ms == 150

@@ -129,5 +129,5 @@ def _is_stuck(values: Mapping[str, Mapping[str, float]], records: Sequence[Recor
         for name in values
         if EFFECTS[name].element in (Element.MOTOR, Element.LOAD)
         for parameter in EFFECTS[name].parameters
-        if parameter.dimension == "torque"
+        if parameter.dimension == "torque" and parameter.null == 0.0  # that of a limit is beyond all torque
     )

@@ -83,7 +83,7 @@ def beliefs(
                 name,
                 names,
                 probability_of(names, scores, tempered),
-                max(share[name], 0.0),
+                min(max(share[name], 0.0), 1.0),
                 without.score - best.score,
                 alike,
             )

@@ -228,7 +228,7 @@ class Search:
             problem = self._extended(warm, effects, inheriting(name, look.release, warm))
             begun = extended(problem, warm_start(problem, warm), current.plain if is_again else rival.plain)
             fits.append(compared(effects, begun, rival, len(self.names)))
-        best = min(fits, key=lambda each: each.score)
+        best = min([each for each in fits if self.is_plausible(each)] or fits, key=lambda each: each.score)
         loose = loosened(best, self.model)
         if loose is not None:
             best = self._more_plausible(best, compared(effects, loose, rival, len(self.names)))

@@ -103,7 +103,7 @@ def decide(search: Search, with_findings: bool = False) -> Decision:
     established = [each for each in ground.beliefs if each.probability >= LEAST_PROBABILITY]
     named = tuple(each for each in established if each.share >= LEAST_SHARE)
     noise = float(np.hypot(*np.exp(best.sizes[[Size.WHITE, Size.COLOURED]])))
-    left = max(free_rms(best) ** 2 - noise**2, 0.0) / free_rms(nothing) ** 2
+    left = min(max(free_rms(best) ** 2 - noise**2, 0.0) / free_rms(nothing) ** 2, 1.0)
     return Decision(
         _verdict(best, bool(named) or with_findings, bool(failed)),
         best,

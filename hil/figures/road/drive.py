@@ -26,7 +26,7 @@ from hil.rig.experiments.approach import Approach
 from hil.rig.experiments.cruise import Cruise
 from hil.rig.experiments.registry import experiment_table
 from hil.rig.experiments.staged import StagedExperiment, TorqueBounds
-from hil.rig.pacing import FreePacer, period_ns
+from hil.rig.pacing import FreePacer, heartbeat_patience_ms, period_ns
 from hil.rig.plan import Plan, plan_run
 from hil.rig.session import run_plan
 from hil.rig.stop import StopRequest
@@ -99,8 +99,9 @@ def drive(
     with server:
         served = with_addresses(rig, server.bus_url, str(server.modbus))
         plan = _plan(served, conditions, duration_s)
-        with recorder, open_devices(served) as devices:
-            run_plan(devices, plan, FreePacer(period_ns(rig.period_s)), recorder, stop, progress)
+        pacer = FreePacer(period_ns(rig.period_s))
+        with recorder, open_devices(served, heartbeat_patience_ms(pacer)) as devices:
+            run_plan(devices, plan, pacer, recorder, stop, progress)
     return Driven(path, conditions, line)
 
 

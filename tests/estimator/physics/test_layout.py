@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from estimator.physics.catalogue import EFFECTS
-from estimator.physics.layout import NOMINAL, SIZE, flat, slot
+from estimator.physics.layout import LOAD, NOMINAL, SIZE, flat, slot
 from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, model
 
 
 class TestLayout:
     def test_every_parameter_has_a_slot_of_its_own(self) -> None:
-        slots = [slot("", name) for name in NOMINAL]
+        slots = [slot("", name) for name in (*NOMINAL, LOAD)]
         slots += [slot(entry.name, p.name) for entry in EFFECTS.values() for p in entry.parameters]
         assert sorted(slots) == list(range(SIZE))
 
