@@ -72,7 +72,7 @@ def answer(ready: Prepared, model: DrivelineModel, progress: Progress, budget_s:
     seen = _looked_at(search, decision, is_over)
     progress("simulating what was found", 0.9)
     unseen = Unseen(line, read_through(ready.holdout).records)
-    runs = free_runs(seen.decision.nothing, seen.believed, chain, unseen)
+    runs = free_runs(seen.decision.nothing, seen.believed, not seen.decision.failed, chain, unseen)
     said = _said(seen, runs, search, untestable, model)
     progress("done", 1.0)
     warnings = (_stopped(search, budget_s),) if search.stopped else ()
@@ -82,7 +82,7 @@ def answer(ready: Prepared, model: DrivelineModel, progress: Progress, budget_s:
 def _said(
     seen: _Seen, runs: FreeRuns, search: Search, untestable: Mapping[str, Untestable], model: DrivelineModel
 ) -> Diagnosis:
-    decision, believed, line = seen.decision, seen.believed, search.model
+    decision, line = seen.decision, search.model
     figures, effects = figures_of(runs, noise_of(decision.best)), effects_of(runs, decision)
     blind = tuple(UntestableEffect(n, u.reason, u.suggested_test, u.needs) for n, u in untestable.items())
     mismatch, remainder = _mismatch(seen, effects), _remainder(seen)
@@ -96,10 +96,10 @@ def _said(
         untestable=blind,
         unnamed=_unnamed(seen, figures),
         fit=figures,
-        parameters=retuned_parameters(believed.white, line, decision.verdict is not Verdict.UNEXPLAINED),
-        load_torque=load_torques(believed.white, line),
+        parameters=retuned_parameters(runs.estimate, line, decision.verdict is not Verdict.UNEXPLAINED),
+        load_torque=load_torques(runs.estimate, line),
         timing_s={},
-        augmented=augmented_model(believed.plain, model, effects),
+        augmented=augmented_model(runs.estimate, model, effects),
         traces=courses_of(runs),
         discrepancy=_discrepancy(seen, line) if mismatch.detected else None,
         remainder=remainder,

@@ -3,30 +3,33 @@
 from __future__ import annotations
 
 import math
-from functools import partial
 
 from estimator.diagnosis.assemble import moments_in, parameters_of, profile_size, profiles_of
-from estimator.diagnosis.inference.likelihood import covariance
 from estimator.diagnosis.inference.plausible import GRADE
 from estimator.diagnosis.inference.posterior import Belief, free_rms
 from estimator.diagnosis.inference.verdict import Decision
 from estimator.diagnosis.intervals import reported_covariance
 from estimator.diagnosis.result import Evidence, FoundEffect
 from estimator.physics.catalogue import EFFECTS
-from estimator.physics.fit import fit
+from estimator.physics.fit import FitResult, fit
 from estimator.physics.model import DrivelineModel
 from estimator.physics.problem import make_problem
 from estimator.physics.starts import warm_start
+from estimator.signals.record import FloatArray
 
 SMALLEST_P = 1e-300
 
 
-def found_effects(decision: Decision, model: DrivelineModel) -> tuple[FoundEffect, ...]:
-    """Return the named effects, the weightiest first."""
-    return tuple(map(partial(_found, decision=decision, model=model), decision.named))
+def found_effects(
+    decision: Decision, estimate: FitResult, cov: FloatArray, model: DrivelineModel
+) -> tuple[FoundEffect, ...]:
+    """Return the named effects, the weightiest first, with the values and covariance of a fit."""
+    return tuple(_found(belief, decision, estimate, cov, model) for belief in decision.named)
 
 
-def _found(belief: Belief, decision: Decision, model: DrivelineModel) -> FoundEffect:
+def _found(
+    belief: Belief, decision: Decision, estimate: FitResult, cov: FloatArray, model: DrivelineModel
+) -> FoundEffect:
     entry, best = EFFECTS[belief.name], decision.best
     nulls = {parameter.name: parameter.null for parameter in entry.parameters}
     profiles = {}
@@ -34,16 +37,16 @@ def _found(belief: Belief, decision: Decision, model: DrivelineModel) -> FoundEf
         of = best.plain.problem
         problem = make_problem(model, of.records, of.shared, own=[b.own for b in of.local], profile=True, use=of.use)
         course = fit(problem, warm_start(problem, best.plain))
-        cov = reported_covariance(course)
-        profiles, parameters = profiles_of(course, cov, model), profile_size(course, cov, model)
+        of_course = reported_covariance(course)
+        profiles, parameters = profiles_of(course, of_course, model), profile_size(course, of_course, model)
     else:
-        parameters = parameters_of(belief.name, best.white, covariance(best), model)
+        parameters = parameters_of(belief.name, estimate, cov, model)
     return FoundEffect(
         name=entry.name,
         element=entry.element,
         statement=entry.sentence(nulls | {name: p.value for name, p in parameters.items()}, model.motion),
         parameters=parameters,
-        time_s=moments_in(belief.name, best.plain) if entry.event else {},
+        time_s=moments_in(belief.name, estimate) if entry.event else {},
         indistinguishable_from=belief.alike,
         evidence=Evidence(
             belief.score,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from estimator.diagnosis.assemble import acquired_effects, rms_of
 from estimator.diagnosis.chain import Chain
@@ -11,8 +12,9 @@ from estimator.diagnosis.holdout import foreign_outputs
 from estimator.diagnosis.hypotheses import NOTHING, everything
 from estimator.diagnosis.inference.effects import found_effects
 from estimator.diagnosis.inference.free_run import Unseen, on_recordings
-from estimator.diagnosis.inference.likelihood import Hypothesis
+from estimator.diagnosis.inference.likelihood import Hypothesis, covariance
 from estimator.diagnosis.inference.verdict import Decision
+from estimator.diagnosis.intervals import reported_covariance
 from estimator.diagnosis.result import Fit, FoundEffect, Trace
 from estimator.physics.fit import FitResult, fit
 from estimator.physics.model import unit
@@ -22,12 +24,14 @@ from estimator.signals.record import FloatArray, OutputKind, Record
 DIMENSIONS = {OutputKind.SPEED: "speed", OutputKind.POSITION: "angle", OutputKind.FORCE: "torque"}
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class FreeRuns:
     """Free runs before and after, on the recordings at their own rate.
 
     Attributes
     ----------
+    is_whole : bool
+        Whether what is believed leaves nothing but its disturbances.
     retuned, final : FitResult
         The nominal model, re-tuned; with the effects that are believed.
     held_before, held_after : float
@@ -37,20 +41,35 @@ class FreeRuns:
     chain: Chain
     unseen: Unseen
     believed: Hypothesis
+    is_whole: bool
     retuned: FitResult
     final: FitResult
     held_before: float
     held_after: float
 
+    @cached_property
+    def estimate(self) -> FitResult:
+        """The fit that values and intervals are told of: of independent innovations, or of the free run."""
+        return self.believed.white if self.is_whole else self.final
 
-def free_runs(nothing: Hypothesis, believed: Hypothesis, chain: Chain, unseen: Unseen) -> FreeRuns:
-    """Simulate the re-tuned nominal model and what is believed, which may be the same."""
-    retuned = on_recordings(nothing, unseen.line, chain.records)
-    held_before = unseen.rms(nothing, retuned)
+    @cached_property
+    def covariance(self) -> FloatArray:
+        """Covariance of its scaled unknowns, shape (U, U); where more than noise is left, of correlated errors."""
+        return covariance(self.believed) if self.is_whole else reported_covariance(self.final)
+
+
+def free_runs(nothing: Hypothesis, believed: Hypothesis, is_whole: bool, chain: Chain, unseen: Unseen) -> FreeRuns:
+    """Simulate the re-tuned nominal model and what is believed, which may be the same.
+
+    The re-tuned model leaves the least that it can: an error that it need not have is no mismatch.
+    """
+    retuned = on_recordings(nothing, unseen.line, chain.records, is_whole=False)
+    held_before = unseen.rms(nothing, retuned, is_whole=False)
     if believed is nothing:
-        return FreeRuns(chain, unseen, believed, retuned, retuned, held_before, held_before)
-    final = on_recordings(believed, unseen.line, chain.records)
-    return FreeRuns(chain, unseen, believed, retuned, final, held_before, unseen.rms(believed, final))
+        return FreeRuns(chain, unseen, believed, is_whole, retuned, retuned, held_before, held_before)
+    final = on_recordings(believed, unseen.line, chain.records, is_whole)
+    held_after = unseen.rms(believed, final, is_whole)
+    return FreeRuns(chain, unseen, believed, is_whole, retuned, final, held_before, held_after)
 
 
 def figures_of(runs: FreeRuns, noise: float) -> Fit:
@@ -70,7 +89,8 @@ def figures_of(runs: FreeRuns, noise: float) -> Fit:
 
 def effects_of(runs: FreeRuns, decision: Decision) -> tuple[FoundEffect, ...]:
     """Return the effects that are named, the weightiest first, and the faults of the acquisition."""
-    found = found_effects(replace(decision, best=runs.believed), runs.unseen.line) if decision.named else ()
+    known = replace(decision, best=runs.believed)
+    found = found_effects(known, runs.estimate, runs.covariance, runs.unseen.line) if decision.named else ()
     held = {"holdout_rms_before": runs.held_before, "holdout_rms_after": runs.held_after}
     named = tuple(replace(each, evidence=replace(each.evidence, **held)) for each in found)
     before = [(out - raw.output)[raw.okay] for out, raw in zip(runs.final.outputs, runs.chain.raw, strict=True)]

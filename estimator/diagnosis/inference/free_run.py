@@ -1,8 +1,9 @@
 """The free run of a hypothesis as ``hil simulate`` makes it, and its error on samples that no fit has seen.
 
 The likelihood weighs errors by their innovations; the figures of a diagnosis are of the free run itself. So what is a
-recording's own (initial state, load torque, the course of a grade) is estimated anew, by least squares; all else is as
-the likelihood has it.
+recording's own (initial state, load torque, the course of a grade) is estimated anew, by least squares. All else is as
+the likelihood has it where the hypothesis leaves nothing but its disturbances. Where it leaves more, the disturbances'
+weighting is not that of what is left, and everything is estimated by least squares of the free run.
 """
 
 from __future__ import annotations
@@ -13,7 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimator.diagnosis.holdout import blocks, foreign_outputs
-from estimator.diagnosis.inference.likelihood import Hypothesis, refitted
+from estimator.diagnosis.inference.descent import descended
+from estimator.diagnosis.inference.likelihood import THOROUGH, Hypothesis, refitted
 from estimator.diagnosis.inference.plausible import GRADE
 from estimator.physics.fit import FitResult, fit
 from estimator.physics.model import DrivelineModel
@@ -27,16 +29,29 @@ ITERATIONS = 8
 
 
 def on_recordings(
-    hypothesis: Hypothesis, line: DrivelineModel, records: Sequence[Record], use: Sequence[BoolArray] | None = None
+    hypothesis: Hypothesis,
+    line: DrivelineModel,
+    records: Sequence[Record],
+    is_whole: bool,
+    use: Sequence[BoolArray] | None = None,
 ) -> FitResult:
     """Return the free run of a hypothesis on recordings it was fitted to, at their own rate.
 
-    ``use`` are the samples from which a recording's own is estimated; by default all good ones.
+    Parameters
+    ----------
+    is_whole : bool
+        Whether the hypothesis leaves nothing but its disturbances: else its parameters are estimated anew, too.
+    use : sequence of ndarray of bool, optional
+        The samples to estimate from; by default all good ones.
     """
     of = hypothesis.plain.problem
     own = [basis.own for basis in of.local]
     problem = make_problem(line, records, of.shared, own=own, profile=GRADE in hypothesis.effects, use=use)
-    return _with_own(problem, warm_start(problem, hypothesis.plain))
+    own_alone = _with_own(problem, warm_start(problem, hypothesis.plain))
+    if is_whole:
+        return own_alone
+    rms = own_alone.rms
+    return descended(own_alone, lambda errors: errors / rms, THOROUGH).light()
 
 
 def _with_own(problem: Problem, x: FloatArray) -> FitResult:
@@ -73,7 +88,7 @@ class Unseen:
     line: DrivelineModel
     records: Sequence[Record]
 
-    def rms(self, hypothesis: Hypothesis, whole: FitResult) -> float:
+    def rms(self, hypothesis: Hypothesis, whole: FitResult, is_whole: bool) -> float:
         """Return the RMS of a hypothesis' free-run error in blocks of 0.6 s every 2 s [unit of the output].
 
         What is between the blocks tells what is a recording's own. Without recordings kept out the hypothesis is
@@ -85,7 +100,7 @@ class Unseen:
             outputs = foreign_outputs(whole, self.line, self.records, between, hypothesis.effects)
         else:
             problem = replace(hypothesis.plain.problem, use=tuple(between))
-            plain = refitted(hypothesis, problem)
-            outputs = on_recordings(replace(hypothesis, plain=plain), self.line, records, between).outputs
+            plain = refitted(hypothesis, problem) if is_whole else hypothesis.plain
+            outputs = on_recordings(replace(hypothesis, plain=plain), self.line, records, is_whole, between).outputs
         errors = [(o - r.output)[r.okay & blocks(r)] for o, r in zip(outputs, records, strict=True)]
         return float(np.sqrt(np.mean(np.concatenate(errors) ** 2)))

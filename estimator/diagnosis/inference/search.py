@@ -36,6 +36,9 @@ MOST_FITS = 6
 WORTH_FITTING = 0.1
 """Share of the best promise below which an effect is not fitted."""
 
+FEWEST_FITS = 2
+"""Effects that are fitted however little a first look promises: a gap shows only where it is nearly as wide as it is."""
+
 SAME_PROMISE = 0.5
 """Share of what an effect promises that a look-alike must promise in its place."""
 
@@ -196,7 +199,8 @@ class Search:
         if rival and rival != GRADE:
             least = max(least, SAME_PROMISE * view.looks(rival)[0].promise)
         loose = [name for name in order if EFFECTS[name].loosens]
-        worth = [name for name in order if looks[name][0].promise >= least]
+        some = 0 if rival else FEWEST_FITS
+        worth = [name for i, name in enumerate(order) if looks[name][0].promise >= least or i < some]
         twins = {twin for name in worth for twin in EFFECTS[name].equivalent if precedes(name, twin)}
         worth = [name for name in worth if name not in twins][:MOST_FITS]
         return {

@@ -14,11 +14,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimator.diagnosis.inference.calibration import LEAST_PROBABILITY, TEMPERED
+from estimator.diagnosis.inference.calibration import LEAST_PROBABILITY
 from estimator.diagnosis.inference.disturbances import Size, estimate, line_of
 from estimator.diagnosis.inference.likelihood import ROUNDS, Hypothesis
 from estimator.diagnosis.inference.posterior import Belief
-from estimator.diagnosis.inference.verdict import Decision
+from estimator.diagnosis.inference.verdict import Decision, tempered_by
 from estimator.diagnosis.result import Verdict
 from estimator.diagnosis.unnamed import Hunt, hunts_of, scene
 from estimator.physics.catalogue import EFFECTS
@@ -143,8 +143,7 @@ def _share_of_names(decision: Decision, score: float) -> float:
     A law of size zero is no law, and values at their bounds are the nominal line: what a rival has of the probability
     is what it has beyond the nominal model, which has had its share of the posterior already.
     """
-    n = decision.best.plain.residual.size
-    tempered = TEMPERED + n * sum(test.value for test in decision.failed if test.is_share)
+    tempered = tempered_by(decision.failed, decision.best.plain.residual.size)
     rival, nominal = (
         math.exp(min(0.5 * (decision.best.score - each) / tempered, 700.0)) for each in (score, decision.nothing.score)
     )

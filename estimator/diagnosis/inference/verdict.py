@@ -77,8 +77,11 @@ class Grounds:
 
 
 def tempered_by(tests: Sequence[Test], samples: int, factor: float = TEMPERED) -> float:
-    """Return by which differences of scores are divided: more where a test finds information that no law has used."""
-    return factor + samples * sum(test.value for test in tests if test.is_share and test.failed)
+    """Return by which differences of scores are divided: more where a test finds information that no law has used.
+
+    That is what it finds beyond what is left in worlds of which all is explained.
+    """
+    return factor + samples * sum(max(test.value - test.most, 0.0) for test in tests if test.is_share)
 
 
 def grounds(search: Search) -> Grounds:

@@ -24,18 +24,25 @@ LONGEST_S = 0.01
 LONGEST_OF_RIGID_S = 0.02
 """The same where a likelihood of the samples is formed: on a millisecond's grid only an encoder's steps are seen."""
 
+BAND_POWER = 0.99
+"""Share of the power of what a joint takes that lies within its band: a joint has no mode, its motion is imposed."""
+
 FEWEST_KEPT = 200
 """Samples of the shortest recording that are kept in any case: fewer do not carry a model with a dozen unknowns."""
 
+TURN = 2.0 * np.pi
 PER_PERIOD = 12.0
 """Samples kept per period of the line's fastest mode, at least; and one in `LONGEST_S`."""
 
 
 def thinned(records: Sequence[Record], model: DrivelineModel) -> list[Record]:
-    """Return recordings with as many samples as the model's fastest mode needs; those that have no more as they are."""
-    if share_of(records) >= 1.0:
+    """Return recordings with as many samples as the model's fastest mode needs; those that have no more as they are.
+
+    A joint has no mode, and its recordings differ in what they need: stretches of them are used instead.
+    """
+    if share_of(records) >= 1.0 or model.structure is Structure.JOINT:
         return list(records)
-    return [_thin(record, factor_for(record.sample_time_s, model)) for record in records]
+    return [_thin(record, factor_for([record], model)) for record in records]
 
 
 def as_slow_as_needed(records: Sequence[Record], model: DrivelineModel) -> list[Record]:
@@ -44,17 +51,25 @@ def as_slow_as_needed(records: Sequence[Record], model: DrivelineModel) -> list[
     Of a short one enough are kept for a model and its noise.
     """
     shortest = min(record.okay.size for record in records)
-    factor = min(factor_for(records[0].sample_time_s, model, LONGEST_OF_RIGID_S), max(shortest // FEWEST_KEPT, 1))
+    factor = min(factor_for(records, model, LONGEST_OF_RIGID_S), max(shortest // FEWEST_KEPT, 1))
     return [_thin(record, factor) for record in records]
 
 
-def factor_for(sample_time_s: float, model: DrivelineModel, longest_s: float = LONGEST_S) -> int:
-    """Return one in how many samples is enough."""
-    if model.structure is Structure.JOINT:
-        return 1
-    fastest = float(natural_frequencies_rad_s(model.values())[-1])
-    longest_s = longest_s if fastest == 0.0 else min(longest_s, 2.0 * np.pi / (PER_PERIOD * fastest))
-    return max(1, int(longest_s / sample_time_s * (1.0 + 1e-9)))
+def factor_for(records: Sequence[Record], model: DrivelineModel, longest_s: float = LONGEST_S) -> int:
+    """Return one in how many samples is enough for recordings of one sampling period."""
+    joint = model.structure is Structure.JOINT
+    fastest_hz = max(map(_band_hz, records)) if joint else float(natural_frequencies_rad_s(model.values())[-1]) / TURN
+    if fastest_hz > 0.0:
+        longest_s = min(longest_s, 1.0 / (PER_PERIOD * fastest_hz))
+    return max(1, int(longest_s / records[0].sample_time_s * (1.0 + 1e-9)))
+
+
+def _band_hz(record: Record) -> float:
+    """Return the frequency below which nearly all the power of an output is [Hz]."""
+    output = np.where(record.okay, record.output, np.mean(record.output[record.okay]))
+    power = np.cumsum(np.abs(np.fft.rfft(output - output.mean())) ** 2)
+    index = int(np.searchsorted(power, BAND_POWER * power[-1]))
+    return float(np.fft.rfftfreq(output.size, record.sample_time_s)[index])
 
 
 def _thin(record: Record, factor: int) -> Record:
@@ -72,6 +87,7 @@ def _thin(record: Record, factor: int) -> Record:
         okay=record.okay[kept],
         torque_okay=None if record.torque_okay is None else trusted,
         offset_s=None if record.offset_s is None else record.offset_s[kept],
+        imposed=None if record.imposed is None else record.imposed[kept],
         reference_nm=None if record.reference_nm is None else _blocks(record.reference_nm, factor).mean(axis=1),
     )
 
