@@ -91,7 +91,7 @@ class World:
     def probability(self, claim: Claim, thresholds: Thresholds) -> float:
         """Return the probability of an effect under some thresholds."""
         shares = (key for key, limit in TEST_LIMITS.items() if limit.is_share)
-        lost = sum(max(self.beyond_chance(key) - thresholds.limits[key], 0.0) for key in shares)
+        lost = max(0.0, *(self.beyond_chance(key) - thresholds.limits[key] for key in shares))
         return probability_of(claim.names, self.scores, thresholds.divisor + self.samples * lost)
 
     def named(self, thresholds: Thresholds) -> list[Claim]:

@@ -96,6 +96,15 @@ def fall(one: Hypothesis, other: Hypothesis, nothing: Hypothesis) -> float:
     return (one.free_squares - other.free_squares) / nothing.free_squares
 
 
+def levels(path: Sequence[Hypothesis]) -> list[float]:
+    """Return the squared free-run error that each set on a way leaves: no more than a set that it holds."""
+    found: list[float] = []
+    for each in path:
+        held = [level for level, other in zip(found, path, strict=False) if other.effects <= each.effects]
+        found.append(min(each.free_squares, *held) if held else each.free_squares)
+    return found
+
+
 def shares(path: Sequence[Hypothesis]) -> dict[str, float]:
     """Return the share of the re-tuned model's squared free-run error that goes with each effect of the last set.
 
@@ -104,9 +113,10 @@ def shares(path: Sequence[Hypothesis]) -> dict[str, float]:
     Together they are what the last set explains.
     """
     found: dict[str, float] = {}
-    for one, other in pairwise(path):
+    left = levels(path)
+    for (one, before), (other, after) in pairwise(zip(path, left, strict=True)):
         gone = sum(found.pop(name) for name in one.effects - other.effects)
-        change, new = fall(one, other, path[0]) + gone, other.effects - one.effects
+        change, new = (before - after) / left[0] + gone, other.effects - one.effects
         among = new or other.effects
         whole = sum(found.values())
         for name in among:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -18,7 +19,7 @@ from estimator.diagnosis.inference.calibration import (
 )
 from estimator.diagnosis.inference.disturbances import Size
 from estimator.diagnosis.inference.likelihood import Hypothesis
-from estimator.diagnosis.inference.posterior import Belief, beliefs, fall, free_rms, shares
+from estimator.diagnosis.inference.posterior import Belief, beliefs, fall, free_rms, levels, shares
 from estimator.diagnosis.inference.remainder import Test, tests
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.result import Verdict
@@ -79,9 +80,10 @@ class Grounds:
 def tempered_by(tests: Sequence[Test], samples: int, factor: float = TEMPERED) -> float:
     """Return by which differences of scores are divided: more where a test finds information that no law has used.
 
-    That is what it finds beyond what is left in worlds of which all is explained.
+    That is what it finds beyond what is left in worlds of which all is explained. Tests find the same information
+    again: the one that finds most of it says how much there is at least.
     """
-    return factor + samples * sum(max(test.value - test.most, 0.0) for test in tests if test.is_share)
+    return factor + samples * max((test.value - test.most for test in tests if test.failed and test.is_share), default=0.0)
 
 
 def grounds(search: Search) -> Grounds:
@@ -106,9 +108,10 @@ def decide(search: Search, with_findings: bool = False) -> Decision:
     established = [each for each in ground.beliefs if each.probability >= LEAST_PROBABILITY]
     named = tuple(each for each in established if each.share >= LEAST_SHARE)
     noise = float(np.hypot(*np.exp(best.sizes[[Size.WHITE, Size.COLOURED]])))
-    left = min(max(free_rms(best) ** 2 - noise**2, 0.0) / free_rms(nothing) ** 2, 1.0)
+    rms = math.sqrt(levels(search.path)[-1] / best.plain.residual.size)
+    left = min(max(rms**2 - noise**2, 0.0) / free_rms(nothing) ** 2, 1.0)
     return Decision(
-        _verdict(best, bool(named) or with_findings, bool(failed)),
+        _verdict(rms / _spread(best), bool(named) or with_findings, bool(failed)),
         best,
         nothing,
         named,
@@ -116,7 +119,7 @@ def decide(search: Search, with_findings: bool = False) -> Decision:
         tuple(each for each in ground.beliefs if each.probability < LEAST_PROBABILITY),
         failed,
         left,
-        free_rms(best) / noise,
+        rms / noise,
     )
 
 
@@ -137,8 +140,8 @@ def _as_simple_as_will_do(search: Search, best: Hypothesis) -> Hypothesis:
     return best
 
 
-def _verdict(best: Hypothesis, is_named: bool, is_more_than_noise: bool) -> Verdict:
-    if free_rms(best) > CLEARLY_BELOW * _spread(best):
+def _verdict(of_spread: float, is_named: bool, is_more_than_noise: bool) -> Verdict:
+    if of_spread > CLEARLY_BELOW:
         return Verdict.UNEXPLAINED
     if is_named:
         return Verdict.PARTLY_EXPLAINED if is_more_than_noise else Verdict.EXPLAINED

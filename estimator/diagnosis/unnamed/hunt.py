@@ -20,7 +20,7 @@ from estimator.signals.record import FloatArray
 RIDGE = 1e-5
 """Keeps columns that are combinations of others small; a share of a column's norm."""
 
-MOST_FORCE = 1.0
+MOST_FORCE = 0.8
 """Largest RMS of a law, in RMS of the torque (or reading) in use: a law that takes more than the line carries is no
 small thing left out but a way to cancel what is there."""
 
