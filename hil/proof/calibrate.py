@@ -21,6 +21,7 @@ from pathlib import Path
 
 import numpy as np
 from scipy.optimize import minimize_scalar
+from threadpoolctl import threadpool_limits
 
 from estimator.diagnosis.chain import mechanical, read_through
 from estimator.diagnosis.hypotheses import everything, open_hypotheses
@@ -33,9 +34,9 @@ from estimator.diagnosis.preconditions import prepare
 from estimator.diagnosis.preconditions.thinned import as_slow_as_needed
 from estimator.errors import EstimatorError
 from hil.proof.campaign.kinds import parse_seeds
-from hil.proof.compare_engines import NOTHING, shown_case
+from hil.proof.compare_engines import NOTHING, OUTSIDE, shown_case
 
-SETS = ("clean", "dirty", "quiet")
+SETS = ("clean", "dirty", "quiet", "outside")
 
 MOST_FALSE = 0.01
 """Share of named effects that may not be there."""
@@ -82,7 +83,7 @@ class World:
     def is_explained(self) -> bool:
         """Whether the best set holds what is strong, and nothing that is not there."""
         strong = self.strong == NOTHING or any(self.strong in claim.names for claim in self.claims)
-        return strong and all(map(self.is_there, self.claims))
+        return strong and all(map(self.is_there, self.claims)) and self.strong not in OUTSIDE
 
     def beyond_chance(self, key: str) -> float:
         """Return what a test found, less what it finds in noise by chance."""
@@ -120,7 +121,8 @@ def searched(which: str, seed: int) -> World | None:
         return None
     line, chain = mechanical(model), read_through(ready.records)
     thin = as_slow_as_needed(chain.records, line)
-    found = grounds(Search(line, thin, everything(thin), open_hypotheses(line, chain.records)[0]))
+    with threadpool_limits(1, user_api="blas"):  # as a diagnosis does
+        found = grounds(Search(line, thin, everything(thin), open_hypotheses(line, chain.records)[0]))
     recognised = {finding.name for finding in chain.findings}
     there = {name for name in case.specimen.sizes if name != NOTHING} - recognised
     return World(
@@ -196,7 +198,7 @@ def table(worlds: Sequence[World], thresholds: Thresholds) -> str:
     for which in SETS:
         mine = [(world, world.named(thresholds)) for world in worlds if world.which == which]
         if mine:
-            strong = [(w, named) for w, named in mine if w.strong != NOTHING]
+            strong = [(w, named) for w, named in mine if w.strong not in (NOTHING, *OUTSIDE)]
             right = sum(any(w.strong in claim.names for claim in named) for w, named in strong)
             false = [sum(not w.is_there(claim) for claim in named) for w, named in mine]
             times = sorted(world.cpu_s for world, _ in mine)

@@ -37,6 +37,7 @@ ENGINES: dict[str, Callable[..., Diagnosis]] = {"likelihood": by_likelihood}
 
 NOTHING = "none"
 KINDS = [name for name, effect in EFFECTS.items() if effect.catalogued and name != NOTHING]
+OUTSIDE = [name for name, effect in EFFECTS.items() if not effect.catalogued]
 ACQUIRED = {"stale_samples", "lost_samples", "sample_jitter", "clock_drift", "speed_quantisation", "speed_sign_blind"}
 """Effects of the acquisition, recognised before any engine; none of them is the strong one of a dirty world."""
 
@@ -55,6 +56,8 @@ def case_of(which: str, seed: int) -> tuple[Case, dict[str, dict[str, float]], s
     if which == "clean":
         strong = NOTHING if seed % 9 == 0 else KINDS[seed % len(KINDS)]
         return make_case(strong, seed), {}, strong
+    if which == "outside":
+        return make_case(OUTSIDE[seed % len(OUTSIDE)], seed), {}, OUTSIDE[seed % len(OUTSIDE)]
     strong = NOTHING if which == "quiet" else STRONG[seed % len(STRONG)]
     return *make_dirty(strong, seed, knows(seed)), strong
 
@@ -126,7 +129,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="python -m hil.proof.compare_engines", description="Answer one set of cases with both engines."
     )
-    parser.add_argument("--set", required=True, choices=["clean", "dirty", "quiet"], dest="which")
+    parser.add_argument("--set", required=True, choices=["clean", "dirty", "quiet", "outside"], dest="which")
     parser.add_argument("--seeds", required=True, help="A..B, both included")
     parser.add_argument("--engines", default=",".join(ENGINES), help="of rules, likelihood (default: both)")
     parser.add_argument("--out", required=True, type=Path, help="folder for the results")
