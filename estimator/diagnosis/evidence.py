@@ -44,12 +44,6 @@ def residuals_by_record(result: FitResult) -> list[FloatArray]:
     return list(np.split(result.residual, sizes))
 
 
-def price(gained: Gain, before_rms: float, after_rms: float) -> float:
-    """Return how many unknowns a gain was bought with, choices among them; the RMS are those without and with them."""
-    fall = 2.0 * math.log(before_rms / after_rms)
-    return (gained.n_effective * fall - gained.delta_bic) / math.log(gained.n_effective)
-
-
 def gain_from_squares(before: float, after: float, added: int, unknowns: int, errors: Sequence[FloatArray]) -> Gain:
     """Compare two nested least-squares fits by their sums of squares.
 

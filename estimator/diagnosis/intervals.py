@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from scipy import stats
 
 from estimator.diagnosis.evidence import residuals_by_record
 from estimator.diagnosis.noise import unpredictable
@@ -59,17 +58,6 @@ def coherent_variance(result: FitResult) -> float:
     """Return the mean square of the error that is no noise, times the samples for which it keeps its value."""
     coherent = max(result.rms**2 - unpredictable(residuals_by_record(result)) ** 2, 0.0)
     return coherent * COHERENT_S / min(record.sample_time_s for record in result.problem.records)
-
-
-def chance_of_coherent(before: FitResult, after: FitResult) -> float:
-    """Return how probable it is that an error which is no noise gives a larger model what it gains.
-
-    The likelihood-ratio test of nested fits, chi-squared with as many degrees as unknowns were added, its variance that
-    of the error which the larger one leaves: noise, and what keeps its value for ``COHERENT_S``.
-    """
-    variance = unpredictable(residuals_by_record(after)) ** 2 + coherent_variance(after)
-    added = max(after.free_count - before.free_count, 1)
-    return float(stats.chi2.sf((before.squares - after.squares) / variance, added))
 
 
 def _free(result: FitResult) -> BoolArray:

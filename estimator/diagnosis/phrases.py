@@ -27,11 +27,6 @@ def is_phrase(name: str) -> bool:
     return name.startswith(ARTICLES)
 
 
-def kind_in_words(name: str) -> str:
-    """Return what kind of law a term is, without its size."""
-    return name if is_phrase(name) else f"a law of {name}"
-
-
 def law_in_words(terms: Sequence[tuple[str, float]]) -> str:
     """Return the first terms of a law: a formula with its coefficient, a phrase as it is."""
     said = ""

@@ -270,14 +270,9 @@ class Effect:
         The effect that the event is where it acts all along, if that is one.
     phases : mapping of str to str
         Own phase to the shared amplitude that it belongs to, for effects periodic in an angle.
-    decisive : tuple[str, ...]
-        Parameters of which at least one must differ from its null; by default the amplitudes of a periodic effect, the
-        first parameter that is fitted of another.
     loosens : frozenset[str]
         Nominal parameters that it moves beyond what they are trusted to. Where one of them is at its bound the effect
         is fitted whatever a first look along its size promises: the look does not move them with it.
-    loosened_by : str
-        The parameter of its own that moves them. Once it is fitted, the rest of the effect is looked for again.
     described : callable
         Model, values of the effect and of the line to the spans in which a data sheet's value of a nominal parameter
         may lie, where the effect changes or splits what the parameter stands for: friction that warms is described
@@ -295,8 +290,6 @@ class Effect:
     retold : callable
         Model, records and fitted values, of the effect and of the line, to where fits of other ways to write the law
         start.
-    bounces : bool
-        True where the error over a long free run has many small minima: it is fitted in short stretches once more.
     derived : callable
         Parameter values, and the line's own, to those of parameters that are held but follow from the others.
     linear : bool
@@ -326,16 +319,13 @@ class Effect:
     step: Step | None = None
     permanent: str = ""
     phases: Mapping[str, str] = field(default_factory=dict)
-    decisive: tuple[str, ...] = ()
     loosens: frozenset[str] = frozenset()
-    loosened_by: str = ""
     described: Spans = as_described
     implausible: Callable[[DrivelineModel, Sequence[Record], Mapping[str, float]], str] = always_plausible
     unresolved: Callable[[DrivelineModel, Sequence[Record], Mapping[str, float]], str] = always_plausible
     rescaled: Callable[[Mapping[str, float]], Mapping[str, float]] = told_one_way
     completed: Callable[[Mapping[str, float]], Mapping[str, float]] = as_given
     retold: Retold = never_retold
-    bounces: bool = False
     derived: Callable[[Mapping[str, float], Mapping[str, float]], Mapping[str, float]] = nothing_derived
     linear: bool = False
     recognised: bool = False

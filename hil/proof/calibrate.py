@@ -24,14 +24,11 @@ from scipy.optimize import minimize_scalar
 from threadpoolctl import threadpool_limits
 
 from estimator.diagnosis.chain import mechanical, read_through
-from estimator.diagnosis.hypotheses import everything, open_hypotheses
 from estimator.diagnosis.inference.calibration import LEAST_SHARE, TEST_LIMITS, THRESHOLDS_FILE
 from estimator.diagnosis.inference.posterior import probability_of
+from estimator.diagnosis.inference.read_again import searched as searched_for
 from estimator.diagnosis.inference.remainder import chance
-from estimator.diagnosis.inference.search import Search
-from estimator.diagnosis.inference.verdict import grounds
 from estimator.diagnosis.preconditions import prepare
-from estimator.diagnosis.preconditions.thinned import as_slow_as_needed
 from estimator.errors import EstimatorError
 from hil.proof.campaign.kinds import parse_seeds
 from hil.proof.compare_engines import NOTHING, OUTSIDE, shown_case
@@ -120,10 +117,9 @@ def searched(which: str, seed: int) -> World | None:
     except EstimatorError:
         return None
     line, chain = mechanical(model), read_through(ready.records)
-    thin = as_slow_as_needed(chain.records, line)
     with threadpool_limits(1, user_api="blas"):  # as a diagnosis does
-        found = grounds(Search(line, thin, everything(thin), open_hypotheses(line, chain.records)[0]))
-    recognised = {finding.name for finding in chain.findings}
+        whole = searched_for(chain, line)
+    found, recognised = whole.grounds, {finding.name for finding in whole.chain.findings}
     there = {name for name in case.specimen.sizes if name != NOTHING} - recognised
     return World(
         which,

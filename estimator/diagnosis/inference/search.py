@@ -37,7 +37,7 @@ WORTH_FITTING = 0.1
 """Share of the best promise below which an effect is not fitted."""
 
 FEWEST_FITS = 2
-"""Effects that are fitted however little a first look promises: a gap shows only where it is nearly as wide as it is."""
+"""Effects that are fitted however little a first look promises: a gap shows only near its own width."""
 
 SAME_PROMISE = 0.5
 """Share of what an effect promises that a look-alike must promise in its place."""

@@ -83,7 +83,8 @@ def tempered_by(tests: Sequence[Test], samples: int, factor: float = TEMPERED) -
     That is what it finds beyond what is left in worlds of which all is explained. Tests find the same information
     again: the one that finds most of it says how much there is at least.
     """
-    return factor + samples * max((test.value - test.most for test in tests if test.failed and test.is_share), default=0.0)
+    beyond = [test.value - test.most for test in tests if test.failed and test.is_share]
+    return factor + samples * max(beyond, default=0.0)
 
 
 def grounds(search: Search) -> Grounds:
@@ -100,9 +101,8 @@ def grounds(search: Search) -> Grounds:
     return Grounds(best, nothing, resolved, examined, scores)
 
 
-def decide(search: Search, with_findings: bool = False) -> Decision:
-    """Search, and decide; ``with_findings`` where faults of the acquisition were recognised and compensated."""
-    ground = grounds(search)
+def decide(search: Search, ground: Grounds, with_findings: bool = False) -> Decision:
+    """Decide on grounds; ``with_findings`` where faults of the acquisition were recognised and compensated."""
     best, nothing = ground.best, ground.nothing
     failed = tuple(test for test in ground.tests if test.failed)
     established = [each for each in ground.beliefs if each.probability >= LEAST_PROBABILITY]

@@ -97,5 +97,4 @@ EFFECT = Effect(
     testable=testable,
     sentence=sentence,
     completed=completed,
-    bounces=True,
 )

@@ -92,7 +92,6 @@ EFFECT = Effect(
     scales=scales,
     starts=starts,
     sentence=sentence,
-    decisive=("hardening_per_rad2", "stage_share"),
     retold=retold,
     loosens=frozenset({"k", "c"}),  # of an oscillation whose frequency goes with its size a linear line damps the beats
 )

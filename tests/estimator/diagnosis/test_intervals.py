@@ -10,7 +10,6 @@ from scipy import stats
 
 from estimator.diagnosis.intervals import (
     Z95,
-    chance_of_coherent,
     covariance,
     interval,
     interval_that_follows,
@@ -178,28 +177,6 @@ class TestReported:
                 for true, (low, high) in zip(TRUE, (interval(result, cov, i) for i in range(3)), strict=True)
             ]
         assert np.mean(hits) >= 0.9
-
-
-def test_a_slow_rest_gives_a_slow_law_next_to_nothing_beyond_chance() -> None:
-    """A law that varies within a second finds something in any rest that does; plain chi-squared calls it certain."""
-    found, plain = np.zeros(REPETITIONS), np.zeros(REPETITIONS)
-    for seed in range(REPETITIONS):
-        rng = np.random.default_rng(seed)
-        rest = 0.5 * autoregressive(0.97, SAMPLES, rng) + rng.standard_normal(SAMPLES)
-        design = np.column_stack([np.ones(SAMPLES), autoregressive(0.97, SAMPLES, rng)])
-        before, after = (regression([design[:, :unknowns]], [rest]) for unknowns in (1, 2))
-        found[seed] = chance_of_coherent(before, after)
-        plain[seed] = stats.chi2.sf(before.squares - after.squares, 1)  # noise of variance 1
-    assert np.mean(found < 0.05) <= stats.binom.ppf(0.999, REPETITIONS, 0.05) / REPETITIONS
-    assert np.mean(plain < 0.05) > 0.3
-
-
-def test_what_is_there_is_beyond_chance() -> None:
-    rng = np.random.default_rng(1)
-    design = np.column_stack([np.ones(SAMPLES), autoregressive(0.97, SAMPLES, rng)])
-    rest = 0.5 * autoregressive(0.97, SAMPLES, rng) + rng.standard_normal(SAMPLES) + 3.0 * design[:, 1]
-    before, after = (regression([design[:, :unknowns]], [rest]) for unknowns in (1, 2))
-    assert chance_of_coherent(before, after) < 1e-6
 
 
 def test_the_interval_of_what_follows_is_that_of_the_formula() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from estimator.diagnosis.phrases import PLACE_NAMES, is_phrase, kind_in_words, law_in_words
+from estimator.diagnosis.phrases import PLACE_NAMES, is_phrase, law_in_words
 from estimator.diagnosis.unnamed.laws import LAWS
 from estimator.physics.effect import Element
 
@@ -36,4 +36,3 @@ def test_what_needs_words_is_a_phrase(name: str) -> None:
     words = [word.strip("()|^-/") for word in name.split()]
     in_words = any(word.isalpha() and len(word) > 5 for word in words)
     assert is_phrase(name) is in_words
-    assert kind_in_words(name).startswith("a law of" if not in_words else ("a ", "the "))

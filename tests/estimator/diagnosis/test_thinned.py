@@ -8,12 +8,20 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis.hypotheses import NOTHING, everything
-from estimator.diagnosis.preconditions.thinned import LONGEST_S, factor_for, thinned
+from estimator.diagnosis.preconditions.thinned import (
+    LONGEST_OF_RIGID_S,
+    LONGEST_S,
+    as_slow_as_needed,
+    factor_for,
+    thinned,
+)
 from estimator.diagnosis.stretches import MOST_SAMPLES
 from estimator.physics.grid import grid_for
 from estimator.physics.layout import flat
+from estimator.physics.model import DrivelineModel, Parameter, Structure
 from estimator.physics.simulate import simulate
 from estimator.physics.start import Start
+from estimator.signals.record import OutputKind
 from tests.estimator.diagnosis.plain import Bench
 from tests.estimator.physics.bench import TWO_MASS, model, random_steps, record
 
@@ -23,7 +31,9 @@ LINE = model(TWO_MASS)
 @pytest.mark.parametrize(("period_s", "factor"), [(0.01, 1), (0.02, 1), (0.005, 2)])
 def test_one_in_as_many_samples_as_the_line_allows(period_s: float, factor: int) -> None:
     """The line swings at a few hertz: 10 ms are enough, and the most."""
-    assert factor_for(period_s, LINE) == factor
+    torque = random_steps(500, 1)
+    read = replace(record(torque, np.zeros(500)), sample_time_s=period_s)
+    assert factor_for([read], LINE) == factor
     assert factor * period_s <= max(LONGEST_S, period_s)
 
 
@@ -31,9 +41,26 @@ def test_a_stiff_line_keeps_twelve_samples_a_period() -> None:
     stiff = model({**TWO_MASS, "k": 100.0 * TWO_MASS["k"]})
     j = TWO_MASS["J_M"] * TWO_MASS["J_L"] / (TWO_MASS["J_M"] + TWO_MASS["J_L"])
     period_s = 2.0 * np.pi / np.sqrt(100.0 * TWO_MASS["k"] / j)
-    factor = factor_for(0.0001, stiff)
+    torque = random_steps(500, 1)
+    factor = factor_for([replace(record(torque, np.zeros(500)), sample_time_s=0.0001)], stiff)
     assert period_s / (factor * 0.0001) >= 12.0
     assert period_s / ((factor + 1) * 0.0001) < 12.0
+
+
+def test_a_joint_keeps_twelve_samples_a_period_of_what_it_takes() -> None:
+    """Force of a slow sine and a little ringing: the ringing has less than a hundredth of the power."""
+    time_s = 0.001 * np.arange(8000)
+    motion = np.sin(2.0 * np.pi * time_s)
+    force = motion + 0.1 * np.sin(2.0 * np.pi * 50.0 * time_s)
+    fast = replace(record(force, force), sample_time_s=0.001, time_s=time_s, imposed=motion, kind=OutputKind.FORCE)
+    joint = DrivelineModel(Structure.JOINT, {"k": Parameter(1.0, 0.5), "c": Parameter(1.0, 0.5)})
+    (thin,) = as_slow_as_needed([fast], joint)
+    assert thin.sample_time_s == pytest.approx(LONGEST_OF_RIGID_S)
+    assert thin.imposed is not None
+    np.testing.assert_array_equal(thin.imposed, motion[:: round(LONGEST_OF_RIGID_S / 0.001)])
+    ringing = replace(fast, output=motion + 0.3 * np.sin(2.0 * np.pi * 50.0 * time_s))
+    (thin,) = as_slow_as_needed([ringing], joint)
+    assert 1.0 / (12.0 * 50.0) >= thin.sample_time_s > 0.5 / (12.0 * 50.0)
 
 
 def test_the_reference_is_averaged_as_the_torque_is() -> None:

@@ -7,8 +7,10 @@ from typing import cast
 
 import pytest
 
+from estimator.diagnosis.inference import remainder
 from estimator.diagnosis.inference.likelihood import Hypothesis
-from estimator.diagnosis.inference.posterior import probability_of, shares
+from estimator.diagnosis.inference.posterior import levels, probability_of, shares
+from estimator.diagnosis.inference.verdict import tempered_by
 
 
 @dataclass
@@ -40,6 +42,14 @@ def test_a_step_without_a_new_effect_changes_all_in_proportion() -> None:
     assert dropped == pytest.approx({"brake": 0.59})
 
 
+def test_a_set_leaves_no_more_than_one_that_it_holds() -> None:
+    """However poor the least-squares fit of the larger one is: what it does not gain is not shared out either."""
+    assert levels(path(("", 100.0), ("lag", 10.0), ("lag brake", 60.0), ("brake", 50.0))) == [100.0, 10.0, 10.0, 50.0]
+    assert shares(path(("", 100.0), ("lag", 10.0), ("lag brake", 60.0), ("lag brake slip", 40.0))) == pytest.approx(
+        {"lag": 0.9, "brake": 0.0, "slip": 0.0}
+    )
+
+
 def test_without_effects_nothing_is_shared_out() -> None:
     assert shares(path(("", 100.0))) == {}
 
@@ -50,3 +60,14 @@ def test_a_probability_sums_over_all_sets_that_hold_the_effect_or_a_look_alike()
     assert one == pytest.approx(2.0 / (3.0 + 0.0498), rel=1e-3)
     assert probability_of({"lag", "filter"}, scores, 1.0) > one
     assert probability_of({"lag", "filter"}, scores, 10.0) < probability_of({"lag", "filter"}, scores, 1.0)
+
+
+def left_over(value: float, most: float, is_share: bool = True) -> remainder.Test:
+    return remainder.Test("", value, most, is_share)
+
+
+def test_differences_of_scores_count_by_what_is_left_beyond_what_explained_worlds_leave() -> None:
+    """Tests find the same information again: the one that finds most of it counts, the others do not add to it."""
+    assert tempered_by([left_over(0.02, 0.03), left_over(50.0, 25.0, is_share=False)], 1000, 4.0) == 4.0
+    assert tempered_by([left_over(0.05, 0.03), left_over(0.13, 0.03)], 1000, 4.0) == pytest.approx(104.0)
+    assert tempered_by([left_over(0.0301, 0.03)], 1000, 4.0) == pytest.approx(4.1)

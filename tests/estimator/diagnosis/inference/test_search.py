@@ -12,7 +12,7 @@ from estimator.diagnosis.hypotheses import everything, open_hypotheses
 from estimator.diagnosis.inference.posterior import free_rms
 from estimator.diagnosis.inference.remainder import tests as examined
 from estimator.diagnosis.inference.search import Search
-from estimator.diagnosis.inference.verdict import Decision, decide
+from estimator.diagnosis.inference.verdict import Decision, decide, grounds
 from estimator.diagnosis.result import Verdict
 from estimator.physics.model import EffectValue
 from estimator.signals.record import Record
@@ -29,7 +29,8 @@ def searched(bench: Bench, records: list[Record] | None = None) -> Search:
 
 
 def decided(name: str, values: Mapping[str, float]) -> Decision:
-    return decide(searched(bench_with(name, values)))
+    search = searched(bench_with(name, values))
+    return decide(search, grounds(search))
 
 
 def test_nothing_is_named_where_nothing_is_missing() -> None:
@@ -87,7 +88,7 @@ def test_a_wave_that_no_effect_makes_is_a_remainder(wave_hz: float) -> None:
         for record in bench.records
     ]
     search = searched(bench, waved)
-    decision = decide(search)
+    decision = decide(search, grounds(search))
     assert decision.verdict in (Verdict.UNEXPLAINED, Verdict.PARTLY_EXPLAINED)
     assert "a line in its spectrum" in {test.name for test in decision.failed}
     assert not decision.named
@@ -108,7 +109,8 @@ def knowing(bench: Bench, name: str, key: str, value: float, tolerance: float) -
 def test_an_effect_that_is_known_roughly_is_tuned_and_no_finding() -> None:
     bench = bench_with("coulomb_friction_motor", {"friction_nm": 8.0})
     roughly = knowing(bench, "coulomb_friction_motor", "friction_nm", 7.0, 0.3)
-    decision = decide(searched(roughly))
+    search = searched(roughly)
+    decision = decide(search, grounds(search))
     assert decision.verdict is Verdict.NO_MISMATCH
     assert decision.best.plain.value("coulomb_friction_motor", "friction_nm") == pytest.approx(8.0, rel=0.02)
 

@@ -12,7 +12,7 @@ from estimator.diagnosis.hypotheses import everything, open_hypotheses
 from estimator.diagnosis.inference import remainder
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.inference.unnamed import Law, best_law, hunts_around, weighed_against
-from estimator.diagnosis.inference.verdict import Decision, decide
+from estimator.diagnosis.inference.verdict import Decision, decide, grounds
 from estimator.diagnosis.result import Verdict
 from estimator.diagnosis.unnamed import scene
 from estimator.physics.effect import Element
@@ -58,7 +58,8 @@ def test_laws_are_weighed_by_the_innovations() -> None:
 def friction() -> Decision:
     bench = bench_with("coulomb_friction_motor", {"friction_nm": 8.0})
     names = ["coulomb_friction_motor", "coulomb_friction_load"]
-    return decide(Search(bench.model, bench.records, bench.use, names))
+    search = Search(bench.model, bench.records, bench.use, names)
+    return decide(search, grounds(search))
 
 
 def law(decision: Decision, element: Element, better: float) -> Law:
