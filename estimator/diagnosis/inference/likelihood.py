@@ -132,7 +132,7 @@ def fitted(
     ``rival`` is minus twice the log-likelihood of the hypothesis it will be compared with: the farther from it, the
     less the last digits matter. Without one it is fitted to its end.
     """
-    plain, choices = begun, choices_of(effects, hypotheses)
+    plain, choices, sizes = begun, choices_of(effects, hypotheses), np.clip(sizes, limits.low, limits.high)
     best: Hypothesis | None = None
     passes: list[float] = []
     while best is None or len(passes) < MOST_PASSES:
@@ -151,20 +151,21 @@ def fitted(
     return replace(best, plain=light(best.plain))
 
 
-def compared(effects: Effects, begun: FitResult, parent: Hypothesis, hypotheses: int) -> Hypothesis:
+def compared(effects: Effects, begun: FitResult, parent: Hypothesis, limits: Limits, hypotheses: int) -> Hypothesis:
     """Fit a hypothesis a few steps from another's disturbances, to be compared with others like it.
 
     Where it explains much more, other disturbances weigh what is left, and it is fitted a few steps under those, too.
+    ``limits`` are those of its own disturbances: a load that may walk far is not every hypothesis'.
     """
-    sizes, best = parent.sizes, parent.minus_twice_log
+    sizes, best = np.clip(parent.sizes, limits.low, limits.high), parent.minus_twice_log
     plain, now = begun, math.inf
     for _ in range(MOST_ROUGH):
         plain = descended(plain, _whitener(plain, sizes), ROUGH)
-        sizes, now = _disturbances(plain, sizes, parent.limits)
+        sizes, now = _disturbances(plain, sizes, limits)
         if now > best - MUCH * plain.residual.size:
             break
         best = now
-    return Hypothesis(effects, plain, sizes, parent.limits, now, choices_of(effects, hypotheses))
+    return Hypothesis(effects, plain, sizes, limits, now, choices_of(effects, hypotheses))
 
 
 def refitted(hypothesis: Hypothesis, problem: Problem) -> FitResult:

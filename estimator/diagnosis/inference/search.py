@@ -150,7 +150,7 @@ class Search:
             alone = replace(release, own=((),) * len(self.records))
             problem = self._extended(begun, current.effects, alone)
             started = extended(problem, warm_start(problem, begun), plain, anew=name)
-            fits.append(compared(current.effects, started, current, len(self.names)))
+            fits.append(self._compared(current.effects, started, current))
         return fits
 
     def _elsewhere(self, current: Hypothesis, name: str) -> Hypothesis | None:
@@ -231,13 +231,16 @@ class Search:
         for look in looks:
             problem = self._extended(warm, effects, inheriting(name, look.release, warm))
             begun = extended(problem, warm_start(problem, warm), current.plain if is_again else rival.plain)
-            fits.append(compared(effects, begun, rival, len(self.names)))
+            fits.append(self._compared(effects, begun, rival))
         best = min([each for each in fits if self.is_plausible(each)] or fits, key=lambda each: each.score)
         loose = loosened(best, self.model)
         if loose is not None:
-            best = self._more_plausible(best, compared(effects, loose, rival, len(self.names)))
+            best = self._more_plausible(best, self._compared(effects, loose, rival))
         self.rivals[name] = min(best.score, self.rivals.get(name, best.score))
         return best if self.is_plausible(best) else None
+
+    def _compared(self, effects: Effects, begun: FitResult, rival: Hypothesis) -> Hypothesis:
+        return compared(effects, begun, rival, self._limits_of(effects), len(self.names))
 
     def _limits_of(self, effects: Effects) -> Limits:
         return self.limits.freed() if GRADE in effects else self.limits

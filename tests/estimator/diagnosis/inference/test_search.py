@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis.hypotheses import everything, open_hypotheses
+from estimator.diagnosis.inference.disturbances import Size
+from estimator.diagnosis.inference.likelihood import compared, fitted
 from estimator.diagnosis.inference.posterior import free_rms
 from estimator.diagnosis.inference.remainder import tests as examined
 from estimator.diagnosis.inference.search import Search
@@ -127,3 +129,18 @@ def test_a_search_that_is_over_tells_the_best_so_far() -> None:
     search.is_over = lambda: True
     assert search.run() is search.nothing()
     assert search.stopped
+
+
+def test_only_a_load_that_is_a_grade_may_walk_far() -> None:
+    """A set in which something else stands in a grade's place does not keep the grade as a disturbance."""
+    search = searched(bench_with("coulomb_friction_motor", {"friction_nm": 8.0}))
+    nothing = search.nothing()
+    far = nothing.limits.freed()
+    sizes = nothing.sizes.copy()
+    sizes[Size.WALK] = far.high[Size.WALK]
+    graded = replace(nothing, effects=frozenset({"road_grade"}), sizes=sizes, limits=far)
+    most = search.limits.high[Size.WALK]
+    rough = compared(nothing.effects, nothing.plain, graded, search.limits, len(search.names))
+    whole = fitted(nothing.effects, nothing.plain, graded.sizes, search.limits, len(search.names))
+    assert rough.sizes[Size.WALK] <= most
+    assert whole.sizes[Size.WALK] <= most
