@@ -31,7 +31,7 @@ from estimator.diagnosis.inference.remainder import chance
 from estimator.diagnosis.preconditions import prepare
 from estimator.errors import EstimatorError
 from hil.proof.campaign.kinds import parse_seeds
-from hil.proof.compare_engines import NOTHING, shown_case
+from hil.proof.worlds import NOTHING, shown_case
 
 SETS = ("clean", "dirty", "quiet")
 
@@ -215,7 +215,7 @@ def table(worlds: Sequence[World], thresholds: Thresholds) -> str:
 def written(thresholds: Thresholds, command: str) -> str:
     """Return the thresholds as the file that the decision reads."""
     lines = [
-        "# Thresholds of a verdict by likelihood, from simulated worlds (docs/diagnosis-engines.md); written by",
+        "# Thresholds of a verdict by likelihood, from simulated worlds (docs/diagnosis.md); written by",
         f"# {command}",
         f"tempered = {thresholds.divisor:.3g}",
         f"least_probability = {thresholds.least_probability:.4g}",

@@ -1,4 +1,4 @@
-"""The comparison of both engines: its cases, its files, and the table it prints."""
+"""How often a diagnosis of simulated worlds is right: the cases, the files, and the table."""
 
 from __future__ import annotations
 
@@ -8,54 +8,51 @@ from pathlib import Path
 import pytest
 
 from hil.config.model_file import read_model
-from hil.proof.compare_engines import KINDS, NOTHING, STRONG, _stated, case_of, knows, main, table
 from hil.proof.truth.dirty import Known
+from hil.proof.worlds import KINDS, NOTHING, OUTSIDE, STRONG, _stated, case_of, knows, main, table
 
 ROWS = [
-    {"set": "dirty", "seed": 1, "engine": "rules", "strong": "backlash", "named": [], "false": [], "time_s": 3.0},
     {
         "set": "dirty",
         "seed": 1,
-        "engine": "likelihood",
         "strong": "backlash",
         "strong_named": True,
         "named": ["backlash", "tyre_slip"],
         "false": ["tyre_slip"],
+        "probability": {"backlash": 0.99, "tyre_slip": 0.95},
         "time_s": 5.0,
     },
     {
         "set": "dirty",
         "seed": 2,
-        "engine": "likelihood",
         "strong": NOTHING,
         "strong_named": False,
         "named": [],
         "false": [],
+        "probability": {},
         "time_s": 4.0,
     },
 ]
 
 
 def test_the_table_counts_what_was_named_and_what_is_not_there() -> None:
-    likelihood, rules = table(ROWS).splitlines()[2:]
-    assert likelihood == "| dirty | likelihood | 2 | 1 of 1 | 2 | 1 | 1 | 5.0 |"
-    assert rules == "| dirty | rules | 1 | 0 of 1 | 0 | 0 | 1 | 3.0 |"
+    assert table(ROWS).splitlines()[2] == "| dirty | 2 | 1 of 1 | 2 | 1 | 1 | 1 of 2 | 5.0, 5.0 |"
 
 
 def test_what_is_answered_is_not_answered_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "dirty.jsonl").write_text("".join(json.dumps(row) + "\n" for row in ROWS))
-    arguments = ["--set", "dirty", "--seeds", "1..2", "--engines", "likelihood", "--out", str(tmp_path)]
-    assert main(arguments) == 0
+    assert main(["--set", "dirty", "--seeds", "1..2", "--out", str(tmp_path)]) == 0
     assert capsys.readouterr().out == table(ROWS)
 
 
-@pytest.mark.parametrize(("which", "seed"), [("clean", 1), ("clean", 9), ("dirty", 3), ("quiet", 5)])
+@pytest.mark.parametrize(("which", "seed"), [("clean", 1), ("clean", 9), ("dirty", 3), ("quiet", 5), ("outside", 2)])
 def test_a_set_conceals_what_it_says(which: str, seed: int) -> None:
     case, known, strong = case_of(which, seed)
     expected = {"clean": NOTHING if seed % 9 == 0 else KINDS[seed % len(KINDS)], "quiet": NOTHING}
+    expected["outside"] = OUTSIDE[seed % len(OUTSIDE)]
     assert strong == expected.get(which, STRONG[seed % len(STRONG)])
     assert set(known) <= set(case.specimen.sizes)
-    assert bool(known) <= (which != "clean" and knows(seed) is not Known.NONE)
+    assert bool(known) <= (which in ("dirty", "quiet") and knows(seed) is not Known.NONE)
 
 
 @pytest.mark.parametrize("tolerance", [0.0, 0.2])
