@@ -16,6 +16,7 @@ import numpy as np
 
 from estimator.diagnosis.hypotheses import Effects
 from estimator.diagnosis.inference.likelihood import Hypothesis
+from estimator.diagnosis.inference.plausible import GRADE
 from estimator.physics.catalogue import EFFECTS
 
 
@@ -123,6 +124,16 @@ def shares(path: Sequence[Hypothesis]) -> dict[str, float]:
             part = 1.0 / len(among) if new or whole <= 0.0 else found[name] / whole
             found[name] = found.get(name, 0.0) + part * change
     return found
+
+
+def shares_with_grade(best: Hypothesis, visited: Mapping[Effects, Hypothesis], nothing: Hypothesis) -> dict[str, float]:
+    """Return the same of a set in which the load walks far, which follows whatever is slow.
+
+    What another effect has is by how much more is left without it; the rest goes with the grade.
+    """
+    without = {name: visited[best.effects - {name}] for name in best.effects if name != GRADE}
+    found = {name: max(fall(each, best, nothing), 0.0) for name, each in without.items()}
+    return found | {GRADE: max(1.0 - best.free_squares / nothing.free_squares - sum(found.values()), 0.0)}
 
 
 def _same_law(name: str) -> set[str]:

@@ -19,7 +19,8 @@ from estimator.diagnosis.inference.calibration import (
 )
 from estimator.diagnosis.inference.disturbances import Size
 from estimator.diagnosis.inference.likelihood import Hypothesis
-from estimator.diagnosis.inference.posterior import Belief, beliefs, fall, free_rms, levels, shares
+from estimator.diagnosis.inference.plausible import GRADE
+from estimator.diagnosis.inference.posterior import Belief, beliefs, fall, free_rms, levels, shares, shares_with_grade
 from estimator.diagnosis.inference.remainder import Test, tests
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.result import Verdict
@@ -95,7 +96,9 @@ def grounds(search: Search) -> Grounds:
         search.without(best, name)
     examined = tests(best)
     tempered = tempered_by(examined, best.plain.residual.size)
-    found = beliefs(best, search.visited, search.plausible, shares(search.path), tempered, ALIKE_WITHIN, ALIKE_SHARE)
+    graded = GRADE in best.effects
+    share = shares_with_grade(best, search.visited, nothing) if graded else shares(search.path)
+    found = beliefs(best, search.visited, search.plausible, share, tempered, ALIKE_WITHIN, ALIKE_SHARE)
     resolved = tuple(each for each in found if search.is_resolved(best, each.name))
     scores = tuple((effects, each.score) for effects, each in search.plausible.items())
     return Grounds(best, nothing, resolved, examined, scores)

@@ -9,7 +9,7 @@ import pytest
 
 from estimator.diagnosis.inference import remainder
 from estimator.diagnosis.inference.likelihood import Hypothesis
-from estimator.diagnosis.inference.posterior import levels, probability_of, shares
+from estimator.diagnosis.inference.posterior import levels, probability_of, shares, shares_with_grade
 from estimator.diagnosis.inference.verdict import tempered_by
 
 
@@ -48,6 +48,15 @@ def test_a_set_leaves_no_more_than_one_that_it_holds() -> None:
     assert shares(path(("", 100.0), ("lag", 10.0), ("lag brake", 60.0), ("lag brake slip", 40.0))) == pytest.approx(
         {"lag": 0.9, "brake": 0.0, "slip": 0.0}
     )
+
+
+def test_a_grade_has_what_no_other_effect_is_needed_for() -> None:
+    """A brake that was found before the grade leaves hardly more without it: the error goes with the grade."""
+    nothing, best = path(("", 100.0), ("brake lag road_grade", 4.0))
+    without = path(("lag road_grade", 4.1), ("brake road_grade", 34.0), ("brake lag", 30.0))
+    visited = {each.effects: each for each in without}
+    found = shares_with_grade(best, visited, nothing)
+    assert found == pytest.approx({"brake": 0.001, "lag": 0.3, "road_grade": 0.659})
 
 
 def test_without_effects_nothing_is_shared_out() -> None:
