@@ -88,6 +88,7 @@ def _recording(source: Path, encoding: str, delimiter: str) -> Table:
     from hil.errors import UsageError
     from hil.recording import read_table
     from hil.recording.format_hints import FormatHints
+    from hil.recording.request import Request
 
     try:
         hints = FormatHints(encoding=encoding, delimiter=delimiter)
@@ -95,7 +96,7 @@ def _recording(source: Path, encoding: str, delimiter: str) -> Table:
         first = error.errors()[0]
         reason = str(first["msg"]).removeprefix("Value error, ")
         raise UsageError(f"--{first['loc'][0]}: expected {reason}, came {first['input']!r}") from error
-    return read_table(source, hints)
+    return read_table(source, Request(hints))
 
 
 def _trace(source: Path, rig: Path | None, every: bool, channel: str | None) -> Table:

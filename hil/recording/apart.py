@@ -22,6 +22,7 @@ from hil.child import environment, python
 from hil.errors import RecordingError
 from hil.recording.bounds import memory_bytes, processor_s
 from hil.recording.kinds import Column
+from hil.recording.request import Request
 from hil.recording.table import Table
 from hil.recording.table_stream import Document, receive, table_of
 
@@ -40,6 +41,8 @@ ENVIRONMENT: Final = {
     "ARROW_DEFAULT_MEMORY_POOL": "system",
 }
 """Threads and allocators that reserve address space, which is what is bounded, are left out."""
+
+EVERYTHING: Final = Request()
 
 What = Literal["table", "metadata"]
 
@@ -62,7 +65,7 @@ class _Process:
             stderr=subprocess.DEVNULL,
         )
 
-    def ask(self, path: Path, what: What, limit_s: float) -> tuple[Document, dict[str, Column]]:
+    def ask(self, path: Path, what: What, limit_s: float, asked: Request) -> tuple[Document, dict[str, Column]]:
         """Have a file read.
 
         Raises
@@ -73,7 +76,7 @@ class _Process:
         watchdog = threading.Timer(limit_s, self._process.kill)
         watchdog.start()
         try:
-            request = json.dumps({"path": str(path.absolute()), "what": what})
+            request = json.dumps({"path": str(path.absolute()), "what": what, "request": asked.as_document()})
             self._process.stdin.write(f"{request}\n".encode())
             self._process.stdin.flush()
             return receive(self._process.stdout)
@@ -108,7 +111,7 @@ class Reader:
         self._lock = threading.Lock()
         self._process: _Process | None = None
 
-    def table(self, path: Path) -> Table:
+    def table(self, path: Path, request: Request = EVERYTHING) -> Table:
         """Read a recording.
 
         Raises
@@ -116,7 +119,7 @@ class Reader:
         RecordingError
             If it can't be read, also where that ends the process, or takes more than it may.
         """
-        document, columns = self._read(path, "table")
+        document, columns = self._read(path, "table", request)
         return table_of(path, document, columns)
 
     def metadata(self, path: Path) -> Mapping[str, str]:
@@ -127,7 +130,7 @@ class Reader:
         RecordingError
             As `table`.
         """
-        said: Mapping[str, str] = self._read(path, "metadata")[0]["metadata"]
+        said: Mapping[str, str] = self._read(path, "metadata", Request())[0]["metadata"]
         return said
 
     def end(self) -> None:
@@ -135,12 +138,12 @@ class Reader:
         with self._lock:
             self._end()
 
-    def _read(self, path: Path, what: What) -> tuple[Document, dict[str, Column]]:
+    def _read(self, path: Path, what: What, request: Request) -> tuple[Document, dict[str, Column]]:
         size = path.stat().st_size
         with self._lock:
             self._process = process = self._process or _Process()
             try:
-                document, columns = process.ask(path, what, WAITING * processor_s(size))
+                document, columns = process.ask(path, what, WAITING * processor_s(size), request)
             except _Gone:
                 raise RecordingError(path, _why(self._end(at_once=False), size)) from None
             except BaseException:  # Ctrl-C, for one: half an answer is no beginning for the next

@@ -14,7 +14,7 @@ from hil.errors import RecordingError
 from hil.recording import csv_format, hdf5_format, mat_format, mdf_format, parquet_format
 from hil.recording.apart import READER
 from hil.recording.checksum import require_whole
-from hil.recording.format_hints import FormatHints
+from hil.recording.request import Request
 from hil.recording.sidecar import read_sidecar_metadata, sidecar_of
 from hil.recording.table import Table
 
@@ -28,7 +28,7 @@ class Format:
     ``apart`` is True where a compiled library parses it: in a process of its own (`hil.recording.apart`).
     """
 
-    read: Callable[[Path, FormatHints], Table]
+    read: Callable[[Path, Request], Table]
     write: Callable[[Table, Path], None] | None
     metadata: Callable[[Path], Mapping[str, str]] | None = None
     beside: Callable[[Path], Path] | None = None
@@ -38,6 +38,8 @@ class Format:
 FORMATS: Mapping[str, Format] = MappingProxyType(
     {
         ".csv": Format(csv_format.read, csv_format.write, read_sidecar_metadata, sidecar_of, apart=False),
+        ".txt": Format(csv_format.read, None, read_sidecar_metadata, sidecar_of, apart=False),
+        ".tsv": Format(csv_format.read, None, read_sidecar_metadata, sidecar_of, apart=False),
         ".parquet": Format(parquet_format.read, parquet_format.write, parquet_format.read_metadata),
         ".mf4": Format(mdf_format.read, mdf_format.write, mdf_format.read_metadata),
         ".mdf": Format(mdf_format.read, None, mdf_format.read_metadata),
@@ -48,7 +50,7 @@ FORMATS: Mapping[str, Format] = MappingProxyType(
 )
 
 
-def read_table(path: Path | str, hints: FormatHints | None = None) -> Table:
+def read_table(path: Path | str, request: Request | None = None) -> Table:
     """Read a recording of any known format.
 
     Raises
@@ -59,7 +61,8 @@ def read_table(path: Path | str, hints: FormatHints | None = None) -> Table:
     path = Path(path)
     known = _known(path)
     _require_readable(path, known)
-    table = READER.table(path) if known.apart else known.read(path, hints or FormatHints())
+    asked = request or Request()
+    table = READER.table(path, asked) if known.apart else known.read(path, asked)
     require_whole(table)
     return table
 
@@ -80,7 +83,7 @@ def read_metadata(path: Path | str) -> Mapping[str, str]:
 
 def metadata_of(known: Format, path: Path) -> Mapping[str, str]:
     """Read what a recording of a format says of itself, in this process."""
-    return known.read(path, FormatHints()).metadata if known.metadata is None else known.metadata(path)
+    return known.read(path, Request()).metadata if known.metadata is None else known.metadata(path)
 
 
 def writer_for(path: Path, replace: bool = False) -> Callable[[Table, Path], None]:

@@ -13,6 +13,7 @@ from hil.recording.description import described_table, metadata_of
 from hil.recording.kinds import Column, Kind, as_column
 from hil.recording.mdf_file import channels_of, is_unfinished
 from hil.recording.mdf_foreign import foreign_metadata, foreign_table
+from hil.recording.request import Request
 from hil.recording.table import Table
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ DESCRIPTION = "recording.json"
 FINALISED = "its writer never finished it: it was finalised in a copy and read from there, the file stays as it is"
 
 
-def parse(path: Path, mdf: MDF) -> Table:
+def parse(path: Path, mdf: MDF, request: Request) -> Table:
     """Read a file's content.
 
     Raises
@@ -32,7 +33,7 @@ def parse(path: Path, mdf: MDF) -> Table:
         If its description is damaged, or it holds no channel with a time.
     """
     text = _description(mdf)
-    table = foreign_table(path, mdf) if text is None else _own(path, mdf, text)
+    table = foreign_table(path, mdf, request) if text is None else _own(path, mdf, text)
     # The columns become plain arrays of their own, not views into the file.
     columns = {name: column.copy() for name, column in table.columns.items()}
     remarks = (*table.remarks, FINALISED) if is_unfinished(path) else table.remarks

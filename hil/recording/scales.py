@@ -1,0 +1,110 @@
+"""The scale of a column: as it was given, else of its unit; and readings that wrap, put right where that was said.
+
+A unit is used only where no scale is given. One of another quantity than the column's role is refused, for two columns
+are swapped then; so is a share of a rated value, for what that is the file does not say.
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import Final
+
+import numpy as np
+
+from hil.errors import RecordingError
+from hil.recording.table import FloatArray, Table
+from hil.recording.units import Quantity, Unit, unit_of
+
+
+class Role(Enum):
+    """What a column is in a model; the value is the word for people."""
+
+    TIME = "time"
+    TORQUE = "torque"
+    SPEED = "speed"
+    POSITION = "position"
+    FORCE = "force"
+
+
+EXPECTED: Final = {
+    Role.TIME: (Quantity.TIME,),
+    Role.TORQUE: (Quantity.TORQUE, Quantity.FORCE),
+    Role.SPEED: (Quantity.SPEED, Quantity.VELOCITY),
+    Role.POSITION: (Quantity.ANGLE, Quantity.LENGTH),
+    Role.FORCE: (Quantity.FORCE, Quantity.TORQUE),
+}
+"""Quantities that a column of a role may be of."""
+
+WRAPS_BITS: Final = (8, 16, 32)
+"""Lengths of the whole numbers that loggers store."""
+
+FEW: Final = 0.02
+"""Share of a counter's range within which a reading lies about both of its ends, where it is one read without sign."""
+
+
+def scale_of(table: Table, column: str, role: Role, given: float | None) -> float:
+    """Return what a column is multiplied by to be in SI units.
+
+    Raises
+    ------
+    RecordingError
+        If its unit is one of another quantity, or a share of a value that isn't said; with the line to write.
+    """
+    if given is not None:
+        return given
+    text = table.units.get(column, "")
+    unit = unit_of(text) if text else None
+    if unit is None or unit.quantity is Quantity.OTHER:
+        return 1.0
+    if unit.quantity in EXPECTED[role]:
+        return unit.factor
+    raise RecordingError(table.path, _not_of_the_role(column, text, unit, role))
+
+
+def _not_of_the_role(column: str, text: str, unit: Unit, role: Role) -> str:
+    if unit.quantity is Quantity.SHARE:
+        return (
+            f"column {column}: expected a {role.value} in a unit of its own, came one in {text} of a rated value that "
+            f"the file does not say. Give the scale: {role.value} = {{ column = {column!r}, scale = RATED * "
+            f"{unit.factor:g} }} with RATED in SI units, worked out."
+        )
+    return (
+        f"column {column}: expected a {role.value}, came a {unit.quantity.value} in {text}. Are two columns swapped in "
+        "[signals]? Where it is right as it is, give its scale."
+    )
+
+
+def wrapped_at(values: FloatArray) -> float | None:
+    """Return where a reading was stored with sign and read without; None where it was not.
+
+    It jumps by nearly the whole range of a counter, between values near 0 and values near its end, where the next
+    reading of a motion is. A counter has 8, 16 or 32 bit of the least step of the readings.
+
+    Parameters
+    ----------
+    values : ndarray, shape (N,)
+        In the file's own unit; NaN is missing.
+    """
+    seen = values[np.isfinite(values)]
+    if seen.size < 2 or seen.min() < 0.0:
+        return None
+    different = np.unique(seen)
+    if different.size < 3:
+        return None
+    resolution = float(np.diff(different).min())
+    for bits in WRAPS_BITS:
+        end = resolution * 2.0**bits
+        if not 0.75 * end <= seen.max() <= end:
+            continue
+        inside = (seen > 0.25 * end) & (seen < 0.75 * end)
+        folded = with_sign(seen, end)
+        jumps = np.abs(np.diff(seen)) > 0.5 * end
+        if jumps.any() and not inside.any() and not (np.abs(np.diff(folded)) > 0.5 * end).any():
+            return end
+    return None
+
+
+def with_sign(values: FloatArray, wraps_at: float) -> FloatArray:
+    """Return a reading that wraps with the sign it had."""
+    signed: FloatArray = np.where(values >= 0.5 * wraps_at, values - wraps_at, values)
+    return signed
