@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperCommand
 
+from hil.cli.dbc_option import Dbc, tell
 from hil.cli.importing import without_collecting
 from hil.cli.silence import is_silent
 from hil.cli.trust_option import TrustLaws
@@ -54,6 +55,7 @@ def diagnose(
         list[Path] | None,
         typer.Option(HOLDOUT, metavar="REC...", help="Recordings kept back to judge the explanation on."),
     ] = None,
+    dbc: Dbc = None,
     trust_laws: TrustLaws = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print diagnosis.json instead of the summary.")] = False,
 ) -> None:
@@ -76,7 +78,7 @@ def diagnose(
 
     require_folder(out)
     file = read_model_for_recordings(model, trust_laws)
-    records = read_records([*recordings, *(holdout or ())], file.signals, file.on_bench)
+    records = read_records([*recordings, *(holdout or ())], file.signals, file.on_bench, dbc, tell)
     training, kept_back = records[: len(recordings)], records[len(recordings) :]
     with progress_bar() as progress:
         diagnosis = diagnose_records(training, file.model, kept_back, progress)

@@ -22,6 +22,7 @@ from hil.child import environment, python
 from hil.errors import RecordingError
 from hil.recording.bounds import memory_bytes, processor_s
 from hil.recording.kinds import Column
+from hil.recording.look.survey import Survey
 from hil.recording.request import Request
 from hil.recording.table import Table
 from hil.recording.table_stream import Document, receive, table_of
@@ -44,7 +45,7 @@ ENVIRONMENT: Final = {
 
 EVERYTHING: Final = Request()
 
-What = Literal["table", "metadata"]
+What = Literal["table", "metadata", "survey"]
 
 
 class _Gone(Exception):
@@ -132,6 +133,16 @@ class Reader:
         """
         said: Mapping[str, str] = self._read(path, "metadata", Request())[0]["metadata"]
         return said
+
+    def survey(self, path: Path, request: Request) -> Survey:
+        """Read what is in a recording, in figures.
+
+        Raises
+        ------
+        RecordingError
+            As `table`.
+        """
+        return Survey.of_document(self._read(path, "survey", request)[0]["survey"])
 
     def end(self) -> None:
         """End the process, if there is one."""

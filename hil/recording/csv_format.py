@@ -97,8 +97,8 @@ def read(path: Path, request: Request) -> Table:
         tuple(remark for remark in remarks if remark),
         skipped,
         elsewhere={
-            name: f"line {form.header_line}: column {name} comes twice or more, as {name} (1), {name} (2): name the one "
-            "that is meant in [signals]"
+            name: f"line {form.header_line}: column {name} comes twice or more, as {name} (1) and {name} (2): name "
+            "the one that is meant in [signals]"
             for name in form.repeated
         },
     )

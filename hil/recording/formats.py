@@ -25,6 +25,7 @@ class Format:
 
     ``write`` is None for a format that is only read, ``metadata`` for one whose metadata come with the table alone.
     ``beside`` names the file that belongs to a recording in a format that has no place for all there is to say.
+    ``tables`` reads a table for each time of a format that may have several.
     ``apart`` is True where a compiled library parses it: in a process of its own (`hil.recording.apart`).
     """
 
@@ -33,6 +34,7 @@ class Format:
     metadata: Callable[[Path], Mapping[str, str]] | None = None
     beside: Callable[[Path], Path] | None = None
     apart: bool = True
+    tables: Callable[[Path, Request], list[Table]] | None = None
 
 
 FORMATS: Mapping[str, Format] = MappingProxyType(
@@ -41,8 +43,8 @@ FORMATS: Mapping[str, Format] = MappingProxyType(
         ".txt": Format(csv_format.read, None, read_sidecar_metadata, sidecar_of, apart=False),
         ".tsv": Format(csv_format.read, None, read_sidecar_metadata, sidecar_of, apart=False),
         ".parquet": Format(parquet_format.read, parquet_format.write, parquet_format.read_metadata),
-        ".mf4": Format(mdf_format.read, mdf_format.write, mdf_format.read_metadata),
-        ".mdf": Format(mdf_format.read, None, mdf_format.read_metadata),
+        ".mf4": Format(mdf_format.read, mdf_format.write, mdf_format.read_metadata, tables=mdf_format.read_all),
+        ".mdf": Format(mdf_format.read, None, mdf_format.read_metadata, tables=mdf_format.read_all),
         ".h5": Format(hdf5_format.read, hdf5_format.write, hdf5_format.read_metadata),
         ".hdf5": Format(hdf5_format.read, hdf5_format.write, hdf5_format.read_metadata),
         ".mat": Format(mat_format.read, mat_format.write, mat_format.read_metadata),
@@ -59,8 +61,7 @@ def read_table(path: Path | str, request: Request | None = None) -> Table:
         If the file can't be opened, its suffix is unknown, its content is at fault, or not what its checksum says.
     """
     path = Path(path)
-    known = _known(path)
-    _require_readable(path, known)
+    known = format_of(path)
     asked = request or Request()
     table = READER.table(path, asked) if known.apart else known.read(path, asked)
     require_whole(table)
@@ -76,8 +77,7 @@ def read_metadata(path: Path | str) -> Mapping[str, str]:
         As `read_table`, but for the checksum.
     """
     path = Path(path)
-    known = _known(path)
-    _require_readable(path, known)
+    known = format_of(path)
     return READER.metadata(path) if known.apart else metadata_of(known, path)
 
 
@@ -107,10 +107,18 @@ def writer_for(path: Path, replace: bool = False) -> Callable[[Table, Path], Non
     return known.write
 
 
-def _known(path: Path) -> Format:
+def format_of(path: Path) -> Format:
+    """Return the format of a file that is there and can be read.
+
+    Raises
+    ------
+    RecordingError
+        If its suffix is unknown, or it can't be opened.
+    """
     known = FORMATS.get(path.suffix.lower())
     if known is None:
         raise RecordingError(path, f"expected a recording ({', '.join(FORMATS)}), came {path.suffix!r}")
+    _require_readable(path, known)
     return known
 
 

@@ -69,8 +69,8 @@ def foreign_table(path: Path, mdf: MDF, request: Request) -> Table:
     chosen = max(rasters, key=lambda raster: _fits(raster, request))
     table = raster_table(path, mdf, chosen)
     elsewhere = {
-        name: f"column {name}: it is in this file, but {raster.said}, and what was read is {chosen.said}. Bring all to one period: "
-        "[signals] resample_s = 0.01"
+        name: f"column {name}: it is in this file, but {raster.said}, and what was read is {chosen.said}. "
+        "Bring all to one period: [signals] resample_s = 0.01"
         for raster in rasters
         for name in raster.places
         if raster is not chosen
@@ -85,6 +85,19 @@ def foreign_table(path: Path, mdf: MDF, request: Request) -> Table:
         master=table.master,
         elsewhere=elsewhere,
     )
+
+
+def foreign_tables(path: Path, mdf: MDF, request: Request) -> list[Table]:
+    """Read all channels, a table for each time.
+
+    Raises
+    ------
+    RecordingError
+        As `foreign_table`.
+    """
+    mdf = readable(path, mdf, request)
+    rasters, _ = rasters_of(path, mdf)
+    return [raster_table(path, mdf, raster) for raster in rasters]
 
 
 def readable(path: Path, mdf: MDF, request: Request) -> MDF:

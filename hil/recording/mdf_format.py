@@ -24,7 +24,7 @@ from hil.recording.checksum import RIG_TEXT
 from hil.recording.description import description_of
 from hil.recording.kinds import Column, Kind
 from hil.recording.mdf_file import IDENTIFICATION_BYTES, opened, require_mdf
-from hil.recording.mdf_parse import DESCRIPTION, parse, parse_metadata
+from hil.recording.mdf_parse import DESCRIPTION, parse, parse_all, parse_metadata
 from hil.recording.request import Request
 from hil.recording.table import Table
 
@@ -53,6 +53,19 @@ def read(path: Path, request: Request) -> Table:
     _require_mdf(path)
     with opened(path) as mdf:
         return parse(path, mdf, request)
+
+
+def read_all(path: Path, request: Request) -> list[Table]:
+    """Read an MDF recording, a table for each of its times.
+
+    Raises
+    ------
+    RecordingError
+        As `read`.
+    """
+    _require_mdf(path)
+    with opened(path) as mdf:
+        return parse_all(path, mdf, request)
 
 
 def read_metadata(path: Path) -> Mapping[str, str]:

@@ -12,7 +12,7 @@ import numpy as np
 from hil.recording.description import described_table, metadata_of
 from hil.recording.kinds import Column, Kind, as_column
 from hil.recording.mdf_file import channels_of, is_unfinished
-from hil.recording.mdf_foreign import foreign_metadata, foreign_table
+from hil.recording.mdf_foreign import foreign_metadata, foreign_table, foreign_tables
 from hil.recording.request import Request
 from hil.recording.table import Table
 
@@ -38,6 +38,12 @@ def parse(path: Path, mdf: MDF, request: Request) -> Table:
     columns = {name: column.copy() for name, column in table.columns.items()}
     remarks = (*table.remarks, FINALISED) if is_unfinished(path) else table.remarks
     return replace(table, columns=columns, remarks=remarks)
+
+
+def parse_all(path: Path, mdf: MDF, request: Request) -> list[Table]:
+    """Read a file's content, a table for each of its times; see `parse`."""
+    text = _description(mdf)
+    return foreign_tables(path, mdf, request) if text is None else [_own(path, mdf, text)]
 
 
 def parse_metadata(path: Path, mdf: MDF) -> Mapping[str, str]:

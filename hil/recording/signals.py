@@ -96,7 +96,7 @@ def to_record(table: Table, signals: SignalsConfig, tell: Tell | None = None) ->
     for signal in signed:
         numbers[signal.column] = _signed(table, signal, numbers[signal.column])
     if tell is not None:
-        for line in (*table.remarks, *remark, *_units_used(table, signals)):
+        for line in (*table.recognised, *remark, *_units_used(table, signals)):
             tell(f"{table.path}: {line}")
     masks = {mask: _inside(numbers[mask.column], mask) for mask in signals.mask}
     flagged = _flagged(table, signals)

@@ -22,6 +22,9 @@ FloatArray = NDArray[np.float64]
 LARGEST = 1e30
 """Magnitude beyond which a number is no measurement, in whatever unit; its fourth power still is a float."""
 
+LEFT_OUT = ": left out, "
+"""What every remark on a column that was not read has behind the column's name."""
+
 LONGEST_CELL = 40
 """Characters of a wrong cell that a message shows."""
 
@@ -82,6 +85,11 @@ class Table:
     def n_rows(self) -> int:
         """Number of rows, N."""
         return int(next(iter(self.columns.values())).shape[0])
+
+    @property
+    def recognised(self) -> tuple[str, ...]:
+        """The remarks but for those on columns that were left out."""
+        return tuple(remark for remark in self.remarks if LEFT_OUT not in remark)
 
     def place(self, row: int) -> str:
         """Name a row (counted from 0) for people: by line of a text file, else by row number from 1."""

@@ -73,7 +73,11 @@ def test_refused_by_line_and_nothing_is_written(refused: Refused, drive: Path, f
         ("run.parquet", b"time_s,speed_rad_s\n", "a damaged or truncated one"),
         ("run.parquet", b"", "a damaged or truncated one"),
         ("run.mat", b"time_s,speed_rad_s\n", "a damaged or truncated one"),
-        ("run.xlsx", b"PK", "expected a recording (.csv, .txt, .tsv, .parquet, .mf4, .mdf, .h5, .hdf5, .mat), came '.xlsx'"),
+        (
+            "run.xlsx",
+            b"PK",
+            "expected a recording (.csv, .txt, .tsv, .parquet, .mf4, .mdf, .h5, .hdf5, .mat), came '.xlsx'",
+        ),
         ("run", b"", "expected a recording (.csv, .txt, .tsv, .parquet, .mf4, .mdf, .h5, .hdf5, .mat), came ''"),
     ],
 )

@@ -119,7 +119,7 @@ def test_a_name_that_comes_twice_is_numbered_so_that_neither_is_taken_by_chance(
     path = written(tmp_path, text("t,T,T"))
     table = read_table(path)
     assert list(table.columns) == ["t", "T (1)", "T (2)"]
-    with pytest.raises(RecordingError, match=r"line 1: column T comes twice or more, as T \(1\), T \(2\)"):
+    with pytest.raises(RecordingError, match=r"line 1: column T comes twice or more, as T \(1\) and T \(2\)"):
         table.numeric(["T"])
 
 

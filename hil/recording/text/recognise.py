@@ -168,7 +168,9 @@ def _formed(cut: _Cut, lines: Sequence[str], hints: FormatHints, comment: str, s
         first_row_line=first,
         header_line=at,
         units_line=units_at,
-        units=_units(called, next((line.cells for line in _all(cut, lines) if line.number == units_at), [])),
+        units=_units(
+            called, names or called, next((line.cells for line in _all(cut, lines) if line.number == units_at), [])
+        ),
         comment=comment,
         trailing=trailing,
         repeated=tuple(repeated),
@@ -271,7 +273,8 @@ def _numbered(names: list[str]) -> tuple[list[str], list[str]]:
     return called, repeated
 
 
-def _units(names: list[str], cells: list[str]) -> dict[str, str]:
-    """Return the unit of each column: of the line of units, else the one that its name ends in."""
+def _units(names: list[str], written: list[str], cells: list[str]) -> dict[str, str]:
+    """Return the unit of each column: of the line of units, else the one that its name, as written, ends in."""
     listed = {name: cell.strip("[]() ") for name, cell in zip(names, cells, strict=False) if cell.strip("[]() ")}
-    return {name: unit for name in names if (unit := listed.get(name) or unit_in(name))}
+    named = dict(zip(names, map(unit_in, written), strict=False))
+    return {name: unit for name in names if (unit := listed.get(name) or named.get(name, ""))}
