@@ -19,6 +19,18 @@ STRONG = (
 """Words that are set in bold: what they say is in the word, not in its look."""
 
 
+LEAST_WIDTH, LEAST_HEIGHT = 10, 2
+"""A panel that is smaller shows nothing: an axis and its title alone take as much. A terminal passes through any size
+while it is resized."""
+
+
+def drawn(draw: Draw, snapshot: Snapshot, width: int, height: int) -> list[str]:
+    """Return a panel's lines, none of them outside its room, whatever that is."""
+    if width < LEAST_WIDTH or height < LEAST_HEIGHT:
+        return []
+    return [line[:width] for line in draw(snapshot, width, height)][:height]
+
+
 def printable(text: str) -> str:
     """Put a dot in place of each character that would steer a terminal instead of being seen on it."""
     return "".join(letter if letter.isprintable() else "·" for letter in text)
@@ -49,9 +61,9 @@ class Panel(Widget):
     def render(self) -> Text:
         """Draw for the present size."""
         width, height = self.size
-        if self._snapshot is None or width <= 0 or height <= 0:
+        if self._snapshot is None:
             return Text("")
-        lines = map(printable, self._draw(self._snapshot, width, height))
+        lines = map(printable, drawn(self._draw, self._snapshot, width, height))
         text = Text("\n".join(lines), no_wrap=True, end="")  # never markup: names and texts are other people's
         text.highlight_words(STRONG, "bold")
         return text
