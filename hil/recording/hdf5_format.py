@@ -129,7 +129,7 @@ def _foreign(path: Path, file: File, request: Request) -> Table:
             remarks.append(f"{name}: left out, it is no vector of numbers or texts")
 
     file.visititems(take)
-    chosen, others = columns_of_shared_length(under_names(vectors, request.columns), request.columns)
+    chosen, others = columns_of_shared_length(under_names(vectors, request.names), request.names)
     return Table(path, chosen, units, _attributes(file), remarks=(*others, *remarks))
 
 

@@ -144,7 +144,7 @@ def _foreign(path: Path, file: File, request: Request) -> Table:
         opened = with_tables(path)
         for name in objects:
             walk(name, opened.get(name), vectors, {}, [])
-    chosen, remarks = columns_of_shared_length(under_names(vectors, request.columns), request.columns)
+    chosen, remarks = columns_of_shared_length(under_names(vectors, request.names), request.names)
     metadata = _foreign_metadata(file)
     roots = {re.split(r"[.(]", name)[0] for name in vectors}
     other = [

@@ -51,7 +51,7 @@ def read(path: Path, request: Request) -> Table:
         if not name.startswith("__"):
             walk(name, value, vectors, scalars, other)
     require_columns(path, len(vectors))
-    chosen, remarks = columns_of_shared_length(under_names(vectors, request.columns), request.columns)
+    chosen, remarks = columns_of_shared_length(under_names(vectors, request.names), request.names)
     columns = {name: as_column(vector) for name, vector in chosen.items()}
     left = [f"{name}: left out, it is no vector of numbers" for name in other]
     return Table(path, columns, metadata=scalars, remarks=(*remarks, *left))

@@ -20,6 +20,8 @@ class Request:
         Of a text file.
     columns : tuple of str
         Channels that are needed, by the names or addresses they have in the file; empty for those that belong together.
+    time : str, optional
+        The channel of the time, where it is one.
     held : tuple of str
         Those of them whose last value counts until the next; between the others' values lie straight lines.
     resample_s : float, optional
@@ -30,15 +32,22 @@ class Request:
 
     form: FormatHints = field(default_factory=FormatHints)
     columns: tuple[str, ...] = ()
+    time: str | None = None
     held: tuple[str, ...] = ()
     resample_s: float | None = None
     dbc: Path | None = None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All channels that are needed, the time included."""
+        return self.columns if self.time is None else (self.time, *self.columns)
 
     def as_document(self) -> dict[str, Any]:
         """Return it as JSON has it."""
         return {
             "form": self.form.model_dump(),
             "columns": list(self.columns),
+            "time": self.time,
             "held": list(self.held),
             "resample_s": self.resample_s,
             "dbc": None if self.dbc is None else str(self.dbc.absolute()),
@@ -51,6 +60,7 @@ class Request:
         return cls(
             FormatHints.model_validate(document["form"]),
             tuple(document["columns"]),
+            document["time"],
             tuple(document["held"]),
             document["resample_s"],
             None if dbc is None else Path(dbc),

@@ -180,4 +180,5 @@ class SignalsConfig(_Strict):
 
     def request(self, dbc: Path | None = None) -> Request:
         """Return what a reader has to know."""
-        return Request(self.format, tuple(self.columns()), tuple(self.held()), self.resample_s, dbc)
+        columns, held = tuple(self.columns()), tuple(self.held())
+        return Request(self.format, columns, self.time.column, held, self.resample_s, dbc)
