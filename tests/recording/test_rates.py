@@ -44,7 +44,9 @@ def three_rates(tmp_path: Path) -> Path:
         mdf.append([Signal(slow(five) / 1e3, five, name="T_M2", unit="kNm")])
         tone = 20.0 * np.sin(2.0 * np.pi * 90.0 * two)
         mdf.append([Signal(slow(two) + tone, two, name="n_M", unit="rpm")])
-        mdf.append([Signal(np.arange(4), np.arange(4.0), name="gear"), Signal(np.arange(4), np.arange(4.0), name="count")])
+        mdf.append(
+            [Signal(np.arange(4), np.arange(4.0), name="gear"), Signal(np.arange(4), np.arange(4.0), name="count")]
+        )
         mdf.append([Signal(np.arange(3), np.arange(3.0), name="gear")])
         mdf.save(path)
     return path
