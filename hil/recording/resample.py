@@ -122,6 +122,7 @@ def _brought(path: Path, name: str, one: Series, time: FloatArray, period_s: flo
         raise RecordingError(
             path, f"column {name}: expected resample_s of at most {MOST_RATIO} of its periods, came {ratio:.0f}"
         )
+    require_cells(path, time.size * math.ceil(ratio))
     return _thinned(one, time, period_s, math.ceil(ratio)), f"low-pass at {0.5 * EDGE / period_s:.4g} Hz and thinned"
 
 

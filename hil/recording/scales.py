@@ -38,8 +38,8 @@ EXPECTED: Final = {
 WRAPS_BITS: Final = (8, 16, 32)
 """Lengths of the whole numbers that loggers store."""
 
-FEW: Final = 0.02
-"""Share of a counter's range within which a reading lies about both of its ends, where it is one read without sign."""
+ALIKE: Final = 4.0
+"""How much larger a step may be where the reading begins anew, put right, than the largest other step."""
 
 
 def scale_of(table: Table, column: str, role: Role, given: float | None) -> float:
@@ -86,20 +86,19 @@ def wrapped_at(values: FloatArray) -> float | None:
         In the file's own unit; NaN is missing.
     """
     seen = values[np.isfinite(values)]
-    if seen.size < 2 or seen.min() < 0.0:
+    if seen.size < 3 or seen.min() < 0.0:
         return None
-    different = np.unique(seen)
-    if different.size < 3:
+    steps = np.abs(np.diff(seen))
+    jumps = steps > 0.5 * seen.max()
+    if not jumps.any() or jumps.all():
         return None
-    resolution = float(np.diff(different).min())
+    resolution = float(np.diff(np.unique(seen)).min())
+    usual = float(steps[~jumps].max())
     for bits in WRAPS_BITS:
         end = resolution * 2.0**bits
-        if not 0.75 * end <= seen.max() <= end:
-            continue
-        inside = (seen > 0.25 * end) & (seen < 0.75 * end)
-        folded = with_sign(seen, end)
-        jumps = np.abs(np.diff(seen)) > 0.5 * end
-        if jumps.any() and not inside.any() and not (np.abs(np.diff(folded)) > 0.5 * end).any():
+        halfway = (seen > 0.25 * end) & (seen < 0.75 * end)
+        put_right = np.abs(np.diff(with_sign(seen, end)))
+        if 0.75 * end <= seen.max() <= end and not halfway.any() and put_right.max() <= ALIKE * usual:
             return end
     return None
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter
 
 from estimator.signals.time_stamps import uniform_period_s
 from hil.errors import RecordingError
@@ -93,10 +94,12 @@ def straightened(time: FloatArray) -> FloatArray | None:
 
 def _change_of_level(off: FloatArray) -> FloatArray:
     """Return by how much the stamps behind each step are later than those before, in the median; shape (N - 1,)."""
-    padded = np.pad(off, LEVEL_ROWS - 1, mode="edge")
-    medians = np.median(np.lib.stride_tricks.sliding_window_view(padded, LEVEL_ROWS), axis=1)
-    before, behind = medians[: off.size], medians[LEVEL_ROWS - 1 :]
-    change: FloatArray = behind[1 : off.size] - before[: off.size - 1]
+    padded = np.pad(off, LEVEL_ROWS, mode="edge")
+    medians = median_filter(padded, LEVEL_ROWS)
+    middle = LEVEL_ROWS // 2
+    before = medians[LEVEL_ROWS - middle : LEVEL_ROWS - middle + off.size - 1]
+    behind = medians[LEVEL_ROWS + 1 + middle : LEVEL_ROWS + middle + off.size]
+    change: FloatArray = behind - before
     return change
 
 

@@ -12,6 +12,7 @@ from hil.errors import RecordingError
 from hil.recording import SignalsConfig, Table, read_record, read_table
 from hil.recording.format_hints import FormatHints
 from hil.recording.request import Request
+from hil.recording.scales import wrapped_at
 
 ROWS = 60
 TIME = np.arange(ROWS) * 0.01
@@ -229,6 +230,26 @@ def test_a_reading_stored_with_sign_and_read_without_is_told_with_the_line_that_
         {"time": {"column": "t"}, "torque": [{"column": "T", "wraps_at": 6553.6}], "speed": {"column": "n"}}
     )
     np.testing.assert_allclose(read_record(path, signals).torque_nm[:, 0], TORQUE, atol=0.06)
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        np.where(np.arange(60) % 20 == 7, 0.0, 60.0 + 0.001 * (np.arange(60) % 7)),  # lost readings are zero
+        60000.0 + np.arange(60.0),
+        np.abs(np.round(30000.0 * np.sin(np.arange(60) / 9.0))),
+        np.where(np.arange(60) < 30, 0.0, 65535.0),
+    ],
+    ids=["lost", "large", "a magnitude", "two levels"],
+)
+def test_what_only_looks_like_a_wrap_is_left_alone(values: np.ndarray) -> None:
+    assert wrapped_at(values) is None
+
+
+@pytest.mark.parametrize("bits", [8, 16])
+def test_a_wrap_is_found_at_its_number_of_bits(bits: int) -> None:
+    signed = np.round(0.1 * 2.0**bits * np.sin(np.arange(400) / 9.0))
+    assert wrapped_at(np.where(signed < 0, signed + 2.0**bits, signed) * 0.5) == 0.5 * 2.0**bits
 
 
 def stamped(tmp_path: Path, stamps: np.ndarray) -> Path:
