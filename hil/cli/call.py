@@ -15,7 +15,9 @@ QUIET = "--quiet"
 LOG_LEVEL = "--log-level"
 HELP, SHORT_HELP = "--help", "-h"
 
-SPEAKERS = frozenset({"bugreport", "commission", "completion", "effects", "model", "monitor", "rig", "runs", "sim"})
+SPEAKERS = frozenset(
+    {"bugreport", "commission", "completion", "effects", "look", "model", "monitor", "rig", "runs", "sim"}
+)
 """Commands that ask, or whose output is what they are called for: ``--quiet`` does not silence them."""
 
 

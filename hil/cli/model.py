@@ -14,6 +14,8 @@ from hil.cli.dbc_option import Dbc
 if TYPE_CHECKING:
     from hil.config.new_model.values import Ask, Known
 
+USUAL = "two_mass"
+
 Kind = TypeVar("Kind", bound=Enum)
 
 app = typer.Typer(add_completion=False, no_args_is_help=True)
@@ -31,8 +33,9 @@ def model() -> None:
 def new(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="The model file; a new one.")] = Path("model.toml"),
     structure: Annotated[
-        str, typer.Option("--structure", metavar="NAME", help="one_mass, two_mass, three_mass or joint.")
-    ] = "two_mass",
+        str | None,
+        typer.Option("--structure", metavar="NAME", help="one_mass, two_mass, three_mass or joint; else two_mass."),
+    ] = None,
     motion: Annotated[str, typer.Option("--motion", metavar="NAME", help="rotation or translation.")] = "rotation",
     value: Annotated[
         list[str] | None, typer.Option("--value", metavar="NAME=NUMBER", help="A parameter, SI; repeatable.")
@@ -68,16 +71,21 @@ def new(
     from hil.support.new_file import refuse_existing, write_new
 
     refuse_existing(file)
-    shape = _member(Structure, "--structure", structure)
+    may_ask = not yes and sys.stdin.isatty()
+    ask = _asker() if may_ask and not value else None
+    if structure is None and ask is not None:
+        structure = ask(f"structure: {', '.join(each.value for each in Structure)}", USUAL, "").strip()
+    shape = _member(Structure, "--structure", structure or USUAL)
     kind = _member(Motion, "--motion", motion)
     values = assignments("--value", value or (), shape)
     own, usual = _tolerances(tolerance or (), TOLERANCE)
     known = {} if identification is None else _known(identification, run)
     signals = () if recording is None else look(recording, dbc).signals
     complete = set(shape.parameter_names) <= {*values, *known}
-    if not (yes or complete or sys.stdin.isatty()):
+    if not (yes or complete or may_ask):
         raise UsageError("expected someone at a terminal to ask, or --yes with every --value, came neither")
-    ask = None if yes or complete else _asker()
+    if ask is None and may_ask and not complete:
+        ask = _asker()
     found = parameters(shape, kind, values, assignments("--tolerance", own, shape), usual, known, ask)
     built = DrivelineModel(structure=shape, motion=kind, parameters=found)
     write_new(file, model_text(file, built, known, signals, recording))

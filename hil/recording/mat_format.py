@@ -15,7 +15,7 @@ from hil.recording.address import under_names
 from hil.recording.bounds import require_columns
 from hil.recording.damaged import damaged
 from hil.recording.kinds import Column, as_column
-from hil.recording.mat_tables import with_tables
+from hil.recording.mat_tables import with_tables_if_possible
 from hil.recording.mat_walk import walk
 from hil.recording.request import Request
 from hil.recording.shared_length import columns_of_shared_length
@@ -34,7 +34,7 @@ def read(path: Path, request: Request) -> Table:
         If the file is damaged, or holds no numeric vector.
     """
     import scipy.io
-    from scipy.io.matlab import MatlabOpaque, MatReadError
+    from scipy.io.matlab import MatReadError
 
     if is_version_73(path):
         return mat73_format.read(path, request)
@@ -42,8 +42,7 @@ def read(path: Path, request: Request) -> Table:
         variables = scipy.io.loadmat(path, struct_as_record=False)
     except (*DAMAGED, MatReadError) as error:
         raise damaged(path, "a whole .mat file", error) from error
-    if any(isinstance(value, MatlabOpaque) for value in variables.values()):
-        variables = with_tables(path)
+    variables = with_tables_if_possible(path, variables)
     vectors: dict[str, Column] = {}
     scalars: dict[str, str] = {}
     other: list[str] = []

@@ -8,6 +8,7 @@ import numpy as np
 
 from hil.recording.address import vectors_of
 from hil.recording.kinds import Column
+from hil.recording.mat_tables import columns_of, is_table
 
 DEEPEST: Final = 12
 """Structs inside structs that are looked into."""
@@ -27,7 +28,9 @@ def walk(
     vectors, scalars, other
         Vectors and scalars of numbers by their address, and addresses of what is neither: added to.
     """
-    if hasattr(value, "_fieldnames"):
+    if is_table(value):
+        fields = columns_of(value)
+    elif hasattr(value, "_fieldnames"):
         fields = {field: getattr(value, field) for field in value._fieldnames}  # noqa: SLF001 - scipy's way to them
     elif isinstance(value, np.ndarray) and value.dtype.names is not None:
         fields = {field: value[field] for field in value.dtype.names}

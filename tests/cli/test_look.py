@@ -130,10 +130,10 @@ def test_a_new_model_file_reads_the_recording_it_was_made_for(
 
 
 def test_values_are_asked_for_at_a_terminal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    answers = iter(["", "-1", "2.5", "0.4", "0.7", ""])
+    answers = iter(["one_mass", "", "-1", "2.5", "0.4", "0.7", ""])
     monkeypatch.setattr("sys.stdin.isatty", lambda: True)
     monkeypatch.setattr("builtins.input", lambda _: next(answers))
-    assert run(["model", "new", str(tmp_path / "m.toml"), "--structure", "one_mass"]) == 0
+    assert run(["model", "new", str(tmp_path / "m.toml")]) == 0
     parameters = read_model(tmp_path / "m.toml").model.parameters
     assert (parameters["J_M"].value, parameters["J_M"].tolerance) == (2.5, 0.4)
     assert (parameters["b_M"].value, parameters["b_M"].tolerance) == (0.7, 0.2)
