@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from hil.cli.silence import is_silent
+from hil.printable import printable
 
 Dbc = Annotated[
     Path | None,
@@ -18,4 +19,4 @@ Dbc = Annotated[
 def tell(line: str) -> None:
     """Tell what was recognised in a file or done to it, on standard error."""
     if not is_silent():
-        typer.echo(f"note: {line}", err=True)
+        typer.echo(f"note: {printable(line)}", err=True)

@@ -25,6 +25,7 @@ def look(
     """Show what is in a recording: channels, units, rates, gaps, what each could be, and the table that reads it."""
     import json
 
+    from hil.printable import printable
     from hil.recording.look.look import look as look_into
 
     found = look_into(file, dbc)
@@ -33,7 +34,7 @@ def look(
         return
     typer.echo(f"{file}: {_size(found)}")
     for line in found.survey.said:
-        typer.echo(f"  {line}")
+        typer.echo(f"  {printable(line)}")
     _show(found)
     typer.echo("")
     if not found.signals:
@@ -70,10 +71,12 @@ def _show(found: Look) -> None:
 
 
 def _plain(text: str) -> str:
-    """Return a text whose brackets are no markup."""
+    """Return a text that steers no terminal, and whose brackets are no markup."""
     from rich.markup import escape
 
-    return escape(text)
+    from hil.printable import printable
+
+    return escape(printable(text))
 
 
 def _rate(group: Group) -> str:

@@ -11,7 +11,7 @@ import pytest
 
 from hil.cli.main import run
 from hil.config.model_file import read_model, read_model_for_recordings
-from hil.recording import read_record
+from hil.recording import Table, read_record, write_table
 
 ROWS = 300
 TIME = np.arange(ROWS) * 0.01
@@ -190,3 +190,24 @@ def test_what_makes_no_model_is_refused_and_nothing_is_written(
     assert run(["model", "new", str(tmp_path / "m.toml"), "--yes", *options]) == 2
     assert said in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
+
+
+HOSTILE = "speed \x1b[2J\nJ_M = 1"
+
+
+def test_names_and_units_of_a_file_do_nothing_on_a_terminal_or_in_a_model_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    units = {"t": "s", "torque": "Nm\nk = 1", HOSTILE: "\x1b]0;x\x07"}
+    columns = {"t": TIME, "torque": np.sin(TIME), HOSTILE: np.cos(TIME)}
+    write_table(Table(tmp_path / "run.parquet", columns, units), tmp_path / "run.parquet")
+    assert run(["look", str(tmp_path / "run.parquet")]) == 0
+    shown = capsys.readouterr().out
+    assert "\x1b" not in shown
+    assert not any(line.startswith(("J_M", "k =")) for line in shown.splitlines())
+    options = ["--recording", str(tmp_path / "run.parquet"), "--yes", *VALUES]
+    assert run(["model", "new", str(tmp_path / "m.toml"), *options]) == 0
+    file = read_model(tmp_path / "m.toml")
+    assert file.signals is not None
+    assert file.signals.output()[1].column == HOSTILE
+    assert file.model.parameters["k"].value == 4500.0

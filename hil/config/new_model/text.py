@@ -12,6 +12,7 @@ from hil.config.model_file import SCHEMA, ModelDocument
 from hil.config.new_model.values import MEANINGS, Known
 from hil.config.problems import validate
 from hil.errors import ModelFileError
+from hil.printable import printable
 
 COMMENTS_AT = 48
 """Column in which comments begin."""
@@ -28,10 +29,11 @@ def model_text(
         If it does not make one.
     """
     where = "at the motor shaft" if model.motion is Motion.ROTATION else "in the line of travel"
+    source = "REC" if recording is None else printable(recording.name)
     lines = [
         schema_line(FileKind.MODEL),
         f"# A model of a driveline. All values are SI, {where}.",
-        f"#   hil diagnose {'REC' if recording is None else recording.name} --model {file.name} --out report",
+        f"#   hil diagnose {source} --model {printable(file.name)} --out report",
         "",
         f'schema = "{SCHEMA}"',
         _line(f'structure = "{model.structure.value}"', "one_mass, two_mass, three_mass or joint"),
@@ -42,12 +44,12 @@ def model_text(
         "[parameters]",
     ]
     for name, parameter in model.parameters.items():
-        source = known[name].source if name in known and known[name].value == parameter.value else ""
-        comment = f"{MEANINGS[name]}, {parameter_unit(name, model.motion)}{f'; {source}' if source else ''}"
+        by = known[name].source if name in known and known[name].value == parameter.value else ""
+        comment = f"{MEANINGS[name]}, {parameter_unit(name, model.motion)}{f'; {printable(by)}' if by else ''}"
         entry = f"{name} = {{ value = {parameter.value!r}, tolerance = {parameter.tolerance!r} }}"
         lines.append(_line(entry, comment))
     if signals:
-        lines += ["", f"# What is what in a recording, as hil look found it in {recording}: check it.", *signals]
+        lines += ["", f"# What is what in a recording, as hil look found it in {source}: check it.", *signals]
     text = "\n".join([*lines, ""])
     validate(ModelDocument, tomllib.loads(text), file, ModelFileError)
     return text

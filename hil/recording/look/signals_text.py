@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 import tomlkit
 
+from hil.printable import printable
 from hil.recording import columns
 from hil.recording.look.roles import Guess, Roles
 from hil.recording.look.survey import Group, Survey, rounded
@@ -91,6 +92,7 @@ def _units_comment(found: tuple[Guess, ...]) -> str:
     texts = []
     for text in dict.fromkeys(guess.channel.unit for guess in found):
         unit = unit_of(text) if text else None
+        text = printable(text)
         if unit is None:
             texts.append(f"in {text}, unknown: give scale" if text else "no unit: SI, or give scale")
         elif unit.quantity is Quantity.SHARE:
