@@ -61,7 +61,8 @@ def _show(found: Look) -> None:
     for group in found.survey.groups:
         table = Table(title=_rate(group), title_justify="left", box=None, pad_edge=False)
         for heading in ("channel", "unit", "samples", "missing", "low", "high", "could be"):
-            table.add_column(heading, justify="right" if heading in ("samples", "missing", "low", "high") else "left")
+            is_number = heading in ("samples", "missing", "low", "high")
+            table.add_column(heading, justify="right" if is_number else "left", overflow="fold")
         for channel in group.channels:
             could = "time" if channel.name == group.time else ", ".join(g.role.value for g in guesses(channel))
             low, high = ("" if value is None else f"{value:.6g}" for value in (channel.low, channel.high))

@@ -65,7 +65,7 @@ def read(path: Path, request: Request) -> Table:
     """
     hints, said = request.form, read_sidecar(path)
     text, encoding = decoded(path, path.read_bytes(), hints.encoding)
-    if not text.strip():
+    if not text or text.isspace():
         return Table(path, {})  # refuses: nothing in it
     form = replace(form_of(text, hints.model_copy(update=OWN) if said.found else hints), encoding=encoding)
     _require_names(path, form)

@@ -45,6 +45,7 @@ FORMATS: Mapping[str, Format] = MappingProxyType(
         ".parquet": Format(parquet_format.read, parquet_format.write, parquet_format.read_metadata),
         ".mf4": Format(mdf_format.read, mdf_format.write, mdf_format.read_metadata, tables=mdf_format.read_all),
         ".mdf": Format(mdf_format.read, None, mdf_format.read_metadata, tables=mdf_format.read_all),
+        ".dat": Format(mdf_format.read, None, mdf_format.read_metadata, tables=mdf_format.read_all),
         ".h5": Format(hdf5_format.read, hdf5_format.write, hdf5_format.read_metadata),
         ".hdf5": Format(hdf5_format.read, hdf5_format.write, hdf5_format.read_metadata),
         ".mat": Format(mat_format.read, mat_format.write, mat_format.read_metadata),

@@ -14,12 +14,13 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-from scipy.signal import fftconvolve, firwin
 
-from estimator.signals.decimate import EDGE, HALF_LENGTH
 from hil.errors import RecordingError
 from hil.recording.bounds import require_cells
 from hil.recording.table import FloatArray
+
+EDGE, HALF_LENGTH = 1.0, 8
+"""Of the low-pass: in new Nyquist frequencies, and in new periods; as in `estimator.signals.decimate`."""
 
 GAP: Final = 2.5
 """Distance of two samples, in the channel's own period, beyond which those between are missing: jitter is less."""
@@ -137,6 +138,8 @@ def _linear(one: Series, time: FloatArray, period_s: float) -> FloatArray:
 
 def _thinned(one: Series, time: FloatArray, period_s: float, factor: int) -> FloatArray:
     """Return every so-manieth value of the low-passed channel; what is missing has no weight in the low-pass."""
+    from scipy.signal import fftconvolve, firwin  # half a second that few recordings need
+
     reach = HALF_LENGTH * factor
     fine = time[0] + period_s / factor * np.arange(-reach, (time.size - 1) * factor + reach + 1)
     values = _linear(one, fine, one.period_s)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter
 
 from estimator.signals.time_stamps import uniform_period_s
 from hil.errors import RecordingError
@@ -94,6 +93,8 @@ def straightened(time: FloatArray) -> FloatArray | None:
 
 def _change_of_level(off: FloatArray) -> FloatArray:
     """Return by how much the stamps behind each step are later than those before, in the median; shape (N - 1,)."""
+    from scipy.ndimage import median_filter  # which few recordings need
+
     padded = np.pad(off, LEVEL_ROWS, mode="edge")
     medians = median_filter(padded, LEVEL_ROWS)
     middle = LEVEL_ROWS // 2

@@ -76,9 +76,9 @@ def test_refused_by_line_and_nothing_is_written(refused: Refused, drive: Path, f
         (
             "run.xlsx",
             b"PK",
-            "expected a recording (.csv, .txt, .tsv, .parquet, .mf4, .mdf, .h5, .hdf5, .mat), came '.xlsx'",
+            "expected a recording (.csv, .txt, .tsv, .parquet, .mf4, .mdf, .dat, .h5, .hdf5, .mat), came '.xlsx'",
         ),
-        ("run", b"", "expected a recording (.csv, .txt, .tsv, .parquet, .mf4, .mdf, .h5, .hdf5, .mat), came ''"),
+        ("run", b"", "expected a recording (.csv, .txt, .tsv, .parquet, .mf4, .mdf, .dat, .h5, .hdf5, .mat), came ''"),
     ],
 )
 def test_what_is_no_recording_is_refused(

@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 from asammdf import MDF, Signal
 
+from estimator.signals import decimate
 from hil.errors import RecordingError
-from hil.recording import SignalsConfig, read_record, read_table
+from hil.recording import SignalsConfig, read_record, read_table, resample
 from hil.recording.look.look import look
 from hil.recording.request import Request
 from hil.recording.resample import Series, resampled
@@ -229,3 +230,19 @@ def test_a_file_of_signals_takes_no_dbc(three_rates: Path, tmp_path: Path) -> No
     (tmp_path / "bus.dbc").write_text(DBC, encoding="ascii")
     with pytest.raises(RecordingError, match="Leave --dbc out"):
         read_table(three_rates, Request(dbc=tmp_path / "bus.dbc"))
+
+
+def test_the_low_pass_is_that_of_the_on_line_chain() -> None:
+    assert (resample.EDGE, resample.HALF_LENGTH) == (decimate.EDGE, decimate.HALF_LENGTH)
+
+
+def test_mdf_3_under_the_name_that_inca_gives_it(tmp_path: Path) -> None:
+    time = np.arange(0.0, LONG_S, 0.01)
+    with MDF(version="3.30") as mdf:
+        mdf.append([Signal(slow(time), time, name=name, unit="Nm") for name in ("T_M1", "T_M2")])
+        mdf.append([Signal(slow(time), time + 0.001, name="n_M", unit="rpm")])
+        mdf.save(tmp_path / "drive.mdf")
+    (tmp_path / "drive.mdf").rename(tmp_path / "drive.dat")
+    record = read_record(tmp_path / "drive.dat", signals(resample_s=0.01))
+    np.testing.assert_allclose(record.torque_nm[:, 0], slow(record.time_s), atol=0.1)
+    assert look(tmp_path / "drive.dat").signals[-1] == "resample_s = 0.01   # channels have times of their own"
