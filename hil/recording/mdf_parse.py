@@ -53,6 +53,8 @@ def parse_metadata(path: Path, mdf: MDF) -> Mapping[str, str]:
 
 
 def _description(mdf: MDF) -> str | None:
+    if mdf.version < "4":  # MDF 3 has none
+        return None
     for number, attachment in enumerate(getattr(mdf, "attachments", [])):
         if str(attachment.file_name) == DESCRIPTION:
             content: Any = mdf.extract_attachment(number)[0]
