@@ -21,7 +21,8 @@ def convert(
     source: Path = typer.Argument(
         ...,
         metavar="IN",
-        help="Recording (.csv, .txt, .tsv, .parquet, .mf4, .mdf, .dat, .h5, .mat) or bus trace (.log, .blf, .asc, .trc).",
+        help="Recording (.csv, .txt, .tsv, .parquet, .mf4, .mdf, .dat, .h5, .mat) or bus trace (.log, .blf, .asc, "
+        ".trc).",
     ),
     target: Path = typer.Argument(..., metavar="OUT", help="Recording to write: .csv, .parquet, .mf4, .h5 or .mat."),
     rig: Path | None = typer.Option(None, "--rig", metavar="RIG", help="Rig file of the run; a bus trace needs it."),

@@ -41,9 +41,6 @@ SPECIAL = ",;\t|"
 OWN: Final[Mapping[str, object]] = {"delimiter": ",", "decimal": ".", "header_line": 1, "units_line": 0}
 """Form of a recording that is described beside: as it is written here, nothing is recognised."""
 
-SAMPLE_BYTES = 1 << 20
-"""Of the beginning, enough for lines of thousands of columns."""
-
 BLOCK_BYTES = 1 << 22
 """pyarrow parses this much at once; also the longest line it can take."""
 
@@ -106,12 +103,10 @@ def read(path: Path, request: Request) -> Table:
 
 def form_of(text: str, hints: FormatHints) -> TextForm:
     """Return the form of a text, by its first lines."""
-    end = -1
-    for _ in range(SAMPLE_LINES):
-        end = text.find("\n", end + 1)
-        if end < 0 or end > SAMPLE_BYTES:
-            break
-    return recognise((text if end < 0 else text[:end]).split("\n"), hints)
+    lines = text[:BLOCK_BYTES].split("\n", SAMPLE_LINES)[:SAMPLE_LINES]
+    if len(text) > BLOCK_BYTES and 1 < len(lines) < SAMPLE_LINES:
+        lines.pop()  # cut in the middle
+    return recognise(lines, hints)
 
 
 def write(table: Table, path: Path) -> None:
@@ -132,7 +127,7 @@ def write(table: Table, path: Path) -> None:
 def _is_recognised(path: Path, table: Table) -> bool:
     """Whether the form of a file that was written here is recognised without a word beside it."""
     with path.open(encoding="utf-8", newline="\n") as file:
-        text = file.read(SAMPLE_BYTES)
+        text = file.read(BLOCK_BYTES)
     form = form_of(text.rstrip("\n"), FormatHints())
     plain = TextForm(tuple(table.columns))
     return form == plain

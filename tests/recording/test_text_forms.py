@@ -13,6 +13,7 @@ from hil.recording import SignalsConfig, Table, read_record, read_table
 from hil.recording.format_hints import FormatHints
 from hil.recording.request import Request
 from hil.recording.scales import wrapped_at
+from hil.recording.text.cells import CellKind, kind_of
 
 ROWS = 60
 TIME = np.arange(ROWS) * 0.01
@@ -293,3 +294,20 @@ def test_a_table_is_as_it_was_where_nothing_was_recognised(tmp_path: Path) -> No
     table = read_table(written(tmp_path, text("t,T,n")))
     assert isinstance(table, Table)
     assert (table.remarks, table.first_line, dict(table.units)) == ((), 2, {})
+
+
+@pytest.mark.parametrize("line", ["1," * 3_000_000, "," * 3_000_000, "a;" * 3_000_000 + "\n1\n"])
+def test_a_line_of_millions_of_cells_is_refused_before_they_are_looked_at(
+    tmp_path: Path, line: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    looked_at = 0
+
+    def counted(cell: str, decimal: str = ".") -> CellKind:
+        nonlocal looked_at
+        looked_at += 1
+        return kind_of(cell, decimal)
+
+    monkeypatch.setattr("hil.recording.text.recognise.kind_of", counted)
+    with pytest.raises(RecordingError, match="expected"):
+        read_table(written(tmp_path, line))
+    assert looked_at < 200_000

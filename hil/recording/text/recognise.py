@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
+from hil.recording.bounds import COLUMNS
 from hil.recording.format_hints import FormatHints
 from hil.recording.text.cells import CellKind, kind_of
 from hil.recording.text.form import BLANKS, COMMA, TAB, TextForm
@@ -21,6 +22,9 @@ from hil.recording.units import unit_in, unit_of
 
 SAMPLE_LINES: Final = 200
 """Lines that are looked at: more than any header has, and enough rows to tell what a column holds."""
+
+MOST_CELLS: Final = 100_000
+"""Cells that are looked at: of a hundred columns those of all lines."""
 
 DELIMITERS: Final = (COMMA, ";", TAB, "|", BLANKS)
 DECIMALS: Final = (".", ",")
@@ -135,11 +139,15 @@ def _comment_of(lines: Sequence[str]) -> str:
 
 
 def _cut(lines: Sequence[str], skipped: int, comment: str, delimiter: str, decimal: str) -> _Cut:
-    found = []
+    found: list[_Line] = []
+    looked_at = 0
     for number, line in enumerate(lines[skipped:], start=skipped + 1):
         if not line.strip() or (comment and line.lstrip().startswith(comment)):
             continue
-        cells = [cell.strip() for cell in split(line, delimiter)]
+        cells = [cell.strip() for cell in split(line, delimiter)[: COLUMNS + 1]]
+        looked_at += len(cells)
+        if looked_at > MOST_CELLS and found:
+            break
         found.append(_Line(number, cells, [kind_of(cell, decimal) for cell in cells]))
     return _Cut(delimiter, decimal, found)
 
