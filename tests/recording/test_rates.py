@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import importlib
 import struct
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import can
+import can.io.mf4
 import numpy as np
 import pytest
 from asammdf import MDF, Signal
@@ -172,13 +174,18 @@ BA_ "VFrameFormat" BO_ 2566848766 3;
 FROM_NODE_3 = 0x18FF0003
 
 
+def bus_writer(path: Path) -> Any:
+    """Open python-can's writer; its module takes asammdf, which imports it, for missing where that came first."""
+    return importlib.reload(can.io.mf4).MF4Writer(str(path))
+
+
 @pytest.fixture(params=["CAN", "J1939"])
 def bus_log(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[Path, Path]:
     """Frames of a bus as python-can's MDF writer logs them, and the DBC file of that bus."""
     extended = request.param == "J1939"
     path, dbc = tmp_path / "bus.mf4", tmp_path / "bus.dbc"
     dbc.write_text(J1939 if extended else DBC, encoding="ascii")
-    with can.MF4Writer(str(path)) as writer:
+    with bus_writer(path) as writer:
         for k in range(60):
             data = struct.pack("<hhi", 10 * k, -5 * k, 100 * k)
             frame_id = FROM_NODE_3 if extended else 385
@@ -216,7 +223,7 @@ def test_a_logged_bus_is_decoded_by_its_dbc(bus_log: tuple[Path, Path]) -> None:
 )
 def test_a_dbc_that_does_not_fit_is_refused(tmp_path: Path, name: str, content: str | None, said: str) -> None:
     path = tmp_path / "bus.mf4"
-    with can.MF4Writer(str(path)) as writer:
+    with bus_writer(path) as writer:
         for k in range(20):
             frame = can.Message(timestamp=1.77e9 + 0.01 * k, arbitration_id=385, is_extended_id=False, data=bytes(8))
             writer.on_message_received(frame)
