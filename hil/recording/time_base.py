@@ -31,6 +31,9 @@ LEVEL_ROWS = 11
 FEWEST_ROWS = 4 * LEVEL_ROWS
 """Fewer rows are not looked at for jitter."""
 
+COARSER = 1.2
+"""Ratio of the least step to the period from which on stamps are rounded: below, one that is repeated is a fault."""
+
 ROUND = 0.01
 """Share of the least step within which all steps are multiples of it, where stamps are rounded."""
 
@@ -84,7 +87,7 @@ def straightened(time: FloatArray) -> FloatArray | None:
     off = time - line
     resolution = float(steps[steps > 0.0].min(initial=np.inf))
     is_rounded = bool((np.abs(np.round(steps / resolution) * resolution - steps) < ROUND * resolution).all())
-    if is_rounded and resolution >= period and float(np.ptp(off)) <= 2.0 * resolution:
+    if is_rounded and resolution >= COARSER * period and float(np.ptp(off)) <= 2.0 * resolution:
         return line
     if resolution == 0.0 or (steps == 0.0).any() or float(np.ptp(off)) > 2.0 * period:
         return None

@@ -273,6 +273,14 @@ def test_stamps_that_jitter_by_most_of_a_period_are_rows_of_one_period(tmp_path:
 
 
 @pytest.mark.parametrize("row", [1, 5, 30, 50, 58])
+def test_a_stamp_that_is_repeated_is_no_rounding(tmp_path: Path, row: int) -> None:
+    stamps = TIME.copy()
+    stamps[row] = stamps[row - 1]
+    with pytest.raises(RecordingError, match=f"line {row + 2}, column t: expected a time greater than in the row bef"):
+        read_record(stamped(tmp_path, stamps), SIGNALS)
+
+
+@pytest.mark.parametrize("row", [1, 5, 30, 50, 58])
 def test_a_row_left_out_is_no_jitter(tmp_path: Path, row: int) -> None:
     path = stamped(tmp_path, np.arange(ROWS) * 0.01 + (np.arange(ROWS) >= row) * 0.01)
     with pytest.raises(RecordingError, match=f"line {row + 2}, column t: expected a uniform step"):
