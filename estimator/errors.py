@@ -14,6 +14,8 @@ Inside a sample loop nothing raises: there a status says what is wrong with the 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 
 class EstimatorError(Exception):
     """Base of every error of this package; never raised itself."""
@@ -49,9 +51,44 @@ class NotExciting(EstimatorError):
         self.names = names
 
 
+@dataclass(frozen=True, slots=True)
+class Cure:
+    """What would make a recording and a model agree: factors for its readings, or two channels that are swapped.
+
+    Attributes
+    ----------
+    recording : str
+        Name of the recording.
+    torque : float
+        For the torques.
+    inputs : tuple of int
+        The torque inputs it is for, from 0; empty for all.
+    output, time : float
+        For the measured output, and for the time.
+    swapped : int or None
+        The torque input that is swapped with the output.
+    """
+
+    recording: str
+    torque: float = 1.0
+    inputs: tuple[int, ...] = ()
+    output: float = 1.0
+    time: float = 1.0
+    swapped: int | None = None
+
+
 class Implausible(EstimatorError, ValueError):
     """Recordings and model contradict each other as only a wrong unit, scale or sign makes them.
 
     Examples: a speed in rpm where rad/s are expected, a torque of the wrong sign. To do: correct the scale in
     ``[signals]``, or the model.
+
+    Attributes
+    ----------
+    cure : Cure or None
+        What to correct, where that is known.
     """
+
+    def __init__(self, message: str, cure: Cure | None = None) -> None:
+        super().__init__(message)
+        self.cure = cure

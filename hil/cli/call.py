@@ -13,8 +13,11 @@ from hil.errors import UsageError
 
 QUIET = "--quiet"
 LOG_LEVEL = "--log-level"
+HELP, SHORT_HELP = "--help", "-h"
 
-SPEAKERS = frozenset({"bugreport", "commission", "completion", "effects", "model", "monitor", "rig", "runs", "sim"})
+SPEAKERS = frozenset(
+    {"bugreport", "commission", "completion", "effects", "look", "model", "monitor", "rig", "runs", "sim"}
+)
 """Commands that ask, or whose output is what they are called for: ``--quiet`` does not silence them."""
 
 
@@ -51,8 +54,8 @@ class Call:
         own, quiet, level = _common(line)
         if not own:
             return cls("", (), quiet, level)
-        first = own[0]
-        if first not in commands and first not in ("--help", "--version"):
+        first = HELP if own[0] == SHORT_HELP else own[0]
+        if first not in commands and first not in (HELP, "--version"):
             raise UsageError(_unknown(first, commands))
         return cls(first, tuple(own[1:]), quiet, level)
 

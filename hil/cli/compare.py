@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from hil.cli.dbc_option import Dbc, tell
 from hil.cli.trust_option import TrustLaws
 
 app = typer.Typer(add_completion=False)
@@ -17,6 +18,7 @@ def compare(
     model: Annotated[Path, typer.Argument(metavar="MODEL", help="Model file, nominal or augmented.")],
     recordings: Annotated[list[Path], typer.Argument(metavar="REC", help="Recordings to compare with.")],
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Folder for compare.html and compare.json.")] = None,
+    dbc: Dbc = None,
     trust_laws: TrustLaws = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the figures as JSON.")] = False,
 ) -> None:
@@ -36,7 +38,7 @@ def compare(
     if out is not None:
         require_folder(out)
     file = read_model_for_recordings(model, trust_laws)
-    records = read_records(recordings, file.signals, file.on_bench)
+    records = read_records(recordings, file.signals, file.on_bench, dbc, tell)
     comparisons = [compare_record(file.model, record) for record in records]
     text = comparison_text(comparisons)
     if out is not None:

@@ -21,7 +21,8 @@ def convert(
     source: Path = typer.Argument(
         ...,
         metavar="IN",
-        help="Recording (.csv, .parquet, .mf4, .mdf, .h5, .mat) or bus trace (.log, .blf, .asc, .trc).",
+        help="Recording (.csv, .txt, .tsv, .parquet, .mf4, .mdf, .dat, .h5, .mat) or bus trace (.log, .blf, .asc, "
+        ".trc).",
     ),
     target: Path = typer.Argument(..., metavar="OUT", help="Recording to write: .csv, .parquet, .mf4, .h5 or .mat."),
     rig: Path | None = typer.Option(None, "--rig", metavar="RIG", help="Rig file of the run; a bus trace needs it."),
@@ -88,6 +89,7 @@ def _recording(source: Path, encoding: str, delimiter: str) -> Table:
     from hil.errors import UsageError
     from hil.recording import read_table
     from hil.recording.format_hints import FormatHints
+    from hil.recording.request import Request
 
     try:
         hints = FormatHints(encoding=encoding, delimiter=delimiter)
@@ -95,7 +97,7 @@ def _recording(source: Path, encoding: str, delimiter: str) -> Table:
         first = error.errors()[0]
         reason = str(first["msg"]).removeprefix("Value error, ")
         raise UsageError(f"--{first['loc'][0]}: expected {reason}, came {first['input']!r}") from error
-    return read_table(source, hints)
+    return read_table(source, Request(hints))
 
 
 def _trace(source: Path, rig: Path | None, every: bool, channel: str | None) -> Table:

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperCommand
 
+from hil.cli.dbc_option import Dbc, tell
 from hil.cli.importing import without_collecting
 from hil.cli.silence import is_silent
 from hil.cli.trust_option import TrustLaws
@@ -63,6 +64,7 @@ def diagnose(
             help="Time after which the best so far is the answer [s]; 30 by default.",
         ),
     ] = None,
+    dbc: Dbc = None,
     trust_laws: TrustLaws = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print diagnosis.json instead of the summary.")] = False,
 ) -> None:
@@ -76,6 +78,7 @@ def diagnose(
         from estimator.diagnosis.diagnose import diagnose as diagnose_records
         from hil.config.model_file import read_model_for_recordings, write_model
         from hil.recording import read_records
+        from hil.recording.cure import with_the_line_to_write
         from hil.report.diagnosis_html import diagnosis_page
         from hil.report.diagnosis_json import diagnosis_text
         from hil.report.diagnosis_text import diagnosis_summary
@@ -85,9 +88,10 @@ def diagnose(
 
     require_folder(out)
     file = read_model_for_recordings(model, trust_laws)
-    records = read_records([*recordings, *(holdout or ())], file.signals, file.on_bench)
+    every = [*recordings, *(holdout or ())]
+    records = read_records(every, file.signals, file.on_bench, dbc, tell)
     training, kept_back = records[: len(recordings)], records[len(recordings) :]
-    with progress_bar() as progress:
+    with with_the_line_to_write(every, file.signals, dbc), progress_bar() as progress:
         diagnosis = diagnose_records(training, file.model, kept_back, progress, budget_s)
     text = diagnosis_text(diagnosis)
     try:
@@ -105,7 +109,7 @@ def diagnose(
         else:
             Console().print(diagnosis_summary(diagnosis))
     results = {DIAGNOSIS: out / "diagnosis.json", MODEL: out / "augmented.toml"}
-    for complaint in attach_to_runs([*recordings, *(holdout or ())], results):
+    for complaint in attach_to_runs(every, results):
         typer.echo(complaint, err=True)
     if not as_json:
         typer.echo(f"report: {out / 'report.html'}")

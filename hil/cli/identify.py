@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from hil.cli.dbc_option import Dbc, tell
 from hil.cli.trust_option import TrustLaws
 
 if TYPE_CHECKING:
@@ -50,6 +51,7 @@ def identify(
     estimator: list[str] = typer.Option(
         [], "--estimator", metavar="NAME", help="Another recursive estimator to compare on the same data; repeatable."
     ),
+    dbc: Dbc = None,
     trust_laws: TrustLaws = False,
     as_json: bool = typer.Option(False, "--json", help="Print identification.json instead of the table."),
 ) -> None:
@@ -80,7 +82,7 @@ def identify(
         raise ModelFileError(
             model, "structure | expected a driveline, which torque moves | came 'joint': diagnose or simulate it"
         )
-    records = read_records(recordings, None if file is None else file.signals)
+    records = read_records(recordings, None if file is None else file.signals, dbc=dbc, tell=tell)
     settings, choice = chosen_orders(settings, order, delay, records)
     expected = None if file is None else file.model
     start = start_values(estimator, expected)

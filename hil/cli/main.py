@@ -39,6 +39,7 @@ COMMANDS: dict[str, str] = {
     "run": "Run one experiment and record it.",
     "monitor": "Watch a rig live; start, mark and stop experiments.",
     "replay": "Play a recording or a bus trace through the on-line estimate.",
+    "look": "What is in a recording, and the table that reads it.",
     "convert": "Between the recording formats, and from bus traces.",
     "runs": "The runs of a folder: list, show, compare, note, delete, export.",
     "identify": "Identify the driveline from recordings.",
@@ -48,12 +49,16 @@ COMMANDS: dict[str, str] = {
     "compare": "Simulation against recording, in figures and plots.",
     "effects": "The catalogue of effects.",
     "rig": "Write a new rig file from a few answers; its schema for editors.",
-    "model": "The schema of model files, for editors.",
+    "model": "Write a new model file; the schema of model files for editors.",
     "completion": "Print the completion script of a shell.",
     "bugreport": "Pack what a supporter needs, without secrets.",
     "export": "Write the on-line estimator for the PLC: Structured Text or PLCopen XML.",
 }
 """Each command's line in ``hil --help``; the command itself is ``app`` in ``hil.cli.<name>``."""
+
+
+HELP_OPTIONS = ["--help", "-h"]
+"""What asks for help, of every command and of those below it."""
 
 
 def exit_status(error: BaseException) -> ExitStatus | None:
@@ -112,7 +117,8 @@ def _called(call: Call) -> int:
 
     app = importlib.import_module(f"hil.cli.{call.command}").app
     flow(app)
-    result = app(list(call.arguments), prog_name=f"hil {call.command}", standalone_mode=False)
+    name = f"hil {call.command}"
+    result = app(list(call.arguments), prog_name=name, standalone_mode=False, help_option_names=HELP_OPTIONS)
     if result == ExitStatus.INTERRUPTED:  # what typer makes of Ctrl-C
         raise KeyboardInterrupt
     return result if isinstance(result, int) else ExitStatus.DONE

@@ -2,17 +2,152 @@
 
 from __future__ import annotations
 
+import sys
+from enum import Enum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import typer
+
+from hil.cli.dbc_option import Dbc
+
+if TYPE_CHECKING:
+    from hil.config.new_model.values import Ask, Known
+
+USUAL = "two_mass"
+
+Kind = TypeVar("Kind", bound=Enum)
 
 app = typer.Typer(add_completion=False, no_args_is_help=True)
 
 
-@app.callback(epilog="Example: hil model schema --out model.schema.json")
+@app.callback(epilog="Example: hil model new bus.toml --recording drive.mf4")
 def model() -> None:
-    """Help to write a model file."""
+    """Write a new model file, or the schema of model files for an editor."""
+
+
+@app.command(
+    epilog="Example: hil model new bus.toml. In a script: hil model new bus.toml --yes --recording drive.mf4 --value "
+    "J_M=1.6 --value J_L=95 --value k=4200 --value c=9 --value b_M=0.35 --value b_L=0.9 --tolerance k=0.3"
+)
+def new(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="The model file; a new one.")] = Path("model.toml"),
+    structure: Annotated[
+        str | None,
+        typer.Option("--structure", metavar="NAME", help="one_mass, two_mass, three_mass or joint; else two_mass."),
+    ] = None,
+    motion: Annotated[str, typer.Option("--motion", metavar="NAME", help="rotation or translation.")] = "rotation",
+    value: Annotated[
+        list[str] | None, typer.Option("--value", metavar="NAME=NUMBER", help="A parameter, SI; repeatable.")
+    ] = None,
+    tolerance: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--tolerance", metavar="[NAME=]NUMBER", help="Relative tolerance, of one parameter or of all; repeatable."
+        ),
+    ] = None,
+    identification: Annotated[
+        Path | None,
+        typer.Option("--from", metavar="FILE", help="identification.json of hil identify: values and tolerances."),
+    ] = None,
+    run: Annotated[
+        str | None, typer.Option("--run", metavar="NAME", help="Recording of --from; else the surest of all.")
+    ] = None,
+    recording: Annotated[
+        Path | None, typer.Option("--recording", metavar="REC", help="Look into it, and write its \\[signals].")
+    ] = None,
+    dbc: Dbc = None,
+    yes: Annotated[bool, typer.Option("--yes", help="Ask nothing: what is missing is refused.")] = False,
+) -> None:
+    """Ask for structure, values and tolerances, and write a model file with a comment on every line.
+
+    Asks for what is not given as an option or by an identification; never writes over a file that is there.
+    """
+    from estimator.physics.model import DrivelineModel, Motion, Structure
+    from hil.config.new_model.text import model_text
+    from hil.config.new_model.values import TOLERANCE, assignments, parameters
+    from hil.errors import UsageError
+    from hil.recording.look.look import look
+    from hil.support.new_file import refuse_existing, write_new
+
+    refuse_existing(file)
+    may_ask = not yes and sys.stdin.isatty()
+    ask = _asker() if may_ask and not value else None
+    if structure is None and ask is not None:
+        structure = ask(f"structure: {', '.join(each.value for each in Structure)}", USUAL, "").strip()
+    shape = _member(Structure, "--structure", structure or USUAL)
+    kind = _member(Motion, "--motion", motion)
+    values = assignments("--value", value or (), shape)
+    own, usual = _tolerances(tolerance or (), TOLERANCE)
+    known = {} if identification is None else _known(identification, run)
+    signals = () if recording is None else look(recording, dbc).signals
+    complete = set(shape.parameter_names) <= {*values, *known}
+    if not (yes or complete or may_ask):
+        raise UsageError("expected someone at a terminal to ask, or --yes with every --value, came neither")
+    if ask is None and may_ask and not complete:
+        ask = _asker()
+    found = parameters(shape, kind, values, assignments("--tolerance", own, shape), usual, known, ask)
+    built = DrivelineModel(structure=shape, motion=kind, parameters=found)
+    write_new(file, model_text(file, built, known, signals, recording))
+    typer.echo(f"{file}: written. Go through it, then: hil diagnose REC --model {file} --out report")
+
+
+def _member(kind: type[Kind], option: str, text: str) -> Kind:
+    """Return the member of that value."""
+    from hil.errors import UsageError
+
+    found = next((member for member in kind if member.value == text), None)
+    if found is None:
+        raise UsageError(f"{option} {text} | expected one of {', '.join(member.value for member in kind)}")
+    return found
+
+
+def _tolerances(texts: list[str] | tuple[str, ...], usual: float) -> tuple[list[str], float]:
+    """Return the tolerances of single parameters, as they were given, and that of all others."""
+    from hil.errors import UsageError
+
+    own = [text for text in texts if "=" in text]
+    for text in texts:
+        if "=" in text:
+            continue
+        try:
+            usual = float(text)
+        except ValueError as error:
+            raise UsageError(f"--tolerance {text} | expected a number, or NAME=NUMBER") from error
+    return own, usual
+
+
+def _known(path: Path, run: str | None) -> dict[str, Known]:
+    """Return what an identification knows of the parameters."""
+    from hil.config.new_model.values import LEAST_TOLERANCE, MOST_TOLERANCE, Known
+    from hil.report.identification.read_back import physical_values
+
+    return {
+        name: Known(
+            found.value,
+            round(min(max(found.half_width / abs(found.value), LEAST_TOLERANCE), MOST_TOLERANCE), 3),
+            f"identified from {found.recording}",
+        )
+        for name, found in physical_values(path, run).items()
+        if found.value > 0.0
+    }
+
+
+def _asker() -> Ask:
+    """Ask at the terminal; the first words say how."""
+    from hil.errors import UsageError
+
+    typer.echo("A model file. Enter takes what stands in [brackets]; Ctrl-C writes nothing.")
+
+    def ask(what: str, default: str, wrong: str) -> str:
+        if wrong:
+            typer.echo(f"  {wrong}")
+        try:
+            return input(f"{what}{f' [{default}]' if default else ''}: ")
+        except EOFError as end:
+            raise UsageError(f"{what}: expected an answer, came the end of the input") from end
+
+    return ask
 
 
 @app.command(epilog="Example: hil model schema --out model.schema.json")

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from hil.cli.dbc_option import Dbc, tell
 from hil.cli.trust_option import TrustLaws
 
 app = typer.Typer(add_completion=False)
@@ -18,6 +19,7 @@ def simulate(
     model: Annotated[Path, typer.Option(metavar="MODEL", help="Model file, nominal or augmented.")],
     recording: Annotated[Path, typer.Option("--input", metavar="REC", help="Recording with the torques.")],
     out: Annotated[Path, typer.Option(metavar="CSV", help="Simulated output, one row per sample of REC.")],
+    dbc: Dbc = None,
     trust_laws: TrustLaws = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
@@ -41,7 +43,7 @@ def simulate(
         raise UsageError(f"--out {out}: expected another file than the recording itself. Choose another name.")
     require_folder(out.parent)
     file = read_model_for_recordings(model, trust_laws)
-    record = read_record(recording, file.signals, file.on_bench)
+    record = read_record(recording, file.signals, file.on_bench, dbc, tell)
     run = replay(file.model, record)
     column = simulated_column(record.kind, file.model.motion)
     table = Table(out, {"time_s": record.time_s, column: run.output})

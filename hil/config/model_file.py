@@ -302,7 +302,7 @@ def _signals_table(signals: SignalsConfig) -> Table:
             rows.extend([_inline(entry) for entry in value])
             table[key] = rows
         else:
-            table[key] = _inline(value)
+            table[key] = _inline(value) if isinstance(value, dict) else value
     return table
 
 

@@ -60,7 +60,7 @@ def poles(snapshot: Snapshot, width: int, height: int) -> list[str]:
         return wrapped(head, nothing_yet(snapshot), width, height)
     canvas = Canvas(width, height - 1)
     reach = float(np.clip(np.max(np.abs(np.r_[model.poles.real, model.zeros.real])), 1.0, LARGEST_REACH))
-    radius = min((canvas.width - 4.0) / 2.0 / reach, canvas.height - 2.0)
+    radius = max(0.0, min((canvas.width - 4.0) / 2.0 / reach, canvas.height - 2.0))
     centre, bottom = canvas.width / 2.0, canvas.height - 1.0
     for angle in np.linspace(0.0, math.pi, round(2.0 * radius)).tolist():
         canvas.dot(centre + radius * math.cos(angle), bottom - radius * math.sin(angle))

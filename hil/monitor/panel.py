@@ -8,6 +8,7 @@ from rich.text import Text
 from textual.widget import Widget
 
 from hil.monitor.snapshot import Snapshot
+from hil.printable import printable as printable
 
 Draw = Callable[[Snapshot, int, int], list[str]]
 """``draw(snapshot, width, height)``: at most ``height`` lines of at most ``width`` characters."""
@@ -19,9 +20,16 @@ STRONG = (
 """Words that are set in bold: what they say is in the word, not in its look."""
 
 
-def printable(text: str) -> str:
-    """Put a dot in place of each character that would steer a terminal instead of being seen on it."""
-    return "".join(letter if letter.isprintable() else "·" for letter in text)
+LEAST_WIDTH = 10
+"""A panel that is narrower shows nothing: an axis alone takes as much. A terminal passes through any size while it is
+resized."""
+
+
+def drawn(draw: Draw, snapshot: Snapshot, width: int, height: int) -> list[str]:
+    """Return a panel's lines, none of them outside its room, whatever that is."""
+    if width < LEAST_WIDTH or height < 1:
+        return []
+    return [line[:width] for line in draw(snapshot, width, height)][:height]
 
 
 class Panel(Widget):
@@ -49,9 +57,9 @@ class Panel(Widget):
     def render(self) -> Text:
         """Draw for the present size."""
         width, height = self.size
-        if self._snapshot is None or width <= 0 or height <= 0:
+        if self._snapshot is None:
             return Text("")
-        lines = map(printable, self._draw(self._snapshot, width, height))
+        lines = map(printable, drawn(self._draw, self._snapshot, width, height))
         text = Text("\n".join(lines), no_wrap=True, end="")  # never markup: names and texts are other people's
         text.highlight_words(STRONG, "bold")
         return text

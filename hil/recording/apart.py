@@ -22,6 +22,8 @@ from hil.child import environment, python
 from hil.errors import RecordingError
 from hil.recording.bounds import memory_bytes, processor_s
 from hil.recording.kinds import Column
+from hil.recording.look.survey import Survey
+from hil.recording.request import Request
 from hil.recording.table import Table
 from hil.recording.table_stream import Document, receive, table_of
 
@@ -41,7 +43,9 @@ ENVIRONMENT: Final = {
 }
 """Threads and allocators that reserve address space, which is what is bounded, are left out."""
 
-What = Literal["table", "metadata"]
+EVERYTHING: Final = Request()
+
+What = Literal["table", "metadata", "survey"]
 
 
 class _Gone(Exception):
@@ -62,7 +66,7 @@ class _Process:
             stderr=subprocess.DEVNULL,
         )
 
-    def ask(self, path: Path, what: What, limit_s: float) -> tuple[Document, dict[str, Column]]:
+    def ask(self, path: Path, what: What, limit_s: float, asked: Request) -> tuple[Document, dict[str, Column]]:
         """Have a file read.
 
         Raises
@@ -73,7 +77,7 @@ class _Process:
         watchdog = threading.Timer(limit_s, self._process.kill)
         watchdog.start()
         try:
-            request = json.dumps({"path": str(path.absolute()), "what": what})
+            request = json.dumps({"path": str(path.absolute()), "what": what, "request": asked.as_document()})
             self._process.stdin.write(f"{request}\n".encode())
             self._process.stdin.flush()
             return receive(self._process.stdout)
@@ -108,7 +112,7 @@ class Reader:
         self._lock = threading.Lock()
         self._process: _Process | None = None
 
-    def table(self, path: Path) -> Table:
+    def table(self, path: Path, request: Request = EVERYTHING) -> Table:
         """Read a recording.
 
         Raises
@@ -116,7 +120,7 @@ class Reader:
         RecordingError
             If it can't be read, also where that ends the process, or takes more than it may.
         """
-        document, columns = self._read(path, "table")
+        document, columns = self._read(path, "table", request)
         return table_of(path, document, columns)
 
     def metadata(self, path: Path) -> Mapping[str, str]:
@@ -127,20 +131,30 @@ class Reader:
         RecordingError
             As `table`.
         """
-        said: Mapping[str, str] = self._read(path, "metadata")[0]["metadata"]
+        said: Mapping[str, str] = self._read(path, "metadata", Request())[0]["metadata"]
         return said
+
+    def survey(self, path: Path, request: Request) -> Survey:
+        """Read what is in a recording, in figures.
+
+        Raises
+        ------
+        RecordingError
+            As `table`.
+        """
+        return Survey.of_document(self._read(path, "survey", request)[0]["survey"])
 
     def end(self) -> None:
         """End the process, if there is one."""
         with self._lock:
             self._end()
 
-    def _read(self, path: Path, what: What) -> tuple[Document, dict[str, Column]]:
+    def _read(self, path: Path, what: What, request: Request) -> tuple[Document, dict[str, Column]]:
         size = path.stat().st_size
         with self._lock:
             self._process = process = self._process or _Process()
             try:
-                document, columns = process.ask(path, what, WAITING * processor_s(size))
+                document, columns = process.ask(path, what, WAITING * processor_s(size), request)
             except _Gone:
                 raise RecordingError(path, _why(self._end(at_once=False), size)) from None
             except BaseException:  # Ctrl-C, for one: half an answer is no beginning for the next

@@ -13,8 +13,9 @@ from typing import IO, Any
 
 from hil.errors import RecordingError
 from hil.recording.bounds import memory_bytes, processor_s
-from hil.recording.format_hints import FormatHints
 from hil.recording.formats import FORMATS, metadata_of
+from hil.recording.look.survey import survey_of
+from hil.recording.request import Request
 from hil.recording.table_stream import described, send
 
 
@@ -35,8 +36,12 @@ def _answer(answers: IO[bytes], request: dict[str, Any]) -> None:
     try:
         if request["what"] == "metadata":
             send(answers, {"metadata": dict(metadata_of(form, path))})
+        elif request["what"] == "survey":
+            asked = Request.of_document(request["request"])
+            tables = form.tables(path, asked) if form.tables is not None else [form.read(path, asked)]
+            send(answers, {"survey": survey_of(tables).as_document()})
         else:
-            table = form.read(path, FormatHints())
+            table = form.read(path, Request.of_document(request["request"]))
             send(answers, described(table), table.columns)
     except RecordingError as error:
         send(answers, {"problems": list(error.problems)})

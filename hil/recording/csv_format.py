@@ -1,9 +1,11 @@
-"""CSV: one header line, one line per row, nothing else.
+"""Text recordings: written as plain CSV, one header line and one line per row; read in the forms that people write.
+
+- What form a file has is recognised (`hil.recording.text.recognise`) or set by hand; pyarrow parses it.
 
 - Floats are written as the shortest decimal that reads back to the same bits, integers without a point; that
   difference is how a reader tells them apart, so that CSV to Parquet and back loses nothing. Units, metadata and the
   kind of columns whose cells do not tell it stand in a file beside (`hil.recording.sidecar`); without that file text
-  that looks like a number becomes one.
+  that looks like a number becomes one, and an empty cell among numbers is NaN.
 - A last line without line end is taken (RFC 4180 allows it): a file cut inside its very last number can't be
   told from a whole one. A cut anywhere else leaves a row with cells missing, and is refused.
 - A quoted cell must end on its line, so that a row is a line and every fault has its number.
@@ -11,66 +13,100 @@
 
 from __future__ import annotations
 
-import csv
 import re
-from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute
 import pyarrow.csv
 
 from hil.errors import RecordingError
 from hil.recording.bounds import require_columns
 from hil.recording.format_hints import FormatHints
-from hil.recording.kinds import Kind, as_text
+from hil.recording.kinds import Kind
+from hil.recording.request import Request
 from hil.recording.sidecar import SCHEMA_KEY, TYPES_KEY, UNITS_KEY, Sidecar, read_sidecar, write_sidecar
-from hil.recording.table import Column, Table
+from hil.recording.table import Column, Table, line_of
+from hil.recording.text.cells import as_column, seconds_of
+from hil.recording.text.encoding import decoded
+from hil.recording.text.form import BLANKS, TextForm
+from hil.recording.text.recognise import SAMPLE_LINES, recognise, split
 
-DELIMITERS = ",;\t|"
-"""Tried on the header where no hint is given, the most frequent outside quotes wins."""
+SPECIAL = ",;\t|"
+"""Characters that a reader could take for a delimiter."""
 
-QUOTED = re.compile('"[^"]*"')
+OWN: Final[Mapping[str, object]] = {"delimiter": ",", "decimal": ".", "header_line": 1, "units_line": 0}
+"""Form of a recording that is described beside: as it is written here, nothing is recognised."""
 
 BLOCK_BYTES = 1 << 22
 """pyarrow parses this much at once; also the longest line it can take."""
 
-FIRST_ROW_LINE = 2
-
-TRUTH = pa.array(["True", "False"])
+TRAILING = "\0"
+"""Stands for what follows a delimiter that ends a row."""
 
 TABLE_KEYS = frozenset({SCHEMA_KEY, UNITS_KEY, TYPES_KEY})
 """Keys that have a meaning of their own in the file beside, and so can't be metadata."""
 
 
-def read(path: Path, hints: FormatHints) -> Table:
-    """Read a CSV recording.
+def read(path: Path, request: Request) -> Table:
+    """Read a text recording, in the form that it is recognised to have or that was set by hand.
 
     Raises
     ------
     RecordingError
-        With the line of the fault, if the file is not text in its encoding, has no row, a header with empty
-        or repeated names, or a row with another number of cells.
+        With the line of the fault, if the file is not text in its encoding, has no row, a column without a name, or a
+        row with another number of cells.
     """
-    content = _utf8(path, hints.encoding)
-    if not content:
+    hints, said = request.form, read_sidecar(path)
+    text, encoding = decoded(path, path.read_bytes(), hints.encoding)
+    if not text or text.isspace():
         return Table(path, {})  # refuses: nothing in it
-    header = content.split(b"\n", 1)[0].decode("utf-8")
-    delimiter = hints.delimiter or max(DELIMITERS, key=QUOTED.sub("", header).count)
-    names = _column_names(path, header, delimiter)
-    if b"\n" not in content:
+    form = replace(form_of(text, hints.model_copy(update=OWN) if said.found else hints), encoding=encoding)
+    _require_names(path, form)
+    rows, skipped = _rows(path, text, form)
+    del text
+    if not rows:
         return Table(path, {})  # refuses: no rows
-    cells = _parse(path, content, names, delimiter)
-    said = read_sidecar(path)
-    del content
-    columns = {}
-    for name in names:
-        columns[name] = _column(cells[name], said.types.get(name))
+    cells = _parse(path, rows, form, skipped)
+    del rows
+    columns: dict[str, Column] = {}
+    units = dict(said.units if said.found else form.units)
+    remarks = [", ".join(form.said())]
+    for name in form.names:
+        column = as_column(cells[name], said.types.get(name), form.decimal)
         cells = cells.drop_columns([name])  # a cell as text takes several times what it does as a number
+        since = None if said.found else seconds_of(column)
+        if since is not None:
+            column, start = since
+            units[name] = "s"
+            remarks.append(f"{name}: dates and times, read as seconds since {start}")
+        columns[name] = column
     pa.default_memory_pool().release_unused()
-    return Table(path, columns, said.units, said.metadata, FIRST_ROW_LINE)
+    return Table(
+        path,
+        columns,
+        units,
+        said.metadata,
+        form.first_row_line,
+        tuple(remark for remark in remarks if remark),
+        skipped,
+        elsewhere={
+            name: f"line {form.header_line}: column {name} comes twice or more, as {name} (1) and {name} (2): name "
+            "the one that is meant in [signals]"
+            for name in form.repeated
+        },
+    )
+
+
+def form_of(text: str, hints: FormatHints) -> TextForm:
+    """Return the form of a text, by its first lines."""
+    lines = text[:BLOCK_BYTES].split("\n", SAMPLE_LINES)[:SAMPLE_LINES]
+    if len(text) > BLOCK_BYTES and 1 < len(lines) < SAMPLE_LINES:
+        lines.pop()  # cut in the middle
+    return recognise(lines, hints)
 
 
 def write(table: Table, path: Path) -> None:
@@ -85,7 +121,16 @@ def write(table: Table, path: Path) -> None:
     with path.open("w", encoding="utf-8", newline="") as file:
         file.write(",".join(map(_quoted, table.columns)) + "\n")
         file.writelines(",".join(row) + "\n" for row in zip(*columns, strict=True))
-    write_sidecar(path, description_of(table))
+    write_sidecar(path, description_of(table), needed=not _is_recognised(path, table))
+
+
+def _is_recognised(path: Path, table: Table) -> bool:
+    """Whether the form of a file that was written here is recognised without a word beside it."""
+    with path.open(encoding="utf-8", newline="\n") as file:
+        text = file.read(BLOCK_BYTES)
+    form = form_of(text.rstrip("\n"), FormatHints())
+    plain = TextForm(tuple(table.columns))
+    return form == plain
 
 
 def description_of(table: Table) -> Sidecar:
@@ -94,99 +139,90 @@ def description_of(table: Table) -> Sidecar:
     return Sidecar({key: value for key, value in table.metadata.items() if key not in TABLE_KEYS}, table.units, types)
 
 
-def _utf8(path: Path, encoding: str) -> bytes:
-    """Read a text file as UTF-8 bytes with line feeds only, no byte order mark, no empty lines at the end."""
-    content = path.read_bytes()
-    try:
-        text = content.decode(encoding)
-    except UnicodeError as error:
-        start = error.start if isinstance(error, UnicodeDecodeError) else 0
-        line = content.count(b"\n", 0, start) + 1
-        byte = content[start : start + 1].hex()
-        raise RecordingError(
-            path,
-            f"line {line}: expected {encoding} text, came byte 0x{byte}. "
-            'Give its encoding in the model file: [signals] format = { encoding = "latin-1" }.',
-        ) from error
-    lines = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
-    return lines.rstrip("\n").encode("utf-8")
-
-
-def _split(line: str, delimiter: str) -> list[str]:
-    """Cut one line into cells; none where it can't be cut (a cell beyond the module's 128 KiB)."""
-    try:
-        return next(csv.reader([line], delimiter=delimiter), [])
-    except csv.Error:
-        return []
-
-
-def _column_names(path: Path, header: str, delimiter: str) -> list[str]:
-    names = [name.strip() for name in _split(header, delimiter) or [""]]
-    require_columns(path, len(names))
+def _require_names(path: Path, form: TextForm) -> None:
+    require_columns(path, form.width)
     problems = [
-        f"line 1: cell {number} of the header is empty, expected a column name"
-        for number, name in enumerate(names, start=1)
+        f"line {form.header_line}: cell {number} of the header is empty, expected a column name"
+        for number, name in enumerate(form.names or ("",), start=1)
         if not name
     ]
-    repeated = sorted(name for name, count in Counter(names).items() if name and count > 1)
-    problems += [f"line 1: column {name} comes twice, expected every name once" for name in repeated]
     if problems:
         raise RecordingError(path, *problems)
-    return names
 
 
-def _parse(path: Path, content: bytes, names: list[str], delimiter: str) -> pa.Table:
+def _rows(path: Path, text: str, form: TextForm) -> tuple[bytes, tuple[int, ...]]:
+    """Return the lines that are rows, and the numbers of the lines among them that are none.
+
+    Raises
+    ------
+    RecordingError
+        For an empty line among the rows: it may stand for a row, or for nothing.
+    """
+    start = 0
+    for _ in range(form.first_row_line - 1):
+        start = text.find("\n", start) + 1
+        if start == 0:
+            return b"", ()
+    body = text[start:]
+    skipped: list[int] = []
+    if form.comment and f"\n{form.comment}" in f"\n{body}":
+        lines = body.split("\n")
+        skipped = [k + form.first_row_line for k, line in enumerate(lines) if line.startswith(form.comment)]
+        body = "\n".join(line for line in lines if not line.startswith(form.comment)).rstrip("\n")
+    if "\n\n" in body and len(form.names) > 1:
+        line = body.count("\n", 0, body.index("\n\n")) + 1 + form.first_row_line
+        line += sum(number <= line for number in skipped)
+        raise RecordingError(
+            path,
+            f"line {line}: expected a row, came an empty line. Remove it; a missing sample is nan.",
+        )
+    if form.delimiter == BLANKS:
+        body = re.sub(r"[ \t]+", " ", re.sub(r"(?m)^[ \t]+|[ \t]+$", "", body))
+    return body.encode("utf-8"), tuple(skipped)
+
+
+def _parse(path: Path, rows: bytes, form: TextForm, skipped: tuple[int, ...]) -> pa.Table:
     """Cut the rows into cells, all as text."""
+    names = [*form.names, *([TRAILING] if form.trailing else [])]
     try:
         cells = pa.csv.read_csv(
-            pa.BufferReader(content),
-            pa.csv.ReadOptions(column_names=names, skip_rows=1, block_size=BLOCK_BYTES),
-            pa.csv.ParseOptions(delimiter=delimiter, newlines_in_values=False, ignore_empty_lines=False),
+            pa.BufferReader(rows),
+            pa.csv.ReadOptions(column_names=names, block_size=BLOCK_BYTES),
+            pa.csv.ParseOptions(delimiter=form.delimiter, newlines_in_values=False, ignore_empty_lines=False),
             pa.csv.ConvertOptions(
                 column_types=dict.fromkeys(names, pa.string()), strings_can_be_null=False, check_utf8=False
             ),
         )
     except pa.ArrowInvalid as error:
-        raise RecordingError(path, _broken_line(content, len(names), delimiter)) from error
-    if cells.num_rows != content.count(b"\n"):
-        raise RecordingError(path, _broken_line(content, len(names), delimiter))
+        raise RecordingError(path, _broken_line(rows, form, skipped)) from error
+    if cells.num_rows != rows.count(b"\n") + 1:
+        raise RecordingError(path, _broken_line(rows, form, skipped))
     return cells
 
 
-def _broken_line(content: bytes, expected: int, delimiter: str) -> str:
+def _broken_line(rows: bytes, form: TextForm, skipped: tuple[int, ...]) -> str:
     """Find the first line that is no row of the header's number of cells, and say what is wrong with it."""
-    lines = content.decode("utf-8").split("\n")
-    for number, line in enumerate(lines[1:], start=FIRST_ROW_LINE):
+    lines = rows.decode("utf-8").split("\n")
+    for row, line in enumerate(lines):
+        number = line_of(row, form.first_row_line, skipped)
         if line.count('"') % 2:
             return f"line {number}: expected every quoted cell to end on its line, came one that does not"
-        count = len(_split(line, delimiter) or [""])
-        if count != expected:
-            cut = number == len(lines) and count < expected
+        count = len(split(line, form.delimiter) or [""])
+        if count != form.width:
+            cut = row + 1 == len(lines) and count < form.width
             cure = "the file is truncated: remove its last line or record again" if cut else "mend that line"
-            return f"line {number}: expected {expected} cells as in the header, came {count}; {cure}"
+            where = "as in the header" if form.header_line else "as in most lines"
+            return f"line {number}: expected {form.width} cells {where}, came {count}; {cure}"
     return f"expected lines shorter than {BLOCK_BYTES} bytes, came a longer one"
-
-
-def _column(cells: pa.ChunkedArray, kind: Kind | None = None) -> Column:
-    """Turn text into the kind it is said to be; unsaid into int64, float64 or text, whichever first fits every cell."""
-    if kind is Kind.TEXT:
-        return as_text(cells.to_pylist())
-    if kind is Kind.BOOLEAN and pa.compute.all(pa.compute.is_in(cells, TRUTH)).as_py():
-        return np.asarray(pa.compute.equal(cells, "True").to_numpy())
-    trimmed = pa.compute.utf8_trim_whitespace(cells)
-    for numeric in (pa.int64(), pa.float64()):
-        try:
-            return np.asarray(pa.compute.cast(trimmed, numeric).to_numpy())
-        except pa.ArrowInvalid:
-            continue
-    return as_text(trimmed.to_pylist())
 
 
 def _tells_its_kind(column: Column) -> bool:
     """Whether the cells alone lead a reader to the same column."""
     if Kind.of(column) is not Kind.TEXT:
         return Kind.of(column) is not Kind.BOOLEAN
-    read = _column(pa.chunked_array([pa.array(column, type=pa.string())]))
+    read = as_column(pa.chunked_array([pa.array(column, type=pa.string())]))
+    if seconds_of(read) is not None:
+        return False
     return Kind.of(read) is Kind.TEXT and bool(np.all(read == column))
 
 
@@ -207,5 +243,5 @@ def _cells(table: Table, path: Path, name: str) -> Iterable[str]:
 
 def _quoted(text: str) -> str:
     """Quote a text with anything in it that a reader could take for a delimiter, or that would leave a line empty."""
-    unclear = not text or any(c in text for c in f'{DELIMITERS}"')
+    unclear = not text or any(c in text for c in f'{SPECIAL}"')
     return '"' + text.replace('"', '""') + '"' if unclear else text

@@ -14,7 +14,7 @@ from hil.errors import RecordingError
 from hil.recording import csv_format, hdf5_format, mat_format, mdf_format, parquet_format
 from hil.recording.apart import READER
 from hil.recording.checksum import require_whole
-from hil.recording.format_hints import FormatHints
+from hil.recording.request import Request
 from hil.recording.sidecar import read_sidecar_metadata, sidecar_of
 from hil.recording.table import Table
 
@@ -25,22 +25,27 @@ class Format:
 
     ``write`` is None for a format that is only read, ``metadata`` for one whose metadata come with the table alone.
     ``beside`` names the file that belongs to a recording in a format that has no place for all there is to say.
+    ``tables`` reads a table for each time of a format that may have several.
     ``apart`` is True where a compiled library parses it: in a process of its own (`hil.recording.apart`).
     """
 
-    read: Callable[[Path, FormatHints], Table]
+    read: Callable[[Path, Request], Table]
     write: Callable[[Table, Path], None] | None
     metadata: Callable[[Path], Mapping[str, str]] | None = None
     beside: Callable[[Path], Path] | None = None
     apart: bool = True
+    tables: Callable[[Path, Request], list[Table]] | None = None
 
 
 FORMATS: Mapping[str, Format] = MappingProxyType(
     {
         ".csv": Format(csv_format.read, csv_format.write, read_sidecar_metadata, sidecar_of, apart=False),
+        ".txt": Format(csv_format.read, None, read_sidecar_metadata, sidecar_of, apart=False),
+        ".tsv": Format(csv_format.read, None, read_sidecar_metadata, sidecar_of, apart=False),
         ".parquet": Format(parquet_format.read, parquet_format.write, parquet_format.read_metadata),
-        ".mf4": Format(mdf_format.read, mdf_format.write, mdf_format.read_metadata),
-        ".mdf": Format(mdf_format.read, None, mdf_format.read_metadata),
+        ".mf4": Format(mdf_format.read, mdf_format.write, mdf_format.read_metadata, tables=mdf_format.read_all),
+        ".mdf": Format(mdf_format.read, None, mdf_format.read_metadata, tables=mdf_format.read_all),
+        ".dat": Format(mdf_format.read, None, mdf_format.read_metadata, tables=mdf_format.read_all),
         ".h5": Format(hdf5_format.read, hdf5_format.write, hdf5_format.read_metadata),
         ".hdf5": Format(hdf5_format.read, hdf5_format.write, hdf5_format.read_metadata),
         ".mat": Format(mat_format.read, mat_format.write, mat_format.read_metadata),
@@ -48,7 +53,7 @@ FORMATS: Mapping[str, Format] = MappingProxyType(
 )
 
 
-def read_table(path: Path | str, hints: FormatHints | None = None) -> Table:
+def read_table(path: Path | str, request: Request | None = None) -> Table:
     """Read a recording of any known format.
 
     Raises
@@ -57,9 +62,9 @@ def read_table(path: Path | str, hints: FormatHints | None = None) -> Table:
         If the file can't be opened, its suffix is unknown, its content is at fault, or not what its checksum says.
     """
     path = Path(path)
-    known = _known(path)
-    _require_readable(path, known)
-    table = READER.table(path) if known.apart else known.read(path, hints or FormatHints())
+    known = format_of(path)
+    asked = request or Request()
+    table = READER.table(path, asked) if known.apart else known.read(path, asked)
     require_whole(table)
     return table
 
@@ -73,14 +78,13 @@ def read_metadata(path: Path | str) -> Mapping[str, str]:
         As `read_table`, but for the checksum.
     """
     path = Path(path)
-    known = _known(path)
-    _require_readable(path, known)
+    known = format_of(path)
     return READER.metadata(path) if known.apart else metadata_of(known, path)
 
 
 def metadata_of(known: Format, path: Path) -> Mapping[str, str]:
     """Read what a recording of a format says of itself, in this process."""
-    return known.read(path, FormatHints()).metadata if known.metadata is None else known.metadata(path)
+    return known.read(path, Request()).metadata if known.metadata is None else known.metadata(path)
 
 
 def writer_for(path: Path, replace: bool = False) -> Callable[[Table, Path], None]:
@@ -104,10 +108,18 @@ def writer_for(path: Path, replace: bool = False) -> Callable[[Table, Path], Non
     return known.write
 
 
-def _known(path: Path) -> Format:
+def format_of(path: Path) -> Format:
+    """Return the format of a file that is there and can be read.
+
+    Raises
+    ------
+    RecordingError
+        If its suffix is unknown, or it can't be opened.
+    """
     known = FORMATS.get(path.suffix.lower())
     if known is None:
         raise RecordingError(path, f"expected a recording ({', '.join(FORMATS)}), came {path.suffix!r}")
+    _require_readable(path, known)
     return known
 
 

@@ -13,10 +13,11 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from hil.errors import RecordingError
+from hil.recording.address import under_names, vectors_of
 from hil.recording.description import SCHEMA, described_table, description_of, metadata_of
-from hil.recording.format_hints import FormatHints
 from hil.recording.hdf5_file import reading, text_of, write_whole
 from hil.recording.kinds import Column, Kind, as_column, is_column
+from hil.recording.request import Request
 from hil.recording.shared_length import columns_of_shared_length
 from hil.recording.table import Table
 
@@ -28,8 +29,8 @@ DESCRIPTION = "recording_json"
 COLUMNS = "columns"
 
 
-def read(path: Path, hints: FormatHints) -> Table:
-    """Read an HDF5 recording; hints are for text formats and play no part.
+def read(path: Path, request: Request) -> Table:
+    """Read an HDF5 recording.
 
     Raises
     ------
@@ -37,7 +38,7 @@ def read(path: Path, hints: FormatHints) -> Table:
         If the file is damaged, or holds no vector.
     """
     with reading(path, "HDF5") as file:
-        return _own(path, file) if _is_own(file) else _foreign(path, file)
+        return _own(path, file) if _is_own(file) else _foreign(path, file, request)
 
 
 def read_metadata(path: Path) -> dict[str, str]:
@@ -107,7 +108,7 @@ def _cells(dataset: Dataset) -> Column:
     return as_column(dataset[()].ravel())
 
 
-def _foreign(path: Path, file: File) -> Table:
+def _foreign(path: Path, file: File, request: Request) -> Table:
     vectors: dict[str, Column] = {}
     units: dict[str, str] = {}
     remarks: list[str] = []
@@ -119,16 +120,16 @@ def _foreign(path: Path, file: File) -> Table:
         fields = (
             {f"{name}/{text_of(field)}": entry[field] for field in entry.dtype.names or ()} if entry.ndim == 1 else {}
         )
-        found = fields or ({name: entry[()].ravel()} if entry.size > 1 and max(entry.shape) == entry.size else {})
+        found = fields or (dict(vectors_of(name, entry[()])) if entry.dtype.names is None else {})
         usable = {key: values for key, values in found.items() if is_column(values)}
         vectors.update({key: as_column(values) for key, values in usable.items()})
-        if name in usable and (unit := _unit(entry)):
-            units[name] = unit
+        if unit := _unit(entry):
+            units.update(dict.fromkeys(usable, unit))
         if not usable:
             remarks.append(f"{name}: left out, it is no vector of numbers or texts")
 
     file.visititems(take)
-    chosen, others = columns_of_shared_length(vectors)
+    chosen, others = columns_of_shared_length(under_names(vectors, request.names), request.names)
     return Table(path, chosen, units, _attributes(file), remarks=(*others, *remarks))
 
 

@@ -19,9 +19,13 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from hil.recording.address import under_names, vectors_of
 from hil.recording.description import described_table, description_of, metadata_of
 from hil.recording.hdf5_file import reading, text_of, write_whole
 from hil.recording.kinds import Column, Kind, as_column, as_text
+from hil.recording.mat_tables import with_tables
+from hil.recording.mat_walk import walk
+from hil.recording.request import Request
 from hil.recording.shared_length import columns_of_shared_length
 from hil.recording.table import Table
 
@@ -36,11 +40,13 @@ HEADER = (
 
 DESCRIPTION = "recording_json"
 REFERENCES = "#refs#"
+EVERYTHING = Request()
+
 LONGEST_NAME = 63
 """Characters of a variable's name that MATLAB tells apart (``namelengthmax``)."""
 
 
-def read(path: Path) -> Table:
+def read(path: Path, request: Request = EVERYTHING) -> Table:
     """Read a .mat recording of version 7.3.
 
     Raises
@@ -49,7 +55,7 @@ def read(path: Path) -> Table:
         If the file is damaged, or holds no vector of numbers.
     """
     with reading(path, ".mat") as file:
-        return _own(path, file) if DESCRIPTION in file else _foreign(path, file)
+        return _own(path, file) if DESCRIPTION in file else _foreign(path, file, request)
 
 
 def read_metadata(path: Path) -> dict[str, str]:
@@ -130,17 +136,44 @@ def _own(path: Path, file: File) -> Table:
     return described_table(path, _text(file[DESCRIPTION]), column)
 
 
-def _foreign(path: Path, file: File) -> Table:
-    datasets = _datasets(file)
-    vectors = {n: _cells(file, d) for n, d in datasets.items() if _is_vector(d)}
-    chosen, remarks = columns_of_shared_length(vectors)
+def _foreign(path: Path, file: File, request: Request) -> Table:
+    vectors: dict[str, Column] = {}
+    objects: list[str] = []
+    _take(file, file, "", vectors, objects)
+    if objects:
+        opened = with_tables(path)
+        for name in objects:
+            walk(name, opened.get(name), vectors, {}, [])
+    chosen, remarks = columns_of_shared_length(under_names(vectors, request.names), request.names)
     metadata = _foreign_metadata(file)
+    roots = {re.split(r"[.(]", name)[0] for name in vectors}
     other = [
         f"{name}: left out, it is no vector of numbers or texts"
         for name in map(text_of, file)
-        if name != REFERENCES and name not in vectors and name not in metadata
+        if not name.startswith("#") and name not in roots and name not in metadata
     ]
     return Table(path, chosen, metadata=metadata, remarks=(*remarks, *other))
+
+
+def _take(file: File, group: File, inside: str, vectors: dict[str, Column], objects: list[str]) -> None:
+    """Add the vectors of a struct's fields, and of structs in it; name what is an object of a class of MATLAB's."""
+    for raw, entry in group.items():
+        name = inside + text_of(raw)
+        if name.startswith("#"):
+            continue
+        if "MATLAB_object_decode" in entry.attrs:
+            objects.append(name)
+        elif not hasattr(entry, "dtype"):
+            _take(file, entry, f"{name}.", vectors, objects)
+        elif entry.dtype.names is None and _is_vector(entry):
+            vectors[name] = _cells(file, entry)
+        elif _is_matrix(entry):
+            vectors.update((address, as_column(cells)) for address, cells in vectors_of(name, entry[()].T))
+
+
+def _is_matrix(dataset: Dataset) -> bool:
+    is_numbers = dataset.dtype.kind in "fiu" and _class_of(dataset) != "char" and not dataset.attrs.get("MATLAB_empty")
+    return is_numbers and len(dataset.shape) == 2 and min(dataset.shape) > 1
 
 
 def _foreign_metadata(file: File) -> dict[str, str]:

@@ -1,7 +1,7 @@
 """MATLAB .mat: versions 4 to 7 are read here, version 7.3 is read and written by `hil.recording.mat73_format`.
 
-A .mat file is a bag of variables: the numeric vectors of the length that most of them share are the columns, scalars
-are metadata.
+A .mat file is a bag of variables: the numeric vectors of the length that most of them share are the columns, by their
+address where they are fields of a struct, columns of a matrix or variables of a timetable; scalars are metadata.
 """
 
 from __future__ import annotations
@@ -10,12 +10,14 @@ import zlib
 from collections.abc import Mapping
 from pathlib import Path
 
-import numpy as np
-
 from hil.recording import mat73_format
+from hil.recording.address import under_names
+from hil.recording.bounds import require_columns
 from hil.recording.damaged import damaged
-from hil.recording.format_hints import FormatHints
-from hil.recording.kinds import as_column
+from hil.recording.kinds import Column, as_column
+from hil.recording.mat_tables import with_tables_if_possible
+from hil.recording.mat_walk import walk
+from hil.recording.request import Request
 from hil.recording.shared_length import columns_of_shared_length
 from hil.recording.table import Table
 
@@ -23,8 +25,8 @@ DAMAGED = (ValueError, TypeError, IndexError, KeyError, OSError, NotImplementedE
 """What scipy raises, beside its own, on a file that is cut or no .mat file."""
 
 
-def read(path: Path, hints: FormatHints) -> Table:
-    """Read a .mat recording; hints are for text formats and play no part.
+def read(path: Path, request: Request) -> Table:
+    """Read a .mat recording.
 
     Raises
     ------
@@ -35,24 +37,28 @@ def read(path: Path, hints: FormatHints) -> Table:
     from scipy.io.matlab import MatReadError
 
     if is_version_73(path):
-        return mat73_format.read(path)
+        return mat73_format.read(path, request)
     try:
-        variables = scipy.io.loadmat(path)
+        variables = scipy.io.loadmat(path, struct_as_record=False)
     except (*DAMAGED, MatReadError) as error:
         raise damaged(path, "a whole .mat file", error) from error
-    arrays = {name: value for name, value in variables.items() if isinstance(value, np.ndarray)}
-    numeric = {name: value for name, value in arrays.items() if value.dtype.kind in "fiub"}
-    vectors = {name: v.ravel() for name, v in numeric.items() if v.size > 1 and max(v.shape) == v.size}
-    scalars = {name: repr(value.item()) for name, value in numeric.items() if value.size == 1}
-    chosen, remarks = columns_of_shared_length(vectors)
-    other = [f"{name}: left out, it is no vector of numbers" for name in arrays if name not in {**vectors, **scalars}]
+    variables = with_tables_if_possible(path, variables)
+    vectors: dict[str, Column] = {}
+    scalars: dict[str, str] = {}
+    other: list[str] = []
+    for name, value in variables.items():
+        if not name.startswith("__"):
+            walk(name, value, vectors, scalars, other)
+    require_columns(path, len(vectors))
+    chosen, remarks = columns_of_shared_length(under_names(vectors, request.names), request.names)
     columns = {name: as_column(vector) for name, vector in chosen.items()}
-    return Table(path, columns, metadata=scalars, remarks=(*remarks, *other))
+    left = [f"{name}: left out, it is no vector of numbers" for name in other]
+    return Table(path, columns, metadata=scalars, remarks=(*remarks, *left))
 
 
 def read_metadata(path: Path) -> Mapping[str, str]:
     """Read what a .mat recording says of itself."""
-    return mat73_format.read_metadata(path) if is_version_73(path) else read(path, FormatHints()).metadata
+    return mat73_format.read_metadata(path) if is_version_73(path) else read(path, Request()).metadata
 
 
 def write(table: Table, path: Path) -> None:
@@ -61,6 +67,7 @@ def write(table: Table, path: Path) -> None:
 
 
 def is_version_73(path: Path) -> bool:
-    """Whether a .mat file is HDF5 inside; its header says so (MAT-File Format, version 7.3)."""
+    """Whether a .mat file is HDF5 inside; its header says so (MAT-File Format, version 7.3: version 0x0200)."""
     with path.open("rb") as file:
-        return file.read(len(mat73_format.TITLE)) == mat73_format.TITLE
+        header = file.read(128)
+    return header.startswith(mat73_format.TITLE) or header[124:] in (b"\x00\x02IM", b"\x02\x00MI")

@@ -1,47 +1,160 @@
 """MDF files of other programs: which of their many groups is the recording.
 
-A file of a measurement tool has a group for each rate. The groups that share their time to the bit belong together; of
-those the ones with the most channels are the recording, the others are left out, by name. Nothing is interpolated: a
-sample that was made up is none.
+A file of a measurement tool has a group for each rate. The groups that share their time to the bit belong together. The
+recording is made of those that have the channels asked for, or the most channels; what the others have is named.
+Channels of different times are brought to one only by ``resample_s``: a sample that was made up is none.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hil.errors import RecordingError
+from hil.recording.bounds import require_columns
+from hil.recording.bus_log import decoded, is_bus_log
 from hil.recording.kinds import Column, Kind, as_column, is_column
 from hil.recording.mdf_file import channels_of
+from hil.recording.request import Request
+from hil.recording.resample import Series, resampled
 from hil.recording.table import Table
 
 if TYPE_CHECKING:
     from asammdf import MDF
 
 
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a channel is in a file."""
+
+    group: int
+    index: int
+
+
 @dataclass(slots=True)
-class _Raster:
-    """The groups that share one time."""
+class Raster:
+    """The groups that share one time, and their channels by name."""
 
     times: Column
-    groups: list[int] = field(default_factory=list)
-    n_channels: int = 0
+    master: str
+    unit: str
+    places: dict[str, Place] = field(default_factory=dict)
+
+    @property
+    def said(self) -> str:
+        """How often it has a sample, for people."""
+        if self.times.size < 2:
+            return f"with {self.times.size} samples"
+        return f"every {float(np.median(np.diff(self.times))):.4g} s"
 
 
-def foreign_table(path: Path, mdf: MDF) -> Table:
-    """Read the channels that share the time of most of them; physical values, invalid ones as NaN."""
-    rasters = sorted(_rasters(mdf), key=lambda raster: (raster.n_channels, raster.times.size), reverse=True)
-    columns: dict[str, Column] = {}
-    units: dict[str, str] = {}
+def foreign_table(path: Path, mdf: MDF, request: Request) -> Table:
+    """Read the channels asked for, or those that share the time of most; physical values, invalid ones as NaN.
+
+    Raises
+    ------
+    RecordingError
+        If the file holds frames of a bus, and nothing says what they mean.
+    """
+    mdf = readable(path, mdf, request)
+    rasters, remarks = rasters_of(path, mdf)
+    if request.resample_s is not None and (found := _found(rasters, request)):
+        return _brought_together(path, mdf, found, request, request.resample_s)
+    if not rasters:
+        return Table(path, {}, {}, foreign_metadata(mdf))
+    chosen = max(rasters, key=lambda raster: _fits(raster, request))
+    table = raster_table(path, mdf, chosen)
+    elsewhere = {
+        name: f"column {name}: it is in this file, but {raster.said}, and what was read is {chosen.said}. "
+        "Bring all to one period: [signals] resample_s = 0.01"
+        for raster in rasters
+        for name in raster.places
+        if raster is not chosen
+    }
+    left = [f"{name}: left out, it has a time of its own" for name in elsewhere]
+    return Table(
+        path,
+        table.columns,
+        table.units,
+        foreign_metadata(mdf),
+        remarks=(*remarks, *table.remarks, *left),
+        master=table.master,
+        elsewhere=elsewhere,
+    )
+
+
+def foreign_tables(path: Path, mdf: MDF, request: Request) -> list[Table]:
+    """Read all channels, a table for each time.
+
+    Raises
+    ------
+    RecordingError
+        As `foreign_table`.
+    """
+    mdf = readable(path, mdf, request)
+    rasters, _ = rasters_of(path, mdf)
+    return [raster_table(path, mdf, raster) for raster in rasters]
+
+
+def readable(path: Path, mdf: MDF, request: Request) -> MDF:
+    """Return a file whose channels are signals: a logged bus decoded.
+
+    Raises
+    ------
+    RecordingError
+        If nothing says what its frames mean.
+    """
+    if request.dbc is not None:
+        return decoded(path, mdf, request.dbc)
+    if is_bus_log(mdf):
+        raise RecordingError(
+            path,
+            "expected signals, came the frames of a bus as they were logged. Say what they mean: --dbc FILE",
+        )
+    return mdf
+
+
+def rasters_of(path: Path, mdf: MDF) -> tuple[list[Raster], list[str]]:
+    """Return the times of a file with their channels; a name that comes again is numbered, and that is said."""
+    rasters: list[Raster] = []
+    count: dict[str, int] = {}
     remarks: list[str] = []
-    for number in rasters[0].groups if rasters else ():
-        _take(mdf, number, columns, units, remarks)
-    for raster in rasters[1:]:
-        remarks += [f"{name}: left out, it has a time of its own" for name in _names(mdf, raster.groups)]
-    return Table(path, columns, units, foreign_metadata(mdf), remarks=tuple(remarks))
+    for group in range(len(mdf.groups)):
+        times = np.asarray(mdf.get_master(group))
+        if not times.size:
+            continue
+        raster = next((known for known in rasters if np.array_equal(known.times, times)), None)
+        if raster is None:
+            rasters.append(raster := Raster(times, *_master(mdf, group)))
+        for index, channel in _channels(mdf, group):
+            name = str(channel.name)
+            count[name] = count.get(name, 0) + 1
+            called = name if count[name] == 1 else f"{name} ({count[name]})"
+            if called != name:
+                remarks.append(f"{name}: another channel has that name, that of group {group + 1} is {called!r} here")
+            raster.places[called] = Place(group, index)
+    require_columns(path, sum(len(raster.places) for raster in rasters))
+    return rasters, remarks
+
+
+def raster_table(path: Path, mdf: MDF, raster: Raster) -> Table:
+    """Read all channels of one time, and that."""
+    columns: dict[str, Column] = {raster.master: as_column(raster.times)}
+    units = {raster.master: raster.unit} if raster.unit else {}
+    remarks: list[str] = []
+    for name, place in raster.places.items():
+        signal = _signal(mdf, place)
+        if signal.samples.ndim != 1 or not is_column(signal.samples):
+            remarks.append(f"{name}: left out, it is no channel of single numbers or texts")
+            continue
+        columns[name] = _valid(as_column(signal.samples), signal.invalidation_bits)
+        if signal.unit:
+            units[name] = str(signal.unit)
+    return Table(path, columns, units, remarks=tuple(remarks), master=raster.master)
 
 
 def foreign_metadata(mdf: MDF) -> dict[str, str]:
@@ -53,37 +166,54 @@ def foreign_metadata(mdf: MDF) -> dict[str, str]:
     return {key: value for key, value in said.items() if value}
 
 
-def _rasters(mdf: MDF) -> list[_Raster]:
-    rasters: list[_Raster] = []
-    for number in range(len(mdf.groups)):
-        times = np.asarray(mdf.get_master(number))
-        if not times.size:
-            continue
-        same = next((raster for raster in rasters if np.array_equal(raster.times, times)), None)
-        if same is None:
-            rasters.append(same := _Raster(times))
-        same.groups.append(number)
-        same.n_channels += len(channels_of(mdf, number))
-    return rasters
+def _channels(mdf: MDF, group: int) -> Iterator[tuple[int, Any]]:
+    """Yield the channels of a group with their number, but for its time."""
+    master = mdf.masters_db.get(group)
+    return ((index, channel) for index, channel in enumerate(channels_of(mdf, group)) if index != master)
 
 
-def _take(mdf: MDF, number: int, columns: dict[str, Column], units: dict[str, str], remarks: list[str]) -> None:
-    """Add the channels of one group; the time of the first is that of all."""
-    master = mdf.masters_db.get(number)
-    for index, channel in enumerate(channels_of(mdf, number)):
-        name = str(channel.name)
-        if index == master and columns:
-            continue
-        if name in columns:
-            remarks.append(f"{name}: left out, another channel has that name")
-            continue
-        signal = mdf.get(group=number, index=index, ignore_invalidation_bits=True)  # else it drops rows
-        if signal.samples.ndim != 1 or not is_column(signal.samples):
-            remarks.append(f"{name}: left out, it is no channel of single numbers or texts")
-            continue
-        columns[name] = _valid(as_column(signal.samples), signal.invalidation_bits)
-        if signal.unit:
-            units[name] = str(signal.unit)
+def _master(mdf: MDF, group: int) -> tuple[str, str]:
+    """Return name and unit of the time of a group."""
+    index = mdf.masters_db.get(group)
+    if index is None:
+        return "time", "s"
+    channel = channels_of(mdf, group)[index]
+    return str(channel.name), str(getattr(channel, "unit", "") or "s")
+
+
+def _fits(raster: Raster, request: Request) -> tuple[int, int, int]:
+    asked = sum(name in raster.places for name in request.columns)
+    return asked, len(raster.places), raster.times.size
+
+
+def _found(rasters: Sequence[Raster], request: Request) -> dict[str, tuple[Raster, Place]]:
+    """Return where the channels that are asked for are."""
+    places = {name: (raster, place) for raster in rasters for name, place in raster.places.items()}
+    return {name: places[name] for name in request.columns if name in places}
+
+
+def _brought_together(
+    path: Path, mdf: MDF, found: dict[str, tuple[Raster, Place]], request: Request, period_s: float
+) -> Table:
+    """Read the channels that are asked for, at one period."""
+    series: dict[str, Series] = {}
+    units: dict[str, str] = {}
+    for name, (raster, place) in found.items():
+        signal = _signal(mdf, place)
+        column = _valid(as_column(signal.samples), signal.invalidation_bits) if signal.samples.ndim == 1 else None
+        if column is None or Kind.of(column) is Kind.TEXT:
+            raise RecordingError(path, f"column {name}: expected a channel of numbers for resample_s, came another")
+        series[name] = Series(raster.times.astype(np.float64), column.astype(np.float64), name in request.held)
+        units[name] = str(signal.unit or "")
+    time, columns, remarks = resampled(path, series, period_s)
+    master = next(iter(found.values()))[0].master
+    units[master] = "s"
+    said = {name: unit for name, unit in units.items() if unit}
+    return Table(path, {master: time, **columns}, said, foreign_metadata(mdf), remarks=tuple(remarks), master=master)
+
+
+def _signal(mdf: MDF, place: Place) -> Any:
+    return mdf.get(group=place.group, index=place.index, ignore_invalidation_bits=True)  # else it drops rows
 
 
 def _valid(column: Column, invalid: Column | None) -> Column:
@@ -91,12 +221,3 @@ def _valid(column: Column, invalid: Column | None) -> Column:
     if invalid is None or not np.any(invalid) or Kind.of(column) is Kind.TEXT:
         return column
     return np.where(np.asarray(invalid, dtype=np.bool_), np.nan, column.astype(np.float64))
-
-
-def _names(mdf: MDF, groups: Sequence[int]) -> list[str]:
-    return [
-        str(channel.name)
-        for number in groups
-        for index, channel in enumerate(channels_of(mdf, number))
-        if index != mdf.masters_db.get(number)
-    ]

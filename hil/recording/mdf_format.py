@@ -22,10 +22,10 @@ from hil import __version__
 from hil.recording import columns
 from hil.recording.checksum import RIG_TEXT
 from hil.recording.description import description_of
-from hil.recording.format_hints import FormatHints
 from hil.recording.kinds import Column, Kind
 from hil.recording.mdf_file import IDENTIFICATION_BYTES, opened, require_mdf
-from hil.recording.mdf_parse import DESCRIPTION, parse, parse_metadata
+from hil.recording.mdf_parse import DESCRIPTION, parse, parse_all, parse_metadata
+from hil.recording.request import Request
 from hil.recording.table import Table
 
 if TYPE_CHECKING:
@@ -42,8 +42,8 @@ LONGEST_PROPERTY = 200
 """Characters of a value that still stands in the file's comment; longer ones are in the attachments only."""
 
 
-def read(path: Path, hints: FormatHints) -> Table:
-    """Read an MDF recording; hints are for text formats and play no part.
+def read(path: Path, request: Request) -> Table:
+    """Read an MDF recording.
 
     Raises
     ------
@@ -52,7 +52,20 @@ def read(path: Path, hints: FormatHints) -> Table:
     """
     _require_mdf(path)
     with opened(path) as mdf:
-        return parse(path, mdf)
+        return parse(path, mdf, request)
+
+
+def read_all(path: Path, request: Request) -> list[Table]:
+    """Read an MDF recording, a table for each of its times.
+
+    Raises
+    ------
+    RecordingError
+        As `read`.
+    """
+    _require_mdf(path)
+    with opened(path) as mdf:
+        return parse_all(path, mdf, request)
 
 
 def read_metadata(path: Path) -> Mapping[str, str]:

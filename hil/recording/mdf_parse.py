@@ -12,7 +12,8 @@ import numpy as np
 from hil.recording.description import described_table, metadata_of
 from hil.recording.kinds import Column, Kind, as_column
 from hil.recording.mdf_file import channels_of, is_unfinished
-from hil.recording.mdf_foreign import foreign_metadata, foreign_table
+from hil.recording.mdf_foreign import foreign_metadata, foreign_table, foreign_tables
+from hil.recording.request import Request
 from hil.recording.table import Table
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ DESCRIPTION = "recording.json"
 FINALISED = "its writer never finished it: it was finalised in a copy and read from there, the file stays as it is"
 
 
-def parse(path: Path, mdf: MDF) -> Table:
+def parse(path: Path, mdf: MDF, request: Request) -> Table:
     """Read a file's content.
 
     Raises
@@ -32,11 +33,17 @@ def parse(path: Path, mdf: MDF) -> Table:
         If its description is damaged, or it holds no channel with a time.
     """
     text = _description(mdf)
-    table = foreign_table(path, mdf) if text is None else _own(path, mdf, text)
+    table = foreign_table(path, mdf, request) if text is None else _own(path, mdf, text)
     # The columns become plain arrays of their own, not views into the file.
     columns = {name: column.copy() for name, column in table.columns.items()}
     remarks = (*table.remarks, FINALISED) if is_unfinished(path) else table.remarks
     return replace(table, columns=columns, remarks=remarks)
+
+
+def parse_all(path: Path, mdf: MDF, request: Request) -> list[Table]:
+    """Read a file's content, a table for each of its times; see `parse`."""
+    text = _description(mdf)
+    return foreign_tables(path, mdf, request) if text is None else [_own(path, mdf, text)]
 
 
 def parse_metadata(path: Path, mdf: MDF) -> Mapping[str, str]:
@@ -46,6 +53,8 @@ def parse_metadata(path: Path, mdf: MDF) -> Mapping[str, str]:
 
 
 def _description(mdf: MDF) -> str | None:
+    if mdf.version < "4":  # MDF 3 has none
+        return None
     for number, attachment in enumerate(getattr(mdf, "attachments", [])):
         if str(attachment.file_name) == DESCRIPTION:
             content: Any = mdf.extract_attachment(number)[0]

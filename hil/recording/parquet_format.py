@@ -13,8 +13,8 @@ import pyarrow.parquet
 from hil.errors import RecordingError
 from hil.recording.bounds import require_cells, require_columns
 from hil.recording.damaged import damaged
-from hil.recording.format_hints import FormatHints
 from hil.recording.kinds import Column, as_column, as_text
+from hil.recording.request import Request
 from hil.recording.table import Table
 
 UNIT_KEY = b"unit"
@@ -26,8 +26,8 @@ FOREIGN_KEYS = frozenset({b"pandas", b"ARROW:schema"})
 """Metadata other programs put there for themselves."""
 
 
-def read(path: Path, hints: FormatHints) -> Table:
-    """Read a Parquet recording; hints are for text formats and play no part.
+def read(path: Path, request: Request) -> Table:
+    """Read a Parquet recording.
 
     Raises
     ------

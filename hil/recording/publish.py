@@ -15,8 +15,8 @@ from pathlib import Path
 from hil.errors import RecordingError
 from hil.recording.checksum import CHECKSUMS, sealed
 from hil.recording.differences import losses
-from hil.recording.format_hints import FormatHints
 from hil.recording.formats import FORMATS, Format, writer_for
+from hil.recording.request import Request
 from hil.recording.table import Table
 
 
@@ -54,7 +54,7 @@ def write_table(
         """Write, and read what was written."""
         try:
             write(sealed(changed(content, path=path)), part)
-            return form.read(part, FormatHints())
+            return form.read(part, Request())
         except RecordingError as error:  # it names the part file, which nobody asked for
             raise RecordingError(path, *error.problems) from error
 

@@ -7,12 +7,16 @@ from pathlib import Path
 
 from estimator.signals.record import Record
 from hil.errors import InputError, RecordingError, UsageError
-from hil.recording.signals import read_record
+from hil.recording.signals import Tell, read_record
 from hil.recording.signals_config import SignalsConfig
 
 
 def read_records(
-    paths: Sequence[Path], signals: SignalsConfig | None = None, on_bench: bool = False
+    paths: Sequence[Path],
+    signals: SignalsConfig | None = None,
+    on_bench: bool = False,
+    dbc: Path | None = None,
+    tell: Tell | None = None,
 ) -> tuple[Record, ...]:
     """Read recordings that are to be explained by one model; see :func:`read_record` for the arguments.
 
@@ -31,7 +35,7 @@ def read_records(
     errors: list[RecordingError] = []
     for path in paths:
         try:
-            records.append(read_record(path, signals, on_bench))
+            records.append(read_record(path, signals, on_bench, dbc, tell))
         except RecordingError as error:
             errors.append(error)
     if len(errors) == 1:

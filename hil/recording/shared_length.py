@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from hil.recording.kinds import Column
 
 
-def columns_of_shared_length(vectors: Mapping[str, Column]) -> tuple[dict[str, Column], tuple[str, ...]]:
-    """Choose the vectors of the length that most of them share; the longest, where two are equally frequent.
+def columns_of_shared_length(
+    vectors: Mapping[str, Column], wanted: Iterable[str] = ()
+) -> tuple[dict[str, Column], tuple[str, ...]]:
+    """Choose the vectors of the length that most of those wanted share, or most of all.
+
+    The longest, where two lengths are equally frequent.
 
     Returns
     -------
@@ -18,7 +22,8 @@ def columns_of_shared_length(vectors: Mapping[str, Column]) -> tuple[dict[str, C
     tuple of str
         One remark for each that was left out.
     """
-    counts = Counter(vector.size for vector in vectors.values())
+    asked = [vectors[name] for name in wanted if name in vectors]
+    counts = Counter(vector.size for vector in asked or vectors.values())
     length = max(counts, key=lambda size: (counts[size], size), default=0)
     chosen = {name: vector for name, vector in vectors.items() if vector.size == length}
     return chosen, tuple(

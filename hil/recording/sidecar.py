@@ -27,11 +27,12 @@ UNITS_KEY, TYPES_KEY = "units", "types"
 
 @dataclass(frozen=True, slots=True)
 class Sidecar:
-    """What stands beside a CSV recording."""
+    """What stands beside a CSV recording; ``found`` tells whether a file of ours is there at all."""
 
     metadata: Mapping[str, str] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
     types: Mapping[str, Kind] = field(default_factory=dict)
+    found: bool = False
 
     @property
     def is_empty(self) -> bool:
@@ -44,15 +45,15 @@ def sidecar_of(recording: Path) -> Path:
     return recording.with_name(f"{recording.name}.json")
 
 
-def write_sidecar(recording: Path, said: Sidecar) -> None:
-    """Write what a recording says of itself; nothing where it says nothing.
+def write_sidecar(recording: Path, said: Sidecar, needed: bool = False) -> None:
+    """Write what a recording says of itself; nothing where it says nothing, unless it is needed all the same.
 
     Raises
     ------
     RecordingError
         If the disk does not take it.
     """
-    if said.is_empty:
+    if said.is_empty and not needed:
         return
     path = sidecar_of(recording)
     tables = {UNITS_KEY: dict(said.units), TYPES_KEY: {name: kind.value for name, kind in said.types.items()}}
@@ -96,7 +97,7 @@ def read_sidecar(recording: Path) -> Sidecar:
         raise RecordingError(
             path, f"expected the description of {recording.name}, came: {error}. Mend it, or move it away."
         ) from error
-    return Sidecar(_texts(content), _texts(content.get(UNITS_KEY)), types)
+    return Sidecar(_texts(content), _texts(content.get(UNITS_KEY)), types, found=True)
 
 
 def read_sidecar_metadata(recording: Path) -> Mapping[str, str]:

@@ -11,7 +11,7 @@ whoever wrote the model file, and no fault of the acquisition that a diagnosis c
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -22,7 +22,9 @@ from estimator.signals.record import OutputKind, Record
 from hil.errors import RecordingError
 from hil.recording import columns
 from hil.recording.formats import read_table
-from hil.recording.signals_config import MaskRange, SignalsConfig
+from hil.recording.resample import Series, resampled
+from hil.recording.scales import Role, scale_of, with_sign, wrapped_at
+from hil.recording.signals_config import MaskRange, OutputSignal, SignalsConfig, TimeSignal, TorqueSignal
 from hil.recording.table import FloatArray, Table
 from hil.recording.time_base import time_base
 
@@ -32,11 +34,24 @@ SMALLEST, GREATEST = 1e-15, 1e15
 SHORTEST_S, LONGEST_S = 1e-9, 1e6
 """Between them is a sampling period."""
 
+SAME_PERIOD = 1e-6
+"""Share by which the steps of a recording may differ from a period it is said to have."""
+
 FEWEST_SAMPLES = 10
 """A recording with fewer usable samples can't carry a constant load, an initial state and anything beside."""
 
 
-def read_record(path: Path | str, signals: SignalsConfig | None = None, on_bench: bool = False) -> Record:
+Tell = Callable[[str], None]
+"""Takes one line of what was recognised, left out or mended."""
+
+
+def read_record(
+    path: Path | str,
+    signals: SignalsConfig | None = None,
+    on_bench: bool = False,
+    dbc: Path | None = None,
+    tell: Tell | None = None,
+) -> Record:
     """Read a recording as the estimator takes it.
 
     Parameters
@@ -47,6 +62,10 @@ def read_record(path: Path | str, signals: SignalsConfig | None = None, on_bench
         Of the model file; the contract's columns without it.
     on_bench : bool
         Whether the model is a joint on a bench: the position is imposed, and the torque it takes is the output.
+    dbc : Path, optional
+        What the frames of a logged CAN bus mean.
+    tell : callable, optional
+        Told what was recognised in the file, and what was done to it.
 
     Returns
     -------
@@ -59,24 +78,32 @@ def read_record(path: Path | str, signals: SignalsConfig | None = None, on_bench
         If the file is at fault, with every fault of a kind, by name and line.
     """
     signals = signals or SignalsConfig()
-    record = to_record(read_table(path, signals.format), signals)
+    record = to_record(read_table(path, signals.request(dbc)), signals, tell)
     return under_imposed_motion(record) if on_bench else record
 
 
-def to_record(table: Table, signals: SignalsConfig) -> Record:
+def to_record(table: Table, signals: SignalsConfig, tell: Tell | None = None) -> Record:
     """Pick the signals out of a table; see :func:`read_record`."""
+    signals = signals.model_copy(update={"time": time_signal(table, signals.time)})
+    table = at_one_period(table, signals)
     torques = signals.torques()
     kind, output = signals.output()
-    named = [] if signals.time.column is None else [signals.time.column]
-    named += [torque.column for torque in torques] + [output.column] + [mask.column for mask in signals.mask]
-    numbers = table.numeric(named)
-    time_s, period_s = time_base(table, signals.time)
+    numbers = table.numeric([*([] if signals.time.column is None else [signals.time.column]), *signals.columns()])
+    time_s, period_s, remark = time_base(table, signals.time)
+    scales = [scale_of(table, torque.column, Role.TORQUE, torque.given_scale) for torque in torques]
+    scale = scale_of(table, output.column, Role(kind.value), output.given_scale)
+    signed: list[TorqueSignal | OutputSignal] = [*torques, output]
+    for signal in signed:
+        numbers[signal.column] = _signed(table, signal, numbers[signal.column])
+    if tell is not None:
+        for line in (*table.recognised, *remark, *_units_used(table, signals)):
+            tell(f"{table.path}: {line}")
     masks = {mask: _inside(numbers[mask.column], mask) for mask in signals.mask}
     flagged = _flagged(table, signals)
     read = np.column_stack([np.isfinite(numbers[torque.column]) & ~flagged for torque in torques])
     trusted = read & np.column_stack([_inside_own(numbers[torque.column], torque.column, masks) for torque in torques])
-    torque_nm = np.column_stack([numbers[torque.column] * torque.scale for torque in torques])
-    measured = numbers[output.column] * output.scale
+    torque_nm = np.column_stack([numbers[torque.column] * by for torque, by in zip(torques, scales, strict=True)])
+    measured = numbers[output.column] * scale
     okay = trusted.all(axis=1) & np.isfinite(measured) & np.logical_and.reduce([~flagged, *masks.values()])
     _require_sizes(
         table, [*((torque.column, torque_nm[:, k]) for k, torque in enumerate(torques)), (output.column, measured)]
@@ -94,6 +121,64 @@ def to_record(table: Table, signals: SignalsConfig) -> Record:
         location=output.at,
         torque_okay=None if read.all() else read,
         reference_nm=_reference(table, signals),
+    )
+
+
+def _signed(table: Table, signal: TorqueSignal | OutputSignal, values: FloatArray) -> FloatArray:
+    """Return a reading with its sign.
+
+    Raises
+    ------
+    RecordingError
+        If it was read without the sign it was stored with, and nobody has said so; with the line to write.
+    """
+    if signal.wraps_at is not None:
+        return with_sign(values, signal.wraps_at)
+    end = wrapped_at(values)
+    if end is not None:
+        raise RecordingError(
+            table.path,
+            f"column {signal.column}: expected a reading with a sign, came one that jumps between 0 and {end:g}: it "
+            f"was stored with a sign and read without. Write {{ column = {signal.column!r}, wraps_at = {end:g} }}.",
+        )
+    return values
+
+
+def _units_used(table: Table, signals: SignalsConfig) -> Iterator[str]:
+    """Say which columns were brought to SI units by the units that the file gives them."""
+    kind, output = signals.output()
+    roles = [*((torque, Role.TORQUE) for torque in signals.torques()), (output, Role(kind.value))]
+    for signal, role in roles:
+        factor = scale_of(table, signal.column, role, signal.given_scale)
+        if signal.given_scale is None and factor != 1.0:
+            yield f"{signal.column}: read in {table.units[signal.column]}, times {factor:.6g}"
+
+
+def time_signal(table: Table, time: TimeSignal) -> TimeSignal:
+    """Return the time to read: the file's own master channel, where it has none of the name given."""
+    if time.column is None or time.column in table.columns or table.master is None:
+        return time
+    return time.model_copy(update={"column": table.master})
+
+
+def at_one_period(table: Table, signals: SignalsConfig) -> Table:
+    """Bring a table of uneven rate to the period that was asked for; one that has it already stays as it is."""
+    period_s, column = signals.resample_s, signals.time.column
+    if period_s is None or column is None:
+        return table
+    numbers = table.numeric([column, *signals.columns()])
+    time = numbers.pop(column) * scale_of(table, column, Role.TIME, signals.time.given_scale)
+    if time.size > 1 and np.allclose(np.diff(time), period_s, rtol=SAME_PERIOD, atol=0.0):
+        return table
+    held = signals.held()
+    series = {name: Series(time, values, name in held) for name, values in numbers.items()}
+    raster, columns, remarks = resampled(table.path, series, period_s)
+    return replace(
+        table,
+        columns={column: raster, **columns},
+        units={**table.units, column: "s"},
+        remarks=(*table.remarks, *remarks),
+        first_line=None,
     )
 
 

@@ -5,6 +5,7 @@ A key left out means the contract's: ``time_s``, ``torque_m1_nm`` and ``torque_m
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -13,6 +14,7 @@ from estimator.signals.record import Location, OutputKind
 from hil.config.problems import Fault, refuse
 from hil.recording import columns
 from hil.recording.format_hints import FormatHints
+from hil.recording.request import Request
 
 Column = Annotated[str, Field(min_length=1)]
 
@@ -22,15 +24,32 @@ class _Strict(BaseModel):
 
 
 class _Scaled(_Strict):
-    """A column times ``scale`` is the SI quantity, reflected to the motor shaft."""
+    """A column times ``scale`` is the SI quantity, reflected to the motor shaft.
+
+    Attributes
+    ----------
+    scale
+        Left out, the unit that the file gives the column counts; 1 where it gives none.
+    wraps_at
+        Where the reading begins anew at 0: values from half of it on are negative. In the file's own unit.
+    hold
+        Whether a value counts until the next where the column is brought to another period.
+    """
 
     column: Column
     scale: float = 1.0
+    wraps_at: float | None = Field(default=None, gt=0)
+    hold: bool = False
 
     @model_validator(mode="after")
     def _scale_is_not_zero(self) -> Self:
         refuse([Fault("scale", "a number other than 0", self.scale)] if self.scale == 0 else [])
         return self
+
+    @property
+    def given_scale(self) -> float | None:
+        """The scale, where it was given."""
+        return self.scale if "scale" in self.model_fields_set else None
 
 
 class TimeSignal(_Strict):
@@ -39,6 +58,11 @@ class TimeSignal(_Strict):
     column: Column | None = None
     scale: float = Field(default=1.0, gt=0)
     sample_time_s: float | None = Field(default=None, gt=0)
+
+    @property
+    def given_scale(self) -> float | None:
+        """The scale, where it was given."""
+        return self.scale if "scale" in self.model_fields_set else None
 
     @model_validator(mode="after")
     def _is_one_of_two(self) -> Self:
@@ -86,6 +110,10 @@ class SignalsConfig(_Strict):
         motion, and the output is ``force`` or, without it, the sum of ``torque``.
     mask
         Rows that count only inside these ranges.
+    format
+        How a text file is written, where that can't be recognised.
+    resample_s
+        Period to which columns of different or uneven rates are brought [s]; nothing is without it.
     """
 
     time: TimeSignal = TimeSignal(column=columns.TIME)
@@ -95,6 +123,7 @@ class SignalsConfig(_Strict):
     force: OutputSignal | None = None
     mask: list[MaskRange] = []
     format: FormatHints = FormatHints()
+    resample_s: float | None = Field(default=None, gt=0)
 
     @model_validator(mode="after")
     def _has_one_output(self) -> Self:
@@ -130,10 +159,26 @@ class SignalsConfig(_Strict):
     def torques(self) -> list[TorqueSignal]:
         """Return the inputs, the contract's where none are named; on a bench, what is measured."""
         if self.names_bench and self.force is not None:
-            return [TorqueSignal(column=self.force.column, scale=self.force.scale)]
+            return [TorqueSignal(**self.force.model_dump(exclude={"at"}, exclude_unset=True))]
         own = [TorqueSignal(column=name) for name in (columns.TORQUE_M1, columns.TORQUE_M2)]
         return self.torque or own
 
     def output(self) -> tuple[OutputKind, OutputSignal]:
         """Return kind and column of the output, the contract's motor speed where none is named."""
         return next(iter(self._outputs()), (OutputKind.SPEED, OutputSignal(column=columns.SPEED)))
+
+    def columns(self) -> list[str]:
+        """Return the names of all columns that are needed, but for the time."""
+        named = [*(torque.column for torque in self.torques()), self.output()[1].column]
+        return list(dict.fromkeys([*named, *(mask.column for mask in self.mask)]))
+
+    def held(self) -> list[str]:
+        """Return the names of those whose last value counts until the next: as it is said, and what only masks."""
+        signals = [*self.torques(), self.output()[1]]
+        roles = {signal.column for signal in signals}
+        return [*(signal.column for signal in signals if signal.hold), *(set(self.columns()) - roles)]
+
+    def request(self, dbc: Path | None = None) -> Request:
+        """Return what a reader has to know."""
+        columns, held = tuple(self.columns()), tuple(self.held())
+        return Request(self.format, columns, self.time.column, held, self.resample_s, dbc)

@@ -22,6 +22,9 @@ FloatArray = NDArray[np.float64]
 LARGEST = 1e30
 """Magnitude beyond which a number is no measurement, in whatever unit; its fourth power still is a float."""
 
+LEFT_OUT = ": left out, "
+"""What every remark on a column that was not read has behind the column's name."""
+
 LONGEST_CELL = 40
 """Characters of a wrong cell that a message shows."""
 
@@ -43,7 +46,13 @@ class Table:
     first_line : int or None
         Line of the first row in a text file; None where rows have no lines.
     remarks : tuple of str
-        What its reader had to leave out or mend, one line each.
+        What its reader recognised, had to leave out or mend, one line each.
+    skipped : tuple of int
+        Lines after the first row that are no rows, ascending.
+    master : str or None
+        The column that the file itself calls its time.
+    elsewhere : mapping of name to str
+        Channels of the file that are no columns here by that name, and what to say where one is asked for.
 
     Raises
     ------
@@ -57,6 +66,9 @@ class Table:
     metadata: Mapping[str, str] = field(default_factory=dict)
     first_line: int | None = None
     remarks: tuple[str, ...] = ()
+    skipped: tuple[int, ...] = ()
+    master: str | None = None
+    elsewhere: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         lengths = {name: column.shape[0] for name, column in self.columns.items()}
@@ -74,9 +86,14 @@ class Table:
         """Number of rows, N."""
         return int(next(iter(self.columns.values())).shape[0])
 
+    @property
+    def recognised(self) -> tuple[str, ...]:
+        """The remarks but for those on columns that were left out."""
+        return tuple(remark for remark in self.remarks if LEFT_OUT not in remark)
+
     def place(self, row: int) -> str:
         """Name a row (counted from 0) for people: by line of a text file, else by row number from 1."""
-        return f"row {row + 1}" if self.first_line is None else f"line {row + self.first_line}"
+        return f"row {row + 1}" if self.first_line is None else f"line {line_of(row, self.first_line, self.skipped)}"
 
     def numeric(self, names: Iterable[str]) -> dict[str, FloatArray]:
         """Return columns as numbers; NaN marks a missing value.
@@ -96,12 +113,14 @@ class Table:
         problems = [problem for name in wanted if (problem := self._problem(name))]
         if problems:
             raise RecordingError(self.path, *problems)
-        return {name: self.columns[name].astype(np.float64) for name in wanted}
+        return {name: _numbers(self.columns[name]) for name in wanted}
 
     def _problem(self, name: str) -> str | None:
         column = self.columns.get(name)
         if column is None:
-            listed = ", ".join(self.columns)
+            if name in self.elsewhere:
+                return self.elsewhere[name]
+            listed = ", ".join([*self.columns, *self.elsewhere])
             return (
                 f"column {name}: missing, the file has {listed}. "
                 "For a foreign recording, name its columns in [signals] of the model file."
@@ -110,8 +129,24 @@ class Table:
         if row is None:
             return None
         cell = str(column[row])
-        shown = repr(cell[:LONGEST_CELL]) if cell else "an empty cell"
+        shown = repr(cell[:LONGEST_CELL])
         return f"{self.place(row)}, column {name}: expected a finite number or nan, came {shown}{_hint(cell)}"
+
+
+def line_of(row: int, first_line: int, skipped: tuple[int, ...]) -> int:
+    """Return the line of a row, where some lines after the first row are none."""
+    line = row + first_line
+    for other in skipped:
+        line += other <= line
+    return line
+
+
+def _numbers(column: Column) -> FloatArray:
+    """Return a column as numbers; an empty text is a missing value."""
+    if column.dtype == object:
+        return np.array([float(cell) if cell else np.nan for cell in column.tolist()], dtype=np.float64)
+    numbers: FloatArray = column.astype(np.float64)
+    return numbers
 
 
 def _first_bad(column: Column) -> int | None:
@@ -124,7 +159,7 @@ def _first_bad(column: Column) -> int | None:
 
 def _is_measurement(cell: str) -> bool:
     try:
-        return not abs(float(cell)) > LARGEST
+        return not cell or not abs(float(cell)) > LARGEST
     except ValueError:
         return False
 

@@ -50,12 +50,26 @@ def receive(stream: IO[bytes]) -> tuple[Document, dict[str, Column]]:
 
 def described(table: Table) -> Document:
     """Return all of a table but its columns and path."""
-    return {"units": dict(table.units), "metadata": dict(table.metadata), "remarks": list(table.remarks)}
+    return {
+        "units": dict(table.units),
+        "metadata": dict(table.metadata),
+        "remarks": list(table.remarks),
+        "master": table.master,
+        "elsewhere": dict(table.elsewhere),
+    }
 
 
 def table_of(path: Path, document: Document, columns: Mapping[str, Column]) -> Table:
     """Return the table that `described` was made of."""
-    return Table(path, columns, document["units"], document["metadata"], remarks=tuple(document["remarks"]))
+    return Table(
+        path,
+        columns,
+        document["units"],
+        document["metadata"],
+        remarks=tuple(document["remarks"]),
+        master=document["master"],
+        elsewhere=document["elsewhere"],
+    )
 
 
 def _column(stream: IO[bytes], kind: Kind, size: int) -> Column:

@@ -40,7 +40,7 @@ BROKEN: dict[str, tuple[Callable[[Lines], Lines], str]] = {
         "line 1: column torque_m1_nm comes twice",
     ),
     "text": (once(1, "abc"), "line 51, column torque_m1_nm: expected a finite number or nan, came 'abc'"),
-    "nothing": (once(3, ""), "line 51, column speed_rad_s: expected a finite number or nan, came an empty cell"),
+    "no time": (once(0, ""), "line 51, column time_s: expected a time greater than in the row before"),
     "infinite": (once(3, "inf"), "line 51, column speed_rad_s: expected a finite number or nan, came 'inf'"),
     "decimal comma": (once(3, '"1,5"'), "came '1,5'. Write decimals with a point"),
     "no measurement": (once(3, "1e200"), "came '1e+200'. Beyond 1e+30 nothing is a measurement"),
@@ -67,14 +67,18 @@ def test_refused_by_line_and_nothing_is_written(refused: Refused, drive: Path, f
 @pytest.mark.parametrize(
     ("name", "content", "said"),
     [
-        ("run.csv", b"\xff\xfet\0i\0", "line 1: expected utf-8 text, came byte 0xff"),
+        ("run.csv", b"\xff\xfet\0i\0", "the file is empty or truncated"),
         ("run.csv", "time_s,caf\u00e9\n".encode("latin-1"), "line 1: expected utf-8 text, came byte 0xe9"),
         ("run.csv", bytes(100), "the file is empty or truncated"),
         ("run.parquet", b"time_s,speed_rad_s\n", "a damaged or truncated one"),
         ("run.parquet", b"", "a damaged or truncated one"),
         ("run.mat", b"time_s,speed_rad_s\n", "a damaged or truncated one"),
-        ("run.xlsx", b"PK", "expected a recording (.csv, .parquet, .mf4, .mdf, .h5, .hdf5, .mat), came '.xlsx'"),
-        ("run", b"", "expected a recording (.csv, .parquet, .mf4, .mdf, .h5, .hdf5, .mat), came ''"),
+        (
+            "run.xlsx",
+            b"PK",
+            "expected a recording (.csv, .txt, .tsv, .parquet, .mf4, .mdf, .dat, .h5, .hdf5, .mat), came '.xlsx'",
+        ),
+        ("run", b"", "expected a recording (.csv, .txt, .tsv, .parquet, .mf4, .mdf, .dat, .h5, .hdf5, .mat), came ''"),
     ],
 )
 def test_what_is_no_recording_is_refused(

@@ -66,3 +66,14 @@ def test_no_word_of_a_help_is_taken_for_markup(
 
 def test_a_list_in_a_help_stays_a_list() -> None:
     assert flowing("First\nof it.\n\nThen\nthis:\n\n  one\n  two\n") == "First of it.\n\nThen this:\n\n  one\n  two"
+
+
+@pytest.mark.parametrize("name", [name for name, _ in EVERY])
+def test_h_is_help(capsys: pytest.CaptureFixture[str], name: str) -> None:
+    assert run([*name.split(), "-h"]) == 0
+    assert f"Usage: hil {name}" in capsys.readouterr().out
+
+
+def test_h_alone_is_the_overview(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["-h"]) == 0
+    assert "Commands:" in capsys.readouterr().out

@@ -363,3 +363,18 @@ def test_a_tolerance_of_an_effect_is_a_share_below_one(tmp_path: Path, tolerance
     (tmp_path / "m.toml").write_text(text)
     with pytest.raises(ModelFileError, match=r"coulomb_friction_motor\.friction_nm\.tolerance"):
         read_model(tmp_path / "m.toml")
+
+
+def test_every_key_of_signals_is_written_as_it_was_read(tmp_path: Path) -> None:
+    text = """
+    [signals]
+    time = { column = "t", scale = 0.001 }
+    torque = [ { column = "a", wraps_at = 6553.6, hold = true }, { column = "data[:, 3]" } ]
+    speed = { column = "n [1/min]", at = "load" }
+    mask = [ { column = "gear", min = 1.0 } ]
+    resample_s = 0.01
+    format = { delimiter = ";", decimal = ",", encoding = "latin-1", header_line = 1, units_line = 2, comment = "#" }
+    """
+    file = read_model(write(tmp_path, ONE_MASS + text))
+    write_model(tmp_path / "again.toml", file.model, file.signals)
+    assert read_model(tmp_path / "again.toml").signals == file.signals

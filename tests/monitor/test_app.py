@@ -11,10 +11,12 @@ from textual.pilot import Pilot
 
 from hil.monitor.app import MonitorApp
 from hil.monitor.dialogs import Choice
+from hil.monitor.layout import PAGES
 from hil.monitor.messages import Began, Ended, Mark, Quit, Ready, Reset, Start, Stop
 from hil.monitor.snapshot import Activity
 from hil.monitor.state import LiveState
 from tests.monitor.fake_source import PERIOD_S, FakeSource
+from tests.monitor.test_panels import snapshot
 
 CHOICES = (Choice("cruise", "holds a speed"), Choice("tip", "steps the torque"))
 
@@ -177,3 +179,17 @@ def test_a_picture_is_drawn_and_the_view_ends(tmp_path: Path) -> None:
     drawn = picture.read_text(encoding="utf-8")
     assert "torque" in drawn
     assert "url(" not in drawn.replace("url(#", "")  # nothing from the network
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_the_view_survives_every_resize_while_a_model_is_shown(page: str) -> None:
+    async def script(pilot: Pilot[None], source: FakeSource, app: MonitorApp) -> None:
+        app._state.snapshot = lambda heard_s=0.0: snapshot()  # type: ignore[method-assign]
+        await pilot.press(str(PAGES.index(page) + 1))
+        for size in ((200, 50), (60, 20), (200, 50), (1, 1), (130, 40), (80, 2), (3, 60), (80, 24)):
+            await pilot.resize_terminal(*size)
+            app._draw()
+            await pilot.pause()
+            assert app.is_running
+
+    play(script)

@@ -13,7 +13,7 @@ from estimator.identification.tracking.alarm import Alarm, Level
 from estimator.identification.tracking.state import TrackingState
 from hil.monitor import bus_panels, head_panels, log_panel, model_panels, signal_panels
 from hil.monitor.messages import Began, Kind, NodeHealth, Notice, PlcHealth, Ready, Samples
-from hil.monitor.panel import Draw
+from hil.monitor.panel import LEAST_WIDTH, Draw, drawn
 from hil.monitor.snapshot import Activity, History, Model, Snapshot
 from hil.monitor.state import LiveState
 from hil.rig.experiments.base import Phase
@@ -99,6 +99,17 @@ def test_a_panel_fits_every_size(draw: Draw) -> None:
         lines = draw(shown, width, height)
         assert len(lines) <= max(height, 2)
         assert all(len(line) <= width for line in lines), (width, height, lines)
+
+
+@pytest.mark.parametrize("draw", DRAWN)
+def test_a_panel_draws_at_every_size_that_a_terminal_passes_through(draw: Draw) -> None:
+    shown = snapshot()
+    for width in (*range(LEAST_WIDTH + 30), 80, 200):
+        for height in (*range(12), 50):
+            lines = drawn(draw, shown, width, height)
+            assert len(lines) <= height
+            assert all(len(line) <= width for line in lines)
+    assert drawn(draw, shown, LEAST_WIDTH, 1)
 
 
 @pytest.mark.parametrize("draw", DRAWN)

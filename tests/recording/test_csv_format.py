@@ -10,12 +10,13 @@ import pytest
 from hil.errors import RecordingError
 from hil.recording import Table, csv_format, read_table, write_table
 from hil.recording.format_hints import FormatHints
+from hil.recording.request import Request
 
 
 def read(tmp_path: Path, content: str | bytes, hints: FormatHints | None = None) -> Table:
     path = tmp_path / "run.csv"
     path.write_bytes(content.encode() if isinstance(content, str) else content)
-    return csv_format.read(path, hints or FormatHints())
+    return csv_format.read(path, Request(hints or FormatHints()))
 
 
 def test_integers_floats_and_text_are_told_apart_by_their_cells(tmp_path: Path) -> None:
@@ -65,9 +66,7 @@ def test_spaces_around_names_and_cells_do_not_count(tmp_path: Path) -> None:
     [
         ("", "the file is empty or truncated"),
         ("\n\n", "the file is empty or truncated"),
-        ("\n1,2\n", "line 1: cell 1 of the header is empty"),
         ("a,,c\n1,2,3\n", "line 1: cell 2 of the header is empty"),
-        ("a,b,a\n1,2,3\n", "line 1: column a comes twice"),
         ("a,b\n", "the file is empty or truncated"),
         ("a,b", "the file is empty or truncated"),
         ("a,b\n1,2\n3,4,5\n6,7\n", "line 3: expected 2 cells as in the header, came 3; mend that line"),
@@ -75,11 +74,11 @@ def test_spaces_around_names_and_cells_do_not_count(tmp_path: Path) -> None:
         ('a,b\n1,2\n3,"4\n5,6\n', "line 3: expected every quoted cell to end on its line"),
         ('a,b\n1,"2\n3"\n5,6\n', "line 2: expected every quoted cell to end on its line"),
         (b"a,b\n1,2\n3,\xe94\n", "line 3: expected utf-8 text, came byte 0xe9"),
-        (b"\xff\xfea\x00", "line 1: expected utf-8 text, came byte 0xff"),
+        (b"\xff\xfea\x00b", "expected utf-16 text"),
         ("a,b\n1," + "2" * 9_000_000 + "\n", "line 2: expected 2 cells as in the header, came 1"),
-        ("x" * 200_000 + "\n1\n", "line 1: cell 1 of the header is empty"),
+        ("a,b\n1,2\n\n3,4\n", "line 3: expected a row, came an empty line"),
     ],
-    ids=range(15),
+    ids=range(13),
 )
 def test_a_file_that_is_no_table_is_refused_by_line(tmp_path: Path, content: str | bytes, said: str) -> None:
     with pytest.raises(RecordingError) as refusal:
@@ -93,18 +92,13 @@ def test_a_wrong_encoding_without_a_place_is_refused(tmp_path: Path) -> None:
         read(tmp_path, b"a", FormatHints(encoding="utf-16"))
 
 
-@pytest.mark.parametrize("cell", ["abc", "", "1,5", "inf", "1e999", "--"])
+@pytest.mark.parametrize("cell", ["abc", "1,5", "inf", "1e999", "--"])
 def test_a_cell_that_is_no_number_is_refused_by_line_and_column(tmp_path: Path, cell: str) -> None:
     table = read(tmp_path, f"a;b\n1;2.0\n3;{cell}\n5;6\n")
     with pytest.raises(RecordingError) as refusal:
         table.numeric(["a", "b"])
     assert "line 3, column b: expected a finite number or nan, came" in str(refusal.value)
-    assert (cell or "an empty cell") in str(refusal.value) or "inf" in str(refusal.value)
-
-
-def test_an_empty_line_is_a_row_without_numbers(tmp_path: Path) -> None:
-    with pytest.raises(RecordingError, match=r"line 3, column a: .* an empty cell"):
-        read(tmp_path, "a,b\n1,2\n\n3,4\n").numeric(["a"])
+    assert cell in str(refusal.value) or "inf" in str(refusal.value)
 
 
 def test_every_faulty_column_is_named_at_once(tmp_path: Path) -> None:
@@ -121,7 +115,7 @@ def test_a_column_nobody_asks_for_may_be_text(tmp_path: Path) -> None:
 def test_text_is_quoted_where_it_must_be(tmp_path: Path) -> None:
     texts = ["a,b", 'say "go"', "plain"]
     csv_format.write(Table(tmp_path, {"x,y": np.array(texts, dtype=object)}), tmp_path / "run.csv")
-    assert csv_format.read(tmp_path / "run.csv", FormatHints()).columns["x,y"].tolist() == texts
+    assert csv_format.read(tmp_path / "run.csv", Request()).columns["x,y"].tolist() == texts
 
 
 def test_text_with_a_line_break_is_not_written(tmp_path: Path) -> None:

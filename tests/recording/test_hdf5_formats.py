@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import h5py
@@ -107,7 +108,7 @@ def test_a_v73_file_of_matlab_is_read(theirs: Path) -> None:
     assert sorted(table.columns) == ["on", "qm", "t", "vir"]
     assert table.columns["on"].dtype == np.bool_
     assert dict(table.metadata) == {"gain": "35.15", "note": "lap 2"} == dict(read_metadata(theirs))
-    assert sorted(remark.split(":")[0] for remark in table.remarks) == ["matrix", "other"]
+    assert {re.split("[:(]", remark)[0] for remark in table.remarks} == {"matrix", "other"}
 
 
 def test_a_v73_file_is_read_through_signals_of_a_model_file(theirs: Path) -> None:
@@ -133,7 +134,7 @@ def test_an_hdf5_file_of_another_program_is_read(tmp_path: Path) -> None:
     assert sorted(table.columns) == ["drive/speed", "log/count", "log/time", "words"]
     assert dict(table.units) == {"drive/speed": "rad/s"}
     assert dict(table.metadata) == {"vehicle": "bus 17"}
-    assert sorted(remark.split(":")[0] for remark in table.remarks) == ["picture", "short"]
+    assert {re.split("[:(]", remark)[0] for remark in table.remarks} == {"picture", "short"}
 
 
 @pytest.mark.parametrize("suffix", [".h5", ".mat"])

@@ -84,7 +84,7 @@ def theirs(tmp_path: Path) -> Path:
 
 def test_of_other_programs_the_groups_of_one_time_are_the_recording(theirs: Path) -> None:
     table = read_table(theirs)
-    assert list(table.columns) == ["time", "Motor Torque", "gear", "speed", "clutch"]
+    assert list(table.columns) == ["time", "Motor Torque", "gear", "speed", "clutch", "gear (2)"]
     assert table.columns["gear"].dtype == np.int64
     assert np.flatnonzero(np.isnan(table.columns["speed"])).tolist() == [1, 6, 11, 16]
     assert table.units["Motor Torque"] == "Nm"

@@ -78,7 +78,7 @@ def test_mat_vectors_of_one_length_are_columns_and_scalars_metadata(tmp_path: Pa
         },
     )
     table = read_table(tmp_path / "drive.mat")
-    assert sorted(table.columns) == ["count", "t", "v"]
+    assert sorted(table.columns) == ["count", *(f"matrix(:,{k})" for k in range(1, 6)), "t", "v"]
     assert table.columns["t"].tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
     assert table.columns["count"].dtype == np.int64
     assert dict(table.metadata) == {"gain": "35.15"}
@@ -112,7 +112,7 @@ def test_a_folder_is_no_recording(tmp_path: Path) -> None:
 
 
 def test_an_unknown_suffix_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(RecordingError, match=r"\.csv, \.parquet, \.mf4.*came '\.xlsx'"):
+    with pytest.raises(RecordingError, match=r"\.csv, \.txt, \.tsv, \.parquet, \.mf4.*came '\.xlsx'"):
         read_table(tmp_path / "run.xlsx")
 
 

@@ -89,6 +89,20 @@ def fitted_inertia(record: Record, line: DrivelineModel, grid: Grid | None) -> I
     return found if found.share >= BODY_TELLS else None
 
 
+def both_bands_agree(record: Record, line: DrivelineModel, grid: Grid | None, ratio: float) -> bool:
+    """Tell whether both bands are off by about the ratio, where both are seen; True where they are not.
+
+    A factor between units moves both alike; a load that is heavier moves the lower one alone.
+    """
+    first_hz = float(natural_frequencies_rad_s(line.values())[0]) / (2.0 * math.pi)
+    if grid is None or not 0.0 < ABOVE[0] * first_hz < 0.5 / record.sample_time_s:
+        return True
+    bands = [by_band(record, line, grid, low * first_hz, high * first_hz) for low, high in (BELOW, ABOVE)]
+    if min(band.share for band in bands) < BANDS_TELL:
+        return True
+    return all(band.ratio > 0.0 and abs(math.log(band.ratio / ratio)) <= abs(0.5 * math.log(ratio)) for band in bands)
+
+
 def by_band(record: Record, line: DrivelineModel, grid: Grid, low_hz: float, high_hz: float) -> Inertia:
     """Return the ratio of inertias by which the nominal answer to the torque is too large in a band."""
     model = driven(record, line, grid, 0.5 * low_hz, 2.0 * high_hz)

@@ -13,10 +13,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimator.diagnosis.preconditions.factors import known_factors
-from estimator.diagnosis.preconditions.inertia import Inertia, fitted_inertia
-from estimator.errors import BadModel, Implausible
-from estimator.physics.grid import grid_for
+from estimator.diagnosis.preconditions.factors import close_factors
+from estimator.diagnosis.preconditions.inertia import Inertia, both_bands_agree, fitted_inertia
+from estimator.errors import BadModel, Cure, Implausible
+from estimator.physics.grid import Grid, grid_for
 from estimator.physics.model import DrivelineModel, Motion, parameter_unit
 from estimator.signals.record import FloatArray, OutputKind, Record
 
@@ -29,6 +29,29 @@ SLOWEST_S = 0.5
 
 CLEARLY = 0.5
 """Share of the unexplained motion that a torque turned round may leave: a mere factor is the simpler answer."""
+
+BETTER = 0.75
+"""The same where the inertia is inside its tolerance with that torque turned round, and outside as it was read."""
+
+SWAPPED_TELLS = 0.9
+"""Share of the motion that must follow from the torque where two columns are swapped back."""
+
+MARGIN = 1.15
+"""Factor beyond an inertia's tolerance from which on torques in whole numbers are taken for per mille."""
+
+FEWEST_VALUES = 5
+"""Different whole numbers at least: fewer are levels that were asked for."""
+
+WHOLE = 1e-6
+"""How far a whole number may be off one."""
+
+PER_MILLE, PER_CENT = 1e-3, 1e-2
+
+MOST_PER_MILLE = 50.0
+"""Ratio of inertias up to which torques in whole numbers are per mille rather than in another unit: of 20 Nm rated."""
+
+MOST_PER_CENT = 300.0
+"""Torque in per cent of a rated one that no drive exceeds."""
 
 NAMED = 2
 """Known factors that a message names."""
@@ -55,35 +78,95 @@ def require_plausible_units(records: Sequence[Record], model: DrivelineModel) ->
         if record.kind is OutputKind.FORCE:
             continue
         found = _inertia(record, line)
-        if found is not None and _is_plausible(found, line):
+        if found is not None and _is_within_tolerance(found, line):
             continue
-        _ask_for_more_than_a_factor(record, line, found)
+        is_plausible = found is not None and _is_plausible(found, line)
+        if not is_plausible:
+            _refuse_milliseconds(record, line)
+            _refuse_swapped_columns(record, line)
+        _refuse_one_torque_turned(record, line, found, is_plausible)
+        if found is not None and (is_plausible or 1.0 < found.ratio < MOST_PER_MILLE):
+            _refuse_per_mille(record, line, found)
+        if is_plausible:
+            continue
         if found is not None and not _is_of_the_torque_path(record, line, found):
-            raise Implausible(_statement(record, line, found))
+            raise _off_by_a_factor(record, line, found)
 
 
-def _ask_for_more_than_a_factor(record: Record, line: DrivelineModel, found: Inertia | None) -> None:
-    """Refuse a recording that is plausible but for its unit of time, or for the sign of one of its torques."""
-    if record.sample_time_s >= SLOWEST_S:
-        shorter = 1e-3 * record.sample_time_s
-        other = _inertia(replace(record, sample_time_s=shorter, time_s=1e-3 * record.time_s), line)
-        if other is not None and _is_plausible(other, line):
+def _refuse_milliseconds(record: Record, line: DrivelineModel) -> None:
+    """Refuse a recording that is plausible but for its unit of time."""
+    if record.sample_time_s < SLOWEST_S:
+        return
+    shorter = 1e-3 * record.sample_time_s
+    other = _inertia(replace(record, sample_time_s=shorter, time_s=1e-3 * record.time_s), line)
+    if other is not None and _is_plausible(other, line):
+        raise Implausible(
+            f"recording {record.name} is implausible: its sampling period is {record.sample_time_s:g} s, and with "
+            f"{shorter:g} s it fits the nominal inertia. Is time in ms, expected s? Give time its scale in "
+            "[signals].",
+            Cure(record.name, time=1e-3),
+        )
+
+
+def _refuse_swapped_columns(record: Record, line: DrivelineModel) -> None:
+    """Refuse a recording that is plausible with a torque and the output changed for one another."""
+    for i in range(record.torque_nm.shape[1]):
+        torque = record.torque_nm.copy()
+        good = np.flatnonzero(record.okay)
+        torque[:, i] = np.interp(np.arange(record.okay.size), good, record.output[good])
+        other = _inertia(replace(record, torque_nm=torque, output=record.torque_nm[:, i], torque_okay=None), line)
+        if other is not None and _is_within_tolerance(other, line) and other.share >= SWAPPED_TELLS:
             raise Implausible(
-                f"recording {record.name} is implausible: its sampling period is {record.sample_time_s:g} s, and with "
-                f"{shorter:g} s it fits the nominal inertia. Is time in ms, expected s? Give time its scale in "
-                "[signals]."
+                f"recording {record.name} is implausible: it fits the nominal inertia with torque input {i + 1} and "
+                "the output changed for one another. Are their columns swapped in [signals]?",
+                Cure(record.name, swapped=i),
             )
+
+
+def _refuse_one_torque_turned(record: Record, line: DrivelineModel, found: Inertia | None, is_plausible: bool) -> None:
+    """Refuse a recording that is plausible but for the sign of one of its torques."""
     unexplained = 1.0 if found is None else 1.0 - found.share
     for i in range(record.torque_nm.shape[1] if record.torque_nm.shape[1] > 1 else 0):
         turned = record.torque_nm.copy()
         turned[:, i] *= -1.0
         other = _inertia(replace(record, torque_nm=turned), line)
-        if other is not None and _is_plausible(other, line) and 1.0 - other.share < CLEARLY * unexplained:
+        if other is None:
+            continue
+        rest = 1.0 - other.share
+        fits = _is_plausible(other, line) and not is_plausible and rest < CLEARLY * unexplained
+        if fits or (_is_within_tolerance(other, line) and rest < BETTER * unexplained):
             raise Implausible(
                 f"recording {record.name} is implausible: it fits the nominal inertia only with the sign of torque "
                 f"input {i + 1} turned round. All torques count positive in the direction of the speed: give that "
-                "column a negative scale in [signals]."
+                "column a negative scale in [signals].",
+                Cure(record.name, torque=-1.0, inputs=(i,)),
             )
+
+
+def _refuse_per_mille(record: Record, line: DrivelineModel, found: Inertia) -> None:
+    """Refuse torques in whole numbers that fit by a factor alone: per mille of a rated torque, as drives send it.
+
+    A payload is felt below the first mode and not above; where both are seen, both must be off by the factor.
+    """
+    tolerance = _tolerance(line)
+    if (1.0 - tolerance) / MARGIN <= found.ratio <= (1.0 + tolerance) * MARGIN:
+        return
+    read = record.torque_nm[np.isfinite(record.torque_nm).all(axis=1)]
+    if np.abs(read - np.round(read)).max() > WHOLE or np.unique(read).size < FEWEST_VALUES:
+        return
+    if not both_bands_agree(record, line, grid_or_none(record, line), found.ratio):
+        return
+    if _is_of_the_torque_path(record, line, found):
+        return
+    scale = float(f"{1.0 / found.ratio:.2g}")
+    raise Implausible(
+        f"recording {record.name} is implausible: its torques are whole numbers, and fit an inertia {found.ratio:.3g} "
+        f"times the nominal {_nominal(line)}. Are they per mille of a rated torque of about "
+        f"{scale / PER_MILLE:.0f} Nm? "
+        "Then the scale is a thousandth of the rated torque. Where they are Nm, correct the inertia in the model file, "
+        "or its tolerance.",
+        Cure(record.name, torque=scale),
+    )
 
 
 def _is_of_the_torque_path(record: Record, line: DrivelineModel, found: Inertia) -> bool:
@@ -112,36 +195,61 @@ def _lessened(record: Record) -> Iterable[FloatArray]:
             yield read * (1.0 - depth * (1.0 - np.exp(-since / (time * since[-1]))))
 
 
+def grid_or_none(record: Record, line: DrivelineModel) -> Grid | None:
+    """Return how a line is simulated; None where its modes can't be with the recording."""
+    try:
+        return grid_for(line, [record])
+    except BadModel:
+        return None
+
+
 def _inertia(record: Record, line: DrivelineModel) -> Inertia | None:
     """Return the inertia that a recording fits; only as one body where the line's modes can't be simulated with it."""
-    try:
-        grid = grid_for(line, [record])
-    except BadModel:
-        grid = None
-    return fitted_inertia(record, line, grid)
+    return fitted_inertia(record, line, grid_or_none(record, line))
+
+
+def _tolerance(line: DrivelineModel) -> float:
+    return max(parameter.tolerance for name, parameter in line.parameters.items() if name.startswith("J"))
+
+
+def _is_within_tolerance(found: Inertia, line: DrivelineModel) -> bool:
+    """Tell whether an inertia is within reach of re-tuning."""
+    return 1.0 - _tolerance(line) <= found.ratio <= 1.0 + _tolerance(line)
 
 
 def _is_plausible(found: Inertia, line: DrivelineModel) -> bool:
     """Tell whether an inertia is within reach of re-tuning, or of physics missing."""
-    tolerance = max(parameter.tolerance for name, parameter in line.parameters.items() if name.startswith("J"))
+    tolerance = _tolerance(line)
     return (1.0 - tolerance) / BEYOND <= found.ratio <= (1.0 + tolerance) * BEYOND
 
 
-def _statement(record: Record, line: DrivelineModel, found: Inertia) -> str:
+def _nominal(line: DrivelineModel) -> str:
     names = [name for name in line.parameters if name.startswith("J")]
     total = sum(line.parameters[name].value for name in names)
-    nominal = f"{' + '.join(names)} = {total:g} {parameter_unit(names[0], line.motion)}"
+    return f"{' + '.join(names)} = {total:g} {parameter_unit(names[0], line.motion)}"
+
+
+def _off_by_a_factor(record: Record, line: DrivelineModel, found: Inertia) -> Implausible:
+    """Return the refusal of a recording that fits another inertia, with the factors that are close."""
     if found.ratio < 0.0:
         torque = "torque" if line.motion is Motion.ROTATION else "force"
-        return (
+        return Implausible(
             f"recording {record.name} is implausible: the output falls where the {torque} rises (an inertia "
-            f"{found.ratio:.3g} times the nominal {nominal} fits). Is the sign of {torque} or output turned round? "
-            "Give one of them a negative scale in [signals]."
+            f"{found.ratio:.3g} times the nominal {_nominal(line)} fits). Is the sign of {torque} or output turned "
+            "round? Give one of them a negative scale in [signals].",
+            Cure(record.name, output=-1.0),
         )
-    close = " ".join(f"This is close to {known}" for known in known_factors(found.ratio, line.gear_ratio)[:NAMED])
-    return (
-        f"recording {record.name} is implausible: it fits an inertia {found.ratio:.3g} times the nominal {nominal}, "
-        f"expected 1 within its tolerance and a factor of {BEYOND:g}. {close or UNKNOWN} "
+    near = close_factors(found.ratio, line.gear_ratio)[:NAMED]
+    close = " ".join(f"This is close to {factor.said}" for factor in near)
+    cures = [Cure(record.name, torque=factor.torque, output=factor.output) for factor in near[:1]]
+    if not near and found.ratio < 1.0 and np.abs(record.torque_nm).max() <= MOST_PER_CENT:
+        scale = float(f"{1.0 / found.ratio:.2g}")
+        close = f"{UNKNOWN} Or is it per cent of a rated torque of about {scale / PER_CENT:.0f} Nm?"
+        cures = [Cure(record.name, torque=scale)]
+    return Implausible(
+        f"recording {record.name} is implausible: it fits an inertia {found.ratio:.3g} times the nominal "
+        f"{_nominal(line)}, expected 1 within its tolerance and a factor of {BEYOND:g}. {close or UNKNOWN} "
         "Correct the scale in [signals] (a torque in per cent of a rated one needs one, too), or the inertia in the "
-        "model file."
+        "model file.",
+        next((cure for cure in cures if cure != Cure(record.name)), None),
     )

@@ -15,6 +15,7 @@ from estimator.signals.record import BoolArray
 from hil.proof.real.case_file import CaseFile, RealFileError, RecordingEntry
 from hil.recording.formats import read_table
 from hil.recording.publish import write_table
+from hil.recording.request import Request
 from hil.recording.table import Column, Table
 
 
@@ -56,7 +57,7 @@ def full_table(case: CaseFile, name: str, data: Path) -> Table:
         If the recording is not there or not the one that was meant.
     """
     entry = case.recordings[name]
-    table = read_table(require_recording(data, entry), case.format)
+    table = read_table(require_recording(data, entry), Request(case.format))
     rows = slice(None) if entry.rows is None else slice(*entry.rows)
     return Table(table.path, {column: values[rows] for column, values in table.columns.items()})
 

@@ -143,3 +143,43 @@ def _json(path: Path) -> dict[str, Any]:
     if not isinstance(found, dict):
         raise FileProblem(path, f"the file | expected a JSON object | came a {type(found).__name__}")
     return found
+
+
+@dataclass(frozen=True, slots=True)
+class PhysicalValue:
+    """A physical parameter that a recording determines, with the half width of its 95 % interval."""
+
+    value: float
+    half_width: float
+    recording: str
+
+
+def physical_values(path: Path, run: str | None = None) -> dict[str, PhysicalValue]:
+    """Return the physical parameters of ``identification.json``: of one recording, or the surest of all.
+
+    Raises
+    ------
+    FileProblem
+        If the file is wrong.
+    UsageError
+        If the recording is not in the file.
+    """
+    read_identification(path)  # says what is wrong with it
+    entries = [each for each in _json(path)["recordings"] if run in (None, each["name"])]
+    if not entries:
+        raise UsageError(f"{path}: expected a recording {run!r} in it, came a file without. See --run.")
+    best: dict[str, PhysicalValue] = {}
+    for entry in entries:
+        for name, one in ((entry.get("physical") or {}).get("parameters") or {}).items():
+            found = _physical_value(one, str(entry["name"]))
+            if found is not None and (name not in best or found.half_width < best[name].half_width):
+                best[name] = found
+    return best
+
+
+def _physical_value(one: Any, recording: str) -> PhysicalValue | None:
+    """Return a value that is determined; None for any other."""
+    match one:
+        case {"determined": True, "value": int() | float() as value, "ci95": [int() | float() as low, high]}:
+            return PhysicalValue(float(value), 0.5 * float(high - low), recording)
+    return None

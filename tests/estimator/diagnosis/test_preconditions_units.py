@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.preconditions.factors import known_factors
+from estimator.diagnosis.preconditions.factors import close_factors
 from estimator.diagnosis.preconditions.inertia import as_one_body, fitted_inertia
 from estimator.diagnosis.preconditions.units import BEYOND, require_plausible_units
 from estimator.errors import Implausible
@@ -161,11 +161,11 @@ def test_too_short_to_tell() -> None:
 
 @pytest.mark.parametrize(("ratio", "first"), [(0.1, "1 / (60/(2 pi))"), (6.0, "2 pi"), (1e-3, "1 / (1000)")])
 def test_the_nearest_known_factor_comes_first(ratio: float, first: str) -> None:
-    assert known_factors(ratio)[0].startswith(f"{first}: ")
+    assert close_factors(ratio)[0].said.startswith(f"{first}: ")
 
 
 def test_nothing_known_is_close() -> None:
-    assert known_factors(25.0) == []
+    assert close_factors(25.0) == []
 
 
 def lessened(change: Callable[[FloatArray], FloatArray], values: dict[str, float]) -> Record:
@@ -189,3 +189,78 @@ def test_what_a_torque_path_does_is_not_refused_as_a_unit(name: str, monkeypatch
     monkeypatch.setattr("estimator.diagnosis.preconditions.units._lessened", lambda record: ())
     with pytest.raises(Implausible):
         require_plausible_units([record], line)
+
+
+def in_per_mille(rated_nm: float) -> Change:
+    return lambda record: replace(record, torque_nm=np.round(record.torque_nm / rated_nm * 1e3))
+
+
+def swapped(i: int) -> Change:
+    def change(record: Record) -> Record:
+        torque = record.torque_nm.copy()
+        torque[:, i] = record.output
+        return replace(record, torque_nm=torque, output=record.torque_nm[:, i])
+
+    return change
+
+
+CURES: dict[str, tuple[Change, dict[str, object]]] = {
+    "rpm": (output(60.0 / (2.0 * math.pi)), {"output": 2.0 * math.pi / 60.0}),
+    "kNm": (torque(1e-3, 1e-3), {"torque": 1e3}),
+    "mNm": (torque(1e3, 1e3), {"torque": 1e-3}),
+    "output turned round": (output(-1.0), {"output": -1.0}),
+    "one torque turned round": (torque(1.0, -1.0), {"torque": -1.0, "inputs": (1,)}),
+    "ms": (in_ms, {"time": 1e-3}),
+    "first torque and speed swapped": (swapped(0), {"swapped": 0}),
+    "second torque and speed swapped": (swapped(1), {"swapped": 1}),
+}
+
+
+@pytest.mark.parametrize("fault", CURES)
+def test_a_refusal_says_what_to_correct(fault: str) -> None:
+    change, expected = CURES[fault]
+    with pytest.raises(Implausible) as refusal:
+        require_plausible_units([change(drive())], model(TWO_MASS))
+    cure = refusal.value.cure
+    assert cure is not None
+    wanted = {"recording": "run", "torque": 1.0, "inputs": (), "output": 1.0, "time": 1.0, "swapped": None, **expected}
+    for name, value in wanted.items():
+        assert getattr(cure, name) == (pytest.approx(value) if isinstance(value, float) else value), name
+
+
+@pytest.mark.parametrize("rated_nm", [300.0, 600.0, 1600.0])
+@pytest.mark.parametrize("values", [TWO_MASS, ONE_MASS], ids=["two masses", "one mass"])
+def test_per_mille_of_a_rated_torque_are_told_with_their_scale(rated_nm: float, values: dict[str, float]) -> None:
+    with pytest.raises(Implausible, match="per mille of a rated torque") as refusal:
+        require_plausible_units([in_per_mille(rated_nm)(drive(values))], model(values))
+    assert refusal.value.cure is not None
+    assert refusal.value.cure.torque == pytest.approx(rated_nm / 1e3, rel=0.2)
+
+
+def test_whole_newton_metres_and_a_payload_are_no_per_mille() -> None:
+    whole = replace(drive(), torque_nm=np.round(drive().torque_nm))
+    require_plausible_units([whole], model(TWO_MASS))
+    require_plausible_units([whole], model(scaled(TWO_MASS, J_L=0.5)))
+
+
+def test_per_mille_within_the_tolerance_change_no_verdict() -> None:
+    """At a rated torque near 1000 Nm there is nothing to tell, and nothing that goes wrong."""
+    require_plausible_units([in_per_mille(950.0)(drive())], model(TWO_MASS))
+
+
+def test_a_torque_in_per_cent_is_told_with_its_scale() -> None:
+    with pytest.raises(Implausible, match="per cent of a rated torque of about") as refusal:
+        require_plausible_units([torque(1.0 / 20.0, 1.0 / 20.0)(drive())], model(TWO_MASS))
+    assert refusal.value.cure is not None
+    assert refusal.value.cure.torque == pytest.approx(20.0, rel=0.2)
+
+
+def test_a_torque_turned_round_is_told_where_the_inertia_is_hardly_off() -> None:
+    rng = np.random.default_rng(4)
+    record = drive()
+    own = np.cumsum(rng.normal(size=(SAMPLES, 2)), axis=0)
+    acting = np.column_stack([3.0 * own[:, 0], own[:, 1]])
+    moved = linear_record(TWO_MASS, acting.sum(axis=1), Start(0.0, 0.0, 0.0, 0.0, 0.0), sigma=0.02)
+    read = replace(record, torque_nm=acting * np.array([1.0, -1.0]), output=moved.output)
+    with pytest.raises(Implausible, match="sign of torque input 2"):
+        require_plausible_units([read], model(TWO_MASS))

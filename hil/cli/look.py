@@ -1,0 +1,101 @@
+"""``hil look``: what is in a recording, and the ``[signals]`` table that reads it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from hil.cli.dbc_option import Dbc
+
+if TYPE_CHECKING:
+    from hil.recording.look.look import Look
+    from hil.recording.look.survey import Group
+
+app = typer.Typer(add_completion=False)
+
+
+@app.command(epilog="Example: hil look drive.mf4. A logged bus: hil look canedge.mf4 --dbc vehicle.dbc")
+def look(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="A recording of any format.")],
+    dbc: Dbc = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+) -> None:
+    """Show what is in a recording: channels, units, rates, gaps, what each could be, and the table that reads it."""
+    import json
+
+    from hil.printable import printable
+    from hil.recording.look.look import look as look_into
+
+    found = look_into(file, dbc)
+    if as_json:
+        typer.echo(json.dumps(_document(found)))
+        return
+    typer.echo(f"{file}: {_size(found)}")
+    for line in found.survey.said:
+        typer.echo(f"  {printable(line)}")
+    _show(found)
+    typer.echo("")
+    if not found.signals:
+        typer.echo("It has the columns that every command reads: no [signals] table is needed.")
+    for line in found.signals:
+        typer.echo(line)
+
+
+def _size(found: Look) -> str:
+    groups = found.survey.groups
+    count = sum(len(group.channels) for group in groups)
+    times = "" if len(groups) == 1 else f", {len(groups)} times"
+    return f"{count} channels{times}"
+
+
+def _show(found: Look) -> None:
+    """Print a table of the channels for each time."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from hil.recording.look.roles import guesses
+
+    console = Console()
+    for group in found.survey.groups:
+        table = Table(title=_rate(group), title_justify="left", box=None, pad_edge=False)
+        for heading in ("channel", "unit", "samples", "missing", "low", "high", "could be"):
+            is_number = heading in ("samples", "missing", "low", "high")
+            table.add_column(heading, justify="right" if is_number else "left", overflow="fold")
+        for channel in group.channels:
+            could = "time" if channel.name == group.time else ", ".join(g.role.value for g in guesses(channel))
+            low, high = ("" if value is None else f"{value:.6g}" for value in (channel.low, channel.high))
+            cells = (channel.name, channel.unit, str(channel.rows), str(channel.missing or ""), low, high, could)
+            table.add_row(*(_plain(cell) for cell in cells))
+        console.print(table)
+
+
+def _plain(text: str) -> str:
+    """Return a text that steers no terminal, and whose brackets are no markup."""
+    from rich.markup import escape
+
+    from hil.printable import printable
+
+    return escape(printable(text))
+
+
+def _rate(group: Group) -> str:
+    if group.period_s is None:
+        return "\nno channel is a time"
+    gaps = f", {group.gaps} gaps" if group.gaps else ""
+    return f"\nevery {group.period_s:.4g} s{'' if group.even else ', uneven'}{gaps}"
+
+
+def _document(found: Look) -> dict[str, Any]:
+    chosen = found.roles
+    return {
+        "schema": "hil.look/1",
+        "input": str(found.path),
+        **found.survey.as_document(),
+        "torque": [guess.channel.name for guess in chosen.torques],
+        "output": None
+        if chosen.output is None
+        else {"kind": chosen.output.role.value, "column": chosen.output.channel.name},
+        "signals": "\n".join(found.signals),
+    }

@@ -1,0 +1,1 @@
+"""A new model file: structure, values and tolerances, from a person, options or an identification."""

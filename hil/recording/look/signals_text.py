@@ -1,0 +1,110 @@
+"""A ``[signals]`` table to paste, for what was found in a file; what is not sure stands in its comments."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import tomlkit
+
+from hil.printable import printable
+from hil.recording import columns
+from hil.recording.look.roles import Guess, Roles
+from hil.recording.look.survey import Group, Survey, rounded
+from hil.recording.scales import Role
+from hil.recording.units import Quantity, unit_of
+
+EPOCH_S = 1e9
+"""Seconds since 1970 that no recording lasts: what is larger is a time of day."""
+
+
+def signals_lines(survey: Survey, roles: Roles, encoding: str | None = None) -> list[str]:
+    """Return the lines of a ``[signals]`` table; none where the file has the contract's columns.
+
+    Parameters
+    ----------
+    survey, roles
+        What is in the file, and what its channels are taken for.
+    encoding : str, optional
+        Of a text file, where it has to be set by hand.
+    """
+    lines = [] if is_own(survey) else list(_lines(survey, roles))
+    if encoding is not None:
+        lines.append(f'format = {{ encoding = "{encoding}" }}')
+    return ["[signals]", *lines] if lines else []
+
+
+def is_own(survey: Survey) -> bool:
+    """Tell whether a file has the contract's columns, in its units, and one rate."""
+    needed = {columns.TIME, columns.TORQUE_M1, columns.TORQUE_M2, columns.SPEED}
+    return any(needed <= {channel.name for channel in group.channels} and group.even for group in survey.groups)
+
+
+def _lines(survey: Survey, roles: Roles) -> Iterator[str]:
+    used = _groups_used(survey, roles)
+    yield _time_line(used[0] if used else survey.groups[0])
+    if roles.torques:
+        yield f"torque = [ {', '.join(_entry(guess) for guess in roles.torques)} ]{_units_comment(roles.torques)}"
+    else:
+        yield "# torque = [ { column = ... } ]   # no channel is called or measured like one: name it"
+    if roles.output is not None:
+        at = ', at = "motor"' if roles.output.role is Role.SPEED else ""
+        yield f"{roles.output.role.value} = {_entry(roles.output, at)}{_units_comment((roles.output,))}"
+    else:
+        yield "# speed = { column = ... }   # no channel is called or measured like one: name it"
+    for guess in roles.others:
+        yield f"# or {guess.role.value}: {_quoted(guess.channel.name)}"
+    if len(used) > 1 or any(not group.even and group.period_s for group in used):
+        slowest = max(group.period_s or 0.0 for group in used)
+        why = "channels have times of their own" if len(used) > 1 else "rows are uneven"
+        yield f"resample_s = {rounded(slowest)!r}   # {why}"
+
+
+def _groups_used(survey: Survey, roles: Roles) -> list[Group]:
+    chosen = {guess.channel for guess in (*roles.torques, *([roles.output] if roles.output else []))}
+    return [group for group in survey.groups if chosen & set(group.channels)]
+
+
+def _time_line(group: Group) -> str:
+    if group.time is None:
+        return "time = { sample_time_s = 0.01 }   # no channel is a time: write the true period"
+    channel = next(channel for channel in group.channels if channel.name == group.time)
+    unit = unit_of(channel.unit) if channel.unit else None
+    scale = "" if unit is not None and unit.quantity is Quantity.TIME else _epoch_scale(channel.high)
+    return f"time = {{ column = {_quoted(channel.name)}{scale} }}"
+
+
+def _epoch_scale(high: float | None) -> str:
+    """Return the scale of a time since 1970 in ms, us or ns, by its size."""
+    if high is None or high < 1e3 * EPOCH_S:
+        return ""
+    power = 3 * math.floor((math.log10(high) - math.log10(EPOCH_S)) / 3)
+    return f", scale = 1e-{power}"
+
+
+def _entry(guess: Guess, more: str = "") -> str:
+    wraps = f", wraps_at = {guess.channel.wraps_at:g}" if guess.channel.wraps_at is not None else ""
+    return f"{{ column = {_quoted(guess.channel.name)}{wraps}{more} }}"
+
+
+def _units_comment(found: tuple[Guess, ...]) -> str:
+    """Say what will be done with the unit, or that there is none."""
+    texts = []
+    for text in dict.fromkeys(guess.channel.unit for guess in found):
+        unit = unit_of(text) if text else None
+        text = printable(text)
+        if unit is None:
+            texts.append(f"in {text}, unknown: give scale" if text else "no unit: SI, or give scale")
+        elif unit.quantity is Quantity.SHARE:
+            texts.append(f"in {text}: give scale = rated value * {unit.factor:g}")
+        elif unit.quantity is Quantity.OTHER:
+            texts.append(f"in {text}: give scale to SI")
+        elif unit.factor != 1.0:
+            texts.append(f"in {text}, read times {unit.factor:.6g}")
+    if any(guess.channel.wraps_at is not None for guess in found):
+        texts.append("was stored with a sign and read without")
+    return f"   # {'; '.join(texts)}" if texts else ""
+
+
+def _quoted(name: str) -> str:
+    return tomlkit.item(name).as_string()

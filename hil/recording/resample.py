@@ -1,0 +1,156 @@
+"""Channels of different or uneven rates, brought to one period: never unasked, and with what was done to each.
+
+Where a channel is thinned, a low-pass comes first (linear phase, Hamming window, edge at the new Nyquist frequency, as
+`estimator.signals.decimate` has it), without delay: what is faster would fold into what is slow. Between two samples
+lies a straight line, or the first of them is held, as the channel says. A gap is missing samples.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from hil.errors import RecordingError
+from hil.recording.bounds import require_cells
+from hil.recording.table import FloatArray
+
+EDGE, HALF_LENGTH = 1.0, 8
+"""Of the low-pass: in new Nyquist frequencies, and in new periods; as in `estimator.signals.decimate`."""
+
+GAP: Final = 2.5
+"""Distance of two samples, in the channel's own period, beyond which those between are missing: jitter is less."""
+
+THINS: Final = 1.5
+"""Ratio of the new period to the channel's own from which on it is thinned."""
+
+MOST_RATIO: Final = 10_000
+"""Of both periods; the low-pass has 16 times as many taps."""
+
+HALF: Final = 0.5
+"""Weight of present samples in the low-pass below which the result is missing."""
+
+
+@dataclass(frozen=True, slots=True)
+class Series:
+    """A channel with times of its own.
+
+    Attributes
+    ----------
+    time_s, values : ndarray, shape (n,)
+        NaN is a missing value.
+    held : bool
+        Whether a value counts until the next.
+    """
+
+    time_s: FloatArray
+    values: FloatArray
+    held: bool = False
+
+    @property
+    def period_s(self) -> float:
+        """The usual distance of two samples [s]."""
+        return float(np.median(np.diff(self.time_s))) if self.time_s.size > 1 else math.inf
+
+
+def resampled(
+    path: Path, series: Mapping[str, Series], period_s: float
+) -> tuple[FloatArray, dict[str, FloatArray], list[str]]:
+    """Bring channels to one period, over the time that all of them have.
+
+    Returns
+    -------
+    ndarray, shape (N,)
+        Time [s].
+    dict of name to ndarray, shape (N,)
+        The channels; NaN where one has a gap.
+    list of str
+        What was done to each.
+
+    Raises
+    ------
+    RecordingError
+        If a channel's time runs backwards or is missing, they have no time in common, or there would be more samples
+        than a recording of the file's size may have.
+    """
+    usable = {name: _in_order(path, name, one) for name, one in series.items()}
+    start = max(float(one.time_s[0]) for one in usable.values())
+    end = min(float(one.time_s[-1]) for one in usable.values())
+    count = math.floor((end - start) / period_s + 1e-6) + 1
+    if count < 2:
+        raise RecordingError(
+            path,
+            f"expected channels with {period_s:g} s in common for resample_s, came the last start at {start:.6g} s "
+            f"and the first end at {end:.6g} s",
+        )
+    require_cells(path, count * (len(usable) + 1))
+    time: FloatArray = start + period_s * np.arange(count, dtype=np.float64)
+    columns, remarks = {}, []
+    for name, one in usable.items():
+        columns[name], done = _brought(path, name, one, time, period_s)
+        remarks.append(f"{name}: {one.period_s:.4g} s brought to {period_s:g} s, {done}")
+    return time, columns, remarks
+
+
+def _in_order(path: Path, name: str, one: Series) -> Series:
+    """Leave out missing values, and of samples at one time all but the last."""
+    present = np.isfinite(one.values) & np.isfinite(one.time_s)
+    time, values = one.time_s[present], one.values[present]
+    if time.size < 2:
+        raise RecordingError(path, f"column {name}: expected two samples or more, came {time.size}")
+    steps = np.diff(time)
+    if (steps < 0).any():
+        row = int(np.flatnonzero(steps < 0)[0])
+        raise RecordingError(
+            path, f"column {name}: expected times that run forward, came {time[row + 1]:.9g} s after {time[row]:.9g} s"
+        )
+    last = np.append(steps > 0, True)
+    return Series(time[last], values[last], one.held)
+
+
+def _brought(path: Path, name: str, one: Series, time: FloatArray, period_s: float) -> tuple[FloatArray, str]:
+    if one.held:
+        rows = np.searchsorted(one.time_s, time, side="right") - 1
+        return one.values[np.maximum(rows, 0)], "the last value held"
+    ratio = period_s / one.period_s
+    if ratio < THINS:
+        return _linear(one, time, one.period_s), "straight lines between its samples"
+    if ratio > MOST_RATIO:
+        raise RecordingError(
+            path, f"column {name}: expected resample_s of at most {MOST_RATIO} of its periods, came {ratio:.0f}"
+        )
+    require_cells(path, time.size * math.ceil(ratio))
+    return _thinned(one, time, period_s, math.ceil(ratio)), f"low-pass at {0.5 * EDGE / period_s:.4g} Hz and thinned"
+
+
+def _linear(one: Series, time: FloatArray, period_s: float) -> FloatArray:
+    values: FloatArray = np.interp(time, one.time_s, one.values)
+    after = np.clip(np.searchsorted(one.time_s, time, side="left"), 1, one.time_s.size - 1)
+    width = one.time_s[after] - one.time_s[after - 1]
+    on_one = (time == one.time_s[after]) | (time == one.time_s[after - 1])
+    values[(width > GAP * period_s) & ~on_one] = np.nan
+    return values
+
+
+def _thinned(one: Series, time: FloatArray, period_s: float, factor: int) -> FloatArray:
+    """Return every so-manieth value of the low-passed channel; what is missing has no weight in the low-pass."""
+    from scipy.signal import fftconvolve, firwin  # half a second that few recordings need
+
+    reach = HALF_LENGTH * factor
+    fine = time[0] + period_s / factor * np.arange(-reach, (time.size - 1) * factor + reach + 1)
+    values = _linear(one, fine, one.period_s)
+    values[(fine < one.time_s[0]) | (fine > one.time_s[-1])] = np.nan
+    present = np.isfinite(values)
+    level = float(values[present].mean())
+    taps = firwin(2 * reach + 1, EDGE / factor, window="hamming")
+    kept = slice(None, None, factor)
+    sums = fftconvolve(np.where(present, values - level, 0.0), taps, mode="valid")[kept]
+    weights = fftconvolve(present.astype(np.float64), taps, mode="valid")[kept]
+    seen = weights > HALF
+    out = np.full(time.size, np.nan)
+    out[seen] = level + sums[seen] / weights[seen]
+    return out

@@ -1,0 +1,213 @@
+"""hil look and hil model new: from a file that nobody has described to one that every command reads."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hil.cli.main import run
+from hil.config.model_file import read_model, read_model_for_recordings
+from hil.recording import Table, read_record, write_table
+
+ROWS = 300
+TIME = np.arange(ROWS) * 0.01
+VALUES = [f"--value={text}" for text in ("J_M=1.7", "J_L=95", "k=4500", "c=8", "b_M=0.3", "b_L=1")]
+
+
+def rows(delimiter: str, *columns: np.ndarray) -> list[str]:
+    return [delimiter.join(f"{cell:.3f}" for cell in row) for row in zip(*columns, strict=True)]
+
+
+@pytest.fixture
+def german(tmp_path: Path) -> Path:
+    """As Excel writes it in Germany, in its own encoding."""
+    text = rows(";", TIME, 80.0 * np.sin(9 * TIME), 70.0 * np.sin(9 * TIME), 900.0 + 20.0 * np.cos(9 * TIME), TIME)
+    head = "Zeit [s];Drehmoment M1 [Nm];Drehmoment M2 [Nm];Drehzahl [1/min];Öltemperatur [°C]"
+    (tmp_path / "fahrt.csv").write_bytes("\r\n".join([head, *text]).replace(".", ",").encode("latin-1"))
+    return tmp_path / "fahrt.csv"
+
+
+def test_what_look_prints_is_all_it_takes_to_read_the_file(
+    german: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["look", str(german)]) == 0
+    shown = capsys.readouterr().out
+    assert "a semicolon between cells, decimal comma" in shown
+    assert "every 0.01 s" in shown
+    table = shown[shown.index("[signals]") :]
+    assert run(["model", "new", str(tmp_path / "bare.toml"), "--yes", *VALUES]) == 0
+    (tmp_path / "bus.toml").write_text((tmp_path / "bare.toml").read_text() + "\n" + table)
+    record = read_record(german, read_model_for_recordings(tmp_path / "bus.toml").signals)
+    assert record.torque_nm.shape == (ROWS, 2)
+    assert record.output[0] == pytest.approx(920.0 * 2.0 * np.pi / 60.0)
+
+
+def test_look_as_json(german: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["look", str(german), "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["schema"] == "hil.look/1"
+    assert document["torque"] == ["Drehmoment M1 [Nm]", "Drehmoment M2 [Nm]"]
+    assert document["output"] == {"kind": "speed", "column": "Drehzahl [1/min]"}
+    assert document["groups"][0]["period_s"] == pytest.approx(0.01)
+    assert [channel["unit"] for channel in document["groups"][0]["channels"]] == ["s", "Nm", "Nm", "1/min", "°C"]
+
+
+def contract(path: Path, *more: str) -> None:
+    head = "time_s,torque_m1_nm,torque_m2_nm,speed_rad_s"
+    path.write_text("\n".join([head, *more, *rows(",", TIME, TIME, TIME**2, 3.0 * TIME)]))
+
+
+def unnamed(path: Path) -> None:
+    path.write_text("\n".join(rows(",", TIME, TIME**2, 3.0 * TIME)))
+
+
+def epoch_ms(path: Path) -> None:
+    stamps = [f"{1.77e12 + 1e3 * t:.0f},{t:.3f},{2 * t:.3f}" for t in TIME.tolist()]
+    path.write_text("\n".join(["timestamp,u,w", *stamps]))
+
+
+def no_time(path: Path) -> None:
+    path.write_text("\n".join(["u,w", *rows(",", np.sin(TIME), np.cos(TIME))]))
+
+
+def per_cent(path: Path) -> None:
+    path.write_text("\n".join(["t,torque,speed", "s,%,rpm", *rows(",", TIME, np.sin(TIME), np.cos(TIME))]))
+
+
+def uneven(path: Path) -> None:
+    stamps = np.cumsum(np.random.default_rng(1).uniform(0.004, 0.016, ROWS))
+    path.write_text("\n".join(["t,u,w", *rows(",", stamps, np.sin(TIME), np.cos(TIME))]))
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (contract, "no [signals] table is needed"),
+        (unnamed, "# torque = [ { column = ... } ]"),
+        (epoch_ms, 'time = { column = "timestamp", scale = 1e-3 }'),
+        (no_time, "time = { sample_time_s = 0.01 }   # no channel is a time: write the true period"),
+        (per_cent, "in %: give scale = rated value * 0.01"),
+        (uneven, "resample_s = 0.01   # rows are uneven"),
+    ],
+)
+def test_what_can_t_be_told_is_left_to_a_person(
+    make: Callable[[Path], None], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    make(tmp_path / "run.csv")
+    assert run(["look", str(tmp_path / "run.csv")]) == 0
+    assert said in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("name", ["gone.csv", "run.xlsx", "broken.mf4", "cut.csv"])
+def test_what_can_t_be_read_is_refused(tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    if name != "gone.csv":
+        (tmp_path / name).write_text("t,u\n0,1\n1")
+    assert run(["look", str(tmp_path / name)]) == 2
+    assert "expected" in capsys.readouterr().err
+
+
+def test_a_new_model_file_reads_the_recording_it_was_made_for(
+    german: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "bus.toml"
+    options = ["--recording", str(german), "--tolerance", "0.3", "--tolerance", "k=0.1"]
+    assert run(["model", "new", str(path), "--yes", *options, *VALUES]) == 0
+    file = read_model_for_recordings(path)
+    assert file.model.parameters["J_M"].value == 1.7
+    assert {name: parameter.tolerance for name, parameter in file.model.parameters.items()} == {
+        **dict.fromkeys(file.model.parameters, 0.3),
+        "k": 0.1,
+    }
+    assert read_record(german, file.signals).okay.all()
+    assert all("#" in line for line in path.read_text().splitlines() if line.startswith(("J_", "k", "c", "b_")))
+    before = path.read_text()
+    assert run(["model", "new", str(path), "--yes", *VALUES]) == 2
+    assert path.read_text() == before
+
+
+def test_values_are_asked_for_at_a_terminal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    answers = iter(["one_mass", "", "-1", "2.5", "0.4", "0.7", ""])
+    monkeypatch.setattr("sys.stdin.isatty", lambda: True)
+    monkeypatch.setattr("builtins.input", lambda _: next(answers))
+    assert run(["model", "new", str(tmp_path / "m.toml")]) == 0
+    parameters = read_model(tmp_path / "m.toml").model.parameters
+    assert (parameters["J_M"].value, parameters["J_M"].tolerance) == (2.5, 0.4)
+    assert (parameters["b_M"].value, parameters["b_M"].tolerance) == (0.7, 0.2)
+
+
+def identification(path: Path) -> None:
+    def one(value: float, half: float, determined: bool) -> dict[str, object]:
+        return {"value": value, "std": half / 2, "ci95": [value - half, value + half], "determined": determined}
+
+    recordings = [
+        {"name": "a", "J_M": one(1.6, 0.5, True), "b_M": one(0.4, 0.1, True)},
+        {"name": "b", "J_M": one(1.5, 0.3, True), "b_M": one(9.0, 0.01, False)},
+    ]
+    document = {
+        "schema": "hil.identification/1",
+        "settings": {"na": 4, "nb": 4, "nk": 1, "sample_time_s": 0.02, "high_pass_hz": 0.3},
+        "recordings": [
+            {"name": r["name"], "output": "speed", "filter_L": [1.0], "physical": {"parameters": {**r}}}
+            for r in recordings
+        ],
+    }
+    path.write_text(json.dumps(document))
+
+
+def test_an_identification_gives_values_and_tolerances(tmp_path: Path) -> None:
+    identification(tmp_path / "identification.json")
+    source = ["--from", str(tmp_path / "identification.json"), "--structure", "one_mass", "--yes"]
+    assert run(["model", "new", str(tmp_path / "surest.toml"), *source]) == 0
+    surest = read_model(tmp_path / "surest.toml").model.parameters
+    assert (surest["J_M"].value, surest["J_M"].tolerance) == (1.5, 0.2)
+    assert (surest["b_M"].value, surest["b_M"].tolerance) == (0.4, 0.25)
+    assert "identified from b" in (tmp_path / "surest.toml").read_text()
+    assert run(["model", "new", str(tmp_path / "a.toml"), *source, "--run", "a", "--value", "b_M=0.1"]) == 0
+    of_a = read_model(tmp_path / "a.toml").model.parameters
+    assert (of_a["J_M"].value, of_a["b_M"].value) == (1.6, 0.1)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--structure", "five_mass"], "--structure five_mass | expected one of one_mass"),
+        (["--value", "J_X=1"], "--value J_X=1 | expected NAME=NUMBER with a name of two_mass"),
+        (["--value", "J_M=heavy"], "--value J_M=heavy | expected NAME=NUMBER"),
+        (["--tolerance", "wide"], "--tolerance wide | expected a number, or NAME=NUMBER"),
+        (["--value", "J_M=1"], "--value J_L=NUMBER | expected inertia of the load"),
+        ([*VALUES, "--value", "k=-5"], "parameters.k"),
+        (["--from", "gone.json"], "gone.json"),
+        (["--recording", "gone.csv"], "gone.csv"),
+    ],
+)
+def test_what_makes_no_model_is_refused_and_nothing_is_written(
+    options: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["model", "new", str(tmp_path / "m.toml"), "--yes", *options]) == 2
+    assert said in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+HOSTILE = "speed \x1b[2J\nJ_M = 1"
+
+
+def test_names_and_units_of_a_file_do_nothing_on_a_terminal_or_in_a_model_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    units = {"t": "s", "torque": "Nm\nk = 1", HOSTILE: "\x1b]0;x\x07"}
+    columns = {"t": TIME, "torque": np.sin(TIME), HOSTILE: np.cos(TIME)}
+    write_table(Table(tmp_path / "run.parquet", columns, units), tmp_path / "run.parquet")
+    assert run(["look", str(tmp_path / "run.parquet")]) == 0
+    shown = capsys.readouterr().out
+    assert "\x1b" not in shown
+    assert not any(line.startswith(("J_M", "k =")) for line in shown.splitlines())
+    options = ["--recording", str(tmp_path / "run.parquet"), "--yes", *VALUES]
+    assert run(["model", "new", str(tmp_path / "m.toml"), *options]) == 0
+    file = read_model(tmp_path / "m.toml")
+    assert file.signals is not None
+    assert file.signals.output()[1].column == HOSTILE
+    assert file.model.parameters["k"].value == 4500.0
