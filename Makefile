@@ -35,6 +35,7 @@ campaign: $(READY)
 	$(BIN)/python -m tests.campaigns.faults
 	$(BIN)/python -m tests.campaigns.faults.processes
 	$(BIN)/python -m tests.campaigns.mutants
+	$(BIN)/python -m tests.campaigns.fuzz
 
 # Speed as ratios to scipy, a bare C loop, raw python-can; growth with the length, memory: docs/benchmarks.md.
 bench: $(READY)

@@ -1,4 +1,4 @@
-"""``python -m tests.campaigns.faults [--runs N] [--seed N]``: faults at random moments of every experiment.
+"""``python -m tests.campaigns.faults [--runs N] [--first N] [--seed N]``: faults at random moments of every experiment.
 
 Prints a table, Markdown, of the worst time to zero torque for each fault; exits 1 if a run was not as it must be: a
 torque above a limit or left, a drive not disarmed, a recording damaged, a wrong cause.
@@ -42,6 +42,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Run the campaign."""
     parser = argparse.ArgumentParser(prog="python -m tests.campaigns.faults")
     parser.add_argument("--runs", type=int, default=10_000)
+    parser.add_argument("--first", type=int, default=0, help="Number of the first run: parts can go at the same time.")
     parser.add_argument("--seed", type=int, default=1)
     asked = parser.parse_args(arguments)
     outcomes: dict[str, list[Outcome]] = defaultdict(list)
@@ -49,7 +50,7 @@ def main(arguments: list[str] | None = None) -> int:
         folder = Path(name)
         rig = campaign_rig(folder)
         steps = lengths(rig, folder)
-        for number in range(asked.runs):
+        for number in range(asked.first, asked.first + asked.runs):
             kind, experiment, at_s = draw(number, asked.seed, steps, rig.period_s)
             outcome = run_with(rig, experiment, KINDS[kind], at_s, folder, steps[experiment])
             outcomes[kind].append(outcome)
