@@ -7,12 +7,13 @@ from pathlib import Path
 import pytest
 
 from hil.config.rig_file import Rig
-from tests.campaigns.faults.__main__ import draw, lengths, report
+from tests.campaigns.faults.__main__ import draw, lengths
 from tests.campaigns.faults.kinds import KINDS, UNTOUCHED
 from tests.campaigns.faults.one_run import Outcome, run_with
 from tests.campaigns.faults.processes import KINDS as PROCESS_KINDS
 from tests.campaigns.faults.processes import run_one
 from tests.campaigns.faults.rig import campaign_rig
+from tests.campaigns.faults.runs import report
 
 SEED = 7
 

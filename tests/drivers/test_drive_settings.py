@@ -151,3 +151,51 @@ def test_a_drive_that_is_guarded_is_found_and_set_right(tmp_path: Path) -> None:
         )
         rig.m1.configure()
         assert rig.m1.check() == ()
+
+
+EMCY = "[1014]\nParameterName=COB-ID EMCY\nObjectType=0x7\nDataType=0x0007\nAccessType=ro\nDefaultValue=$NODEID+0x80\n"
+NO_ERROR_CODE = (("[603F]", "[2F3F]"), ("=0x603F", "=0x2F3F"))
+
+
+@pytest.mark.parametrize("has_error_code", [True, False])
+@pytest.mark.parametrize("access", ["ro", "rw"])
+@pytest.mark.parametrize(
+    ("default", "of_another", "own"),
+    [
+        ("$NODEID+0x80", False, True),
+        ("0x85", False, True),
+        ("0x81", True, False),  # node 1's, and node 127's
+        ("0xFF", True, False),
+        ("0x80", False, False),  # of no node: it is heard by nobody, and taken for nobody else's
+        ("0x100", False, False),
+        ("0x80000085", False, False),
+        ("", False, False),
+    ],
+)
+def test_emcy_is_moved_where_it_alone_tells_the_cause_or_is_taken_for_another_node_s(
+    tmp_path: Path, has_error_code: bool, access: str, default: str, of_another: bool, own: bool
+) -> None:
+    entry = EMCY.replace("AccessType=ro", f"AccessType={access}").replace("$NODEID+0x80", default)
+    eds = changed_eds(tmp_path, (EMCY, entry), *(() if has_error_code else NO_ERROR_CODE))
+    moved = access == "rw" and not own and (of_another or not has_error_code)
+    settings = given(replace(M1, eds_path=eds))
+    assert ((0x1014, 0) in settings) == moved
+    assert settings.get((0x1014, 0), (0x85, "this program")) == (0x85, "this program")
+
+
+COUNTER = """
+[1019]
+ParameterName=Synchronous counter overflow value
+ObjectType=0x7
+DataType=0x0005
+AccessType={access}
+DefaultValue={value}
+PDOMapping=0
+"""
+
+
+@pytest.mark.parametrize(("access", "value", "written"), [("rw", 10, True), ("rw", 0, True), ("ro", 0, False)])
+def test_the_sync_counter_is_switched_off(tmp_path: Path, access: str, value: int, written: bool) -> None:
+    eds = changed_eds(tmp_path, more=COUNTER.format(access=access, value=value))
+    found = given(replace(M1, eds_path=eds)).get((0x1019, 0))
+    assert found == ((0, "this program") if written else None)

@@ -51,10 +51,12 @@ class Trial:
 def trials(name: str, target: Target, seed: int, first: int = 0, grow: bool = True) -> Iterator[Trial]:
     """Try the seeds as they are, then mutants of them without end.
 
-    Where a mutant is refused in words not met before, it has come further than the others: it becomes a seed.
+    Where a mutant is refused in words not met before, it has come further than the others: it becomes a seed. Every
+    second mutant is one of a whole input.
     """
     with tempfile.TemporaryDirectory() as folder, ExitStack() as stack:
-        seeds = [*target.seeds(Path(folder)), *kept(name)]
+        whole = target.seeds(Path(folder))
+        seeds = [*whole, *kept(name)]
         read = stack.enter_context(target.opened(Path(folder)))
         known = set()
         for number, data in enumerate(seeds):
@@ -62,7 +64,7 @@ def trials(name: str, target: Target, seed: int, first: int = 0, grow: bool = Tr
             known.add(_shape(trial.said))
             yield trial
         while True:
-            data = mutant(seeds, random.Random(f"{seed}:{name}:{first}"), target.text)
+            data = mutant(whole if first % 2 else seeds, random.Random(f"{seed}:{name}:{first}"), target.text)
             trial = _tried(first, data, read, target)
             if grow and len(seeds) < MOST_SEEDS and (shape := _shape(trial.said)) not in known:
                 known.add(shape)
