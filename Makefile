@@ -58,6 +58,8 @@ lint: $(READY)
 lock:   # needs `pip install uv`; writes names, versions and hashes only
 	uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-emit-find-links \
 	    --no-header --no-annotate --group dev --group docs pyproject.toml -o requirements.lock
+	uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-emit-find-links \
+	    --no-header --no-annotate --group audit -o .ci/audit.lock
 
 clean:
 	rm -rf .venv out

@@ -96,7 +96,7 @@ class Table:
         problems = [problem for name in wanted if (problem := self._problem(name))]
         if problems:
             raise RecordingError(self.path, *problems)
-        return {name: self.columns[name].astype(np.float64) for name in wanted}
+        return {name: _as_numbers(self.columns[name]) for name in wanted}
 
     def _problem(self, name: str) -> str | None:
         column = self.columns.get(name)
@@ -114,11 +114,20 @@ class Table:
         return f"{self.place(row)}, column {name}: expected a finite number or nan, came {shown}{_hint(cell)}"
 
 
+def _as_numbers(column: Column) -> FloatArray:
+    """Return cells as numbers; every NaN as the quiet one, with which arithmetic goes on without a word."""
+    with np.errstate(invalid="ignore"):
+        numbers = column.astype(np.float64)
+        numbers[np.isnan(numbers)] = np.nan
+    return numbers
+
+
 def _first_bad(column: Column) -> int | None:
     """Find the first cell that is neither a number of at most `LARGEST` nor NaN; None where all are."""
     if column.dtype == object:
         return next((row for row, cell in enumerate(column) if not _is_measurement(cell)), None)
-    too_large = np.flatnonzero(np.abs(column) > LARGEST) if column.dtype.kind == "f" else np.empty(0)
+    with np.errstate(invalid="ignore"):
+        too_large = np.flatnonzero(np.abs(column) > LARGEST) if column.dtype.kind == "f" else np.empty(0)
     return int(too_large[0]) if too_large.size else None
 
 

@@ -16,7 +16,7 @@ from hil.recording import RecordingWriter
 from hil.rig.build import open_devices
 from hil.rig.experiments.base import Phase
 from hil.rig.live import LiveEstimate, tracking_chain
-from hil.rig.pacing import FreePacer, period_ns
+from hil.rig.pacing import FreePacer, heartbeat_patience_ms, period_ns
 from hil.rig.plan import plan_run
 from hil.rig.session import run_plan
 from hil.rig.stop import StopRequest
@@ -46,8 +46,9 @@ def run(hours: float, out: Path) -> list[float]:
             print(f"| {len(memory)} | {memory[-1]:.1f} | {time.monotonic() - began_s:.0f} |", flush=True)
 
     live = LiveEstimate(tracking_chain(rig.period_s))
-    with served(rig) as (_, at), RecordingWriter(out) as recorder, open_devices(at) as devices:
-        pacer = FreePacer(period_ns(at.period_s), 60.0)
+    pacer = FreePacer(period_ns(rig.period_s), 60.0)
+    patience_ms = heartbeat_patience_ms(pacer)
+    with served(rig) as (_, at), RecordingWriter(out) as recorder, open_devices(at, patience_ms) as devices:
         run_plan(devices, plan_run(at, "cruise"), pacer, recorder, StopRequest(), progress, observers=(live,))
         rows = recorder.n_samples
     print(f"| published, {rows} rows | {memory_mib():.1f} | {time.monotonic() - began_s:.0f} |")

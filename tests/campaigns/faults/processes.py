@@ -176,7 +176,10 @@ def run_one(kind: Kind, rig_path: Path, experiment: str, after_s: float, real_ti
                     outcome.problems.append("the run ended")
                 stop_host(at)
             if kind.meet is not kill_rig:
-                outcome.zero_s = states.await_no_torque(kind.by_themselves)
+                try:
+                    outcome.zero_s = states.await_no_torque(kind.by_themselves)
+                except TimeoutError as error:
+                    outcome.problems.append(str(error))
         if kind.by_themselves and outcome.zero_s > LIMIT_S:
             outcome.problems.append(f"torque was on for {outcome.zero_s:.3f} s")
         if kind.meet is suspend_host:
@@ -206,6 +209,7 @@ def _judge(kind: Kind, at: Scene, said: str, outcome: Outcome) -> None:
 def main(arguments: list[str] | None = None) -> int:
     """Run the campaign."""
     asked = asked_for("tests.campaigns.faults.processes", 200, arguments)
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)  # under nohup the hosts would outlive their terminals, too
     with tempfile.TemporaryDirectory() as name:
         rig, kinds = campaign_rig(Path(name), by_the_clock=True), possible(Path(name))
 

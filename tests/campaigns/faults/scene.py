@@ -71,9 +71,13 @@ class States:
         """Wait until neither drive is in a state that may carry torque; give how long that took [s].
 
         Ask for the states, or listen to the answers the host gets when it disarms.
+
+        Raises
+        ------
+        TimeoutError
+            If they are not within `PATIENCE_S`.
         """
         began_s = time.monotonic()
-        self.answers.clear()
         while len(self.answers) < 2 or any(state in TORQUE_STATES for state in self.answers.values()):
             if time.monotonic() - began_s > PATIENCE_S:
                 raise TimeoutError(f"after {PATIENCE_S} s the drives are in {self.answers}")

@@ -33,8 +33,8 @@ MOST_MIB = 1024.0
 
 OUT = Path("out") / "fuzz"
 
-FIRST_ANSWER_S = 180.0
-"""Until the first answer: libraries are loaded and seeds made."""
+FIRST_ANSWER_S = 600.0
+"""Until the first answer: libraries are loaded, seeds made, and code is compiled for the first time."""
 
 
 @dataclass
