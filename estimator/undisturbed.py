@@ -17,7 +17,7 @@ from numba.core import event
 SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 
 
-class Undisturbed(event.Listener):  # type: ignore[misc]  # numba carries no types
+class Undisturbed(event.Listener):
     """Defers signals from the beginning of a compilation to its end."""
 
     def __init__(self) -> None:
@@ -54,4 +54,4 @@ class Undisturbed(event.Listener):  # type: ignore[misc]  # numba carries no typ
 
 def compile_undisturbed() -> None:
     """Defer signals from now on while numba compiles."""
-    event.register("numba:compile", Undisturbed())
+    event.register("numba:compile", Undisturbed())  # type: ignore[no-untyped-call]  # numba carries none
