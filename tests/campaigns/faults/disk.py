@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 SIZE_BYTES = 24 << 20
 
@@ -71,10 +72,10 @@ def disk(folder: Path) -> Iterator[Disk]:
 
 
 @cache
-def can_mount(folder: Path) -> bool:
+def can_mount() -> bool:
     """Whether this machine lets this user make such a disk."""
     try:
-        with disk(folder):
+        with TemporaryDirectory() as folder, disk(Path(folder)):
             return True
     except (subprocess.CalledProcessError, FileNotFoundError):
         return False

@@ -139,9 +139,9 @@ KINDS: dict[str, Kind] = {
 }
 
 
-def possible(folder: Path) -> dict[str, Kind]:
+def possible() -> dict[str, Kind]:
     """Return the kinds that this machine can have; say which it can't."""
-    there = {"": True, "disk": can_mount(folder), "clock": compiler() is not None}
+    there = {"": True, "disk": can_mount(), "clock": compiler() is not None}
     for name, kind in KINDS.items():
         if not there[kind.needs]:
             print(f"not on this machine, which gives it no {kind.needs} of its own: {name}", file=sys.stderr)
@@ -211,7 +211,7 @@ def main(arguments: list[str] | None = None) -> int:
     asked = asked_for("tests.campaigns.faults.processes", 200, arguments)
     signal.signal(signal.SIGHUP, signal.SIG_DFL)  # under nohup the hosts would outlive their terminals, too
     with tempfile.TemporaryDirectory() as name:
-        rig, kinds = campaign_rig(Path(name), by_the_clock=True), possible(Path(name))
+        rig, kinds = campaign_rig(Path(name), by_the_clock=True), possible()
 
         def one(number: int) -> tuple[str, str, Outcome]:
             drawn = random.Random(f"{asked.seed}:{number}")

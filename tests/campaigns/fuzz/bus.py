@@ -10,6 +10,7 @@ import itertools
 import struct
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from pathlib import Path
 
 from drivers.canopen.can_link import CanLink
@@ -215,6 +216,9 @@ def _modbus_seeds(folder: Path) -> list[bytes]:
 _COB_IDS = (0x000, 0x080, 0x080 + M1.node_id, 0x180 + M1.node_id, 0x200 + M1.node_id, 0x580 + M1.node_id)
 _COB_IDS += (0x600 + M1.node_id, 0x700 + M1.node_id, 0x77F, 0x7FF)
 
+_PATIENT = replace(M1, host_timeout_ms=60_000, rpdo_deadline_ms=60_000, state_timeout_s=30.0)
+"""A busy machine is no fault."""
+
 MOST_INPUTS = 40
 """After so many a bench is made anew: drives that are in fault, or switched off, hide what is behind."""
 
@@ -226,7 +230,7 @@ def _bus(folder: Path) -> Iterator[Read]:
     scene: Iterator[Bench] | None = None
 
     def fresh() -> Iterator[Bench]:
-        with bench() as rig:
+        with bench(settings=_PATIENT) as rig:
             for inverter in (rig.m1, rig.m2):
                 inverter.configure()
             rig.m1.arm()
@@ -241,7 +245,11 @@ def _bus(folder: Path) -> Iterator[Read]:
                 scene.close()  # type: ignore[attr-defined]  # a generator: it raises what a callback raised
             scene = fresh()
         inputs += 1
-        _disturb(next(scene), data)
+        try:
+            _disturb(next(scene), data)
+        except Exception:
+            scene = None
+            raise
 
     yield read
     if scene is not None:
