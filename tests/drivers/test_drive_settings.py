@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import FrozenInstanceError, replace
 from pathlib import Path
 
 import pytest
@@ -68,6 +68,13 @@ def test_option_codes_are_the_rig_file_s_or_a_dcf_s_and_never_an_eds_s_default(t
     dcf = eds.rename(tmp_path / "changed.dcf")
     assert given(replace(M1, eds_path=dcf))[0x605E, 0] == (2, "DCF")
     assert given(replace(M1, eds_path=dcf, option_codes={0x605E: 1}))[0x605E, 0] == (1, "rig file")
+
+
+def test_what_is_listed_is_what_will_be_written() -> None:
+    eds = EdsFile(M1.eds_path, M1.node_id)
+    first, *_ = drive_settings(plan_drive(eds.sheet), M1)
+    with pytest.raises(FrozenInstanceError):
+        first.value = 1  # type: ignore[misc]
 
 
 def test_torque_slope_is_written_in_per_mille_of_rated_torque_where_the_rig_file_gives_it() -> None:

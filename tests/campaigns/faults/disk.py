@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import threading
 from collections.abc import Iterator
@@ -30,11 +31,12 @@ class Disk:
 
     def fill(self) -> None:
         """Leave no room: the next write meets ENOSPC."""
-        with (self.root / "filler").open("wb", buffering=0) as filler, suppress(OSError):
-            for size in (CHUNK_BYTES, 1):
+        with (self.root / "filler").open("wb", buffering=0) as filler:
+            for size in (CHUNK_BYTES, 1, CHUNK_BYTES, 1):  # once written out it often takes less room than set aside
                 with suppress(OSError):
                     while filler.write(bytes(size)) == size:
                         pass
+                os.fsync(filler)
 
     def stall(self, duration_s: float) -> None:
         """Have every write wait for so long; returns at once."""

@@ -58,6 +58,7 @@ def trials(name: str, target: Target, seed: int, first: int = 0, grow: bool = Tr
         whole = target.seeds(Path(folder))
         seeds = [*whole, *kept(name)]
         read = stack.enter_context(target.opened(Path(folder)))
+        _tried(0, whole[0], read, target)  # compiles and loads what is needed: no input takes the time for that
         known = set()
         for number, data in enumerate(seeds):
             trial = _tried(number - len(seeds), data, read, target)
