@@ -206,3 +206,22 @@ def test_the_sync_counter_is_switched_off(tmp_path: Path, access: str, value: in
     eds = changed_eds(tmp_path, more=COUNTER.format(access=access, value=value))
     found = given(replace(M1, eds_path=eds)).get((0x1019, 0))
     assert found == ((0, "this program") if written else None)
+
+
+HEARTBEAT = "[1017]\nParameterName=Producer heartbeat time\nObjectType=0x7\nDataType=0x0006\nAccessType=rw\nDefaultValue="
+
+
+@pytest.mark.parametrize(("default", "heartbeat_ms"), [("200", 199), ("200", 200), ("", 1), ("50", 100)])
+def test_a_heartbeat_that_can_t_be_set_has_to_be_as_often_as_asked_for(
+    tmp_path: Path, default: str, heartbeat_ms: int
+) -> None:
+    text = data_file("inverter.eds").read_text()
+    written = text[text.index(HEARTBEAT) + len(HEARTBEAT) :].split("\n")[0]
+    fixed = HEARTBEAT.replace("AccessType=rw", "AccessType=ro")
+    eds = changed_eds(tmp_path, (f"{HEARTBEAT}{written}", f"{fixed}{default}"))
+    settings = replace(M1, eds_path=eds, heartbeat_ms=heartbeat_ms)
+    if heartbeat_ms == 199:
+        with pytest.raises(ConfigMismatch, match="heartbeat_ms is 199, expected at least 200"):
+            given(settings)
+    else:
+        assert (0x1017, 0) not in given(settings)
