@@ -54,6 +54,7 @@ def test_the_drive_is_made_to_watch_its_host_in_three_ways() -> None:
     settings = given(replace(M1, rpdo_deadline_ms=150))
     assert settings[0x1016, 1] == (127 << 16 | 150, "rig file")
     assert settings[0x1400, 5] == (150, "rig file")
+    assert settings[0x1017, 0] == (M1.heartbeat_ms, "rig file")
     assert (0x6007, 0) not in settings  # the third, as the drive has it
 
 
@@ -110,6 +111,32 @@ def test_node_guarding_is_switched_off(tmp_path: Path, factor: int | str) -> Non
     eds = changed_eds(tmp_path, more=NODE_GUARDING.format(guard_ms=100, factor=factor))
     settings = given(replace(M1, eds_path=eds))
     assert settings[0x100C, 0] == settings[0x100D, 0] == (0, "this program")
+
+
+def test_node_guarding_that_can_t_be_written_is_left_alone(tmp_path: Path) -> None:
+    fixed = NODE_GUARDING.format(guard_ms=0, factor=0).replace("AccessType=rw", "AccessType=ro")
+    assert not {(0x100C, 0), (0x100D, 0)} & {*given(replace(M1, eds_path=changed_eds(tmp_path, more=fixed)))}
+
+
+def test_half_of_node_guarding_is_none_and_left_alone(tmp_path: Path) -> None:
+    guard_time, factor = NODE_GUARDING.format(guard_ms=100, factor=3).split("\n\n")
+    for half in (guard_time, f"\n{factor}"):
+        assert not {(0x100C, 0), (0x100D, 0)} & {*given(replace(M1, eds_path=changed_eds(tmp_path, more=half)))}
+
+
+SYNC = "[1005]\nParameterName=COB-ID SYNC message\nObjectType=0x7\nDataType=0x0007\nAccessType="
+
+
+@pytest.mark.parametrize(("access", "value"), [("rw", "0x81"), ("ro", "0x80"), ("ro", ""), ("ro", "0x81")])
+def test_sync_comes_by_its_usual_identifier_or_the_drive_is_refused(tmp_path: Path, access: str, value: str) -> None:
+    text = data_file("inverter.eds").read_text()
+    before = text[text.index(SYNC) :].split("PDOMapping")[0]
+    settings = replace(M1, eds_path=changed_eds(tmp_path, (before, f"{SYNC}{access}\nDefaultValue={value}\n")))
+    if (access, value) == ("ro", "0x81"):
+        with pytest.raises(ConfigMismatch, match="COB-ID SYNC 0x1005:00 that is 0x00000080 or can be written"):
+            given(settings)
+    else:
+        assert given(settings).get((0x1005, 0)) == ((0x80, "this program") if access == "rw" else None)
 
 
 def test_slope_and_codes_are_in_the_drive_after_configuring_and_in_the_list_before() -> None:
@@ -208,7 +235,9 @@ def test_the_sync_counter_is_switched_off(tmp_path: Path, access: str, value: in
     assert found == ((0, "this program") if written else None)
 
 
-HEARTBEAT = "[1017]\nParameterName=Producer heartbeat time\nObjectType=0x7\nDataType=0x0006\nAccessType=rw\nDefaultValue="
+HEARTBEAT = (
+    "[1017]\nParameterName=Producer heartbeat time\nObjectType=0x7\nDataType=0x0006\nAccessType=rw\nDefaultValue="
+)
 
 
 @pytest.mark.parametrize(("default", "heartbeat_ms"), [("200", 199), ("200", 200), ("", 1), ("50", 100)])
