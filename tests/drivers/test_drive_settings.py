@@ -80,7 +80,7 @@ def test_what_is_listed_is_what_will_be_written() -> None:
 
 def test_torque_slope_is_written_in_per_mille_of_rated_torque_where_the_rig_file_gives_it() -> None:
     assert (0x6087, 0) not in given(M1)
-    assert given(replace(M1, torque_slope_nm_per_s=300.0))[0x6087, 0] == (500, "rig file")
+    assert given(replace(M1, torque_slope_nm_per_s=600.0))[0x6087, 0] == (1000, "rig file")
 
 
 @pytest.mark.parametrize("from_rig_file", [True, False])
