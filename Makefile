@@ -35,6 +35,7 @@ campaign: $(READY)
 	$(BIN)/python -m tests.campaigns.faults
 	$(BIN)/python -m tests.campaigns.faults.processes
 	$(BIN)/python -m tests.campaigns.mutants
+	$(BIN)/python -m tests.campaigns.fuzz
 
 # Speed as ratios to scipy, a bare C loop, raw python-can; growth with the length, memory: docs/benchmarks.md.
 bench: $(READY)
@@ -57,6 +58,8 @@ lint: $(READY)
 lock:   # needs `pip install uv`; writes names, versions and hashes only
 	uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-emit-find-links \
 	    --no-header --no-annotate --group dev --group docs pyproject.toml -o requirements.lock
+	uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-emit-find-links \
+	    --no-header --no-annotate --group audit -o .ci/audit.lock
 
 clean:
 	rm -rf .venv out

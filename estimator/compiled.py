@@ -15,6 +15,8 @@ from typing import Any, TypeVar, cast
 import numba
 from numba.core import config as numba_config
 
+from estimator.undisturbed import compile_undisturbed
+
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
@@ -38,6 +40,7 @@ def _cache_folder() -> Path:
 if not os.environ.get("NUMBA_CACHE_DIR"):
     vars(numba_config)["CACHE_DIR"] = str(_cache_folder())  # numba defines its settings at run time
 
+compile_undisturbed()
 
 IS_COMPILED = not vars(numba_config)["DISABLE_JIT"]
 """Whether code is compiled, and not run by Python, for a debugger, because of ``NUMBA_DISABLE_JIT``."""

@@ -25,7 +25,8 @@ def is_inside(folder: Path, path: Path) -> bool:
     """Whether a path, symbolic links followed, is in a folder or one below it; neither has to be there."""
     try:
         home, found = folder.resolve(), path.resolve()
-    except (OSError, RuntimeError, ValueError):  # a loop of links, or a NUL in the name
+        found.exists()
+    except (OSError, RuntimeError, ValueError):  # a loop of links, a NUL in the name, or more than a name can have
         return False
     return found != home and found.is_relative_to(home)
 

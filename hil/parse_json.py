@@ -12,9 +12,17 @@ def parse_json(text: str) -> Any:
     Raises
     ------
     ValueError
-        If it is no JSON, is nested deeper than Python can follow, or has a number of too many digits.
+        If it is no JSON, is nested deeper than Python can follow, or has a whole number beyond 64 bit.
     """
     try:
-        return json.loads(text)
+        return json.loads(text, parse_int=_of_64_bit)
     except RecursionError:
         raise ValueError("values nested too deep") from None
+
+
+def _of_64_bit(digits: str) -> int:
+    """Return a whole number; a longer one is none of a count, and fits no float where it is divided."""
+    value = int(digits)
+    if not -(1 << 63) <= value < 1 << 63:
+        raise ValueError(f"a whole number of {len(digits)} digits, expected at most 64 bit")
+    return value

@@ -43,6 +43,12 @@ PROBES = (b"\x00\x10\x00", b"\x01\x10\x00", b"\x18\x10\x01")
 
 _FRAME_BYTES = 8
 
+MOST_SEGMENTS = 1024
+"""Of one transfer, 7 bytes each: the longest texts of a device have some hundred characters."""
+
+_OUT_OF_MEMORY = 0x05040005
+"""Abort code for a transfer that is longer than this client takes."""
+
 
 class SdoSilence(SdoCommunicationError):
     """The node has not answered in time."""
@@ -55,6 +61,7 @@ class MatchingSdoClient(SdoClient):
         super().__init__(rx_cobid, tx_cobid, dictionary)  # type: ignore[no-untyped-call]
         self._multiplexer = b""
         self._in_segments = False
+        self._segments = 0
         self._unanswered: Counter[bytes] = Counter()
         self._probes = list(PROBES)
 
@@ -68,8 +75,14 @@ class MatchingSdoClient(SdoClient):
             the same, for it may be the one that takes the torque away.
         SdoAbortedError
             If the node refuses.
+        SdoCommunicationError
+            If an object has no end.
         """
         self._in_segments = sdo_request[0] >> 5 not in _INITIATE_REQUESTS
+        self._segments = self._segments + 1 if self._in_segments else 0
+        if self._segments > MOST_SEGMENTS:
+            self.abort(_OUT_OF_MEMORY)
+            raise SdoCommunicationError(f"more than {MOST_SEGMENTS} segments came and none was the last")
         if self._in_segments:  # of the object that its initiate has named
             return self._ask(sdo_request)
         multiplexer = bytes(sdo_request[1:4])

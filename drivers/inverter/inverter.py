@@ -8,15 +8,12 @@ success when the drive has not followed.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Final
 
 from drivers.canopen.can_link import CanLink
-from drivers.canopen.emcy import EMCY_COB_ID
-from drivers.canopen.heartbeat import HEARTBEAT_COB_ID, NMT_COB_ID, NmtCommand, NmtState, nmt_frame
-from drivers.canopen.node_monitor import NodeMonitor
+from drivers.canopen.heartbeat import NMT_COB_ID, NmtCommand, NmtState, nmt_frame
 from drivers.canopen.sdo import SdoChannel
 from drivers.canopen.sdo_node import SdoNode
 from drivers.errors import CommandRefused, ConfigMismatch, DriverError
@@ -26,7 +23,7 @@ from drivers.inverter.commissioned import CommissionedValue, commissioned_values
 from drivers.inverter.drive_settings import drive_settings
 from drivers.inverter.feedback import FeedbackReceiver, InverterFeedback
 from drivers.inverter.follow_watch import FollowWatch
-from drivers.inverter.frozen_feedback import FrozenFeedback
+from drivers.inverter.health import InverterHealth
 from drivers.inverter.pdo_setup import set_up_pdos
 from drivers.inverter.pdos import TARGET_TORQUE, TORQUE_OFFSET, InverterPdos, TorqueCounts
 from drivers.inverter.power_control import PowerControl
@@ -38,9 +35,6 @@ from drivers.torque_guard import GuardedTorque
 __all__ = ["Difference", "Inverter", "InverterFeedback", "InverterSettings"]
 
 NO_TORQUE: Final = TorqueCounts()
-
-SDO_REQUEST_COB_ID: Final = 0x600
-"""Plus the node id."""
 
 
 class Inverter:
@@ -73,14 +67,11 @@ class Inverter:
         link.network.add_node(node)
         self._sdo = SdoChannel(node, self._pdos.eds, self._where, settings.sdo_timeout_s)
         self._feedback = self._subscribe_feedback()
-        self._monitor = self._subscribe_monitor()
-        self._power = PowerControl(self._sdo, settings, self._torque_objects(), self._error_code)
-        self._frozen = FrozenFeedback(self._where)
+        self._health = InverterHealth(link, settings, self._pdos.rpdos)
+        self._monitor = self._health.monitor
+        self._power = PowerControl(self._sdo, settings, self._torque_objects(), self._health.error_code)
         self._following = FollowWatch(settings)
         self._armed = False
-        for cob_id in self._pdos.rpdos:
-            link.strangers.claim(cob_id, f"{self._where}: an RPDO")
-        link.strangers.claim(SDO_REQUEST_COB_ID + settings.node_id, f"{self._where}: an SDO request")
 
     @property
     def latest(self) -> InverterFeedback | None:
@@ -188,7 +179,7 @@ class Inverter:
             If the node does not answer or does not become operational.
         """
         self._armed = False
-        self._frozen.start_anew()
+        self._health.frozen.start_anew()
         self._monitor.expect(None)
         self._send_nmt(NmtCommand.ENTER_PRE_OPERATIONAL)
         if differences := tuple(fixed_differences(self._sdo, self._plan, self.settings)):
@@ -241,7 +232,7 @@ class Inverter:
                 f"{self._where}: {torque.base_nm} Nm commanded while disarmed, expected arm() before. Nothing was sent."
             )
         counts = self._pdos.counts(torque)
-        self._frozen.commanded(counts.total, self.latest)
+        self._health.frozen.commanded(counts.total, self.latest)
         self._following.commanded(counts.total)
         self._send_command(Command.ENABLE_OPERATION, counts)
 
@@ -357,10 +348,7 @@ class Inverter:
         ForeignController
             If somebody else commands the drives, while the link is watched for that.
         """
-        self._link.raise_if_failed()
-        self._link.strangers.raise_if_seen()
-        self._monitor.raise_if_unwell(time.monotonic_ns())
-        self._frozen.raise_if_frozen()
+        self._health.raise_if_unwell()
         latest = self.latest
         if latest is not None:
             self._power.raise_if_fault(latest.state)
@@ -372,22 +360,11 @@ class Inverter:
         there = offset is not None and offset.writable and (TORQUE_OFFSET, 0) in self._pdos.eds.types()
         return (TARGET_TORQUE, TORQUE_OFFSET) if there else (TARGET_TORQUE,)
 
-    def _error_code(self) -> int | None:
-        """Give the error code of the drive's last EMCY; None if it sent none."""
-        emergency = self._monitor.emergency
-        return None if emergency is None else emergency.code
-
     def _subscribe_feedback(self) -> FeedbackReceiver:
         receiver = self._pdos.receiver()
         for cob_id, take in receiver.subscriptions:
             self._link.subscribe(cob_id, take)
         return receiver
-
-    def _subscribe_monitor(self) -> NodeMonitor:
-        monitor = NodeMonitor(self._where, self.settings.heartbeat_timeout_ms * 1_000_000)
-        self._link.subscribe(HEARTBEAT_COB_ID + self.settings.node_id, monitor.on_heartbeat)
-        self._link.subscribe(EMCY_COB_ID + self.settings.node_id, monitor.on_emergency)
-        return monitor
 
     def _send_nmt(self, command: NmtCommand) -> None:
         self._link.send(NMT_COB_ID, nmt_frame(command, self.settings.node_id))

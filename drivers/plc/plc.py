@@ -16,18 +16,19 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from enum import Enum
 from types import TracebackType
 from typing import Final, Self, TypeVar
 
-from drivers.errors import ConfigMismatch, DeviceFault, DeviceTimeout, ProtocolViolation
-from drivers.plc.map_needs import from_si, require_usable
+from drivers.errors import ConfigMismatch, DeviceFault, DeviceTimeout
+from drivers.plc.map_needs import require_usable
 from drivers.plc.modbus_link import ModbusLink
 from drivers.plc.modbus_security import ClientSecurity
-from drivers.plc.reading import Reading, reading
+from drivers.plc.named_registers import NamedRegisters
+from drivers.plc.reading import Reading
 from drivers.plc.register import Value
-from drivers.plc.register_map import Block, RegisterMap, blocks_of
+from drivers.plc.register_map import RegisterMap
 from drivers.plc.types import ClutchState, DriveMode, PlcStatus, PlcWatchdog, PrbsSettings, PrbsSource
 from drivers.torque_guard import GuardedTorque
 
@@ -101,6 +102,7 @@ class Plc:
         "_link",
         "_map",
         "_mode_timeout_s",
+        "_registers",
         "_seen_ns",
         "_setting_prbs",
     )
@@ -121,6 +123,7 @@ class Plc:
         require_usable(register_map)
         self._link = ModbusLink(host, port, register_map.device_id, timeout_s, security)
         self._map = register_map
+        self._registers = NamedRegisters(self._link, register_map)
         self._mode_timeout_s = mode_timeout_s
         self._beat_timeout_s = beat_timeout_s
         self._greeting_timeout_s = greeting_timeout_s
@@ -211,7 +214,7 @@ class Plc:
             If it can't be read, or means nothing.
         """
         t_ns = self._clock_ns()
-        values = await self._read(STATUS)
+        values = await self._registers.read(STATUS)
         self._latest = PlcStatus(
             drive_mode=_member(DriveMode, values["drive_mode"]),
             clutch=_member(ClutchState, values["clutch"]),
@@ -270,12 +273,12 @@ class Plc:
             "prbs_seed": settings.seed,
             "prbs_source": settings.source.value,
         }
-        words = self._encoded(values)
+        words = self._registers.encoded(values)
         async with self._setting_prbs:
-            await self._write(self._encoded({"prbs_enable": False}))
-            await self._write(words)
+            await self._registers.write(self._registers.encoded({"prbs_enable": False}))
+            await self._registers.write(words)
             if settings.enabled:
-                await self._write(self._encoded({"prbs_enable": True}))
+                await self._registers.write(self._registers.encoded({"prbs_enable": True}))
         return settings
 
     async def request_drive_mode(self, mode: DriveMode) -> None:
@@ -286,7 +289,7 @@ class Plc:
         DeviceFault
             If the PLC stays in another mode.
         """
-        await self._write(self._encoded({"drive_mode_request": mode.value}))
+        await self._registers.write(self._registers.encoded({"drive_mode_request": mode.value}))
         deadline_ns = self._clock_ns() + int(self._mode_timeout_s * NS_PER_S)
         while (current := await self._drive_mode()) is not mode:
             if self._clock_ns() >= deadline_ns:
@@ -310,11 +313,11 @@ class Plc:
         else:
             await self._require_seen(self._host_count, now_ns)
         count = 0 if self._host_count is None else (self._host_count + 1) % COUNTS
-        await self._write(self._encoded({"host_count": count}))
+        await self._registers.write(self._registers.encoded({"host_count": count}))
         self._host_count = count
 
     async def _require_seen(self, count: int, now_ns: int) -> None:
-        seen = (await self._read(("host_count_seen",)))["host_count_seen"]
+        seen = (await self._registers.read(("host_count_seen",)))["host_count_seen"]
         if seen == count:
             self._seen_ns = now_ns
         elif now_ns - self._seen_ns > self._beat_timeout_s * NS_PER_S:
@@ -324,10 +327,10 @@ class Plc:
             )
 
     async def _drive_mode(self) -> DriveMode:
-        return _member(DriveMode, (await self._read(("drive_mode",)))["drive_mode"])
+        return _member(DriveMode, (await self._registers.read(("drive_mode",)))["drive_mode"])
 
     async def _verify_identity(self) -> None:
-        found = await self._read(self._map.identity)
+        found = await self._registers.read(self._map.identity)
         wrong = [
             f"{name} is {found[name]}, expected {expected}"
             for name, expected in self._map.identity.items()
@@ -347,52 +350,7 @@ class Plc:
         BusDown, DeviceTimeout
             If the PLC can't be asked, or does not answer.
         """
-        readings: dict[str, Reading] = {}
-        for block in blocks_of(self._map, self._map.registers):
-            try:
-                readings |= await self._read_block(block)
-            except (ProtocolViolation, DeviceFault) as error:
-                readings |= {
-                    name: Reading(name, self._map[name], None, str(error), "a register that can be read")
-                    for name in block.names
-                }
-        return tuple(readings[name] for name in self._map.registers)
-
-    async def _read(self, names: Iterable[str]) -> dict[str, Value]:
-        values: dict[str, Value] = {}
-        for block in blocks_of(self._map, names):
-            for name, each in (await self._read_block(block)).items():
-                try:
-                    values[name] = each.required()
-                except ProtocolViolation as error:
-                    raise ProtocolViolation(f"{self._link.place}: {error}") from error
-        return values
-
-    async def _read_block(self, block: Block) -> dict[str, Reading]:
-        words = await self._link.read(block.kind, block.address, block.count)
-        readings = {}
-        for name in block.names:
-            register = self._map[name]
-            offset = register.address - block.address
-            readings[name] = reading(name, register, words[offset : offset + register.size])
-        return readings
-
-    def _encoded(self, values: Mapping[str, Value]) -> dict[str, tuple[int, ...]]:
-        registers = {name: self._map[name] for name in values}
-        return {name: registers[name].encode(from_si(name, registers[name], value)) for name, value in values.items()}
-
-    async def _write(self, words: Mapping[str, tuple[int, ...]]) -> None:
-        """Write registers block by block and see that they then hold what was written."""
-        for block in blocks_of(self._map, words):
-            sent = tuple(word for name in block.names for word in words[name])
-            await self._link.write(block.kind, block.address, sent)
-            held = await self._link.read(block.kind, block.address, block.count)
-            if held != sent:
-                raise ProtocolViolation(
-                    f"{self._link.place}: {', '.join(block.names)} ({block.kind.value} {block.address}): "
-                    f"expected to read back {list(sent)} as written, came {list(held)}. Look for a limit in "
-                    "the PLC's program, or for another host that writes there."
-                )
+        return await self._registers.all()
 
 
 def _member(members: type[Member], value: Value) -> Member:

@@ -8,6 +8,7 @@ asked for when they were installed.
 from __future__ import annotations
 
 import importlib
+import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -99,7 +100,7 @@ def _law(path: Path, name: str, table: LawTable) -> OwnLaw:
 
 def _function(name: str, text: str, folder: Path) -> Callable[..., object]:
     module_name, _, function_name = text.partition(":")
-    if not folder.is_dir():  # Python would look into an archive too, whatever it is called
+    if not os.path.isdir(folder):  # Python would look into an archive too; pathlib raises for a name that can't be
         raise BadModel(f"laws.{name}.folder | expected an existing folder | came {folder}")
     try:
         with _searched_first(folder):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Annotated
 
@@ -23,7 +24,7 @@ def _beside_the_file(value: object, info: ValidationInfo) -> Path:
         raise ValueError("the path of a file, as text")
     folder: Path = (info.context or {}).get("path", Path("file")).parent
     path = (folder / value).resolve()
-    if not path.is_file():
+    if not os.path.isfile(path):  # False also for a name that no system can have, where pathlib raises
         raise ValueError(f"an existing file, looked for {path}")
     return path
 

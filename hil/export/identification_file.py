@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from estimator.errors import BadModel
+from estimator.errors import BadModel, BadSetting
 from estimator.identification.online.adaptation import Adaptation
 from hil.errors import FileProblem
 from hil.export.plc_estimator import PlcEstimator
@@ -34,9 +34,7 @@ def plc_estimator(
     UsageError
         If the recording is not in the file, or none is named and there are several.
     FileProblem
-        If the file is wrong, or its filter could not filter.
-    BadSetting
-        As `PlcEstimator`.
+        If the file is wrong, its filter could not filter, or its settings suit no PLC, or not that period.
     """
     found = identified(path, run, adaptation)
     origin = f"{path.name}, recording {found.name}"
@@ -44,3 +42,5 @@ def plc_estimator(
         return PlcEstimator(found.settings, cycle_s, None if adaptive else found.L, origin)
     except BadModel as cause:
         raise FileProblem(path, f"recordings.{found.name}.filter_L | {cause}") from cause
+    except BadSetting as cause:
+        raise FileProblem(path, f"settings | {cause}") from cause

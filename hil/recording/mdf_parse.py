@@ -53,9 +53,9 @@ def parse_metadata(path: Path, mdf: MDF) -> Mapping[str, str]:
 
 
 def _description(mdf: MDF) -> str | None:
-    if mdf.version < "4":  # MDF 3 has none
+    if mdf.version < "4":  # such files have no attachments, and asammdf refuses to say so
         return None
-    for number, attachment in enumerate(getattr(mdf, "attachments", [])):
+    for number, attachment in enumerate(mdf.attachments):
         if str(attachment.file_name) == DESCRIPTION:
             content: Any = mdf.extract_attachment(number)[0]
             return content if isinstance(content, str) else bytes(content).decode("utf-8")

@@ -16,6 +16,7 @@ from hil.errors import RecordingError
 from hil.recording.checksum import CHECKSUMS, sealed
 from hil.recording.differences import losses
 from hil.recording.formats import FORMATS, Format, writer_for
+from hil.recording.no_room import no_room
 from hil.recording.request import Request
 from hil.recording.table import Table
 
@@ -62,10 +63,7 @@ def write_table(
         _write(table, path, written, on_loss)
         _publish(part, path, form)
     except OSError as error:
-        raise RecordingError(
-            path,
-            f"expected room for the recording, came: {error.strerror or error}. Make room, or choose another disk.",
-        ) from error
+        raise no_room(path, "the recording", error) from error
     finally:
         for file in (part, *([] if form.beside is None else [form.beside(part)])):
             if file.is_file():  # on a disk that can't be written even removing nothing is refused

@@ -18,6 +18,7 @@ from typing import Any
 from hil.errors import RecordingError
 from hil.parse_json import parse_json
 from hil.recording.kinds import Kind
+from hil.recording.no_room import no_room
 
 SCHEMA_KEY, SCHEMA = "schema", "hil.recording/1"
 """By which a file of ours is told from any other of that name."""
@@ -65,7 +66,7 @@ def write_sidecar(recording: Path, said: Sidecar, needed: bool = False) -> None:
         unfinished.replace(path)
     except OSError as error:
         unfinished.unlink(missing_ok=True)
-        raise RecordingError(path, f"expected room for the description, came: {error.strerror or error}.") from error
+        raise no_room(path, "the description", error) from error
 
 
 def is_sidecar(path: Path) -> bool:

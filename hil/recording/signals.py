@@ -102,8 +102,9 @@ def to_record(table: Table, signals: SignalsConfig, tell: Tell | None = None) ->
     flagged = _flagged(table, signals)
     read = np.column_stack([np.isfinite(numbers[torque.column]) & ~flagged for torque in torques])
     trusted = read & np.column_stack([_inside_own(numbers[torque.column], torque.column, masks) for torque in torques])
-    torque_nm = np.column_stack([numbers[torque.column] * by for torque, by in zip(torques, scales, strict=True)])
-    measured = numbers[output.column] * scale
+    with np.errstate(over="ignore"):  # what is too large then is refused
+        torque_nm = np.column_stack([numbers[torque.column] * by for torque, by in zip(torques, scales, strict=True)])
+        measured = numbers[output.column] * scale
     okay = trusted.all(axis=1) & np.isfinite(measured) & np.logical_and.reduce([~flagged, *masks.values()])
     _require_sizes(
         table, [*((torque.column, torque_nm[:, k]) for k, torque in enumerate(torques)), (output.column, measured)]

@@ -113,7 +113,7 @@ class Table:
         problems = [problem for name in wanted if (problem := self._problem(name))]
         if problems:
             raise RecordingError(self.path, *problems)
-        return {name: _numbers(self.columns[name]) for name in wanted}
+        return {name: _as_numbers(self.columns[name]) for name in wanted}
 
     def _problem(self, name: str) -> str | None:
         column = self.columns.get(name)
@@ -141,11 +141,13 @@ def line_of(row: int, first_line: int, skipped: tuple[int, ...]) -> int:
     return line
 
 
-def _numbers(column: Column) -> FloatArray:
-    """Return a column as numbers; an empty text is a missing value."""
+def _as_numbers(column: Column) -> FloatArray:
+    """Return a column as numbers: an empty text is a missing value, and every NaN the quiet one of arithmetic."""
     if column.dtype == object:
         return np.array([float(cell) if cell else np.nan for cell in column.tolist()], dtype=np.float64)
-    numbers: FloatArray = column.astype(np.float64)
+    with np.errstate(invalid="ignore"):
+        numbers: FloatArray = column.astype(np.float64)
+        numbers[np.isnan(numbers)] = np.nan
     return numbers
 
 
@@ -153,7 +155,8 @@ def _first_bad(column: Column) -> int | None:
     """Find the first cell that is neither a number of at most `LARGEST` nor NaN; None where all are."""
     if column.dtype == object:
         return next((row for row, cell in enumerate(column) if not _is_measurement(cell)), None)
-    too_large = np.flatnonzero(np.abs(column) > LARGEST) if column.dtype.kind == "f" else np.empty(0)
+    with np.errstate(invalid="ignore"):
+        too_large = np.flatnonzero(np.abs(column) > LARGEST) if column.dtype.kind == "f" else np.empty(0)
     return int(too_large[0]) if too_large.size else None
 
 

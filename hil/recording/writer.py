@@ -26,6 +26,7 @@ from hil.recording.checksum import sealed
 from hil.recording.csv_format import description_of
 from hil.recording.description import OUTCOME
 from hil.recording.formats import read_table, writer_for
+from hil.recording.no_room import no_room
 from hil.recording.publish import write_table
 from hil.recording.samples import cells_of
 from hil.recording.sidecar import write_sidecar
@@ -111,10 +112,7 @@ class RecordingWriter:
         except OSError as error:
             self._give_up(self._file)
             self._file = None
-            raise RecordingError(
-                self.path,
-                f"expected room for the recording, came: {error.strerror or error}. Make room, or choose another disk.",
-            ) from error
+            raise no_room(self.path, "the recording", error) from error
         self._writing = WritingThread(self._file, CAPACITY)
         return self
 
@@ -183,11 +181,8 @@ class RecordingWriter:
 
     def _raise_if_failed(self, writing: WritingThread) -> None:
         if writing.failed is not None:
-            raise RecordingError(
-                self.path,
-                f"expected room for sample {writing.n_written + 1}, came: {writing.failed.strerror}. Those before it "
-                "are kept; make room and run again.",
-            ) from writing.failed
+            what, then = f"sample {writing.n_written + 1}", "Those before it are kept; make room and run again."
+            raise no_room(self.path, what, writing.failed, then) from writing.failed
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None

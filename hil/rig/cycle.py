@@ -175,9 +175,14 @@ class Cycle:
             station.rate.take(station.inverter.received)
 
     @property
+    def speeds_rad_s(self) -> tuple[float, float]:
+        """The speed of the one shaft, as each inverter reads it; NaN before it answered [rad/s]."""
+        return self._m1.speed_rad_s, self._m2.speed_rad_s
+
+    @property
     def fastest_rad_s(self) -> float:
-        """The reading furthest from standstill: both inverters turn one shaft; NaN before both answered [rad/s]."""
-        speeds = (self._m1.speed_rad_s, self._m2.speed_rad_s)
+        """The reading furthest from standstill; NaN before both answered [rad/s]."""
+        speeds = self.speeds_rad_s
         return math.nan if any(map(math.isnan, speeds)) else max(speeds, key=abs)
 
     def refuse_if_overslept(self, tick: Tick) -> None:

@@ -159,7 +159,7 @@ class Drive:
         self._summary.cycles += 1
         self._summary.most_late_ns = max(self._summary.most_late_ns, tick.late_ns)
         self.cycle.refuse_if_overslept(tick)  # first: whatever looks wrong after a stall is its consequence
-        return tick, self.watch.look(tick, self.cycle.fastest_rad_s)
+        return tick, self.watch.look(tick, *self.cycle.speeds_rad_s)
 
     def _record(self, sample: Sample) -> None:
         if self._last is not None:

@@ -7,6 +7,7 @@ from the start of the poll.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from concurrent.futures import Future
 from dataclasses import replace
 
@@ -64,15 +65,15 @@ class PlcWatch:
         """The report that came in the present cycle, if one did."""
         return self._news
 
-    def look(self, tick: Tick, speed_rad_s: float) -> SampleFlag:
+    def look(self, tick: Tick, *speeds_rad_s: float) -> SampleFlag:
         """Poll if it is due, and judge what is known.
 
         Parameters
         ----------
         tick
             The present cycle.
-        speed_rad_s
-            Latest motor speed, of both inverters' readings the one further from standstill [rad/s].
+        speeds_rad_s
+            Latest motor speed, as each inverter reads it: they turn one shaft [rad/s].
 
         Raises
         ------
@@ -90,7 +91,7 @@ class PlcWatch:
                 f"PLC: no answer for {age_ns / NS_PER_S:.2f} s, expected one every "
                 f"{POLL_EVERY_NS / NS_PER_S:g} s. Check that its program runs and its network is up."
             )
-        self._judge(speed_rad_s)
+        self._judge(speeds_rad_s)
         return SampleFlag.PLC_STALE if age_ns > 2 * POLL_EVERY_NS else SampleFlag.GOOD
 
     def _start_if_due(self, now_ns: int) -> None:
@@ -116,11 +117,10 @@ class PlcWatch:
         self._poll = None
         return replace(status, t_ns=self._asked_ns)
 
-    def _judge(self, speed_rad_s: float) -> None:
+    def _judge(self, speeds_rad_s: Sequence[float]) -> None:
         reasons = list(changes(self._before, self._latest, self._needs))
-        if abs(speed_rad_s) > self._latest.speed_limit_rad_s:
-            reasons.append(
-                f"speed is {speed_rad_s:.1f} rad/s, expected at most {self._latest.speed_limit_rad_s:g} rad/s"
-            )
+        if any(abs(speed_rad_s) > self._latest.speed_limit_rad_s for speed_rad_s in speeds_rad_s):
+            read = " and ".join(f"{speed_rad_s:.1f}" for speed_rad_s in speeds_rad_s)  # one may read a speed long past
+            reasons.append(f"speed is {read} rad/s, expected at most {self._latest.speed_limit_rad_s:g} rad/s")
         if reasons:
             raise RunAborted(f"PLC: {'; '.join(reasons)}. The run was ended at zero torque; mend the cause, run again.")

@@ -16,6 +16,7 @@ from typing import Self
 import can
 
 from hil.errors import RecordingError
+from hil.recording.no_room import no_room
 
 SUFFIXES = (".blf", ".log", ".asc")
 """Vector's binary and text logs, and the text of Linux's candump: what ``can.Logger`` writes by these names."""
@@ -81,11 +82,7 @@ class BusTrace:
             From the first that could not be written.
         """
         if self._failed is not None:
-            raise RecordingError(
-                self.path,
-                f"expected room for the bus trace, came: {self._failed.strerror or self._failed}. "
-                "Make room and run again.",
-            ) from self._failed
+            raise no_room(self.path, "the bus trace", self._failed, "Make room and run again.") from self._failed
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None

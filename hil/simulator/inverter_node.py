@@ -24,14 +24,13 @@ from drivers.canopen.can_link import CanLink, FrameCallback
 from drivers.canopen.emcy import EMCY_COB_ID, Emergency
 from drivers.canopen.heartbeat import HEARTBEAT_COB_ID, NMT_COB_ID, HeartbeatProducer, NmtCommand, NmtState
 from drivers.canopen.pdo_map import COB_ID_INVALID
-from drivers.capability.plan import plan_drive
-from drivers.capability.speed_unit import described_scale, speed_scale
 from drivers.datasheet.file import EdsFile
 from drivers.errors import BusDown
-from drivers.scaling import IntegerType, VelocityScale
+from drivers.scaling import IntegerType
+from hil.simulator.described_drive import INTEGERS, fitting, power_on_values, velocity_scale
 from hil.simulator.heartbeat_consumer import HeartbeatConsumer
 from hil.simulator.host_watch import HEARTBEAT_ERROR, RPDO_TIMEOUT, HostWatch
-from hil.simulator.inverter_device import LOST_CONNECTION, PARAMETERS, InverterDevice, ObjectRefused
+from hil.simulator.inverter_device import LOST_CONNECTION, InverterDevice, ObjectRefused
 from hil.simulator.inverter_settings import SimulatedInverter
 from hil.simulator.object_server import ObjectServer
 from hil.simulator.pdo_frame import PdoFrame
@@ -43,7 +42,6 @@ _CONSUMER_HEARTBEAT_TIME = (0x1016, 1)
 _PRODUCER_HEARTBEAT_TIME = 0x1017
 _ERROR_BEHAVIOUR = (0x1029, 1)
 _EMCY_COB_ID = 0x1014
-MAX_TORQUE = 0x6072
 _PDO_LENGTH_ERROR = 0x8210
 """Error code of CiA 301."""
 
@@ -54,7 +52,6 @@ _STALE_STREAM = 1
 """Of a node's random numbers: the reading noise has one of its own."""
 
 _NMT_COMMANDS = {bytes((command,)): command for command in NmtCommand}
-_INTEGERS = frozenset(IntegerType)
 _CYCLIC = range(1, 241)
 
 _LOST_HOST_STATES = {0: NmtState.PRE_OPERATIONAL, 2: NmtState.STOPPED}
@@ -83,7 +80,7 @@ class InverterNode:
         self._lock = RLock()  # frames are taken in one thread, the heartbeat is sent by another
         self._eds = EdsFile(settings.eds_path, settings.node_id)
         self._identity = {1: settings.identity[0], 2: settings.identity[1]}
-        self._device = InverterDevice(settings, self._defaults(), self._velocity(settings), seed)
+        self._device = InverterDevice(settings, power_on_values(self._eds), velocity_scale(self._eds, settings), seed)
         self._random = np.random.default_rng([seed, settings.node_id, _STALE_STREAM])
         self._server = ObjectServer(self._node_id, self._eds, settings.faults, self._on_read, self._on_write)
         link.network.add_node(self._server)
@@ -170,20 +167,6 @@ class InverterNode:
     def _dead(self) -> bool:
         """Whether it neither hears nor says anything."""
         return self._device.hung or self._off_bus
-
-    def _defaults(self) -> dict[int, int]:
-        """Power-on values of what the device holds, from the EDS where it has them."""
-        described = {index: self._eds.sheet.value(index) for index in (*PARAMETERS, 0x6502)}
-        known = {index: value for index, value in described.items() if value is not None}
-        if not known.get(MAX_TORQUE):
-            known.pop(MAX_TORQUE, None)  # a place left free: no drive is made to give no torque
-        return {**PARAMETERS, **known}
-
-    def _velocity(self, settings: SimulatedInverter) -> VelocityScale:
-        """Scale of its speed: its EDS's, else what the rig file states of it."""
-        plan = plan_drive(self._eds.sheet)
-        where = f"simulated inverter, node {settings.node_id}"
-        return described_scale(plan, where) or speed_scale(plan, settings.speed_unit, where)
 
     def _error_behaviour(self) -> int:
         return 0 if self._eds.sheet.entry(*_ERROR_BEHAVIOUR) is None else self._value(*_ERROR_BEHAVIOUR)
@@ -330,18 +313,10 @@ class InverterNode:
         value = self._device.read(index, subindex)
         if value is None and index == 0x1018 and self._eds.sheet.value(index, subindex) is None:
             value = self._identity.get(subindex)
-        return None if value is None else self._fitting(value, od.data_type)
-
-    @staticmethod
-    def _fitting(value: int, data_type: int) -> int:
-        """Give a value in the range of its object: makers have narrower ones than CiA 402."""
-        if data_type not in _INTEGERS:
-            return value
-        kind = IntegerType(data_type)
-        return min(max(value, kind.low), kind.high)
+        return None if value is None else fitting(value, od.data_type)
 
     def _on_write(self, *, index: int, subindex: int, od: Any, data: bytes) -> None:
-        if od.data_type not in _INTEGERS:
+        if od.data_type not in INTEGERS:
             return
         value = IntegerType(od.data_type).decode(data)
         try:

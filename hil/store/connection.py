@@ -15,7 +15,7 @@ from hil.errors import StoreError
 from hil.store.schema import (
     MIGRATIONS,
     ForeignDatabase,
-    NewerStore,
+    UnknownVersion,
     bring_up_to_date,
     columns_of,
     expected_columns,
@@ -104,11 +104,11 @@ def told(path: Path) -> Iterator[None]:
     """
     try:
         yield
-    except NewerStore as error:
+    except UnknownVersion as error:
         raise StoreError(
             path,
-            f"expected a store of version {len(MIGRATIONS)} or older, came version {error}: a newer program made it. "
-            "Use that one.",
+            f"expected a store of version {len(MIGRATIONS)} or older, came version {error}: a newer program made it, "
+            "or it is damaged. Use that program, or a copy that is whole.",
         ) from error
     except ForeignDatabase as error:
         raise StoreError(

@@ -59,8 +59,8 @@ MIGRATIONS: tuple[str, ...] = (_FIRST,)
 """Step k leads from version k to version k + 1."""
 
 
-class NewerStore(Exception):
-    """The store is of a version that this program does not know."""
+class UnknownVersion(Exception):
+    """The store is of a version that this program does not know: a newer one, or none at all."""
 
 
 class ForeignDatabase(Exception):
@@ -72,7 +72,7 @@ def bring_up_to_date(connection: sqlite3.Connection) -> None:
 
     Raises
     ------
-    NewerStore, ForeignDatabase
+    UnknownVersion, ForeignDatabase
         If it can't be this program's to change.
     """
     if _version(connection) == len(MIGRATIONS) and _pragma(connection, "application_id") == APPLICATION_ID:
@@ -121,8 +121,8 @@ def _require_ours(connection: sqlite3.Connection) -> None:
     is_empty = connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0] == 0
     if owner != APPLICATION_ID and not is_empty:
         raise ForeignDatabase
-    if version > len(MIGRATIONS):
-        raise NewerStore(version)
+    if not 0 <= version <= len(MIGRATIONS):
+        raise UnknownVersion(version)
 
 
 def _statements(script: str) -> list[str]:

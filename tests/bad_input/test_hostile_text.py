@@ -80,7 +80,13 @@ def test_what_is_no_file_of_a_person_is_refused_and_not_read_to_its_end(tmp_path
         read_toml(path, RigFileError)
 
 
-JSON = {"nested": "[" * DEEP + "]" * DEEP, "nested objects": '{"a":' * DEEP, "long": '{"a": ' + "9" * 5000 + "}"}
+JSON = {
+    "nested": "[" * DEEP + "]" * DEEP,
+    "nested objects": '{"a":' * DEEP,
+    "long": '{"a": ' + "9" * 5000 + "}",
+    "beyond a float": '{"a": ' + "9" * 400 + "}",
+    "beyond 64 bit": '{"a": ' + str(1 << 63) + "}",
+}
 
 
 @pytest.mark.parametrize("text", JSON.values(), ids=JSON)
@@ -220,4 +226,5 @@ def test_a_list_with_keys_of_thousands_of_digits_and_a_million_entries_is_checke
 
 def test_every_refusal_is_of_the_input() -> None:
     assert issubclass(RigFileError, InputError)
-    assert json.loads("1") == parse_json("1")
+    for text in ("1", str((1 << 63) - 1), str(-(1 << 63)), "1e300"):
+        assert json.loads(text) == parse_json(text)

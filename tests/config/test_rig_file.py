@@ -288,11 +288,16 @@ class TestFilesItNames:
             ((r'^# eds = "inverter.eds"', 'eds = "none.eds"'), "inverters.m1.eds"),
             ((r'^# map = "plc.toml"', 'map = "none.toml"'), "plc.map"),
             ((r'^# model = "model.toml"', 'model = "none.toml"'), "simulation.model"),
+            ((r'^# eds = "inverter.eds"', f'eds = "none{"9" * 400}.eds"'), "inverters.m1.eds"),
         ],
     )
-    def test_one_that_is_not_there_is_named(self, change: tuple[str, str], key: str, tmp_path: Path) -> None:
+    def test_one_that_is_not_there_or_can_t_be_is_named(
+        self, change: tuple[str, str], key: str, tmp_path: Path
+    ) -> None:
         (problem,) = problems_of(changed(tmp_path, change))
-        assert re.match(rf"{key} \| expected an existing file, looked for {tmp_path}/none\.\w+ \| came 'none", problem)
+        assert re.match(
+            rf"{key} \| expected an existing file, looked for {tmp_path}/none9*\.\w+ \| came 'none", problem
+        )
 
     def test_a_path_that_is_no_text_is_named(self, tmp_path: Path) -> None:
         (problem,) = problems_of(changed(tmp_path, (r'^# eds = "inverter.eds"', "eds = 5")))

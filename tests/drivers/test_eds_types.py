@@ -74,8 +74,10 @@ def test_max_torque_as_a_signed_number_means_the_same(tmp_path: Path) -> None:
     assert of_data_type(edited("6072", "DataType=0x0006", "DataType=0x0003"), "6072", tmp_path) != [E]
 
 
-def test_drive_without_a_torque_mode_is_told(tmp_path: Path) -> None:
-    text = edited("6502", "DefaultValue=0x00000208", "DefaultValue=0x00000065")
+@pytest.mark.parametrize("value", ["0x00000065", "$NODEID", "$NODEID+0x40"])
+def test_drive_without_a_torque_mode_is_told(tmp_path: Path, value: str) -> None:
+    """Also one that has a mode by chance, at some node ids."""
+    text = edited("6502", "DefaultValue=0x00000208", f"DefaultValue={value}")
     told = [each for each in checked(tmp_path, text).findings if each.place == "[6502] DefaultValue"]
     assert [each.severity for each in told] == [W]
     assert "4 (profile torque) or 10 (cyclic synchronous torque)" in told[0].expected

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from threading import Timer
@@ -329,3 +330,15 @@ def test_abort_codes_come_as_text(pair: Pair, code: int) -> None:
     pair.node.answers = lambda request: [b"\x80" + request[1:4] + code.to_bytes(4, "little")]
     with pytest.raises(ConfigMismatch, match=f"0x{code:08X}, .*{ABORT_TEXTS[code]}"):
         pair.sdo.download(0x6071, 0, 0)
+
+
+def test_an_object_whose_segments_have_no_end_is_a_violation(pair: Pair) -> None:
+    def endless(request: bytes) -> list[bytes]:
+        if request[0] >> 5 == 2:
+            return [b"\x41" + request[1:4] + struct.pack("<I", 10)]
+        return [bytes((request[0] & 0x10,)) + b"drive 1"]
+
+    pair.node.answers = endless
+    with pytest.raises(ProtocolViolation, match="more than 1024 segments came and none was the last"):
+        pair.sdo.upload_text(0x1008)
+    assert pair.node.requests[-1] == b"\x80\x08\x10\x00" + struct.pack("<I", 0x05040005)

@@ -76,6 +76,18 @@ def foreign(path: Path) -> None:
         mdf.save(path)
 
 
+def test_a_file_of_version_3_is_read(tmp_path: Path) -> None:
+    """It has no attachments, where ours describe themselves."""
+    path = tmp_path / "old.mdf"
+    with MDF(version="3.30") as mdf:
+        mdf.append([Signal(np.arange(20.0), 0.01 * np.arange(20), name="speed", unit="rad/s")])
+        mdf.save(path)
+    table = read_table(path)
+    assert table.columns["speed"].tolist() == list(range(20))
+    assert table.units["speed"] == "rad/s"
+    assert "start_time" in read_metadata(path)
+
+
 @pytest.fixture
 def theirs(tmp_path: Path) -> Path:
     foreign(tmp_path / "theirs.mf4")

@@ -310,3 +310,22 @@ def test_a_torque_that_is_zero_throughout_is_a_torque(tmp_path: Path, own_table:
     idle = Table(tmp_path / "x.csv", {**own_table.columns, "torque_m1_nm": np.zeros(own_table.n_rows)})
     write_table(idle, tmp_path / "x.csv")
     assert not read_record(tmp_path / "x.csv").torque_nm[:, 0].any()
+
+
+SIGNALLING_NAN = np.array([0x7FF4000000000000], dtype=np.uint64).view(np.float64)
+
+
+@pytest.mark.parametrize("suffix", [".parquet", ".h5", ".mat", ".mf4"])
+def test_a_signalling_nan_is_a_missing_value_like_any_other(tmp_path: Path, own_table: Table, suffix: str) -> None:
+    columns = {name: column.copy() for name, column in own_table.columns.items()}
+    columns["torque_m1_nm"][3:4] = columns["speed_rad_s"][5:6] = SIGNALLING_NAN
+    path = tmp_path / f"run{suffix}"
+    write_table(Table(path, columns), path)
+    assert np.flatnonzero(~read_record(path).okay).tolist() == [3, 5]
+
+
+def test_a_scale_that_leaves_no_numbers_is_refused(tmp_path: Path, changed: Callable[..., Table]) -> None:
+    path = tmp_path / "run.csv"
+    write_table(changed(torque_m1_nm=np.full(40, 100.0)), path)
+    with pytest.raises(RecordingError, match="column torque_m1_nm: expected a signal in SI units"):
+        read_record(path, signals(torque=[{"column": "torque_m1_nm", "scale": 1e308}]))

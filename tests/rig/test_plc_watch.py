@@ -82,9 +82,10 @@ def test_poll_that_fails_ends_the_run_with_its_reason() -> None:
             plc_watch.look(at(0), 0.0)
 
 
-@pytest.mark.parametrize("speed_rad_s", [-320.1, 320.1])
-def test_speed_above_what_the_plc_permits(speed_rad_s: float) -> None:
+@pytest.mark.parametrize("speeds_rad_s", [(-320.1, 0.0), (0.0, 320.1), (320.1, 320.1), (float("nan"), 320.1)])
+def test_speed_above_what_the_plc_permits_by_either_reading(speeds_rad_s: tuple[float, float]) -> None:
     with watch(patience_s=5.0) as (_, plc_watch):
-        plc_watch.look(at(0), 320.0 if speed_rad_s > 0 else -320.0)
-        with pytest.raises(RunAborted, match=r"320\.1 rad/s, expected at most 320 rad/s"):
-            plc_watch.look(at(10), speed_rad_s)
+        plc_watch.look(at(0), 320.0, -320.0)
+        m1, m2 = speeds_rad_s
+        with pytest.raises(RunAborted, match=f"speed is {m1:.1f} and {m2:.1f} rad/s, expected at most 320 rad/s"):
+            plc_watch.look(at(10), *speeds_rad_s)

@@ -36,7 +36,9 @@ def change(folder: Path, statement: str, *values: Any) -> None:
     database.close()
 
 
-@pytest.mark.parametrize("name", ["{outside}", "../thesis.csv", "x/../../thesis.csv", "link.csv", ".", "", "x\0y"])
+@pytest.mark.parametrize(
+    "name", ["{outside}", "../thesis.csv", "x/../../thesis.csv", "link.csv", ".", "", "x\0y", "x" * 400]
+)
 def test_a_row_that_leads_out_of_the_folder_is_told_and_harms_nothing(
     filled: Path, name: str, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -83,13 +83,14 @@ def test_a_truncated_store_is_told_and_rebuilt(filled: Path) -> None:
     assert set(names(filled)) == set("abc")
 
 
-def test_a_newer_store_is_refused_and_left_alone(filled: Path) -> None:
+@pytest.mark.parametrize("version", [len(MIGRATIONS) + 1, -1])
+def test_a_newer_store_is_refused_and_left_alone(filled: Path, version: int) -> None:
     with sqlite3.connect(store_of(filled)) as database:
-        database.execute(f"PRAGMA user_version = {len(MIGRATIONS) + 1}")
+        database.execute(f"PRAGMA user_version = {version}")
     database.close()
     before = store_of(filled).read_bytes()
     for attempt in (lambda: names(filled), lambda: rebuild(filled)):
-        with pytest.raises(StoreError, match=f"version {len(MIGRATIONS)} or older, came version {len(MIGRATIONS) + 1}"):
+        with pytest.raises(StoreError, match=f"version {len(MIGRATIONS)} or older, came version {version}"):
             attempt()
     assert store_of(filled).read_bytes() == before
 

@@ -7,9 +7,11 @@ from collections.abc import Iterator
 from drivers.datasheet.check.context import EdsContext, at_key
 from drivers.datasheet.finding import EdsFinding, Severity
 from drivers.inverter.cia402 import TorqueMode
-from drivers.inverter.drive_settings import SYNC_COUNTER_OVERFLOW
+from drivers.inverter.drive_settings import NODES, SYNC_COUNTER_OVERFLOW
 
 SUPPORTED_MODES = 0x6502
+
+_TORQUE_MODES = TorqueMode.PROFILE_TORQUE.support_bit | TorqueMode.CYCLIC_SYNCHRONOUS_TORQUE.support_bit
 
 
 def check_modes(context: EdsContext) -> Iterator[EdsFinding]:
@@ -20,10 +22,10 @@ def check_modes(context: EdsContext) -> Iterator[EdsFinding]:
 
 def _torque_mode(context: EdsContext) -> Iterator[EdsFinding]:
     entry = context.entry(SUPPORTED_MODES)
-    value = None if entry is None else entry.value(context.node_id)
-    if entry is None or not value:  # blank and 0 say nothing: the drive itself is asked
+    if entry is None:
         return
-    if not any(value & mode.support_bit for mode in TorqueMode):
+    values = {entry.value(node_id) for node_id in NODES}  # one, unless by some mistake it follows from the node id
+    if any(value and not value & _TORQUE_MODES for value in values):  # blank and 0 say nothing: the drive is asked
         expected = f"a torque mode among the supported ones: {' or '.join(mode.title for mode in TorqueMode)}"
         advice = "Look into the drive's manual; a drive without one can't be used."
         yield at_key(Severity.WARNING, entry.section, entry.value_key, expected, "none in", advice)

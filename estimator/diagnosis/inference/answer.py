@@ -50,6 +50,9 @@ from estimator.signals.record import FloatArray
 
 SMALLEST_P = 1e-300
 
+SEARCH_SHARE = 0.7
+"""Share of the budget for the search; the rest is for laws without a name and the free runs of the answer."""
+
 LOCATING_ROUNDS, LOOKING_ROUNDS = 6, 2
 """Rounds of the search for a law without a name: where nothing is named it locates the mismatch, else it says what is
 left."""
@@ -57,12 +60,12 @@ left."""
 
 def answer(ready: Prepared, model: DrivelineModel, progress: Progress, budget_s: float) -> Diagnosis:
     """Return the diagnosis of recordings that are fit for one; after ``budget_s`` of the best set of effects so far."""
-    began = time.perf_counter()
+    began, search_s = time.perf_counter(), SEARCH_SHARE * budget_s
 
     def is_over() -> bool:
         spent_s = time.perf_counter() - began
-        progress("comparing hypotheses", min(0.1 + 0.7 * spent_s / max(budget_s, spent_s, 1e-9), 0.8))
-        return spent_s >= budget_s
+        progress("comparing hypotheses", min(0.1 + 0.7 * spent_s / max(search_s, spent_s, 1e-9), 0.8))
+        return spent_s >= search_s
 
     line, chain = mechanical(model), read_through(ready.records)
     found = searched(chain, line, is_over)
@@ -131,10 +134,13 @@ class _Seen:
 
 
 def _looked_at(search: Search, decision: Decision, is_over: Callable[[], bool]) -> _Seen:
-    """Weigh the names against a law without one, and look for the law of what is left, while there is time."""
+    """Weigh the names against a law without one, and look for the law of what is left while there is time.
+
+    No name stands that was not weighed so: a law outside the catalogue is imitated by sets of those within.
+    """
     hunts: list[Hunt] = []
     law: Law | None = None
-    if (decision.failed or decision.named) and not is_over():
+    if decision.failed or decision.named:
         hunts = hunts_around(decision.nothing, LOOKING_ROUNDS if decision.named else LOCATING_ROUNDS)
         law = best_law(decision.nothing, hunts)
         decision = weighed_against(decision, law)

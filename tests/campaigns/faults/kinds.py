@@ -41,13 +41,16 @@ class Kind:
 
 
 _NOT_CONFIRMED = r"not every drive is confirmed disarmed.*inverter m{}"
+_STALE = r"stands still|torque actual value|speed is -?\d{1,2}\.\d and -?3\d\d\.\d rad/s"
+"""Old feedback shows in its torque, or in a speed that is not the one the other drive reads."""
+
 _STRANGER = "came from somebody else on the bus"
 
 KINDS: dict[str, Kind] = {
     "drive hangs": Kind("m1.hang@S", _NOT_CONFIRMED.format(1), silent=1),
     "drive starts anew": Kind("m2.reset@S", r"inverter m2.*NMT state is"),
     "drive off the bus": Kind("m2.bus_off@S", _NOT_CONFIRMED.format(2), silent=2),
-    "drive sends old feedback": Kind("m1.stale_pdo@S", "stands still|torque actual value", needs_torque=True),
+    "drive sends old feedback": Kind("m1.stale_pdo@S", _STALE, needs_torque=True),
     "drive ignores its target": Kind("m2.ignores_target@S", "ignores the target torque"),
     "drive gives double": Kind("m1.torque_gain@S=2", "torque actual value", needs_torque=True, exceeds=True),
     "drive gives nothing": Kind("m2.torque_gain@S=0", "torque actual value", needs_torque=True),

@@ -1,55 +1,55 @@
-"""``python -m tests.campaigns.faults.processes [--runs N]``: faults of real processes, by the wall clock.
+"""``python -m tests.campaigns.faults.processes [--runs N] [--seed N]``: faults of real processes, by the wall clock.
 
 A host, ``hil run``, and a rig, ``hil sim``, are processes of their own, between them TCP connections that can be cut or
-go silent. At a random moment with torque on, one of them meets a fault; a third program on the bus asks the drives for
-their states until none can carry torque. Prints a table of the worst time to that for each fault.
+go silent. At a random moment with torque on, one of them, the disk or the clock meets a fault; a third program on the
+bus takes the states of the drives until none can carry torque. Prints a table of the worst time to that for each fault.
+
+A disk of its own has to be mounted, which takes root; a clock of its own a C compiler. Without them it says so.
 """
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import random
 import re
 import signal
-import subprocess
 import sys
 import tempfile
 import time
-from collections import defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
+
+import numpy as np
 
 from drivers.canopen.can_link import CanLink
 from drivers.errors import BusDown
-from drivers.inverter.cia402 import TORQUE_STATES, PowerState, state_of
 from hil.recording import read_table
-from tests.campaigns.faults.__main__ import report
+from tests.campaigns.faults.clock import Clock, compiler
+from tests.campaigns.faults.disk import can_mount, disk
 from tests.campaigns.faults.one_run import Outcome
 from tests.campaigns.faults.rig import campaign_rig
-from tests.campaigns.faults.tcp_proxy import TcpProxy
+from tests.campaigns.faults.runs import asked_for, tried
+from tests.campaigns.faults.scene import PATIENCE_S, Place, Scene, States, scene
 
 LIMIT_S = 0.25
 """Within this a dead host has to mean zero torque, with the defaults of a rig file."""
 
-PATIENCE_S = 30.0
-
 SUSPENDED_S = 1.0
 """How much longer than the drives need a suspended host sleeps [s]."""
 
+STALL_S = 2.0
+"""How long the disk takes nothing [s]."""
 
-@dataclass
-class Scene:
-    """A host that drives a rig."""
+LASTING_S = 3.0
+"""How long a run is watched that no fault must end [s]."""
 
-    rig: subprocess.Popen[str]
-    host: subprocess.Popen[str]
-    bus: TcpProxy
-    plc: TcpProxy
-    out: Path
+GAP_S = 0.5
+"""Between two rows of such a run [s]: less than what the fault would delay, more than a busy machine does."""
 
+STEP_S = 3600
+"""By how much the clock is set forward, or back [s]."""
 
 Meet = Callable[[Scene], None]
 
@@ -74,17 +74,52 @@ def hang_up(scene: Scene) -> None:
     scene.host.send_signal(signal.SIGHUP)
 
 
+def kill_rig(scene: Scene) -> None:
+    """As when the bus's supply fails."""
+    scene.rig.kill()
+
+
+def fill_disk(scene: Scene) -> None:
+    """As another program does that writes to it."""
+    assert scene.place.disk is not None
+    scene.place.disk.fill()
+
+
+def stall_disk(scene: Scene) -> None:
+    """As one that is slow to wake up, or a network drive."""
+    assert scene.place.disk is not None
+    scene.place.disk.stall(STALL_S)
+
+
+def step_clock(seconds: int) -> Meet:
+    """As the first answer of a time server does, for host and rig."""
+
+    def meet(scene: Scene) -> None:
+        assert scene.place.clock is not None
+        scene.place.clock.step(seconds)
+
+    return meet
+
+
 @dataclass(frozen=True)
 class Kind:
     """What is met, what the host has to say, and whether the drives have to stop by themselves.
 
     A host that goes on must not be disturbed: who asks its drives for anything is a foreign controller.
+
+    Attributes
+    ----------
+    ends_it
+        Whether the run has to end; else it has to go on as if nothing were, and is stopped later.
+    needs
+        A ``disk`` or a ``clock`` of its own.
     """
 
     meet: Meet
     cause: str = ""
     by_themselves: bool = False
-    options: tuple[str, ...] = ()
+    ends_it: bool = True
+    needs: str = ""
 
 
 KINDS: dict[str, Kind] = {
@@ -96,124 +131,62 @@ KINDS: dict[str, Kind] = {
     "bus connection silent": Kind(lambda scene: scene.bus.swallow(), "no TPDO|CAN bus|heartbeat", by_themselves=True),
     "PLC connection cut": Kind(lambda scene: scene.plc.cut(), "PLC"),
     "PLC connection silent": Kind(lambda scene: scene.plc.swallow(), "PLC"),
-    "rig killed (SIGKILL)": Kind(lambda scene: scene.rig.kill(), "CAN bus|no TPDO|PLC"),
+    "rig killed (SIGKILL)": Kind(kill_rig, "CAN bus|no TPDO|PLC"),
+    "disk full": Kind(fill_disk, "expected room for sample", needs="disk"),
+    "disk stalled for 2 s": Kind(stall_disk, ends_it=False, needs="disk"),
+    "clock set forward by an hour": Kind(step_clock(STEP_S), ends_it=False, needs="clock"),
+    "clock set back by an hour": Kind(step_clock(-STEP_S), ends_it=False, needs="clock"),
 }
 
 
-@dataclass
-class _States:
-    """The power states of both drives, asked for by SDO."""
-
-    link: CanLink
-    answers: dict[int, PowerState] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        for node_id in (1, 2):
-            self.link.subscribe(0x580 + node_id, lambda data, t_ns, node=node_id: self._take(node, data))
-
-    def _take(self, node_id: int, data: bytes) -> None:
-        if data[1:4] == b"\x41\x60\x00":
-            self.answers[node_id] = state_of(int.from_bytes(data[4:6], "little"))
-
-    def await_no_torque(self, ask: bool) -> float:
-        """Wait until neither drive is in a state that may carry torque; give how long that took [s].
-
-        Ask for the states, or listen to the answers the host gets when it disarms.
-        """
-        began_s = time.monotonic()
-        self.answers.clear()
-        while len(self.answers) < 2 or any(state in TORQUE_STATES for state in self.answers.values()):
-            if time.monotonic() - began_s > PATIENCE_S:
-                raise TimeoutError(f"after {PATIENCE_S} s the drives are in {self.answers}")
-            for node_id in (1, 2) if ask else ():
-                self.link.send(0x600 + node_id, b"\x40\x41\x60\x00\x00\x00\x00\x00")
-            time.sleep(0.003)
-        return time.monotonic() - began_s
+def possible() -> dict[str, Kind]:
+    """Return the kinds that this machine can have; say which it can't."""
+    there = {"": True, "disk": can_mount(), "clock": compiler() is not None}
+    for name, kind in KINDS.items():
+        if not there[kind.needs]:
+            print(f"not on this machine, which gives it no {kind.needs} of its own: {name}", file=sys.stderr)
+    return {name: kind for name, kind in KINDS.items() if there[kind.needs]}
 
 
 @contextmanager
-def scene(rig_path: Path, folder: Path, experiment: str, real_time: bool) -> Iterator[tuple[Scene, str]]:
-    """Start rig and host; yields them once the drives are in operation, and where the bus is served."""
-    hil = [sys.executable, "-m", "hil"]
-    with ExitStack() as stack:
-        rig = stack.enter_context(
-            _process(
-                [*hil, "sim", str(rig_path), "--bus", "ws://127.0.0.1:0/", "--modbus", "127.0.0.1:0"]
-                + ["--real-time"] * real_time
-            )
+def place_for(kind: Kind) -> Iterator[Place]:
+    """Make a folder, with the disk or the clock that a fault needs."""
+    with tempfile.TemporaryDirectory() as name, ExitStack() as stack:
+        folder = Path(name)
+        yield Place(
+            folder,
+            stack.enter_context(disk(folder)) if kind.needs == "disk" else None,
+            Clock(folder) if kind.needs == "clock" else None,
         )
-        assert rig.stdout is not None
-        ready = re.match(r"ready bus=ws://127.0.0.1:(\d+)(\S*) modbus=127.0.0.1:(\d+)", rig.stdout.readline())
-        assert ready is not None
-        bus = stack.enter_context(TcpProxy(int(ready[1])))
-        plc = stack.enter_context(TcpProxy(int(ready[3])))
-        out = folder / "run.csv"
-        host = stack.enter_context(
-            _process(
-                [
-                    *hil,
-                    "run",
-                    str(rig_path),
-                    experiment,
-                    "--out",
-                    str(out),
-                    "--no-estimate",
-                    "--bus",
-                    f"ws://127.0.0.1:{bus.port}{ready[2]}",
-                    "--modbus",
-                    f"127.0.0.1:{plc.port}",
-                ]
-            )
-        )
-        url = f"ws://127.0.0.1:{ready[1]}{ready[2]}"
-        _await_operation(url, host)
-        yield Scene(rig, host, bus, plc, out), url
-
-
-@contextmanager
-def _process(command: list[str]) -> Iterator[subprocess.Popen[str]]:
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    try:
-        yield process
-    finally:
-        if process.poll() is None:
-            process.kill()
-        process.communicate()
-
-
-def _await_operation(url: str, host: subprocess.Popen[str]) -> None:
-    """Listen to the TPDOs of both drives; the host's own SDO is left alone."""
-    states: dict[int, PowerState] = {}
-    with CanLink.open(url) as link:
-        for node_id in (1, 2):
-            link.subscribe(
-                0x180 + node_id,
-                lambda data, t_ns, node=node_id: states.update({node: state_of(int.from_bytes(data[:2], "little"))}),
-            )
-        while list(states.values()) != [PowerState.OPERATION_ENABLED] * 2:
-            if host.poll() is not None:
-                raise AssertionError(host.communicate())
-            time.sleep(0.01)
 
 
 def run_one(kind: Kind, rig_path: Path, experiment: str, after_s: float, real_time: bool) -> Outcome:
     """Let one fault happen, and judge."""
     outcome = Outcome()
-    with tempfile.TemporaryDirectory() as name, scene(rig_path, Path(name), experiment, real_time) as (at, url):
+    with place_for(kind) as place, scene(rig_path, place, experiment, real_time) as at:
         time.sleep(after_s)
         alive = at.host.poll() is None
-        with CanLink.open(url) as link, contextlib.suppress(BusDown):
-            states = _States(link)
+        with CanLink.open(at.url) as link, contextlib.suppress(BusDown):
+            states = States(link)
             kind.meet(at)
-            if kind.meet is not KINDS["rig killed (SIGKILL)"].meet:
-                outcome.zero_s = states.await_no_torque(kind.by_themselves)
+            if not kind.ends_it:
+                time.sleep(LASTING_S)
+                alive = at.host.poll() is None
+                if not alive:
+                    outcome.problems.append("the run ended")
+                stop_host(at)
+            if kind.meet is not kill_rig:
+                try:
+                    outcome.zero_s = states.await_no_torque(kind.by_themselves)
+                except TimeoutError as error:
+                    outcome.problems.append(str(error))
         if kind.by_themselves and outcome.zero_s > LIMIT_S:
             outcome.problems.append(f"torque was on for {outcome.zero_s:.3f} s")
         if kind.meet is suspend_host:
             time.sleep(SUSPENDED_S)
         at.host.send_signal(signal.SIGCONT)
         _, said = at.host.communicate(timeout=PATIENCE_S)
-        outcome.said = said or "ended"
+        outcome.said = (said or "ended") if kind.ends_it else ""
         if alive:
             _judge(kind, at, said, outcome)
     return outcome
@@ -224,29 +197,31 @@ def _judge(kind: Kind, at: Scene, said: str, outcome: Outcome) -> None:
         outcome.problems.append("exit status 0")
     if kind.cause and not re.search(kind.cause, said):
         outcome.problems.append(f"said {said[-300:]!r}, expected {kind.cause!r}")
-    for kept in (at.out, at.out.with_name("run.part.csv")):
+    if not kind.ends_it and "interrupted" not in said:
+        outcome.problems.append(f"said {said[-300:]!r}, expected an interruption alone")
+    for kept in (at.place.out, at.place.out.with_name("run.part.csv")):
         if kept.exists() and kept.read_text("utf-8").count("\n") > 1:
-            read_table(kept)
+            time_s = read_table(kept).columns["time_s"]
+            if not kind.ends_it and (gap_s := float(np.diff(time_s).max())) > GAP_S:
+                outcome.problems.append(f"the recording has a gap of {gap_s:.2f} s")
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the campaign."""
-    parser = argparse.ArgumentParser(prog="python -m tests.campaigns.faults.processes")
-    parser.add_argument("--runs", type=int, default=200)
-    parser.add_argument("--seed", type=int, default=1)
-    asked = parser.parse_args(arguments)
-    outcomes: dict[str, list[Outcome]] = defaultdict(list)
+    asked = asked_for("tests.campaigns.faults.processes", 200, arguments)
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)  # under nohup the hosts would outlive their terminals, too
     with tempfile.TemporaryDirectory() as name:
-        rig = campaign_rig(Path(name), by_the_clock=True)
-        for number in range(asked.runs):
+        rig, kinds = campaign_rig(Path(name), by_the_clock=True), possible()
+
+        def one(number: int) -> tuple[str, str, Outcome]:
             drawn = random.Random(f"{asked.seed}:{number}")
-            kind = list(KINDS)[number % len(KINDS)]
+            kind = list(kinds)[number % len(kinds)]
             experiment, real_time = drawn.choice(sorted(rig.experiments)), drawn.random() < 0.5
-            outcome = run_one(KINDS[kind], Path(name) / "rig.toml", experiment, drawn.uniform(0.0, 1.5), real_time)
-            outcomes[kind].append(outcome)
-            for problem in outcome.problems:
-                print(f"run {number}: {kind} in {experiment}: {problem}", file=sys.stderr, flush=True)
-    return report(outcomes)
+            after_s = drawn.uniform(0.0, 1.5)
+            outcome = run_one(kinds[kind], Path(name) / "rig.toml", experiment, after_s, real_time)
+            return kind, f"after {after_s:.2f} s of {experiment}", outcome
+
+        return tried(asked, one)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,51 @@
+"""What is fuzzed: one reader of files, or one decoder of frames."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+Read = Callable[[bytes], object]
+"""Reads one input; a refusal is one of the errors that the command line tells in words."""
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """One reader.
+
+    Attributes
+    ----------
+    seeds
+        Makes whole inputs, in a folder of its own.
+    opened
+        Gives what reads, in the same folder, for as long as it is open.
+    text
+        Whether its inputs are texts.
+    names_file
+        Whether a refusal has to name the file.
+    """
+
+    seeds: Callable[[Path], list[bytes]]
+    opened: Callable[[Path], AbstractContextManager[Read]]
+    text: bool = False
+    names_file: bool = True
+
+
+def file_target(
+    name: str, read: Callable[[Path], object], seeds: Callable[[Path], list[bytes]], text: bool = False
+) -> Target:
+    """Return the target of what reads a file of a name."""
+
+    @contextmanager
+    def opened(folder: Path) -> Iterator[Read]:
+        path = folder / name
+
+        def read_one(data: bytes) -> object:
+            path.write_bytes(data)
+            return read(path)
+
+        yield read_one
+
+    return Target(seeds, opened, text)
