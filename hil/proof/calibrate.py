@@ -86,6 +86,11 @@ class World:
         strong = self.strong == NOTHING or any(self.strong in claim.names for claim in self.claims)
         return strong and all(map(self.is_there, self.claims))
 
+    @property
+    def weighty(self) -> list[Claim]:
+        """The claims with a share that is no trace."""
+        return [claim for claim in self.claims if claim.share >= LEAST_SHARE]
+
     def beyond_chance(self, key: str) -> float:
         """Return what a test found, less what it finds in noise by chance."""
         return self.tests[key] - chance(key, self.samples)
@@ -99,8 +104,7 @@ class World:
     def named(self, thresholds: Thresholds) -> list[Claim]:
         """Return the effects that are named under some thresholds."""
         least = thresholds.least_probability
-        weighty = [claim for claim in self.claims if claim.share >= LEAST_SHARE]
-        return [claim for claim in weighty if self.probability(claim, thresholds) >= least]
+        return [claim for claim in self.weighty if self.probability(claim, thresholds) >= least]
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,10 +176,13 @@ def _most_probable(surprise: Callable[[float], float]) -> float:
 
 
 def _surprise(worlds: Sequence[World], thresholds: Thresholds) -> float:
-    """Return minus the log-likelihood of what is there and what is not, by the probabilities that are stated."""
+    """Return minus the log-likelihood of what is there and what is not, by the probabilities that are stated.
+
+    Those are of effects that can be named; of traces no probability is stated.
+    """
     total = 0.0
     for world in worlds:
-        for claim in world.claims:
+        for claim in world.weighty:
             p = min(max(world.probability(claim, thresholds), 1e-6), 1.0 - 1e-6)
             total -= float(np.log(p if world.is_there(claim) else 1.0 - p))
     return total
@@ -183,7 +190,7 @@ def _surprise(worlds: Sequence[World], thresholds: Thresholds) -> float:
 
 def _least_probability(worlds: Sequence[World], thresholds: Thresholds) -> float:
     """Return the least probability above which no more names are false than may be; not below `BELIEVED`."""
-    weighty = [(world, claim) for world in worlds for claim in world.claims if claim.share >= LEAST_SHARE]
+    weighty = [(world, claim) for world in worlds for claim in world.weighty]
     stated = sorted(((w.probability(c, thresholds), w.is_there(c)) for w, c in weighty), reverse=True)
     false = np.cumsum([not there for _, there in stated])
     allowed = np.flatnonzero(false <= MOST_FALSE * np.arange(1, false.size + 1))
