@@ -10,26 +10,19 @@ import numpy as np
 from estimator.diagnosis.acquisition import (
     OUTPUT,
     Finding,
-    Misfit,
     as_read,
     compensate,
     hidden_jitter,
     mean_shift,
     recognise,
-    repaired,
 )
 from estimator.diagnosis.segments import tiles
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult
 from estimator.physics.free_run import FreeRun, free_run
 from estimator.physics.model import DrivelineModel
-from estimator.physics.problem import start_of
 from estimator.physics.rates import rates
-from estimator.physics.simulate import simulate
 from estimator.signals.record import BoolArray, FloatArray, Record
-
-PULSE_SHARE = 0.01
-"""A torque pulse of this share of the largest torque shows the line's answer without disturbing its motion."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,10 +33,8 @@ class Chain:
     ----------
     raw : tuple of Record
         As read.
-    filled : tuple of Record
-        With the faults compensated, torques that were not read filled in.
     records : tuple of Record
-        The same with these torques estimated, and without what jitter adds in the mean, for fits.
+        With the faults compensated, and without what jitter adds in the mean, for fits.
     findings : tuple of Finding
         What was recognised.
     shifts : tuple of ndarray, shape (N,)
@@ -51,19 +42,9 @@ class Chain:
     """
 
     raw: tuple[Record, ...]
-    filled: tuple[Record, ...]
     records: tuple[Record, ...]
     findings: tuple[Finding, ...]
     shifts: tuple[FloatArray, ...] = ()
-
-    @property
-    def torque_is_unknown(self) -> bool:
-        """Whether some torque was not read."""
-        return any(not record.torque_trusted.all() for record in self.records)
-
-    def with_torques_from(self, result: FitResult) -> Chain:
-        """Return the chain with the torques that were not read estimated from a fit's error."""
-        return replace(self, records=repaired(self.records, _misfits(result), self.filled))
 
     def with_jitter_in(self, result: FitResult) -> Chain:
         """Return the chain with the jitter that only the errors of a converged fit show, where they show any.
@@ -102,8 +83,7 @@ class Chain:
 def read_through(records: Sequence[Record]) -> Chain:
     """Recognise the faults of a set of recordings and compensate them."""
     findings = recognise(records) if records else ()
-    filled = compensate(records, findings)
-    return Chain(tuple(records), filled, filled, findings)
+    return Chain(tuple(records), compensate(records, findings), findings)
 
 
 def _read_rows(record: Record, findings: Iterable[Finding]) -> BoolArray:
@@ -113,30 +93,6 @@ def _read_rows(record: Record, findings: Iterable[Finding]) -> BoolArray:
         if finding.name == "lost_samples":
             rows = rows & ~finding.touched(record)[:, OUTPUT]
     return rows
-
-
-def _misfits(result: FitResult) -> list[Misfit]:
-    return [Misfit(_error(result, i), _pulse(result, i)) for i in range(len(result.problem.records))]
-
-
-def _error(result: FitResult, index: int) -> FloatArray:
-    error: FloatArray = result.outputs[index] - result.problem.records[index].output
-    return error
-
-
-def _pulse(result: FitResult, index: int) -> FloatArray:
-    """Return the answer of the output to 1 Nm during the first sample."""
-    record = result.problem.records[index]
-    size = PULSE_SHARE * float(np.max(np.abs(record.torque_nm)))
-    torque = record.torque_nm.copy()
-    torque[0, 0] += size
-    start, extra = (
-        start_of(result.problem, result.x, index),
-        result.problem.local[index].extra_load(result.local_of(index)),
-    )
-    moved = simulate(result.problem.grid, replace(record, torque_nm=torque), result.p_of(index), start, extra)
-    answer: FloatArray = (moved - result.outputs[index]) / size
-    return answer
 
 
 def mechanical(model: DrivelineModel) -> DrivelineModel:

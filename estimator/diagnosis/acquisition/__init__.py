@@ -5,12 +5,10 @@ from estimator.diagnosis.acquisition.compensate import compensate
 from estimator.diagnosis.acquisition.finding import OUTPUT, Finding, Sized
 from estimator.diagnosis.acquisition.hidden_jitter import hidden_jitter, mean_shift
 from estimator.diagnosis.acquisition.recognise import as_if_not_lost, recognise
-from estimator.diagnosis.acquisition.repair import Misfit, repaired
 
 __all__ = [
     "OUTPUT",
     "Finding",
-    "Misfit",
     "Sized",
     "as_if_not_lost",
     "as_read",
@@ -18,5 +16,4 @@ __all__ = [
     "hidden_jitter",
     "mean_shift",
     "recognise",
-    "repaired",
 ]

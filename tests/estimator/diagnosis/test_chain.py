@@ -12,7 +12,6 @@ from estimator.diagnosis.assemble import rms_of
 from estimator.diagnosis.chain import Chain, mechanical, read_through, replay
 from estimator.diagnosis.hypotheses import NOTHING, everything
 from estimator.physics.catalogue import EFFECTS
-from estimator.physics.fit import FitResult
 from estimator.physics.free_run import free_run
 from estimator.physics.layout import slot
 from estimator.physics.model import DrivelineModel, EffectValue, Parameter, Structure
@@ -55,7 +54,6 @@ class TestHealthy:
         chain = read_through([HEALTHY])
         assert chain.findings == ()
         assert chain.effects() == {}
-        assert not chain.torque_is_unknown
         assert chain.records[0] is chain.raw[0] is HEALTHY
 
     def test_its_errors_are_plain_differences(self) -> None:
@@ -64,7 +62,7 @@ class TestHealthy:
         np.testing.assert_allclose(errors, 0.3)
 
     def test_of_no_recordings_there_is_an_empty_chain(self) -> None:
-        assert read_through([]) == Chain((), (), (), ())
+        assert read_through([]) == Chain((), (), ())
 
 
 class TestStale:
@@ -100,35 +98,6 @@ class TestLostZeros:
         knows = line_of(TRUTH.line, {"lost_samples": {"share": float(LOST.mean())}})
         assert replay(knows, self.READ).rms == pytest.approx(NOISE, rel=0.05)
         assert replay(MODEL, self.READ).rms > 100.0 * NOISE
-
-
-class TestLostTorque:
-    def test_it_is_unknown_and_estimated_from_what_the_speed_did(self) -> None:
-        read = with_lost_torque()
-        chain = read_through([read])
-        assert chain.torque_is_unknown
-        held = self.error_nm(chain)
-        repaired = chain.with_torques_from(self.fitted(chain))
-        assert repaired.raw == chain.raw
-        assert held > 20.0
-        assert self.error_nm(repaired) < 0.3 * held
-
-    def test_a_fit_to_the_repaired_is_at_the_noise(self) -> None:
-        chain = read_through([with_lost_torque()])
-        held = self.fitted(chain)
-        fitted = self.fitted(chain.with_torques_from(held))
-        assert held.rms > 2.0 * NOISE
-        assert fitted.rms < 1.3 * NOISE
-
-    @staticmethod
-    def fitted(chain: Chain) -> FitResult:
-        return Bench(MODEL, chain.records, everything(chain.records)).fit(NOTHING)
-
-    @staticmethod
-    def error_nm(chain: Chain) -> float:
-        """RMS error of the total torque in the rows in which it was not read."""
-        off = (chain.records[0].total_torque_nm - HEALTHY.total_torque_nm)[LOST]
-        return float(np.sqrt(np.mean(off**2)))
 
 
 class TestHiddenJitter:

@@ -1,17 +1,13 @@
-"""Compensated records: wrong readings masked, torques filled by their clock or estimated from a fit."""
+"""Compensated records: wrong readings masked, torques filled by their clock."""
 
 from __future__ import annotations
-
-import time
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from estimator.diagnosis.acquisition import OUTPUT, Misfit, as_read, compensate, recognise, repaired
+from estimator.diagnosis.acquisition import OUTPUT, as_read, compensate, recognise
 from estimator.diagnosis.acquisition.holding import clock_of, fill
-from estimator.errors import BadShape
 from estimator.signals.record import BoolArray, FloatArray, Record
 from tests.estimator.diagnosis.acquisition.bench import (
     KINDS,
@@ -23,7 +19,6 @@ from tests.estimator.diagnosis.acquisition.bench import (
     drives,
     prbs,
     random_rows,
-    repeating,
     stale,
 )
 
@@ -53,69 +48,6 @@ def test_stale_rows_are_masked_and_their_torque_known_by_its_clock(kind: str) ->
     assert known[rows].mean() > 0.9
     assert torque_error(truth, record, rows & known) < 5.0 * TORQUE_NOISE
     assert torque_error(truth, raw, rows) > 20.0
-
-
-def lost(truth: Truth, kind: str, rows: BoolArray) -> Record:
-    """A recording in which rows were lost and the last torque is held."""
-    record = truth.record(kind)
-    torque = np.column_stack([repeating(torque, rows) for torque in record.torque_nm.T])
-    return replace(record, torque_nm=torque, okay=~rows, torque_okay=~rows)
-
-
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize(("share", "burst"), [(0.1, 1.0), (0.02, 3.0), (0.08, 3.0)])
-def test_unknown_torques_are_estimated_from_the_error(kind: str, share: float, burst: float) -> None:
-    truth, rows = drive(kind, 3), random_rows(np.random.default_rng(1), share, burst)
-    held = lost(truth, kind, rows)
-    (filled,) = compensate([held], recognise([held]))
-    misfits = [Misfit(simulated(truth, r) - r.output, truth.line.pulse()) for r in (held, filled)]
-    mended, both = repaired([held, filled], misfits)
-    assert error_rms(truth, held) > 2.0 * NOISE
-    assert error_rms(truth, mended) < 1.4 * NOISE
-    assert error_rms(truth, both) < 1.15 * NOISE
-    assert torque_error(truth, mended, rows) < 0.5 * torque_error(truth, held, rows)
-    assert torque_error(truth, both, rows) < 0.5 * torque_error(truth, held, rows)
-    np.testing.assert_array_equal(both.torque_nm[~rows], held.torque_nm[~rows])
-    np.testing.assert_array_equal(both.torque_trusted, filled.torque_trusted)
-
-
-def test_one_inverter_alone_is_corrected() -> None:
-    truth, rows = drive("cruise", 4), random_rows(np.random.default_rng(1), 0.05)
-    record = truth.record()
-    read = np.column_stack([~rows, np.ones(SAMPLES, dtype=bool)])
-    torque = np.column_stack([repeating(record.torque_nm[:, 0], rows), record.torque_nm[:, 1]])
-    held = replace(record, torque_nm=torque, torque_okay=read)
-    (mended,) = repaired([held], [Misfit(simulated(truth, held) - held.output, truth.line.pulse())])
-    np.testing.assert_array_equal(mended.torque_nm[:, 1], held.torque_nm[:, 1])
-    assert torque_error(truth, mended, rows) < 0.3 * torque_error(truth, held, rows)
-
-
-@pytest.mark.parametrize("rows", [np.arange(SAMPLES) % 3 == 1, (np.arange(SAMPLES) > 500) & (np.arange(SAMPLES) < 700)])
-def test_too_many_unknown_torques_stay_as_they_are(rows: BoolArray) -> None:
-    truth = drive("cruise", 1)
-    held = lost(truth, "cruise", rows)
-    (same,) = repaired([held], [Misfit(simulated(truth, held) - held.output, truth.line.pulse())])
-    assert same is held
-
-
-def test_repairing_300_rows_of_3000_is_fast() -> None:
-    truth, rows = drive("cruise", 1), np.arange(SAMPLES) % 10 == 5
-    held = lost(truth, "cruise", rows)
-    misfit = Misfit(simulated(truth, held) - held.output, truth.line.pulse())
-    took = []
-    for _ in range(5):
-        begin = time.process_time()
-        repaired([held], [misfit])
-        took.append(time.process_time() - begin)
-    assert min(took) < 0.2
-
-
-def test_an_error_of_the_wrong_shape_is_refused() -> None:
-    truth = drive("cruise", 1)
-    record = truth.record()
-    for error in (np.zeros(5), np.full(SAMPLES, np.nan)):
-        with pytest.raises(BadShape, match="recording run: expected an error of shape"):
-            repaired([record], [Misfit(error, truth.line.pulse())])
 
 
 @pytest.mark.parametrize("hold", [2, 3, 7])
