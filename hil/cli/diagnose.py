@@ -61,7 +61,7 @@ def diagnose(
             "--budget-s",
             min=0.0,
             metavar="S",
-            help="Time after which the best so far is the answer [s]; 30 by default.",
+            help="Time after which the best so far is the answer \\[s]; 30 by default.",
         ),
     ] = None,
     dbc: Dbc = None,

@@ -13,7 +13,7 @@ from drivers.inverter.drive_settings import OPTION_CODES
 from drivers.plc.map_needs import USED
 from estimator.diagnosis import holdout
 from estimator.diagnosis.diagnose import BUDGET_S
-from estimator.diagnosis.inference import calibration, search, unnamed
+from estimator.diagnosis.inference import calibration, plausible, unnamed
 from estimator.diagnosis.where import locate
 from estimator.physics import own_law
 from hil.cli.main import ExitStatus
@@ -98,7 +98,7 @@ def test_the_thresholds_of_a_verdict_are_those_of_the_code() -> None:
         f"whose share is below {calibration.LEAST_SHARE:g}",
     ):
         assert said in page
-    assert search.LEAST_THROUGH == 0.2
+    assert plausible.LEAST_THROUGH == 0.2
     assert "lets through less than a fifth" in page
     assert unnamed.MOST_OF_IT == 0.5
     assert "gain less than half of what it gains at their place" in page

@@ -244,7 +244,7 @@ class TestAcquired:
 
     @pytest.fixture
     def acquired(self) -> FoundEffect:
-        chain = Chain((), (), (), (self.FOUND,))
+        chain = Chain((), (), (self.FOUND,))
         (effect,) = acquired_effects(chain, self.BEFORE, [0.1 * error for error in self.BEFORE])
         return effect
 
@@ -265,7 +265,7 @@ class TestAcquired:
         assert acquired.evidence.holdout_rms_after == pytest.approx(0.1 * rms)
 
     def test_without_findings_there_are_none(self) -> None:
-        assert acquired_effects(Chain((), (), (), ()), self.BEFORE, self.BEFORE) == ()
+        assert acquired_effects(Chain((), (), ()), self.BEFORE, self.BEFORE) == ()
 
 
 class TestParameters:

@@ -197,10 +197,6 @@ class TestMoments:
         assert fitted.rms == pytest.approx(SIGMA, rel=0.05)
         assert best.promise > 0.5 * (retuned.squares - fitted.squares)
 
-    def test_where_it_does_not_happen_next_to_nothing_is_left_of_it(self, coupled: Looked) -> None:
-        begin, end = (float(x) for x in coupled[2].local_of(2)[coupled[2].problem.local[2].own_rows])
-        assert end - begin < 0.1
-
 
 class TestPromising:
     """Starts of one law: with two parameters free, or with one of them held."""
