@@ -14,10 +14,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimator.diagnosis.inference.calibration import LEAST_PROBABILITY
+from estimator.diagnosis.inference.calibration import LEAST_PROBABILITY, LEAST_SHARE
 from estimator.diagnosis.inference.disturbances import Size, estimate, line_of
 from estimator.diagnosis.inference.likelihood import ROUNDS, Hypothesis
-from estimator.diagnosis.inference.posterior import Belief
+from estimator.diagnosis.inference.posterior import Belief, free_rms
 from estimator.diagnosis.inference.verdict import Decision, tempered_by
 from estimator.diagnosis.result import Verdict
 from estimator.diagnosis.unnamed import Hunt, hunts_of, scene
@@ -115,9 +115,10 @@ def weighed_against(decision: Decision, law: Law | None) -> Decision:
 
     ``law`` is the best beside no effect at all. In as far as it makes the recordings more probable than the best set of
     names, what these explain is there, and they are not. At its own place a law without a name is a name's law in
-    another form, where the names gain most of what it gains.
+    another form, where the names gain most of what it gains. One that leaves the free-run error as it was is a trace,
+    and no other explanation of what the names explain.
     """
-    if law is None:
+    if law is None or 1.0 - (law.rms / free_rms(decision.nothing)) ** 2 < LEAST_SHARE:
         return decision
     gained, by_law = (decision.nothing.score - score for score in (decision.best.score, law.score))
     same = gained >= MOST_OF_IT * by_law

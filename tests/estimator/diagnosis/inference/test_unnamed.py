@@ -10,6 +10,7 @@ import pytest
 
 from estimator.diagnosis.hypotheses import everything, open_hypotheses
 from estimator.diagnosis.inference import remainder
+from estimator.diagnosis.inference.posterior import free_rms
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.inference.unnamed import Law, best_law, hunts_around, weighed_against
 from estimator.diagnosis.inference.verdict import Decision, decide, grounds
@@ -102,3 +103,9 @@ def test_what_is_no_better_than_the_nominal_model_takes_nothing(friction: Decisi
         rival = Law(Element.SHAFT, (("T", 1.0),), friction.nothing.score - better, 0.1)
         (weighed,) = weighed_against(doubtful, rival).named
         assert weighed.probability == pytest.approx(friction.named[0].probability)
+
+
+def test_a_law_that_leaves_the_error_as_it_is_takes_nothing(friction: Decision) -> None:
+    """It makes the innovations smaller; the name explains what goes wrong over seconds."""
+    trace = replace(law(friction, Element.SHAFT, 100.0), rms=free_rms(friction.nothing))
+    assert weighed_against(friction, trace) is friction
