@@ -101,9 +101,7 @@ class Search:
         for _ in range(2 * MOST_EFFECTS):
             if self.is_over():
                 self.stopped = True
-                better = self._graded(current)  # without it nothing is known of a road
-                self.path += [better] if better else []
-                return better or current
+                break
             better = self._best_addition(current) if len(current.effects) < MOST_EFFECTS else None
             better = better or self._best_drop(current) or self._best_exchange(current) or self._graded(current)
             if better is None:
