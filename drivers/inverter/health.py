@@ -1,4 +1,4 @@
-"""What is watched of an inverter while it runs, beside feedback: bus, other controllers, life signs, old values."""
+"""What is watched of an inverter while it runs: bus, other controllers, life signs, feedback that no longer changes."""
 
 from __future__ import annotations
 

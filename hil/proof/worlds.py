@@ -109,7 +109,7 @@ def _stated(name: str, sizes: dict[str, float], tolerance: float) -> str:
 
 
 def table(rows: Sequence[Row]) -> str:
-    """Return what came out as a table in Markdown; probabilities are those of 0.9 and more that are right."""
+    """Return the results as a table in Markdown, with how many of the names given 0.9 or more are there."""
     lines = [
         "| set | cases | strong named | names | false names | no false name | of given 0.9, there | median, most [s] |"
     ]

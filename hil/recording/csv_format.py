@@ -39,7 +39,7 @@ SPECIAL = ",;\t|"
 """Characters that a reader could take for a delimiter."""
 
 OWN: Final[Mapping[str, object]] = {"delimiter": ",", "decimal": ".", "header_line": 1, "units_line": 0}
-"""Form of a recording that is described beside: as it is written here, nothing is recognised."""
+"""Form of a recording with a sidecar: as hil writes it, nothing has to be recognised."""
 
 BLOCK_BYTES = 1 << 22
 """pyarrow parses this much at once; also the longest line it can take."""
@@ -125,7 +125,7 @@ def write(table: Table, path: Path) -> None:
 
 
 def _is_recognised(path: Path, table: Table) -> bool:
-    """Whether the form of a file that was written here is recognised without a word beside it."""
+    """Whether the form of a file that hil wrote is recognised without a sidecar."""
     with path.open(encoding="utf-8", newline="\n") as file:
         text = file.read(BLOCK_BYTES)
     form = form_of(text.rstrip("\n"), FormatHints())

@@ -12,7 +12,7 @@ from hil.recording.format_hints import FormatHints
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """What a reader has to know beside the file.
+    """What a reader has to know in addition to the file.
 
     Attributes
     ----------

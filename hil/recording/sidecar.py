@@ -28,7 +28,7 @@ UNITS_KEY, TYPES_KEY = "units", "types"
 
 @dataclass(frozen=True, slots=True)
 class Sidecar:
-    """What stands beside a CSV recording; ``found`` tells whether a file of ours is there at all."""
+    """The sidecar of a CSV recording; ``found`` tells whether a file of ours is there at all."""
 
     metadata: Mapping[str, str] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)

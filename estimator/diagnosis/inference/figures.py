@@ -49,7 +49,7 @@ class FreeRuns:
 
     @cached_property
     def estimate(self) -> FitResult:
-        """The fit that values and intervals are told of: of independent innovations, or of the free run."""
+        """The fit that values and intervals are taken from: of independent innovations, or of the free run."""
         return self.believed.white if self.is_whole else self.final
 
     @cached_property

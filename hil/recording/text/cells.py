@@ -13,7 +13,7 @@ import pyarrow.compute
 from hil.recording.kinds import Column, Kind, as_text
 
 MISSING: Final = ("", "NA", "N/A", "#N/A", "n/a", "null", "NULL")
-"""Cells that say that nothing was read, beside nan in any spelling."""
+"""Cells that say that nothing was read, in addition to nan in any spelling."""
 
 NUMBER: Final = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:inf|infinity)", re.IGNORECASE)
 

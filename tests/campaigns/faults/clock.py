@@ -37,7 +37,7 @@ class Clock:
         self._path.write_bytes(bytes(8))
 
     def step(self, seconds: int) -> None:
-        """Set it so far off the machine's; what is monotonic goes on as it was."""
+        """Set it so far off the machine's; the monotonic clock is not changed."""
         with self._path.open("r+b") as file, mmap.mmap(file.fileno(), 8) as content:
             content[:] = seconds.to_bytes(8, "little", signed=True)
 

@@ -45,7 +45,7 @@ class Disk:
         self._thaw.start()
 
     def await_end_of_stall(self) -> None:
-        """Wait until writes go on."""
+        """Wait until writes succeed again."""
         if self._thaw is not None:
             self._thaw.join()
 

@@ -110,7 +110,7 @@ class Kind:
     Attributes
     ----------
     ends_it
-        Whether the run has to end; else it has to go on as if nothing were, and is stopped later.
+        Whether the run has to end; else it has to continue undisturbed, and is stopped later.
     needs
         A ``disk`` or a ``clock`` of its own.
     """
