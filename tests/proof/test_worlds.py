@@ -21,6 +21,7 @@ ROWS = [
         "false": ["tyre_slip"],
         "probability": {"backlash": 0.99, "tyre_slip": 0.95},
         "time_s": 5.0,
+        "cpu_s": 7.0,
     },
     {
         "set": "dirty",
@@ -31,12 +32,13 @@ ROWS = [
         "false": [],
         "probability": {},
         "time_s": 4.0,
+        "cpu_s": 6.0,
     },
 ]
 
 
 def test_the_table_counts_what_was_named_and_what_is_not_there() -> None:
-    assert table(ROWS).splitlines()[2] == "| dirty | 2 | 1 of 1 | 2 | 1 | 1 | 1 of 2 | 5.0, 5.0 |"
+    assert table(ROWS).splitlines()[2] == "| dirty | 2 | 1 of 1 | 2 | 1 | 1 | 1 of 2 | 5.0, 5.0 | 7.0, 7.0 |"
 
 
 def test_what_is_answered_is_not_answered_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -319,14 +319,20 @@ class Search:
         return self._better([each for each in nearest if each is not None], current)
 
     def _nearest(self, current: Hypothesis, name: str) -> Hypothesis | None:
-        """Fit the look-alike that explains most in an effect's place to its end; None where none comes near."""
+        """Fit the look-alike that explains most in an effect's place to its end; None where none comes near.
+
+        A load that walks far has no law for a first look to judge it by: it is fitted to its end.
+        """
         base = self.without(current, name)
         alike = [other for other in self.names if other not in current.effects and are_alike(name, other)]
         looks = self._looks(base, alike, name)
         rough = [self._added(base, other, looks[other], current) for other in looks]
         near = current.score + NEARLY * _gain(current, base)
         found = [each for each in rough if each is not None and each.score < near]
-        return self.finish(min(found, key=lambda each: each.score), current) if found else None
+        best = [self.finish(min(found, key=lambda each: each.score), current)] if found else []
+        if GRADE in alike and not self.is_over():
+            best.append(self._with_grade(base))
+        return min(best, key=lambda each: each.score, default=None)
 
     def _extended(self, warm: FitResult, effects: Effects, release: Release) -> Problem:
         common = kept(warm, (effects - {GRADE}) | set(self.model.effects))

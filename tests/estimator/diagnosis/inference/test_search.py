@@ -131,6 +131,14 @@ def test_a_search_that_is_over_tells_the_best_so_far() -> None:
     assert search.stopped
 
 
+def test_a_grade_is_tried_in_the_place_of_a_load_s_law() -> None:
+    """Else a brake that was found first, and takes the largest part of a grade, would keep it."""
+    search = searched(bench_with("aerodynamic_drag", {"drag_nm_s2": 0.05}))
+    search.names = ["aerodynamic_drag", "road_grade"]
+    assert search.run().effects == {"aerodynamic_drag"}
+    assert frozenset({"road_grade"}) in search.visited
+
+
 def test_only_a_load_that_is_a_grade_may_walk_far() -> None:
     """A set in which something else stands in a grade's place does not keep the grade as a disturbance."""
     search = searched(bench_with("coulomb_friction_motor", {"friction_nm": 8.0}))
