@@ -43,7 +43,7 @@ def moments_in(name: str, result: FitResult) -> dict[str, tuple[Interval, ...]]:
     for record, (from_s, to_s) in zip(result.problem.records, moments_of(result, name), strict=True):
         began = float(record.time_s[0] - record.since_start_s[0])
         is_seen = not EFFECTS[name].permanent or inside(record, from_s) or inside(record, to_s)
-        if is_seen and to_s - from_s > record.sample_time_s:
+        if record.of is None and is_seen and to_s - from_s > record.sample_time_s:
             found[record.name] = ((began + from_s, began + to_s),)
     return found
 
@@ -128,7 +128,7 @@ def profiles_of(result: FitResult, cov: FloatArray, model: DrivelineModel) -> di
     torque_unit = unit("torque", model.motion)
     profiles = {}
     first = len(result.problem.shared)
-    for i, (record, basis) in enumerate(zip(result.problem.records, result.problem.local, strict=True)):
+    for i, (record, basis) in enumerate(zip(result.problem.records, result.problem.bases, strict=False)):
         local = local_part(result.problem, result.x, i)
         rows = slice(first + local.size - basis.profile.shape[0], first + local.size)
         first += local.size
@@ -183,7 +183,7 @@ def load_torques(result: FitResult, model: DrivelineModel) -> dict[str, Estimate
     torques = {}
     first = len(result.problem.shared)
     shared = {unknown.name: (k, unknown.scale) for k, unknown in enumerate(result.problem.shared) if not unknown.effect}
-    for i, (record, basis) in enumerate(zip(result.problem.records, result.problem.local, strict=True)):
+    for i, (record, basis) in enumerate(zip(result.problem.records, result.problem.bases, strict=False)):
         own = local_part(result.problem, result.x, i)[LOAD_TORQUE] * basis.scale[LOAD_TORQUE]
         value = float(own + result.p[slot("", LOAD)])
         index, scale = shared.get(LOAD, (first + LOAD_TORQUE, float(basis.scale[LOAD_TORQUE])))

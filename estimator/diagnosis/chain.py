@@ -16,12 +16,14 @@ from estimator.diagnosis.acquisition import (
     mean_shift,
     recognise,
 )
+from estimator.diagnosis.noise import noise_floor
 from estimator.diagnosis.segments import tiles
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult
 from estimator.physics.free_run import FreeRun, free_run
 from estimator.physics.model import DrivelineModel
 from estimator.physics.rates import rates
+from estimator.signals.outputs import outputs_apart
 from estimator.signals.record import BoolArray, FloatArray, Record
 
 
@@ -45,6 +47,11 @@ class Chain:
     records: tuple[Record, ...]
     findings: tuple[Finding, ...]
     shifts: tuple[FloatArray, ...] = ()
+
+    @property
+    def apart(self) -> list[Record]:
+        """The recordings for fits, each measured output by itself."""
+        return outputs_apart(self.records, noise_floor)
 
     def with_jitter_in(self, result: FitResult) -> Chain:
         """Return the chain with the jitter that only the errors of a converged fit show, where they show any.

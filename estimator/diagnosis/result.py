@@ -164,8 +164,24 @@ class UnnamedLaw:
 
 
 @dataclass(frozen=True, slots=True)
+class OutputFit:
+    """RMS of the free-run error of a further measured output, in ``unit``, and the noise of its reading."""
+
+    name: str
+    kind: str
+    at: str
+    unit: str
+    retuned: float
+    augmented: float
+    noise: float
+
+
+@dataclass(frozen=True, slots=True)
 class Fit:
-    """RMS of the free-run simulation error, in ``unit``; holdout on samples not used for that fit."""
+    """RMS of the free-run simulation error, in ``unit``; holdout on samples not used for that fit.
+
+    Of the recordings' first output; ``outputs`` has the further ones.
+    """
 
     unit: str
     nominal: float
@@ -174,6 +190,7 @@ class Fit:
     holdout_retuned: float
     holdout_augmented: float
     noise_floor: float
+    outputs: tuple[OutputFit, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -64,6 +64,23 @@ class FitResult:
         """Return this fit without its derivative, which of long recordings takes most of its room."""
         return replace(self, derivative=None)
 
+    def first_outputs(self) -> FitResult:
+        """Return this fit of the recordings' first outputs alone; it has the same unknowns."""
+        problem, count = self.problem, len(self.problem.bases)
+        if count == len(problem.records):
+            return self
+        rows = slice(0, sum(int(use.sum()) for use in problem.use[:count]))
+        first = replace(
+            problem,
+            records=problem.records[:count],
+            local=problem.local[:count],
+            use=problem.use[:count],
+            leads=problem.leads[:count],
+        )
+        derivative = None if self.derivative is None else self.derivative[rows]
+        outputs = self.outputs[:count]
+        return replace(self, problem=first, outputs=outputs, residual=self.residual[rows], derivative=derivative)
+
     @property
     def squares(self) -> float:
         """Sum of the squared errors of the samples that count."""
@@ -122,7 +139,7 @@ def not_fitted(problem: Problem, x: FloatArray) -> FitResult:
 def _moments(problem: Problem) -> BoolArray:
     """Return which unknowns are moments of events, shape (U,)."""
     parts = [np.zeros(len(problem.shared), dtype=bool)]
-    for basis in problem.local:
+    for basis in problem.bases:
         own = np.zeros(basis.guess.size, dtype=bool)
         own[basis.own_rows] = [unknown.name in MOMENT_NAMES for unknown in basis.own]
         parts.append(own)

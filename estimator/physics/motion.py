@@ -20,6 +20,8 @@ def measured_speed(record: Record) -> FloatArray:
 
     An imposed motion is a position, known throughout.
     """
+    if record.of is not None:
+        return measured_speed(record.of)
     output = np.where(record.okay, record.output, np.nan) if record.imposed is None else record.imposed
     if record.imposed is None and record.kind is not OutputKind.POSITION:
         return output

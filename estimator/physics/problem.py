@@ -19,6 +19,7 @@ from estimator.physics.simulate import simulate_each, simulate_records
 from estimator.physics.start import Start
 from estimator.physics.unknowns import LocalBasis, Shared, local_basis, own_unknowns, shared_load
 from estimator.signals.once import once
+from estimator.signals.outputs import leads
 from estimator.signals.record import BoolArray, FloatArray, Record
 
 BAD = 1e3
@@ -33,8 +34,12 @@ class Problem:
     ----------
     p : ndarray, shape (layout.SIZE,)
         Parameter vector; unknowns overwrite their slots.
+    local : tuple of LocalBasis
+        What each recording has of its own; a further output has that of the recording it is of.
     use : tuple of ndarray of bool
         Per recording, which samples count.
+    leads : tuple of int
+        Which recording's own unknowns each recording has; those that have their own come first.
     """
 
     grid: Grid
@@ -43,6 +48,12 @@ class Problem:
     shared: tuple[Shared, ...]
     local: tuple[LocalBasis, ...]
     use: tuple[BoolArray, ...]
+    leads: tuple[int, ...]
+
+    @property
+    def bases(self) -> tuple[LocalBasis, ...]:
+        """What recordings have of their own, in the order of the unknowns."""
+        return tuple(basis for i, basis in enumerate(self.local) if self.leads[i] == i)
 
 
 def make_problem(
@@ -66,16 +77,19 @@ def make_problem(
         shared = (*shared, shared_load(model, records))
     has_own_load = model.load is Load.OWN or (model.load is Load.SHARED and len(records) == 1)
     effects = frozenset(model.effects) | {unknown.effect for unknown in shared}
+    lead_of = leads(records)
+    local = [
+        local_basis(model, record, profile, mine, effects, has_own_load)
+        for record, mine in zip(records, own, strict=True)
+    ]
     return Problem(
         grid or grid_for(model, records),
         tuple(records),
         flat(model),
         tuple(shared),
-        tuple(
-            local_basis(model, record, profile, mine, effects, has_own_load)
-            for record, mine in zip(records, own, strict=True)
-        ),
+        tuple(local[lead] for lead in lead_of),
         tuple(record.okay for record in records) if use is None else tuple(use),
+        lead_of,
     )
 
 
@@ -94,20 +108,20 @@ def local_part(problem: Problem, x: FloatArray, index: int) -> FloatArray:
 
 def own_part(problem: Problem, index: int) -> slice:
     """Return where the unknowns of one recording stand among all."""
-    first = len(problem.shared) + sum(basis.guess.size for basis in problem.local[:index])
+    first = len(problem.shared) + sum(basis.guess.size for basis in problem.local[: problem.leads[index]])
     return slice(first, first + problem.local[index].guess.size)
 
 
 def bounds(problem: Problem) -> tuple[FloatArray, FloatArray]:
     """Return lower and upper bounds of the scaled unknowns."""
-    low = np.concatenate([np.array([s.low for s in problem.shared]), *(basis.low for basis in problem.local)])
-    high = np.concatenate([np.array([s.high for s in problem.shared]), *(basis.high for basis in problem.local)])
+    low = np.concatenate([np.array([s.low for s in problem.shared]), *(basis.low for basis in problem.bases)])
+    high = np.concatenate([np.array([s.high for s in problem.shared]), *(basis.high for basis in problem.bases)])
     return low, high
 
 
 def start_vector(problem: Problem) -> FloatArray:
     """Return where a fit starts without better knowledge."""
-    return np.concatenate([np.array([s.start for s in problem.shared]), *(b.guess for b in problem.local)])
+    return np.concatenate([np.array([s.start for s in problem.shared]), *(b.guess for b in problem.bases)])
 
 
 def outputs_at(problem: Problem, x: FloatArray) -> tuple[FloatArray, ...]:

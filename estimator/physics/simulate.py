@@ -27,8 +27,16 @@ _OUTPUT_STATE = {
     (OutputKind.SPEED, Location.MOTOR): state_vector.SPEED,
     (OutputKind.SPEED, Location.LOAD): state_vector.LOAD_SPEED,
     (OutputKind.POSITION, Location.MOTOR): state_vector.ANGLE,
+    (OutputKind.POSITION, Location.LOAD): state_vector.LOAD_ANGLE,
+    (OutputKind.TORQUE, Location.SHAFT): state_vector.SHAFT_TORQUE,
+    (OutputKind.TORQUE, Location.LOAD): state_vector.SHAFT_TORQUE,
+    (OutputKind.ACCELERATION, Location.MOTOR): state_vector.SPEED,
+    (OutputKind.ACCELERATION, Location.LOAD): state_vector.LOAD_SPEED,
 }
+"""What the kernel gives of each output; of an acceleration the speed, whose slope it is."""
 
+_SENSED = (state_vector.SPEED, state_vector.LOAD_SPEED)
+"""What the effects of a speed sensor act on."""
 
 LENGTHS_DIFFER = 1.1
 """Length of the longest recording over the mean of all from which they go each by itself: the others would go on to
@@ -52,12 +60,22 @@ def output_state(record: Record, structure: Structure) -> int:
     if structure is Structure.JOINT:
         return joint.TORQUE
     index = _OUTPUT_STATE.get((record.kind, record.location))
-    if index is None or (structure is Structure.ONE_MASS and record.location is Location.LOAD):
+    if index is None or (structure is Structure.ONE_MASS and record.location is not Location.MOTOR):
         raise BadModel(
             f"recording {record.name}: {record.kind.value} at the {record.location.value} is no output of "
-            f"{structure.value}. Expected speed at the motor, position at the motor, or (two_mass) speed at the load."
+            f"{structure.value}. Expected speed, position or acceleration at the motor or, where the structure has a "
+            "shaft, at the load, or torque at the shaft."
         )
     return index
+
+
+def _is_sensed(record: Record, output: int | None, wanted: int) -> bool:
+    """Tell whether an output is read by the sensor that effects of the sensor are of: the first one of a recording."""
+    return output is None and record.of is None and wanted in _SENSED
+
+
+def _is_slope(record: Record, output: int | None) -> bool:
+    return output is None and record.kind is OutputKind.ACCELERATION
 
 
 def simulate(
@@ -112,7 +130,9 @@ def simulate_each(
         return np.array([_under_laws(grid, record, case, wanted, output is None) for case in cases])
     given = inputs_of([record], [0] * len(cases), cases)
     shape = (len(cases), record.time_s.size)
-    slopes = np.zeros((shape[0], 2, shape[1] if output is None and record.offset_s is not None else 0))
+    is_slope = _is_slope(record, output)
+    steep = is_slope or (output is None and record.offset_s is not None)
+    slopes = np.zeros((shape[0], 2, shape[1] if steep else 0))
     out = np.empty(shape)
     many.integrate_each(
         MASSES[grid.structure],
@@ -128,12 +148,23 @@ def simulate_each(
         given.p,
         given.state,
         wanted,
-        output is None and wanted != state_vector.ANGLE,
+        _is_sensed(record, output, wanted),
         out,
         slopes,
         _samples_alike(record, len(cases), alike_s),
     )
-    return _sampled_off_time(out, slopes, record.offset_s)
+    return _read(record, out, slopes, output)
+
+
+def _read(record: Record, out: FloatArray, slopes: FloatArray, output: int | None) -> FloatArray:
+    """Return what is read of outputs, shape (..., N), in the recording's own unit."""
+    if output is not None:
+        return out
+    if _is_slope(record, output):  # of a torque held over each period the mean of both sides
+        found: FloatArray = 0.5 * slopes.sum(axis=-2) / record.unit
+        found[..., [0, -1]] = slopes[..., [1, 0], [0, -1]] / record.unit
+        return found
+    return _sampled_off_time(out, slopes, record.offset_s) / record.unit
 
 
 def simulate_records(grid: Grid, records: Sequence[Record], cases: Sequence[Case]) -> list[FloatArray]:
@@ -175,8 +206,8 @@ def go_together(grid: Grid, records: Sequence[Record], lines: Sequence[FloatArra
     p = np.array(lines)
     acts = (p != 0.0).any(axis=0)
     acts[list(moved)] = True
-    alike = len({(record.kind, record.location, record.sample_time_s) for record in records}) == 1
-    on_time = all(record.offset_s is None for record in records)
+    alike = len({(each.kind, each.location, each.of is None, each.sample_time_s) for each in records}) == 1
+    on_time = all(record.offset_s is None and not _is_slope(record, None) for record in records)
     begin_alike = len({record.since_start_s[0] for record in records}) == 1
     if not alike or not on_time or acts[PERIODIC].any() or not (begin_alike or not acts[TIMED].any()):
         return False
@@ -212,11 +243,12 @@ def simulate_together(grid: Grid, records: Sequence[Record], of: Sequence[int], 
         given.p,
         given.state,
         wanted,
-        wanted != state_vector.ANGLE,
+        _is_sensed(records[0], None, wanted),
         out,
         np.zeros((len(cases), 2, 0)),
         np.zeros(len(cases), dtype=np.int64),
     )
+    out /= np.array([records[i].unit for i in of])[:, np.newaxis]
     return out
 
 
@@ -257,7 +289,8 @@ def _under_laws(grid: Grid, record: Record, case: Case, output: int, recorded: b
     run = own_law_run.Run.of(masses, grid.substeps, grid.sign_width, record, torque, load, angle, case.p).under(
         laws, state
     )
-    slopes = np.zeros((2, run.torque.size if recorded and record.offset_s is not None else 0))
+    steep = recorded and (record.offset_s is not None or _is_slope(record, None))
+    slopes = np.zeros((2, run.torque.size if steep else 0))
     out = np.empty_like(run.torque)
     integration.integrate(
         masses,
@@ -272,14 +305,14 @@ def _under_laws(grid: Grid, record: Record, case: Case, output: int, recorded: b
         case.p,
         state.copy(),
         output,
-        recorded and output != state_vector.ANGLE,
+        recorded and _is_sensed(record, None, output),
         out,
         slopes,
     )
-    if recorded:
+    if recorded and record.of is None:
         out += run.misread(laws, state)
     every = grid.substeps
-    return _sampled_off_time(out[::every], slopes[:, ::every], record.offset_s)
+    return _read(record, out[::every], slopes[:, ::every], None if recorded else output)
 
 
 TIMED = np.array([slots.GENERATOR, slots.CRACK, slots.PAYLOAD, slots.BRAKE, slots.WARMING, slots.DRIFT])
@@ -307,6 +340,8 @@ def motor_angle(record: Record) -> FloatArray:
     Laws that are periodic in the angle take their phase from it. A simulated angle would drift off by whole radians
     while a fit is still on its way.
     """
+    if record.of is not None:
+        return motor_angle(record.of)
     good = np.flatnonzero(record.okay)
     output = np.interp(record.time_s, record.time_s[good], record.output[good])
     if record.imposed is not None:

@@ -73,7 +73,7 @@ def in_common(problem: Problem, other: Problem) -> tuple[IntArray, IntArray, Flo
 def _names(problem: Problem) -> list[Name]:
     """Return what tells each unknown from all others."""
     names: list[Name] = [(shared.effect, shared.name) for shared in problem.shared]
-    for i, basis in enumerate(problem.local):
+    for i, basis in enumerate(problem.bases):
         names += [(i, row) for row in range(basis.own_rows.start)]
         names += [(i, own.effect, own.name) for own in basis.own]
         names += [(i, *basis.profile.shape, row) for row in range(basis.profile.shape[0])]
@@ -81,4 +81,4 @@ def _names(problem: Problem) -> list[Name]:
 
 
 def _scales(problem: Problem) -> FloatArray:
-    return np.concatenate([[shared.scale for shared in problem.shared], *(basis.scale for basis in problem.local)])
+    return np.concatenate([[shared.scale for shared in problem.shared], *(basis.scale for basis in problem.bases)])

@@ -87,8 +87,9 @@ def _told(
         _complement(result.problem.local[i], result.local_of(i), name, record, moments, from_the_start)
         for i, (record, moments) in enumerate(found)
     ]
-    problem = replace(result.problem, local=tuple(basis for basis, _ in turned))
-    return fit(problem, np.concatenate([x, *(local for _, local in turned)]))
+    leads = result.problem.leads
+    problem = replace(result.problem, local=tuple(turned[lead][0] for lead in leads))
+    return fit(problem, np.concatenate([x, *(turned[i][1] for i in sorted(set(leads)))]))
 
 
 def _complement(

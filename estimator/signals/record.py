@@ -22,13 +22,39 @@ class OutputKind(Enum):
     SPEED = "speed"
     POSITION = "position"
     FORCE = "force"
+    TORQUE = "torque"
+    ACCELERATION = "acceleration"
 
 
 class Location(Enum):
-    """Which end of the driveline the output is measured at."""
+    """Where in the driveline the output is measured."""
 
     MOTOR = "motor"
     LOAD = "load"
+    SHAFT = "shaft"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Channel:
+    """A further measured output of a recording.
+
+    Attributes
+    ----------
+    kind, location
+        What it is, and where it is measured.
+    label : str
+        The column it was read from; names it in results.
+    output : ndarray, shape (N,)
+        Its readings [rad/s, rad, Nm, rad/s^2; translation m/s, m, N, m/s^2].
+    okay : ndarray of bool, shape (N,)
+        False where a reading must not be used.
+    """
+
+    kind: OutputKind
+    location: Location
+    label: str
+    output: FloatArray
+    okay: BoolArray
 
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
@@ -63,6 +89,14 @@ class Record:
         ``torque_nm`` holds too. None: the torque acts and the motion is measured.
     offset_s : ndarray, shape (N,), optional
         True sampling instant of the output less ``time_s`` [s]. None: on time.
+    channels : tuple of Channel
+        Further measured outputs.
+    of : Record, optional
+        The recording that this one is a further output of (``signals.outputs``); None: it is the recording itself.
+    label : str
+        Names the further output; empty for the first one.
+    unit : float
+        What ``output`` is given in, in SI units.
     """
 
     name: str
@@ -78,12 +112,17 @@ class Record:
     offset_s: FloatArray | None = None
     imposed: FloatArray | None = None
     reference_nm: FloatArray | None = None
+    channels: tuple[Channel, ...] = ()
+    of: Record | None = None
+    label: str = ""
+    unit: float = 1.0
 
     def __post_init__(self) -> None:
         n = self.time_s.shape[0]
         shapes = {"torque_nm": self.torque_nm.shape[:1], "output": self.output.shape, "okay": self.okay.shape}
         optional = {"offset_s": self.offset_s, "imposed": self.imposed, "reference_nm": self.reference_nm}
         shapes |= {name: values.shape for name, values in optional.items() if values is not None}
+        shapes |= {f"output {channel.label}": channel.output.shape for channel in self.channels}
         for name, shape in shapes.items():
             if shape != (n,):
                 raise BadShape(

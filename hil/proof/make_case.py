@@ -28,11 +28,13 @@ _COLUMNS = (
     ("speed_rad_s", "%.5f"),
     ("flags", "%d"),
 )
+_AT_THE_LOAD = ("speed_load_rad_s", "%.5f")
 
 
-def write_recording(path: Path, recording: TruthRecording) -> None:
+def write_recording(path: Path, recording: TruthRecording, at_the_load: bool = False) -> None:
     """Write the columns a tool may see as CSV; ``flags`` only where the recorder has given any."""
-    columns = [(name, number) for name, number in _COLUMNS if getattr(recording, name) is not None]
+    shown = (*_COLUMNS, _AT_THE_LOAD) if at_the_load else _COLUMNS
+    columns = [(name, number) for name, number in shown if getattr(recording, name) is not None]
     np.savetxt(
         path,
         np.column_stack([getattr(recording, name) for name, _ in columns]),
@@ -43,12 +45,15 @@ def write_recording(path: Path, recording: TruthRecording) -> None:
     )
 
 
-def write_shown(case: Case, folder: Path) -> None:
-    """Write what the tool gets into a folder, which is made where it is missing."""
+def write_shown(case: Case, folder: Path, at_the_load: bool = False) -> None:
+    """Write what the tool gets into a folder, which is made where it is missing.
+
+    ``at_the_load`` where the speed of the load is recorded, too, and the model file names it as an output.
+    """
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "model.toml").write_text(model_toml(case.specimen), encoding="utf-8")
+    (folder / "model.toml").write_text(model_toml(case.specimen, at_the_load), encoding="utf-8")
     for number, recording in enumerate(case.recordings, start=1):
-        write_recording(folder / f"run_{number}.csv", recording)
+        write_recording(folder / f"run_{number}.csv", recording, at_the_load)
 
 
 def write_sealed(case: Case, folder: Path) -> None:

@@ -63,14 +63,14 @@ def case_of(which: str, seed: int) -> tuple[Case, dict[str, dict[str, float]], s
 
 
 def shown_case(
-    which: str, seed: int
+    which: str, seed: int, at_the_load: bool = False
 ) -> tuple[Sequence[Record], DrivelineModel, Case, dict[str, dict[str, float]], str]:
     """Return recordings and model of a case as a tool gets them, the case, what its model knows, what is strong."""
     case, known, strong = case_of(which, seed)
     tolerance = NOMINAL_TOLERANCE if knows(seed) is Known.OFF else 0.0
     with tempfile.TemporaryDirectory(prefix="hil-case-") as place:
         shown = Path(place)
-        write_shown(case, shown)
+        write_shown(case, shown, at_the_load)
         with (shown / "model.toml").open("a", encoding="utf-8") as model:
             model.write("".join(_stated(name, sizes, tolerance) for name, sizes in known.items()))
         file = read_model_for_recordings(shown / "model.toml")
@@ -78,9 +78,9 @@ def shown_case(
     return records, file.model, case, known, strong
 
 
-def answered(which: str, seed: int, budget_s: float = BUDGET_S) -> Row:
+def answered(which: str, seed: int, budget_s: float = BUDGET_S, at_the_load: bool = False) -> Row:
     """Return the row of a case: what is there, what was named, and the time by the clock and of the processors."""
-    records, model, case, known, strong = shown_case(which, seed)
+    records, model, case, known, strong = shown_case(which, seed, at_the_load)
     hidden = [name for name in case.specimen.sizes if name != NOTHING and name not in known]
     row: Row = {"set": which, "seed": seed, "strong": strong, "hidden": hidden}
     began, worked = time.perf_counter(), time.process_time()
@@ -96,6 +96,8 @@ def answered(which: str, seed: int, budget_s: float = BUDGET_S) -> Row:
         "strong_named": any(strong in claim for claim in claims.values()),
         "false": [name for name, claim in claims.items() if not claim & ({*hidden} | known_names)],
         "probability": {effect["name"]: effect["probability"] for effect in answer["effects"]},
+        "alike": {name: sorted(claim - {name}) for name, claim in claims.items()},
+        "untestable": [each["name"] for each in answer["untestable"]],
         "traces": [trace["name"] for trace in answer["traces"]],
         "time_s": round(time.perf_counter() - began, 2),
         "cpu_s": round(time.process_time() - worked, 2),
@@ -137,6 +139,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--set", required=True, choices=["clean", "dirty", "quiet", "outside"], dest="which")
     parser.add_argument("--seeds", required=True, help="A..B, both included")
+    parser.add_argument("--at-the-load", action="store_true", help="with the load's speed as a second output")
     parser.add_argument("--budget-s", type=float, default=BUDGET_S, help="of a diagnosis; more on a busy machine")
     parser.add_argument("--out", required=True, type=Path, help="folder for the results")
     return parser
@@ -151,7 +154,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     done = {row["seed"] for row in rows}
     for seed in parse_seeds(options.seeds):
         if seed not in done:
-            row = answered(options.which, seed, options.budget_s)
+            row = answered(options.which, seed, options.budget_s, options.at_the_load)
             rows.append(row)
             with path.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(row, allow_nan=False) + "\n")

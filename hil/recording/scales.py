@@ -24,6 +24,7 @@ class Role(Enum):
     SPEED = "speed"
     POSITION = "position"
     FORCE = "force"
+    ACCELERATION = "acceleration"
 
 
 EXPECTED: Final = {
@@ -32,6 +33,7 @@ EXPECTED: Final = {
     Role.SPEED: (Quantity.SPEED, Quantity.VELOCITY),
     Role.POSITION: (Quantity.ANGLE, Quantity.LENGTH),
     Role.FORCE: (Quantity.FORCE, Quantity.TORQUE),
+    Role.ACCELERATION: (),
 }
 """Quantities that a column of a role may be of."""
 

@@ -18,13 +18,20 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.signals.record import OutputKind, Record
+from estimator.signals.record import Channel, OutputKind, Record
 from hil.errors import RecordingError
 from hil.recording import columns
 from hil.recording.formats import read_table
 from hil.recording.resample import Series, resampled
 from hil.recording.scales import Role, scale_of, with_sign, wrapped_at
-from hil.recording.signals_config import MaskRange, OutputSignal, SignalsConfig, TimeSignal, TorqueSignal
+from hil.recording.signals_config import (
+    MaskRange,
+    MeasuredOutput,
+    OutputSignal,
+    SignalsConfig,
+    TimeSignal,
+    TorqueSignal,
+)
 from hil.recording.table import FloatArray, Table
 from hil.recording.time_base import time_base
 
@@ -92,7 +99,8 @@ def to_record(table: Table, signals: SignalsConfig, tell: Tell | None = None) ->
     time_s, period_s, remark = time_base(table, signals.time)
     scales = [scale_of(table, torque.column, Role.TORQUE, torque.given_scale) for torque in torques]
     scale = scale_of(table, output.column, Role(kind.value), output.given_scale)
-    signed: list[TorqueSignal | OutputSignal] = [*torques, output]
+    further = signals.further()
+    signed: list[TorqueSignal | OutputSignal] = [*torques, output, *further]
     for signal in signed:
         numbers[signal.column] = _signed(table, signal, numbers[signal.column])
     if tell is not None:
@@ -105,10 +113,13 @@ def to_record(table: Table, signals: SignalsConfig, tell: Tell | None = None) ->
     with np.errstate(over="ignore"):  # what is too large then is refused
         torque_nm = np.column_stack([numbers[torque.column] * by for torque, by in zip(torques, scales, strict=True)])
         measured = numbers[output.column] * scale
-    okay = trusted.all(axis=1) & np.isfinite(measured) & np.logical_and.reduce([~flagged, *masks.values()])
+        channels = [_channel(table, each, numbers[each.column]) for each in further]
+    counted = trusted.all(axis=1) & np.logical_and.reduce([~flagged, *masks.values()])
+    okay = counted & np.isfinite(measured)
     _require_sizes(
         table, [*((torque.column, torque_nm[:, k]) for k, torque in enumerate(torques)), (output.column, measured)]
     )
+    _require_sizes(table, [(channel.label, channel.output) for channel in channels])
     _require_period(table, period_s)
     _require_samples(table, okay)
     return Record(
@@ -122,7 +133,14 @@ def to_record(table: Table, signals: SignalsConfig, tell: Tell | None = None) ->
         location=output.at,
         torque_okay=None if read.all() else read,
         reference_nm=_reference(table, signals),
+        channels=tuple(channels),
     )
+
+
+def _channel(table: Table, signal: MeasuredOutput, values: FloatArray) -> Channel:
+    """Return a further measured output; where it was not read, it counts for nothing."""
+    measured = values * scale_of(table, signal.column, Role(signal.kind.value), signal.given_scale)
+    return Channel(signal.kind, signal.at, signal.column, measured, np.isfinite(measured))
 
 
 def _signed(table: Table, signal: TorqueSignal | OutputSignal, values: FloatArray) -> FloatArray:
@@ -148,7 +166,8 @@ def _signed(table: Table, signal: TorqueSignal | OutputSignal, values: FloatArra
 def _units_used(table: Table, signals: SignalsConfig) -> Iterator[str]:
     """Say which columns were brought to SI units by the units that the file gives them."""
     kind, output = signals.output()
-    roles = [*((torque, Role.TORQUE) for torque in signals.torques()), (output, Role(kind.value))]
+    roles: list[tuple[TorqueSignal | OutputSignal, Role]] = [(torque, Role.TORQUE) for torque in signals.torques()]
+    roles += [(output, Role(kind.value)), *((each, Role(each.kind.value)) for each in signals.further())]
     for signal, role in roles:
         factor = scale_of(table, signal.column, role, signal.given_scale)
         if signal.given_scale is None and factor != 1.0:
@@ -195,6 +214,7 @@ def under_imposed_motion(record: Record) -> Record:
         kind=OutputKind.FORCE,
         imposed=np.interp(record.time_s, record.time_s[good], record.output[good]),
         torque_okay=None,
+        channels=(),
     )
 
 

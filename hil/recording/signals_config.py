@@ -82,6 +82,20 @@ class OutputSignal(_Scaled):
     at: Annotated[Location, Field(strict=False)] = Location.MOTOR
 
 
+class MeasuredOutput(OutputSignal):
+    """One of several measured outputs, of any kind the structure has there."""
+
+    kind: Annotated[OutputKind, Field(strict=False)]
+
+    @model_validator(mode="after")
+    def _is_somewhere(self) -> Self:
+        is_torque = self.kind is OutputKind.TORQUE
+        if self.kind is OutputKind.FORCE or self.at is (Location.MOTOR if is_torque else Location.SHAFT):
+            expected = "speed, position or acceleration at the motor or at the load, or torque at the shaft or the load"
+            refuse([Fault("kind", expected, f"{self.kind.value} at the {self.at.value}")])
+        return self
+
+
 class MaskRange(_Strict):
     """Rows whose value in ``column``, as in the file, is outside ``min`` to ``max`` are missing samples."""
 
@@ -108,6 +122,9 @@ class SignalsConfig(_Strict):
     speed, position, force
         The output: one of them; none for the contract's motor speed. For a joint on a bench ``position`` is the imposed
         motion, and the output is ``force`` or, without it, the sum of ``torque``.
+    outputs
+        All measured outputs, or those beyond the one that ``speed`` or ``position`` names. The first speed or position
+        among them is the recording's output; the others are further ones.
     mask
         Rows that count only inside these ranges.
     format
@@ -121,6 +138,7 @@ class SignalsConfig(_Strict):
     speed: OutputSignal | None = None
     position: OutputSignal | None = None
     force: OutputSignal | None = None
+    outputs: list[MeasuredOutput] = []
     mask: list[MaskRange] = []
     format: FormatHints = FormatHints()
     resample_s: float | None = Field(default=None, gt=0)
@@ -131,7 +149,15 @@ class SignalsConfig(_Strict):
         if len(given) > 1 and given != ["position", "force"]:
             expected = "one of speed, position, force (position and force together: an imposed motion)"
             refuse([Fault("", expected, " and ".join(given))])
+        if self.outputs and not given and not self.is_own_recording and self._first_of_outputs is None:
+            expected = "a speed or a position among them, or speed = { ... } for one"
+            refuse([Fault("outputs", expected, ", ".join(output.kind.value for output in self.outputs))])
         return self
+
+    @property
+    def _first_of_outputs(self) -> MeasuredOutput | None:
+        """The recording's output, where it is one of several that are named."""
+        return next((each for each in self.outputs if each.kind in (OutputKind.SPEED, OutputKind.POSITION)), None)
 
     def _outputs(self) -> list[tuple[OutputKind, OutputSignal]]:
         pairs = (
@@ -139,7 +165,13 @@ class SignalsConfig(_Strict):
             (OutputKind.POSITION, self.position),
             (OutputKind.FORCE, self.force),
         )
-        return [(kind, signal) for kind, signal in pairs if signal is not None]
+        named: list[tuple[OutputKind, OutputSignal]] = [(kind, each) for kind, each in pairs if each is not None]
+        first = self._first_of_outputs
+        if named or first is None:
+            return named
+        if self.is_own_recording and not any(output.at is Location.MOTOR for output in self.outputs):
+            return []  # the contract's motor speed; what is named are further outputs
+        return [(first.kind, first)]
 
     @property
     def is_own_recording(self) -> bool:
@@ -151,15 +183,29 @@ class SignalsConfig(_Strict):
         """True where the output is not the contract's motor speed."""
         return bool(self._outputs())
 
+    def further(self) -> list[MeasuredOutput]:
+        """Return the outputs beyond the first one, each column once."""
+        first = self.output()[1]
+        taken = {first.column, *(torque.column for torque in self.torques())}
+        others = [each for each in self.outputs if each.column not in taken]
+        return list({each.column: each for each in others}.values())
+
     @property
     def names_bench(self) -> bool:
         """True where an imposed motion is named, and the torque or force that it takes."""
-        return self.position is not None and (self.force is not None or bool(self.torque))
+        return self.position is not None and (self._taken is not None or bool(self.torque))
+
+    @property
+    def _taken(self) -> OutputSignal | None:
+        """What an imposed motion takes, where it is named as an output: a force, or the torque at a shaft."""
+        is_alone = len(self.outputs) == 1 and self.outputs[0].kind is OutputKind.TORQUE and not self.torque
+        return self.force or (self.outputs[0] if is_alone else None)
 
     def torques(self) -> list[TorqueSignal]:
         """Return the inputs, the contract's where none are named; on a bench, what is measured."""
-        if self.names_bench and self.force is not None:
-            return [TorqueSignal(**self.force.model_dump(exclude={"at"}, exclude_unset=True))]
+        taken = self._taken
+        if self.names_bench and taken is not None:
+            return [TorqueSignal(**taken.model_dump(exclude={"at", "kind"}, exclude_unset=True))]
         own = [TorqueSignal(column=name) for name in (columns.TORQUE_M1, columns.TORQUE_M2)]
         return self.torque or own
 
@@ -169,12 +215,12 @@ class SignalsConfig(_Strict):
 
     def columns(self) -> list[str]:
         """Return the names of all columns that are needed, but for the time."""
-        named = [*(torque.column for torque in self.torques()), self.output()[1].column]
+        named = [signal.column for signal in (*self.torques(), self.output()[1], *self.further())]
         return list(dict.fromkeys([*named, *(mask.column for mask in self.mask)]))
 
     def held(self) -> list[str]:
         """Return the names of those whose last value counts until the next: as it is said, and what only masks."""
-        signals = [*self.torques(), self.output()[1]]
+        signals = [*self.torques(), self.output()[1], *self.further()]
         roles = {signal.column for signal in signals}
         return [*(signal.column for signal in signals if signal.hold), *(set(self.columns()) - roles)]
 

@@ -12,7 +12,7 @@ from html import escape
 
 import numpy as np
 
-from estimator.diagnosis.result import Diagnosis, FoundEffect, Trace, UnnamedLaw
+from estimator.diagnosis.result import Diagnosis, Fit, FoundEffect, Trace, UnnamedLaw
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
 from estimator.signals.record import FloatArray
@@ -121,7 +121,22 @@ def _fit(diagnosis: Diagnosis) -> str:
         for name, value, unseen, kind in rows
     ]
     headings = ("model", f"RMS error [{fit.unit}]", "to noise floor", f"on unseen data [{fit.unit}]", "")
-    return html.section("Fit", html.html_table(headings, cells, numbers=(1, 2, 3)))
+    table = html.html_table(headings, cells, numbers=(1, 2, 3))
+    return html.section("Fit", table + _further_outputs(fit) if fit.outputs else table)
+
+
+def _further_outputs(fit: Fit) -> str:
+    headings = ("further output", "where", "re-tuned", "augmented", "noise of its reading", "augmented to noise")
+    cells = [
+        [
+            escape(each.name),
+            escape(f"{each.kind} at the {each.at}"),
+            *(shown(value, each.unit) for value in (each.retuned, each.augmented, each.noise)),
+            shown_ratio(each.augmented, each.noise),
+        ]
+        for each in fit.outputs
+    ]
+    return html.html_table(headings, cells, numbers=(2, 3, 4, 5))
 
 
 def _acquired(diagnosis: Diagnosis) -> str:

@@ -22,6 +22,7 @@ from estimator.diagnosis.result import (
     Interval,
     LawPicture,
     Mismatch,
+    OutputFit,
     Profile,
     RejectedEffect,
     Remainder,
@@ -234,4 +235,10 @@ def _fit(fit: Fit) -> Json:
         "holdout_retuned": json_number(fit.holdout_retuned),
         "holdout_augmented": json_number(fit.holdout_augmented),
         "noise_floor": json_number(fit.noise_floor),
+        "outputs": [_output(each) for each in fit.outputs],
     }
+
+
+def _output(each: OutputFit) -> Json:
+    figures = {name: json_number(getattr(each, name)) for name in ("retuned", "augmented", "noise")}
+    return {"column": each.name, "kind": each.kind, "at": each.at, "unit": each.unit, **figures}

@@ -66,6 +66,10 @@ def _fit_table(diagnosis: Diagnosis) -> Table:
         ("noise floor", fit.noise_floor, float("nan")),
     ):
         table.add_row(name, shown(value), shown_ratio(value, fit.noise_floor), shown(unseen))
+    for each in fit.outputs:
+        for name, value in (("re-tuned", each.retuned), ("augmented", each.augmented)):
+            what = escape(f"{each.name}, {name} [{each.unit}]")
+            table.add_row(what, shown(value), shown_ratio(value, each.noise), "")
     return table
 
 

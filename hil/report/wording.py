@@ -62,7 +62,15 @@ def quantity(output_unit: str) -> str:
     return _QUANTITIES.get(output_unit, "output")
 
 
-_DIMENSIONS = MappingProxyType({OutputKind.SPEED: "speed", OutputKind.POSITION: "angle", OutputKind.FORCE: "torque"})
+_DIMENSIONS = MappingProxyType(
+    {
+        OutputKind.SPEED: "speed",
+        OutputKind.POSITION: "angle",
+        OutputKind.FORCE: "torque",
+        OutputKind.TORQUE: "torque",
+        OutputKind.ACCELERATION: "acceleration",
+    }
+)
 
 
 def output_unit(kind: OutputKind, motion: Motion) -> str:

@@ -13,10 +13,10 @@ from estimator.diagnosis.assemble import augmented_model, load_torques, retuned_
 from estimator.diagnosis.chain import mechanical, read_through
 from estimator.diagnosis.hypotheses import Progress, open_hypotheses
 from estimator.diagnosis.inference.data_sheet import free_line
-from estimator.diagnosis.inference.disturbances import Size
+from estimator.diagnosis.inference.disturbances import reading_noise
 from estimator.diagnosis.inference.figures import FreeRuns, courses_of, effects_of, figures_of, free_runs
 from estimator.diagnosis.inference.free_run import Unseen
-from estimator.diagnosis.inference.likelihood import SAME, Hypothesis, fitted
+from estimator.diagnosis.inference.likelihood import SAME, Hypothesis, fitted, of_first_outputs
 from estimator.diagnosis.inference.posterior import free_rms
 from estimator.diagnosis.inference.read_again import searched
 from estimator.diagnosis.inference.search import Search
@@ -141,8 +141,9 @@ def _looked_at(search: Search, decision: Decision, is_over: Callable[[], bool]) 
     hunts: list[Hunt] = []
     law: Law | None = None
     if decision.failed or decision.named:
-        hunts = hunts_around(decision.nothing, LOOKING_ROUNDS if decision.named else LOCATING_ROUNDS)
-        law = best_law(decision.nothing, hunts)
+        nothing = of_first_outputs(decision.nothing)
+        hunts = hunts_around(nothing, LOOKING_ROUNDS if decision.named else LOCATING_ROUNDS)
+        law = best_law(nothing, hunts)
         decision = weighed_against(decision, law)
     line = free_line(search) if decision.failed or decision.named else None
     if line is not None:
@@ -152,7 +153,8 @@ def _looked_at(search: Search, decision: Decision, is_over: Callable[[], bool]) 
         return _Seen(replace(decision, named=()), decision.nothing, hunts, law, strays)
     believed = _with_names_alone(search, decision)
     is_left = bool(decision.failed) and not is_over()
-    left = best_law(believed, hunts_around(believed, LOOKING_ROUNDS)) if is_left else None
+    first = of_first_outputs(believed)
+    left = best_law(first, hunts_around(first, LOOKING_ROUNDS)) if is_left else None
     return _Seen(decision, believed, hunts, left)
 
 
@@ -192,25 +194,25 @@ def _stopped(search: Search, budget_s: float) -> str:
 
 def noise_of(hypothesis: Hypothesis) -> float:
     """Return the reading's noise, white and coloured [unit of the output]."""
-    return float(np.hypot(*np.exp(hypothesis.sizes[[Size.WHITE, Size.COLOURED]])))
+    return float(reading_noise(hypothesis.sizes)[0])
 
 
 def _errors(hypothesis: Hypothesis) -> list[FloatArray]:
     """Return the free-run error per recording, 0 where a sample is missing."""
-    plain = hypothesis.plain
+    plain = hypothesis.plain.first_outputs()
     return [np.where(r.okay, r.output - out, 0.0) for r, out in zip(plain.problem.records, plain.outputs, strict=True)]
 
 
 def _band_hz(hypothesis: Hypothesis, noise: float) -> Interval | None:
-    periods = [record.sample_time_s for record in hypothesis.plain.problem.records]
-    return locate.band_hz(_errors(hypothesis), periods, noise)
+    errors = _errors(hypothesis)
+    return locate.band_hz(errors, [hypothesis.plain.problem.records[0].sample_time_s] * len(errors), noise)
 
 
 def _mismatch(seen: _Seen, effects: Sequence[FoundEffect]) -> Mismatch:
     decision = seen.decision
     if decision.verdict is Verdict.NO_MISMATCH:
         return Mismatch(False, None, {}, None, None, 1.0)
-    nothing, noise = decision.nothing.plain, noise_of(decision.best)
+    nothing, noise = decision.nothing.plain.first_outputs(), noise_of(decision.best)
     element: Element | None = None if seen.law is None else seen.law.element
     if effects or seen.strays:
         element = (effects or seen.strays)[0].element
@@ -227,10 +229,10 @@ def _mismatch(seen: _Seen, effects: Sequence[FoundEffect]) -> Mismatch:
 
 def _discrepancy(seen: _Seen, line: DrivelineModel) -> Discrepancy:
     """Return the mismatch as the report draws it."""
-    nothing = seen.decision.nothing
     noise = noise_of(seen.decision.best)
+    nothing, believed = of_first_outputs(seen.decision.nothing), seen.believed.plain.first_outputs()
     return discrepancy(
-        nothing.plain, seen.believed.plain, noise, line.motion, rounds=1, begun=seen.hunts, whitening=nothing.filter
+        nothing.plain, believed, noise, line.motion, rounds=1, begun=seen.hunts, whitening=nothing.filter
     )
 
 

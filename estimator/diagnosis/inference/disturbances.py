@@ -6,11 +6,15 @@ The free-run error of a hypothesis is the output of the line under these disturb
 
 Torque noise is white, its drift and the coloured reading noise are of first order, the load's walk is a random one. A
 Kalman filter of this model whitens the error; the model's sizes and times are estimated with each hypothesis.
+
+Each measured output has disturbances of its own, and the log-likelihoods of all outputs are added up. What they have in
+common, a load that walks, then counts once for each: a composite likelihood (Varin, Reid and Firth, Statistica Sinica
+21, 2011), whose differences are divided by the number of outputs before anything is believed.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
 
@@ -18,10 +22,12 @@ import numpy as np
 from scipy.linalg import expm
 
 from estimator.diagnosis.line.whitening import fill_gains, innovate
+from estimator.diagnosis.noise import noise_floor
 from estimator.physics.fit import FitResult
 from estimator.physics.layout import slot
 from estimator.physics.model import Structure
 from estimator.physics.motion import torque_scale
+from estimator.signals.outputs import by_output
 from estimator.signals.record import BoolArray, FloatArray, Location, OutputKind, Record
 
 
@@ -53,7 +59,7 @@ PRIOR_SPREAD = 1.5
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Usual values of a noise model and the bounds they are estimated in, all logarithms; shapes (7,)."""
+    """Usual values of noise models and the bounds they are estimated in, all logarithms; shapes (7 C,) of C outputs."""
 
     usual: FloatArray
     low: FloatArray
@@ -62,8 +68,30 @@ class Limits:
     def freed(self) -> Limits:
         """Return limits for a load that may walk as far as it likes: a road's grade."""
         high = self.high.copy()
-        high[Size.WALK] += np.log(100.0)
+        high[Size.WALK :: len(Size)] += np.log(100.0)
         return replace(self, high=high)
+
+    def of(self, output: int) -> Limits:
+        """Return those of one output."""
+        return Limits(*(sizes_of(each, output) for each in (self.usual, self.low, self.high)))
+
+
+def sizes_of(sizes: FloatArray, output: int) -> FloatArray:
+    """Return the part of a vector of noise models that is one output's, shape (7,)."""
+    return sizes[output * len(Size) : (output + 1) * len(Size)]
+
+
+def reading_noise(sizes: FloatArray) -> FloatArray:
+    """Return the noise of each output's reading, white and coloured, shape (C,)."""
+    each = np.exp(sizes.reshape(-1, len(Size)))
+    noise: FloatArray = np.hypot(each[:, Size.WHITE], each[:, Size.COLOURED])
+    return noise
+
+
+def limits_of(records: Sequence[Record]) -> Limits:
+    """Return usual values and bounds of the disturbances of every output of some recordings."""
+    each = [limits_for(records[part], noise_floor(records[part])) for part in by_output(records)]
+    return Limits(*(np.concatenate([getattr(one, name) for one in each]) for name in ("usual", "low", "high")))
 
 
 def limits_for(records: Sequence[Record], white: float) -> Limits:
@@ -105,10 +133,12 @@ class Line:
     direct: float = 0.0
 
 
-def line_of(result: FitResult) -> Line:
-    """Return the linear line with a fit's values; effects beyond it do not change how disturbances spread."""
-    problem = result.problem
-    record, structure = problem.records[0], problem.grid.structure
+def line_of(result: FitResult, record: Record | None = None) -> Line:
+    """Return the linear line with a fit's values, as a recording's output shows it; by default the first one's.
+
+    Effects beyond it do not change how disturbances spread.
+    """
+    record, structure = record or result.problem.records[0], result.problem.grid.structure
     if structure is Structure.JOINT:
         nothing = np.zeros(0)
         return Line(np.zeros((0, 0)), nothing, nothing, nothing, 1.0)
@@ -116,14 +146,25 @@ def line_of(result: FitResult) -> Line:
     a, at_motor, at_load = _continuous(values)
     n = a.shape[0]
     speed = n - 2 if record.location is Location.LOAD else 0  # the angle stands last
-    h = np.zeros(n)
-    h[n - 1 if record.kind is OutputKind.POSITION else speed] = 1.0
     a[n - 1, speed] = 1.0
+    h = _seen(record.kind, a, speed, values) / record.unit
     joined = np.zeros((n + 2, n + 2))
     joined[:n, :n], joined[:n, n], joined[:n, n + 1] = a, at_motor, at_load
     moved = expm(joined * record.sample_time_s)
     keep = list(range(n if record.kind is OutputKind.POSITION else n - 1))
     return Line(moved[np.ix_(keep, keep)], moved[keep, n], moved[keep, n + 1], h[keep])
+
+
+def _seen(kind: OutputKind, a: FloatArray, speed: int, values: Mapping[str, float]) -> FloatArray:
+    """Return how the state of a chain shows in an output; what a torque adds to an acceleration at once is left out."""
+    h = np.zeros(a.shape[0])
+    if kind is OutputKind.TORQUE:
+        h[:3] = values["c"], values["k"], -values["c"]
+    elif kind is OutputKind.ACCELERATION:
+        h[:] = a[speed]
+    else:
+        h[-1 if kind is OutputKind.POSITION else speed] = 1.0
+    return h
 
 
 def _continuous(values: dict[str, float]) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -147,17 +188,17 @@ def _continuous(values: dict[str, float]) -> tuple[FloatArray, FloatArray, Float
 
 @dataclass(frozen=True, slots=True)
 class Whitener:
-    """A Kalman filter for recordings: a linear map of their errors to innovations of variance 1.
+    """Kalman filters for recordings: a linear map of their errors to innovations of variance 1.
 
     Attributes
     ----------
-    f, h : ndarray, shapes (m, m) and (m,)
+    f, h : tuple of ndarray, shapes (m, m) and (m,)
     gains, spread : tuple of ndarray, shapes (N_i, m) and (N_i,)
     use : tuple of ndarray of bool, shape (N_i,)
     """
 
-    f: FloatArray
-    h: FloatArray
+    f: tuple[FloatArray, ...]
+    h: tuple[FloatArray, ...]
     gains: tuple[FloatArray, ...]
     spread: tuple[FloatArray, ...]
     use: tuple[BoolArray, ...]
@@ -176,8 +217,34 @@ class Whitener:
         use = self.use[index]
         whole = np.zeros((use.size, columns.shape[1]))
         whole[use] = columns
-        innovate(self.f, self.h, self.gains[index], self.spread[index], whole)
+        innovate(self.f[index], self.h[index], self.gains[index], self.spread[index], whole)
         return whole[use]
+
+    def minus_twice_log(self, innovations: FloatArray) -> float:
+        """Return minus twice the log-likelihood of stacked innovations, but for a constant."""
+        logs = sum(float(np.log(spread[use]).sum()) for spread, use in zip(self.spread, self.use, strict=True))
+        return 2.0 * logs + float(innovations @ innovations)
+
+
+def joined(filters: Sequence[Whitener]) -> Whitener:
+    """Return the filters of several outputs as one."""
+    names = ("f", "h", "gains", "spread", "use")
+    return Whitener(*(tuple(each for one in filters for each in getattr(one, name)) for name in names))
+
+
+def whitener_of(result: FitResult, sizes: FloatArray) -> Whitener:
+    """Return the filters of a fit's errors, a noise model for each output; ``sizes`` of shape (7 C,)."""
+    problem = result.problem
+    return joined(
+        [
+            whitener(_line_of(result, part), sizes_of(sizes, i), problem.records[0].sample_time_s, problem.use[part])
+            for i, part in enumerate(by_output(problem.records))
+        ]
+    )
+
+
+def _line_of(result: FitResult, part: slice) -> Line:
+    return line_of(result, result.problem.records[part.start])
 
 
 def whitener(line: Line, sizes: FloatArray, period_s: float, use: Sequence[BoolArray]) -> Whitener:
@@ -201,7 +268,8 @@ def whitener(line: Line, sizes: FloatArray, period_s: float, use: Sequence[BoolA
             fill_gains(f, h, q, white**2, prior, np.asarray(mask), gains, spread)
             seen[mask.tobytes()] = gains, spread
     each = [seen[mask.tobytes()] for mask in use]
-    return Whitener(f, h, tuple(gains for gains, _ in each), tuple(spread for _, spread in each), tuple(use))
+    count = len(use)
+    return Whitener((f,) * count, (h,) * count, tuple(g for g, _ in each), tuple(s for _, s in each), tuple(use))
 
 
 STEP = 1e-4
@@ -224,6 +292,26 @@ def starts(sizes: FloatArray, limits: Limits) -> list[FloatArray]:
         other[large], other[small] = limits.high[large] - np.log(2.0), sizes[small] - np.log(10.0)
         found.append(np.clip(other, limits.low, limits.high))
     return found
+
+
+def estimated(
+    result: FitResult, error: FloatArray, sizes: FloatArray, limits: Limits, rounds: int, is_anew: bool = False
+) -> tuple[FloatArray, float]:
+    """Return the most probable noise model of each output's error, (7 C,), and minus twice the log-posterior of all.
+
+    ``is_anew`` where each is begun from elsewhere, too (``starts``).
+    """
+    problem, found, whole, first = result.problem, [], 0.0, 0
+    for i, part in enumerate(by_output(problem.records)):
+        use, mine, bounds = problem.use[part], sizes_of(sizes, i), limits.of(i)
+        rows = slice(first, first + sum(int(each.sum()) for each in use))
+        line, period_s, first = _line_of(result, part), problem.records[0].sample_time_s, rows.stop
+        begun = starts(mine, bounds) if is_anew else [mine]
+        tried = [estimate(line, error[rows], each, bounds, period_s, use, rounds) for each in begun]
+        best, value = min(tried, key=lambda each: each[1])
+        found.append(best)
+        whole += value
+    return np.concatenate(found), whole
 
 
 def estimate(

@@ -6,22 +6,32 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+import numpy as np
+
 from estimator.diagnosis.assemble import acquired_effects, rms_of
 from estimator.diagnosis.chain import Chain
 from estimator.diagnosis.holdout import foreign_outputs
 from estimator.diagnosis.hypotheses import NOTHING, everything
+from estimator.diagnosis.inference.disturbances import reading_noise
 from estimator.diagnosis.inference.effects import found_effects
 from estimator.diagnosis.inference.free_run import Unseen, on_recordings
 from estimator.diagnosis.inference.likelihood import Hypothesis, covariance
 from estimator.diagnosis.inference.verdict import Decision
 from estimator.diagnosis.intervals import reported_covariance
-from estimator.diagnosis.result import Fit, FoundEffect, Trace
+from estimator.diagnosis.result import Fit, FoundEffect, OutputFit, Trace
 from estimator.physics.fit import FitResult, fit
 from estimator.physics.model import unit
 from estimator.physics.problem import make_problem
+from estimator.signals.outputs import by_output
 from estimator.signals.record import FloatArray, OutputKind, Record
 
-DIMENSIONS = {OutputKind.SPEED: "speed", OutputKind.POSITION: "angle", OutputKind.FORCE: "torque"}
+DIMENSIONS = {
+    OutputKind.SPEED: "speed",
+    OutputKind.POSITION: "angle",
+    OutputKind.FORCE: "torque",
+    OutputKind.TORQUE: "torque",
+    OutputKind.ACCELERATION: "acceleration",
+}
 
 
 @dataclass(frozen=True)
@@ -32,8 +42,8 @@ class FreeRuns:
     ----------
     is_whole : bool
         Whether what is believed leaves nothing but its disturbances.
-    retuned, final : FitResult
-        The nominal model, re-tuned; with the effects that are believed.
+    before, after : FitResult
+        The nominal model, re-tuned; with the effects that are believed: every measured output.
     held_before, held_after : float
         RMS of their errors on samples that no fit has seen [unit of the output].
     """
@@ -42,20 +52,30 @@ class FreeRuns:
     unseen: Unseen
     believed: Hypothesis
     is_whole: bool
-    retuned: FitResult
-    final: FitResult
+    before: FitResult
+    after: FitResult
     held_before: float
     held_after: float
 
     @cached_property
+    def retuned(self) -> FitResult:
+        """The nominal model, re-tuned: the recordings' first outputs."""
+        return self.before.first_outputs()
+
+    @cached_property
+    def final(self) -> FitResult:
+        """What is believed: the recordings' first outputs."""
+        return self.after.first_outputs()
+
+    @cached_property
     def estimate(self) -> FitResult:
         """The fit that values and intervals are taken from: of independent innovations, or of the free run."""
-        return self.believed.white if self.is_whole else self.final
+        return self.believed.white if self.is_whole else self.after
 
     @cached_property
     def covariance(self) -> FloatArray:
         """Covariance of its scaled unknowns, shape (U, U); where more than noise is left, of correlated errors."""
-        return covariance(self.believed) if self.is_whole else reported_covariance(self.final)
+        return covariance(self.believed) if self.is_whole else reported_covariance(self.after)
 
 
 def free_runs(nothing: Hypothesis, believed: Hypothesis, is_whole: bool, chain: Chain, unseen: Unseen) -> FreeRuns:
@@ -63,13 +83,13 @@ def free_runs(nothing: Hypothesis, believed: Hypothesis, is_whole: bool, chain: 
 
     The re-tuned model leaves the least that it can: an error that it need not have is no mismatch.
     """
-    retuned = on_recordings(nothing, unseen.line, chain.records, is_whole=False)
-    held_before = unseen.rms(nothing, retuned, is_whole=False)
+    before = on_recordings(nothing, unseen.line, chain.apart, is_whole=False)
+    held_before = unseen.rms(nothing, before, is_whole=False)
     if believed is nothing:
-        return FreeRuns(chain, unseen, believed, is_whole, retuned, retuned, held_before, held_before)
-    final = on_recordings(believed, unseen.line, chain.records, is_whole)
-    held_after = unseen.rms(believed, final, is_whole)
-    return FreeRuns(chain, unseen, believed, is_whole, retuned, final, held_before, held_after)
+        return FreeRuns(chain, unseen, believed, is_whole, before, before, held_before, held_before)
+    after = on_recordings(believed, unseen.line, chain.apart, is_whole)
+    held_after = unseen.rms(believed, after, is_whole)
+    return FreeRuns(chain, unseen, believed, is_whole, before, after, held_before, held_after)
 
 
 def figures_of(runs: FreeRuns, noise: float) -> Fit:
@@ -84,7 +104,27 @@ def figures_of(runs: FreeRuns, noise: float) -> Fit:
         holdout_retuned=runs.held_before,
         holdout_augmented=runs.held_after,
         noise_floor=noise,
+        outputs=_further(runs),
     )
+
+
+def _further(runs: FreeRuns) -> tuple[OutputFit, ...]:
+    """Return the errors of the outputs beyond the first one, each in its own unit."""
+    problem, found = runs.after.problem, []
+    for part, noise in list(zip(by_output(problem.records), reading_noise(runs.believed.sizes), strict=True))[1:]:
+        record = problem.records[part.start]
+        before, after = (_rms(fit, part) * record.unit for fit in (runs.before, runs.after))
+        kind, at = record.kind.value, record.location.value
+        si = unit(DIMENSIONS[record.kind], runs.unseen.line.motion)
+        found.append(OutputFit(record.label, kind, at, si, before, after, float(noise) * record.unit))
+    return tuple(found)
+
+
+def _rms(fit: FitResult, part: slice) -> float:
+    problem = fit.problem
+    rows = zip(fit.outputs[part], problem.records[part], problem.use[part], strict=True)
+    errors = np.concatenate([(output - record.output)[use] for output, record, use in rows])
+    return float(np.sqrt(np.mean(errors**2)))
 
 
 def effects_of(runs: FreeRuns, decision: Decision) -> tuple[FoundEffect, ...]:

@@ -57,14 +57,14 @@ def on_recordings(
 def _with_own(problem: Problem, x: FloatArray) -> FitResult:
     """Estimate initial states, load torques and courses; phases and moments stay where they are."""
     count = len(problem.shared)
-    held = tuple(_held(basis, x_i) for basis, x_i in zip(problem.local, _parts(problem, x), strict=True))
-    alone = replace(problem, p=parameters(problem, x), shared=(), local=held)
+    held = tuple(_held(basis, x_i) for basis, x_i in zip(problem.bases, _parts(problem, x), strict=True))
+    alone = replace(problem, p=parameters(problem, x), shared=(), local=tuple(held[lead] for lead in problem.leads))
     own = fit(alone, x[count:], ITERATIONS)
     return FitResult(problem, np.concatenate([x[:count], own.x]), own.outputs, own.residual, None, own.converged)
 
 
 def _parts(problem: Problem, x: FloatArray) -> list[FloatArray]:
-    ends = np.cumsum([basis.guess.size for basis in problem.local])[:-1]
+    ends = np.cumsum([basis.guess.size for basis in problem.bases])[:-1]
     return list(np.split(x[len(problem.shared) :], ends))
 
 
@@ -102,5 +102,6 @@ class Unseen:
             problem = replace(hypothesis.plain.problem, use=tuple(between))
             plain = refitted(hypothesis, problem) if is_whole else hypothesis.plain
             outputs = on_recordings(replace(hypothesis, plain=plain), self.line, records, is_whole, between).outputs
-        errors = [(o - r.output)[r.okay & blocks(r)] for o, r in zip(outputs, records, strict=True)]
+        pairs = [(out, record) for out, record in zip(outputs, records, strict=True) if record.of is None]
+        errors = [(out - record.output)[record.okay & blocks(record)] for out, record in pairs]
         return float(np.sqrt(np.mean(np.concatenate(errors) ** 2)))

@@ -17,12 +17,22 @@ import numpy as np
 
 from estimator.diagnosis.hypotheses import Effects
 from estimator.diagnosis.inference.descent import Effort, descended, extended, light
-from estimator.diagnosis.inference.disturbances import Limits, Size, Whitener, estimate, line_of, starts, whitener
+from estimator.diagnosis.inference.disturbances import (
+    Limits,
+    Size,
+    Whitener,
+    estimated,
+    minus_twice_log_prior,
+    reading_noise,
+    sizes_of,
+    whitener_of,
+)
 from estimator.diagnosis.inference.moments import moved
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import MOMENT_NAMES, FitResult, not_fitted
 from estimator.physics.jacobian import jacobian_at
 from estimator.physics.problem import Problem, bounds
+from estimator.signals.outputs import by_output
 from estimator.signals.record import FloatArray
 
 SAME = 1.0
@@ -76,6 +86,11 @@ class Hypothesis:
     choices: float
 
     @property
+    def outputs(self) -> int:
+        """How many measured outputs the recordings have: each may have seen the same."""
+        return self.sizes.size // len(Size)
+
+    @property
     def unknowns(self) -> int:
         """How many unknowns were fitted; moments of events only where these act."""
         low, high = bounds(self.plain.problem)
@@ -95,14 +110,14 @@ class Hypothesis:
         A load that may walk far leaves the noise of the reading: the rest is what it did.
         """
         if "road_grade" in self.effects:
-            return self.plain.residual.size * float(np.sum(np.exp(2.0 * self.sizes[[Size.WHITE, Size.COLOURED]])))
+            return float(np.sum(samples_of(self.plain) * reading_noise(self.sizes) ** 2))
         rms = self.plain.rms
         return descended(self.plain, lambda errors: errors / rms, FREE).squares
 
     @cached_property
     def filter(self) -> Whitener:
         """The filter that whitens errors under the hypothesis' own disturbances."""
-        return _whitener(self.plain, self.sizes)
+        return whitener_of(self.plain, self.sizes)
 
     @cached_property
     def white(self) -> FitResult:
@@ -136,11 +151,10 @@ def fitted(
     best: Hypothesis | None = None
     passes: list[float] = []
     while best is None or len(passes) < MOST_PASSES:
-        plain = descended(plain, _whitener(plain, sizes), THOROUGH)
+        plain = descended(plain, whitener_of(plain, sizes), THOROUGH)
         if len(passes) < WITH_MOMENTS:
             plain = _with_moments(plain, sizes)
-        tried = [sizes] if passes else starts(sizes, limits)
-        sizes, now = min((_disturbances(plain, each, limits) for each in tried), key=lambda found: found[1])
+        sizes, now = _disturbances(plain, sizes, limits, is_anew=not passes)
         enough = SAME if math.isnan(rival) else max(SAME, DIGITS * abs(now - rival))
         last = best is not None and now > best.minus_twice_log - enough
         if best is None or now < best.minus_twice_log:
@@ -160,7 +174,7 @@ def compared(effects: Effects, begun: FitResult, parent: Hypothesis, limits: Lim
     sizes, best = np.clip(parent.sizes, limits.low, limits.high), parent.minus_twice_log
     plain, now = begun, math.inf
     for _ in range(MOST_ROUGH):
-        plain = descended(plain, _whitener(plain, sizes), ROUGH)
+        plain = descended(plain, whitener_of(plain, sizes), ROUGH)
         sizes, now = _disturbances(plain, sizes, limits)
         if now > best - MUCH * plain.residual.size:
             break
@@ -171,17 +185,30 @@ def compared(effects: Effects, begun: FitResult, parent: Hypothesis, limits: Lim
 def refitted(hypothesis: Hypothesis, problem: Problem) -> FitResult:
     """Return the fit of a hypothesis to other samples of the same recordings, its disturbances as they are."""
     begun = not_fitted(problem, hypothesis.plain.x)
-    return descended(begun, _whitener(begun, hypothesis.sizes), THOROUGH)
+    return descended(begun, whitener_of(begun, hypothesis.sizes), THOROUGH)
 
 
-def _disturbances(plain: FitResult, sizes: FloatArray, limits: Limits) -> tuple[FloatArray, float]:
-    problem, period_s = plain.problem, plain.problem.records[0].sample_time_s
-    return estimate(line_of(plain), plain.residual, sizes, limits, period_s, problem.use, ROUNDS)
+def _disturbances(
+    plain: FitResult, sizes: FloatArray, limits: Limits, is_anew: bool = False
+) -> tuple[FloatArray, float]:
+    return estimated(plain, plain.residual, sizes, limits, ROUNDS, is_anew)
 
 
-def _whitener(plain: FitResult, sizes: FloatArray) -> Whitener:
-    problem = plain.problem
-    return whitener(line_of(plain), sizes, problem.records[0].sample_time_s, problem.use)
+def samples_of(plain: FitResult) -> FloatArray:
+    """Return how many samples count of each output, shape (C,)."""
+    use = plain.problem.use
+    return np.array([sum(int(each.sum()) for each in use[part]) for part in by_output(plain.problem.records)])
+
+
+def of_first_outputs(hypothesis: Hypothesis) -> Hypothesis:
+    """Return what a hypothesis says of the recordings' first outputs alone."""
+    plain = hypothesis.plain.first_outputs()
+    if plain is hypothesis.plain:
+        return hypothesis
+    sizes, limits = sizes_of(hypothesis.sizes, 0), hypothesis.limits.of(0)
+    filtered = whitener_of(plain, sizes)
+    now = filtered.minus_twice_log(filtered(plain.residual)) + minus_twice_log_prior(sizes, limits)
+    return Hypothesis(hypothesis.effects, plain, sizes, limits, now, hypothesis.choices)
 
 
 def _with_moments(plain: FitResult, sizes: FloatArray) -> FitResult:
@@ -189,21 +216,21 @@ def _with_moments(plain: FitResult, sizes: FloatArray) -> FitResult:
     if not _has_moments(plain.problem):
         return plain
     for _ in range(2):
-        found = moved(plain, _whitener(plain, sizes))
+        found = moved(plain, whitener_of(plain, sizes))
         if found is None:
             break
-        plain = descended(extended(*found, plain), _whitener(plain, sizes), THOROUGH)
+        plain = descended(extended(*found, plain), whitener_of(plain, sizes), THOROUGH)
     return plain
 
 
 def _has_moments(problem: Problem) -> bool:
-    return any(u.name in MOMENT_NAMES and u.low < u.high for basis in problem.local for u in basis.own)
+    return any(u.name in MOMENT_NAMES and u.low < u.high for basis in problem.bases for u in basis.own)
 
 
 def _idle_moments(plain: FitResult) -> int:
     """Return how many moments are of events that do not take place in their recording."""
     count = 0
-    for i, basis in enumerate(plain.problem.local):
+    for i, basis in enumerate(plain.problem.bases):
         values = plain.local_of(i)[basis.own_rows]
         own = {(u.effect, u.name): (u, float(v)) for u, v in zip(basis.own, values, strict=True)}
         for name in {u.effect for u in basis.own if EFFECTS[u.effect].event}:

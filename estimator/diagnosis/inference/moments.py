@@ -31,12 +31,12 @@ def moved(result: FitResult, filtered: Whitener) -> tuple[Problem, FloatArray] |
     """
     problem, x, better = result.problem, result.x.copy(), False
     bases = list(problem.local)
-    for i, basis in enumerate(problem.local):
+    for i, basis in enumerate(problem.bases):
         local = _moved_in(result, filtered, i)
         if local is not None:
             x[own_part(problem, i)], better = local, True
             bases[i] = _around(basis, local, problem.records[i])
-    return (replace(problem, local=tuple(bases)), x) if better else None
+    return (replace(problem, local=tuple(bases[lead] for lead in problem.leads)), x) if better else None
 
 
 def _around(basis: LocalBasis, local: FloatArray, record: Record) -> LocalBasis:

@@ -154,7 +154,7 @@ def _alike(name: str, best: Hypothesis, visited: Mapping[Effects, Hypothesis], w
         if len(effects - others) == 1 and others <= effects
     }
     near = {name, *(other for other, each in exchanged.items() if each.score - best.score < within)}
-    equivalent = {twin for other in near for twin in EFFECTS[other].equivalent}
+    equivalent = {twin for other in near for twin in EFFECTS[other].equivalent if best.outputs == 1}
     return tuple(sorted((near | equivalent) - best.effects))
 
 

@@ -14,8 +14,10 @@ from estimator.diagnosis.hypotheses import everything, open_hypotheses
 from estimator.diagnosis.inference.free_run import on_recordings
 from estimator.diagnosis.inference.search import Search, never
 from estimator.diagnosis.inference.verdict import Grounds, grounds
+from estimator.diagnosis.noise import noise_floor
 from estimator.diagnosis.preconditions.thinned import as_slow_as_needed
 from estimator.physics.model import DrivelineModel
+from estimator.signals.outputs import outputs_apart
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,11 +34,12 @@ def searched(chain: Chain, line: DrivelineModel, is_over: Callable[[], bool] = n
     found = _found(chain, line, is_over)
     if is_over():
         return found
-    steady = chain.with_jitter_in(on_recordings(found.grounds.best, line, chain.records, is_whole=True))
+    free = on_recordings(found.grounds.best, line, chain.apart, is_whole=True)
+    steady = chain.with_jitter_in(free.first_outputs())
     return found if steady is chain else _found(steady, line, is_over)
 
 
 def _found(chain: Chain, line: DrivelineModel, is_over: Callable[[], bool]) -> Found:
-    fitted_to = as_slow_as_needed(chain.records, line)
+    fitted_to = outputs_apart(as_slow_as_needed(chain.records, line), noise_floor)
     search = Search(line, fitted_to, everything(fitted_to), open_hypotheses(line, chain.records)[0], is_over=is_over)
     return Found(chain, search, grounds(search))

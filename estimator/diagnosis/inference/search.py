@@ -10,12 +10,11 @@ import numpy as np
 
 from estimator.diagnosis.hypotheses import NOTHING, Effects, open_hypotheses, with_effect
 from estimator.diagnosis.inference.descent import extended
-from estimator.diagnosis.inference.disturbances import Limits, limits_for
+from estimator.diagnosis.inference.disturbances import Limits, limits_of
 from estimator.diagnosis.inference.likelihood import Hypothesis, compared, fitted
 from estimator.diagnosis.inference.looks import Answers, Look, screen
 from estimator.diagnosis.inference.plausible import GRADE, is_plausible, loosened, may_be_loose
 from estimator.diagnosis.inherit import forgetting, inheriting, kept, line_values, placed
-from estimator.diagnosis.noise import noise_floor
 from estimator.diagnosis.screening import promising
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult, not_fitted
@@ -91,7 +90,7 @@ class Search:
     def limits(self) -> Limits:
         """Usual disturbances of these recordings and their bounds."""
         if self._limits is None:
-            self._limits = limits_for(self.records, noise_floor(self.records))
+            self._limits = limits_of(self.records)
         return self._limits
 
     def run(self) -> Hypothesis:
@@ -201,7 +200,8 @@ class Search:
         loose = [name for name in order if EFFECTS[name].loosens]
         some = 0 if rival else FEWEST_FITS
         worth = [name for i, name in enumerate(order) if looks[name][0].promise >= least or i < some]
-        twins = {twin for name in worth for twin in EFFECTS[name].equivalent if precedes(name, twin)}
+        equals = {name: EFFECTS[name].equivalent if current.outputs == 1 else () for name in worth}
+        twins = {twin for name in worth for twin in equals[name] if precedes(name, twin)}
         worth = [name for name in worth if name not in twins][:MOST_FITS]
         return {
             name: promising(looks[name])

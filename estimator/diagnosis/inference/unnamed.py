@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimator.diagnosis.inference.calibration import LEAST_PROBABILITY, LEAST_SHARE
-from estimator.diagnosis.inference.disturbances import Size, estimate, line_of
-from estimator.diagnosis.inference.likelihood import ROUNDS, Hypothesis
+from estimator.diagnosis.inference.calibration import LEAST_PROBABILITY, LEAST_SHARE, TEMPERED
+from estimator.diagnosis.inference.disturbances import estimated, reading_noise
+from estimator.diagnosis.inference.likelihood import ROUNDS, Hypothesis, of_first_outputs
 from estimator.diagnosis.inference.posterior import Belief, free_rms
 from estimator.diagnosis.inference.verdict import Decision, tempered_by
 from estimator.diagnosis.result import Verdict
@@ -50,7 +50,7 @@ class Law:
 
 def hunts_around(hypothesis: Hypothesis, rounds: int) -> list[Hunt]:
     """Look for the best law at every element beside a hypothesis."""
-    noise = float(np.hypot(*np.exp(hypothesis.sizes[[Size.WHITE, Size.COLOURED]])))
+    noise = float(reading_noise(hypothesis.sizes)[0])
     return hunts_of(scene(hypothesis.plain, noise, hypothesis.filter), rounds)
 
 
@@ -87,8 +87,7 @@ def _minus_twice_log(hypothesis: Hypothesis, hunt: Hunt) -> float:
             for out, record, use in zip(result.outputs, result.problem.records, result.problem.use, strict=True)
         ]
     )
-    period_s, use = result.problem.records[0].sample_time_s, result.problem.use
-    return estimate(line_of(result), error, hypothesis.sizes, hypothesis.limits, period_s, use, ROUNDS)[1]
+    return estimated(result, error, hypothesis.sizes, hypothesis.limits, ROUNDS)[1]
 
 
 def _rms(hunt: Hunt) -> float:
@@ -116,13 +115,16 @@ def weighed_against(decision: Decision, law: Law | None) -> Decision:
     ``law`` is the best beside no effect at all. In as far as it makes the recordings more probable than the best set of
     names, what these explain is there, and they are not. At its own place a law without a name is a name's law in
     another form, where the names gain most of what it gains. One that leaves the free-run error as it was is a trace,
-    and no other explanation of what the names explain.
+    and no other explanation of what the names explain. Laws without a name are sought in the first output alone, and
+    weighed by what it says.
     """
-    if law is None or 1.0 - (law.rms / free_rms(decision.nothing)) ** 2 < LEAST_SHARE:
+    best, nothing = of_first_outputs(decision.best), of_first_outputs(decision.nothing)
+    if law is None or 1.0 - (law.rms / free_rms(nothing)) ** 2 < LEAST_SHARE:
         return decision
-    gained, by_law = (decision.nothing.score - score for score in (decision.best.score, law.score))
-    same = gained >= MOST_OF_IT * by_law
-    return beside_rival(decision, law.score, lambda each: not (same and law.element in _elements(each)))
+    gained, by_law = (nothing.score - score for score in (best.score, law.score))
+    same, first = gained >= MOST_OF_IT * by_law, replace(decision, best=best, nothing=nothing)
+    weighed = beside_rival(first, law.score, lambda each: not (same and law.element in _elements(each)))
+    return replace(weighed, best=decision.best, nothing=decision.nothing)
 
 
 def beside_rival(decision: Decision, score: float, falls: Callable[[Belief], bool]) -> Decision:
@@ -144,7 +146,8 @@ def _share_of_names(decision: Decision, score: float) -> float:
     A law of size zero is no law, and values at their bounds are the nominal line: what a rival has of the probability
     is what it has beyond the nominal model, which has had its share of the posterior already.
     """
-    tempered = tempered_by(decision.failed, decision.best.plain.residual.size)
+    best = decision.best
+    tempered = tempered_by(decision.failed, best.plain.residual.size, TEMPERED * best.outputs)
     rival, nominal = (
         math.exp(min(0.5 * (decision.best.score - each) / tempered, 700.0)) for each in (score, decision.nothing.score)
     )

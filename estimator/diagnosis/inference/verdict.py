@@ -17,7 +17,7 @@ from estimator.diagnosis.inference.calibration import (
     LEAST_SHARE,
     TEMPERED,
 )
-from estimator.diagnosis.inference.disturbances import Size
+from estimator.diagnosis.inference.disturbances import reading_noise
 from estimator.diagnosis.inference.likelihood import Hypothesis
 from estimator.diagnosis.inference.plausible import GRADE
 from estimator.diagnosis.inference.posterior import Belief, beliefs, fall, free_rms, levels, shares, shares_with_grade
@@ -78,7 +78,7 @@ class Grounds:
     scores: tuple[tuple[Effects, float], ...]
 
 
-def tempered_by(tests: Sequence[Test], samples: int, factor: float = TEMPERED) -> float:
+def tempered_by(tests: Sequence[Test], samples: int, factor: float) -> float:
     """Return by which differences of scores are divided: more where a test finds information that no law has used.
 
     That is what it finds beyond what is left in worlds of which all is explained. Tests find the same information
@@ -95,7 +95,7 @@ def grounds(search: Search) -> Grounds:
     for name in best.effects:
         search.without(best, name)
     examined = tests(best)
-    tempered = tempered_by(examined, best.plain.residual.size)
+    tempered = tempered_by(examined, best.plain.residual.size, TEMPERED * best.outputs)
     graded = GRADE in best.effects
     share = shares_with_grade(best, search.visited, nothing) if graded else shares(search.path)
     found = beliefs(best, search.visited, search.plausible, share, tempered, ALIKE_WITHIN, ALIKE_SHARE)
@@ -110,7 +110,7 @@ def decide(search: Search, ground: Grounds, with_findings: bool = False) -> Deci
     failed = tuple(test for test in ground.tests if test.failed)
     established = [each for each in ground.beliefs if each.probability >= LEAST_PROBABILITY]
     named = tuple(each for each in established if each.share >= LEAST_SHARE)
-    noise = float(np.hypot(*np.exp(best.sizes[[Size.WHITE, Size.COLOURED]])))
+    noise = float(reading_noise(best.sizes)[0])
     rms = math.sqrt(levels(search.path)[-1] / best.plain.residual.size)
     left = min(max(rms**2 - noise**2, 0.0) / free_rms(nothing) ** 2, 1.0)
     return Decision(

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from estimator.diagnosis.acquisition import as_if_not_lost
 from estimator.diagnosis.joined import joined
+from estimator.diagnosis.preconditions.channels import with_usable_channels
 from estimator.diagnosis.preconditions.clipped import without_clipped
 from estimator.diagnosis.preconditions.exciting import require_excitation, require_signals
 from estimator.diagnosis.preconditions.model_values import model_warnings
@@ -21,6 +22,7 @@ from estimator.diagnosis.segments import Cut, cut
 from estimator.errors import NotExciting
 from estimator.physics.model import DrivelineModel
 from estimator.physics.simulate import output_state
+from estimator.signals.outputs import outputs_apart
 from estimator.signals.record import Record
 
 
@@ -43,7 +45,7 @@ def _as_moved(records: Sequence[Record]) -> tuple[list[Record], list[str]]:
     """Return recordings without what no sensor has read, and what there is to say of it."""
     warnings: list[str] = []
     mended = list(records)
-    for mend in (unwrapped, without_clipped, without_not_read):
+    for mend in (unwrapped, without_clipped, without_not_read, with_usable_channels):
         mended, said = mend(mended)
         warnings += said
     return mended, warnings
@@ -66,7 +68,8 @@ def prepare(records: Sequence[Record], model: DrivelineModel, holdout: Sequence[
     require_together([*records, *holdout] if records else records)
     mended, warnings = _as_moved([*records, *holdout])
     for record in mended:
-        output_state(record, model.structure)
+        for each in outputs_apart([record], lambda _: 1.0):
+            output_state(each, model.structure)
         require_signals(record)
     segments = cut(thinned(mended, model))
     require_room(segments.records)

@@ -27,6 +27,7 @@ from estimator.physics.kernel.feed import begun_feed, fed, is_late
 from estimator.physics.kernel.line import Line, is_bristled, is_within
 from estimator.physics.kernel.linear import WORTHWHILE_SAMPLES, Answers, answers, has_dry_friction, is_linear, led_on
 from estimator.physics.kernel.makes import for_its_make
+from estimator.physics.kernel.rates import read_out
 from estimator.physics.kernel.sensing import entry, reading, shown, smoothed
 from estimator.physics.kernel.state_vector import (
     BRISTLES_LOAD,
@@ -143,7 +144,7 @@ def integrate_made(
     to, read = answers(line, now, p, h, 0), False
     for k in range(first, n):
         turn = angle[k + 1] - angle[k] if k + 1 < angle.shape[0] else angle[k] - angle[k - 1]
-        value = entry(x, output)
+        value = read_out(line, now, x, output, p)
         out[k] = shown(reading(value, angle[k], p), filtered, p) if sensor else value
         leave_slope(k, slope, slopes)
         time_s = start_s + k * sample_time_s
@@ -161,7 +162,7 @@ def integrate_made(
             mean, rise, lagged, lag_rise = fed(torque, feed, k, j * length, length, lagged, lag_rise, p)
             before = x
             x, bristles = rubbed_on(line, summing, to, now, mean, rise, before, bristles, p, h)
-            slope = (entry(x, output) - entry(before, output)) / h
+            slope = (entry(x, output, p) - entry(before, output, p)) / h
             if filtering:
                 turned, turns = angle[k] + turn * j * length, angle[k] + turn * (j + 1) * length
                 filtered, filter_rise = smoothed(before, x, output, turned, turns, filtered, filter_rise, low, p, h)

@@ -15,7 +15,8 @@ from estimator.physics.effects import (
 from estimator.physics.kernel import slots
 from estimator.physics.kernel.conditions import line_share
 from estimator.physics.kernel.line import Line
-from estimator.physics.kernel.state_vector import Conditions, State
+from estimator.physics.kernel.sensing import entry
+from estimator.physics.kernel.state_vector import SHAFT_TORQUE, Conditions, State
 from estimator.physics.laws import beyond_gap, dry_friction
 from estimator.signals.record import FloatArray
 
@@ -66,6 +67,33 @@ def shaft_torques(line: Line, rate: float, now: Conditions, x: State, p: FloatAr
 
 
 @inlined
+def within(line: Line, p: FloatArray) -> tuple[bool, bool]:
+    """Tell whether an extra inertia is in the line before the shaft, and behind it."""
+    return line.extended and every(p[slots.BETWEEN] > 0.0), line.extended and every(p[slots.BEHIND] > 0.0)
+
+
+@inlined
+def driven(line: Line, x: State) -> float:
+    """Return the speed of what the first shaft drives [rad/s]."""
+    return x.middle_speed if line.masses == 3 else x.load_speed
+
+
+@inlined
+def twist_rate(line: Line, x: State, p: FloatArray) -> float:
+    """Return the rate of the first shaft's twist [rad/s]."""
+    between, behind = within(line, p)
+    return (x.branch_speed if between else x.speed) - (x.branch_speed if behind else driven(line, x))
+
+
+@inlined
+def read_out(line: Line, now: Conditions, x: State, output: int, p: FloatArray) -> float:
+    """Return an output: of the state, or the torque that the shaft passes on [Nm]."""
+    if line.masses > 1 and output == SHAFT_TORQUE:
+        return shaft_torques(line, twist_rate(line, x, p), now, x, p)[0]
+    return entry(x, output, p)
+
+
+@inlined
 def rates(line: Line, now: Conditions, x: State, p: FloatArray) -> State:
     """Return the time derivative of the mechanical state under the conditions ``now``."""
     drive = now.torque - motor_friction(x.speed, p, now.width_motor, now.dry_motor)
@@ -78,10 +106,9 @@ def rates(line: Line, now: Conditions, x: State, p: FloatArray) -> State:
         return State(
             x.speed, acceleration, still, still, still, still, own_rate, like(branch, x.speed), still, still, still
         )
-    between, behind = line.extended and every(p[slots.BETWEEN] > 0.0), line.extended and every(p[slots.BEHIND] > 0.0)
-    driven = x.middle_speed if line.masses == 3 else x.load_speed
-    own_rate = x.branch_speed - driven if behind else x.speed - x.branch_speed
-    rate = (x.branch_speed if between else x.speed) - (x.branch_speed if behind else driven)
+    between, behind = within(line, p)
+    own_rate = x.branch_speed - driven(line, x) if behind else x.speed - x.branch_speed
+    rate = twist_rate(line, x, p)
     shaft, reaction = shaft_torques(line, rate, now, x, p)
     pull, branch = shaft, like(0.0, x.speed)
     if line.extended:

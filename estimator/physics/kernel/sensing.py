@@ -9,18 +9,26 @@ from estimator.compiled import inlined
 from estimator.physics.effects import resolver_error, speed_filter
 from estimator.physics.kernel import slots
 from estimator.physics.kernel.line import is_within
-from estimator.physics.kernel.state_vector import LOAD_SPEED, SPEED, TWIST, State
+from estimator.physics.kernel.state_vector import LOAD_ANGLE, LOAD_SPEED, SPEED, TWIST, State
 from estimator.physics.low_pass import LowPass
 from estimator.signals.record import FloatArray
 
 
 @inlined
-def entry(x: State, output: int) -> float:
-    """Return the state that is an output: ANGLE, SPEED, TWIST or LOAD_SPEED."""
+def load_angle(x: State, p: FloatArray) -> float:
+    """Return the angle of the load [rad]."""
+    return x.angle - x.twist - x.middle_twist - (x.branch_twist if is_within(p) else 0.0)
+
+
+@inlined
+def entry(x: State, output: int, p: FloatArray) -> float:
+    """Return what is an output of the state alone: all but SHAFT_TORQUE, which is 0."""
     if output == SPEED:
         return x.speed
     if output == LOAD_SPEED:
         return x.load_speed
+    if output == LOAD_ANGLE:
+        return load_angle(x, p)
     return x.twist if output == TWIST else x.angle
 
 
@@ -29,7 +37,7 @@ def travelled(x: State, output: int, p: FloatArray) -> float:
     """Return the angle whose rate is the output [rad]: what a filter's input has been in the mean is its change."""
     if output == SPEED:
         return x.angle
-    return x.angle - x.twist - x.middle_twist - (x.branch_twist if is_within(p) else 0.0)
+    return load_angle(x, p)
 
 
 @inlined
@@ -67,7 +75,7 @@ def smoothed(
 
     The filter's input is a straight line whose mean is what the output has been in the mean.
     """
-    begin, end = entry(before, output), entry(after, output)
+    begin, end = entry(before, output, p), entry(after, output, p)
     bow = travelled(after, output, p) / h - travelled(before, output, p) / h - 0.5 * (begin + end)
     read, ends = reading(begin + bow, angle_before, p), reading(end + bow, angle_after, p)
     return speed_filter.step(read, ends, filtered, rise, low, h)

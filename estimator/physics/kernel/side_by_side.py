@@ -20,7 +20,8 @@ from estimator.physics.kernel.feed import begun_feed, fed, is_late
 from estimator.physics.kernel.line import Line, is_bristled, is_elastic
 from estimator.physics.kernel.linear import is_linear
 from estimator.physics.kernel.makes import for_its_make
-from estimator.physics.kernel.sensing import entry, reading, shown, smoothed
+from estimator.physics.kernel.rates import read_out
+from estimator.physics.kernel.sensing import reading, shown, smoothed
 from estimator.physics.kernel.state_vector import (
     BRISTLES_LOAD,
     BRISTLES_MOTOR,
@@ -188,7 +189,7 @@ def advance(
     filtered, filter_rise = start[FILTERED], start[FILTER_RISE]
     now = conditions(line.masses, start_s + first * sample_time_s, h, 0.0, load[first], sign_width, p)
     for k in range(first, samples):
-        out[k] = filtered if filtering else entry(x, output)
+        out[k] = filtered if filtering else read_out(line, now, x, output, p)
         turn = angle[k + 1] - angle[k] if k + 1 < angle.shape[0] else angle[k] - angle[k - 1]
         time_s = start_s + k * sample_time_s
         varying = waving or is_changing(time_s - sample_time_s, time_s + sample_time_s, p)

@@ -7,6 +7,9 @@ from typing import NamedTuple
 ANGLE, SPEED, TWIST, LOAD_SPEED = 0, 1, 2, 3
 """Mechanical states that can be an output; see ``State``."""
 
+LOAD_ANGLE, SHAFT_TORQUE = 20, 21
+"""Outputs that follow from several states."""
+
 VEHICLE_SPEED, BRANCH_TWIST, BRANCH_SPEED, MIDDLE_TWIST, MIDDLE_SPEED, TRACTION = 5, 6, 7, 8, 9, 10
 """Further ones."""
 

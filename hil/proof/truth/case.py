@@ -17,8 +17,9 @@ from hil.proof.truth.observed import observed
 from hil.proof.truth.physics import FloatArray, Physics
 from hil.proof.truth.readings import sampling_instants_s, speed_as_read
 from hil.proof.truth.rows import IntArray, Rows, as_recorded
-from hil.proof.truth.sensors import USUAL, Noise, torque_reading
+from hil.proof.truth.sensors import USUAL, Noise, speed_reading, torque_reading
 from hil.proof.truth.specimen import Specimen, Stream, draw_specimen, stream
+from hil.proof.truth.state import State
 
 TESTS = tuple(Test)
 
@@ -29,6 +30,8 @@ PROFILE_STRIDE = 25
 @dataclass(frozen=True, slots=True)
 class TruthRecording:
     """One recording. Arrays of shape (N,); the first five and ``flags``, where there are any, are the contract's.
+
+    ``speed_load_rad_s`` is what a sensor at the wheels reads; a case's files have it only where that is asked for.
 
     ``speed_true_rad_s`` (the sensor's speed without noise), ``disturbance_nm`` (the torque of hill and brake against
     the load every 0.25 s) and ``events`` (when what took place) are the truth and go into no recording file.
@@ -42,6 +45,7 @@ class TruthRecording:
     speed_true_rad_s: FloatArray
     disturbance_nm: FloatArray
     flags: IntArray | None = None
+    speed_load_rad_s: FloatArray | None = None
     events: Mapping[str, Sequence[Interval]] = field(default_factory=dict)
 
 
@@ -124,7 +128,7 @@ def _drive(
     m1, m2 = plan.share_m1 * torque, (1.0 - plan.share_m1) * torque
     time_s = sample_times_s()
     instants_s = sampling_instants_s(time_s, acquisition, rng_acquisition)
-    speed, disturbance = _sample(rolling.driveline, m1, m2, instants_s)
+    speed, disturbance, wheels = _sample(rolling.driveline, m1, m2, instants_s)
     m1_read, m2_read = (torque_reading(each, rng_sensors, noise) for each in (m1, m2))
     read = Rows(m1_read, m2_read, speed_as_read(speed, acquisition, rng_sensors, noise))
     rows = as_recorded(read, acquisition, rng_acquisition)
@@ -137,13 +141,14 @@ def _drive(
         speed_true_rad_s=speed,
         disturbance_nm=disturbance[::PROFILE_STRIDE],
         flags=rows.flags,
+        speed_load_rad_s=speed_reading(wheels, rng_sensors.spawn(1)[0], noise),
     )
 
 
 def _sample(
     bus: TruthDriveline, m1_nm: FloatArray, m2_nm: FloatArray, instants_s: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Drive with torques that change every period; return speed and load disturbance at other instants.
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Drive with torques that change every period; return speed, load disturbance and speed of the load at instants.
 
     The last torque stays on: a clock may ask for a speed after the last period.
     """
@@ -151,4 +156,5 @@ def _sample(
     moments_s = np.unique(np.concatenate([switches_s, instants_s, [0.0]]))
     held = np.searchsorted(switches_s, moments_s[:-1], side="right")
     states = np.vstack([bus.state, bus.course(m1_nm[held], m2_nm[held], np.diff(moments_s))])
-    return observed(bus.physics, states[np.searchsorted(moments_s, instants_s)])
+    seen = states[np.searchsorted(moments_s, instants_s)]
+    return *observed(bus.physics, seen), seen[:, State.SPEED_L]
