@@ -70,6 +70,14 @@ def woven(function: Function) -> Function:
     return cast(Function, numba.njit(nogil=True, error_model="numpy", inline="always")(function))
 
 
+def assembled(function: Function) -> Function:
+    """Compile a function that was put together from others into whatever calls it; it has no file that a cache knows.
+
+    What calls it is cached with it.
+    """
+    return cast(Function, numba.njit(nogil=True, error_model="numpy", forceinline=True)(function))
+
+
 def brief(function: Function) -> Function:
     """Compile a function that is over in microseconds and is called all the time: it keeps the interpreter lock.
 

@@ -34,7 +34,8 @@ def open_hypotheses(model: DrivelineModel, records: Sequence[Record]) -> tuple[t
     Effects that make no sense in the model's structure, or that the model already has, are in neither.
     """
     testable, untestable = [], {}
-    for name, entry in EFFECTS.items():
+    for name in (*EFFECTS, *model.laws):
+        entry = EFFECTS[name]
         fits = model.structure in entry.structures and all(record.kind in entry.kinds for record in records)
         turns = model.motion is Motion.ROTATION or not entry.phases
         if not (fits and turns) or name in model.effects or entry.recognised:

@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from estimator.physics.effects import (
     actuator_lag,
     aerodynamic_drag,
+    asymmetric_friction,
     backlash,
     brake_drag,
     cardan_second_order,
     clock_drift,
     coulomb_friction_load,
     coulomb_friction_motor,
+    eddy_drag,
     extra_torsional_mode,
+    gear_losses,
     generator_coupled,
+    gravity,
+    grounded_spring,
     inertia_change,
     inverter_gain_mismatch,
     load_imbalance,
@@ -34,13 +40,17 @@ from estimator.physics.effects import (
     stiffness_change,
     stiffness_nonlinearity,
     stribeck_friction,
+    torque_bias,
     torque_derating,
+    torque_nonlinearity,
     torque_ripple,
     torque_saturation,
     transport_delay,
     tyre_slip,
+    viscoelastic_shaft,
     warming_friction,
 )
+from estimator.physics.law_name import LawName
 
 if TYPE_CHECKING:
     from estimator.physics.effect import Effect
@@ -50,17 +60,23 @@ _ENTRIES = (
     inverter_gain_mismatch.EFFECT,
     torque_derating.EFFECT,
     torque_saturation.EFFECT,
+    torque_nonlinearity.EFFECT,
+    torque_bias.EFFECT,
     actuator_lag.EFFECT,
     transport_delay.EFFECT,
     torque_ripple.EFFECT,
     coulomb_friction_motor.EFFECT,
     stribeck_friction.EFFECT,
     quadratic_friction.EFFECT,
+    eddy_drag.EFFECT,
+    asymmetric_friction.EFFECT,
     generator_coupled.EFFECT,
     backlash.EFFECT,
     stiffness_nonlinearity.EFFECT,
     stiffness_change.EFFECT,
     shaft_hysteresis.EFFECT,
+    viscoelastic_shaft.EFFECT,
+    gear_losses.EFFECT,
     cardan_second_order.EFFECT,
     extra_torsional_mode.EFFECT,
     coulomb_friction_load.EFFECT,
@@ -69,6 +85,8 @@ _ENTRIES = (
     brake_drag.EFFECT,
     tyre_slip.EFFECT,
     load_imbalance.EFFECT,
+    gravity.EFFECT,
+    grounded_spring.EFFECT,
     inertia_change.EFFECT,
     warming_friction.EFFECT,
     resolver_error.EFFECT,
@@ -81,26 +99,49 @@ _ENTRIES = (
     clock_drift.EFFECT,
 )
 
-BUILT_IN: Mapping[str, Effect] = MappingProxyType({entry.name: entry for entry in _ENTRIES})
+
+def _mutual(entries: Sequence[Effect]) -> dict[str, Effect]:
+    """Return the entries by name; what one resembles, or is equivalent to, resembles it or is equivalent to it."""
+
+    def of(entry: Effect, names: Callable[[Effect], tuple[str, ...]]) -> tuple[str, ...]:
+        return tuple(dict.fromkeys([*names(entry), *(each.name for each in entries if entry.name in names(each))]))
+
+    return {
+        entry.name: replace(
+            entry,
+            resembles=of(entry, lambda each: each.resembles),
+            equivalent=of(entry, lambda each: each.equivalent),
+        )
+        for entry in entries
+    }
+
+
+BUILT_IN: Mapping[str, Effect] = MappingProxyType(_mutual(_ENTRIES))
 """The entries that the kernel has."""
 
-_entries = dict(BUILT_IN)
 
-EFFECTS: Mapping[str, Effect] = MappingProxyType(_entries)
-"""Name to entry, along the chain from torque command to load; a user's own laws behind them."""
+class _Effects(Mapping[str, "Effect"]):
+    """The catalogue, in which the name of a user's own law finds its law, too."""
+
+    def __getitem__(self, name: str) -> Effect:
+        return name.entry if isinstance(name, LawName) else BUILT_IN[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(BUILT_IN)
+
+    def __len__(self) -> int:
+        return len(BUILT_IN)
 
 
-def add(entries: Sequence[Effect]) -> None:
-    """Make these the entries behind the built-in ones, in place of those before (``own_law.install``)."""
-    _entries.clear()
-    _entries.update(BUILT_IN, **{entry.name: entry for entry in entries})
+EFFECTS: Mapping[str, Effect] = _Effects()
+"""Name to entry, along the chain from torque command to load."""
 
 
 def effect_problems(name: str, values: Mapping[str, EffectValue], model: DrivelineModel) -> list[str]:
     """Return what is wrong with an effect of a model, one line per fault; empty where nothing is."""
     entry = EFFECTS.get(name)
     if entry is None:
-        return [f"effects.{name}: unknown effect, expected one of {', '.join(EFFECTS)}"]
+        return [f"effects.{name}: unknown effect, expected one of {', '.join([*EFFECTS, *model.laws])}"]
     problems = []
     if model.structure not in entry.structures:
         fits = ", ".join(sorted(structure.value for structure in entry.structures))

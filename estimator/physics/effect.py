@@ -1,7 +1,8 @@
 """What an entry of the catalogue is: a law that can be released from its null, and what is known of it.
 
-A missing effect is a constraint of the superset model to release: at ``null`` its law does nothing. The law itself
-is compiled into the one kernel (``estimator.physics.kernel``); everything else about it stands in its entry.
+A missing effect is a constraint of the superset model to release: at ``null`` its law does nothing. A law
+that acts at one of the places of ``estimator.physics.acting`` is taken into the one kernel from its entry; one that
+changes the line itself is written into the kernel. Everything else about it stands in its entry.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 
+from estimator.physics.acting import Acting
 from estimator.physics.model import DrivelineModel, Motion, Structure, unit
 from estimator.signals.record import OutputKind, Record
 
@@ -131,50 +133,7 @@ Span = tuple[float, float]
 Spans = Callable[[DrivelineModel, Mapping[str, float], Mapping[str, float]], Mapping[str, tuple[Span, ...]]]
 Starts = Callable[[DrivelineModel, Sequence[Record]], list[Start]]
 Testable = Callable[[DrivelineModel, Sequence[Record]], Untestable | None]
-
-
-def of_order_one(_model: DrivelineModel, _records: Sequence[Record]) -> tuple[float, ...]:
-    """Return the scale of an effect that is not fitted, and whose one parameter is its own scale."""
-    return (1.0,)
-
-
-def not_fitted(_model: DrivelineModel, _records: Sequence[Record]) -> list[Start]:
-    """Return no start: the effect is recognised in the raw data."""
-    return []
-
-
-def in_any_recording(_model: DrivelineModel, _records: Sequence[Record]) -> Untestable | None:
-    """Ask nothing of the recordings beyond what ``excited_by`` says."""
-    return None
-
-
-def as_given(values: Mapping[str, float]) -> Mapping[str, float]:
-    """Leave values as they were given."""
-    return values
-
-
-def never_retold(
-    _model: DrivelineModel, _records: Sequence[Record], _values: Mapping[str, float], _line: Mapping[str, float]
-) -> list[Retelling]:
-    """Know no other way to write the law."""
-    return []
-
-
-def as_described(
-    _model: DrivelineModel, _values: Mapping[str, float], _line: Mapping[str, float]
-) -> Mapping[str, tuple[Span, ...]]:
-    """Leave every nominal parameter what its data sheet says."""
-    return {}
-
-
-def nothing_derived(_values: Mapping[str, float], _nominal: Mapping[str, float]) -> Mapping[str, float]:
-    """Take every held value as it is."""
-    return {}
-
-
-def told_one_way(_values: Mapping[str, float]) -> Mapping[str, float]:
-    """Know no other way to tell the same motion."""
-    return {}
+Objection = Callable[[DrivelineModel, Sequence[Record], Mapping[str, float]], str]
 
 
 MOMENTS = (
@@ -182,11 +141,6 @@ MOMENTS = (
     EffectParameter("to_s", "s", 0.0, 0.0, math.inf, "moment it ends: t_2, of each recording", True, True),
 )
 """Own parameters of an event: from when to when it acts, since the recording began."""
-
-
-def always_plausible(_model: DrivelineModel, _records: Sequence[Record], _values: Mapping[str, float]) -> str:
-    """Find nothing to object to."""
-    return ""
 
 
 def long_enough(key: str) -> Callable[[DrivelineModel, Sequence[Record], Mapping[str, float]], str]:
@@ -244,11 +198,16 @@ class Effect:
     structures : frozenset[Structure]
         Where it makes sense.
     resembles : tuple[str, ...]
-        Rivals that look alike in part: names of effects.
+        Rivals that look alike in part: names of effects. In the catalogue it holds both ways.
     equivalent : tuple[str, ...]
         Effects that are the same linear system seen from torque and speed: no recording tells them apart.
     contains : tuple[str, ...]
         Effects that are special cases of this one.
+    acting : Acting or None
+        The law and where it acts; None where it is a part of the equations (``estimator.physics.kernel``) or of the
+        torque path.
+    example : mapping of str to float
+        Sizes that show on a bus of 2 kg m^2, 4000 Nm/rad and 40 to 100 kg m^2: for tests and pictures.
     scales : callable
         Model and records to a typical size of each parameter that all recordings share (positive).
     starts : callable
@@ -293,7 +252,14 @@ class Effect:
     derived : callable
         Parameter values, and the line's own, to those of parameters that are held but follow from the others.
     linear : bool
-        True where it is a linear system beside the nominal one, with an order and nothing else to write otherwise.
+        True where a line is linear with it, or where it acts before the line or behind it: the simulation then takes
+        its sub-steps as sums.
+    waving : bool
+        True where it changes the conditions of the motion all the time, by an angle or by the time.
+    timed : bool
+        True where the simulated line depends on the time since its recording began; an event does by itself.
+    shows_start : frozenset[str]
+        What else of a joint's start matters with it: ``twist``, ``preload``.
     recognised : bool
         True where it is recognised in the raw data before any fit (repeated, lost, quantised samples).
     """
@@ -307,12 +273,14 @@ class Effect:
     parameters: tuple[EffectParameter, ...]
     structures: frozenset[Structure]
     resembles: tuple[str, ...]
-    equivalent: tuple[str, ...]
-    contains: tuple[str, ...]
     sentence: Callable[[Mapping[str, float], Motion], str]
-    scales: Scales = of_order_one
-    starts: Starts = not_fitted
-    testable: Testable = in_any_recording
+    equivalent: tuple[str, ...] = ()
+    contains: tuple[str, ...] = ()
+    acting: Acting | None = None
+    example: Mapping[str, float] = field(default_factory=dict)
+    scales: Scales = lambda _model, _records: (1.0,)
+    starts: Starts = lambda _model, _records: []
+    testable: Testable = lambda _model, _records: None
     kinds: frozenset[OutputKind] = frozenset(OutputKind)
     profile: bool = False
     event: bool = False
@@ -320,14 +288,17 @@ class Effect:
     permanent: str = ""
     phases: Mapping[str, str] = field(default_factory=dict)
     loosens: frozenset[str] = frozenset()
-    described: Spans = as_described
-    implausible: Callable[[DrivelineModel, Sequence[Record], Mapping[str, float]], str] = always_plausible
-    unresolved: Callable[[DrivelineModel, Sequence[Record], Mapping[str, float]], str] = always_plausible
-    rescaled: Callable[[Mapping[str, float]], Mapping[str, float]] = told_one_way
-    completed: Callable[[Mapping[str, float]], Mapping[str, float]] = as_given
-    retold: Retold = never_retold
-    derived: Callable[[Mapping[str, float], Mapping[str, float]], Mapping[str, float]] = nothing_derived
+    described: Spans = lambda _model, _values, _line: {}
+    implausible: Objection = lambda _model, _records, _values: ""
+    unresolved: Objection = lambda _model, _records, _values: ""
+    rescaled: Callable[[Mapping[str, float]], Mapping[str, float]] = lambda _values: {}
+    completed: Callable[[Mapping[str, float]], Mapping[str, float]] = lambda values: values
+    retold: Retold = lambda _model, _records, _values, _line: []
+    derived: Callable[[Mapping[str, float], Mapping[str, float]], Mapping[str, float]] = lambda _values, _nominal: {}
     linear: bool = False
+    waving: bool = False
+    timed: bool = False
+    shows_start: frozenset[str] = frozenset()
     recognised: bool = False
 
     @property

@@ -7,9 +7,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from estimator.errors import BadModel
+from estimator.physics.law_name import LawName
 from estimator.physics.model import DrivelineModel, Structure, natural_frequencies_rad_s
 from estimator.physics.motion import reverses, speed_scale
-from estimator.signals.record import Record
+from estimator.signals.record import FloatArray, Record
 
 RADIANS_PER_STEP = 0.2
 """Integration step in radians of the line's natural frequency, or its fastest decay. Fourth order would allow more; a
@@ -32,11 +33,16 @@ parameters: on a real drive fits from different starts then ended up to 10 % apa
 
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """How a model is integrated on a set of recordings: sub-steps per period and width of a sign change."""
+    """How a model is integrated on a set of recordings: sub-steps per period, width of a sign change, its own laws."""
 
     structure: Structure
     substeps: int
     sign_width: float
+    laws: tuple[LawName, ...] = ()
+
+    def active(self, p: FloatArray) -> list[LawName]:
+        """Return the user's laws that a parameter vector switches on."""
+        return [law for law in self.laws if law.is_active(p)]
 
 
 def substeps_for(values: Mapping[str, float], period_s: float) -> int:
@@ -79,7 +85,7 @@ def _too_fast(values: Mapping[str, float], fastest_rad_s: float, period_s: float
 def grid_for(model: DrivelineModel, records: Sequence[Record]) -> Grid:
     """Choose the integration grid for a model on a set of recordings of one sampling period."""
     substeps = substeps_for(model.values(), records[0].sample_time_s)
-    return Grid(model.structure, substeps, SIGN_WIDTH * _slow_scale(records))
+    return Grid(model.structure, substeps, SIGN_WIDTH * _slow_scale(records), model.laws)
 
 
 def _slow_scale(records: Sequence[Record]) -> float:

@@ -15,7 +15,7 @@ import numpy as np
 from estimator.abreast import LANES
 from estimator.physics.differences import fill_differences
 from estimator.physics.inputs import Case
-from estimator.physics.parallel import WORKERS, concurrently
+from estimator.physics.parallel import concurrently
 from estimator.physics.problem import Problem, bounds, case_of, far_away, local_part, own_part, parameters
 from estimator.physics.simulate import are_of_a_length, go_together, lanes_filled, simulate_each, simulate_together
 from estimator.physics.unknowns import Shared
@@ -86,17 +86,17 @@ def _moves(problem: Problem, free: BoolArray, index: int) -> BoolArray:
 
 
 def _apart(moving: Sequence[IntArray]) -> list[_Moved]:
-    """Return parts of one recording each: enough for both cores, none wider than the lanes."""
+    """Return parts of one recording each: two at least, none wider than the lanes."""
     return [
         _Moved(np.full(some.size, i), some)
         for i, mine in enumerate(moving)
-        for some in np.array_split(mine, max(WORKERS, math.ceil(mine.size / LANES)))
+        for some in np.array_split(mine, max(2, math.ceil(mine.size / LANES)))
         if some.size
     ]
 
 
 def _together(problem: Problem, moving: Sequence[IntArray]) -> list[_Moved]:
-    """Return parts across recordings, one for each core, that fill the lanes; the same unknown of all is next to it."""
+    """Return parts across recordings that fill the lanes; the same unknown of all is next to it."""
     of = np.repeat(np.arange(len(moving)), [mine.size for mine in moving])
     columns = np.concatenate(moving)
     own = columns >= len(problem.shared)

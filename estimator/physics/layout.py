@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from estimator.physics.catalogue import BUILT_IN, EFFECTS
-from estimator.physics.effect import Effect
+from estimator.physics.catalogue import BUILT_IN
+from estimator.physics.law_name import LawName
 from estimator.physics.model import DrivelineModel, Load, Structure
 from estimator.signals.record import FloatArray
 
@@ -30,38 +30,35 @@ _SLOTS["", LOAD] = len(_SLOTS)
 SIZE = len(_SLOTS)
 """Length of the flat vector, without a user's own laws."""
 
-_OWN_SLOTS: dict[tuple[str, str], int] = {}
-
-
-def add(entries: Sequence[Effect]) -> None:
-    """Place the parameters of these behind all others, in place of those before (``own_law.install``)."""
-    _OWN_SLOTS.clear()
-    for entry in entries:
-        for parameter in entry.parameters:
-            _OWN_SLOTS[entry.name, parameter.name] = SIZE + len(_OWN_SLOTS)
-
 
 def slot(effect: str, parameter: str) -> int:
     """Index of an effect's parameter; of a nominal one where ``effect`` is empty."""
-    key = effect, parameter
-    return _SLOTS[key] if key in _SLOTS else _OWN_SLOTS[key]
+    return effect.places[parameter] if isinstance(effect, LawName) else _SLOTS[effect, parameter]
 
 
 def flat(model: DrivelineModel) -> FloatArray:
-    """Return the kernel's parameter vector of a model, shape (SIZE,): its values, every other effect at null."""
+    """Return the kernel's parameter vector of a model: its values, every other effect at null.
+
+    Shape (SIZE,), and more where the model has laws of a user's own.
+    """
     nominal = model.values() if isinstance(model.load, Load) else {**model.values(), LOAD: model.load}
-    return flat_values(nominal, {name: {k: v.value for k, v in e.items()} for name, e in model.effects.items()})
+    effects = {name: {k: v.value for k, v in e.items()} for name, e in model.effects.items()}
+    return flat_values(nominal, effects, model.laws)
 
 
-def flat_values(nominal: Mapping[str, float], effects: Mapping[str, Mapping[str, float]]) -> FloatArray:
-    """Return the kernel's parameter vector from plain values, shape (SIZE,)."""
-    vector = np.zeros(SIZE + len(_OWN_SLOTS))
-    for entry in EFFECTS.values():
+def flat_values(
+    nominal: Mapping[str, float], effects: Mapping[str, Mapping[str, float]], laws: Sequence[LawName] = ()
+) -> FloatArray:
+    """Return the same from plain values; ``laws`` are those of a user's own that the model has."""
+    own: dict[str, LawName] = {name: name for name in laws}
+    entries = [*BUILT_IN.values(), *(name.entry for name in laws)]
+    vector = np.zeros(SIZE + sum(len(name.places) for name in laws))
+    for entry in entries:
         for parameter in entry.parameters:
             vector[slot(entry.name, parameter.name)] = parameter.null
     for name, value in nominal.items():
         vector[slot("", name)] = value
     for effect, values in effects.items():
         for name, value in values.items():
-            vector[slot(effect, name)] = value
+            vector[slot(own.get(effect, effect), name)] = value
     return vector

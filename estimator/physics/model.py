@@ -24,6 +24,7 @@ from enum import Enum
 import numpy as np
 
 from estimator.errors import BadModel
+from estimator.physics.law_name import LawName
 from estimator.signals.record import FloatArray
 
 
@@ -155,6 +156,8 @@ class DrivelineModel:
         Motor turns per wheel turn.
     load : Load or float
         The constant load torque: unknown, of each recording or of all of them together, or its value [Nm].
+    laws : tuple of LawName
+        A user's own laws, which no other model has (``own_law.named``).
 
     Raises
     ------
@@ -168,8 +171,10 @@ class DrivelineModel:
     effects: Mapping[str, Mapping[str, EffectValue]] = field(default_factory=dict)
     gear_ratio: float | None = None
     load: Load | float = Load.OWN
+    laws: tuple[LawName, ...] = ()
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "effects", {self.own(name): values for name, values in self.effects.items()})
         problems = [*self._parameter_problems(), *self._effect_problems()]
         if not isinstance(self.load, Load) and not math.isfinite(self.load):
             problems.append(f"load.constant: expected 'own', 'shared' or a finite number, came {self.load}")
@@ -197,6 +202,10 @@ class DrivelineModel:
         from estimator.physics.catalogue import effect_problems
 
         return [problem for name, values in self.effects.items() for problem in effect_problems(name, values, self)]
+
+    def own(self, name: str) -> str:
+        """Return the name of an effect as this model knows it: one of its own laws by the name that knows the law."""
+        return next((law for law in self.laws if law == name), name)
 
     def values(self) -> dict[str, float]:
         """Nominal parameter values alone."""

@@ -126,3 +126,36 @@ def speed_sweeps(record: Record) -> bool:
     """Tell whether the speed of a recording changes by more than half of its top value."""
     low, high = np.nanpercentile(measured_speed(record), [2, 98])
     return bool(high - low > 0.5 * speed_scale([record]))
+
+
+@once
+def motor_angle(record: Record) -> FloatArray:
+    """Return the motor angle by the record's own output, from 0 at its start; shape (N,) [rad].
+
+    Laws that are periodic in the angle take their phase from it. A simulated angle would drift off by whole radians
+    while a fit is still on its way.
+    """
+    if record.of is not None:
+        return motor_angle(record.of)
+    good = np.flatnonzero(record.okay)
+    output = np.interp(record.time_s, record.time_s[good], record.output[good])
+    if record.imposed is not None:
+        return np.asarray(record.imposed - record.imposed[0])
+    if record.kind is OutputKind.POSITION:
+        return np.asarray(output - output[0])
+    step = 0.5 * record.sample_time_s * (output[1:] + output[:-1])
+    return np.concatenate([[0.0], np.cumsum(step)])
+
+
+MOST_TURNS = 100.0
+"""Turns of the motor beyond which what it drives is taken to turn on and on, whatever its gear ratio."""
+
+
+def range_of(records: Sequence[Record]) -> float:
+    """Return the range of the motor's angle, or of a travel, in the recording that has most of it."""
+    return max(float(np.ptp(motor_angle(record))) for record in records)
+
+
+def turns_on(records: Sequence[Record]) -> bool:
+    """Tell whether the motor turns on and on, and does not only go to and fro."""
+    return range_of(records) > 2.0 * np.pi * MOST_TURNS

@@ -9,13 +9,16 @@ from __future__ import annotations
 import inspect
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import cast
 
+import numba
 import numpy as np
 
 from estimator.errors import BadModel
 from estimator.physics import catalogue, layout
 from estimator.physics.effect import EVERY_LINE, WITH_SHAFT, Effect, EffectParameter, Element
+from estimator.physics.law_name import LawName
 from estimator.physics.model import Motion
 from estimator.signals.record import FloatArray
 
@@ -32,6 +35,23 @@ STRUCTURES = {
 
 TRIAL = np.array([[0.0, 0.5, 1.0], [-2.0, 0.0, 3.0], [-1.0, 0.0, 2.0], [-0.01, 0.0, 0.02], [-5.0, 0.0, 7.0]])
 """Arguments on which a law is tried before it is used: both signs and standstill; shape (5, 3)."""
+
+
+Columns = Callable[[FloatArray, tuple[float, ...]], FloatArray]
+"""Arguments of shape (5, N) and parameters to the law over each column, (N,)."""
+
+
+def over_columns(law: Callable[..., float]) -> Columns:
+    """Return the compiled function that calls a compiled law for each column of its arguments."""
+
+    def columns(arguments: FloatArray, values: tuple[float, ...]) -> FloatArray:
+        found = np.empty(arguments.shape[1])
+        for k in range(found.size):
+            given = arguments[:, k]
+            found[k] = law(given[0], given[1], given[2], given[3], given[4], *values)
+        return found
+
+    return cast(Columns, numba.njit(columns))
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,6 +103,7 @@ class OwnLaw:
     parameters: tuple[OwnParameter, ...]
     label: str = ""
     takes_arrays: bool = field(init=False, default=False)
+    columns: Columns | None = field(init=False, default=None)
 
     def __post_init__(self) -> None:
         problems = self._problems()
@@ -121,6 +142,8 @@ class OwnLaw:
             ) from error
         self(TRIAL, starts)
         object.__setattr__(self, "takes_arrays", self._same_of_arrays(starts))
+        if not self.takes_arrays:
+            object.__setattr__(self, "columns", self._compiled(starts))
         first = self.parameters[0]
         idle = self(TRIAL, starts | {first.name: first.null})
         if np.any(idle != 0.0):
@@ -165,10 +188,31 @@ class OwnLaw:
             return False
         return together.shape in ((), TRIAL.shape[1:]) and bool(np.all(together == self._one_by_one(TRIAL, values)))
 
+    @property
+    def is_compiled(self) -> bool:
+        """Whether a function of numbers could be compiled, so that it is not called from Python for each of them."""
+        return self.columns is not None
+
+    def _compiled(self, values: Mapping[str, float]) -> Columns | None:
+        """Return the function over columns, compiled; None where it can't be, or returns something else then."""
+        try:
+            columns = over_columns(numba.njit(self.function))
+            found = columns(TRIAL, self._in_order(values))
+        except Exception:  # noqa: BLE001  # a compiler refuses a function in any way: it is called as it is
+            return None
+        return columns if np.array_equal(found, self._one_by_one(TRIAL, values)) else None
+
+    def _in_order(self, values: Mapping[str, float]) -> tuple[float, ...]:
+        """Return the parameters in the order in which the function takes them behind its arguments."""
+        taken = list(inspect.signature(self.function).parameters)[len(ARGUMENTS) :]
+        return tuple(float(values[name]) for name in taken)
+
     def _called(self, arguments: FloatArray, values: Mapping[str, float]) -> FloatArray:
         if self.takes_arrays:
             returned = np.asarray(self.function(*arguments, **values), dtype=np.float64)
             return np.broadcast_to(returned, arguments.shape[1:])
+        if self.columns is not None:
+            return self.columns(np.ascontiguousarray(arguments), self._in_order(values))
         return self._one_by_one(arguments, values)
 
     def _one_by_one(self, arguments: FloatArray, values: Mapping[str, float]) -> FloatArray:
@@ -195,17 +239,11 @@ class OwnLaw:
             ),
             structures=STRUCTURES[self.element],
             resembles=(),
-            equivalent=(),
-            contains=(),
             scales=lambda model, records: tuple(p.scale for p in self.parameters),
             starts=lambda model, records: [tuple(p.start / p.scale for p in self.parameters)],
             testable=lambda model, records: None,
             sentence=sentence,
         )
-
-    def values(self, p: FloatArray) -> dict[str, float]:
-        """Return its parameters from the parameter vector."""
-        return {each.name: float(p[layout.slot(self.name, each.name)]) for each in self.parameters}
 
 
 def title_of(element: Element) -> str:
@@ -213,11 +251,8 @@ def title_of(element: Element) -> str:
     return element.value.replace("_", " ")
 
 
-_installed: list[OwnLaw] = []
-
-
-def install(laws: Sequence[OwnLaw]) -> None:
-    """Make these the user's laws of this process, in place of those before; models that use those are void.
+def named(laws: Sequence[OwnLaw]) -> tuple[LawName, ...]:
+    """Return the names of the laws of one model, which know the laws and their places in its parameter vector.
 
     Raises
     ------
@@ -228,12 +263,11 @@ def install(laws: Sequence[OwnLaw]) -> None:
     taken = [name for name in names if name in catalogue.BUILT_IN or names.count(name) > 1]
     if taken:
         raise BadModel(f"laws.{taken[0]}: expected a name that is not in the catalogue and comes once. Rename it.")
-    entries = [law.effect() for law in laws]
-    catalogue.add(entries)
-    layout.add(entries)
-    _installed[:] = laws
-
-
-def active(p: FloatArray) -> list[OwnLaw]:
-    """Return the user's laws that a parameter vector switches on."""
-    return [law for law in _installed if p[layout.slot(law.name, law.parameters[0].name)] != law.parameters[0].null]
+    found, size = [], layout.SIZE
+    for law in laws:
+        name = LawName(law.name)
+        name.law, name.entry = law, replace(law.effect(), name=name)
+        name.places = {each.name: size + i for i, each in enumerate(law.parameters)}
+        size += len(law.parameters)
+        found.append(name)
+    return tuple(found)

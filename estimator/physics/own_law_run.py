@@ -18,7 +18,7 @@ import numpy as np
 from estimator.compiled import compiled
 from estimator.physics.effect import Element
 from estimator.physics.kernel import integration, state_vector
-from estimator.physics.own_law import OwnLaw
+from estimator.physics.law_name import LawName
 from estimator.signals.record import FloatArray, Record
 
 BLOCK = 64
@@ -95,7 +95,7 @@ class Run:
             p,
         )
 
-    def under(self, laws: Sequence[OwnLaw], begin: FloatArray) -> Run:
+    def under(self, laws: Sequence[LawName], begin: FloatArray) -> Run:
         """Return the run with the laws' torques in its own.
 
         Where law and motion do not come to agree even over one step (a slope above inertia over step), the rest is NaN:
@@ -106,7 +106,7 @@ class Run:
         BadModel
             Where a law fails or returns what is no number.
         """
-        laws = [law for law in laws if law.element in _FORCES]
+        laws = [law for law in laws if law.law.element in _FORCES]
         if not laws:
             return self
         torque, load, state = self.torque.copy(), self.load.copy(), begin.copy()
@@ -130,7 +130,7 @@ class Run:
 
     def _agreed(
         self,
-        laws: Sequence[OwnLaw],
+        laws: Sequence[LawName],
         torque: FloatArray,
         load: FloatArray,
         begin: FloatArray,
@@ -175,22 +175,22 @@ class Run:
         """Return the arguments of a law, shape (5, steps); ``later`` by this share of a step."""
         return np.vstack([self.time_s[steps] + later * self.step_s, motion, self.reading[steps]])
 
-    def _forces(self, laws: Sequence[OwnLaw], motion: FloatArray, steps: slice) -> FloatArray:
+    def _forces(self, laws: Sequence[LawName], motion: FloatArray, steps: slice) -> FloatArray:
         arguments = self._arguments(motion, steps, 0.5)
         forces = np.zeros((2, motion.shape[1]))
         for law in laws:
-            forces += np.outer(_FORCES[law.element], law(arguments, law.values(self.p)))
+            forces += np.outer(_FORCES[law.law.element], law.law(arguments, law.values(self.p)))
         return forces
 
-    def misread(self, laws: Sequence[OwnLaw], begin: FloatArray) -> FloatArray:
+    def misread(self, laws: Sequence[LawName], begin: FloatArray) -> FloatArray:
         """Return the error that the laws at the sensor add to the reading, shape (S,)."""
-        laws = [law for law in laws if law.element is Element.SPEED_SENSOR]
+        laws = [law for law in laws if law.law.element is Element.SPEED_SENSOR]
         error = np.zeros_like(self.torque)
         if laws:
             motion, _ = self._motion(self.torque, self.load, begin, 0)
             arguments = self._arguments(motion[:, :-1], slice(None), 0.0)
             for law in laws:
-                error += law(arguments, law.values(self.p))
+                error += law.law(arguments, law.values(self.p))
         return error
 
 

@@ -1,57 +1,90 @@
-"""Work on both cores: the compiled kernel holds no interpreter lock, so threads are enough.
+"""Work on all cores: the compiled kernel holds no interpreter lock, so threads are enough.
 
 Whoever calls works itself and lets idle cores help. Calls inside such a call do the same: when one long piece of work
-is left, what is inside it is shared out.
+is left, what is inside it is shared out. How work is cut never depends on how many cores there are, and so no result
+does, to the last bit.
 """
 
 from __future__ import annotations
 
+import os
 import threading
 from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from functools import cache
 from typing import TypeVar
 
-WORKERS = 2
-DEEPEST = 8
+PARTS = 4
+"""Parts into which sums and lanes are cut where the cut shows in the last bits."""
+
+THREADS_PER_CORE = 4
 """Threads that may exist: one works per core, the others wait for what they shared out."""
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
-_idle_cores = threading.Semaphore(WORKERS - 1)
+
+def available_cores() -> int:
+    """Return how many cores this process may use."""
+    allowed = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    return allowed or 1
 
 
-@cache
-def _pool() -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(DEEPEST, thread_name_prefix="driveline")
+class _Cores:
+    """The cores that work, and who of them is idle."""
+
+    def __init__(self, count: int) -> None:
+        self.count = count
+        self.idle = threading.Semaphore(count - 1)
+        self.pool = ThreadPoolExecutor(THREADS_PER_CORE * count, thread_name_prefix="driveline")
+
+
+_cores = _Cores(available_cores())
+
+
+def workers() -> int:
+    """Return on how many cores is worked."""
+    return _cores.count
+
+
+def work_on(cores: int) -> None:
+    """Work on so many cores from the next call on; what is under way goes on as it began.
+
+    Raises
+    ------
+    ValueError
+        Where they are fewer than 1.
+    """
+    global _cores
+    if cores < 1:
+        raise ValueError(f"cores: expected 1 or more, came {cores}")
+    _cores = _Cores(cores)
 
 
 def in_turn(function: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
-    """Do the same one after the other: each item has all the room, and both cores for what is shared out inside."""
+    """Do the same one after the other: each item has all the room, and all cores for what is shared out inside."""
     return [function(item) for item in items]
 
 
 def concurrently(function: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
     """Return ``function`` of each item, in order; the first error ends the rest."""
-    todo, results = deque(enumerate(items)), dict[int, Result]()
+    cores, todo, results = _cores, deque(enumerate(items)), dict[int, Result]()
     helpers: list[Future[None]] = []
 
     def help_out() -> None:
         try:
             work(recruit=False)
         finally:
-            _idle_cores.release()
+            cores.idle.release()
 
     def work(recruit: bool) -> None:
         while todo:
             try:
                 i, item = todo.popleft()
-            except IndexError:  # the other core took the last one
+            except IndexError:  # another core took the last one
                 return
-            if recruit and todo and _idle_cores.acquire(blocking=False):
-                helpers.append(_pool().submit(help_out))
+            if recruit and todo and cores.idle.acquire(blocking=False):
+                helpers.append(cores.pool.submit(help_out))
             try:
                 results[i] = function(item)
             except BaseException:
@@ -61,19 +94,19 @@ def concurrently(function: Callable[[Item], Result], items: Sequence[Item]) -> l
     try:
         work(recruit=True)
     finally:
-        _wait_for(helpers)
+        _wait_for(helpers, cores)
     for helper in helpers:
         helper.result()
     return [results[i] for i in range(len(items))]
 
 
-def _wait_for(helpers: Sequence[Future[None]]) -> None:
+def _wait_for(helpers: Sequence[Future[None]], cores: _Cores) -> None:
     """Wait until helpers are done; whoever waits leaves its core to them."""
     if all(helper.done() for helper in helpers):
         return
-    _idle_cores.release()
+    cores.idle.release()
     try:
         for helper in helpers:
             helper.exception()
     finally:
-        _idle_cores.acquire()
+        cores.idle.acquire()

@@ -10,14 +10,15 @@ import numpy as np
 
 from estimator.abreast import LANES
 from estimator.errors import BadModel
-from estimator.physics import joint, own_law, own_law_run
+from estimator.physics import catalogue, joint, own_law_run
 from estimator.physics.grid import Grid
 from estimator.physics.inputs import Case, inputs_of, load_of
-from estimator.physics.kernel import integration, many, side_by_side, slots, state_vector
+from estimator.physics.kernel import integration, many, side_by_side, state_vector
+from estimator.physics.layout import slot
 from estimator.physics.model import Structure
-from estimator.physics.parallel import WORKERS, concurrently
+from estimator.physics.motion import motor_angle
+from estimator.physics.parallel import PARTS, concurrently
 from estimator.physics.start import Start
-from estimator.signals.once import once
 from estimator.signals.record import FloatArray, IntArray, Location, OutputKind, Record
 
 MASSES = {Structure.ONE_MASS: 1, Structure.TWO_MASS: 2, Structure.THREE_MASS: 3}
@@ -126,7 +127,7 @@ def simulate_each(
     if grid.structure is Structure.JOINT:
         imposed = joint.imposed_in(record)
         return np.array([_joint_output(record, imposed, case, wanted) for case in cases])
-    if any(own_law.active(case.p) for case in cases):
+    if any(grid.active(case.p) for case in cases):
         return np.array([_under_laws(grid, record, case, wanted, output is None) for case in cases])
     given = inputs_of([record], [0] * len(cases), cases)
     shape = (len(cases), record.time_s.size)
@@ -168,7 +169,7 @@ def _read(record: Record, out: FloatArray, slopes: FloatArray, output: int | Non
 
 
 def simulate_records(grid: Grid, records: Sequence[Record], cases: Sequence[Case]) -> list[FloatArray]:
-    """Simulate several recordings, a case of each: side by side where they can be, else on both cores."""
+    """Simulate several recordings, a case of each: side by side where they can be, else on all cores."""
     count = len(records)
     fill_lanes = 1 < count <= LANES or (count > LANES and are_of_a_length(records))
     if not fill_lanes or not go_together(grid, records, [case.p for case in cases]):
@@ -180,8 +181,8 @@ def simulate_records(grid: Grid, records: Sequence[Record], cases: Sequence[Case
 
 
 def lanes_filled(count: int, most: int = sys.maxsize) -> list[slice]:
-    """Return so many simulations in parts, one for each core, that fill the lanes; more where ``most`` lanefuls fit."""
-    width = LANES * min(math.ceil(count / (WORKERS * LANES)), most)
+    """Return so many simulations in parts that fill the lanes, more where only ``most`` lanefuls fit."""
+    width = LANES * min(math.ceil(count / (PARTS * LANES)), most)
     return [slice(first, first + width) for first in range(0, count, width)]
 
 
@@ -201,7 +202,7 @@ def go_together(grid: Grid, records: Sequence[Record], lines: Sequence[FloatArra
     moved : sequence of int
         Places of parameters that may also have other values.
     """
-    if grid.structure is Structure.JOINT or any(own_law.active(p) for p in lines):
+    if grid.structure is Structure.JOINT or any(grid.active(p) for p in lines):
         return False
     p = np.array(lines)
     acts = (p != 0.0).any(axis=0)
@@ -283,7 +284,7 @@ def _joint_output(record: Record, imposed: joint.Imposed, case: Case, output: in
 
 def _under_laws(grid: Grid, record: Record, case: Case, output: int, recorded: bool) -> FloatArray:
     """Simulate with laws of a user's own: their torques are held over an integration step, which is a sample then."""
-    laws, given = own_law.active(case.p), inputs_of([record], [0], [case])
+    laws, given = grid.active(case.p), inputs_of([record], [0], [case])
     torque, load, state = given.torque[0], given.load[0], given.state[0]
     angle, masses = _angle(record, given.p), MASSES[grid.structure]
     run = own_law_run.Run.of(masses, grid.substeps, grid.sign_width, record, torque, load, angle, case.p).under(
@@ -315,38 +316,8 @@ def _under_laws(grid: Grid, record: Record, case: Case, output: int, recorded: b
     return _read(record, out[::every], slopes[:, ::every], None if recorded else output)
 
 
-TIMED = np.array([slots.GENERATOR, slots.CRACK, slots.PAYLOAD, slots.BRAKE, slots.WARMING, slots.DRIFT])
+TIMED = np.array([slot(e.name, e.parameters[0].name) for e in catalogue.BUILT_IN.values() if e.event or e.timed])
 """Sizes of the laws that depend on the time since a recording began."""
 
-PERIODIC = np.array(
-    [
-        slots.RIPPLE,
-        slots.RIPPLE_SHARE,
-        slots.CARDAN,
-        slots.CARDAN_ANGLE,
-        slots.CARDAN_SHARE,
-        slots.IMBALANCE,
-        slots.RESOLVER_ONCE,
-        slots.RESOLVER_TWICE,
-    ]
-)
+PERIODIC = np.array([slot(e.name, size) for e in catalogue.BUILT_IN.values() for size in e.phases.values()])
 """Amplitudes of the laws that are periodic in the motor's angle."""
-
-
-@once
-def motor_angle(record: Record) -> FloatArray:
-    """Return the motor angle by the record's own output, from 0 at its start; shape (N,) [rad].
-
-    Laws that are periodic in the angle take their phase from it. A simulated angle would drift off by whole radians
-    while a fit is still on its way.
-    """
-    if record.of is not None:
-        return motor_angle(record.of)
-    good = np.flatnonzero(record.okay)
-    output = np.interp(record.time_s, record.time_s[good], record.output[good])
-    if record.imposed is not None:
-        return np.asarray(record.imposed - record.imposed[0])
-    if record.kind is OutputKind.POSITION:
-        return np.asarray(output - output[0])
-    step = 0.5 * record.sample_time_s * (output[1:] + output[:-1])
-    return np.concatenate([[0.0], np.cumsum(step)])

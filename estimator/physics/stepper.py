@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from estimator.errors import BadModel
-from estimator.physics import own_law
 from estimator.physics.effects import transport_delay
 from estimator.physics.grid import substeps_for
 from estimator.physics.kernel import integration, sensing, state_vector
@@ -42,9 +41,9 @@ class Stepper:
     ) -> None:
         self._masses = MASSES[model.structure]
         self._p = flat(model)
-        if laws := own_law.active(self._p):
+        if laws := [law for law in model.laws if law.is_active(self._p)]:
             raise BadModel(
-                f"effects.{laws[0].name}: expected effects of the catalogue, came a law of your own, which a simulated "
+                f"effects.{laws[0]}: expected effects of the catalogue, came a law of your own, which a simulated "
                 "rig can't have. Take it out of the model file."
             )
         self._period_s = period_s

@@ -7,6 +7,8 @@ import functools
 import numpy as np
 from scipy.signal import lfilter
 
+from estimator.physics.acting import Place
+from estimator.physics.catalogue import BUILT_IN
 from estimator.physics.effects import torque_saturation
 from estimator.physics.layout import slot
 from estimator.signals.once import MOST_BYTES, once
@@ -21,7 +23,15 @@ _LIMIT_SUM = slot("torque_saturation", "limit_sum_nm")
 _DEPTH = slot("torque_derating", "depth")
 _DERATING_TIME = slot("torque_derating", "time_constant_s")
 _HEATED = slot("torque_derating", "heating_nm")
-_PATH = np.array([_GAIN_M1, _GAIN_M2, _LIMIT_M1, _LIMIT_M2, _SHARPNESS, _LIMIT_SUM, _DEPTH, _DERATING_TIME, _HEATED])
+_DECLARED = [
+    (e.acting.law, [slot(e.name, each.name) for each in e.parameters], e.parameters[0].null)
+    for e in BUILT_IN.values()
+    if e.acting is not None and e.acting.place is Place.TORQUE
+]
+"""Laws of entries at this place, where their parameters are, and at which value of the first they do nothing."""
+
+_WRITTEN = [_GAIN_M1, _GAIN_M2, _LIMIT_M1, _LIMIT_M2, _SHARPNESS, _LIMIT_SUM, _DEPTH, _DERATING_TIME, _HEATED]
+_PATH = np.array([*_WRITTEN, *(place for _, places, _ in _DECLARED for place in places)])
 """Where all stands that ``shaft_torque`` depends on."""
 
 
@@ -90,6 +100,9 @@ def shaft_torque_from(
         columns = [limited(torque, limit, p[_SHARPNESS]) for torque, limit in zip(torque_nm.T, limits, strict=False)]
         torque_nm = np.column_stack([*columns, torque_nm[:, limits.size :]])
     total: FloatArray = limited(functools.reduce(np.add, torque_nm.T), p[_LIMIT_SUM], p[_SHARPNESS])
+    for law, places, null in _DECLARED:
+        if p[places[0]] != null:
+            total = law(total, since_start_s, *p[places])
     if p[_DEPTH] == 0.0:
         return total, 0.0
     warm = warmth(total, since_start_s, period_s, p, begun)

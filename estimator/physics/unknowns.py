@@ -16,8 +16,7 @@ from estimator.physics.effect import Effect, EffectParameter, Held, Within
 from estimator.physics.effects import road_grade
 from estimator.physics.layout import LOAD, slot
 from estimator.physics.model import DrivelineModel, Structure, natural_frequencies_rad_s
-from estimator.physics.motion import measured_speed, speed_scale, torque_scale
-from estimator.physics.simulate import motor_angle
+from estimator.physics.motion import measured_speed, motor_angle, speed_scale, torque_scale
 from estimator.physics.start import Start
 from estimator.signals.record import FloatArray, OutputKind, Record
 
@@ -79,6 +78,7 @@ def effect_unknowns(name: str, model: DrivelineModel, records: Sequence[Record])
     What recordings have of their own starts at its null: phases and moments are found by a scan
     (``estimator.diagnosis.screening``).
     """
+    name = model.own(name)
     entry = EFFECTS[name]
     if entry.profile:
         return [Release((), tuple(_own_unknowns(entry, record) for record in records))]
@@ -131,9 +131,6 @@ def _own_unknowns(entry: Effect, record: Record) -> tuple[Shared, ...]:
 
 LOAD_TORQUE, TWIST, PRELOAD = 0, 1, 2
 """Where the constant load torque stands among a recording's own unknowns; a joint's twist at the start, and preload."""
-
-TELLS_REST = frozenset({"backlash", "stiffness_nonlinearity", "stiffness_change"})
-"""Effects with which it matters where a joint is without twist; without them the constant torque says as much."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -284,7 +281,8 @@ def shared_load(model: DrivelineModel, records: Sequence[Record]) -> Shared:
 
 def _joint_basis(record: Record, own: tuple[Shared, ...], effects: frozenset[str], has_own_load: bool) -> LocalBasis:
     """Set up the constant torque of a joint, its twist at the start and its preload, none until a fit knows better."""
-    held = (*(() if effects & TELLS_REST else (TWIST,)), *(() if "backlash" in effects else (PRELOAD,)))
+    shown = frozenset[str]().union(*(EFFECTS[name].shows_start for name in effects if name))
+    held = (*(() if "twist" in shown else (TWIST,)), *(() if "preload" in shown else (PRELOAD,)))
     twist = max(0.1 * float(np.ptp(motor_angle(record))), np.finfo(float).tiny)
     torque = 0.1 * torque_scale([record])
     scale = np.array([torque, twist, torque, *[1.0] * len(own)])

@@ -12,6 +12,7 @@ from typer.core import TyperCommand
 
 from hil.cli.dbc_option import Dbc, tell
 from hil.cli.importing import without_collecting
+from hil.cli.jobs_option import Jobs
 from hil.cli.silence import is_silent
 from hil.cli.trust_option import TrustLaws
 
@@ -66,6 +67,7 @@ def diagnose(
     ] = None,
     dbc: Dbc = None,
     trust_laws: TrustLaws = False,
+    jobs: Jobs = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print diagnosis.json instead of the summary.")] = False,
 ) -> None:
     """Say where simulation and recordings differ, and which physics the model left out.

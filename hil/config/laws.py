@@ -20,7 +20,8 @@ from pydantic import Field
 
 from estimator.errors import BadModel
 from estimator.physics.effect import Element
-from estimator.physics.own_law import OwnLaw, OwnParameter, install
+from estimator.physics.law_name import LawName
+from estimator.physics.own_law import OwnLaw, OwnParameter, named
 from hil.config.table import Table, Text
 from hil.errors import ModelFileError
 
@@ -50,8 +51,8 @@ class LawTable(Table):
     folder: Text = "."
 
 
-def install_laws(path: Path, tables: Mapping[str, LawTable], trust_laws: bool) -> None:
-    """Make the laws of a model file, and those of installed packages, the user's laws of this process.
+def laws_of(path: Path, tables: Mapping[str, LawTable], trust_laws: bool) -> tuple[LawName, ...]:
+    """Return the laws of a model file and those of installed packages, for the model of that file alone.
 
     Raises
     ------
@@ -69,11 +70,12 @@ def install_laws(path: Path, tables: Mapping[str, LawTable], trust_laws: bool) -
         except BadModel as error:
             problems += str(error).splitlines()
     try:
-        install([*laws, *_offered()])
+        names = named([*laws, *_offered()])
     except BadModel as error:
         problems += str(error).splitlines()
     if problems:
         raise ModelFileError(path, *problems)
+    return names
 
 
 def moved(tables: Mapping[str, LawTable], path: Path) -> dict[str, LawTable]:

@@ -20,9 +20,10 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from tomlkit.items import InlineTable, Table
 
 from estimator.errors import BadModel
+from estimator.physics.law_name import LawName
 from estimator.physics.model import DrivelineModel, EffectValue, Load, Motion, Parameter, Structure, parameter_unit
 from hil.config.file_schema import FileKind, schema_line
-from hil.config.laws import LawTable, install_laws, moved
+from hil.config.laws import LawTable, laws_of, moved
 from hil.config.problems import Fault, problem_lines, read_toml, refuse
 from hil.errors import ModelFileError
 from hil.recording import columns
@@ -104,7 +105,7 @@ class ModelFile:
 
 
 def read_model(path: Path | str, trust_laws: bool = False) -> ModelFile:
-    """Read a model file; its own laws become those of this process, in place of any before (``own_law.install``).
+    """Read a model file; its own laws are the model's, and no other model has them.
 
     Parameters
     ----------
@@ -126,14 +127,14 @@ def read_model(path: Path | str, trust_laws: bool = False) -> ModelFile:
         document = ModelDocument.model_validate(content)
     except ValidationError as error:
         problems += problem_lines(ModelDocument, error)
-    named = {} if document is None else document.laws
+    laws: tuple[LawName, ...] = ()
     try:
-        install_laws(path, named, trust_laws)
+        laws = laws_of(path, {} if document is None else document.laws, trust_laws)
     except ModelFileError as error:
         problems += error.problems
     known = {} if document is not None and trust_laws else _table(content.get("laws"))
     try:
-        model = _model(content, without=known)
+        model = _model(content, laws, without=known)
     except BadModel as error:
         problems += str(error).splitlines()
     if document is None or model is None or problems:
@@ -188,7 +189,9 @@ def write_model(
         part.unlink(missing_ok=True)
 
 
-def _model(content: Mapping[str, Any], without: Collection[str] = ()) -> DrivelineModel | None:
+def _model(
+    content: Mapping[str, Any], laws: tuple[LawName, ...], without: Collection[str] = ()
+) -> DrivelineModel | None:
     """Build the model from what is usable of a file's tables; None where not even the structure is known.
 
     ``without`` names effects that can't be checked, since the laws they are of could not be read.
@@ -210,6 +213,7 @@ def _model(content: Mapping[str, Any], without: Collection[str] = ()) -> Driveli
         },
         gear_ratio=_number(content.get("geometry"), "gear_ratio", None),
         load=_load(content.get("load")),
+        laws=laws,
     )
 
 

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
 from importlib.metadata import EntryPoint
 from pathlib import Path
 from types import ModuleType
 
 import pytest
 
-from estimator.physics import own_law
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
 from estimator.physics.own_law import OwnLaw, OwnParameter
@@ -29,13 +27,11 @@ LAW = OwnLaw(
 
 
 @pytest.fixture
-def package(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def package(monkeypatch: pytest.MonkeyPatch) -> None:
     """A package that offers a law, a thing that is none, and one that isn't there."""
     module = ModuleType("a_package_of_laws")
     module.law, module.thing = LAW, 3  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, module.__name__, module)
-    yield
-    own_law.install(())
 
 
 def offer(monkeypatch: pytest.MonkeyPatch, value: str) -> None:
@@ -47,8 +43,9 @@ def offer(monkeypatch: pytest.MonkeyPatch, value: str) -> None:
 
 def test_an_installed_law_takes_part_in_every_model(package: None, monkeypatch: pytest.MonkeyPatch) -> None:
     offer(monkeypatch, "a_package_of_laws:law")
-    read_model(EXAMPLE)
-    assert "offered" in EFFECTS
+    model = read_model(EXAMPLE).model
+    assert model.laws == ("offered",)
+    assert EFFECTS[model.laws[0]].element is Element.MOTOR
 
 
 @pytest.mark.parametrize(

@@ -51,7 +51,7 @@ def drag(name: str, speeds: FloatArray) -> Callable[[Values], Curve]:
         for label, effects in (("without", {}), ("with", {name: values})):
             p = flat_values(BUS, effects)
             now = conditions.conditions(2, 0.0, 1e-3, 0.0, 0.0, 0.05, p)
-            lines.append((label, speeds, np.array([rates.load_drag(w, w, now, p) for w in speeds])))
+            lines.append((label, speeds, np.array([rates.load_friction(w, w, now, p) for w in speeds])))
         return Curve("load speed [rad/s]", "drag [Nm]", tuple(lines))
 
     return curve

@@ -54,7 +54,14 @@ def extended(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_the_page_has_an_example_of_each_kind() -> None:
     assert len(TRIALS) == 4
-    assert sum(block.language == "diff" for block in EXTEND) == 6
+    assert sum(block.language == "diff" for block in EXTEND) == 4
+
+
+def test_the_effect_of_the_page_takes_one_file_and_two_lines() -> None:
+    mine = [block for block in EXTEND if block.title and "physics" in block.title]
+    added = [line for block in mine if block.language == "diff" for line in block.text.splitlines() if line[:1] == "+"]
+    assert sum(block.language != "diff" for block in mine) == 1
+    assert len(added) == 2
 
 
 @pytest.mark.parametrize("number", range(len(TRIALS)), ids=["effect", "law", "experiment", "format"])
@@ -71,7 +78,7 @@ def test_the_example_runs_as_printed(extended: Path, number: int) -> None:
 
 def test_the_copy_is_what_runs(extended: Path) -> None:
     """Without this the examples might be tried on the installed packages, which lack them."""
-    program = "import estimator.physics.catalogue as c; print(c.__file__); print('eddy_current_drag' in c.EFFECTS)"
+    program = "import estimator.physics.catalogue as c; print(c.__file__); print('pump_drag' in c.EFFECTS)"
     done = subprocess.run([sys.executable, "-c", program], cwd=extended, capture_output=True, text=True, check=True)
     file, known = done.stdout.splitlines()
     assert Path(file).is_relative_to(extended)
@@ -81,4 +88,4 @@ def test_the_copy_is_what_runs(extended: Path) -> None:
 def test_the_shipped_catalogue_has_not_been_touched() -> None:
     from estimator.physics.catalogue import EFFECTS
 
-    assert "eddy_current_drag" not in EFFECTS
+    assert "pump_drag" not in EFFECTS

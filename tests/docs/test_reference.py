@@ -15,7 +15,6 @@ from estimator.diagnosis import holdout
 from estimator.diagnosis.diagnose import BUDGET_S
 from estimator.diagnosis.inference import calibration, plausible, unnamed
 from estimator.diagnosis.where import locate
-from estimator.physics import own_law
 from hil.cli.main import ExitStatus
 from hil.config.experiment_tables import AnyExperiment
 from hil.config.model_file import read_model
@@ -124,7 +123,6 @@ def test_a_shown_model_file_is_one(page: Path, model: str, tmp_path: Path) -> No
             (tmp_path / block.title).write_text(block.text, encoding="utf-8")
     path.write_text(model, encoding="utf-8")
     assert read_model(path, trust_laws=True).model.parameters
-    own_law.install(())
 
 
 def test_the_shown_signals_are_read(tmp_path: Path) -> None:

@@ -191,7 +191,7 @@ ROWS = [
     _row("backlash", "backlash"),
     _row("backlash", "stiffness_nonlinearity", outcome="wrong", success=False),
     _row("none", group="none", verdict="no_mismatch", element_right=None),
-    _row("maxwell_shaft", group="outside", verdict="unexplained", outcome="abstained"),
+    _row("speed_stiffened_shaft", group="outside", verdict="unexplained", outcome="abstained"),
     _row("backlash+road_grade", "backlash", group="pairs", outcome="incomplete", success=False),
 ]
 
@@ -201,7 +201,7 @@ def test_the_matrix_counts_the_strongest_name_or_none():
     assert matrix == {
         "backlash": Counter({"backlash": 1, "stiffness_nonlinearity": 1}),
         "none": Counter({"(no mismatch)": 1}),
-        "maxwell_shaft": Counter({"(no name)": 1}),
+        "speed_stiffened_shaft": Counter({"(no name)": 1}),
     }
     assert columns(matrix) == ["backlash", "stiffness_nonlinearity", "(no mismatch)", "(no name)"]
 

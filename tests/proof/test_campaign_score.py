@@ -53,9 +53,9 @@ def _scored(name, answer, **events):
         ("backlash+road_grade", _answer("explained", _entry("backlash")), "incomplete", False),
         ("none", _answer("no_mismatch"), "right", True),
         ("off", _answer("explained", _entry("backlash")), "invented", False),
-        ("maxwell_shaft", _answer("unexplained"), "abstained", True),
-        ("maxwell_shaft", _answer("explained", _entry("backlash")), "wrong", False),
-        ("maxwell_shaft", _answer("no_mismatch"), "missed", False),
+        ("speed_stiffened_shaft", _answer("unexplained"), "abstained", True),
+        ("speed_stiffened_shaft", _answer("explained", _entry("backlash")), "wrong", False),
+        ("speed_stiffened_shaft", _answer("no_mismatch"), "missed", False),
     ],
 )
 def test_each_group_has_its_right_answer(planted, answer, outcome, success):
@@ -65,7 +65,7 @@ def test_each_group_has_its_right_answer(planted, answer, outcome, success):
 
 def test_the_right_columns_are_those_of_a_success():
     assert right_columns(kind("none")) == right_columns(kind("off")) == {"(no mismatch)"}
-    assert right_columns(kind("maxwell_shaft")) == {"(no name)"}
+    assert right_columns(kind("speed_stiffened_shaft")) == {"(no name)"}
     assert right_columns(kind("backlash")) == {"backlash"}
     assert right_columns(kind("speed_filter")) == {"speed_filter", "actuator_lag"}
 
@@ -150,9 +150,9 @@ def test_a_size_without_counterpart_in_this_draw_is_not_compared():
 
 def test_kinds_are_groups_names_and_pairs():
     assert [kind.name for kind in parse_kinds("none,off,backlash,none")] == ["none", "off", "backlash"]
-    assert len(parse_kinds("single")) == 32
+    assert len(parse_kinds("single")) == 38
     assert {kind.group for kind in parse_kinds("all")} == set(Group)
-    assert len(parse_kinds("outside")) >= 6
+    assert len(parse_kinds("outside")) >= 8
     assert parse_kinds("none")[0].nominal_error == 0.0 < parse_kinds("off")[0].nominal_error
     with pytest.raises(UsageError, match="'blacklash': expected one of"):
         parse_kinds("blacklash")

@@ -35,7 +35,7 @@ CASES = [
         Outcome.RIGHT,
     ),
     ("backlash+road_grade", _diagnosis("explained", _effect("backlash")), Outcome.INCOMPLETE),
-    ("maxwell_shaft", _diagnosis("unexplained"), Outcome.ABSTAINED),
+    ("speed_stiffened_shaft", _diagnosis("unexplained"), Outcome.ABSTAINED),
 ]
 
 

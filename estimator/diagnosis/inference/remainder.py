@@ -16,8 +16,7 @@ from estimator.diagnosis.inference.calibration import TEST_LIMITS
 from estimator.diagnosis.inference.disturbances import Size
 from estimator.diagnosis.inference.likelihood import Hypothesis, residuals
 from estimator.diagnosis.noise import PREDICTOR_ORDER, unpredictable
-from estimator.physics.motion import measured_speed
-from estimator.physics.simulate import motor_angle
+from estimator.physics.motion import measured_speed, motor_angle
 from estimator.signals.record import FloatArray, Record
 
 BINS = 12

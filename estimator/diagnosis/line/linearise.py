@@ -6,6 +6,7 @@ import numpy as np
 
 from estimator.diagnosis.line.differences import Nudges, Setting, linearise
 from estimator.diagnosis.line.tangent import Tangent
+from estimator.physics.acting import Place
 from estimator.physics.catalogue import BUILT_IN
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
@@ -13,9 +14,9 @@ from estimator.physics.kernel import slots, state_vector
 from estimator.physics.kernel.line import is_bristled_at_load, is_bristled_at_motor
 from estimator.physics.layout import LOAD, slot
 from estimator.physics.model import Structure, natural_frequencies_rad_s
-from estimator.physics.motion import speed_scale, torque_scale
+from estimator.physics.motion import motor_angle, speed_scale, torque_scale
 from estimator.physics.problem import start_of
-from estimator.physics.simulate import MASSES, motor_angle, output_state
+from estimator.physics.simulate import MASSES, output_state
 from estimator.physics.start import initial_state
 from estimator.physics.torque_path import shaft_torque
 from estimator.signals.record import FloatArray, OutputKind, Record
@@ -121,30 +122,41 @@ _NONLINEAR = tuple(
 """Decisive parameter of each effect that changes how the line answers to a torque behind the torque path."""
 
 
+_BY_ANGLE = [
+    slot(entry.name, entry.parameters[0].name)
+    for entry in BUILT_IN.values()
+    if entry.acting is not None and entry.acting.place is Place.LOAD_ANGLE
+]
+"""Sizes of the laws by which the motion depends on where it is."""
+
+
 def is_linear(p: FloatArray) -> bool:
     """Tell whether a parameter vector is that of a linear line that does not change with time."""
     return all(p[i] == null for i, null in _NONLINEAR)
 
 
+_MOVED_BY = {
+    slots.SLIDER: (state_vector.State._fields.index("loading"),),
+    slots.SLIP: (state_vector.VEHICLE_SPEED,),
+    slots.RELAXING: (state_vector.RELAXING,),
+    slots.BRANCH_INERTIA: (state_vector.BRANCH_TWIST, state_vector.BRANCH_SPEED),
+    slots.FILTER: (state_vector.FILTERED,),
+    slots.FILTER_SHAPE: (state_vector.FILTER_RISE,),
+}
+"""States that a law has of its own, by its size."""
+
+
 def active_states(structure: Structure, p: FloatArray, kind: OutputKind) -> tuple[int, ...]:
     """Return which entries of the kernel's state can move the output of a model."""
-    states = [state_vector.ANGLE] if kind is OutputKind.POSITION else []
+    held = (p[_BY_ANGLE] != 0.0).any()
+    states = [state_vector.ANGLE] if kind is OutputKind.POSITION or held else []
     states.append(state_vector.SPEED)
     if structure is not Structure.ONE_MASS:
         states += [state_vector.TWIST, state_vector.LOAD_SPEED]
     names = state_vector.State._fields
     if structure is Structure.THREE_MASS:
         states += [names.index("middle_twist"), names.index("middle_speed")]
-    if p[slots.SLIDER] != 0.0:
-        states.append(names.index("loading"))
-    if p[slots.SLIP] > 0.0:
-        states.append(names.index("vehicle_speed"))
-    if p[slots.BRANCH_INERTIA] > 0.0:
-        states += [names.index("branch_twist"), names.index("branch_speed")]
-    if p[slots.FILTER] > 0.0:
-        states.append(state_vector.FILTERED)
-    if p[slots.FILTER_SHAPE] > 0.0:
-        states.append(state_vector.FILTER_RISE)
+    states += [state for size, moved in _MOVED_BY.items() if p[size] > 0.0 for state in moved]
     if is_bristled_at_motor(p):
         states.append(state_vector.BRISTLES_MOTOR)
     if is_bristled_at_load(p):
@@ -161,5 +173,5 @@ def _scales(result: FitResult, states: tuple[int, ...]) -> FloatArray:
     sizes = dict.fromkeys(range(state_vector.STATES), speed)
     sizes |= {names.index(name): twist for name in ("twist", "branch_twist", "middle_twist")}
     sizes |= {names.index("loading"): 1.0, state_vector.ANGLE: 1.0}
-    sizes |= dict.fromkeys((state_vector.BRISTLES_MOTOR, state_vector.BRISTLES_LOAD), torque)
+    sizes |= dict.fromkeys((state_vector.RELAXING, state_vector.BRISTLES_MOTOR, state_vector.BRISTLES_LOAD), torque)
     return np.array([sizes[state] for state in states])

@@ -13,8 +13,9 @@ from estimator.physics.fit import FitResult
 from estimator.physics.inputs import Case
 from estimator.physics.kernel import state_vector
 from estimator.physics.model import Structure
+from estimator.physics.motion import motor_angle
 from estimator.physics.problem import Problem, local_part, parameters
-from estimator.physics.simulate import motor_angle, simulate_each
+from estimator.physics.simulate import simulate_each
 from estimator.signals.record import FloatArray, Record
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from estimator.diagnosis.unnamed.candidates import Pool
 from estimator.diagnosis.unnamed.ground import Ground
-from estimator.physics.parallel import WORKERS, concurrently
+from estimator.physics.parallel import PARTS, concurrently
 from estimator.signals.correlation import effective_samples
 from estimator.signals.record import FloatArray, IntArray
 
@@ -130,8 +130,8 @@ def _products(pool: Pool, ground: Ground) -> tuple[FloatArray, FloatArray, Float
     Rows are taken in chunks: the answers of a long recording fill the memory once, and not once more for what is left.
     """
     seen = pool.answers @ ground.basis
-    halves = np.array_split(np.arange(0, ground.error.size, CHUNK), WORKERS)
-    parts = concurrently(lambda firsts: _summed(pool, ground, seen, firsts), halves)
+    shares = np.array_split(np.arange(0, ground.error.size, CHUNK), PARTS)
+    parts = concurrently(lambda firsts: _summed(pool, ground, seen, firsts), shares)
     before, gram, match = (np.sum(each, axis=0) for each in zip(*parts, strict=True))
     after = np.diag(gram)
     alive = after > ALIKE * np.maximum(before, np.finfo(float).tiny)

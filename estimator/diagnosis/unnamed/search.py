@@ -85,7 +85,7 @@ def unnamed_laws(result: FitResult, rounds: int = 1) -> list[UnnamedLaw]:
 
 
 def each_of(result: FitResult, search: Callable[[Item], Found], items: Sequence[Item]) -> list[Found]:
-    """Search for laws in what a fit leaves in several ways: on both cores, or in turn where each takes much room."""
+    """Search for laws in what a fit leaves in several ways: on all cores, or in turn where each takes much room."""
     return (concurrently if result.residual.size <= MOST_AT_ONCE else in_turn)(search, items)
 
 

@@ -81,7 +81,7 @@ def effects_added(retuned: FitResult, final: FitResult) -> tuple[str, ...]:
     """Return the effects with shared parameters that a fit has beyond another, in the catalogue's order."""
     before = {shared.effect for shared in retuned.problem.shared}
     after = {shared.effect for shared in final.problem.shared}
-    return tuple(name for name in EFFECTS if name in after - before)
+    return tuple(name for name in (*EFFECTS, *final.problem.grid.laws) if name in after - before)
 
 
 def _equivalents(view: Scene, motion: model.Motion) -> tuple[Equivalent, ...]:

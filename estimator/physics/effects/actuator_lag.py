@@ -64,7 +64,6 @@ EFFECT = Effect(
     structures=EVERY_LINE,
     resembles=("transport_delay", "extra_torsional_mode", "speed_filter"),
     equivalent=("speed_filter",),
-    contains=(),
     scales=low_pass.scales,
     starts=low_pass.starts,
     sentence=sentence,

@@ -4,16 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from estimator.compiled import compiled
+from estimator.physics.acting import Acting, Place
 from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element
 from estimator.physics.effects import quadratic_friction
 from estimator.physics.model import Motion, unit
-
-
-@compiled
-def law(speed: float, drag: float) -> float:
-    """Return the drag ``q w |w|`` against the motion [Nm]."""
-    return drag * speed * abs(speed)
 
 
 def sentence(values: Mapping[str, float], motion: Motion) -> str:
@@ -30,10 +24,9 @@ EFFECT = Effect(
     source="Gillespie, Fundamentals of Vehicle Dynamics, SAE 1992",
     excited_by="a wide range of speeds, high ones among them",
     parameters=(EffectParameter("drag_nm_s2", "quadratic_drag", 0.0, 0.0, 40.0, "torque per speed squared: q"),),
+    acting=Acting(Place.LOAD, quadratic_friction.law),
     structures=EVERY_LINE,
     resembles=("quadratic_friction", "road_grade"),
-    equivalent=(),
-    contains=(),
     scales=quadratic_friction.scales,
     starts=quadratic_friction.starts,
     testable=quadratic_friction.testable,

@@ -90,11 +90,10 @@ EFFECT = Effect(
         "stiffness_change",
         "shaft_hysteresis",
     ),
-    equivalent=(),
-    contains=(),
     scales=scales,
     starts=starts,
     testable=testable,
     sentence=sentence,
     completed=completed,
+    shows_start=frozenset({"twist", "preload"}),
 )

@@ -52,12 +52,11 @@ EFFECT = Effect(
     ),
     structures=EVERY_LINE,
     resembles=("generator_coupled", "coulomb_friction_load", "road_grade"),
-    equivalent=(),
-    contains=(),
     event=True,
     permanent="coulomb_friction_load",
     scales=scales,
     starts=starts,
     retold=retold,
     sentence=sentence,
+    linear=True,
 )

@@ -57,11 +57,10 @@ EFFECT = Effect(
     ),
     structures=WITH_SHAFT,
     resembles=("torque_ripple", "load_imbalance", "resolver_error"),
-    equivalent=(),
-    contains=(),
     phases={"phase_rad": "amplitude_nm", "angle_phase_rad": "angle_rad", "share_phase_rad": "share"},
     scales=scales,
     starts=starts,
     testable=testable,
     sentence=sentence,
+    waving=True,
 )

@@ -57,11 +57,11 @@ EFFECT = Effect(
     parameters=(EffectParameter("rate", "", 0.0, -20.0, 20.0, "relative difference of the rates: r"),),
     structures=EVERY_LINE,
     resembles=("transport_delay", "sample_jitter"),
-    equivalent=(),
-    contains=(),
     scales=scales,
     starts=starts,
     unresolved=unresolved,
     sentence=sentence,
     rescaled=rescaled,
+    linear=True,
+    timed=True,
 )

@@ -64,11 +64,10 @@ EFFECT = Effect(
     parameters=(EffectParameter("friction_nm", "torque", 0.0, 0.0, 40.0, "friction torque T_c"), PRESLIDING),
     structures=WITH_SHAFT,
     resembles=("coulomb_friction_motor", "stribeck_friction", "brake_drag"),
-    equivalent=(),
-    contains=(),
     scales=scales,
     starts=starts,
     testable=testable,
     retold=retold,
     sentence=sentence,
+    linear=True,
 )

@@ -62,11 +62,10 @@ EFFECT = Effect(
     ),
     structures=EVERY_LINE,
     resembles=("stribeck_friction", "quadratic_friction", "backlash", "shaft_hysteresis", "coulomb_friction_load"),
-    equivalent=(),
-    contains=(),
     scales=scales,
     starts=starts,
     testable=testable,
     retold=retold,
     sentence=sentence,
+    linear=True,
 )

@@ -179,8 +179,6 @@ EFFECT = Effect(
     ),
     structures=WITH_SHAFT,
     resembles=("actuator_lag", "stiffness_nonlinearity", "tyre_slip", "speed_filter"),
-    equivalent=(),
-    contains=(),
     scales=scales,
     starts=starts,
     sentence=sentence,

@@ -38,10 +38,9 @@ EFFECT = Effect(
     ),
     structures=EVERY_LINE,
     resembles=("stiffness_change", "brake_drag", "inertia_change"),
-    equivalent=(),
-    contains=(),
     event=True,
     scales=scales,
     starts=starts,
     sentence=sentence,
+    linear=True,
 )

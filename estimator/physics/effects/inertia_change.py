@@ -46,12 +46,11 @@ EFFECT = Effect(
     ),
     structures=EVERY_LINE,
     resembles=("generator_coupled", "road_grade"),
-    equivalent=(),
-    contains=(),
     event=True,
     step=Step(load_inertia),
     scales=scales,
     starts=starts,
     sentence=sentence,
     described=described,
+    linear=True,
 )

@@ -65,11 +65,10 @@ EFFECT = Effect(
     ),
     structures=EVERY_LINE,
     resembles=("torque_derating", "torque_saturation"),
-    equivalent=(),
-    contains=(),
     scales=scales,
     starts=starts,
     testable=testable,
     sentence=sentence,
     rescaled=rescaled,
+    linear=True,
 )

@@ -49,11 +49,10 @@ EFFECT = Effect(
     ),
     structures=EVERY_LINE,
     resembles=("torque_ripple", "cardan_second_order", "road_grade"),
-    equivalent=(),
-    contains=(),
     phases={"phase_rad": "amplitude_nm"},
     scales=scales,
     starts=starts,
     testable=testable,
     sentence=sentence,
+    waving=True,
 )

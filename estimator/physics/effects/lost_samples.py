@@ -26,8 +26,6 @@ EFFECT = Effect(
     parameters=(EffectParameter("share", "", 0.0, 0.0, 1.0, "share of lost rows", most=1.0),),
     structures=EVERY_STRUCTURE,
     resembles=(),
-    equivalent=(),
-    contains=(),
     sentence=sentence,
     recognised=True,
 )

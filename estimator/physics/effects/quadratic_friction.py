@@ -4,10 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from estimator.compiled import compiled
+from estimator.physics.acting import Acting, Place
 from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start, Untestable
 from estimator.physics.model import DrivelineModel, Motion, unit
 from estimator.physics.motion import speed_scale, speeds_differ, torque_scale
 from estimator.signals.record import Record
+
+
+@compiled
+def law(speed: float, drag: float) -> float:
+    """Return the drag ``q w |w|`` against the motion [Nm]."""
+    return drag * speed * abs(speed)
 
 
 def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
@@ -41,10 +49,9 @@ EFFECT = Effect(
     source="fan and windage loss: Pyrhönen, Jokinen, Hrabovcová, Design of Rotating Electrical Machines, 2014",
     excited_by="a wide range of speeds",
     parameters=(EffectParameter("quadratic_nm_s2", "quadratic_drag", 0.0, 0.0, 40.0, "torque per speed squared: q"),),
+    acting=Acting(Place.MOTOR, law),
     structures=EVERY_LINE,
     resembles=("coulomb_friction_motor", "aerodynamic_drag"),
-    equivalent=(),
-    contains=(),
     scales=scales,
     starts=starts,
     testable=testable,

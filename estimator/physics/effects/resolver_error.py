@@ -76,11 +76,10 @@ EFFECT = Effect(
     ),
     structures=EVERY_LINE,
     resembles=("torque_ripple", "cardan_second_order", "speed_sign_blind"),
-    equivalent=(),
-    contains=(),
     kinds=frozenset({OutputKind.SPEED}),
     phases={"once_phase_rad": "once_rad", "twice_phase_rad": "twice_rad"},
     scales=scales,
     starts=starts,
     sentence=sentence,
+    linear=True,
 )

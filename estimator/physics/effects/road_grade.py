@@ -89,8 +89,6 @@ EFFECT = Effect(
         "inertia_change",
         "warming_friction",
     ),
-    equivalent=(),
-    contains=(),
     scales=scales,
     starts=starts,
     testable=testable,

@@ -68,8 +68,6 @@ EFFECT = Effect(
     ),
     structures=WITH_SPRING,
     resembles=("coulomb_friction_motor", "backlash", "stiffness_nonlinearity"),
-    equivalent=(),
-    contains=(),
     scales=scales,
     starts=starts,
     sentence=sentence,

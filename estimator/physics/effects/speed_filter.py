@@ -51,7 +51,6 @@ EFFECT = Effect(
     structures=EVERY_LINE,
     resembles=("actuator_lag", "transport_delay", "extra_torsional_mode"),
     equivalent=("actuator_lag",),
-    contains=(),
     kinds=frozenset({OutputKind.SPEED}),
     scales=low_pass.scales,
     starts=low_pass.starts,

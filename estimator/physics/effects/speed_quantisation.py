@@ -27,9 +27,8 @@ EFFECT = Effect(
     parameters=(EffectParameter("step_rad_s", "speed", 0.0, 0.0, float("inf"), "step q"),),
     structures=EVERY_LINE,
     resembles=(),
-    equivalent=(),
-    contains=(),
     sentence=sentence,
     kinds=frozenset({OutputKind.SPEED}),
     recognised=True,
+    linear=True,
 )

@@ -57,12 +57,11 @@ EFFECT = Effect(
     parameters=(EffectParameter("share", "", 0.0, 0.0, 1.0, "share of the magnitude: s", most=1.0),),
     structures=EVERY_LINE,
     resembles=("resolver_error",),
-    equivalent=(),
-    contains=(),
     kinds=frozenset({OutputKind.SPEED}),
     scales=scales,
     starts=starts,
     testable=testable,
     sentence=sentence,
     implausible=implausible,
+    linear=True,
 )

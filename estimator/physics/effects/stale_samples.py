@@ -26,8 +26,6 @@ EFFECT = Effect(
     parameters=(EffectParameter("share", "", 0.0, 0.0, 1.0, "share of stale rows", most=1.0),),
     structures=EVERY_STRUCTURE,
     resembles=("transport_delay",),
-    equivalent=(),
-    contains=(),
     sentence=sentence,
     recognised=True,
 )

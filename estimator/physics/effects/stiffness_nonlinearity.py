@@ -87,11 +87,10 @@ EFFECT = Effect(
     ),
     structures=WITH_SPRING,
     resembles=("torque_saturation", "backlash", "stiffness_change", "shaft_hysteresis", "extra_torsional_mode"),
-    equivalent=(),
-    contains=(),
     scales=scales,
     starts=starts,
     sentence=sentence,
     retold=retold,
     loosens=frozenset({"k", "c"}),  # of an oscillation whose frequency goes with its size a linear line damps the beats
+    shows_start=frozenset({"twist"}),
 )

@@ -78,11 +78,11 @@ EFFECT = Effect(
     ),
     structures=EVERY_LINE,
     resembles=("coulomb_friction_motor", "backlash", "coulomb_friction_load"),
-    equivalent=(),
     contains=("coulomb_friction_motor",),
     scales=scales,
     starts=starts,
     testable=testable,
     retold=retold,
     sentence=sentence,
+    linear=True,
 )

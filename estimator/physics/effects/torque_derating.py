@@ -70,11 +70,10 @@ EFFECT = Effect(
     ),
     structures=EVERY_LINE,
     resembles=("inverter_gain_mismatch", "road_grade", "warming_friction"),
-    equivalent=(),
-    contains=(),
     scales=scales,
     starts=starts,
     retold=retold,
     sentence=sentence,
     implausible=implausible,
+    linear=True,
 )

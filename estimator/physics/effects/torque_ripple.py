@@ -63,11 +63,10 @@ EFFECT = Effect(
     ),
     structures=EVERY_LINE,
     resembles=("cardan_second_order", "load_imbalance", "resolver_error"),
-    equivalent=(),
-    contains=(),
     phases={"phase_rad": "amplitude_nm", "share_phase_rad": "share"},
     scales=scales,
     starts=starts,
     testable=testable,
     sentence=sentence,
+    waving=True,
 )

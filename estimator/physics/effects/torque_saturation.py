@@ -58,9 +58,8 @@ EFFECT = Effect(
     ),
     structures=EVERY_LINE,
     resembles=("inverter_gain_mismatch", "stiffness_nonlinearity"),
-    equivalent=(),
-    contains=(),
     scales=scales,
     starts=starts,
     sentence=sentence,
+    linear=True,
 )

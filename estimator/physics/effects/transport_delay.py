@@ -63,8 +63,6 @@ EFFECT = Effect(
     ),
     structures=EVERY_LINE,
     resembles=("actuator_lag", "speed_filter", "stale_samples", "clock_drift"),
-    equivalent=(),
-    contains=(),
     scales=scales,
     starts=starts,
     sentence=sentence,

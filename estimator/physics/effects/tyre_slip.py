@@ -122,8 +122,6 @@ EFFECT = Effect(
     ),
     structures=WITH_SHAFT,
     resembles=("extra_torsional_mode",),
-    equivalent=(),
-    contains=(),
     loosens=frozenset({"k", "c"}),  # a carcass is a spring behind the shaft, and the tread damps its oscillation
     scales=scales,
     starts=starts,

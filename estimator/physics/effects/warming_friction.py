@@ -60,10 +60,10 @@ EFFECT = Effect(
     ),
     structures=EVERY_LINE,
     resembles=("torque_derating", "road_grade"),
-    equivalent=(),
-    contains=(),
     scales=scales,
     starts=starts,
     sentence=sentence,
     described=described,
+    waving=True,
+    timed=True,
 )

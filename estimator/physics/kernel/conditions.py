@@ -4,37 +4,60 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from estimator.abreast import choose, every, like, some
 from estimator.compiled import inlined
+from estimator.physics.catalogue import BUILT_IN
 from estimator.physics.effects import extra_torsional_mode, warming_friction
 from estimator.physics.kernel import slots
+from estimator.physics.kernel.declared import over_recorded_angle
 from estimator.physics.kernel.line import is_within
 from estimator.physics.kernel.state_vector import Conditions, Tyre
 from estimator.physics.laws import inertia_while, overtoned_wave, share_inside, wave
+from estimator.physics.layout import slot
 from estimator.signals.record import FloatArray
 
 STICK_STABILITY = 1.5
 """Runge-Kutta is stable to h * slope / J = 2.78; friction's slope at standstill is held to about half of it."""
 
 
+WAVING = np.array(
+    [
+        slot(entry.name, name)
+        for entry in BUILT_IN.values()
+        if entry.waving
+        for name in entry.phases.values() or [entry.parameters[0].name]
+    ]
+)
+"""Sizes of the laws over the angle, or over the time."""
+
+EVENTS = np.array(
+    [
+        [slot(entry.name, name) for name in (entry.parameters[0].name, "from_s", "to_s")]
+        for entry in BUILT_IN.values()
+        if entry.event
+    ]
+)
+"""Size and both moments of each event."""
+
+
 @inlined
 def is_waving(p: FloatArray) -> bool:
     """Tell whether the conditions change all the time: by a law over the angle, or over time."""
-    ripples = p[slots.RIPPLE] != 0.0 or p[slots.RIPPLE_SHARE] != 0.0 or p[slots.IMBALANCE] != 0.0
-    joints = p[slots.CARDAN] != 0.0 or p[slots.CARDAN_ANGLE] != 0.0 or p[slots.CARDAN_SHARE] != 0.0
-    return bool(ripples or joints or p[slots.WARMING] != 0.0)
+    for i in range(WAVING.size):
+        if p[WAVING[i]] != 0.0:
+            return True
+    return False
 
 
 @inlined
 def is_changing(begin_s: float, end_s: float, p: FloatArray) -> bool:
     """Tell whether an event begins or ends between two times."""
-    generator = some(p[slots.GENERATOR] != 0.0) and is_edge(
-        begin_s, end_s, p[slots.GENERATOR_FROM], p[slots.GENERATOR_TO]
-    )
-    crack = some(p[slots.CRACK] != 0.0) and is_edge(begin_s, end_s, p[slots.CRACK_FROM], p[slots.CRACK_TO])
-    payload = some(p[slots.PAYLOAD] != 0.0) and is_edge(begin_s, end_s, p[slots.PAYLOAD_FROM], p[slots.PAYLOAD_TO])
-    brake = some(p[slots.BRAKE] != 0.0) and is_edge(begin_s, end_s, p[slots.BRAKE_FROM], p[slots.BRAKE_TO])
-    return generator or crack or payload or brake
+    for i in range(EVENTS.shape[0]):
+        if some(p[EVENTS[i, 0]] != 0.0) and is_edge(begin_s, end_s, p[EVENTS[i, 1]], p[EVENTS[i, 2]]):
+            return True
+    return False
 
 
 @inlined
@@ -78,7 +101,7 @@ def conditions(
     ripple = overtoned_wave(p[slots.RIPPLE], turned, p[slots.RIPPLE_PHASE], *overtone)
     torque_factor = 1.0 + overtoned_wave(p[slots.RIPPLE_SHARE], turned, p[slots.RIPPLE_SHARE_PHASE], *overtone)
     rolled, oval = angle / p[slots.IMBALANCE_RATIO], (p[slots.IMBALANCE_IN_STEP], p[slots.IMBALANCE_ACROSS])
-    load += overtoned_wave(p[slots.IMBALANCE], rolled, p[slots.IMBALANCE_PHASE], *oval)
+    load += over_recorded_angle(angle, p) + overtoned_wave(p[slots.IMBALANCE], rolled, p[slots.IMBALANCE_PHASE], *oval)
     cardan = wave(p[slots.CARDAN], 2.0 * angle, p[slots.CARDAN_PHASE])
     shaft_factor = 1.0 + wave(p[slots.CARDAN_SHARE], 2.0 * angle, p[slots.CARDAN_SHARE_PHASE])
     joint_angle = wave(p[slots.CARDAN_ANGLE], 2.0 * angle, p[slots.CARDAN_ANGLE_PHASE])

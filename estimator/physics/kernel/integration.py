@@ -39,20 +39,13 @@ from estimator.physics.kernel.state_vector import (
     Bristles,
     Conditions,
     State,
+    unpacked,
 )
 from estimator.physics.low_pass import low_pass
 from estimator.signals.record import FloatArray
 
 RADIANS_PER_STEP_OF_MODE = 0.6
 """Integration step in radians of the extra mode, which is seen through the motor's inertia only."""
-
-
-@inlined
-def unpacked(state: FloatArray) -> State:
-    """Return the mechanical part of the state array."""
-    return State(
-        state[0], state[1], state[2], state[3], state[4], state[5], state[6], state[7], state[8], state[9], state[10]
-    )
 
 
 @inlined

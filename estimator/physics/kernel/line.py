@@ -22,7 +22,8 @@ class Line(NamedTuple):
     sliding : bool
         Whether there may be a slider inside that shaft.
     extended : bool
-        Whether it has states beyond those of its masses and a slider: an extra mode, a tyre that slips.
+        Whether it has states beyond those of its masses and a slider: an extra mode, a tyre that slips, a shaft that
+        relaxes.
     """
 
     masses: int
@@ -61,7 +62,7 @@ def is_bristled_at_load(p: FloatArray) -> bool:
 @inlined
 def is_extended(p: FloatArray) -> bool:
     """Tell whether a line has states beyond those of its masses and a slider."""
-    return bool(p[slots.BRANCH_INERTIA] > 0.0 or is_within(p) or p[slots.SLIP] > 0.0)
+    return bool(p[slots.BRANCH_INERTIA] > 0.0 or is_within(p) or p[slots.SLIP] > 0.0 or p[slots.RELAXING] > 0.0)
 
 
 @inlined

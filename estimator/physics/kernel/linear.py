@@ -30,36 +30,13 @@ from estimator.signals.record import FloatArray
 WORTHWHILE_SAMPLES = 50
 """Samples from which on reading the answers takes less time than they save."""
 
-LINEAR = frozenset(
-    {
-        "inverter_gain_mismatch",
-        "torque_derating",
-        "torque_saturation",
-        "actuator_lag",
-        "transport_delay",
-        "clock_drift",
-        "coulomb_friction_motor",
-        "stribeck_friction",
-        "generator_coupled",
-        "extra_torsional_mode",
-        "stiffness_change",
-        "coulomb_friction_load",
-        "brake_drag",
-        "inertia_change",
-        "resolver_error",
-        "speed_filter",
-        "speed_quantisation",
-        "speed_sign_blind",
-    }
-)
-"""Effects with which a line is linear, or that act before it or behind it. With any other it takes its sub-steps."""
-
-_OTHERS = [(entry.name, each) for entry in BUILT_IN.values() if entry.name not in LINEAR for each in entry.parameters]
+_OTHERS = [(entry.name, each) for entry in BUILT_IN.values() if not entry.linear for each in entry.parameters]
 BENDING = np.array([slot(effect, parameter.name) for effect, parameter in _OTHERS])
 NULLS = np.array([parameter.null for _, parameter in _OTHERS])
-"""Where the parameters of all other effects stand, and what each is where its effect is not there."""
+"""Where the parameters of all effects stand that leave no line linear, and what each is where its effect is not there:
+with one of them a line takes its sub-steps."""
 
-REST = State(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+REST = State(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class Answers(NamedTuple):
@@ -67,7 +44,7 @@ class Answers(NamedTuple):
 
     Attributes
     ----------
-    angle, speed, twist, load_speed, branch_twist, branch_speed, middle_twist, middle_speed : State
+    angle, speed, twist, load_speed, branch_twist, branch_speed, middle_twist, middle_speed, relaxing : State
         To one unit of the entry of that name [unit of the state / unit of the entry].
     torque, rise, load : State
         To a torque on the shaft of this mean, of this rise from end to end, and to a load torque [unit of the state /
@@ -82,6 +59,7 @@ class Answers(NamedTuple):
     branch_speed: State
     middle_twist: State
     middle_speed: State
+    relaxing: State
     torque: State
     rise: State
     load: State
@@ -123,20 +101,40 @@ def is_beyond(begun: float, ended: float, limit: float) -> bool:
     return min(begun, ended) > limit or max(begun, ended) < -limit
 
 
+@inlined
+def unit(entry: int) -> State:
+    """Return the state of a line at rest but for one unit of an entry."""
+    return State(
+        1.0 if entry == 0 else 0.0,
+        1.0 if entry == 1 else 0.0,
+        1.0 if entry == 2 else 0.0,
+        1.0 if entry == 3 else 0.0,
+        0.0,
+        0.0,
+        1.0 if entry == 6 else 0.0,
+        1.0 if entry == 7 else 0.0,
+        1.0 if entry == 8 else 0.0,
+        1.0 if entry == 9 else 0.0,
+        0.0,
+        1.0 if entry == 11 else 0.0,
+    )
+
+
 @compiled
 def answers(line: Line, now: Conditions, p: FloatArray, h: float, steps: int) -> Answers:
     """Return what ``steps`` sub-steps of ``h`` [s] make of each unit of a state and a torque, without dry friction."""
     now = with_friction(now, 0.0, 0.0, 0.0, 0.0, 0.0)
     pulled = with_torques(now, 0.0, 1.0)
     return Answers(
-        after(line, now, 0.0, 0.0, State(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), p, h, steps),
-        after(line, now, 0.0, 0.0, State(0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), p, h, steps),
-        after(line, now, 0.0, 0.0, State(0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), p, h, steps),
-        after(line, now, 0.0, 0.0, State(0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), p, h, steps),
-        after(line, now, 0.0, 0.0, State(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0), p, h, steps),
-        after(line, now, 0.0, 0.0, State(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0), p, h, steps),
-        after(line, now, 0.0, 0.0, State(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0), p, h, steps),
-        after(line, now, 0.0, 0.0, State(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0), p, h, steps),
+        after(line, now, 0.0, 0.0, unit(0), p, h, steps),
+        after(line, now, 0.0, 0.0, unit(1), p, h, steps),
+        after(line, now, 0.0, 0.0, unit(2), p, h, steps),
+        after(line, now, 0.0, 0.0, unit(3), p, h, steps),
+        after(line, now, 0.0, 0.0, unit(6), p, h, steps),
+        after(line, now, 0.0, 0.0, unit(7), p, h, steps),
+        after(line, now, 0.0, 0.0, unit(8), p, h, steps),
+        after(line, now, 0.0, 0.0, unit(9), p, h, steps),
+        after(line, now, 0.0, 0.0, unit(11), p, h, steps),
         after(line, now, 1.0, 0.0, REST, p, h, steps),
         after(line, now, 0.0, 1.0, REST, p, h, steps),
         after(line, pulled, 0.0, 0.0, REST, p, h, steps),
@@ -181,7 +179,7 @@ def answered(line: Line, to: Answers, now: Conditions, torque: float, rise: floa
     if now.dry_motor != 0.0:
         torque -= dry_friction(x.speed, p[slots.COULOMB], now.width_motor)
     load = now.load + dry_at_load(carried, now)
-    after = State(0.0, 0.0, 0.0, 0.0, x.loading, x.vehicle_speed, 0.0, 0.0, 0.0, 0.0, x.traction)
+    after = State(0.0, 0.0, 0.0, 0.0, x.loading, x.vehicle_speed, 0.0, 0.0, 0.0, 0.0, x.traction, 0.0)
     after = moved(line, after, to.torque, torque)
     after = moved(line, after, to.load, load)
     if rise != 0.0:
@@ -197,4 +195,5 @@ def answered(line: Line, to: Answers, now: Conditions, torque: float, rise: floa
     if line.extended:
         after = moved(line, after, to.branch_twist, x.branch_twist)
         after = moved(line, after, to.branch_speed, x.branch_speed)
+        after = moved(line, after, to.relaxing, x.relaxing)
     return after

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from estimator.abreast import every, like
+from estimator.abreast import every, like, some
 from estimator.compiled import inlined
 from estimator.physics.effects import (
-    aerodynamic_drag,
     backlash,
     shaft_hysteresis,
     stiffness_nonlinearity,
     stribeck_friction,
     tyre_slip,
+    viscoelastic_shaft,
 )
 from estimator.physics.kernel import slots
 from estimator.physics.kernel.conditions import line_share
+from estimator.physics.kernel.declared import held_by_angle, load_drag, motor_drag, shaft_loss
 from estimator.physics.kernel.line import Line
-from estimator.physics.kernel.sensing import entry
+from estimator.physics.kernel.sensing import angle_at_load, entry
 from estimator.physics.kernel.state_vector import SHAFT_TORQUE, Conditions, State
-from estimator.physics.laws import beyond_gap, dry_friction
+from estimator.physics.laws import beyond_gap, dry_friction, smooth_sign
 from estimator.signals.record import FloatArray
 
 
@@ -25,7 +26,7 @@ from estimator.signals.record import FloatArray
 def motor_friction(speed: float, p: FloatArray, width: float, dry: float) -> float:
     """Return the torque of every friction law at the motor [Nm], viscous included; the dry ones where there are any."""
     friction = float(p[slots.B_M]) * speed
-    friction += float(p[slots.QUADRATIC]) * speed * abs(speed)
+    friction += motor_drag(speed, p)
     if every(dry == 0.0):
         return friction
     coulomb, excess = p[slots.STRIBECK_COULOMB], p[slots.STRIBECK]
@@ -89,7 +90,8 @@ def twist_rate(line: Line, x: State, p: FloatArray) -> float:
 def read_out(line: Line, now: Conditions, x: State, output: int, p: FloatArray) -> float:
     """Return an output: of the state, or the torque that the shaft passes on [Nm]."""
     if line.masses > 1 and output == SHAFT_TORQUE:
-        return shaft_torques(line, twist_rate(line, x, p), now, x, p)[0]
+        shaft = shaft_torques(line, twist_rate(line, x, p), now, x, p)[0]
+        return shaft + x.relaxing if line.extended else shaft
     return entry(x, output, p)
 
 
@@ -98,19 +100,35 @@ def rates(line: Line, now: Conditions, x: State, p: FloatArray) -> State:
     """Return the time derivative of the mechanical state under the conditions ``now``."""
     drive = now.torque - motor_friction(x.speed, p, now.width_motor, now.dry_motor)
     if line.masses == 1:
-        drag = load_drag(x.speed, x.speed, now, p) + now.load
+        drag = load_friction(x.speed, x.speed, now, p) + now.load + held_by_angle(x.angle, p)
         branch = branch_rate(x.branch_twist, x.speed - x.branch_speed, now, p) if line.extended else 0.0
         acceleration = (drive - now.branch_inertia * branch - drag) * now.inverse_motor
         still = like(0.0, x.speed)
         own_rate = x.speed - x.branch_speed
         return State(
-            x.speed, acceleration, still, still, still, still, own_rate, like(branch, x.speed), still, still, still
+            x.speed,
+            acceleration,
+            still,
+            still,
+            still,
+            still,
+            own_rate,
+            like(branch, x.speed),
+            still,
+            still,
+            still,
+            still,
         )
     between, behind = within(line, p)
     own_rate = x.branch_speed - driven(line, x) if behind else x.speed - x.branch_speed
     rate = twist_rate(line, x, p)
     shaft, reaction = shaft_torques(line, rate, now, x, p)
-    pull, branch = shaft, like(0.0, x.speed)
+    branch, relaxing = like(0.0, x.speed), like(0.0, x.speed)
+    if line.extended and some(p[slots.RELAXING] > 0.0):
+        shaft, reaction = shaft + x.relaxing, reaction + x.relaxing
+        stiffness = p[slots.RELAXING] * p[slots.K]
+        relaxing = viscoelastic_shaft.relaxing_rate(x.relaxing, rate, stiffness, now.fastest, p[slots.RELAXATION_TIME])
+    pull = shaft
     if line.extended:
         branch = branch_rate(x.branch_twist, own_rate, now, p)
         own = now.branch_inertia * branch
@@ -139,6 +157,7 @@ def rates(line: Line, now: Conditions, x: State, p: FloatArray) -> State:
         middle_twist,
         middle_speed,
         traction,
+        relaxing,
     )
 
 
@@ -167,9 +186,15 @@ def dry_at_load(wheel: float, now: Conditions) -> float:
 
 
 @inlined
-def load_drag(wheel: float, vehicle: float, now: Conditions, p: FloatArray) -> float:
-    """Return what slows the load down [Nm]: dry friction at the wheel, viscous and air drag at the vehicle."""
-    return dry_at_load(wheel, now) + now.viscous_load * vehicle + aerodynamic_drag.law(vehicle, p[slots.AERO])
+def load_friction(wheel: float, vehicle: float, now: Conditions, p: FloatArray) -> float:
+    """Return what slows the load down [Nm]: dry friction at the wheel, viscous and other drag at the vehicle."""
+    return dry_at_load(wheel, now) + now.viscous_load * vehicle + load_drag(vehicle, p)
+
+
+@inlined
+def load_angle(line: Line, x: State, p: FloatArray) -> float:
+    """Return the angle of the load [rad]."""
+    return angle_at_load(x, p) if line.extended else x.angle - x.twist - x.middle_twist
 
 
 @inlined
@@ -177,8 +202,10 @@ def load_rates(line: Line, pull: float, now: Conditions, x: State, p: FloatArray
     """Return the accelerations of the load and, where the tyre slips, of the vehicle [rad/s^2]; the traction's rate."""
     wheel = x.load_speed
     still = like(0.0, wheel)
+    pull -= shaft_loss(pull, smooth_sign(wheel, now.width_load), p)
+    load = now.load + held_by_angle(load_angle(line, x, p), p)
     if not line.extended or every(p[slots.SLIP] <= 0.0):
-        return (pull - load_drag(wheel, wheel, now, p) - now.load) * now.inverse_load, still, still
+        return (pull - load_friction(wheel, wheel, now, p) - load) * now.inverse_load, still, still
     vehicle = x.vehicle_speed
     tyre, slide, rate = now.tyre, wheel - vehicle, still
     inverse_wheel, inverse_vehicle = tyre.inverse_wheel, tyre.inverse_vehicle
@@ -194,5 +221,5 @@ def load_rates(line: Line, pull: float, now: Conditions, x: State, p: FloatArray
         traction = slope * slide
     traction = tyre_slip.gripped(traction, p[slots.GRIP], tyre.inverse_grip)
     dry = dry_at_load(wheel, now)
-    drag = load_drag(wheel, vehicle, now, p) - dry
-    return (pull - dry - traction) * inverse_wheel, (traction - drag - now.load) * inverse_vehicle, rate
+    drag = load_friction(wheel, vehicle, now, p) - dry
+    return (pull - dry - traction) * inverse_wheel, (traction - drag - load) * inverse_vehicle, rate

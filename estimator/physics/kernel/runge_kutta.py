@@ -19,12 +19,13 @@ def moved(line: Line, x: State, dx: State, h: float) -> State:
     if line.masses == 3:
         middle_twist, middle_speed = middle_twist + h * dx.middle_twist, middle_speed + h * dx.middle_speed
     loading, vehicle_speed, traction = x.loading, x.vehicle_speed, x.traction
-    branch_twist, branch_speed = x.branch_twist, x.branch_speed
+    branch_twist, branch_speed, relaxing = x.branch_twist, x.branch_speed, x.relaxing
     if line.sliding:
         loading += h * dx.loading
     if line.extended:
         vehicle_speed, traction = vehicle_speed + h * dx.vehicle_speed, traction + h * dx.traction
         branch_twist, branch_speed = branch_twist + h * dx.branch_twist, branch_speed + h * dx.branch_speed
+        relaxing += h * dx.relaxing
     return State(
         x.angle + h * dx.angle,
         x.speed + h * dx.speed,
@@ -37,6 +38,7 @@ def moved(line: Line, x: State, dx: State, h: float) -> State:
         middle_twist,
         middle_speed,
         traction,
+        relaxing,
     )
 
 

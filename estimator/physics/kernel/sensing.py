@@ -15,7 +15,7 @@ from estimator.signals.record import FloatArray
 
 
 @inlined
-def load_angle(x: State, p: FloatArray) -> float:
+def angle_at_load(x: State, p: FloatArray) -> float:
     """Return the angle of the load [rad]."""
     return x.angle - x.twist - x.middle_twist - (x.branch_twist if is_within(p) else 0.0)
 
@@ -28,7 +28,7 @@ def entry(x: State, output: int, p: FloatArray) -> float:
     if output == LOAD_SPEED:
         return x.load_speed
     if output == LOAD_ANGLE:
-        return load_angle(x, p)
+        return angle_at_load(x, p)
     return x.twist if output == TWIST else x.angle
 
 
@@ -37,7 +37,7 @@ def travelled(x: State, output: int, p: FloatArray) -> float:
     """Return the angle whose rate is the output [rad]: what a filter's input has been in the mean is its change."""
     if output == SPEED:
         return x.angle
-    return load_angle(x, p)
+    return angle_at_load(x, p)
 
 
 @inlined

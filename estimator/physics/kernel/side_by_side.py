@@ -30,7 +30,7 @@ from estimator.physics.kernel.state_vector import (
     LAG_RISE,
     LAGGED,
     Bristles,
-    State,
+    unpacked,
 )
 from estimator.physics.layout import slot
 from estimator.physics.low_pass import LowPass, low_pass
@@ -181,9 +181,7 @@ def advance(
     waving = is_waving(one_of_them)
     samples = load_lanes.shape[0]
     parts = torque_lanes.shape[0] // samples
-    x = State(
-        start[0], start[1], start[2], start[3], start[4], start[5], start[6], start[7], start[8], start[9], start[10]
-    )
+    x = unpacked(start)
     bristled, bristles = is_bristled(one_of_them), Bristles(start[BRISTLES_MOTOR], start[BRISTLES_LOAD])
     low = LowPass(filters[0], filters[1], filters[2], filters[3], filters[4], filters[5], filters[6])
     filtered, filter_rise = start[FILTERED], start[FILTER_RISE]

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from estimator.compiled import inlined
+from estimator.signals.record import FloatArray
+
 ANGLE, SPEED, TWIST, LOAD_SPEED = 0, 1, 2, 3
 """Mechanical states that can be an output; see ``State``."""
 
@@ -13,11 +16,11 @@ LOAD_ANGLE, SHAFT_TORQUE = 20, 21
 VEHICLE_SPEED, BRANCH_TWIST, BRANCH_SPEED, MIDDLE_TWIST, MIDDLE_SPEED, TRACTION = 5, 6, 7, 8, 9, 10
 """Further ones."""
 
-STATES = 17
+STATES = 18
 """Length of the state array: ``State``, the lagged torque and its rise [Nm], the filtered reading and its [rad/s], and
 ``Bristles``."""
 
-LAGGED, LAG_RISE, FILTERED, FILTER_RISE, BRISTLES_MOTOR, BRISTLES_LOAD = 11, 12, 13, 14, 15, 16
+RELAXING, LAGGED, LAG_RISE, FILTERED, FILTER_RISE, BRISTLES_MOTOR, BRISTLES_LOAD = 11, 12, 13, 14, 15, 16, 17
 
 
 class State(NamedTuple):
@@ -39,6 +42,8 @@ class State(NamedTuple):
         Of the extra mode: of its spring, and of its inertia [rad, rad/s].
     middle_twist, middle_speed : float
         Twist of the second shaft [rad] and speed of the mass before it [rad/s].
+    relaxing : float
+        Torque of the branch in the first shaft that relaxes [Nm].
     """
 
     angle: float
@@ -52,6 +57,16 @@ class State(NamedTuple):
     middle_twist: float
     middle_speed: float
     traction: float
+    relaxing: float
+
+
+@inlined
+def unpacked(state: FloatArray) -> State:
+    """Return the mechanical part of the state array."""
+    return State(
+        state[0], state[1], state[2], state[3], state[4], state[5],
+        state[6], state[7], state[8], state[9], state[10], state[11],
+    )  # fmt: skip
 
 
 class Bristles(NamedTuple):

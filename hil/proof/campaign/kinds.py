@@ -52,6 +52,12 @@ PAIRS = (
     "speed_quantisation+backlash",
     "lost_samples+stiffness_nonlinearity",
     "clock_drift+coulomb_friction_motor",
+    "eddy_drag+backlash",
+    "viscoelastic_shaft+road_grade",
+    "asymmetric_friction+transport_delay",
+    "gear_losses+resolver_error",
+    "torque_nonlinearity+backlash",
+    "torque_bias+stiffness_nonlinearity",
 )
 """Pairs that meet on real vehicles: wear with wear, wear with road or load, mechanics with a fault of the chain that
 records it. Left out are those that no recording of torque and speed tells from one of them alone."""

@@ -92,6 +92,10 @@ def _jitter_rms(sizes: Json, bus: Json) -> float:
     return float(sizes["jitter_s"]) / math.sqrt(3.0)
 
 
+def _lost_driving(sizes: Json, bus: Json) -> float:
+    return 1.0 - float(sizes["efficiency"])
+
+
 COUNTERPARTS: Mapping[str, Mapping[str, Convert]] = {
     "inverter_gain_mismatch": {"gain_m1": _same("gain_m1")},
     "torque_derating": {"depth": _derating_depth, "time_constant_s": _unless_zero("time_constant_s")},
@@ -137,6 +141,9 @@ COUNTERPARTS: Mapping[str, Mapping[str, Convert]] = {
     "stale_samples": {"share": _beat},
     "sample_jitter": {"jitter_s": _jitter_rms},
     "clock_drift": {"rate": _same("clock_error")},
+    "eddy_drag": {"peak_nm": _same("eddy_nm"), "peak_rad_s": _same("eddy_speed_rad_s")},
+    "asymmetric_friction": {"difference_nm_s": _same("viscous_forward_nm_s")},
+    "gear_losses": {"driving_share": _lost_driving},
 }
 """Effect to fitted parameter to what it should be."""
 

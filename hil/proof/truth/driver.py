@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from hil.proof.truth.driveline import TruthDriveline
-from hil.proof.truth.laws import eddy_torque
+from hil.proof.truth.laws import eddy_torque, torque_by_direction
 from hil.proof.truth.physics import FLAT_ROAD, Physics
 
 _SETTLING_S = 3.0
@@ -29,9 +29,9 @@ def holding_torque(physics: Physics, speed_rad_s: float, share_m1: float) -> flo
     p = physics
     torque_nm = p.load_torque_nm + (p.b_M + p.b_L * p.cold_factor) * speed_rad_s
     torque_nm += (p.quadratic_motor + p.quadratic_load) * speed_rad_s * abs(speed_rad_s)
-    torque_nm += eddy_torque(p, speed_rad_s)
     if speed_rad_s:
         torque_nm += p.friction_motor_nm + p.friction_load_nm
+    torque_nm = torque_nm / p.efficiency + eddy_torque(p, speed_rad_s) + torque_by_direction(p, speed_rad_s)
     return torque_nm / (p.gain_m1 * share_m1 + 1.0 - share_m1) + 2.0 * p.deadband_nm
 
 
@@ -44,6 +44,8 @@ def before_the_recording(physics: Physics) -> Physics:
         stiffness_step=0.0,
         payload_share=0.0,
         derating=0.0,
+        bias_nm=0.0,
+        dropout_every_s=0.0,
         b_L=physics.b_L * physics.cold_factor,
         cold_factor=1.0,
     )

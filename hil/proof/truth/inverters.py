@@ -1,6 +1,7 @@
 """From the inverters' readings to the torque they give: everything between that has no dynamics of its own.
 
-In this order: gain of m1, deadband, derating with time, limit of each inverter, sum, limit of the sum.
+In this order: gain of m1, deadband, derating with time, limit of each inverter, sum, limit of the sum, saturation of
+the machine, offset, failures.
 """
 
 from __future__ import annotations
@@ -30,12 +31,20 @@ def true_torque(p: Physics, reading_nm: tuple[float, float], time_s: float) -> f
     m1 = left * _beyond(p.gain_m1 * reading_nm[0], p.deadband_nm)
     m2 = left * _beyond(reading_nm[1], p.deadband_nm)
     both = _limited(m1, p.limit_m1_nm, p.limit_knee) + _limited(m2, p.limit_m2_nm, p.limit_knee)
-    return _limited(both, p.limit_total_nm, p.limit_knee)
+    given = _saturated(p, _limited(both, p.limit_total_nm, p.limit_knee)) + laws_in_time.bias_torque(p, time_s)
+    return 0.0 if laws_in_time.is_blocked(p, time_s) else given
 
 
 @compiled
 def _beyond(torque_nm: float, deadband_nm: float) -> float:
     return math.copysign(max(0.0, abs(torque_nm) - deadband_nm), torque_nm)
+
+
+@compiled
+def _saturated(p: Physics, torque_nm: float) -> float:
+    """Return ``S asinh(T / S)``: nearly T while small, growing ever less."""
+    size = p.saturating_nm if torque_nm > 0.0 else p.saturating_back_nm
+    return size * math.asinh(torque_nm / size) if size > 0.0 else torque_nm
 
 
 @compiled

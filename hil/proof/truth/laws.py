@@ -78,5 +78,34 @@ def shaft_torque(
 @compiled
 def eddy_torque(p: Physics, speed: float) -> float:
     """Return the drag of eddy currents [Nm]: it is greatest at one speed and falls beyond."""
-    over = speed / p.eddy_speed_rad_s
-    return p.eddy_nm * 2.0 * over / (1.0 + over * over)
+    if p.eddy_nm == 0.0 or speed == 0.0:
+        return 0.0
+    over = math.pow(abs(speed) / p.eddy_speed_rad_s, p.eddy_exponent)
+    return math.copysign(p.eddy_nm * 2.0 / (over + 1.0 / over), speed)
+
+
+@compiled
+def inertia_over_rotor(p: Physics, speed: float) -> float:
+    """Return the motor's inertia, with what it draws along at a speed, over its own."""
+    square = (speed / p.drawn_half_rad_s) ** 2
+    return 1.0 + p.drawn_share * square / (1.0 + square)
+
+
+STANDSTILL_RAD_S = 0.02
+"""Speed within which a torque that depends on the direction changes over."""
+
+
+@compiled
+def torque_by_direction(p: Physics, speed: float) -> float:
+    """Return what friction at the motor holds more forward than it would, or less backward [Nm]."""
+    return p.viscous_forward * abs(speed) + p.dry_forward_nm * math.tanh(speed / STANDSTILL_RAD_S) ** 2
+
+
+@compiled
+def behind_gears(p: Physics, torque_nm: float, speed: float) -> float:
+    """Return what gears make of the torque at their driving side [Nm], at a speed of both."""
+    if p.efficiency == 1.0 and p.efficiency_back == 1.0:
+        return torque_nm
+    driving = torque_nm * speed > 0.0
+    behind = torque_nm * p.efficiency if driving else torque_nm / p.efficiency_back
+    return torque_nm + (behind - torque_nm) * abs(math.tanh(speed / STANDSTILL_RAD_S))

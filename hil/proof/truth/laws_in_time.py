@@ -77,3 +77,15 @@ def torque_left(p: Physics, time_s: float) -> float:
     if p.derating_time_s > 0.0:
         return 1.0 + p.derating * math.expm1(-time_s / p.derating_time_s)
     return 1.0 - p.derating * ramp(time_s, 0.0, TIME_TO_DERATE_S)
+
+
+@compiled
+def bias_torque(p: Physics, time_s: float) -> float:
+    """Return the torque that a reading lacks at a time [Nm]: a hyperbola towards its end."""
+    return p.bias_nm * time_s / (time_s + p.bias_half_s)
+
+
+@compiled
+def is_blocked(p: Physics, time_s: float) -> bool:
+    """Tell whether the inverters give no torque at a time."""
+    return bool(p.dropout_every_s > 0.0 and (time_s + 0.5 * p.dropout_every_s) % p.dropout_every_s < p.dropout_s)

@@ -59,6 +59,7 @@ def _on_motor(state: FloatArray, p: Physics, speed: float) -> float:
     """Torque on the motor inertia without the line's."""
     given = state[State.INVERTER_NM]
     torque: float = given - p.b_M * speed - p.quadratic_motor * speed * abs(speed) - laws.eddy_torque(p, speed)
+    torque -= laws.torque_by_direction(p, speed)
     torque += laws_in_angle.ripple_torque(p, state[State.ANGLE_M], given)
     if p.friction_motor_nm > 0.0:
         limit = breakaway_limit(p, speed)
@@ -86,8 +87,8 @@ def _through_shaft(state: FloatArray, p: Physics, speeds: Speeds) -> tuple[float
     stiffness = laws_in_time.stiffness_over_k(p, state[State.TIME_S], driving)
     slider_nm = iwan.torque(state[State.SLIDERS : STATES], p) if p.hysteresis_stiffness > 0.0 else 0.0
     torque: float = laws.shaft_torque(p, twist, slope * driving - driven, stiffness, slider_nm)
-    torque += state[State.MAXWELL_NM]
-    return slope * torque, torque
+    torque += state[State.MAXWELL_NM] + state[State.MAXWELL_FAST_NM]
+    return slope * torque, laws.behind_gears(p, torque, driven)
 
 
 @compiled
@@ -128,7 +129,7 @@ def accelerations(state: FloatArray, p: Physics, disturbance_nm: float, speeds: 
             from_motor, of_extra = link_nm, (link_nm - driving_nm) / p.extra_inertia
         else:
             to_load, of_extra = link_nm, (driven_nm - link_nm) / p.extra_inertia
-    of_motor = (_on_motor(state, p, motor) - from_motor) / p.J_M
+    of_motor = (_on_motor(state, p, motor) - from_motor) / (p.J_M * laws.inertia_over_rotor(p, motor))
     on_vehicle = -disturbance_nm - p.quadratic_load * vehicle * abs(vehicle)
     of_load, of_vehicle = _of_wheels_and_vehicle(state, p, to_load + _on_load(state, p, load), on_vehicle, speeds)
     return of_motor, of_extra, of_load, of_vehicle

@@ -49,8 +49,11 @@ class Physics(NamedTuple):
     hysteresis_stiffness, hysteresis_slip_rad : float
         Shaft branch of springs in series with dry sliders: stiffness before any slides [Nm/rad], and the twist at
         which the last one does.
-    maxwell_stiffness, maxwell_time_s : float
-        Second shaft branch, spring in series with damper: stiffness [Nm/rad] and relaxation time.
+    maxwell_stiffness, maxwell_time_s, maxwell_fast_share : float
+        Second shaft branch, spring in series with damper: stiffness [Nm/rad] and relaxation time; stiffness over it of
+        a third one that relaxes faster.
+    efficiency, efficiency_back : float
+        Power out over power in of the gears at the shaft's driven end: while the motor drives, while the load does.
     joint_angle_rad, joint_phase_rad : float
         Bend of a Cardan joint at the driving end of the shaft, and the motor angle of its fork.
     extra_inertia, extra_stiffness, extra_damping : float
@@ -64,6 +67,14 @@ class Physics(NamedTuple):
         up to `TIME_TO_DERATE_S`.
     limit_m1_nm, limit_m2_nm, limit_total_nm, limit_knee : float
         What inverter m1, m2, and both together can give [Nm], 0 for no limit; the knee's sharpness.
+    saturating_nm, saturating_back_nm : float
+        Torque about which it grows less than its reading, forward and backward [Nm]; 0 where it does not.
+    bias_nm, bias_half_s : float
+        Offset of the torque that the reading comes to lack, and the time until half of it.
+    slew_nm_s : float
+        Fastest change of the torque [Nm/s]; 0 without a limit.
+    dropout_every_s, dropout_s : float
+        Time from one failure of the torque to the next, 0 for none, and how long each lasts.
     deadband_nm : float
         Reading of each inverter below which it gives no torque, and which is missing above.
     ripple_nm, ripple_share, ripple_order, ripple_phase_rad : float
@@ -77,8 +88,12 @@ class Physics(NamedTuple):
         slower before.
     clutch_nm, clutch_rise_s, clutch_from_s, clutch_to_s : float
         What the clutch holds when closed [Nm], the time it takes to close, and when it does and opens again.
-    eddy_nm, eddy_speed_rad_s : float
-        Eddy-current drag on the motor: the greatest [Nm], and the speed of it.
+    eddy_nm, eddy_speed_rad_s, eddy_exponent : float
+        Eddy-current drag on the motor: the greatest [Nm], the speed of it, and how steeply it rises and falls.
+    viscous_forward, dry_forward_nm : float
+        By how much the motor's viscous [Nm s/rad] and dry friction are more forward and less backward.
+    drawn_share, drawn_half_rad_s : float
+        Inertia over ``J_M`` that a fast motor draws along, and the speed of half of it.
     wheel_inertia, slip_stiffness_nm, grip_nm, relaxation_rad : float
         Tyre: part of ``J_L`` that turns with the wheels [kg m^2], 0 for a tyre that can't slip; torque per slip,
         greatest torque [Nm]; motor angle over which a slip builds up.
@@ -127,6 +142,9 @@ class Physics(NamedTuple):
     hysteresis_slip_rad: float = 1.0
     maxwell_stiffness: float = 0.0
     maxwell_time_s: float = 1.0
+    maxwell_fast_share: float = 0.0
+    efficiency: float = 1.0
+    efficiency_back: float = 1.0
     joint_angle_rad: float = 0.0
     joint_phase_rad: float = 0.0
     extra_inertia: float = 0.0
@@ -141,6 +159,13 @@ class Physics(NamedTuple):
     limit_total_nm: float = 0.0
     limit_knee: float = 8.0
     deadband_nm: float = 0.0
+    saturating_nm: float = 0.0
+    saturating_back_nm: float = 0.0
+    bias_nm: float = 0.0
+    bias_half_s: float = 1.0
+    slew_nm_s: float = 0.0
+    dropout_every_s: float = 0.0
+    dropout_s: float = 0.0
     ripple_nm: float = 0.0
     ripple_share: float = 0.0
     ripple_order: float = 1.0
@@ -155,6 +180,11 @@ class Physics(NamedTuple):
     clutch_to_s: float = 0.0
     eddy_nm: float = 0.0
     eddy_speed_rad_s: float = 1.0
+    eddy_exponent: float = 1.0
+    viscous_forward: float = 0.0
+    dry_forward_nm: float = 0.0
+    drawn_share: float = 0.0
+    drawn_half_rad_s: float = 1.0
     wheel_inertia: float = 0.0
     slip_stiffness_nm: float = 0.0
     grip_nm: float = 1.0

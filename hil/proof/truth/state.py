@@ -30,7 +30,8 @@ class State(IntEnum):
     SPEED_G = 13
     FILTERED = 14
     FILTERED_RATE = 15
-    SLIDERS = 16
+    MAXWELL_FAST_NM = 16
+    SLIDERS = 17
 
 
 SPEEDS = (State.SPEED_M, State.SPEED_X, State.SPEED_L, State.SPEED_V, State.SPEED_G, State.FILTERED)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 import re
 from collections.abc import Mapping
@@ -11,10 +12,13 @@ from types import MappingProxyType
 import numpy as np
 import pytest
 
+from estimator.physics import torque_path
+from estimator.physics.acting import Place
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Effect, Element, Held
 from estimator.physics.grid import grid_for
-from estimator.physics.layout import flat, flat_values
+from estimator.physics.kernel import slots
+from estimator.physics.layout import flat, flat_values, slot
 from estimator.physics.model import Motion, Structure
 from estimator.physics.simulate import simulate
 from estimator.physics.start import Start
@@ -48,6 +52,7 @@ UNIT_OF_SUFFIX = MappingProxyType(
         "kg_m2": "kg m^2",
         "per_nm": "1/Nm",
         "per_rad2": "1/rad^2",
+        "nm_per_rad": "Nm/rad",
     }
 )
 
@@ -104,15 +109,16 @@ def start_values(entry: Effect, records: list[Record]) -> list[dict[str, float]]
     ]
 
 
-@entries
-def test_name_and_element_are_those_of_the_contract(entry: Effect) -> None:
-    assert ELEMENT_OF[entry.name] is entry.element
+@pytest.mark.parametrize("name", ELEMENT_OF)
+def test_every_name_of_the_contract_has_an_entry_at_its_element(name: str) -> None:
+    """Further entries are extensions."""
+    assert EFFECTS[name].element is ELEMENT_OF[name]
 
 
 @entries
-def test_it_names_only_effects_of_the_contract(entry: Effect) -> None:
+def test_it_names_only_effects_of_the_catalogue(entry: Effect) -> None:
     for group in (entry.resembles, entry.equivalent, entry.contains):
-        assert set(group) <= ELEMENT_OF.keys()
+        assert set(group) <= EFFECTS.keys(), f"{entry.name} names effects that have no entry"
         assert len(set(group)) == len(group)
         assert entry.name not in group
     assert set(entry.equivalent) <= set(entry.resembles)
@@ -230,6 +236,32 @@ def test_what_it_resembles_resembles_it(entry: Effect) -> None:
 
 
 @entries
+def test_every_entry_has_its_law_in_the_simulation(entry: Effect) -> None:
+    """What is recognised in the raw data, and a profile over time, have no law there."""
+    if entry.profile or entry.element is Element.ACQUISITION:
+        return
+    taken = {value for name, value in vars(slots).items() if name.isupper()} | set(torque_path._WRITTEN)
+    missing = [each.name for each in entry.parameters if slot(entry.name, each.name) not in taken]
+    assert entry.acting is not None or not missing, (
+        f"{entry.name}: the simulation does not read {', '.join(missing)}. Give the entry acting=Acting(place, law) "
+        "(estimator/physics/acting.py), or a place in estimator/physics/kernel/slots.py and the law that reads it."
+    )
+
+
+@entries
+def test_a_declared_law_takes_the_parameters_of_its_entry(entry: Effect) -> None:
+    if entry.acting is None:
+        return
+    law = getattr(entry.acting.law, "py_func", entry.acting.law)
+    given = 2 if entry.acting.place in (Place.TORQUE, Place.SHAFT_LOSS) else 1
+    takes = len(inspect.signature(law).parameters)
+    assert takes == given + len(entry.parameters), (
+        f"{entry.name}: its law takes {takes} arguments, expected {given} for its place and one per parameter: "
+        f"{', '.join(each.name for each in entry.parameters)}"
+    )
+
+
+@entries
 def test_a_clear_reversal_can_tell_every_effect(entry: Effect, reversal: Record, forward: Record) -> None:
     assert entry.testable(GEARED, [reversal]) is None
     if entry.name != "inverter_gain_mismatch":  # which needs two inputs in every recording
@@ -292,8 +324,7 @@ def test_what_acts_in_or_behind_the_shaft_needs_one() -> None:
     """Friction at the load of a single mass is friction at the motor; a tyre needs two sides to slip between."""
     behind = {"coulomb_friction_load", "tyre_slip"}
     for entry in EFFECTS.values():
-        assert Structure.TWO_MASS in entry.structures
-        assert Structure.THREE_MASS in entry.structures
+        assert {Structure.TWO_MASS, Structure.THREE_MASS} <= entry.structures
         needs = entry.element is Element.SHAFT or entry.name in behind
         assert (Structure.ONE_MASS in entry.structures) is not needs
 

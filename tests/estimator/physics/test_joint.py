@@ -24,8 +24,9 @@ from estimator.physics.model import (
     natural_frequencies_rad_s,
     parameter_unit,
 )
+from estimator.physics.motion import motor_angle
 from estimator.physics.problem import make_problem
-from estimator.physics.simulate import motor_angle, output_state, simulate
+from estimator.physics.simulate import output_state, simulate
 from estimator.physics.start import Start
 from estimator.physics.unknowns import nominal_unknowns
 from estimator.signals.record import FloatArray, OutputKind, Record

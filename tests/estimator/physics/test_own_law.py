@@ -3,27 +3,27 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from estimator.diagnosis.hypotheses import open_hypotheses
 from estimator.errors import BadModel
-from estimator.physics import own_law
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
-from estimator.physics.grid import Grid
-from estimator.physics.layout import SIZE, flat_values, slot
-from estimator.physics.model import Structure
-from estimator.physics.own_law import TRIAL, OwnLaw, OwnParameter
+from estimator.physics.grid import Grid, grid_for
+from estimator.physics.layout import SIZE, flat, flat_values, slot
+from estimator.physics.model import EffectValue, Structure
+from estimator.physics.own_law import TRIAL, OwnLaw, OwnParameter, named
 from estimator.physics.simulate import simulate
 from estimator.physics.start import Start
 from estimator.physics.stepper import Stepper
 from estimator.signals.record import FloatArray
 from tests.estimator.physics import bench
 
-GRID = Grid(Structure.TWO_MASS, 4, 0.02)
 START = Start(0.0, 0.0, 30.0, 0.0, 30.0)
 SIZE_OF_IT = (OwnParameter("size", "", 0.0, 0.0, 1e4, 1.0),)
 
@@ -50,19 +50,16 @@ def bent(time_s: Any, motor_speed: Any, load_speed: Any, twist: Any, torque: Any
     return size * time_s + size * motor_speed**2
 
 
-@pytest.fixture(autouse=True)
-def nothing_installed() -> Iterator[None]:
-    yield
-    own_law.install(())
-
-
 def law(function: Callable[..., object], element: Element = Element.MOTOR, name: str = "mine") -> OwnLaw:
     return OwnLaw(name, function, element, SIZE_OF_IT, "laws:it")
 
 
-def simulated(effects: dict[str, dict[str, float]], values: dict[str, float] = bench.TWO_MASS) -> FloatArray:
-    grid = GRID if "k" in values else Grid(Structure.ONE_MASS, 4, 0.02)
-    return simulate(grid, bench.record(bench.random_steps(1500, 1)), flat_values(values, effects), START)
+def simulated(
+    effects: dict[str, dict[str, float]], values: dict[str, float] = bench.TWO_MASS, *laws: OwnLaw
+) -> FloatArray:
+    names = named(laws)
+    grid = Grid(Structure.TWO_MASS if "k" in values else Structure.ONE_MASS, 4, 0.02, names)
+    return simulate(grid, bench.record(bench.random_steps(1500, 1)), flat_values(values, effects, names), START)
 
 
 @pytest.mark.parametrize(
@@ -81,57 +78,75 @@ def test_it_acts_as_the_same_law_of_the_kernel_does(
     built_in: dict[str, dict[str, float]],
     closeness: float,
 ) -> None:
-    own_law.install([law(function, element)])
-    mine, known, without = simulated({"mine": {"size": size}}), simulated(built_in), simulated({})
+    mine = simulated({"mine": {"size": size}}, bench.TWO_MASS, law(function, element))
+    known, without = simulated(built_in), simulated({})
     assert np.abs(mine - known).max() < closeness * np.abs(known - without).max()
-    assert np.array_equal(simulated({"mine": {"size": 0.0}}), without)
+    assert np.array_equal(simulated({"mine": {"size": 0.0}}, bench.TWO_MASS, law(function, element)), without)
 
 
 def test_one_mass_has_a_motor_for_it() -> None:
-    own_law.install([law(square)])
     known = simulated({"quadratic_friction": {"quadratic_nm_s2": 0.01}}, bench.ONE_MASS)
     without = simulated({}, bench.ONE_MASS)
-    mine = simulated({"mine": {"size": 0.01}}, bench.ONE_MASS)
+    mine = simulated({"mine": {"size": 0.01}}, bench.ONE_MASS, law(square))
     assert np.abs(mine - known).max() < 1e-3 * np.abs(known - without).max()
 
 
 def test_an_error_of_the_reading_is_added_to_it() -> None:
-    own_law.install([law(bent, Element.SPEED_SENSOR)])
     without = simulated({})
     time_s = bench.SAMPLE_TIME_S * np.arange(without.size)
-    assert simulated({"mine": {"size": 0.02}}) == pytest.approx(without + 0.02 * time_s + 0.02 * without**2, rel=1e-9)
+    misread = simulated({"mine": {"size": 0.02}}, bench.TWO_MASS, law(bent, Element.SPEED_SENSOR))
+    assert misread == pytest.approx(without + 0.02 * time_s + 0.02 * without**2, rel=1e-9)
 
 
 def test_the_output_is_smooth_enough_to_differentiate() -> None:
-    own_law.install([law(square)])
-    at = {step: simulated({"mine": {"size": 0.01 * (1.0 + step)}}) for step in (-1e-5, 0.0, 1e-5, 1e-2, -1e-2)}
+    at = {
+        step: simulated({"mine": {"size": 0.01 * (1.0 + step)}}, bench.TWO_MASS, law(square))
+        for step in (-1e-5, 0.0, 1e-5, 1e-2, -1e-2)
+    }
     fine = (at[1e-5] - at[-1e-5]) / 2e-5
     coarse = (at[1e-2] - at[-1e-2]) / 2e-2
     assert fine == pytest.approx(coarse, abs=1e-3 * np.abs(coarse).max())
 
 
 def test_a_law_steeper_than_the_line_can_follow_is_no_solution() -> None:
-    own_law.install([law(lambda t, w, load, twist, torque, size: 1e9 * size * np.tanh(w / 1e-3))])
-    assert np.isnan(simulated({"mine": {"size": 1.0}})).any()
+    steep = law(lambda t, w, load, twist, torque, size: 1e9 * size * np.tanh(w / 1e-3))
+    assert np.isnan(simulated({"mine": {"size": 1.0}}, bench.TWO_MASS, steep)).any()
 
 
-def test_it_stands_in_catalogue_and_layout_until_others_are_installed() -> None:
-    own_law.install([law(square), law(air, Element.LOAD, "other")])
-    assert EFFECTS["mine"].element is Element.MOTOR
-    assert Structure.ONE_MASS not in EFFECTS["other"].structures
-    assert (slot("mine", "size"), slot("other", "size")) == (SIZE, SIZE + 1)
-    own_law.install([law(air, Element.LOAD, "other")])
-    assert "mine" not in EFFECTS
-    assert slot("other", "size") == SIZE
-    own_law.install(())
-    assert "other" not in EFFECTS
-    assert flat_values({}, {}).size == SIZE
+def test_its_name_finds_it_in_catalogue_and_layout() -> None:
+    mine, other = named([law(square), law(air, Element.LOAD, "other")])
+    assert (mine, other) == ("mine", "other")
+    assert EFFECTS[mine].element is Element.MOTOR
+    assert Structure.ONE_MASS not in EFFECTS[other].structures
+    assert (slot(mine, "size"), slot(other, "size")) == (SIZE, SIZE + 1)
+    assert flat_values({}, {}, (mine, other)).size == SIZE + 2
+
+
+def test_a_law_belongs_to_its_model_and_to_no_other() -> None:
+    """Two models have laws of the same name, a third has none; whichever was made last changes nothing."""
+    effects = {"mine": {"size": 0.01}}
+    first, second = (
+        replace(bench.model(bench.TWO_MASS), laws=named([law(function, element)]))
+        for function, element in ((square, Element.MOTOR), (air, Element.LOAD))
+    )
+    rec = bench.record(bench.random_steps(500, 1), np.full(500, 30.0))
+    known = {"quadratic_friction": {"quadratic_nm_s2": 0.01}}, {"aerodynamic_drag": {"drag_nm_s2": 0.01}}
+    for owner, built_in in zip((first, second, first), (*known, known[0]), strict=True):
+        line = replace(owner, effects={"mine": {"size": EffectValue(0.01)}})
+        grid = replace(grid_for(line, [rec]), substeps=4)
+        mine = simulate(grid, rec, flat(line), START)
+        alike, without = (simulate(grid, rec, flat_values(bench.TWO_MASS, e), START) for e in (built_in, {}))
+        assert np.abs(mine - alike).max() < 1e-3 * np.abs(alike - without).max()
+    assert "mine" in open_hypotheses(first, [rec])[0]
+    assert "mine" not in open_hypotheses(bench.model(bench.TWO_MASS), [rec])[0]
+    with pytest.raises(BadModel, match=r"effects.mine: unknown effect"):
+        bench.model(bench.TWO_MASS, effects=effects)
 
 
 @pytest.mark.parametrize("names", [["backlash"], ["mine", "mine"]])
 def test_a_name_that_is_taken_is_refused(names: list[str]) -> None:
     with pytest.raises(BadModel, match="not in the catalogue and comes once"):
-        own_law.install([law(square, name=name) for name in names])
+        named([law(square, name=name) for name in names])
 
 
 @pytest.mark.parametrize(
@@ -196,7 +211,18 @@ def test_what_it_says_of_itself() -> None:
 
 
 def test_a_simulated_rig_can_not_have_it() -> None:
-    own_law.install([law(square)])
+    line = replace(bench.model(bench.TWO_MASS), laws=named([law(square)]))
     with pytest.raises(BadModel, match=r"effects.mine: expected effects of the catalogue"):
-        Stepper(bench.model(bench.TWO_MASS, effects={"mine": {"size": 0.1}}), 0.01)
-    Stepper(bench.model(bench.TWO_MASS, effects={"mine": {"size": 0.0}}), 0.01)
+        Stepper(replace(line, effects={"mine": {"size": EffectValue(0.1)}}), 0.01)
+    Stepper(replace(line, effects={"mine": {"size": EffectValue(0.0)}}), 0.01)
+
+
+def test_a_function_of_numbers_is_compiled_where_that_can_be() -> None:
+    """What can't be compiled is called as it is: here a text in between."""
+
+    def by_text(t: float, w: float, load: float, twist: float, torque: float, size: float) -> float:
+        return size * float(f"{w:.6f}")
+
+    assert law(square_by_cases).is_compiled
+    assert not law(by_text).is_compiled
+    assert law(by_text)(TRIAL, {"size": 2.0}) == pytest.approx(2.0 * TRIAL[1])

@@ -1,13 +1,28 @@
-"""Work on both cores: order, nesting and exceptions are those of a plain loop."""
+"""Work on all cores: order, nesting and exceptions are those of a plain loop."""
 
 from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Iterator
 
+import numpy as np
 import pytest
 
-from estimator.physics.parallel import WORKERS, concurrently
+from estimator.physics.jacobian import jacobian_at
+from estimator.physics.parallel import available_cores, concurrently, work_on, workers
+from estimator.physics.problem import make_problem, outputs_at, start_vector
+from estimator.physics.unknowns import nominal_unknowns
+from tests.estimator.physics.bench import TWO_MASS, model, random_steps, record
+
+
+@pytest.fixture(autouse=True)
+def cores() -> Iterator[None]:
+    """Work on two cores, whatever the machine has."""
+    before = workers()
+    work_on(2)
+    yield
+    work_on(before)
 
 
 class Broken(Exception):
@@ -30,8 +45,8 @@ def test_results_come_in_the_order_of_the_items() -> None:
 
 def test_so_many_items_are_worked_on_at_once() -> None:
     """They wait for each other: one after the other would break the barrier."""
-    meeting = threading.Barrier(WORKERS, timeout=10.0)
-    concurrently(lambda _: meeting.wait(), range(WORKERS))
+    meeting = threading.Barrier(workers(), timeout=10.0)
+    concurrently(lambda _: meeting.wait(), range(workers()))
     assert not meeting.broken
 
 
@@ -57,9 +72,9 @@ def test_calls_inside_calls_never_work_on_more_than_so_many_at_once() -> None:
     def outer(item: int) -> list[list[int]]:
         return concurrently(lambda inner: concurrently(leaf, [item, inner]), range(3))
 
-    items = range(4 * WORKERS)
+    items = range(4 * workers())
     assert concurrently(outer, items) == [[[item, inner] for inner in range(3)] for item in items]
-    assert most == WORKERS
+    assert most == workers()
 
 
 def test_an_idle_core_helps_inside_the_last_long_call() -> None:
@@ -71,7 +86,7 @@ def test_an_idle_core_helps_inside_the_last_long_call() -> None:
         time.sleep(0.001)
 
     concurrently(lambda item: concurrently(leaf, range(200 * item)), range(2))
-    assert len(workers) == WORKERS
+    assert len(workers) == workers()
 
 
 def test_an_exception_comes_out_and_the_next_call_works() -> None:
@@ -91,3 +106,34 @@ def test_an_exception_of_a_call_inside_comes_out_too() -> None:
 
     with pytest.raises(Broken, match="7"):
         concurrently(lambda item: concurrently(inner, [item, item]), [7, 7])
+
+
+@pytest.mark.parametrize("count", [1, 3, 5])
+def test_so_many_cores_as_were_asked_for_work(count: int) -> None:
+    work_on(count)
+    meeting = threading.Barrier(count, timeout=10.0)
+    concurrently(lambda _: meeting.wait(), range(count))
+    assert not meeting.broken
+    assert workers() == count
+
+
+def test_a_process_may_use_one_core_at_least() -> None:
+    assert available_cores() >= 1
+    with pytest.raises(ValueError, match="expected 1 or more, came 0"):
+        work_on(0)
+
+
+def test_a_jacobian_is_the_same_to_the_last_bit_on_any_number_of_cores() -> None:
+    torques = [random_steps(300, seed=seed) for seed in range(3)]
+    records = [record(torque, np.cumsum(torque) * 1e-3, name=f"run_{i}") for i, torque in enumerate(torques)]
+    line = model(TWO_MASS, effects={"backlash": {"gap_rad": 0.01}, "eddy_drag": {"peak_nm": 9.0, "peak_rad_s": 3.0}})
+    problem = make_problem(line, records, nominal_unknowns(line))
+    x = start_vector(problem)
+    found = []
+    for count in (1, 2, 5):
+        work_on(count)
+        outputs = outputs_at(problem, x)
+        found.append((np.concatenate(outputs), jacobian_at(problem, x, outputs)))
+    for outputs, derivative in found[1:]:
+        np.testing.assert_array_equal(outputs, found[0][0])
+        np.testing.assert_array_equal(derivative, found[0][1])

@@ -51,7 +51,19 @@ TOLD: dict[str, tuple[dict[str, float], list[str]]] = {
     "speed_filter": ({"time_constant_s": 0.0123}, ["12.3 ms"]),
     "speed_sign_blind": ({"share": 0.98}, ["0.98"]),
     "clock_drift": ({"rate": -0.000123}, ["-123 ppm"]),
+    "eddy_drag": ({"peak_nm": 12.3, "peak_rad_s": 4.56}, ["12.3 Nm", "4.56 rad/s"]),
+    "asymmetric_friction": ({"difference_nm_s": -1.23}, ["1.23 Nm s/rad more backward"]),
+    "gear_losses": ({"driving_share": 0.0456, "back_share": 0.0789}, ["4.56% driving", "7.89%"]),
+    "torque_nonlinearity": (
+        {"curvature_per_nm": 4e-4, "asymmetry_per_nm": 1e-4},
+        ["5.00% at 100 Nm", "3.00% at -100 Nm"],
+    ),
+    "torque_bias": ({"offset_nm": -4.56, "time_constant_s": 7.89}, ["-4.56 Nm", "7.89 s"]),
+    "grounded_spring": ({"stiffness_nm_per_rad": 45.6}, ["45.6 Nm/rad"]),
+    "gravity": ({"moment_nm": 4.56, "motor_turns_per_turn": 7.89}, ["4.56 Nm", "7.89 motor turns"]),
+    "viscoelastic_shaft": ({"branch_share": 0.456, "relaxation_s": 0.0123}, ["45.6%", "12.3 ms"]),
 }
+TOLD |= {name: (dict(entry.example), []) for name, entry in EFFECTS.items() if entry.example and name not in TOLD}
 
 fitted = pytest.mark.parametrize("entry", [e for e in EFFECTS.values() if not e.recognised], ids=lambda e: e.name)
 

@@ -61,6 +61,8 @@ EFFECTS: dict[str, dict[str, float]] = {
 }
 """Effects that need no angle, each large enough to be seen."""
 
+EFFECTS |= {name: dict(entry.example) for name, entry in CATALOGUE.items() if entry.example and not entry.phases}
+
 PERIODIC: dict[str, dict[str, float]] = {
     "torque_ripple": {"amplitude_nm": 40.0, "order": 6.0, "phase_rad": 0.5},
     "torque_ripple/share": {"share": 0.4, "order": 2.0, "share_phase_rad": 0.5},
@@ -71,6 +73,12 @@ PERIODIC: dict[str, dict[str, float]] = {
     "resolver_error": {"once_rad": 0.1, "twice_rad": 0.05},
 }
 """Effects of the motor's angle: the stepper knows it, the simulation takes it from the record."""
+
+PERIODIC |= {
+    name: {**entry.example, **dict.fromkeys(entry.phases, 0.5)}
+    for name, entry in CATALOGUE.items()
+    if entry.example and entry.phases
+}
 
 ALONE = {case: model(TWO_MASS, effects={effect_of(case): values}) for case, values in EFFECTS.items()}
 LINES = {

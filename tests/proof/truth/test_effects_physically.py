@@ -189,3 +189,11 @@ def test_a_maxwell_branch_is_stiff_when_fast_and_gone_when_slow(plain, trace, tw
     up = np.flatnonzero((speed[:-1] < 0) & (speed[1:] >= 0))
     frequency = 2 * np.pi * (up.size - 1) / ((up[-1] - up[0]) * 0.001)
     assert frequency == pytest.approx(np.sqrt(6200.0 * (1 / p.J_M + 1 / p.J_L)), rel=2e-3)
+
+
+def test_a_second_branch_relaxes_six_times_as_fast(plain, trace):
+    p = plain._replace(maxwell_stiffness=2000.0, maxwell_time_s=0.6, maxwell_fast_share=0.2)
+    states = trace(p, [400.0] * 10, period_s=1e-4)[-1]
+    assert states[State.MAXWELL_FAST_NM] == pytest.approx(0.2 * states[State.MAXWELL_NM], rel=5e-3)
+    alone = trace(p._replace(maxwell_fast_share=0.0), [400.0] * 10)[-1]
+    assert alone[State.MAXWELL_FAST_NM] == 0.0

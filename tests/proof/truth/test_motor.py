@@ -72,3 +72,31 @@ def test_eddy_drag_slows_the_motor(plain):
     driveline = TruthDriveline(plain._replace(k=0.0, c=0.0, b_M=0.0, eddy_nm=30.0, eddy_speed_rad_s=15.0), 15.0)
     driveline.advance((0.0, 0.0), 0.01)
     assert driveline.quantity(State.SPEED_M) == pytest.approx(15.0 - 30.0 * 0.01 / 1.6, rel=1e-4)
+
+
+def test_currents_that_keep_to_the_surface_flatten_the_drag_but_not_its_peak(plain):
+    p = plain._replace(eddy_nm=30.0, eddy_speed_rad_s=15.0)
+    flat = p._replace(eddy_exponent=0.9)
+    assert laws.eddy_torque(flat, 15.0) == pytest.approx(30.0)
+    for speed in (3.0, 60.0):
+        assert 30.0 > laws.eddy_torque(flat, speed) > laws.eddy_torque(p, speed)
+
+
+def test_friction_by_direction_is_more_forward_and_as_much_less_backward(plain):
+    p = plain._replace(viscous_forward=0.4, dry_forward_nm=2.0)
+    assert laws.torque_by_direction(p, 10.0) == pytest.approx(6.0)
+    assert laws.torque_by_direction(p, -10.0) == pytest.approx(6.0)
+    assert laws.torque_by_direction(p, 0.0) == 0.0
+
+
+def test_gears_lose_a_share_of_the_power_whoever_drives(plain):
+    p = plain._replace(efficiency=0.95, efficiency_back=0.9)
+    assert laws.behind_gears(p, 100.0, 10.0) == pytest.approx(95.0)
+    assert laws.behind_gears(p, -100.0, -10.0) == pytest.approx(-95.0)
+    assert laws.behind_gears(p, -90.0, 10.0) == pytest.approx(-100.0)
+    assert laws.behind_gears(p, 100.0, 0.0) == 100.0
+
+
+def test_a_fast_motor_draws_more_along(plain):
+    p = plain._replace(drawn_share=0.2, drawn_half_rad_s=20.0)
+    assert [laws.inertia_over_rotor(p, speed) for speed in (0.0, 20.0, -20.0)] == pytest.approx([1.0, 1.1, 1.1])

@@ -60,6 +60,34 @@ def test_a_deadband_is_missing_from_each_inverter(plain):
     assert true_torque(p, (-30.0, 8.0), 0.0) == pytest.approx(-20.0)
 
 
+def test_a_machine_saturates_of_each_sign_by_itself(plain):
+    p = plain._replace(saturating_nm=400.0, saturating_back_nm=1200.0)
+    assert true_torque(p, (200.0, 200.0), 0.0) == pytest.approx(400.0 * math.log(1.0 + math.sqrt(2.0)))
+    assert true_torque(p, (-200.0, -200.0), 0.0) == pytest.approx(-1200.0 * math.asinh(1.0 / 3.0))
+    assert true_torque(p, (1.0, 0.0), 0.0) == pytest.approx(1.0, rel=1e-5)
+
+
+def test_an_offset_comes_and_has_come_by_half_at_its_time(plain):
+    p = plain._replace(bias_nm=20.0, bias_half_s=5.0)
+    given = [true_torque(p, (60.0, 40.0), time_s) - 100.0 for time_s in (0.0, 5.0, 1e6)]
+    assert given == pytest.approx([0.0, 10.0, 20.0], abs=1e-3)
+
+
+def test_inverters_that_are_blocked_give_nothing_for_an_instant(plain):
+    p = plain._replace(dropout_every_s=1.0, dropout_s=0.045)
+    given = np.array([true_torque(p, (60.0, 40.0), time_s) for time_s in np.arange(0.0, 3.0, 0.01)])
+    assert set(given.tolist()) == {0.0, 100.0}
+    assert np.count_nonzero(given == 0.0) == 15
+
+
+def test_a_torque_changes_no_faster_than_its_inverter_can(plain):
+    driveline = TruthDriveline(plain._replace(slew_nm_s=5000.0))
+    driveline.advance((60.0, 60.0), 0.01)
+    assert driveline.quantity(State.INVERTER_NM) == pytest.approx(50.0)
+    driveline.advance((60.0, 60.0), 0.02)
+    assert driveline.quantity(State.INVERTER_NM) == pytest.approx(120.0)
+
+
 def test_the_reading_and_the_true_torque_are_the_same_without_a_fault(plain):
     assert true_torque(plain, (310.0, -45.0), 12.0) == 265.0
 

@@ -1,4 +1,4 @@
-"""A viscoelastic shaft: rubber adds a second branch, a spring in series with a damper. No catalogue entry."""
+"""A viscoelastic shaft: rubber adds branches that relax, one slow and a smaller one fast (a Prony series)."""
 
 from __future__ import annotations
 
@@ -13,13 +13,16 @@ def _draw(rng: np.random.Generator, bus: Bus) -> Sizes:
     return {
         "maxwell_stiffness_nm_per_rad": bus.k * log_uniform(rng, 0.15, 0.6),
         "maxwell_time_s": log_uniform(rng, 0.01, 0.04),
+        "maxwell_fast_share": rng.uniform(0.0, 0.25),
     }
 
 
 def _apply(physics: Physics, sizes: Sizes, rng: np.random.Generator) -> Physics:
     return physics._replace(
-        maxwell_stiffness=sizes["maxwell_stiffness_nm_per_rad"], maxwell_time_s=sizes["maxwell_time_s"]
+        maxwell_stiffness=sizes["maxwell_stiffness_nm_per_rad"],
+        maxwell_time_s=sizes["maxwell_time_s"],
+        maxwell_fast_share=sizes["maxwell_fast_share"],
     )
 
 
-EFFECT = HiddenEffect("maxwell_shaft", Place.SHAFT, False, _draw, _apply)
+EFFECT = HiddenEffect("viscoelastic_shaft", Place.SHAFT, True, _draw, _apply)

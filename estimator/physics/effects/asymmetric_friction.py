@@ -1,0 +1,61 @@
+"""Viscous friction at the motor that is not the same forward and backward: seals, helical gears, worn bearings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from estimator.compiled import compiled
+from estimator.physics.acting import Acting, Place
+from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start, Untestable
+from estimator.physics.model import DrivelineModel, Motion, unit
+from estimator.physics.motion import reverses, speed_scale, torque_scale
+from estimator.signals.record import Record
+
+
+@compiled
+def law(speed: float, difference: float) -> float:
+    """Return ``d |w|``: what is more forward is less backward [Nm]."""
+    return difference * abs(speed)
+
+
+def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+    """Return a twentieth of the torque in use at the top speed."""
+    return (0.05 * torque_scale(records) / speed_scale(records),)
+
+
+def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
+    """Return one start of either sign: the problem is linear in it but for the sign of ``b_M`` within its bounds."""
+    return [(0.5,), (-0.5,)]
+
+
+def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
+    """Need motion in both directions."""
+    if any(reverses(record) for record in records):
+        return None
+    return Untestable("the speed never changes sign: not separable from viscous friction", "reversal")
+
+
+def sentence(values: Mapping[str, float], motion: Motion) -> str:
+    """Say what was found."""
+    size = f"{abs(values['difference_nm_s']):.3g} {unit('damping', motion)}"
+    more, less = ("forward", "backward") if values["difference_nm_s"] > 0.0 else ("backward", "forward")
+    return f"friction at the motor depends on the direction: {size} more {more} and as much less {less}"
+
+
+EFFECT = Effect(
+    name="asymmetric_friction",
+    element=Element.MOTOR,
+    title="friction by direction",
+    law="T_f = d |w_M|: b_M + d forward, b_M - d backward; dry friction that differs is a constant load torque",
+    source="friction by direction: Kelly, Davila Santibáñez, Loría, Control of Robot Manipulators, Springer 2005",
+    excited_by="motion in both directions at different speeds",
+    parameters=(EffectParameter("difference_nm_s", "damping", 0.0, -40.0, 40.0, "half the difference: d"),),
+    example={"difference_nm_s": 3.0},
+    acting=Acting(Place.MOTOR, law),
+    structures=EVERY_LINE,
+    resembles=("coulomb_friction_motor", "road_grade", "torque_nonlinearity"),
+    scales=scales,
+    starts=starts,
+    testable=testable,
+    sentence=sentence,
+)

@@ -1,0 +1,87 @@
+"""Eddy-current drag at the motor: it rises with the speed, levels off, and falls beyond a peak."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from estimator.abreast import choose, every
+from estimator.compiled import compiled
+from estimator.physics.acting import Acting, Place
+from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start, Untestable
+from estimator.physics.model import DrivelineModel, Motion, unit
+from estimator.physics.motion import measured_speed, speed_scale, torque_scale
+from estimator.signals.record import Record
+
+LEAST_RANGE = 0.2
+"""Share of the top speed that the speed must range over: in less, any law of the speed is a straight line."""
+
+STRAIGHT = 3.0
+"""Peak speed over the top speed from which on the law is a straight line, as viscous friction is: 10 % off it."""
+
+
+@compiled
+def law(speed: float, peak: float, peak_speed: float) -> float:
+    """Return ``2 T_p s / (1 + s^2)`` with ``s = w/w_p``, the torque against the motion."""
+    if every(peak == 0.0):
+        return 0.0
+    ratio = speed / choose(peak_speed > 0.0, peak_speed, 1.0)
+    return choose(peak_speed > 0.0, 2.0 * peak * ratio / (1.0 + ratio * ratio), 0.0)
+
+
+def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+    """Return a twentieth of the torque in use and the top speed."""
+    return (0.05 * torque_scale(records), speed_scale(records))
+
+
+def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
+    """Return a peak inside the speeds driven and one at their end: the error is not convex in the peak's speed."""
+    return [(1.0, 0.15), (1.0, 0.6)]
+
+
+def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
+    """Need speeds far enough apart."""
+    top = speed_scale(records)
+    if any(float(np.nanmax(w) - np.nanmin(w)) >= LEAST_RANGE * top for w in map(measured_speed, records)):
+        return None
+    return Untestable("the speed hardly varies: not separable from viscous friction and the constant load", "reversal")
+
+
+def implausible(model: DrivelineModel, records: Sequence[Record], values: Mapping[str, float]) -> str:
+    """Object to a drag that does not level off in the speeds driven."""
+    top = speed_scale(records)
+    if values["peak_rad_s"] < STRAIGHT * top:
+        return ""
+    return f"a drag that is greatest at {values['peak_rad_s']:.3g} {unit('speed', model.motion)} is viscous friction"
+
+
+def sentence(values: Mapping[str, float], motion: Motion) -> str:
+    """Say what was found."""
+    return (
+        f"a drag at the motor rises with its speed to {values['peak_nm']:.3g} {unit('torque', motion)} "
+        f"at {values['peak_rad_s']:.3g} {unit('speed', motion)} and falls beyond, as eddy currents brake"
+    )
+
+
+EFFECT = Effect(
+    name="eddy_drag",
+    element=Element.MOTOR,
+    title="drag that levels off",
+    law="T_f = 2 T_p s / (1 + s^2), s = w_M / w_p",
+    source="Wouterse: Critical torque and speed of eddy current brake, IEE Proceedings B 138(4), 1991",
+    excited_by="motion at very different speeds, low ones among them",
+    parameters=(
+        EffectParameter("peak_nm", "torque", 0.0, 0.0, 40.0, "greatest drag: T_p"),
+        EffectParameter("peak_rad_s", "speed", 1.0, 0.02, 5.0, "speed of the greatest drag: w_p"),
+    ),
+    example={"peak_nm": 40.0, "peak_rad_s": 2.0},
+    acting=Acting(Place.MOTOR, law),
+    structures=EVERY_LINE,
+    resembles=("coulomb_friction_motor", "stribeck_friction", "quadratic_friction"),
+    scales=scales,
+    starts=starts,
+    testable=testable,
+    implausible=implausible,
+    sentence=sentence,
+)

@@ -1,0 +1,29 @@
+"""A shorted turn in the motor: eddy-current drag that is greatest at one speed.
+
+Currents keep to the surface at speed, which bends the law (Davies, 1963).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hil.proof.truth.bus import Bus
+from hil.proof.truth.hidden import HiddenEffect, Place, Sizes, log_uniform
+from hil.proof.truth.physics import Physics
+
+
+def _draw(rng: np.random.Generator, bus: Bus) -> Sizes:
+    return {
+        "eddy_nm": log_uniform(rng, 10.0, 60.0),
+        "eddy_speed_rad_s": log_uniform(rng, 8.0, 25.0),
+        "eddy_exponent": rng.uniform(0.88, 1.0),
+    }
+
+
+def _apply(physics: Physics, sizes: Sizes, rng: np.random.Generator) -> Physics:
+    return physics._replace(
+        eddy_nm=sizes["eddy_nm"], eddy_speed_rad_s=sizes["eddy_speed_rad_s"], eddy_exponent=sizes["eddy_exponent"]
+    )
+
+
+EFFECT = HiddenEffect("eddy_drag", Place.MOTOR, True, _draw, _apply)

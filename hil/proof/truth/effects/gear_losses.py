@@ -1,0 +1,21 @@
+"""Gears that lose a share of the power they transmit, and more of it when the load drives them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hil.proof.truth.bus import Bus
+from hil.proof.truth.hidden import HiddenEffect, Place, Sizes, log_uniform
+from hil.proof.truth.physics import Physics
+
+
+def _draw(rng: np.random.Generator, bus: Bus) -> Sizes:
+    efficiency = 1.0 - log_uniform(rng, 0.03, 0.12)
+    return {"efficiency": efficiency, "efficiency_back": 1.0 - (1.0 - efficiency) * rng.uniform(1.0, 1.8)}
+
+
+def _apply(physics: Physics, sizes: Sizes, rng: np.random.Generator) -> Physics:
+    return physics._replace(efficiency=sizes["efficiency"], efficiency_back=sizes["efficiency_back"])
+
+
+EFFECT = HiddenEffect("gear_losses", Place.SHAFT, True, _draw, _apply)
