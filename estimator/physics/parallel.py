@@ -12,6 +12,7 @@ import threading
 from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from itertools import takewhile
 from typing import TypeVar
 
 PARTS = 4
@@ -37,6 +38,10 @@ class _Cores:
         self.count = count
         self.idle = threading.Semaphore(count - 1)
         self.pool = ThreadPoolExecutor(THREADS_PER_CORE * count, thread_name_prefix="driveline")
+
+    def taken(self, most: int) -> int:
+        """Take idle cores, as many as there are and no more than wanted; return how many."""
+        return sum(1 for _ in takewhile(lambda _: self.idle.acquire(blocking=False), range(most)))
 
 
 _cores = _Cores(available_cores())
@@ -83,8 +88,8 @@ def concurrently(function: Callable[[Item], Result], items: Sequence[Item]) -> l
                 i, item = todo.popleft()
             except IndexError:  # another core took the last one
                 return
-            if recruit and todo and cores.idle.acquire(blocking=False):
-                helpers.append(cores.pool.submit(help_out))
+            if recruit:
+                helpers.extend(cores.pool.submit(help_out) for _ in range(cores.taken(len(todo))))
             try:
                 results[i] = function(item)
             except BaseException:

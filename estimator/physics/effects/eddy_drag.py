@@ -12,10 +12,10 @@ from estimator.physics.acting import Acting, Place
 from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start, Untestable
 from estimator.physics.model import DrivelineModel, Motion, unit
 from estimator.physics.motion import measured_speed, speed_scale, torque_scale
-from estimator.signals.record import Record
+from estimator.signals.record import FloatArray, Record
 
 LEAST_RANGE = 0.2
-"""Share of the top speed that the speed must range over: in less, any law of the speed is a straight line."""
+"""Share of its top speed that the speed of a recording must range over: in less any law of it is a straight line."""
 
 STRAIGHT = 3.0
 """Peak speed over the top speed from which on the law is a straight line, as viscous friction is: 10 % off it."""
@@ -40,10 +40,15 @@ def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
     return [(1.0, 0.15), (1.0, 0.6)]
 
 
+def speed_of(record: Record) -> FloatArray:
+    """Return the speeds that were measured."""
+    speed = measured_speed(record)
+    return speed[np.isfinite(speed)]
+
+
 def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
     """Need speeds far enough apart."""
-    top = speed_scale(records)
-    if any(float(np.nanmax(w) - np.nanmin(w)) >= LEAST_RANGE * top for w in map(measured_speed, records)):
+    if any(float(np.ptp(speed_of(record))) >= LEAST_RANGE * speed_scale([record]) for record in records):
         return None
     return Untestable("the speed hardly varies: not separable from viscous friction and the constant load", "reversal")
 

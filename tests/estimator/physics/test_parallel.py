@@ -79,14 +79,14 @@ def test_calls_inside_calls_never_work_on_more_than_so_many_at_once() -> None:
 
 def test_an_idle_core_helps_inside_the_last_long_call() -> None:
     """As soon as nothing else is left: many short calls inside it are enough to see that."""
-    workers = set[int]()
+    threads = set[int]()
 
     def leaf(_: int) -> None:
-        workers.add(threading.get_ident())
+        threads.add(threading.get_ident())
         time.sleep(0.001)
 
     concurrently(lambda item: concurrently(leaf, range(200 * item)), range(2))
-    assert len(workers) == workers()
+    assert len(threads) == workers()
 
 
 def test_an_exception_comes_out_and_the_next_call_works() -> None:

@@ -119,6 +119,14 @@ def test_every_fitted_law_is_planted() -> None:
     assert {effect_of(case) for case in PLANTS} == {e.name for e in EFFECTS.values() if not (e.profile or e.recognised)}
 
 
+def torque_of(name: str, seed: int) -> FloatArray:
+    """Steps of one size, or, where the law is one of that size, of several."""
+    torque = random_steps(SAMPLES, seed=seed, size_nm=200.0, hold=25)
+    if name != "torque_nonlinearity":
+        return torque
+    return torque * np.repeat(np.random.default_rng(seed).choice([0.3, 0.6, 1.0], SAMPLES // 25), 25)
+
+
 def effect_of(case: str) -> str:
     return case.partition("/")[0]
 
@@ -127,7 +135,7 @@ def recordings(name: str, plant: Plant) -> list[Record]:
     """Two recordings of a line with the effect; periodic laws run on the angle of their own output."""
     records = []
     for i, start in enumerate((Start(20.0, 0.0, 3.0, 0.01, 2.9), Start(-10.0, 0.0, -2.0, 0.0, -2.0))):
-        torque = random_steps(SAMPLES, seed=10 + i, size_nm=200.0, hold=25)
+        torque = torque_of(name, 10 + i)
         share = 0.5 + 0.1 * i
         rec = record(np.column_stack([share * torque, (1.0 - share) * torque]), np.ones(SAMPLES), name=f"run_{i}")
         p = flat_values(TRUE, {name: {**plant.shared, **plant.own[i]}})
