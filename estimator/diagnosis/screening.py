@@ -37,8 +37,8 @@ ROOM_SAMPLES = 2**21
 STEP_SHARES = (1.0, 0.1)
 """Shares of a start's size that are looked along: what is not smooth shows in full, what moves far in small."""
 
-STARTS = 2
-"""Start points of an effect that are fitted, the most promising of its list."""
+STARTS = 4
+"""Shapes of an effect that are fitted, the most promising of its list."""
 
 PROMISING = 0.5
 """Share of the best start's promise below which another start of the same effect is not tried."""
@@ -59,16 +59,25 @@ class Look:
         """Which of the law's parameters are free: what is held makes it another variant."""
         return frozenset(unknown.name for unknown in self.release.shared if unknown.low < unknown.high)
 
+    @property
+    def shape(self) -> tuple[tuple[str, float], ...]:
+        """Where the law's parameters start, but for its size: along that a look goes by itself."""
+        free = [(unknown.name, unknown.start) for unknown in self.release.shared if unknown.low < unknown.high]
+        return tuple(free[1:])
+
 
 def promising(looks: Sequence[Look]) -> list[Look]:
     """Return the starts worth a fit: the best, and others where they promise nearly as much.
 
-    These are the second best, and the best of every other variant of the law: a look at one is no look at another.
+    These are the best of every other shape, since a law has an optimum near each, and of every other variant: a look at
+    one is no look at another.
     """
     near = [look for look in looks if look.promise >= PROMISING * looks[0].promise or look is looks[0]]
-    seen = {look.variant for look in near[:STARTS]}
+    shapes = {(look.variant, look.shape): look for look in reversed(near)}
+    first = [look for look in near if shapes[look.variant, look.shape] is look][:STARTS]
+    seen = {look.variant for look in first}
     others = {look.variant: look for look in reversed(near) if look.variant not in seen}
-    return [*near[:STARTS], *others.values()]
+    return [*first, *others.values()]
 
 
 @dataclass(frozen=True, slots=True)

@@ -39,7 +39,8 @@ class Problem:
     use : tuple of ndarray of bool
         Per recording, which samples count.
     leads : tuple of int
-        Which recording's own unknowns each recording has; those that have their own come first.
+        Which recording's own unknowns each recording has; those that have their own come first. By default as
+        ``Record.of`` says.
     """
 
     grid: Grid
@@ -48,7 +49,11 @@ class Problem:
     shared: tuple[Shared, ...]
     local: tuple[LocalBasis, ...]
     use: tuple[BoolArray, ...]
-    leads: tuple[int, ...]
+    leads: tuple[int, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.leads:
+            object.__setattr__(self, "leads", leads(self.records))
 
     @property
     def bases(self) -> tuple[LocalBasis, ...]:
