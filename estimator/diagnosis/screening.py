@@ -37,8 +37,11 @@ ROOM_SAMPLES = 2**21
 STEP_SHARES = (1.0, 0.1)
 """Shares of a start's size that are looked along: what is not smooth shows in full, what moves far in small."""
 
-STARTS = 4
-"""Shapes of an effect that are fitted, the most promising of its list."""
+STARTS = 2
+"""Start points of an effect that are fitted, the most promising of its list."""
+
+SHAPES = 2
+"""Further ones, of other shapes than these."""
 
 PROMISING = 0.5
 """Share of the best start's promise below which another start of the same effect is not tried."""
@@ -69,12 +72,13 @@ class Look:
 def promising(looks: Sequence[Look]) -> list[Look]:
     """Return the starts worth a fit: the best, and others where they promise nearly as much.
 
-    These are the best of every other shape, since a law has an optimum near each, and of every other variant: a look at
-    one is no look at another.
+    These are the second best, and the best of other shapes, since a law has an optimum near each, and of every other
+    variant: a look at one is no look at another.
     """
     near = [look for look in looks if look.promise >= PROMISING * looks[0].promise or look is looks[0]]
-    shapes = {(look.variant, look.shape): look for look in reversed(near)}
-    first = [look for look in near if shapes[look.variant, look.shape] is look][:STARTS]
+    best = {(look.variant, look.shape): look for look in reversed(near)}
+    apart = [look for look in near[STARTS:] if best[look.variant, look.shape] is look]
+    first = [*near[:STARTS], *apart[:SHAPES]]
     seen = {look.variant for look in first}
     others = {look.variant: look for look in reversed(near) if look.variant not in seen}
     return [*first, *others.values()]
