@@ -42,7 +42,7 @@ def commission_page(state: State, titles: Mapping[str, str]) -> str:
         (piece for piece in body if piece),
         f"hil commission {state['hil_version']}, begun {moment(state['started_utc'])}, as of "
         f"{moment(state['updated_utc'])}. "
-        "Intervals are of 95 % confidence; foretold values are from the driveline as it was known before each run.",
+        "Intervals are of 95 % confidence; predicted values are from the driveline as it was known before each run.",
     )
 
 

@@ -16,6 +16,7 @@ from estimator.diagnosis.result import Diagnosis, FoundEffect, Trace, UnnamedLaw
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
 from estimator.signals.record import FloatArray
+from hil.provenance import Provenance
 from hil.report import page as html
 from hil.report.discrepancy_html import frequency, law_pictures, location, worth_marking
 from hil.report.figures import (
@@ -25,10 +26,10 @@ from hil.report.figures import (
     band_figure,
     input_lines,
     spectrum_figure,
-    stretches_for,
     time_figure,
 )
 from hil.report.interval_bar import interval_bar
+from hil.report.made import made_section
 from hil.report.numbers import p_statement, shown, shown_interval, shown_ratio, shown_times
 from hil.report.sentence import listed
 from hil.report.wording import BADGES, ELEMENTS, belief, headline, quantity, torque_axis
@@ -41,7 +42,7 @@ AUGMENTED = "augmented"
 KEPT_BACK = "stretches kept back as unseen data"
 
 
-def diagnosis_page(diagnosis: Diagnosis) -> str:
+def diagnosis_page(diagnosis: Diagnosis, made: Provenance | None = None) -> str:
     """Return the text of the page."""
     drawn = _drawn(diagnosis.traces)
     body = [
@@ -55,6 +56,7 @@ def diagnosis_page(diagnosis: Diagnosis) -> str:
         _rivals(diagnosis),
         _untestable(diagnosis),
         _parameters(diagnosis),
+        made_section(made),
     ]
     seconds = shown(diagnosis.timing_s.get("total", float("nan")), "s")
     return html.page(
@@ -207,8 +209,7 @@ def _drawn(traces: Sequence[Trace]) -> list[Trace]:
 
 
 def _recordings(diagnosis: Diagnosis, drawn: Sequence[Trace]) -> list[str]:
-    stretches = stretches_for(len(drawn))
-    sections = [_recording(diagnosis, trace, i, stretches) for i, trace in enumerate(drawn)]
+    sections = [_recording(diagnosis, trace, i, len(drawn)) for i, trace in enumerate(drawn)]
     left_out = len(diagnosis.traces) - len(drawn)
     if left_out:
         text = f"{left_out} more recordings, with smaller errors of the re-tuned model, are not drawn."
@@ -221,28 +222,11 @@ def _rms(error: FloatArray) -> float:
     return float(np.sqrt(np.mean(finite**2))) if finite.size else 0.0
 
 
-def _recording(diagnosis: Diagnosis, trace: Trace, number: int, stretches: int) -> str:
+def _recording(diagnosis: Diagnosis, trace: Trace, number: int, recordings: int) -> str:
     fit = diagnosis.fit
     measured = np.where(trace.okay, trace.measured, np.nan)
     before, after = measured - trace.retuned, measured - trace.augmented
-    inputs = input_lines(trace.torque_nm)
-    errors = [Line(RETUNED, before, Style.BEFORE)]
-    models = [Line(RETUNED, trace.retuned, Style.BEFORE)]
-    if not np.array_equal(trace.retuned, trace.augmented):
-        errors.append(Line(AUGMENTED, after, Style.AFTER))
-        models.append(Line(AUGMENTED, trace.augmented, Style.AFTER))
-    panels = (
-        Panel(torque_axis(diagnosis.augmented.motion), inputs),
-        Panel(
-            f"{quantity(fit.unit)} [{fit.unit}]",
-            (
-                Line("measured", measured, Style.MEASURED),
-                Line("nominal as given", trace.nominal, Style.NOMINAL, hidden=True),
-                *models,
-            ),
-        ),
-        Panel(f"error [{fit.unit}]", tuple(errors), band=fit.noise_floor),
-    )
+    panels = course_panels(diagnosis, trace)
     shaded = worth_marking(trace, diagnosis.mismatch.time_s.get(trace.name, ()))
     sample_time_s = float(np.median(np.diff(trace.time_s)))
     kind = "held out" if trace.holdout else "used for the fit"
@@ -254,9 +238,34 @@ def _recording(diagnosis: Diagnosis, trace: Trace, number: int, stretches: int) 
             f"{figures} Drag to zoom, double click to go back; the dotted pair of lines is the noise floor.{marked}",
             "note",
         ),
-        time_figure(f"time-{number}", trace.time_s, panels, stretches, shaded),
+        time_figure(f"time-{number}", trace.time_s, panels, recordings, shaded),
         "<h3>Spectrum of the error</h3>",
-        spectrum_figure(f"spectrum-{number}", sample_time_s, errors, fit.unit, fit.noise_floor),
+        spectrum_figure(f"spectrum-{number}", sample_time_s, panels[-1].lines, fit.unit, fit.noise_floor),
+    )
+
+
+def course_panels(diagnosis: Diagnosis, trace: Trace) -> tuple[Panel, ...]:
+    """Return torques, measured and simulated outputs, and the errors of a recording."""
+    fit = diagnosis.fit
+    measured = np.where(trace.okay, trace.measured, np.nan)
+    before, after = measured - trace.retuned, measured - trace.augmented
+    inputs = input_lines(trace.torque_nm)
+    errors = [Line(RETUNED, before, Style.BEFORE)]
+    models = [Line(RETUNED, trace.retuned, Style.BEFORE)]
+    if not np.array_equal(trace.retuned, trace.augmented):
+        errors.append(Line(AUGMENTED, after, Style.AFTER))
+        models.append(Line(AUGMENTED, trace.augmented, Style.AFTER))
+    return (
+        Panel(torque_axis(diagnosis.augmented.motion), inputs),
+        Panel(
+            f"{quantity(fit.unit)} [{fit.unit}]",
+            (
+                Line("measured", measured, Style.MEASURED),
+                Line("nominal as given", trace.nominal, Style.NOMINAL, hidden=True),
+                *models,
+            ),
+        ),
+        Panel(f"error [{fit.unit}]", tuple(errors), band=fit.noise_floor),
     )
 
 

@@ -12,7 +12,7 @@ from hil.figures.numbers import Row
 from hil.figures.palette import series_colour
 from hil.figures.road.conditions import Conditions
 from hil.report import page as html
-from hil.report.figures import Line, Panel, Style, stretches_for, time_figure
+from hil.report.figures import Line, Panel, Style, time_figure
 from hil.report.identification.pole_map import PoleSet, known_sets, pole_figure
 from hil.report.identification.responses import responses_figure
 from hil.report.numbers import shown
@@ -135,7 +135,6 @@ def _percent(share: float) -> str:
 
 def _signals(models: Sequence[LocalModel]) -> str:
     drawn = models[:SHOWN_SIGNALS]
-    stretches = stretches_for(4 * len(drawn))
     pieces = []
     for number, model in enumerate(drawn):
         record = model.record
@@ -144,7 +143,10 @@ def _signals(models: Sequence[LocalModel]) -> str:
             Panel("T_tot [Nm]", (Line("total torque", record.total_torque_nm, Style.BEFORE),)),
             Panel("ω_M [rad/s]", (Line("motor speed", speed, Style.AFTER),)),
         )
-        pieces += [f"<h3>{escape(model.name)}</h3>", time_figure(f"signals-{number}", record.time_s, panels, stretches)]
+        pieces += [
+            f"<h3>{escape(model.name)}</h3>",
+            time_figure(f"signals-{number}", record.time_s, panels, 4 * len(drawn)),
+        ]
     text = f"As recorded, every {1e3 * drawn[0].record.sample_time_s:g} ms. Drag to zoom, double click to go back."
     return html.section("Fig. 2: total torque and motor speed", html.paragraph(text, "note"), *pieces)
 
