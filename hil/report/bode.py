@@ -24,6 +24,7 @@ MAGNITUDE, PHASE, COHERENCE = 1, 2, 3
 """Rows of the figure."""
 
 HEIGHT_PX = 760
+FULL_TURN_DEG = 360.0
 PHASE_TICKS_DEG = (-180, -90, 0, 90, 180)
 DB_PER_LOG = 20.0 / np.log(10.0)
 
@@ -64,7 +65,7 @@ def curve(
         spread = spread_of(fit, f)
         group = {"legendgroup": name, "name": name}
         _band(figure, f, decibels(response), DB_PER_LOG * spread, MAGNITUDE, look["color"], group)
-        _band(figure, f, degrees(response), np.rad2deg(spread), PHASE, look["color"], group)
+        _turns(figure, f, np.angle(response), spread, look["color"], group)
     for row, y in ((MAGNITUDE, decibels(response)), (PHASE, degrees(response))):
         figure.add_trace(
             go.Scatter(
@@ -116,11 +117,20 @@ def estimate(
     group = {"legendgroup": name, "name": name}
     if band:
         _band(figure, f, decibels(response), DB_PER_LOG * relative, MAGNITUDE, colour, group)
-        _band(figure, f, angle, np.rad2deg(relative), PHASE, colour, group)
+        _turns(figure, f, np.angle(response), relative, colour, group)
     dots = {"mode": "markers", "marker": {"color": colour, "size": 4, "opacity": 0.55}, **group}
     for row, y in ((MAGNITUDE, decibels(response)), (PHASE, angle), (COHERENCE, coherence)):
         trace = go.Scatter(x=_compact(f), y=_compact(y), showlegend=row == MAGNITUDE and band, **dots)
         figure.add_trace(trace, row=row, col=1)
+
+
+def _turns(
+    figure: go.Figure, f: FloatArray, angle: FloatArray, half: FloatArray, colour: str, group: dict[str, str]
+) -> None:
+    """Draw the band of a phase [rad], once for every turn that it goes through: none crosses the figure."""
+    whole = np.rad2deg(np.unwrap(angle))
+    for turn in np.unique(np.round(whole / FULL_TURN_DEG)):
+        _band(figure, f, whole - turn * FULL_TURN_DEG, np.rad2deg(half), PHASE, colour, group)
 
 
 def _band(

@@ -183,7 +183,7 @@ def _effect(diagnosis: Diagnosis, effect: FoundEffect) -> list[str]:
     pieces += law_pictures(diagnosis, effect.name)
     pieces.append(
         html.paragraph(
-            f"{belief(effect)}Evidence: information criterion better by {shown(evidence.delta_bic)}; error on unseen "
+            f"{belief(effect)}Evidence: information criterion {_bettered(evidence.delta_bic)}; error on unseen "
             f"data {shown(evidence.holdout_rms_before)} → {shown(evidence.holdout_rms_after)}; "
             f"{p_statement(evidence.p_value)}."
         )
@@ -200,6 +200,10 @@ def _effect(diagnosis: Diagnosis, effect: FoundEffect) -> list[str]:
         axis = f"{effect.name} [{profile.unit}]"
         pieces.append(band_figure(div, profile.time_s, profile.value, profile.low, profile.high, axis))
     return pieces
+
+
+def _bettered(delta_bic: float) -> str:
+    return f"better by {shown(delta_bic)}" if not delta_bic < 0.0 else f"worse by {shown(-delta_bic)}"
 
 
 def _drawn(traces: Sequence[Trace]) -> list[Trace]:
