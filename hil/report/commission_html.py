@@ -10,8 +10,10 @@ from collections.abc import Iterator, Mapping
 from html import escape
 from typing import Any
 
+from hil.provenance import Provenance
 from hil.report import page as html
 from hil.report.commission_step import STATUSES, STYLE, badge, card_row, card_table, step_section
+from hil.report.made import made_section
 from hil.report.numbers import moment, shown
 
 State = Mapping[str, Any]
@@ -20,7 +22,7 @@ MOST_NAMED = 4
 """Findings outside their limits that the head of the page names."""
 
 
-def commission_page(state: State, titles: Mapping[str, str]) -> str:
+def commission_page(state: State, titles: Mapping[str, str], made: Provenance | None = None) -> str:
     """Return the text of the page.
 
     Parameters
@@ -36,7 +38,7 @@ def commission_page(state: State, titles: Mapping[str, str]) -> str:
         for name in titles
         if steps[name]["status"] != "pending"
     ]
-    body = [STYLE, _top(state), _overview(steps, titles), *sections, _decisions(state), _rig(state)]
+    body = [STYLE, _top(state), _overview(steps, titles), *sections, _decisions(state), _rig(state), made_section(made)]
     return html.page(
         f"Commissioning of {state['rig_name']}",
         (piece for piece in body if piece),

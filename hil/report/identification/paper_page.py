@@ -11,10 +11,12 @@ from hil.figures.local_model import LocalModel
 from hil.figures.numbers import Row
 from hil.figures.palette import series_colour
 from hil.figures.road.conditions import Conditions
+from hil.provenance import Provenance
 from hil.report import page as html
 from hil.report.figures import Line, Panel, Style, time_figure
 from hil.report.identification.pole_map import PoleSet, known_sets, pole_figure
 from hil.report.identification.responses import responses_figure
+from hil.report.made import made_section
 from hil.report.numbers import shown
 
 SHOWN_SIGNALS = 3
@@ -26,7 +28,12 @@ SOURCE = (
 )
 
 
-def paper_page(models: Sequence[LocalModel], rows: Sequence[Row], driven: Sequence[Conditions]) -> str:
+def paper_page(
+    models: Sequence[LocalModel],
+    rows: Sequence[Row],
+    driven: Sequence[Conditions],
+    made: Provenance | None = None,
+) -> str:
     """Return the text of the page.
 
     Parameters
@@ -43,6 +50,7 @@ def paper_page(models: Sequence[LocalModel], rows: Sequence[Row], driven: Sequen
         _responses(models),
         _poles(models),
         *([html.section("What was driven", *_conditions(models, driven))] if driven else []),
+        *([made_section(made)] if made is not None else []),
     ]
     return html.page("The paper's figures", sections, f"hil paper. After {SOURCE}.")
 
