@@ -36,15 +36,18 @@ def comparison_page(comparisons: Sequence[Sequence[Comparison]], made: Provenanc
     models = [each.model for each in comparisons[0]]
     count = len(comparisons)
     title = f"{' and '.join(models)} against {count} recording{'s' if count > 1 else ''}"
-    rows = [_row(each) for of_recording in comparisons for each in of_recording]
+    first = comparisons[0][0]
+    rows = [(each.record.name, each.model, *_figures(each)) for of_recording in comparisons for each in of_recording]
     if count > 1:
-        rows += [
-            ("all together", of[0].model, shown(together(of), of[0].unit), "", "", "", "", "")
-            for of in zip(*comparisons, strict=True)
-        ]
-    headings = ("recording", "model", "RMS error", "largest error", "NRMSE fit", "load torque", "samples used",
-                "p, past torque")  # fmt: skip
-    figures = html.table(headings, rows, numbers=(2, 3, 4, 5, 6, 7))
+        by_model = zip(*comparisons, strict=True)
+        rows += [("together", of[0].model, shown(together(of)), *[""] * 5) for of in by_model]
+    if len(models) == 1:
+        rows = [(name, *rest) for name, _, *rest in rows]
+    headings = (
+        "recording", *(["model"] if len(models) > 1 else []), f"RMS error [{first.unit}]", f"largest [{first.unit}]",
+        "NRMSE fit [%]", f"load torque [{unit('torque', first.motion)}]", "samples used", "p, past torque",
+    )  # fmt: skip
+    figures = html.table(headings, rows, numbers=range(len(headings) - 6, len(headings)))
     top = f'<header class="top">\n<h1>{escape(title)}</h1>\n{figures}\n</header>'
     sections = [_recording(of_recording, i, count) for i, of_recording in enumerate(comparisons)]
     return html.page(
@@ -55,17 +58,10 @@ def comparison_page(comparisons: Sequence[Sequence[Comparison]], made: Provenanc
     )
 
 
-def _row(each: Comparison) -> tuple[str, ...]:
-    return (
-        each.record.name,
-        each.model,
-        shown(each.rms, each.unit),
-        shown(each.largest, each.unit),
-        shown(each.fit_percent, "%"),
-        shown(each.load_torque, unit("torque", each.motion)),
-        f"{int(each.record.okay.sum())} of {each.record.okay.size}",
-        shown_p(each.past_input.p_value),
-    )
+def _figures(each: Comparison) -> tuple[str, ...]:
+    used = f"{int(each.record.okay.sum())} of {each.record.okay.size}"
+    figures = (each.rms, each.largest, each.fit_percent, each.load_torque)
+    return (*map(shown, figures), used, shown_p(each.past_input.p_value))
 
 
 def _recording(of_recording: Sequence[Comparison], number: int, recordings: int) -> str:

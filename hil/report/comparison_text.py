@@ -21,6 +21,8 @@ def comparison_summary(comparisons: Sequence[Sequence[Comparison]]) -> Table:
     table = Table(*(escape(heading) for heading in headings), box=None, pad_edge=False)
     for column in table.columns[2 if several else 1 :]:
         column.justify = "right"
+    for column in table.columns[: 2 if several else 1]:
+        column.no_wrap = True
     for of_recording in comparisons:
         for each in of_recording:
             table.add_row(each.record.name, *((each.model,) if several else ()), *_figures(each))
