@@ -31,12 +31,12 @@ def publish_diagnosis(
         All recordings, and the files they were read from; None for one that was not.
     """
     text, prepared = diagnosis_text(diagnosis, made), prepared_by(diagnosis, records, paths)
-    augmented = diagnosis.augmented
+    augmented, page = diagnosis.augmented, diagnosis_page(diagnosis, made, prepared.one_in)
     publish(
         folder,
         {
             "diagnosis.json": lambda path: path.write_text(text, encoding="utf-8"),
             "augmented.toml": lambda path: write_model(path, augmented, file.signals, file.laws, prepared),
-            "report.html": lambda path: path.write_text(diagnosis_page(diagnosis, made), encoding="utf-8"),
+            "report.html": lambda path: path.write_text(page, encoding="utf-8"),
         },
     )

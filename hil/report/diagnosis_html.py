@@ -42,11 +42,11 @@ AUGMENTED = "augmented"
 KEPT_BACK = "stretches kept back as unseen data"
 
 
-def diagnosis_page(diagnosis: Diagnosis, made: Provenance | None = None) -> str:
-    """Return the text of the page."""
+def diagnosis_page(diagnosis: Diagnosis, made: Provenance | None = None, one_in: int = 1) -> str:
+    """Return the text of the page; ``one_in`` tells to one in how many samples recordings were thinned."""
     drawn = _drawn(diagnosis.traces)
     body = [
-        _top(diagnosis),
+        _top(diagnosis, one_in),
         _fit(diagnosis),
         _acquired(diagnosis),
         _found(diagnosis),
@@ -67,11 +67,17 @@ def diagnosis_page(diagnosis: Diagnosis, made: Provenance | None = None) -> str:
     )
 
 
-def _top(diagnosis: Diagnosis) -> str:
+def _top(diagnosis: Diagnosis, one_in: int) -> str:
     verdict, fit = diagnosis.verdict, diagnosis.fit
     training = [trace.name for trace in diagnosis.traces if not trace.holdout]
     held_out = len(diagnosis.traces) - len(training)
     warnings = "".join(html.paragraph(f"Note: {text}", "warning") for text in diagnosis.warnings)
+    if one_in > 1:
+        warnings += html.paragraph(
+            f"Of the recordings one in {one_in} samples was used, the torque as the mean of those between: the line "
+            "answers to no more. All figures and plots are of these.",
+            "note",
+        )
     figures = html.tiles(
         [
             (

@@ -45,6 +45,8 @@ def description(
         attributes = {"modelIdentifier": IDENTIFIER}
         if kind == "CoSimulation":
             attributes["canHandleVariableCommunicationStepSize"] = "true"
+        elif not is_2:
+            attributes["needsCompletedIntegratorStep"] = "true"  # what a delay remembers; in FMI 2.0 by default
         of_kind = SubElement(root, kind, attributes)
         if is_2:
             files = SubElement(of_kind, "SourceFiles")
