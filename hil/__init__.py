@@ -1,3 +1,24 @@
-"""The rig: configuration, cycle, experiments, simulated slaves, recordings, reports, command line."""
+"""The rig: configuration, cycle, experiments, simulated slaves, recordings, reports, command line.
+
+From Python: ``hil.read``, ``hil.read_model``, ``hil.Record.from_pandas``, ``hil.diagnose`` and ``hil.compare``
+(``hil.api``), imported when they are asked for.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from hil.api import Record, compare, diagnose, read, read_model
 
 __version__ = "0.1.0"
+
+__all__ = ["Record", "compare", "diagnose", "read", "read_model"]
+
+
+def __getattr__(name: str) -> Any:
+    if name in __all__:
+        from hil import api
+
+        return getattr(api, name)
+    raise AttributeError(f"module 'hil' has no attribute {name!r}")

@@ -20,7 +20,7 @@ from estimator.diagnosis.noise import noise_floor
 from estimator.diagnosis.segments import tiles
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult
-from estimator.physics.free_run import FreeRun, free_run
+from estimator.physics.free_run import NOTHING_KNOWN, FreeRun, Own, free_run
 from estimator.physics.model import DrivelineModel
 from estimator.physics.rates import rates
 from estimator.signals.outputs import outputs_apart
@@ -107,11 +107,11 @@ def mechanical(model: DrivelineModel) -> DrivelineModel:
     return replace(model, effects={name: v for name, v in model.effects.items() if not EFFECTS[name].recognised})
 
 
-def replay(model: DrivelineModel, record: Record) -> FreeRun:
+def replay(model: DrivelineModel, record: Record, known: Own = NOTHING_KNOWN) -> FreeRun:
     """Simulate one recording with a model, as the acquisition that the model describes would have read it.
 
     After a long gap the simulation begins anew, with an initial state and a load of its own; ``start`` is that of the
-    segment with the most good samples.
+    segment with the most good samples. ``known`` is as in ``free_run``.
 
     Raises
     ------
@@ -119,7 +119,7 @@ def replay(model: DrivelineModel, record: Record) -> FreeRun:
         Where the model's structure does not have the recorded output.
     """
     parts = tiles(record)
-    runs = [_replay(model, part) for part in parts]
+    runs = [_replay(model, part, known) for part in parts]
     most = max(range(len(parts)), key=lambda i: int(parts[i].okay.sum()))
     output = np.concatenate([run.output for run, _ in runs])
     read = np.concatenate([rows for _, rows in runs])
@@ -127,7 +127,7 @@ def replay(model: DrivelineModel, record: Record) -> FreeRun:
     return FreeRun(output, float(np.sqrt(np.mean(error**2))), runs[most][0].start)
 
 
-def _replay(model: DrivelineModel, record: Record) -> tuple[FreeRun, BoolArray]:
+def _replay(model: DrivelineModel, record: Record, known: Own) -> tuple[FreeRun, BoolArray]:
     """Simulate one recording without long gaps; also returns the rows that were read, shape (N,)."""
     acquired: Mapping[str, Mapping[str, float]] = {
         name: {key: value.value for key, value in values.items()}
@@ -135,7 +135,7 @@ def _replay(model: DrivelineModel, record: Record) -> tuple[FreeRun, BoolArray]:
         if EFFECTS[name].recognised
     }
     if not acquired:
-        return free_run(model, record), record.okay
+        return free_run(model, record, known), record.okay
     found = tuple(finding for finding in recognise([record]) if finding.name in acquired)
-    run = free_run(mechanical(model), compensate([record], found)[0])
+    run = free_run(mechanical(model), compensate([record], found)[0], known)
     return replace(run, output=as_read(run.output, record, acquired)), _read_rows(record, found)

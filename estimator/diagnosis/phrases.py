@@ -38,3 +38,8 @@ def law_in_words(terms: Sequence[tuple[str, float]]) -> str:
             said += f" {sign} " if said else sign
             said += f"{abs(coefficient):.3g} {name}"
     return said
+
+
+def times(ratio: float) -> str:
+    """Return a multiple to three digits as people write it: 281 and not 2.81e+02."""
+    return f"{float(f'{ratio:.3g}'):.0f}" if ratio >= 100.0 else f"{ratio:.3g}"

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 
+from estimator.identification.linear_model import ComplexArray
 from estimator.physics.effect import Element
 from estimator.physics.model import DrivelineModel
 from estimator.signals.record import BoolArray, FloatArray
@@ -266,18 +267,19 @@ class ErrorSpectrum:
 
 @dataclass(frozen=True, slots=True)
 class Response:
-    """Size of the response from torque to output in one recording, without a model and of the models; shapes (M,).
+    """Response from torque to output in one recording, without a model and of the models; shapes (M,).
 
-    ``low`` and ``high`` bound the 95 % band of the estimate; ``p_before`` and ``p_after`` are the probabilities that it
-    differs so much from the re-tuned and from the augmented model by chance.
+    ``std`` is the standard deviation of the size of what was measured, ``coherence`` the share of the output's power
+    that the torque explains; ``p_before`` and ``p_after`` are the probabilities that it differs so much from the
+    re-tuned and from the augmented model by chance.
     """
 
     frequency_hz: FloatArray
-    measured: FloatArray
-    low: FloatArray
-    high: FloatArray
-    before: FloatArray
-    after: FloatArray
+    measured: ComplexArray
+    std: FloatArray
+    coherence: FloatArray
+    before: ComplexArray
+    after: ComplexArray
     p_before: float
     p_after: float
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -20,6 +21,11 @@ from estimator.physics.simulate import simulate_each
 from estimator.physics.start import Start
 from estimator.physics.unknowns import own_unknowns
 from estimator.signals.record import BoolArray, FloatArray, Record
+
+Own = Mapping[tuple[str, str], float]
+"""Effect and parameter to a recording's own value."""
+
+NOTHING_KNOWN: Own = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,11 +47,16 @@ class FreeRun:
     start: Start
 
 
-def free_run(model: DrivelineModel, record: Record) -> FreeRun:
+def free_run(model: DrivelineModel, record: Record, known: Own = NOTHING_KNOWN) -> FreeRun:
     """Simulate one recording with a model from its measured torques.
 
     Beside load torque and initial state, what the model's effects leave to every recording is estimated from it: phases
     of angles, moments of events, the load profile of a road.
+
+    Parameters
+    ----------
+    known : mapping of (str, str) to float
+        Effect and parameter to what is known of these: the estimate starts there, and nothing is sought.
 
     Raises
     ------
@@ -54,19 +65,19 @@ def free_run(model: DrivelineModel, record: Record) -> FreeRun:
     """
     profile = any(EFFECTS[name].profile for name in model.effects)
     problem = make_problem(model, [record], (), profile=profile)
-    result = settle(problem)
+    result = settle(problem, known)
     start = start_of(problem, result.x, 0)
     whole = replace(start, load_torque_nm=start.load_torque_nm + float(problem.p[slot("", LOAD)]))
     return FreeRun(result.outputs[0], result.rms, whole)
 
 
-def settle(problem: Problem) -> FitResult:
+def settle(problem: Problem, known: Own = NOTHING_KNOWN) -> FitResult:
     """Estimate what is its own in a problem of one recording without shared unknowns.
 
     With a gap in the line the recording may begin on either flank or between them, and the error has an optimum near
     each: every one is tried. Phases and moments start where a scan finds them.
     """
-    start = _with_own(problem) if problem.local[0].own else start_vector(problem)
+    start = _with_own(problem, known) if problem.local[0].own else start_vector(problem)
     twist, gap_rad = problem.local[0].twist_index, float(problem.p[slot("backlash", "gap_rad")])
     starts = [start]
     if twist is not None and gap_rad > 0.0:
@@ -77,10 +88,11 @@ def settle(problem: Problem) -> FitResult:
     return min(results, key=lambda result: result.rms)
 
 
-def _with_own(problem: Problem) -> FloatArray:
+def _with_own(problem: Problem, known: Own) -> FloatArray:
     """Return a start with phases and moments found by a scan around the fit without their effects."""
     basis, record, use = problem.local[0], problem.records[0], problem.use[0]
-    names = sorted({u.effect for u in basis.own if EFFECTS[u.effect].event or EFFECTS[u.effect].phases})
+    sought = {u.effect for u in basis.own if EFFECTS[u.effect].event or EFFECTS[u.effect].phases}
+    names = sorted(sought - {effect for effect, _ in known})
     sizes = {name: _sizes(problem.p, name) for name in names}
     silent = problem.p.copy()
     for name in names:
@@ -94,7 +106,7 @@ def _with_own(problem: Problem) -> FloatArray:
         cases = [Case(p, begin, extra) for p in parameters]
         return simulate_each(problem.grid, record, cases, alike_s=alike_s)[:, use]
 
-    found: dict[tuple[str, str], float] = {}
+    found = dict(known)
     for name in names:
         entry = EFFECTS[name]
         alone = silent.copy()

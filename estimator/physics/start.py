@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimator.compiled import compiled
+from estimator.compiled import compiled, inlined
 from estimator.physics.kernel import bristles, sensing, slots, state_vector
 from estimator.physics.kernel.conditions import branch_frequency, branch_inertia
 from estimator.physics.kernel.line import is_bristled, is_within
@@ -56,19 +56,24 @@ def initial_states(starts: Sequence[Start], torque_nm: FloatArray, angle_rad: fl
 def _follow(states: FloatArray, torque_nm: FloatArray, angle_rad: float, p: FloatArray) -> None:
     """Fill in what follows from the rest, a row per simulation."""
     for row in range(states.shape[0]):
-        x, q = states[row], p[row]
-        speed, carried = x[state_vector.SPEED], x[state_vector.LOAD_SPEED]
-        x[state_vector.VEHICLE_SPEED] = carried
-        x[state_vector.BRANCH_SPEED] = carried if q[slots.BEHIND] > 0.0 else speed
-        if is_within(q):  # another spring of the line carries what the shaft does
-            x[state_vector.BRANCH_TWIST] = (
-                q[slots.K] * x[state_vector.TWIST] / (branch_inertia(q) * branch_frequency(q) ** 2)
-            )
-        x[state_vector.LAGGED] = torque_nm[row] + q[slots.LAGGED_BEFORE]
-        x[state_vector.LAG_RISE] = -q[slots.LAGGED_BEFORE]
-        x[state_vector.FILTERED] = sensing.reading(speed, angle_rad, q) + q[slots.FILTERED_BEFORE]
-        x[state_vector.FILTER_RISE] = -q[slots.FILTERED_BEFORE]
-        if is_bristled(q):  # of friction that has slid for long
-            x[state_vector.BRISTLES_MOTOR] = bristles.slid(speed, bristles.sliding(speed, q))
-            loaded = carried if q[slots.J_L] > 0.0 else speed
-            x[state_vector.BRISTLES_LOAD] = bristles.slid(loaded, q[slots.COULOMB_LOAD])
+        follow(states[row], torque_nm[row], angle_rad, p[row])
+
+
+@inlined
+def follow(x: FloatArray, torque_nm: float, angle_rad: float, p: FloatArray) -> None:
+    """Fill in what follows from the rest of a state, shape (STATES,)."""
+    speed, carried = x[state_vector.SPEED], x[state_vector.LOAD_SPEED]
+    x[state_vector.VEHICLE_SPEED] = carried
+    x[state_vector.BRANCH_SPEED] = carried if p[slots.BEHIND] > 0.0 else speed
+    if is_within(p):  # another spring of the line carries what the shaft does
+        x[state_vector.BRANCH_TWIST] = (
+            p[slots.K] * x[state_vector.TWIST] / (branch_inertia(p) * branch_frequency(p) ** 2)
+        )
+    x[state_vector.LAGGED] = torque_nm + p[slots.LAGGED_BEFORE]
+    x[state_vector.LAG_RISE] = -p[slots.LAGGED_BEFORE]
+    x[state_vector.FILTERED] = sensing.reading(speed, angle_rad, p) + p[slots.FILTERED_BEFORE]
+    x[state_vector.FILTER_RISE] = -p[slots.FILTERED_BEFORE]
+    if is_bristled(p):  # of friction that has slid for long
+        x[state_vector.BRISTLES_MOTOR] = bristles.slid(speed, bristles.sliding(speed, p))
+        loaded = carried if p[slots.J_L] > 0.0 else speed
+        x[state_vector.BRISTLES_LOAD] = bristles.slid(loaded, p[slots.COULOMB_LOAD])

@@ -37,6 +37,10 @@ def check(
             "disabled; no torque is commanded. Not while another program drives them.",
         ),
     ] = False,
+    proof: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="FILE", help="Keep what --prove-stop saw: JSON with date, rig file and command."),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")] = False,
     bus: Annotated[str | None, typer.Option(metavar="URL", help="CAN bus in place of the rig file's.")] = None,
     modbus: Annotated[str | None, typer.Option(metavar="HOST:PORT", help="PLC in place of the rig file's.")] = None,
@@ -58,9 +62,13 @@ def check(
         raise UsageError("expected a rig file, an EDS with --eds, or both, came neither. See: hil check --help")
     if rig is None and (bus or modbus or prove_stop):
         raise UsageError("--bus, --modbus and --prove-stop concern the rig's devices: expected a rig file beside them")
+    if proof is not None:
+        _require_proof(proof, prove_stop)
     rig_file = None if rig is None else with_addresses(read_rig(rig), bus, modbus)
     reports = tuple(check_eds(path) for path in eds or ())
     findings = () if rig_file is None or not all(each.usable for each in reports) else check_rig(rig_file, prove_stop)
+    if proof is not None and rig is not None:
+        _keep(proof, _document(rig_file, findings, reports), rig)
     if as_json:
         typer.echo(json.dumps(_document(rig_file, findings, reports), indent=2))
     else:
@@ -68,6 +76,25 @@ def check(
         if rig_file is not None and findings:
             _print(rig_file.name, findings)
     _refuse(reports, rig_file, findings)
+
+
+def _require_proof(proof: Path, prove_stop: bool) -> None:
+    """Refuse a file that can't be written, before drives are touched."""
+    from hil.report.outputs import require_folder
+
+    if not prove_stop:
+        raise UsageError(f"--out {proof}: expected --prove-stop, whose proof it keeps. Give both or neither.")
+    require_folder(proof.parent)
+
+
+def _keep(proof: Path, document: dict[str, Any], rig: Path) -> None:
+    """Write what was seen, with what made it: a proof that is not kept is none."""
+    from hil.provenance import provenance
+    from hil.report.outputs import publish
+
+    text = json.dumps({**document, "made": provenance([rig]).document()}, indent=2) + "\n"
+    publish(proof.parent, {proof.name: lambda path: path.write_text(text, encoding="utf-8")})
+    typer.echo(f"proof: {proof}", err=True)
 
 
 def _refuse(reports: tuple[EdsReport, ...], rig: Rig | None, findings: tuple[Finding, ...]) -> None:

@@ -1,4 +1,4 @@
-"""``hil compare``: simulation against recording, in figures and plots."""
+"""``hil compare``: simulations against recordings, in figures and plots."""
 
 from __future__ import annotations
 
@@ -13,36 +13,52 @@ from hil.cli.trust_option import TrustLaws
 app = typer.Typer(add_completion=False)
 
 
-@app.command(epilog="Example: hil compare bus.toml run_1.csv run_2.csv --out comparison")
+@app.command(epilog="Example: hil compare bus.toml run_1.csv run_2.csv --model out/augmented.toml --out comparison")
 def compare(
-    model: Annotated[Path, typer.Argument(metavar="MODEL", help="Model file, nominal or augmented.")],
+    model: Annotated[Path, typer.Argument(metavar="MODEL", help="Model file, nominal or augmented, or an FMU.")],
     recordings: Annotated[list[Path], typer.Argument(metavar="REC", help="Recordings to compare with.")],
+    more: Annotated[
+        list[Path] | None,
+        typer.Option("--model", metavar="MODEL", help="A further model in the same plots; may be given several times."),
+    ] = None,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Folder for compare.html and compare.json.")] = None,
+    mapped: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--map",
+            metavar="KEY=NAME,...",
+            help="Variables of an FMU: torque=T1,T2 (one: their sum), output=w, load=T_L and start=w0,... (estimated).",
+        ),
+    ] = None,
+    trust_fmu: Annotated[
+        bool, typer.Option("--trust-fmu", help="Run the program in an FMU; without it FMUs are refused.")
+    ] = False,
     dbc: Dbc = None,
     trust_laws: TrustLaws = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the figures as JSON.")] = False,
 ) -> None:
     """Simulate each recording from its torques and say how far the output is off.
 
-    Only initial state and constant load torque are estimated; the model's parameters stay as they are.
+    Only initial state and constant load torque are estimated; the model's parameters stay as they are. Recordings are
+    prepared as the diagnosis did that wrote the model.
     """
     from rich.console import Console
 
-    from hil.config.model_file import read_model_for_recordings
-    from hil.recording import read_records
-    from hil.report.comparison import compare_record, comparison_text
+    from hil.plants.compare import Trust, compared
+    from hil.provenance import provenance
+    from hil.report.comparison import comparison_text
     from hil.report.comparison_html import comparison_page
     from hil.report.comparison_text import comparison_summary
     from hil.report.outputs import publish, require_folder
 
     if out is not None:
         require_folder(out)
-    file = read_model_for_recordings(model, trust_laws)
-    records = read_records(recordings, file.signals, file.on_bench, dbc, tell)
-    comparisons = [compare_record(file.model, record) for record in records]
-    text = comparison_text(comparisons)
+    models = [model, *(more or ())]
+    comparisons = compared(models, recordings, mapped or (), Trust(trust_laws, trust_fmu), dbc, tell)
+    made = provenance(models, recordings)
+    text = comparison_text(comparisons, made)
     if out is not None:
-        page = comparison_page(model.name, file.model.motion, comparisons)
+        page = comparison_page(comparisons, made)
         publish(
             out,
             {

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from hil.cli.dbc_option import Dbc
+
 if TYPE_CHECKING:
     from hil.recording.table import Table
 
@@ -31,6 +33,7 @@ def convert(
     force: bool = typer.Option(False, "--force", help="Replace OUT where it exists."),
     encoding: str = typer.Option("utf-8", metavar="NAME", help="Of a text IN, such as latin-1."),
     delimiter: str = typer.Option("", metavar="CHARACTER", help="Of a CSV IN, where its header does not tell it."),
+    dbc: Dbc = None,
     as_json: bool = typer.Option(False, "--json", help="Print the result as JSON."),
 ) -> None:
     """Convert between the recording formats without loss, or say on standard error what is lost.
@@ -44,10 +47,11 @@ def convert(
 
     _require_room(target, force)
     if _is_trace(source):
+        _refuse_for_trace(source, dbc)
         table = _trace(source, rig, every, channel)
     else:
         _refuse_for_recording(source, rig, every, channel)
-        table = _recording(source, encoding, delimiter)
+        table = _recording(source, encoding, delimiter, dbc)
     lost: list[str] = []
     write_table(table, target, replace=force, on_loss=lost.extend)
     for line in (*(f"{source}: {remark}" for remark in table.remarks), *(f"{target}: lost: {what}" for what in lost)):
@@ -83,7 +87,17 @@ def _refuse_for_recording(source: Path, rig: Path | None, every: bool, channel: 
         )
 
 
-def _recording(source: Path, encoding: str, delimiter: str) -> Table:
+def _refuse_for_trace(source: Path, dbc: Path | None) -> None:
+    from hil.errors import UsageError
+
+    if dbc is not None:
+        raise UsageError(
+            f"{source}: expected --dbc with a recording of a logged bus (MDF), came a bus trace, whose frames the EDS "
+            "files of --rig explain. Leave it out."
+        )
+
+
+def _recording(source: Path, encoding: str, delimiter: str, dbc: Path | None) -> Table:
     from pydantic import ValidationError
 
     from hil.errors import UsageError
@@ -97,7 +111,7 @@ def _recording(source: Path, encoding: str, delimiter: str) -> Table:
         first = error.errors()[0]
         reason = str(first["msg"]).removeprefix("Value error, ")
         raise UsageError(f"--{first['loc'][0]}: expected {reason}, came {first['input']!r}") from error
-    return read_table(source, Request(hints))
+    return read_table(source, Request(hints, dbc=dbc))
 
 
 def _trace(source: Path, rig: Path | None, every: bool, channel: str | None) -> Table:

@@ -151,12 +151,14 @@ class _Demo:
     def _publish(self, diagnosis: Diagnosis, recordings: list[Path]) -> dict[str, Any]:
         """Write and print the verdict; a seal from an earlier run is not left beside it."""
         from hil.config.model_file import write_model
+        from hil.provenance import provenance
         from hil.report.diagnosis_html import diagnosis_page
         from hil.report.diagnosis_json import diagnosis_text
         from hil.report.diagnosis_text import diagnosis_summary
         from hil.report.outputs import publish
 
-        text, page = diagnosis_text(diagnosis), diagnosis_page(diagnosis)
+        made = provenance([self._nominal], recordings)
+        text, page = diagnosis_text(diagnosis, made), diagnosis_page(diagnosis, made)
         kept = {path.name: path for path in (*recordings, self._nominal, self._rig_path)}
         for name in (SEAL, JUDGEMENT):
             (self._out / name).unlink(missing_ok=True)

@@ -78,13 +78,14 @@ def diagnose(
         from rich.console import Console
 
         from estimator.diagnosis.diagnose import diagnose as diagnose_records
-        from hil.config.model_file import read_model_for_recordings, write_model
+        from hil.config.model_file import read_model_for_recordings
+        from hil.provenance import provenance
         from hil.recording import read_records
         from hil.recording.cure import with_the_line_to_write
-        from hil.report.diagnosis_html import diagnosis_page
+        from hil.report.diagnosis_files import publish_diagnosis
         from hil.report.diagnosis_json import diagnosis_text
         from hil.report.diagnosis_text import diagnosis_summary
-        from hil.report.outputs import publish, require_folder
+        from hil.report.outputs import require_folder
         from hil.store import attach_to_runs
         from hil.store.entry import DIAGNOSIS, MODEL
 
@@ -95,16 +96,10 @@ def diagnose(
     training, kept_back = records[: len(recordings)], records[len(recordings) :]
     with with_the_line_to_write(every, file.signals, dbc), progress_bar() as progress:
         diagnosis = diagnose_records(training, file.model, kept_back, progress, budget_s)
-    text = diagnosis_text(diagnosis)
+    made = provenance([model], every)
+    text = diagnosis_text(diagnosis, made)
     try:
-        publish(
-            out,
-            {
-                "diagnosis.json": lambda path: path.write_text(text, encoding="utf-8"),
-                "augmented.toml": lambda path: write_model(path, diagnosis.augmented, file.signals, file.laws),
-                "report.html": lambda path: path.write_text(diagnosis_page(diagnosis), encoding="utf-8"),
-            },
-        )
+        publish_diagnosis(out, diagnosis, file, records, every, made)
     finally:  # told even where the disk does not take it
         if as_json:
             typer.echo(text, nl=False)

@@ -1,4 +1,4 @@
-"""``hil export``: the estimator for other machines."""
+"""``hil export``: the estimator for a PLC, the driveline for other simulations."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from hil.cli.dbc_option import Dbc
+from hil.export.fmu.versions import FmiVersion
 from hil.export.plcopen import Tc6
 
 if TYPE_CHECKING:
@@ -43,7 +45,7 @@ PROFILE = "decreasing_then_constant_trace"
 
 @app.callback(epilog="Example: hil export st identified/identification.json --run cruise --out estimator.st")
 def export() -> None:
-    """Write the on-line estimator for another machine."""
+    """Write the on-line estimator for a PLC, or a driveline for another simulation."""
 
 
 @app.command(epilog="Example: hil export st identified/identification.json --run cruise --out estimator.st")
@@ -114,3 +116,35 @@ def _write(out: Path, text: str, estimator: PlcEstimator) -> None:
     publish(out.parent, {out.name: lambda path: path.write_text(text, encoding="ascii")})
     orders = estimator.settings.orders
     typer.echo(f"{out}: {estimator.origin}; na {orders.na}, nb {orders.nb}, nk {orders.nk}; call FB_HilEstimator")
+
+
+@app.command(epilog="Example: hil export fmu out/augmented.toml --recording run_1.csv --out bus.fmu")
+def fmu(
+    model: Annotated[Path, typer.Argument(metavar="MODEL", help="Model file, nominal or augmented.")],
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="FMU to write; replaced where it is there.")],
+    fmi: Annotated[
+        FmiVersion, typer.Option("--fmi", metavar="VERSION", help="Version of the standard, 2.0 or 3.0.")
+    ] = FmiVersion.V2,
+    period: Annotated[
+        float, typer.Option("--period", min=1e-5, metavar="SECONDS", help="Usual communication step.")
+    ] = CYCLE_S,
+    recording: Annotated[
+        Path | None,
+        typer.Option(
+            "--recording", metavar="REC", help="Start as in this recording: initial state, load, phases, moments."
+        ),
+    ] = None,
+    sources_only: Annotated[
+        bool, typer.Option("--sources-only", help="C sources without a binary: no compiler is needed.")
+    ] = False,
+    dbc: Dbc = None,
+) -> None:
+    """Write the driveline as an FMU, for co-simulation and model exchange.
+
+    Inputs T_M1, T_M2, T_load; outputs speeds, motor angle, shaft torque; each parameter with its value. It holds C
+    sources and a Linux binary, which is made by the C compiler of this machine.
+    """
+    from hil.export.fmu.command import written_fmu
+
+    for line in written_fmu(model, out, fmi.value, period, recording, sources_only, dbc):
+        typer.echo(line)

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from estimator.identification.study import Study
     from estimator.physics.model import DrivelineModel
     from estimator.signals.record import Record
+    from hil.provenance import Provenance
 
 PAGE = "report.html"
 
@@ -64,6 +65,8 @@ def identify(
     from estimator.identification.identify import Settings
     from hil.config.model_file import read_model_for_recordings
     from hil.errors import ModelFileError
+    from hil.plants.scales import tell_scales
+    from hil.provenance import provenance
     from hil.recording import read_records
     from hil.recording.timing_check import require_even_cycles
     from hil.report.identification.choices import chosen_estimators, chosen_orders, start_values
@@ -83,6 +86,8 @@ def identify(
             model, "structure | expected a driveline, which torque moves | came 'joint': diagnose or simulate it"
         )
     records = read_records(recordings, None if file is None else file.signals, dbc=dbc, tell=tell)
+    if file is not None:
+        tell_scales(records, recordings, file.model, file.signals, dbc, tell)
     settings, choice = chosen_orders(settings, order, delay, records)
     expected = None if file is None else file.model
     start = start_values(estimator, expected)
@@ -92,7 +97,8 @@ def identify(
         for record, each in zip(records, studies, strict=True)
         for name, entry in entries.items()
     ]
-    _publish(out, records, settings, studies, expected, choice, compared, as_json=as_json)
+    made = provenance([] if model is None else [model], recordings)
+    _publish(out, records, settings, studies, expected, choice, compared, made, as_json=as_json)
     for complaint in attach_to_runs(recordings, {IDENTIFICATION: out / "identification.json"}):
         typer.echo(complaint, err=True)
 
@@ -123,6 +129,7 @@ def _publish(
     model: DrivelineModel | None,
     choice: OrderChoice | None,
     compared: Sequence[Compared],
+    made: Provenance,
     *,
     as_json: bool,
 ) -> None:
@@ -139,8 +146,8 @@ def _publish(
         LocalModel.with_expected(record, each.found, model) for record, each in zip(records, studies, strict=True)
     ]
     nominal = models[0].reference_mode
-    text = identification_text([each.found for each in studies], settings, nominal, studies, choice, compared)
-    page = identification_page(models, studies, choice, compared)
+    text = identification_text([each.found for each in studies], settings, nominal, studies, choice, compared, made)
+    page = identification_page(models, studies, choice, compared, made)
     publish(
         out,
         {

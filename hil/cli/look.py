@@ -20,6 +20,10 @@ app = typer.Typer(add_completion=False)
 def look(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="A recording of any format.")],
     dbc: Dbc = None,
+    model: Annotated[
+        Path | None,
+        typer.Option("--model", metavar="MODEL", help="Model file to read FILE by: tells which scale is wrong."),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Show what is in a recording: channels, units, rates, gaps, what each could be, and the table that reads it."""
@@ -41,6 +45,20 @@ def look(
         typer.echo("It has the columns that every command reads: no [signals] table is needed.")
     for line in found.signals:
         typer.echo(line)
+    if model is not None:
+        _tell_scales(file, model, dbc)
+
+
+def _tell_scales(file: Path, model: Path, dbc: Path | None) -> None:
+    """Read a recording by a model file and tell which scale does not fit the model, with the line that cures it."""
+    from hil.cli.dbc_option import tell
+    from hil.config.model_file import read_model_for_recordings
+    from hil.plants.scales import tell_scales
+    from hil.recording import read_record
+
+    known = read_model_for_recordings(model)
+    record = read_record(file, known.signals, known.on_bench, dbc, tell)
+    tell_scales([record], [file], known.model, known.signals, dbc, tell)
 
 
 def _size(found: Look) -> str:

@@ -52,7 +52,7 @@ COMMANDS: dict[str, str] = {
     "model": "Write a new model file; the schema of model files for editors.",
     "completion": "Print the completion script of a shell.",
     "bugreport": "Pack what a supporter needs, without secrets.",
-    "export": "Write the on-line estimator for the PLC: Structured Text or PLCopen XML.",
+    "export": "Write the on-line estimator for a PLC, or the driveline as an FMU.",
 }
 """Each command's line in ``hil --help``; the command itself is ``app`` in ``hil.cli.<name>``."""
 
@@ -104,10 +104,15 @@ def _run(call: Call, keep_log: bool) -> int:
     if call.command not in COMMANDS:
         sys.stdout.write(f"hil {__version__}\n" if call.command == "--version" else overview(COMMANDS))
         return ExitStatus.DONE if call.command else ExitStatus.BAD_INPUT
+    from hil.provenance import under
     from hil.support.command_log import level_of, logged
 
     level = level_of(call.log_level)
-    with logged(call.command, call.arguments, level if keep_log else "off"), silence(call.silent):
+    with (
+        logged(call.command, call.arguments, level if keep_log else "off"),
+        silence(call.silent),
+        under((call.command, *call.arguments)),
+    ):
         return _called(call)
 
 

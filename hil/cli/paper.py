@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from hil.figures.local_model import LocalModel
     from hil.figures.numbers import Row
     from hil.figures.road.drive import Driven
+    from hil.provenance import Provenance
     from hil.rig.drive import Progress
 
 PAGE, DATA = "report.html", "paper.json"
@@ -70,13 +71,15 @@ def paper(
     from estimator.identification.identify import Settings
     from estimator.identification.linear_model import Orders
     from hil.figures.drawn.style import require_matplotlib
+    from hil.provenance import provenance
     from hil.report.outputs import require_folder
 
     require_folder(out)
     require_matplotlib()
     settings = Settings(orders=Orders(nk=delay), offline_sample_time_s=PAPER_PERIOD_S)
     if recordings:
-        _publish(out, _recorded(recordings, model, trust_laws, settings), settings, as_json=as_json)
+        made = provenance([] if model is None else [model], recordings)
+        _publish(out, _recorded(recordings, model, trust_laws, settings), settings, made=made, as_json=as_json)
         return
     if model is not None:
         from hil.errors import UsageError
@@ -146,6 +149,7 @@ def _publish(
     driven: list[Driven] | None = None,
     seed: int | None = None,
     *,
+    made: Provenance | None = None,
     as_json: bool,
 ) -> None:
     from rich.console import Console
@@ -157,8 +161,8 @@ def _publish(
 
     rows = [row_of(model) for model in models]
     conditions = [each.conditions for each in driven or ()]
-    text = paper_text(rows, settings, conditions, seed if driven else None)
-    page = paper_page(models, rows, conditions)
+    text = paper_text(rows, settings, conditions, seed if driven else None, made)
+    page = paper_page(models, rows, conditions, made)
     publish(
         out,
         {

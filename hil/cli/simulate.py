@@ -28,10 +28,12 @@ def simulate(
     Only what is REC's own is estimated from it: the initial state and the constant load torque; where the model has
     such effects, also phases of angles, moments of events and the profile of the road.
     """
-    from estimator.diagnosis.chain import replay
     from estimator.physics.model import unit
     from hil.config.model_file import read_model_for_recordings
     from hil.errors import UsageError
+    from hil.plants import ModelPlant
+    from hil.plants.prepared import known_events, prepare_again
+    from hil.provenance import provenance
     from hil.recording import Table, csv_format, read_record
     from hil.report.numbers import json_number, shown
     from hil.report.outputs import publish, require_folder
@@ -44,7 +46,8 @@ def simulate(
     require_folder(out.parent)
     file = read_model_for_recordings(model, trust_laws)
     record = read_record(recording, file.signals, file.on_bench, dbc, tell)
-    run = replay(file.model, record)
+    (record,) = prepare_again([record], file.prepared, tell, keep_rows=True)
+    run = ModelPlant(model.name, file.model, known_events(file.prepared, [recording])).run(record)
     column = simulated_column(record.kind, file.model.motion)
     table = Table(out, {"time_s": record.time_s, column: run.output})
     publish(out.parent, {out.name: lambda path: csv_format.write(table, path)})
@@ -57,6 +60,7 @@ def simulate(
             "samples": record.time_s.size,
             "rms": {"value": json_number(run.rms), "unit": error_unit},
             "constant_load": {"value": json_number(run.start.load_torque_nm), "unit": load_unit},
+            "made": provenance([model], [recording]).document(),
         }
         typer.echo(json.dumps(document))
         return

@@ -76,6 +76,41 @@ class _Load(_Strict):
     constant: Literal["own", "shared"] | float = "own"
 
 
+class PreparedRecording(_Strict):
+    """A recording that was used.
+
+    Attributes
+    ----------
+    sha256 : str
+        Of its file; empty where it was not read from one.
+    samples_used : int
+        How many of its samples counted.
+    events : dict
+        From when to when each event was found in it, since it began [s].
+    """
+
+    name: str
+    sha256: str
+    samples_used: int
+    events: dict[str, Annotated[list[float], Field(min_length=2, max_length=2)]] = {}
+
+
+class Prepared(_Strict):
+    """What ``hil diagnose`` did to recordings before it fitted: ``hil simulate`` and ``hil compare`` do it again.
+
+    Attributes
+    ----------
+    mended : bool
+        Whether wrapped positions are put together, and what was cut off, held or interpolated does not count.
+    one_in : int
+        To one in how many samples recordings are thinned.
+    """
+
+    mended: bool = True
+    one_in: int = Field(default=1, ge=1)
+    recordings: list[PreparedRecording] = []
+
+
 class ModelDocument(_Strict):
     """The file's tables, before the model is made of them."""
 
@@ -88,15 +123,17 @@ class ModelDocument(_Strict):
     effects: dict[str, dict[str, _EffectEntry]] = {}
     laws: dict[str, LawTable] = {}
     signals: SignalsConfig | None = None
+    prepared: Prepared | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class ModelFile:
-    """A model and, where the file has them, the way its recordings are read and a user's own laws."""
+    """A model and, where the file has them, the way its recordings are read and prepared, and a user's own laws."""
 
     model: DrivelineModel
     signals: SignalsConfig | None = None
     laws: Mapping[str, LawTable] = field(default_factory=dict)
+    prepared: Prepared | None = None
 
     @property
     def on_bench(self) -> bool:
@@ -139,7 +176,7 @@ def read_model(path: Path | str, trust_laws: bool = False) -> ModelFile:
         problems += str(error).splitlines()
     if document is None or model is None or problems:
         raise ModelFileError(path, *problems)
-    return ModelFile(model, document.signals, moved(document.laws, path))
+    return ModelFile(model, document.signals, moved(document.laws, path), document.prepared)
 
 
 def read_model_for_recordings(path: Path | str, trust_laws: bool = False) -> ModelFile:
@@ -175,6 +212,7 @@ def write_model(
     model: DrivelineModel,
     signals: SignalsConfig | None = None,
     laws: Mapping[str, LawTable] | None = None,
+    prepared: Prepared | None = None,
 ) -> None:
     """Write a model file, whole or not at all; one that is there is replaced.
 
@@ -183,7 +221,7 @@ def write_model(
     path = Path(path)
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        part.write_text(_as_toml(model, signals, laws or {}), encoding="utf-8")
+        part.write_text(_as_toml(model, signals, laws or {}, prepared), encoding="utf-8")
         part.replace(path)
     finally:
         part.unlink(missing_ok=True)
@@ -246,7 +284,12 @@ def _effect_value(entry: object) -> EffectValue:
     return EffectValue(value, None, tolerance)
 
 
-def _as_toml(model: DrivelineModel, signals: SignalsConfig | None, laws: Mapping[str, LawTable]) -> str:
+def _as_toml(
+    model: DrivelineModel,
+    signals: SignalsConfig | None,
+    laws: Mapping[str, LawTable],
+    prepared: Prepared | None = None,
+) -> str:
     document = tomlkit.document()
     document["schema"] = SCHEMA
     document["structure"] = model.structure.value
@@ -268,6 +311,8 @@ def _as_toml(model: DrivelineModel, signals: SignalsConfig | None, laws: Mapping
         document["laws"] = _laws_table(laws)
     if signals is not None:
         document["signals"] = _signals_table(signals)
+    if prepared is not None:
+        document["prepared"] = _prepared_table(prepared)
     return f"{schema_line(FileKind.MODEL)}\n{tomlkit.dumps(document)}"
 
 
@@ -307,6 +352,16 @@ def _signals_table(signals: SignalsConfig) -> Table:
             table[key] = rows
         else:
             table[key] = _inline(value) if isinstance(value, dict) else value
+    return table
+
+
+def _prepared_table(prepared: Prepared) -> Table:
+    table = tomlkit.table()
+    table.comment("what was done to the recordings before the fit; hil simulate and hil compare do it again")
+    table.update({"mended": prepared.mended, "one_in": prepared.one_in})
+    recordings = tomlkit.array().multiline(True)
+    recordings.extend([_inline(each.model_dump(exclude_defaults=True)) for each in prepared.recordings])
+    table["recordings"] = recordings
     return table
 
 

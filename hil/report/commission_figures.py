@@ -16,8 +16,8 @@ from hil.report.identification.pole_map import PoleSet, pole_figure
 
 Evidence = Mapping[str, Any]
 
-STRETCHES = 800
-"""Courses are thinned before they are kept; no further here."""
+COURSES = ("noise", "signs", "friction", "validation")
+"""Figures over time that share the page."""
 
 
 def _array(values: list[float]) -> np.ndarray:
@@ -27,7 +27,7 @@ def _array(values: list[float]) -> np.ndarray:
 def _noise(evidence: Evidence) -> list[str]:
     course = evidence["course"]
     panel = Panel("speed [rad/s]", (Line("speed at zero torque", _array(course["speed_rad_s"]), Style.AFTER),))
-    return [time_figure("noise-course", _array(course["time_s"]), (panel,), STRETCHES)]
+    return [time_figure("noise-course", _array(course["time_s"]), (panel,), len(COURSES))]
 
 
 def _signs(evidence: Evidence) -> list[str]:
@@ -45,7 +45,7 @@ def _pulses(name: str, course: Mapping[str, list[float]]) -> list[str]:
         ),
         Panel("speed [rad/s]", (Line("speed", _array(course["speed_rad_s"]), Style.AFTER),)),
     )
-    return [f"<h3>Pulses of {name}</h3>", time_figure(f"signs-{name}", _array(course["time_s"]), panels, STRETCHES)]
+    return [f"<h3>Pulses of {name}</h3>", time_figure(f"signs-{name}", _array(course["time_s"]), panels, len(COURSES))]
 
 
 def _friction(evidence: Evidence) -> list[str]:
@@ -54,7 +54,7 @@ def _friction(evidence: Evidence) -> list[str]:
         Panel("torque [Nm]", (Line("torque of both", _array(course["torque_nm"]), Style.FIRST_INPUT),)),
         Panel("speed [rad/s]", (Line("speed", _array(course["speed_rad_s"]), Style.AFTER),)),
     )
-    return [time_figure("friction-course", _array(course["time_s"]), panels, STRETCHES)]
+    return [time_figure("friction-course", _array(course["time_s"]), panels, len(COURSES))]
 
 
 def _identification(evidence: Evidence) -> list[str]:
@@ -128,7 +128,7 @@ def _validation(evidence: Evidence) -> list[str]:
         Panel("error [rad/s]", (Line("error", measured - simulated, Style.BEFORE),)),
     )
     title = f"<h3>Worst of the unseen runs: {worst['name']}</h3>"
-    return [title, time_figure("validation-course", time_s, panels, STRETCHES)]
+    return [title, time_figure("validation-course", time_s, panels, len(COURSES))]
 
 
 _FIGURES: Mapping[str, Callable[[Evidence], list[str]]] = MappingProxyType(

@@ -10,8 +10,10 @@ from collections.abc import Iterator, Mapping
 from html import escape
 from typing import Any
 
+from hil.provenance import Provenance
 from hil.report import page as html
 from hil.report.commission_step import STATUSES, STYLE, badge, card_row, card_table, step_section
+from hil.report.made import made_section
 from hil.report.numbers import moment, shown
 
 State = Mapping[str, Any]
@@ -20,7 +22,7 @@ MOST_NAMED = 4
 """Findings outside their limits that the head of the page names."""
 
 
-def commission_page(state: State, titles: Mapping[str, str]) -> str:
+def commission_page(state: State, titles: Mapping[str, str], made: Provenance | None = None) -> str:
     """Return the text of the page.
 
     Parameters
@@ -36,13 +38,13 @@ def commission_page(state: State, titles: Mapping[str, str]) -> str:
         for name in titles
         if steps[name]["status"] != "pending"
     ]
-    body = [STYLE, _top(state), _overview(steps, titles), *sections, _decisions(state), _rig(state)]
+    body = [STYLE, _top(state), _overview(steps, titles), *sections, _decisions(state), _rig(state), made_section(made)]
     return html.page(
         f"Commissioning of {state['rig_name']}",
         (piece for piece in body if piece),
         f"hil commission {state['hil_version']}, begun {moment(state['started_utc'])}, as of "
         f"{moment(state['updated_utc'])}. "
-        "Intervals are of 95 % confidence; foretold values are from the driveline as it was known before each run.",
+        "Intervals are of 95 % confidence; predicted values are from the driveline as it was known before each run.",
     )
 
 

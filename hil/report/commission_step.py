@@ -62,7 +62,7 @@ def step_section(name: str, title: str, record: Mapping[str, Any], folder_note: 
     pieces.append(folder_note)
     pieces += step_figures(name, record["evidence"])
     if record["runs"]:
-        pieces.append(html.details(f"Runs ({len(record['runs'])}): foretold and measured", _runs(record["runs"])))
+        pieces.append(html.details(f"Runs ({len(record['runs'])}): predicted and measured", _runs(record["runs"])))
     if record["history"]:
         pieces.append(html.details(f"Earlier attempts ({len(record['history'])})", _history(record["history"])))
     return html.section(title, *(piece for piece in pieces if piece))
@@ -110,7 +110,7 @@ def _finding(finding: Mapping[str, Any]) -> str:
 
 
 def _runs(runs: Sequence[Mapping[str, Any]]) -> str:
-    headings = ("run", "recording", "s", "m1 [Nm]", "foretold", "m2 [Nm]", "foretold", "speed [rad/s]", "foretold")
+    headings = ("run", "recording", "s", "m1 [Nm]", "predicted", "m2 [Nm]", "predicted", "speed [rad/s]", "predicted")
     rows = [
         (
             run["name"] + ("" if run["whole"] else " (ended early)"),

@@ -1,4 +1,4 @@
-"""``compare.html``: simulation against recordings as one self-contained page."""
+"""``compare.html``: simulations against recordings as one self-contained page, several models in one overlay."""
 
 from __future__ import annotations
 
@@ -7,69 +7,94 @@ from html import escape
 
 import numpy as np
 
-from estimator.physics.model import Motion, unit
+from estimator.identification.offline.validation import CorrelationTest
+from estimator.physics.model import unit
+from hil.provenance import Provenance
 from hil.report import page as html
-from hil.report.comparison import Comparison
-from hil.report.figures import (
-    Line,
-    Panel,
-    Style,
-    input_lines,
-    spectrum_figure,
-    stretches_for,
-    time_figure,
-)
-from hil.report.numbers import shown
+from hil.report.comparison import Comparison, together
+from hil.report.figures import MODEL_STYLES, Line, Panel, Style, input_lines, spectrum_figure, time_figure
+from hil.report.identification.residuals import correlation_figure
+from hil.report.made import made_section
+from hil.report.numbers import shown, shown_p
 from hil.report.wording import quantity, torque_axis
 
-MODEL = "simulated"
+RESIDUALS = (
+    "A model that lacks nothing leaves an error that has nothing to do with the torque that went before: p is the "
+    "probability of a correlation like this one if there is none. Below 0.05 the model misses a part of the response. "
+    "An error that goes with its own past alone is noise with a colour, or drift."
+)
 
 
-def comparison_page(model_name: str, motion: Motion, comparisons: Sequence[Comparison]) -> str:
-    """Return the text of the page."""
-    title = f"{model_name} against {len(comparisons)} recording{'s' if len(comparisons) > 1 else ''}"
-    rows = [
-        (
-            each.record.name,
-            shown(each.rms, each.unit),
-            shown(each.largest, each.unit),
-            shown(each.fit_percent, "%"),
-            shown(each.load_torque, unit("torque", motion)),
-            f"{int(each.record.okay.sum())} of {each.record.okay.size}",
-        )
-        for each in comparisons
-    ]
-    headings = ("recording", "RMS error", "largest error", "NRMSE fit", "load torque", "samples used")
-    figures = html.table(headings, rows, numbers=(1, 2, 3, 4, 5))
+def comparison_page(comparisons: Sequence[Sequence[Comparison]], made: Provenance | None = None) -> str:
+    """Return the text of the page.
+
+    Parameters
+    ----------
+    comparisons : sequence of sequence of Comparison
+        Of each recording those of all models.
+    """
+    models = [each.model for each in comparisons[0]]
+    count = len(comparisons)
+    title = f"{' and '.join(models)} against {count} recording{'s' if count > 1 else ''}"
+    first = comparisons[0][0]
+    rows = [(each.record.name, each.model, *_figures(each)) for of_recording in comparisons for each in of_recording]
+    if count > 1:
+        by_model = zip(*comparisons, strict=True)
+        rows += [("together", of[0].model, shown(together(of)), *[""] * 5) for of in by_model]
+    if len(models) == 1:
+        rows = [(name, *rest) for name, _, *rest in rows]
+    headings = (
+        "recording", *(["model"] if len(models) > 1 else []), f"RMS error [{first.unit}]", f"largest [{first.unit}]",
+        "NRMSE fit [%]", f"load torque [{unit('torque', first.motion)}]", "samples used", "p, past torque",
+    )  # fmt: skip
+    figures = html.table(headings, rows, numbers=range(len(headings) - 6, len(headings)))
     top = f'<header class="top">\n<h1>{escape(title)}</h1>\n{figures}\n</header>'
-    stretches = stretches_for(len(comparisons))
-    sections = [_recording(motion, each, i, stretches) for i, each in enumerate(comparisons)]
+    sections = [_recording(of_recording, i, count) for i, of_recording in enumerate(comparisons)]
     return html.page(
         title,
-        [top, *sections],
+        [top, *sections, made_section(made)],
         "hil compare. Free-run simulations: measured torque in, nothing fed back; only constant load torque "
         "and initial state are estimated in each recording.",
     )
 
 
-def _recording(motion: Motion, comparison: Comparison, number: int, stretches: int) -> str:
-    record = comparison.record
-    measured = np.where(record.okay, record.output, np.nan)
-    error = Line("error", comparison.error, Style.AFTER)
-    panels = (
-        Panel(torque_axis(motion), input_lines(record.torque_nm)),
-        Panel(
-            f"{quantity(comparison.unit)} [{comparison.unit}]",
-            (
-                Line("measured", measured, Style.MEASURED),
-                Line(MODEL, comparison.simulated, Style.AFTER),
-            ),
-        ),
-        Panel(f"error [{comparison.unit}]", (error,)),
-    )
+def _figures(each: Comparison) -> tuple[str, ...]:
+    used = f"{int(each.record.okay.sum())} of {each.record.okay.size}"
+    figures = (each.rms, each.largest, each.fit_percent, each.load_torque)
+    return (*map(shown, figures), used, shown_p(each.past_input.p_value))
+
+
+def _recording(of_recording: Sequence[Comparison], number: int, recordings: int) -> str:
+    first = of_recording[0]
+    record = first.record
+    panels = comparison_panels(of_recording)
+    errors = panels[-1].lines
     return html.section(
         f"Recording {record.name}",
-        time_figure(f"time-{number}", record.time_s, panels, stretches),
+        time_figure(f"time-{number}", record.time_s, panels, recordings),
         "<h3>Spectrum of the error</h3>",
-        spectrum_figure(f"spectrum-{number}", record.sample_time_s, (error,), comparison.unit),
+        spectrum_figure(f"spectrum-{number}", record.sample_time_s, errors, first.unit),
+        "<h3>Does the error go with the torque?</h3>",
+        html.paragraph(RESIDUALS, "note"),
+        correlation_figure(f"residual-{number}", _tests(of_recording)),
     )
+
+
+def comparison_panels(of_recording: Sequence[Comparison]) -> tuple[Panel, ...]:
+    """Return torques, measured and simulated outputs, and the errors of all models."""
+    first = of_recording[0]
+    record = first.record
+    measured = Line("measured", np.where(record.okay, record.output, np.nan), Style.MEASURED)
+    styles = [MODEL_STYLES[i % len(MODEL_STYLES)] for i in range(len(of_recording))]
+    pairs = list(zip(of_recording, styles, strict=True))
+    simulated = [Line(each.model, each.simulated, style) for each, style in pairs]
+    errors = [Line(each.model, each.error, style) for each, style in pairs]
+    return (
+        Panel(torque_axis(first.motion), input_lines(record.torque_nm)),
+        Panel(f"{quantity(first.unit)} [{first.unit}]", (measured, *simulated)),
+        Panel(f"error [{first.unit}]", tuple(errors)),
+    )
+
+
+def _tests(of_recording: Sequence[Comparison]) -> list[tuple[str, CorrelationTest]]:
+    return [(f"{each.model}: error with the past torque", each.past_input) for each in of_recording]

@@ -16,6 +16,7 @@ from estimator.diagnosis.result import Diagnosis, Fit, FoundEffect, Trace, Unnam
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
 from estimator.signals.record import FloatArray
+from hil.provenance import Provenance
 from hil.report import page as html
 from hil.report.discrepancy_html import frequency, law_pictures, location, worth_marking
 from hil.report.figures import (
@@ -25,10 +26,10 @@ from hil.report.figures import (
     band_figure,
     input_lines,
     spectrum_figure,
-    stretches_for,
     time_figure,
 )
 from hil.report.interval_bar import interval_bar
+from hil.report.made import made_section
 from hil.report.numbers import p_statement, shown, shown_interval, shown_ratio, shown_times
 from hil.report.sentence import listed
 from hil.report.wording import BADGES, ELEMENTS, belief, headline, quantity, torque_axis
@@ -41,11 +42,11 @@ AUGMENTED = "augmented"
 KEPT_BACK = "stretches kept back as unseen data"
 
 
-def diagnosis_page(diagnosis: Diagnosis) -> str:
-    """Return the text of the page."""
+def diagnosis_page(diagnosis: Diagnosis, made: Provenance | None = None, one_in: int = 1) -> str:
+    """Return the text of the page; ``one_in`` tells to one in how many samples recordings were thinned."""
     drawn = _drawn(diagnosis.traces)
     body = [
-        _top(diagnosis),
+        _top(diagnosis, one_in),
         _fit(diagnosis),
         _acquired(diagnosis),
         _found(diagnosis),
@@ -55,6 +56,7 @@ def diagnosis_page(diagnosis: Diagnosis) -> str:
         _rivals(diagnosis),
         _untestable(diagnosis),
         _parameters(diagnosis),
+        made_section(made),
     ]
     seconds = shown(diagnosis.timing_s.get("total", float("nan")), "s")
     return html.page(
@@ -65,11 +67,17 @@ def diagnosis_page(diagnosis: Diagnosis) -> str:
     )
 
 
-def _top(diagnosis: Diagnosis) -> str:
+def _top(diagnosis: Diagnosis, one_in: int) -> str:
     verdict, fit = diagnosis.verdict, diagnosis.fit
     training = [trace.name for trace in diagnosis.traces if not trace.holdout]
     held_out = len(diagnosis.traces) - len(training)
     warnings = "".join(html.paragraph(f"Note: {text}", "warning") for text in diagnosis.warnings)
+    if one_in > 1:
+        warnings += html.paragraph(
+            f"Of the recordings one in {one_in} samples was used, the torque as the mean of those between: the line "
+            "answers to no more. All figures and plots are of these.",
+            "note",
+        )
     figures = html.tiles(
         [
             (
@@ -196,7 +204,7 @@ def _effect(diagnosis: Diagnosis, effect: FoundEffect) -> list[str]:
     pieces += law_pictures(diagnosis, effect.name)
     pieces.append(
         html.paragraph(
-            f"{belief(effect)}Evidence: information criterion better by {shown(evidence.delta_bic)}; error on unseen "
+            f"{belief(effect)}Evidence: information criterion {_bettered(evidence.delta_bic)}; error on unseen "
             f"data {shown(evidence.holdout_rms_before)} → {shown(evidence.holdout_rms_after)}; "
             f"{p_statement(evidence.p_value)}."
         )
@@ -215,6 +223,10 @@ def _effect(diagnosis: Diagnosis, effect: FoundEffect) -> list[str]:
     return pieces
 
 
+def _bettered(delta_bic: float) -> str:
+    return f"better by {shown(delta_bic)}" if not delta_bic < 0.0 else f"worse by {shown(-delta_bic)}"
+
+
 def _drawn(traces: Sequence[Trace]) -> list[Trace]:
     """Return the recordings that are drawn, in their order."""
     largest = sorted(traces, key=lambda trace: _rms(trace.retuned - trace.measured), reverse=True)[:MOST_DRAWN]
@@ -222,8 +234,7 @@ def _drawn(traces: Sequence[Trace]) -> list[Trace]:
 
 
 def _recordings(diagnosis: Diagnosis, drawn: Sequence[Trace]) -> list[str]:
-    stretches = stretches_for(len(drawn))
-    sections = [_recording(diagnosis, trace, i, stretches) for i, trace in enumerate(drawn)]
+    sections = [_recording(diagnosis, trace, i, len(drawn)) for i, trace in enumerate(drawn)]
     left_out = len(diagnosis.traces) - len(drawn)
     if left_out:
         text = f"{left_out} more recordings, with smaller errors of the re-tuned model, are not drawn."
@@ -236,28 +247,11 @@ def _rms(error: FloatArray) -> float:
     return float(np.sqrt(np.mean(finite**2))) if finite.size else 0.0
 
 
-def _recording(diagnosis: Diagnosis, trace: Trace, number: int, stretches: int) -> str:
+def _recording(diagnosis: Diagnosis, trace: Trace, number: int, recordings: int) -> str:
     fit = diagnosis.fit
     measured = np.where(trace.okay, trace.measured, np.nan)
     before, after = measured - trace.retuned, measured - trace.augmented
-    inputs = input_lines(trace.torque_nm)
-    errors = [Line(RETUNED, before, Style.BEFORE)]
-    models = [Line(RETUNED, trace.retuned, Style.BEFORE)]
-    if not np.array_equal(trace.retuned, trace.augmented):
-        errors.append(Line(AUGMENTED, after, Style.AFTER))
-        models.append(Line(AUGMENTED, trace.augmented, Style.AFTER))
-    panels = (
-        Panel(torque_axis(diagnosis.augmented.motion), inputs),
-        Panel(
-            f"{quantity(fit.unit)} [{fit.unit}]",
-            (
-                Line("measured", measured, Style.MEASURED),
-                Line("nominal as given", trace.nominal, Style.NOMINAL, hidden=True),
-                *models,
-            ),
-        ),
-        Panel(f"error [{fit.unit}]", tuple(errors), band=fit.noise_floor),
-    )
+    panels = course_panels(diagnosis, trace)
     shaded = worth_marking(trace, diagnosis.mismatch.time_s.get(trace.name, ()))
     sample_time_s = float(np.median(np.diff(trace.time_s)))
     kind = "held out" if trace.holdout else "used for the fit"
@@ -269,9 +263,34 @@ def _recording(diagnosis: Diagnosis, trace: Trace, number: int, stretches: int) 
             f"{figures} Drag to zoom, double click to go back; the dotted pair of lines is the noise floor.{marked}",
             "note",
         ),
-        time_figure(f"time-{number}", trace.time_s, panels, stretches, shaded),
+        time_figure(f"time-{number}", trace.time_s, panels, recordings, shaded),
         "<h3>Spectrum of the error</h3>",
-        spectrum_figure(f"spectrum-{number}", sample_time_s, errors, fit.unit, fit.noise_floor),
+        spectrum_figure(f"spectrum-{number}", sample_time_s, panels[-1].lines, fit.unit, fit.noise_floor),
+    )
+
+
+def course_panels(diagnosis: Diagnosis, trace: Trace) -> tuple[Panel, ...]:
+    """Return torques, measured and simulated outputs, and the errors of a recording."""
+    fit = diagnosis.fit
+    measured = np.where(trace.okay, trace.measured, np.nan)
+    before, after = measured - trace.retuned, measured - trace.augmented
+    inputs = input_lines(trace.torque_nm)
+    errors = [Line(RETUNED, before, Style.BEFORE)]
+    models = [Line(RETUNED, trace.retuned, Style.BEFORE)]
+    if not np.array_equal(trace.retuned, trace.augmented):
+        errors.append(Line(AUGMENTED, after, Style.AFTER))
+        models.append(Line(AUGMENTED, trace.augmented, Style.AFTER))
+    return (
+        Panel(torque_axis(diagnosis.augmented.motion), inputs),
+        Panel(
+            f"{quantity(fit.unit)} [{fit.unit}]",
+            (
+                Line("measured", measured, Style.MEASURED),
+                Line("nominal as given", trace.nominal, Style.NOMINAL, hidden=True),
+                *models,
+            ),
+        ),
+        Panel(f"error [{fit.unit}]", tuple(errors), band=fit.noise_floor),
     )
 
 

@@ -30,6 +30,7 @@ from estimator.diagnosis.result import (
     Slight,
     UnnamedLaw,
 )
+from hil.provenance import Provenance
 from hil.report.numbers import json_number
 
 SCHEMA = "hil.diagnosis/1"
@@ -37,9 +38,10 @@ SCHEMA = "hil.diagnosis/1"
 Json = dict[str, Any]
 
 
-def diagnosis_text(diagnosis: Diagnosis) -> str:
+def diagnosis_text(diagnosis: Diagnosis, made: Provenance | None = None) -> str:
     """Return the text of the file."""
-    return json.dumps(diagnosis_json(diagnosis), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    content = diagnosis_json(diagnosis) | ({} if made is None else {"made": made.document()})
+    return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def diagnosis_json(diagnosis: Diagnosis) -> Json:

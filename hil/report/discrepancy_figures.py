@@ -10,6 +10,8 @@ from plotly.subplots import make_subplots
 
 from estimator.diagnosis.result import Course, Equivalent, ErrorSpectrum, Interval, LawPicture, Response
 from estimator.signals.record import FloatArray
+from hil.figures.palette import GREY
+from hil.report import bode
 from hil.report.decimate import extremes
 from hil.report.figures import DECADES, LEGEND_PX, PANEL_PX, SHADE, Style, figure_html
 from hil.report.wording import PLACES
@@ -21,7 +23,6 @@ GAP = 8.0
 """In distances of neighbouring bins: from here on nothing is drawn between two of them."""
 
 BAND = "rgba(0,114,178,0.18)"
-MEASURED_BAND = "rgba(120,128,136,0.28)"
 FLOOR = {"color": "#777777", "width": 1.2, "dash": "dot"}
 
 
@@ -173,37 +174,30 @@ def error_spectrum_figure(name: str, spectrum: ErrorSpectrum, unit: str, band_hz
     return figure_html(figure, name, PANEL_PX + 40 + LEGEND_PX)
 
 
-def response_figure(name: str, responses: Mapping[str, Response], axis: str) -> str:
+def response_figure(name: str, responses: Mapping[str, Response]) -> str:
     """Draw the response of a recording with its confidence, and of both models, one recording at a time."""
-    figure = go.Figure()
+    figure = bode.panels()
     recordings, shown = list(responses), list[str]()
     for recording, response in responses.items():
-        for trace in _responses(response):
+        _response(figure, response)
+        for trace in figure.data[len(shown) :]:
             trace.visible = recording == recordings[0]
-            figure.add_trace(trace)
             shown.append(recording)
+    bode.fix_scale(figure, [each.before for each in responses.values()] + [each.after for each in responses.values()])
     _choose(figure, recordings, shown)
-    figure.update_xaxes(title_text="frequency [Hz]", **DECADES)
-    figure.update_yaxes(title_text=axis, **DECADES)
-    return figure_html(figure, name, PANEL_PX + 40 + LEGEND_PX + CHOICE_PX, top_px=34 + CHOICE_PX)
+    return figure_html(figure, name, bode.HEIGHT_PX + CHOICE_PX, top_px=34 + CHOICE_PX)
 
 
-def _responses(response: Response) -> list[go.Scatter]:
+def _response(figure: go.Figure, response: Response) -> None:
+    seen = np.isfinite(response.std) & (np.abs(response.measured) > 0.0)
     f = response.frequency_hz
-    smallest = 0.1 * float(np.min(response.measured[response.measured > 0.0], initial=np.inf))
-    high = np.where(np.isfinite(response.high), response.high, response.measured)
-    lines = [_line(f, np.maximum(response.low, smallest), None), _line(f, high, None)]
-    lines[1].update(fill="tonexty", fillcolor=MEASURED_BAND, name="estimate without a model, 95 %", showlegend=True)
-    lines.append(_line(f, response.measured, Style.MEASURED, "estimate without a model"))
-    lines.append(_line(f, response.before, Style.BEFORE, "nominal re-tuned"))
+    bode.estimate(
+        figure, f[seen], response.measured[seen], response.std[seen], response.coherence[seen], GREY,
+        "estimate without a model, 95 %",
+    )  # fmt: skip
+    models = [("nominal re-tuned", response.before, Style.BEFORE)]
     if not np.array_equal(response.before, response.after):
-        lines.append(_line(f, response.after, Style.AFTER, "augmented"))
-    return lines
-
-
-def _line(x: FloatArray, y: FloatArray, style: Style | None, name: str = "") -> go.Scatter:
-    if style is None:
-        edge = {"width": 0}
-        return go.Scatter(x=x, y=y, mode="lines", line=edge, showlegend=False, hoverinfo="skip")
-    colour, width, _ = style.value
-    return go.Scatter(x=x, y=y, mode="lines", line={"color": colour, "width": min(width, 2.5)}, name=name)
+        models.append(("augmented", response.after, Style.AFTER))
+    for label, values, style in models:
+        there = np.abs(values) > 0.0
+        bode.curve(figure, f[there], values[there], label, {"color": style.value[0], "width": 2.0})

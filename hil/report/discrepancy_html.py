@@ -122,15 +122,16 @@ def frequency(diagnosis: Diagnosis) -> str:
     ]
     if seen.responses:
         motion = diagnosis.augmented.motion
-        torque_unit = torque_axis(motion).split("[")[1].rstrip("]")
+        of_torque = torque_axis(motion).split("[")[1].rstrip("]")
         tests = [(name, p_statement(each.p_before), p_statement(each.p_after)) for name, each in seen.responses.items()]
         pieces += [
             f"<h3>Response from {escape(torque_axis(motion).split(' [')[0])} to {escape(quantity(unit))}</h3>",
             html.paragraph(
-                "The spectral estimate needs no model. Where a model leaves its band, its dynamics are wrong there.",
+                f"The spectral estimate needs no model. Where a model leaves its band, its dynamics are wrong there. "
+                f"0 dB is 1 {unit} per {of_torque}.",
                 "note",
             ),
-            response_figure("response", seen.responses, f"size [{unit} per {torque_unit}]"),
+            response_figure("response", seen.responses),
             html.table(("chance of so large a difference", "nominal re-tuned", "augmented"), tests, numbers=(1, 2)),
         ]
     return html.section("Over frequency", *pieces)

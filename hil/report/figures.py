@@ -24,6 +24,7 @@ from plotly.utils import PlotlyJSONEncoder
 from estimator.signals.record import FloatArray
 from hil.figures.palette import BLACK, BLUE, GREEN, GREY, ORANGE, PALE, PURPLE, VERMILION, faded
 from hil.report.decimate import extremes
+from hil.report.samples import packed
 
 Interval = tuple[float, float]
 
@@ -38,11 +39,14 @@ class Style(Enum):
     FIRST_INPUT = (BLACK, 1.2, "solid")
     SECOND_INPUT = (GREEN, 1.2, "dash")
     THIRD_INPUT = (PURPLE, 1.2, "dot")
+    THIRD_MODEL = (GREEN, 1.3, "solid")
+    FOURTH_MODEL = (PURPLE, 1.3, "solid")
 
 
 plotly.io.templates.default = "none"  # copied into every figure at each change of it; `figure_html` gives it once
 
 INPUT_STYLES = (Style.FIRST_INPUT, Style.SECOND_INPUT, Style.THIRD_INPUT)
+MODEL_STYLES = (Style.AFTER, Style.BEFORE, Style.THIRD_MODEL, Style.FOURTH_MODEL)
 
 SHADE = ORANGE
 PANEL_PX = 230
@@ -76,12 +80,16 @@ TORQUE_NAMES = ("T_M1", "T_M2")
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """One line of a panel; ``y`` has shape (N,), NaN is a gap. A ``hidden`` one waits in the legend."""
+    """One line of a panel; ``y`` has shape (N,), NaN is a gap.
+
+    A ``hidden`` one waits in the legend; one that is ``held`` keeps each value until the next: drawn in steps.
+    """
 
     name: str
     y: FloatArray
     style: Style
     hidden: bool = False
+    held: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,11 +107,11 @@ def stretches_for(recordings: int) -> int:
 
 
 def input_lines(torque_nm: FloatArray) -> tuple[Line, ...]:
-    """Name and style the inputs of a recording; ``torque_nm`` has shape (N, M)."""
+    """Name and style the inputs of a recording, which are held over each period; ``torque_nm`` has shape (N, M)."""
     count = torque_nm.shape[1]
     names = TORQUE_NAMES if count == len(TORQUE_NAMES) else [f"input {i + 1}" for i in range(count)]
     return tuple(
-        Line("input" if count == 1 else name, torque_nm[:, i], INPUT_STYLES[i % len(INPUT_STYLES)])
+        Line("input" if count == 1 else name, torque_nm[:, i], INPUT_STYLES[i % len(INPUT_STYLES)], held=True)
         for i, name in enumerate(names)
     )
 
@@ -120,10 +128,10 @@ def time_figure(
     name: str,
     time_s: FloatArray,
     panels: Sequence[Panel],
-    stretches: int,
+    recordings: int,
     shaded: Sequence[Interval] = (),
 ) -> str:
-    """Draw panels over a common time axis.
+    """Draw panels over a common time axis; zoomed in, every sample is drawn.
 
     Parameters
     ----------
@@ -131,11 +139,30 @@ def time_figure(
         Unique in the page.
     time_s : ndarray, shape (N,)
         Time [s].
-    stretches : int
-        See :func:`hil.report.decimate.extremes`.
+    recordings : int
+        Recordings that share the page: the more, the coarser each is drawn.
     shaded : sequence of (float, float)
         Intervals of time to mark [s].
     """
+    stretches = stretches_for(recordings)
+    figure = time_panels(time_s, panels, stretches, shaded)
+    height_px = PANEL_PX * len(panels) + LEGEND_PX
+    if time_s.size <= 2 * stretches:
+        return figure_html(figure, name, height_px)
+    samples, every = packed(time_s, [line.y for panel in panels for line in panel.lines], recordings)
+    finest = "every sample" if every == 1 else f"the lowest and the highest of {2 * every} samples"
+    said = (
+        f"Drawn: the lowest and the highest of each {-(-time_s.size // stretches)} samples; zoomed in, {finest}. "
+        f"{time_s.size} samples in all."
+    )
+    note = f'<p class="note thinned" id="{name}-thinned">{said}</p>'
+    return note + figure_html(figure, name, height_px, samples=samples)
+
+
+def time_panels(
+    time_s: FloatArray, panels: Sequence[Panel], stretches: int, shaded: Sequence[Interval] = ()
+) -> go.Figure:
+    """Return panels over a common time axis; of each line the extremes of so many stretches (``decimate``)."""
     figure = make_subplots(rows=len(panels), cols=1, shared_xaxes=True, vertical_spacing=0.04)
     seen: set[str] = set()
     for row, panel in enumerate(panels, start=1):
@@ -150,7 +177,7 @@ def time_figure(
     for low, high in shaded:
         figure.add_vrect(x0=low, x1=high, fillcolor=SHADE, opacity=0.25, line_width=0, layer="below")
     figure.update_xaxes(title_text="time [s]", row=len(panels), col=1)
-    return figure_html(figure, name, PANEL_PX * len(panels) + LEGEND_PX)
+    return figure
 
 
 def spectrum_figure(
@@ -199,7 +226,7 @@ def _scatter(line: Line, x: FloatArray, y: FloatArray, *, first: bool) -> go.Sca
         legendgroup=line.name,
         showlegend=first,
         mode="lines",
-        line={"color": colour, "width": width, "dash": dash},
+        line={"color": colour, "width": width, "dash": dash, **({"shape": "hv"} if line.held else {})},
         visible="legendonly" if line.hidden else True,
     )
 
@@ -211,10 +238,17 @@ def _template() -> dict[str, Any]:
     return look
 
 
-def figure_html(figure: go.Figure, name: str, height_px: int, top_px: int = TOP_PX, hover: str = "x unified") -> str:
+def figure_html(
+    figure: go.Figure,
+    name: str,
+    height_px: int,
+    top_px: int = TOP_PX,
+    hover: str = "x unified",
+    samples: dict[str, Any] | None = None,
+) -> str:
     """Return a figure as a piece of HTML with the page's look; ``name`` is unique in the page.
 
-    ``hover`` is what a pointer shows: all of one abscissa, or the ``closest`` point.
+    ``hover`` is what a pointer shows: all of one abscissa, or the ``closest`` point. ``samples`` are those to zoom to.
     """
     inside_px = height_px - top_px - LEGEND_PX + TOP_PX
     figure.update_layout(
@@ -226,7 +260,8 @@ def figure_html(figure: go.Figure, name: str, height_px: int, top_px: int = TOP_
     )
     drawn = figure.to_plotly_json()
     drawn["layout"]["template"] = _template()
-    text = json.dumps({**drawn, "config": CONFIG}, cls=PlotlyJSONEncoder, separators=(",", ":"))
+    more = {} if samples is None else {"samples": samples}
+    text = json.dumps({**drawn, "config": CONFIG, **more}, cls=PlotlyJSONEncoder, separators=(",", ":"))
     data = text.replace("<", "\\u003c")  # no text of a figure can end the script element it stands in
     return (
         f'<figure class="plot"><div class="plotly-graph-div" id="{name}" data-figure="{name}-data" tabindex="0" '

@@ -29,8 +29,68 @@
     screens.set(div, { height: figure.layout.height, legend: figure.layout.legend.y, margin: figure.layout.margin });
     Plotly.newPlot(div, figure.data, figure.layout, figure.config);
     if (printing) Plotly.relayout(div, onPaper(div));
+    if (figure.samples) zoomable(div, figure);
     div.addEventListener("keydown", (event) => onKey(div, event));
     reachable(div);
+  }
+
+  const DRAWN = 3000; // samples of a line in view beyond which its extremes are drawn
+  const GAP = -32768;
+
+  function unpacked(text, Kind) {
+    const bytes = Uint8Array.from(atob(text), (each) => each.charCodeAt(0));
+    return new Kind(bytes.buffer);
+  }
+
+  /* A figure over time that stands on more samples than are drawn: what comes into view is drawn from them. */
+  function zoomable(div, figure) {
+    const samples = figure.samples;
+    const stamps = samples.stamps ? unpacked(samples.stamps, Float64Array) : null;
+    const lines = samples.lines.map((line) => ({ ...line, codes: unpacked(line.codes, Int16Array) }));
+    const whole = figure.data.map((trace) => ({ x: trace.x, y: trace.y }));
+    const time = (i) => (stamps ? stamps[i] : samples.start + i * samples.step);
+    const value = (line, i) => (line.codes[i] === GAP ? null : line.offset + line.scale * line.codes[i]);
+    const row = (t) => {
+      if (!stamps) return (t - samples.start) / samples.step;
+      let low = 0;
+      for (let high = stamps.length; low < high; ) {
+        const middle = (low + high) >> 1;
+        if (stamps[middle] < t) low = middle + 1;
+        else high = middle;
+      }
+      return low;
+    };
+    let shown = "";
+    function redraw() {
+      const range = div._fullLayout.xaxis.range;
+      const first = Math.max(0, Math.floor(row(range[0])) - 1);
+      const last = Math.min(samples.count - 1, Math.ceil(row(range[1])) + 1);
+      const key = first === 0 && last === samples.count - 1 ? "" : `${first} ${last}`;
+      if (key === shown || last <= first) return;
+      shown = key;
+      const drawn = key ? lines.map((line) => inView(line, first, last)) : whole;
+      Plotly.restyle(div, { x: drawn.map((each) => each.x), y: drawn.map((each) => each.y) });
+    }
+    function inView(line, first, last) {
+      const length = Math.max(1, Math.floor((2 * (last - first + 1)) / DRAWN));
+      const x = [];
+      const y = [];
+      for (let begin = first; begin <= last; begin += length) {
+        let low = begin;
+        let high = begin;
+        for (let i = begin; i < begin + length && i <= last; i++) {
+          if (line.codes[i] === GAP) continue;
+          if (line.codes[low] === GAP || line.codes[i] < line.codes[low]) low = i;
+          if (line.codes[high] === GAP || line.codes[i] > line.codes[high]) high = i;
+        }
+        for (const i of low === high ? [low] : [Math.min(low, high), Math.max(low, high)]) {
+          x.push(time(i));
+          y.push(value(line, i));
+        }
+      }
+      return { x, y };
+    }
+    div.on("plotly_relayout", redraw);
   }
 
   /* Buttons of a figure's own bar, for those without a pointer. */

@@ -91,7 +91,7 @@ def torque_axis(motion: Motion) -> str:
 
 def headline(diagnosis: Diagnosis) -> str:
     """Say the verdict in one line."""
-    found = [_title(effect.name) for effect in diagnosis.effects]
+    found = [f"{_title(effect.name)}{_sure(effect)}" for effect in diagnosis.effects]
     if diagnosis.verdict is Verdict.EXPLAINED:
         return f"Missing in the model: {listed(found)}"
     if diagnosis.verdict is Verdict.PARTLY_EXPLAINED:
@@ -105,11 +105,24 @@ def headline(diagnosis: Diagnosis) -> str:
     return "Something is missing that no entry of the catalogue explains"
 
 
+def _sure(effect: FoundEffect) -> str:
+    """Say how probable an effect is, in brackets; "" where that is not known: it was read off the raw data."""
+    if not math.isfinite(effect.probability):
+        return ""
+    return f" ({probability(effect.probability)} sure)"
+
+
+def probability(value: float) -> str:
+    """Return a probability in per cent, as many digits as it is sure: never 100 %."""
+    digits = next((d for d in (0, 1, 2) if 100.0 * (1.0 - value) >= 0.5 * 10.0**-d), None)
+    return "over 99.99 %" if digits is None else f"{100.0 * value:.{digits}f} %"
+
+
 def belief(effect: FoundEffect) -> str:
     """Say how much of the mismatch goes with an effect and how probable it is; "" where that is not known."""
     if not (math.isfinite(effect.share) and math.isfinite(effect.probability)):
         return ""
-    return f"{effect.share:.0%} of the squared error goes with it; probability {effect.probability:.3g}. "
+    return f"{effect.share:.0%} of the squared error goes with it; probability {probability(effect.probability)}. "
 
 
 def _title(name: str) -> str:

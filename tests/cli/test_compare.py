@@ -47,7 +47,7 @@ def test_figures_and_plots_are_written(inputs: list[str], tmp_path: Path, capsys
     assert "run_2" in out
     assert sorted(path.name for path in (tmp_path / "result").iterdir()) == ["compare.html", "compare.json"]
     page = (tmp_path / "result" / "compare.html").read_text()
-    assert page.count('class="plotly-graph-div"') == 4
+    assert page.count('class="plotly-graph-div"') == 6
     assert "drive.toml against 2 recordings" in page
 
 

@@ -70,13 +70,25 @@ def quick_rig(short_rig: Path) -> Path:
     return short_rig
 
 
-def test_hil_check_proves_it_without_a_torque(quick_rig: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_hil_check_proves_it_without_a_torque(
+    quick_rig: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    proof = tmp_path / "proof.json"
     with served(read_rig(quick_rig)) as (server, _):
         addresses = ("--bus", server.bus_url, "--modbus", str(server.modbus))
-        assert run(["check", str(quick_rig), "--prove-stop", *addresses]) == 0
+        assert run(["check", str(quick_rig), "--prove-stop", "--out", str(proof), *addresses]) == 0
         assert_disarmed(server.bus_url, 1, 2)
         assert server.torque_nm == (0.0, 0.0)
     assert capsys.readouterr().out.count("agrees") == 4
+    kept = json.loads(proof.read_text())
+    assert {device["result"] for device in kept["devices"]} == {"agrees"}
+    assert any("EMCY" in json.dumps(device["protections"]) for device in kept["devices"])
+    assert kept["made"]["models"][0]["file"] == str(quick_rig)
+
+
+def test_a_proof_without_a_trial_is_refused(quick_rig: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["check", str(quick_rig), "--out", "proof.json"]) == 2
+    assert "expected --prove-stop, whose proof it keeps" in capsys.readouterr().err
 
 
 def test_hil_check_names_what_it_can_not_prove(quick_rig: Path, capsys: pytest.CaptureFixture[str]) -> None:

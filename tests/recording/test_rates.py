@@ -15,6 +15,7 @@ import pytest
 from asammdf import MDF, Signal
 
 from estimator.signals import decimate
+from hil.cli.main import run
 from hil.errors import RecordingError
 from hil.recording import SignalsConfig, read_record, read_table, resample
 from hil.recording.look.look import look
@@ -209,6 +210,15 @@ def test_a_logged_bus_is_decoded_by_its_dbc(bus_log: tuple[Path, Path]) -> None:
     assert record.sample_time_s == pytest.approx(0.01, rel=1e-3)
     np.testing.assert_allclose(record.torque_nm, np.column_stack([np.arange(60.0), -0.5 * np.arange(60)]), atol=1e-9)
     np.testing.assert_allclose(record.output, np.arange(60.0) * 2.0 * np.pi / 60.0)
+
+
+def test_a_logged_bus_is_converted_by_its_dbc(bus_log: tuple[Path, Path], tmp_path: Path) -> None:
+    path, dbc = bus_log
+    assert run(["convert", str(path), str(tmp_path / "bus.parquet"), "--dbc", str(dbc)]) == 0
+    table = read_table(tmp_path / "bus.parquet")
+    assert table.n_rows == 60
+    np.testing.assert_allclose(table.numeric(["T_M1"])["T_M1"], np.arange(60.0), atol=1e-9)
+    assert run(["convert", str(path), str(tmp_path / "none.parquet")]) == 2
 
 
 @pytest.mark.parametrize(

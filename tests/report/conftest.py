@@ -59,7 +59,8 @@ def discrepancy() -> Discrepancy:
     course = Course(t, np.sin(t), np.sin(t) - 0.2, np.sin(t) + 0.2)
     places = (("motor", "Nm", 3101.0), ("shaft", "Nm", 3285.0), ("load", "Nm", -118.0), ("sensor", "rad/s", -4641.0))
     size = 1 / f
-    response = Response(f, size, 0.9 * size, 1.1 * size, 0.8 * size, size, 1e-20, 0.6)
+    measured = size * np.exp(-1j * f / 30)
+    response = Response(f, measured, 0.05 * size, np.full(f.size, 0.9), 0.8 * measured, measured, 1e-20, 0.6)
     law = -30 * np.tanh(x / 50)
     return Discrepancy(
         element=Element.SHAFT,

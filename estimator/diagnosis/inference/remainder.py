@@ -69,7 +69,7 @@ def tests(best: Hypothesis) -> tuple[Test, ...]:
     whole = np.concatenate(errors)
     power = float(whole @ whole) / whole.size
     limited = (
-        ("most_predictable", "foretold by its own past", 1.0 - unpredictable(errors) ** 2 / power),
+        ("most_predictable", "predictable from its own past", 1.0 - unpredictable(errors) ** 2 / power),
         ("most_dependent", "dependent on torque, speed or angle", _dependent(best, whole)),
         ("most_line", "a line in its spectrum", max(_line(each) for each in errors)),
         ("most_change", "changing over time", _change(errors, problem.records, power)),

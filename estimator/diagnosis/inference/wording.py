@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from estimator.diagnosis.inference.data_sheet import in_words
 from estimator.diagnosis.inference.verdict import Decision
-from estimator.diagnosis.phrases import PLACE_NAMES
+from estimator.diagnosis.phrases import PLACE_NAMES, times
 from estimator.diagnosis.result import Fit, FoundEffect, Remainder, Stray, UntestableEffect, Verdict
 
 
@@ -49,7 +49,7 @@ def _left(decision: Decision, remainder: Remainder) -> str:
     if remainder.element is not None:
         law = f", and looks most like {remainder.law} at the {PLACE_NAMES[remainder.element]}"
     return (
-        f"What is left, {remainder.times_noise:.2g} times the reading's noise, is more than noise and drift: it is "
+        f"What is left, {times(remainder.times_noise)} times the reading's noise, is more than noise and drift: it is "
         f"{', '.join(test.name for test in decision.failed)}{law}."
     )
 

@@ -41,7 +41,7 @@ class Prepared:
         return replace(whole, warnings=(*self.warnings, *whole.warnings))
 
 
-def _as_moved(records: Sequence[Record]) -> tuple[list[Record], list[str]]:
+def as_moved(records: Sequence[Record]) -> tuple[list[Record], list[str]]:
     """Return recordings without what no sensor has read, and what there is to say of it."""
     warnings: list[str] = []
     mended = list(records)
@@ -66,7 +66,7 @@ def prepare(records: Sequence[Record], model: DrivelineModel, holdout: Sequence[
         Torque, output or time that is off by a factor or in sign.
     """
     require_together([*records, *holdout] if records else records)
-    mended, warnings = _as_moved([*records, *holdout])
+    mended, warnings = as_moved([*records, *holdout])
     for record in mended:
         for each in outputs_apart([record], lambda _: 1.0):
             output_state(each, model.structure)

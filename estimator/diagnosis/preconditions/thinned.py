@@ -42,7 +42,7 @@ def thinned(records: Sequence[Record], model: DrivelineModel) -> list[Record]:
     """
     if share_of(records) >= 1.0 or model.structure is Structure.JOINT:
         return list(records)
-    return [_thin(record, factor_for([record], model)) for record in records]
+    return [thin(record, factor_for([record], model)) for record in records]
 
 
 def as_slow_as_needed(records: Sequence[Record], model: DrivelineModel) -> list[Record]:
@@ -52,7 +52,7 @@ def as_slow_as_needed(records: Sequence[Record], model: DrivelineModel) -> list[
     """
     shortest = min(record.okay.size for record in records)
     factor = min(factor_for(records, model, LONGEST_OF_RIGID_S), max(shortest // FEWEST_KEPT, 1))
-    return [_thin(record, factor) for record in records]
+    return [thin(record, factor) for record in records]
 
 
 def factor_for(records: Sequence[Record], model: DrivelineModel, longest_s: float = LONGEST_S) -> int:
@@ -72,7 +72,8 @@ def _band_hz(record: Record) -> float:
     return float(np.fft.rfftfreq(output.size, record.sample_time_s)[index])
 
 
-def _thin(record: Record, factor: int) -> Record:
+def thin(record: Record, factor: int) -> Record:
+    """Return a recording with one in ``factor`` of its samples."""
     if factor == 1:
         return record
     count = record.okay.size // factor

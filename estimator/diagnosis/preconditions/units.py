@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from estimator.diagnosis.phrases import times
 from estimator.diagnosis.preconditions.factors import close_factors
 from estimator.diagnosis.preconditions.inertia import Inertia, both_bands_agree, fitted_inertia
 from estimator.errors import BadModel, Cure, Implausible
@@ -160,8 +161,8 @@ def _refuse_per_mille(record: Record, line: DrivelineModel, found: Inertia) -> N
         return
     scale = float(f"{1.0 / found.ratio:.2g}")
     raise Implausible(
-        f"recording {record.name} is implausible: its torques are whole numbers, and fit an inertia {found.ratio:.3g} "
-        f"times the nominal {_nominal(line)}. Are they per mille of a rated torque of about "
+        f"recording {record.name} is implausible: its torques are whole numbers, and fit an inertia "
+        f"{times(found.ratio)} times the nominal {_nominal(line)}. Are they per mille of a rated torque of about "
         f"{scale / PER_MILLE:.0f} Nm? "
         "Then the scale is a thousandth of the rated torque. Where they are Nm, correct the inertia in the model file, "
         "or its tolerance.",
@@ -235,7 +236,7 @@ def _off_by_a_factor(record: Record, line: DrivelineModel, found: Inertia) -> Im
         torque = "torque" if line.motion is Motion.ROTATION else "force"
         return Implausible(
             f"recording {record.name} is implausible: the output falls where the {torque} rises (an inertia "
-            f"{found.ratio:.3g} times the nominal {_nominal(line)} fits). Is the sign of {torque} or output turned "
+            f"{times(found.ratio)} times the nominal {_nominal(line)} fits). Is the sign of {torque} or output turned "
             "round? Give one of them a negative scale in [signals].",
             Cure(record.name, output=-1.0),
         )
@@ -247,7 +248,7 @@ def _off_by_a_factor(record: Record, line: DrivelineModel, found: Inertia) -> Im
         close = f"{UNKNOWN} Or is it per cent of a rated torque of about {scale / PER_CENT:.0f} Nm?"
         cures = [Cure(record.name, torque=scale)]
     return Implausible(
-        f"recording {record.name} is implausible: it fits an inertia {found.ratio:.3g} times the nominal "
+        f"recording {record.name} is implausible: it fits an inertia {times(found.ratio)} times the nominal "
         f"{_nominal(line)}, expected 1 within its tolerance and a factor of {BEYOND:g}. {close or UNKNOWN} "
         "Correct the scale in [signals] (a torque in per cent of a rated one needs one, too), or the inertia in the "
         "model file.",

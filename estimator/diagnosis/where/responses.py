@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 from scipy import stats
 
-from estimator.diagnosis.intervals import Z95
 from estimator.diagnosis.result import Response
 from estimator.diagnosis.where.spectrum import SEGMENT
 from estimator.errors import NotExciting
@@ -59,14 +58,13 @@ def _differenced(record: Record, output: FloatArray) -> Record:
 
 
 def _response(measured: SpectralEstimate, before: SpectralEstimate, after: SpectralEstimate) -> Response:
-    size, spread = np.abs(measured.response), Z95 * measured.magnitude_std
     return Response(
         measured.frequency_hz,
-        size,
-        np.maximum(size - spread, 0.0),
-        size + spread,
-        np.abs(before.response),
-        np.abs(after.response),
+        measured.response,
+        measured.magnitude_std,
+        measured.coherence,
+        before.response,
+        after.response,
         _p_value(measured, before),
         _p_value(measured, after),
     )

@@ -121,19 +121,34 @@ def validate(fit: LinearFit, record: Record, unseen: Sequence[Record] = (), lags
         If a recording is sampled at another period than the model, or the model is unstable.
     """
     own = free_run(fit.model, record, fit.noise)
-    blocks = Blocks(record.okay & np.isfinite(own.error), fit.block)
-    error = blocks.mean(own.error)
-    u = Blocks(np.ones_like(record.okay), fit.block).mean(record.total_torque_nm)
+    tests = residual_tests(own.error, record, fit.block, min(fit.model.nk, LEAST_DELAY), lags)
+    return Validation(own, tuple(free_run(fit.model, other, fit.noise) for other in unseen), *tests)
+
+
+def residual_tests(
+    error: FloatArray, record: Record, block: int, first: int = LEAST_DELAY, lags: int = LAGS
+) -> tuple[CorrelationTest, CorrelationTest, CorrelationTest]:
+    """Correlate what a simulation leaves with past input, with later input, and with itself.
+
+    Parameters
+    ----------
+    error : ndarray, shape (N,)
+        Of a free run of the recording; NaN where it is not known.
+    block : int
+        Samples of which the mean is looked at (``block_of``).
+    first : int
+        Samples from which on the input can act.
+    """
+    blocks = Blocks(record.okay & np.isfinite(error), block)
+    residual = blocks.mean(np.nan_to_num(error))
+    u = Blocks(np.ones_like(record.okay), block).mean(record.total_torque_nm)
     with threadpool_limits(1):
-        white_error, white_input, both = _prewhitened(error, u, blocks.okay, record.sample_time_s * fit.block)
-    first = min(fit.model.nk, LEAST_DELAY)
-    late = first if fit.block == 1 else 0  # within one block both directions are possible
-    return Validation(
-        own=own,
-        unseen=tuple(free_run(fit.model, other, fit.noise) for other in unseen),
-        independence=correlation_test(white_error, white_input, both, np.arange(first, first + lags)),
-        feedback=correlation_test(white_error, white_input, both, np.arange(-lags, late)),
-        autocorrelation=correlation_test(error, error, blocks.okay, np.arange(1, lags + 1)),
+        white_error, white_input, both = _prewhitened(residual, u, blocks.okay, record.sample_time_s * block)
+    late = first if block == 1 else 0  # within one block both directions are possible
+    return (
+        correlation_test(white_error, white_input, both, np.arange(first, first + lags)),
+        correlation_test(white_error, white_input, both, np.arange(-lags, late)),
+        correlation_test(residual, residual, blocks.okay, np.arange(1, lags + 1)),
     )
 
 

@@ -11,6 +11,7 @@ from hil.commission.announce import plan_document
 from hil.commission.registry import STEPS
 from hil.commission.state import State
 from hil.commission.step import Job
+from hil.provenance import provenance
 from hil.report.commission_text import plan_lines, result_document, result_lines
 from hil.report.outputs import publish
 
@@ -30,7 +31,10 @@ def write_report(state: State) -> None:
     """
     from hil.report.commission_html import commission_page  # brings the plotting library along
 
-    page = commission_page(state.document(), {step.name: step.title for step in STEPS})
+    runs = [run for record in state.steps.values() for run in record.runs if run.recording]
+    recordings = [path for run in runs if (path := state.folder / str(run.recording)).is_file()]
+    made = provenance(recordings=recordings)
+    page = commission_page(state.document(), {step.name: step.title for step in STEPS}, made)
     publish(state.folder, {REPORT: lambda path: path.write_text(page, encoding="utf-8")})
 
 

@@ -12,6 +12,7 @@ from hil.commission.step import Job, Outcome, Step
 from hil.commission.steps.identification import cruises
 from hil.config.model_file import write_model
 from hil.errors import UsageError
+from hil.provenance import Provenance, provenance
 from hil.report.diagnosis_html import diagnosis_page
 from hil.report.diagnosis_json import diagnosis_text
 from hil.report.numbers import shown
@@ -49,7 +50,8 @@ def _do(job: Job) -> Outcome:
     chosen = [slow_to_fast[0], slow_to_fast[-1], *others]
     records = [record_of(job.recording(run)) for run in chosen]
     result = diagnose(records, nominal, (), job.progress)
-    _publish(job, result, nominal)
+    made = provenance(recordings=[job.recording(run) for run in chosen])
+    _publish(job, result, nominal, made)
     return Outcome(_findings(result), _evidence(result))
 
 
@@ -65,12 +67,12 @@ def _nominal(job: Job) -> DrivelineModel:
     return model_from_json(document)
 
 
-def _publish(job: Job, result: Diagnosis, nominal: DrivelineModel) -> None:
+def _publish(job: Job, result: Diagnosis, nominal: DrivelineModel, made: Provenance) -> None:
     publish(
         job.folder / FOLDER,
         {
-            "diagnosis.json": lambda path: path.write_text(diagnosis_text(result), encoding="utf-8"),
-            "report.html": lambda path: path.write_text(diagnosis_page(result), encoding="utf-8"),
+            "diagnosis.json": lambda path: path.write_text(diagnosis_text(result, made), encoding="utf-8"),
+            "report.html": lambda path: path.write_text(diagnosis_page(result, made), encoding="utf-8"),
         },
     )
     publish(

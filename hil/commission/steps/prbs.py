@@ -44,7 +44,7 @@ TRIES = 3
 
 @dataclass(frozen=True, slots=True)
 class _Seen:
-    """What a trial showed, or is foretold to show."""
+    """What a trial showed, or is predicted to show."""
 
     spread: ResonanceSpread | None
     vibration_m_s2: float
@@ -106,12 +106,12 @@ def _comfort_cap(job: Job) -> Iterator[Cap]:
     """Foretell the vibration with the rig file's amplitude; it grows with it."""
     if not job.evidence("scales").get("model") and job.nominal is None:
         return
-    seen = _foretold(job, job.rig.prbs.amplitude_nm)
+    seen = _predicted(job, job.rig.prbs.amplitude_nm)
     if seen.vibration_m_s2 > 0.0:
         yield Cap(job.rig.prbs.amplitude_nm * COMFORT_LIMIT_M_S2 / seen.vibration_m_s2, "the comfort of those on board")
 
 
-def _foretold(job: Job, amplitude_nm: float) -> _Seen:
+def _predicted(job: Job, amplitude_nm: float) -> _Seen:
     prediction = job.predict(_order(job, amplitude_nm))
     vibration = vibration_m_s2(
         prediction.torque_nm, prediction.course_rad_s, job.model(), job.rig.period_s, job.travel_m_per_rad
@@ -126,10 +126,10 @@ def _do(job: Job) -> Outcome:
     choice = _choice(job)
     tries: list[dict[str, Any]] = []
     for number in range(1, TRIES + 1):
-        foretold = _foretold(job, choice.amplitude_nm)
+        predicted = _predicted(job, choice.amplitude_nm)
         run = job.run("prbs", _order(job, choice.amplitude_nm, number))
         seen = _measured(job, run)
-        tries.append({"amplitude_nm": choice.amplitude_nm, "foretold": _json(foretold), "measured": _json(seen)})
+        tries.append({"amplitude_nm": choice.amplitude_nm, "predicted": _json(predicted), "measured": _json(seen)})
         better = _better(job, choice, seen)
         if number == TRIES or better is None:
             break
@@ -137,7 +137,7 @@ def _do(job: Job) -> Outcome:
         choice = better
     job.run("prbs", halt(job.rig))
     evidence = {"amplitude_nm": choice.amplitude_nm, "reason": choice.reason, "tries": tries}
-    return Outcome(_findings(job, choice, foretold, seen, run), evidence)
+    return Outcome(_findings(job, choice, predicted, seen, run), evidence)
 
 
 def _measured(job: Job, run: RunRecord) -> _Seen:
@@ -180,7 +180,7 @@ def _better(job: Job, choice: Choice, seen: _Seen) -> Choice | None:
     return replace(higher, reason="too little for the resonance")
 
 
-def _findings(job: Job, choice: Choice, foretold: _Seen, seen: _Seen, run: RunRecord) -> list[Finding]:
+def _findings(job: Job, choice: Choice, predicted: _Seen, seen: _Seen, run: RunRecord) -> list[Finding]:
     speed = cruise_of(job.rig).speed_rad_s
     band = max(LEAST_BAND_RAD_S, SPEED_BAND * abs(speed))
     inside = speed - band <= seen.low_rad_s and seen.high_rad_s <= speed + band
@@ -194,19 +194,19 @@ def _findings(job: Job, choice: Choice, foretold: _Seen, seen: _Seen, run: RunRe
             choice.needed_nm <= choice.amplitude_nm <= choice.cap.amplitude_nm + 1e-9,
             weaker,
         ),
-        *_spread_findings(foretold.spread, seen.spread, weaker),
+        *_spread_findings(predicted.spread, seen.spread, weaker),
         Finding(
             "vibration of the vehicle (RMS)",
             f"at most {COMFORT_LIMIT_M_S2:g} m/s² (ISO 2631-1){travel}",
-            f"{seen.vibration_m_s2:.3f} m/s², foretold {foretold.vibration_m_s2:.3f}",
+            f"{seen.vibration_m_s2:.3f} m/s², predicted {predicted.vibration_m_s2:.3f}",
             seen.vibration_m_s2 <= COMFORT_LIMIT_M_S2,
             "Lower [prbs] amplitude_nm; give the vehicle's own way per motor radian by --travel",
         ),
         Finding(
             "speed while measured",
             f"{speed - band:g} to {speed + band:g} rad/s",
-            f"{seen.low_rad_s:.1f} to {seen.high_rad_s:.1f}, foretold {foretold.low_rad_s:.1f} to "
-            f"{foretold.high_rad_s:.1f}",
+            f"{seen.low_rad_s:.1f} to {seen.high_rad_s:.1f}, predicted {predicted.low_rad_s:.1f} to "
+            f"{predicted.high_rad_s:.1f}",
             inside,
             "Look for a level road without wind, or lower the amplitude",
         ),
@@ -214,9 +214,9 @@ def _findings(job: Job, choice: Choice, foretold: _Seen, seen: _Seen, run: RunRe
     ]
 
 
-def _spread_findings(foretold: ResonanceSpread | None, seen: ResonanceSpread | None, advice: str) -> Iterator[Finding]:
+def _spread_findings(predicted: ResonanceSpread | None, seen: ResonanceSpread | None, advice: str) -> Iterator[Finding]:
     def told(value: float | None) -> str:
-        return "" if value is None else f", foretold {shown(100.0 * value, '%')}"
+        return "" if value is None else f", predicted {shown(100.0 * value, '%')}"
 
     if seen is None:
         yield Finding("resonance in one run", "a lightly damped mode", "none found", False, advice)
@@ -225,7 +225,7 @@ def _spread_findings(foretold: ResonanceSpread | None, seen: ResonanceSpread | N
         "standard deviation of the resonance's frequency, one run",
         f"at most {100.0 * FREQUENCY_STD:g} %",
         f"{shown(100.0 * seen.frequency_std, '%')} of {shown(seen.mode.frequency_hz, 'Hz')}"
-        + told(None if foretold is None else foretold.frequency_std),
+        + told(None if predicted is None else predicted.frequency_std),
         seen.frequency_std <= FREQUENCY_STD,
         advice,
     )
@@ -233,7 +233,7 @@ def _spread_findings(foretold: ResonanceSpread | None, seen: ResonanceSpread | N
         "standard deviation of its damping, one run",
         f"at most {100.0 * DAMPING_STD:g} %",
         f"{shown(100.0 * seen.damping_std, '%')} of {seen.mode.damping:.3f}"
-        + told(None if foretold is None else foretold.damping_std),
+        + told(None if predicted is None else predicted.damping_std),
         seen.damping_std <= DAMPING_STD,
         advice,
     )

@@ -15,6 +15,7 @@ from hil.commission.readings import record_of, thinned
 from hil.commission.step import Job, Outcome, Step
 from hil.commission.steps.identification import cruises
 from hil.errors import UsageError
+from hil.plants import ModelPlant
 from hil.report.comparison import Comparison, compare_record
 from hil.report.numbers import shown
 
@@ -46,7 +47,7 @@ def _do(job: Job) -> Outcome:
     inertia = float(job.evidence("friction").get("inertia_kg_m2", [job.rig.vehicle.inertia_kg_m2])[0])
     fit = fit_two_mass(seen, inertia, mode)
     job.progress("simulating unseen runs", 0.8)
-    compared = [compare_record(fit.model, record) for record in unseen]
+    compared = [compare_record(ModelPlant("fitted", fit.model), record) for record in unseen]
     job.progress("validated", 1.0)
     return Outcome(_findings(job, fit, mode, compared), _evidence(fit, compared))
 

@@ -18,6 +18,7 @@ from estimator.identification.modes.modes import Mode
 from estimator.identification.offline.orders import OrderChoice
 from estimator.identification.spectral.welch import SpectralEstimate
 from estimator.identification.study import Study
+from hil.provenance import Provenance
 from hil.report.identification.document_study import studied
 from hil.report.numbers import json_number
 
@@ -32,6 +33,7 @@ def identification_text(
     studies: Sequence[Study] = (),
     choice: OrderChoice | None = None,
     compared: Sequence[Compared] = (),
+    made: Provenance | None = None,
 ) -> str:
     """Return the text of the file.
 
@@ -69,6 +71,8 @@ def identification_text(
         "recordings": [_recording(result) | extra for result, extra in zip(results, extras, strict=True)],
         "compared": [_compared(each) for each in compared],
     }
+    if made is not None:
+        document["made"] = made.document()
     return json.dumps(document, indent=1, allow_nan=False) + "\n"
 
 

@@ -14,16 +14,15 @@ from estimator.identification.offline.orders import OrderChoice
 from estimator.identification.study import Study
 from hil.figures.local_model import LocalModel
 from hil.figures.palette import series_colour
+from hil.provenance import Provenance
 from hil.report import page as html
 from hil.report.identification.pole_map import PoleSet, known_sets, pole_figure
-from hil.report.identification.recording_section import recording_section
+from hil.report.identification.recording_section import MOST_DRAWN, recording_section
 from hil.report.identification.responses import responses_figure
 from hil.report.identification.tables import compared_table, numbers_table, orders_table, physical_tables
 from hil.report.identification.wording import headline, plus_minus, statement, verdict, warnings
+from hil.report.made import made_section
 from hil.report.numbers import shown
-
-MOST_DRAWN = 12
-"""Recordings with a section of their own; the tables hold all."""
 
 FOOTER = (
     "hil identify. High-passed and decimated; errors and fits are those of free-run simulations: measured torque in, "
@@ -36,6 +35,7 @@ def identification_page(
     studies: Sequence[Study],
     choice: OrderChoice | None = None,
     compared: Sequence[Compared] = (),
+    made: Provenance | None = None,
 ) -> str:
     """Return the text of the page.
 
@@ -62,6 +62,7 @@ def identification_page(
         sections.append(
             html.section("More recordings", html.paragraph(f"{left} more are in the tables alone.", "note"))
         )
+    sections.append(made_section(made))
     return html.page(f"Identification: {headline(studies)}", sections, FOOTER)
 
 

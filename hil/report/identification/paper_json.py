@@ -10,13 +10,23 @@ from typing import Any, Final
 from estimator.identification.identify import Settings
 from hil.figures.numbers import Row
 from hil.figures.road.conditions import Conditions
+from hil.provenance import Provenance
 from hil.report.numbers import json_number
 
 SCHEMA: Final = "hil.paper/1"
 
 
-def paper_text(rows: Sequence[Row], settings: Settings, driven: Sequence[Conditions], seed: int | None) -> str:
-    """Return the text of the file; ``seed`` is None and ``driven`` empty where recordings were given."""
+def paper_text(
+    rows: Sequence[Row],
+    settings: Settings,
+    driven: Sequence[Conditions],
+    seed: int | None,
+    made: Provenance | None = None,
+) -> str:
+    """Return the text of the file; ``seed`` is None and ``driven`` empty where recordings were given.
+
+    ``made`` is given with recordings alone: from one seed the same file comes at any time.
+    """
     document = {
         "schema": SCHEMA,
         "seed": seed,
@@ -30,6 +40,7 @@ def paper_text(rows: Sequence[Row], settings: Settings, driven: Sequence[Conditi
         },
         "experiments": [_row(row) for row in rows],
         "conditions": [asdict(each) for each in driven],
+        **({} if made is None else {"made": made.document()}),
     }
     return json.dumps(document, indent=1, allow_nan=False) + "\n"
 

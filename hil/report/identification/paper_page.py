@@ -11,10 +11,12 @@ from hil.figures.local_model import LocalModel
 from hil.figures.numbers import Row
 from hil.figures.palette import series_colour
 from hil.figures.road.conditions import Conditions
+from hil.provenance import Provenance
 from hil.report import page as html
-from hil.report.figures import Line, Panel, Style, stretches_for, time_figure
+from hil.report.figures import Line, Panel, Style, time_figure
 from hil.report.identification.pole_map import PoleSet, known_sets, pole_figure
 from hil.report.identification.responses import responses_figure
+from hil.report.made import made_section
 from hil.report.numbers import shown
 
 SHOWN_SIGNALS = 3
@@ -26,7 +28,12 @@ SOURCE = (
 )
 
 
-def paper_page(models: Sequence[LocalModel], rows: Sequence[Row], driven: Sequence[Conditions]) -> str:
+def paper_page(
+    models: Sequence[LocalModel],
+    rows: Sequence[Row],
+    driven: Sequence[Conditions],
+    made: Provenance | None = None,
+) -> str:
     """Return the text of the page.
 
     Parameters
@@ -43,6 +50,7 @@ def paper_page(models: Sequence[LocalModel], rows: Sequence[Row], driven: Sequen
         _responses(models),
         _poles(models),
         *([html.section("What was driven", *_conditions(models, driven))] if driven else []),
+        *([made_section(made)] if made is not None else []),
     ]
     return html.page("The paper's figures", sections, f"hil paper. After {SOURCE}.")
 
@@ -135,7 +143,6 @@ def _percent(share: float) -> str:
 
 def _signals(models: Sequence[LocalModel]) -> str:
     drawn = models[:SHOWN_SIGNALS]
-    stretches = stretches_for(4 * len(drawn))
     pieces = []
     for number, model in enumerate(drawn):
         record = model.record
@@ -144,7 +151,10 @@ def _signals(models: Sequence[LocalModel]) -> str:
             Panel("T_tot [Nm]", (Line("total torque", record.total_torque_nm, Style.BEFORE),)),
             Panel("ω_M [rad/s]", (Line("motor speed", speed, Style.AFTER),)),
         )
-        pieces += [f"<h3>{escape(model.name)}</h3>", time_figure(f"signals-{number}", record.time_s, panels, stretches)]
+        pieces += [
+            f"<h3>{escape(model.name)}</h3>",
+            time_figure(f"signals-{number}", record.time_s, panels, 4 * len(drawn)),
+        ]
     text = f"As recorded, every {1e3 * drawn[0].record.sample_time_s:g} ms. Drag to zoom, double click to go back."
     return html.section("Fig. 2: total torque and motor speed", html.paragraph(text, "note"), *pieces)
 

@@ -19,8 +19,8 @@ from hil.report.identification.responses import response_figure
 from hil.report.identification.wording import best_statement
 from hil.report.numbers import shown, shown_p
 
-STRETCHES = 900
-"""A signal is drawn with two points in each of so many parts."""
+MOST_DRAWN = 12
+"""Recordings with a section of their own; the tables hold all."""
 
 LARGEST_REGION = 1.0
 """Regions wider than this in z say only that the data know nothing of the root; they would hide the others."""
@@ -35,7 +35,7 @@ def recording_section(model: LocalModel, study: Study, number: int) -> str:
         *_regional(study),
         "<h3>Frequency response</h3>",
         html.paragraph(_spectral(study), "note"),
-        response_figure(f"response-{number}", model, study.best.fit.model),
+        response_figure(f"response-{number}", model, study.best.fit),
         "<h3>Poles and zeros</h3>",
         *_roots(model, study, number),
         "<h3>Free run of the output-error model</h3>",
@@ -116,7 +116,7 @@ def _free_run(study: Study, number: int) -> str:
         ),
         Panel("error", (Line("error", error, Style.BEFORE),)),
     )
-    return time_figure(f"free-run-{number}", data.time_s, panels, STRETCHES)
+    return time_figure(f"free-run-{number}", data.time_s, panels, MOST_DRAWN)
 
 
 def _tests(study: Study) -> str:

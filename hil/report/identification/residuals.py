@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
@@ -9,7 +11,7 @@ from estimator.identification.offline.validation import CorrelationTest, Validat
 from hil.figures.palette import BLUE, GREY, VERMILION, faded
 from hil.report.figures import figure_html
 
-HEIGHT_PX = 620
+PANEL_PX, AROUND_PX = 160, 140
 
 
 def residual_figure(name: str, validation: Validation) -> str:
@@ -19,13 +21,24 @@ def residual_figure(name: str, validation: Validation) -> str:
         ("with later input", validation.feedback, BLUE),
         ("with itself", validation.autocorrelation, GREY),
     )
+    return _stacked(name, panels)
+
+
+def correlation_figure(name: str, tests: Sequence[tuple[str, CorrelationTest]]) -> str:
+    """Draw correlations by lag over one another, each under its title."""
+    return _stacked(name, [(title, test, BLUE) for title, test in tests])
+
+
+def _stacked(name: str, panels: Sequence[tuple[str, CorrelationTest, str]]) -> str:
     titles = [title for title, _, _ in panels]
-    figure = make_subplots(rows=len(panels), cols=1, subplot_titles=titles, vertical_spacing=0.13)
+    figure = make_subplots(
+        rows=len(panels), cols=1, subplot_titles=titles, vertical_spacing=min(0.13, 0.3 / len(panels))
+    )
     for row, (title, test, colour) in enumerate(panels, start=1):
         _stems(figure, row, title, test, colour)
     figure.update_xaxes(title_text="lag [samples]", row=len(panels), col=1)
     figure.update_annotations(font_size=13, x=0.0, xanchor="left")
-    return figure_html(figure, name, HEIGHT_PX, hover="closest")
+    return figure_html(figure, name, AROUND_PX + PANEL_PX * len(panels), hover="closest")
 
 
 def _stems(figure: go.Figure, row: int, title: str, test: CorrelationTest, colour: str) -> None:

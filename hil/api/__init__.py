@@ -1,0 +1,8 @@
+"""For Python and notebooks: what the commands do, as functions, with results that show and save themselves."""
+
+from hil.api.comparison import ComparisonResult, compare
+from hil.api.diagnosis import DiagnosisResult, diagnose
+from hil.api.models import read_model
+from hil.api.record import Record, read
+
+__all__ = ["ComparisonResult", "DiagnosisResult", "Record", "compare", "diagnose", "read", "read_model"]

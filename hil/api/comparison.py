@@ -1,0 +1,103 @@
+"""Models against recordings in Python."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from hil.api.diagnosis import Recordings, records_of, sources_of
+from hil.api.models import Model, as_file
+from hil.api.record import DRAWN
+from hil.plants import ModelPlant
+from hil.plants.prepared import known_events, prepare_again
+from hil.provenance import Provenance, provenance
+from hil.report import page as html
+from hil.report.comparison import Comparison, compare_record, comparison_text, together
+from hil.report.comparison_html import comparison_page, comparison_panels
+from hil.report.figures import time_panels
+from hil.report.numbers import shown
+from hil.report.outputs import publish
+
+if TYPE_CHECKING:
+    import pandas
+    import plotly.graph_objects as go
+
+
+@dataclass(frozen=True, slots=True)
+class ComparisonResult:
+    """How far models are off; ``comparisons`` holds of each recording those of all models."""
+
+    comparisons: Sequence[Sequence[Comparison]]
+    made: Provenance
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """Return a row per recording and model: errors, fit, load torque, p-value."""
+        import pandas
+
+        rows = [
+            (each.record.name, each.model, each.rms, each.largest, each.fit_percent, each.load_torque,
+             each.past_input.p_value)
+            for of_recording in self.comparisons
+            for each in of_recording
+        ]  # fmt: skip
+        names = ["recording", "model", "rms", "largest", "fit_percent", "load_torque", "past_input_p_value"]
+        return pandas.DataFrame(rows, columns=names).set_index(["recording", "model"])
+
+    def plot(self, recording: int = 0) -> go.Figure:
+        """Draw measured and simulated output of a recording, by its place, and the errors."""
+        of_recording = self.comparisons[recording]
+        return time_panels(of_recording[0].record.time_s, comparison_panels(of_recording), DRAWN)
+
+    def save(self, folder: Path | str) -> Path:
+        """Write compare.json and compare.html, as ``hil compare --out`` does; return the folder."""
+        folder = Path(folder)
+        text, page = comparison_text(self.comparisons, self.made), comparison_page(self.comparisons, self.made)
+        publish(
+            folder,
+            {
+                "compare.json": lambda path: path.write_text(text, encoding="utf-8"),
+                "compare.html": lambda path: path.write_text(page, encoding="utf-8"),
+            },
+        )
+        return folder
+
+    def __repr__(self) -> str:
+        by_model = zip(*self.comparisons, strict=True)
+        told = ", ".join(f"{of[0].model} off by {shown(together(of), of[0].unit)}" for of in by_model)
+        return f"<Comparison with {len(self.comparisons)} recordings: {told}>"
+
+    def _repr_html_(self) -> str:
+        rows = [
+            (each.record.name, each.model, shown(each.rms, each.unit), shown(each.fit_percent, "%"))
+            for of_recording in self.comparisons
+            for each in of_recording
+        ]
+        table = html.table(("recording", "model", "RMS error", "NRMSE fit"), rows, numbers=(2, 3))
+        return f"<div><b>{escape(repr(self)[1:-1])}</b>{table}</div>"
+
+
+def compare(models: Model | Sequence[Model], recordings: Recordings) -> ComparisonResult:
+    """Simulate recordings with models, nothing fed back, and measure the errors.
+
+    Parameters
+    ----------
+    models : path or model file, or several
+        Recordings are read by the first, and prepared as it says where a diagnosis wrote it.
+    recordings : Record, path, or several
+    """
+    given = list(models) if isinstance(models, Sequence) and not isinstance(models, str) else [models]
+    files = [as_file(each) for each in given]
+    records = records_of(recordings, files[0])
+    prepared = next((file.prepared for file in files if file.prepared is not None), None)
+    ready = prepare_again(records, prepared, lambda _line: None)
+    names = [Path(each).name if isinstance(each, Path | str) else f"model {i}" for i, each in enumerate(given, start=1)]
+    sources = sources_of(records)
+    plants = [
+        ModelPlant(name, file.model, known_events(file.prepared, sources))
+        for name, file in zip(names, files, strict=True)
+    ]
+    made = provenance([Path(each) for each in given if isinstance(each, Path | str)], sources)
+    return ComparisonResult([[compare_record(plant, record) for plant in plants] for record in ready], made)

@@ -1,0 +1,51 @@
+"""A model in Python: read from a file, with how its recordings are read."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from hil.config.model_file import ModelFile, read_model_for_recordings
+from hil.config.problems import problem_lines
+from hil.errors import UsageError
+from hil.recording.signals_config import SignalsConfig
+
+Model = Path | str | ModelFile
+"""A model file, by its path or as it was read."""
+
+
+def read_model(path: Path | str, trust_laws: bool = False) -> ModelFile:
+    """Read a model file; laws of its own run only where they are trusted.
+
+    Raises
+    ------
+    ModelFileError
+        With one line for every fault.
+    """
+    return read_model_for_recordings(path, trust_laws)
+
+
+def as_file(model: Model) -> ModelFile:
+    """Return a model file, read where a path is given."""
+    return model if isinstance(model, ModelFile) else read_model(model)
+
+
+def signals_of(signals: Mapping[str, Any] | None, model: Model | None) -> tuple[SignalsConfig, bool]:
+    """Return how a recording is read, and whether it is of a joint on a bench.
+
+    Raises
+    ------
+    UsageError
+        If ``signals`` is no ``[signals]`` table.
+    """
+    file = None if model is None else as_file(model)
+    on_bench = file is not None and file.on_bench
+    if signals is None:
+        return (file.signals if file is not None else None) or SignalsConfig(), on_bench
+    try:
+        return SignalsConfig.model_validate(dict(signals)), on_bench
+    except ValidationError as error:
+        raise UsageError("signals: " + "; ".join(problem_lines(SignalsConfig, error))) from error

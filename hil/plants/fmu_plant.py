@@ -1,0 +1,175 @@
+"""Another program's model as an FMU, simulated by FMPy.
+
+An FMU is a program from whoever made it: it runs only where it is trusted.
+"""
+
+from __future__ import annotations
+
+import shutil
+import sys
+import tempfile
+import weakref
+from collections.abc import Sequence
+from contextlib import redirect_stdout
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from estimator.diagnosis.segments import tiles
+from estimator.physics.free_run import FreeRun
+from estimator.physics.model import Motion
+from estimator.physics.start import Start
+from estimator.signals.record import FloatArray, Record
+from hil.errors import UsageError
+from hil.plants.names import Names, names
+
+ROUNDS = 4
+"""Steps of Gauss and Newton: the output is nearly linear in a load and an initial state."""
+
+SMALL = 1e-3
+"""Step of a difference, in the scale of what is estimated."""
+
+NUMBERS = ("Real", "Float64", "Float32")
+"""Types of inputs that are given."""
+
+SHARE_OF_RANGE = 0.1
+"""Scale of a load or an initial state, over the range of the torque or the output."""
+
+
+class FmuPlant:
+    """The model in an FMU.
+
+    Parameters
+    ----------
+    path : Path
+        The FMU.
+    mapped : sequence of str
+        What ``--map`` gives (``names``).
+    trusted : bool
+        Whether its code may run.
+
+    Raises
+    ------
+    UsageError
+        If it is not trusted, no FMU, or does not have the variables; or without FMPy.
+    """
+
+    motion = Motion.ROTATION
+
+    def __init__(self, path: Path, mapped: Sequence[str], trusted: bool) -> None:
+        if not trusted:
+            raise UsageError(
+                f"{path}: an FMU is a program of whoever made it, and runs only where you trust it: --trust-fmu"
+            )
+        self.name = path.name
+        self._fmpy = _fmpy()
+        self._folder = tempfile.mkdtemp(prefix="hil-fmu-")
+        weakref.finalize(self, shutil.rmtree, self._folder, ignore_errors=True)
+        try:
+            self._described = self._fmpy.read_model_description(str(path))
+            self._fmpy.extract(str(path), unzipdir=self._folder)
+        except Exception as error:
+            raise UsageError(f"{path}: expected an FMU of FMI 1.0, 2.0 or 3.0, came: {error}") from error
+        variables = {each.name: each for each in self._described.modelVariables}
+        self._names = names(mapped, variables)
+        given = {name: each for name, each in variables.items() if each.causality == "input"}
+        self._inputs = {name: float(each.start or 0.0) for name, each in given.items() if each.type in NUMBERS}
+
+    def run(self, record: Record) -> FreeRun:
+        """Simulate a recording; load torque and initial state are estimated where the FMU has them.
+
+        After a long gap the simulation begins anew, as that of a model file does.
+        """
+        runs = [self._run(part) for part in tiles(record)]
+        output = np.concatenate([run.output for run in runs])
+        error = (output - record.output)[record.okay]
+        longest = max(runs, key=lambda run: run.output.size)
+        return FreeRun(output, float(np.sqrt(np.mean(error**2))), longest.start)
+
+    def _run(self, record: Record) -> FreeRun:
+        unknown = _Unknown.of(self._names, record)
+        x = unknown.guess
+        output = self._simulated(record, unknown, x)
+        for _ in range(ROUNDS if x.size else 0):
+            moved = [self._simulated(record, unknown, x + SMALL * row) for row in np.eye(x.size)]
+            slopes = np.array([(each - output)[record.okay] / SMALL for each in moved]).T
+            step = np.linalg.lstsq(slopes, (record.output - output)[record.okay], rcond=None)[0]
+            x = x + step
+            output = self._simulated(record, unknown, x)
+            if np.abs(step).max() < SMALL * SMALL:
+                break
+        error = (output - record.output)[record.okay]
+        load = float(x[0] * unknown.scale[0]) if self._names.load else float("nan")
+        return FreeRun(output, float(np.sqrt(np.mean(error**2))), Start(load, 0.0, float("nan")))
+
+    def _simulated(self, record: Record, unknown: _Unknown, x: FloatArray) -> FloatArray:
+        values = dict(zip(unknown.names, (x * unknown.scale).tolist(), strict=True))
+        held = {name: value for name, value in values.items() if name in self._inputs}
+        start = {name: value for name, value in values.items() if name not in self._inputs}
+        since_s = record.time_s - record.time_s[0]
+        kind = "CoSimulation" if self._described.coSimulation is not None else "ModelExchange"
+        try:
+            with redirect_stdout(sys.stderr):  # an FMU may say what it likes, but not in the midst of JSON
+                result = self._fmpy.simulate_fmu(
+                    self._folder,
+                    model_description=self._described,
+                    fmi_type=kind,
+                    stop_time=float(since_s[-1]),
+                    step_size=record.sample_time_s if kind == "CoSimulation" else None,
+                    output_interval=record.sample_time_s,
+                    start_values=start,
+                    input=self._given(record, since_s, held, kind),
+                    output=[self._names.output],
+                )
+        except Exception as error:
+            raise UsageError(f"{self.name}: expected an FMU that simulates {record.name}, came: {error}") from error
+        return np.asarray(np.interp(since_s, result["time"], result[self._names.output]), dtype=np.float64)
+
+    def _given(self, record: Record, since_s: FloatArray, held: dict[str, float], kind: str) -> Any:
+        """Return FMPy's table of inputs; each torque is held until the next, in model exchange by a step."""
+        torques = record.torque_nm if len(self._names.torque) > 1 else record.total_torque_nm[:, np.newaxis]
+        still = {name: np.full(since_s.size, value) for name, value in self._inputs.items()}
+        columns = {"time": since_s, **still, **dict(zip(self._names.torque, torques.T, strict=False))}
+        columns |= {name: np.full(since_s.size, value) for name, value in held.items()}
+        rows = np.zeros(since_s.size, dtype=[(name, float) for name in columns])
+        for name, values in columns.items():
+            rows[name] = values
+        if kind == "CoSimulation":
+            return rows
+        steps = np.repeat(rows, 2)[:-1]
+        steps["time"][1::2] = since_s[1:]
+        return steps
+
+
+@dataclass(frozen=True, slots=True)
+class _Unknown:
+    """What is estimated of a recording: names in the FMU, scales and where the search starts, (K,)."""
+
+    names: tuple[str, ...]
+    scale: FloatArray
+    guess: FloatArray
+
+    @classmethod
+    def of(cls, known: Names, record: Record) -> _Unknown:
+        torque, output = np.ptp(record.total_torque_nm), np.ptp(record.output[record.okay])
+        first = float(record.output[record.okay][0])
+        scales = [(known.load, SHARE_OF_RANGE * torque or 1.0, 0.0)] if known.load else []
+        size = SHARE_OF_RANGE * output or 1.0
+        for name in known.start:
+            is_speed = "speed" in name
+            scales.append((name, size if is_speed else SHARE_OF_RANGE * size, first / size if is_speed else 0.0))
+        return cls(
+            tuple(n for n, _, _ in scales), np.array([s for _, s, _ in scales]), np.array([g for *_, g in scales])
+        )
+
+
+def _fmpy() -> Any:
+    try:
+        import fmpy
+    except ModuleNotFoundError as error:
+        raise UsageError(
+            "expected FMPy, which simulates FMUs, came none. Install it: pip install 'hil-driveline[fmu]'"
+        ) from error
+    return fmpy

@@ -1,0 +1,78 @@
+"""Which variables of an FMU are torque, load, output and start: ``--map torque=T_M1,T_M2`` and the like."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+
+from hil.errors import UsageError
+
+KEYS = ("torque", "output", "load", "start")
+
+
+@dataclass(frozen=True, slots=True)
+class Names:
+    """Names of an FMU's variables.
+
+    Attributes
+    ----------
+    torque : tuple of str
+        Inputs, in the order of the recording's torques; a single one takes their sum.
+    output : str
+        What is held against the measured output.
+    load : str
+        Input or parameter that takes a constant load torque, to be estimated; "" for none.
+    start : tuple of str
+        Parameters of the initial state, to be estimated.
+    """
+
+    torque: tuple[str, ...] = ("T_M1", "T_M2")
+    output: str = "speed_measured"
+    load: str = "T_load"
+    start: tuple[str, ...] = ("start.speed", "start.twist", "start.load_speed")
+
+
+def names(given: Sequence[str], known: Collection[str]) -> Names:
+    """Return the names that ``--map`` gives, the others as ``hil export fmu`` writes them.
+
+    Parameters
+    ----------
+    given : sequence of str
+        ``KEY=NAME,...`` each.
+    known : collection of str
+        The variables that the FMU has.
+
+    Raises
+    ------
+    UsageError
+        For a key that there is not, or a name that the FMU does not have.
+    """
+    entries = [text.partition("=") for text in given]
+    for key, sign, _ in entries:
+        if key not in KEYS or not sign:
+            raise UsageError(f"--map {key}{sign}: expected KEY=NAME, KEY one of {', '.join(KEYS)}")
+    mapped = {key: tuple(name.strip() for name in value.split(",") if name.strip()) for key, _, value in entries}
+    standard = Names()
+    found = replace(
+        standard,
+        torque=mapped.get("torque", tuple(name for name in standard.torque if name in known)),
+        output=(mapped.get("output") or (standard.output,))[0],
+        load=(mapped.get("load") or ((standard.load,) if standard.load in known and "load" not in mapped else ("",)))[
+            0
+        ],
+        start=mapped.get("start", tuple(name for name in standard.start if name in known)),
+    )
+    for key, each in (("torque", found.torque or ("",)), ("output", (found.output,)), ("start", found.start)):
+        for name in each:
+            if name not in known:
+                raise UsageError(
+                    f"--map {key}=...: expected a variable of the FMU, came {name or 'none'!r}. It has: {_some(known)}"
+                )
+    if found.load and found.load not in known:
+        raise UsageError(f"--map load={found.load}: expected a variable of the FMU. It has: {_some(known)}")
+    return found
+
+
+def _some(known: Collection[str]) -> str:
+    shown = sorted(known)
+    return ", ".join(shown[:20]) + (f" and {len(shown) - 20} more" if len(shown) > 20 else "")

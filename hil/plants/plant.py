@@ -1,0 +1,53 @@
+"""A plant: it simulates a recording from its torques, with what is the recording's own estimated."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from estimator.diagnosis.chain import replay
+from estimator.physics.free_run import NOTHING_KNOWN, FreeRun, Own
+from estimator.physics.model import DrivelineModel, Motion
+from estimator.signals.record import Record
+
+Events = Mapping[str, Own]
+
+
+class Plant(Protocol):
+    """Something that simulates recordings."""
+
+    @property
+    def name(self) -> str:
+        """What it is called in figures and tables."""
+
+    @property
+    def motion(self) -> Motion:
+        """Kind of motion, for the units."""
+
+    def run(self, record: Record) -> FreeRun:
+        """Simulate a recording from its torques, nothing fed back."""
+
+
+@dataclass(frozen=True, slots=True)
+class ModelPlant:
+    """The model of a model file.
+
+    Attributes
+    ----------
+    events : mapping
+        By the name of a recording, what is known of the moments of its events.
+    """
+
+    name: str
+    model: DrivelineModel
+    events: Events = field(default_factory=dict)
+
+    @property
+    def motion(self) -> Motion:
+        """Kind of motion, for the units."""
+        return self.model.motion
+
+    def run(self, record: Record) -> FreeRun:
+        """Simulate a recording; constant load torque and initial state are estimated."""
+        return replay(self.model, record, self.events.get(record.name, NOTHING_KNOWN))

@@ -1,0 +1,83 @@
+"""What a result was made from: program, date, command, and the files with their checksums.
+
+The checksums are SHA-256 of the files as they are, so that ``sha256sum`` shows the same.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import shlex
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from hil import __version__
+
+_LINE: ContextVar[tuple[str, ...]] = ContextVar("_LINE", default=())
+
+CHUNK_BYTES = 1 << 20
+
+
+@contextmanager
+def under(line: Sequence[str]) -> Iterator[None]:
+    """Let results that are made inside say that this command line made them."""
+    token = _LINE.set(tuple(line))
+    try:
+        yield
+    finally:
+        _LINE.reset(token)
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """A file that took part: its path as it was given, and its SHA-256."""
+
+    file: str
+    sha256: str
+
+    @classmethod
+    def of(cls, path: Path) -> Source:
+        """Take the checksum of a file."""
+        digest = hashlib.sha256()
+        with path.open("rb") as stream:
+            while chunk := stream.read(CHUNK_BYTES):
+                digest.update(chunk)
+        return cls(str(path), digest.hexdigest())
+
+
+@dataclass(frozen=True, slots=True)
+class Provenance:
+    """What a result was made from.
+
+    Attributes
+    ----------
+    command : str
+        The command line; "" where a program of the user's called.
+    date : str
+        ISO 8601, UTC.
+    """
+
+    version: str
+    date: str
+    command: str
+    models: tuple[Source, ...]
+    recordings: tuple[Source, ...]
+
+    def document(self) -> dict[str, Any]:
+        """Return it for JSON."""
+        listed = {
+            key: [{"file": each.file, "sha256": each.sha256} for each in sources]
+            for key, sources in (("models", self.models), ("recordings", self.recordings))
+        }
+        return {"program": f"hil {self.version}", "date": self.date, "command": self.command, **listed}
+
+
+def provenance(models: Sequence[Path] = (), recordings: Sequence[Path] = ()) -> Provenance:
+    """Return what a result is made from that these files go into, now."""
+    now = datetime.now(UTC).isoformat(timespec="seconds")
+    line = shlex.join(("hil", *_LINE.get())) if _LINE.get() else ""
+    return Provenance(__version__, now, line, tuple(map(Source.of, models)), tuple(map(Source.of, recordings)))

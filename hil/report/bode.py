@@ -1,0 +1,147 @@
+"""Bode plots, all of one style: magnitude in dB, phase and coherence over one axis.
+
+An estimate without a model is dots with its 95 % band, a parametric model a line with that of its parameters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+from estimator.identification.linear_model import ComplexArray, LinearModel
+from estimator.identification.modes.propagate import QUANTILE, propagate
+from estimator.identification.offline.linear_fit import LinearFit
+from estimator.signals.record import FloatArray
+from hil.figures.local_model import decibels, degrees
+from hil.figures.palette import faded
+from hil.report.figures import DECADES
+
+MAGNITUDE, PHASE, COHERENCE = 1, 2, 3
+"""Rows of the figure."""
+
+HEIGHT_PX = 760
+FULL_TURN_DEG = 360.0
+PHASE_TICKS_DEG = (-180, -90, 0, 90, 180)
+DB_PER_LOG = 20.0 / np.log(10.0)
+
+ROOM_DB = (6.0, 4.0)
+"""Below the lowest and above the highest level that is drawn."""
+
+
+def panels() -> go.Figure:
+    """Return an empty figure."""
+    figure = make_subplots(rows=3, cols=1, shared_xaxes=True, vertical_spacing=0.03, row_heights=[0.5, 0.3, 0.2])
+    figure.update_yaxes(title_text="magnitude [dB]", row=MAGNITUDE, col=1)
+    figure.update_yaxes(title_text="phase [°]", tickvals=PHASE_TICKS_DEG, range=[-190, 190], row=PHASE, col=1)
+    figure.update_yaxes(title_text="coherence", range=[0, 1.03], row=COHERENCE, col=1)
+    figure.update_xaxes(**DECADES)
+    figure.update_xaxes(title_text="frequency [Hz]", row=COHERENCE, col=1)
+    return figure
+
+
+def fix_scale(figure: go.Figure, responses: Sequence[ComplexArray]) -> None:
+    """Fix the scale by these responses: the band of an estimate that says nothing has no end."""
+    levels = np.concatenate([decibels(each[np.abs(each) > 0.0]) for each in responses])
+    figure.update_yaxes(range=[levels.min() - ROOM_DB[0], levels.max() + ROOM_DB[1]], row=MAGNITUDE, col=1)
+
+
+def curve(
+    figure: go.Figure,
+    f: FloatArray,
+    response: ComplexArray,
+    name: str,
+    look: dict[str, Any],
+    *,
+    first: bool = True,
+    hidden: bool = False,
+    fit: LinearFit | None = None,
+) -> None:
+    """Draw the response of a model, (M,); with the 95 % band of its parameters where it was fitted."""
+    if fit is not None and not hidden:
+        spread = spread_of(fit, f)
+        group = {"legendgroup": name, "name": name}
+        _band(figure, f, decibels(response), DB_PER_LOG * spread, MAGNITUDE, look["color"], group)
+        _turns(figure, f, np.angle(response), spread, look["color"], group)
+    for row, y in ((MAGNITUDE, decibels(response)), (PHASE, degrees(response))):
+        figure.add_trace(
+            go.Scatter(
+                x=_compact(f),
+                y=_compact(y),
+                name=name,
+                legendgroup=name,
+                showlegend=first and row == MAGNITUDE,
+                mode="lines",
+                line=look,
+                visible="legendonly" if hidden else True,
+            ),
+            row=row,
+            col=1,
+        )
+
+
+def spread_of(fit: LinearFit, frequency_hz: FloatArray) -> FloatArray:
+    """Return half the 95 % interval of a fitted response's logarithm: of its size, and in radians of its phase, (M,).
+
+    The larger of the two, by the delta method (``propagate``).
+    """
+    model = fit.model
+    known = model.response(frequency_hz)
+
+    def apart(theta: FloatArray) -> FloatArray:
+        ratio = LinearModel.from_theta(theta, model.orders, model.sample_time_s).response(frequency_hz) / known
+        return np.concatenate([np.log(np.abs(ratio)), np.angle(ratio)])
+
+    _, covariance = propagate(apart, model.theta, fit.covariance)
+    deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0)).reshape(2, -1)
+    return np.asarray(QUANTILE * deviations.max(axis=0), dtype=np.float64)
+
+
+def estimate(
+    figure: go.Figure,
+    f: FloatArray,
+    response: ComplexArray,
+    std: FloatArray,
+    coherence: FloatArray,
+    colour: str,
+    name: str,
+    *,
+    band: bool = True,
+) -> None:
+    """Draw an estimate without a model, (M,), with the 95 % band of its standard deviation."""
+    relative = QUANTILE * std / np.abs(response)
+    angle = np.rad2deg(np.angle(response))
+    group = {"legendgroup": name, "name": name}
+    if band:
+        _band(figure, f, decibels(response), DB_PER_LOG * relative, MAGNITUDE, colour, group)
+        _turns(figure, f, np.angle(response), relative, colour, group)
+    dots = {"mode": "markers", "marker": {"color": colour, "size": 4, "opacity": 0.55}, **group}
+    for row, y in ((MAGNITUDE, decibels(response)), (PHASE, angle), (COHERENCE, coherence)):
+        trace = go.Scatter(x=_compact(f), y=_compact(y), showlegend=row == MAGNITUDE and band, **dots)
+        figure.add_trace(trace, row=row, col=1)
+
+
+def _turns(
+    figure: go.Figure, f: FloatArray, angle: FloatArray, half: FloatArray, colour: str, group: dict[str, str]
+) -> None:
+    """Draw the band of a phase [rad], once for every turn that it goes through: none crosses the figure."""
+    whole = np.rad2deg(np.unwrap(angle))
+    for turn in np.unique(np.round(whole / FULL_TURN_DEG)):
+        _band(figure, f, whole - turn * FULL_TURN_DEG, np.rad2deg(half), PHASE, colour, group)
+
+
+def _band(
+    figure: go.Figure, f: FloatArray, y: FloatArray, half: FloatArray, row: int, colour: str, group: dict[str, str]
+) -> None:
+    edge = {"mode": "lines", "line": {"width": 0}, "showlegend": False, "hoverinfo": "skip", **group}
+    figure.add_trace(go.Scatter(x=_compact(f), y=_compact(y - half), **edge), row=row, col=1)
+    area = {"fill": "tonexty", "fillcolor": faded(colour, 0.2)}
+    figure.add_trace(go.Scatter(x=_compact(f), y=_compact(y + half), **edge, **area), row=row, col=1)
+
+
+def _compact(values: FloatArray) -> FloatArray:
+    """Halve what a figure takes up; seven digits are more than a screen shows."""
+    return values.astype(np.float32)

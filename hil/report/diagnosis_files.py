@@ -1,0 +1,42 @@
+"""The files of a diagnosis: diagnosis.json, augmented.toml and report.html."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from estimator.diagnosis.result import Diagnosis
+from estimator.signals.record import Record
+from hil.config.model_file import ModelFile, write_model
+from hil.plants.prepared import prepared_by
+from hil.provenance import Provenance
+from hil.report.diagnosis_html import diagnosis_page
+from hil.report.diagnosis_json import diagnosis_text
+from hil.report.outputs import publish
+
+
+def publish_diagnosis(
+    folder: Path,
+    diagnosis: Diagnosis,
+    file: ModelFile,
+    records: Sequence[Record],
+    paths: Sequence[Path | None],
+    made: Provenance,
+) -> None:
+    """Write the files of a diagnosis, all or none.
+
+    Parameters
+    ----------
+    records, paths
+        All recordings, and the files they were read from; None for one that was not.
+    """
+    text, prepared = diagnosis_text(diagnosis, made), prepared_by(diagnosis, records, paths)
+    augmented, page = diagnosis.augmented, diagnosis_page(diagnosis, made, prepared.one_in)
+    publish(
+        folder,
+        {
+            "diagnosis.json": lambda path: path.write_text(text, encoding="utf-8"),
+            "augmented.toml": lambda path: write_model(path, augmented, file.signals, file.laws, prepared),
+            "report.html": lambda path: path.write_text(page, encoding="utf-8"),
+        },
+    )

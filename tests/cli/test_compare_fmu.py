@@ -1,0 +1,69 @@
+"""``hil compare`` with an FMU: the same figures as the model file it was made of, and only where it is trusted."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from hil.cli.main import run
+from tests.cli import bench
+
+FRICTION = "\n[effects.coulomb_friction_motor]\nfriction_nm = { value = 1.5 }\n"
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> tuple[str, str, str]:
+    bench.record(tmp_path / "run_1.csv", 1, noise=0.05)
+    (tmp_path / "drive.toml").write_text(bench.MODEL)
+    names = tuple(str(tmp_path / name) for name in ("drive.toml", "drive.fmu", "run_1.csv"))
+    assert run(["export", "fmu", names[0], "--out", names[1]]) == 0
+    return names[0], names[1], names[2]
+
+
+def test_an_fmu_is_as_far_off_as_its_model_file(
+    files: tuple[str, str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model, fmu, recording = files
+    capsys.readouterr()
+    command = ["compare", model, recording, "--model", fmu, "--trust-fmu", "--out", str(tmp_path / "out"), "--json"]
+    assert run(command) == 0
+    models = json.loads(capsys.readouterr().out)["models"]
+    own, other = (models[name]["recordings"]["run_1"] for name in ("drive.toml", "drive.fmu"))
+    assert other["rms"] == pytest.approx(own["rms"], rel=1e-6)
+    assert other["load_torque"] == pytest.approx(own["load_torque"], abs=1e-4)
+    page = (tmp_path / "out" / "compare.html").read_text()
+    assert '"drive.fmu"' in page
+
+
+def test_alone_and_mapped_by_hand(files: tuple[str, str, str], capsys: pytest.CaptureFixture[str]) -> None:
+    _, fmu, recording = files
+    capsys.readouterr()
+    mapped = ("torque=T_M1", "output=speed_motor", "load=T_load", "start=start.speed")
+    assert run(["compare", fmu, recording, "--trust-fmu", "--json", *(w for m in mapped for w in ("--map", m))]) == 0
+    assert json.loads(capsys.readouterr().out)["recordings"]["run_1"]["rms"] == pytest.approx(0.05, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        ([], "runs only where you trust it: --trust-fmu"),
+        (["--trust-fmu", "--map", "speed=w"], "KEY one of torque, output, load, start"),
+        (["--trust-fmu", "--map", "output=w"], "expected a variable of the FMU, came 'w'. It has: "),
+    ],
+)
+def test_what_is_not_trusted_or_named_is_refused(
+    more: list[str], said: str, files: tuple[str, str, str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    _, fmu, recording = files
+    assert run(["compare", fmu, recording, *more]) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_what_is_no_fmu_is_refused(
+    files: tuple[str, str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "broken.fmu").write_bytes(b"PK none")
+    assert run(["compare", str(tmp_path / "broken.fmu"), files[2], "--trust-fmu"]) == 2
+    assert "broken.fmu: expected an FMU" in capsys.readouterr().err
