@@ -43,7 +43,7 @@ def moments_in(name: str, result: FitResult) -> dict[str, tuple[Interval, ...]]:
     for record, (from_s, to_s) in zip(result.problem.records, moments_of(result, name), strict=True):
         began = float(record.time_s[0] - record.since_start_s[0])
         is_seen = not EFFECTS[name].permanent or inside(record, from_s) or inside(record, to_s)
-        if record.of is None and is_seen and to_s - from_s > record.sample_time_s:
+        if record.lead is None and is_seen and to_s - from_s > record.sample_time_s:
             found[record.name] = ((began + from_s, began + to_s),)
     return found
 

@@ -20,8 +20,8 @@ def measured_speed(record: Record) -> FloatArray:
 
     An imposed motion is a position, known throughout.
     """
-    if record.of is not None:
-        return measured_speed(record.of)
+    if record.lead is not None:
+        return measured_speed(record.lead)
     output = np.where(record.okay, record.output, np.nan) if record.imposed is None else record.imposed
     if record.imposed is None and record.kind is not OutputKind.POSITION:
         return output
@@ -135,8 +135,8 @@ def motor_angle(record: Record) -> FloatArray:
     Laws that are periodic in the angle take their phase from it. A simulated angle would drift off by whole radians
     while a fit is still on its way.
     """
-    if record.of is not None:
-        return motor_angle(record.of)
+    if record.lead is not None:
+        return motor_angle(record.lead)
     good = np.flatnonzero(record.okay)
     output = np.interp(record.time_s, record.time_s[good], record.output[good])
     if record.imposed is not None:

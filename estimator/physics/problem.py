@@ -40,7 +40,7 @@ class Problem:
         Per recording, which samples count.
     leads : tuple of int
         Which recording's own unknowns each recording has; those that have their own come first. By default as
-        ``Record.of`` says.
+        ``Record.lead`` says.
     """
 
     grid: Grid

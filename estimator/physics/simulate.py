@@ -72,7 +72,7 @@ def output_state(record: Record, structure: Structure) -> int:
 
 def _is_sensed(record: Record, output: int | None, wanted: int) -> bool:
     """Tell whether an output is read by the sensor that effects of the sensor are of: the first one of a recording."""
-    return output is None and record.of is None and wanted in _SENSED
+    return output is None and record.lead is None and wanted in _SENSED
 
 
 def _is_slope(record: Record, output: int | None) -> bool:
@@ -207,7 +207,7 @@ def go_together(grid: Grid, records: Sequence[Record], lines: Sequence[FloatArra
     p = np.array(lines)
     acts = (p != 0.0).any(axis=0)
     acts[list(moved)] = True
-    alike = len({(each.kind, each.location, each.of is None, each.sample_time_s) for each in records}) == 1
+    alike = len({(each.kind, each.location, each.lead is None, each.sample_time_s) for each in records}) == 1
     on_time = all(record.offset_s is None and not _is_slope(record, None) for record in records)
     begin_alike = len({record.since_start_s[0] for record in records}) == 1
     if not alike or not on_time or acts[PERIODIC].any() or not (begin_alike or not acts[TIMED].any()):
@@ -310,7 +310,7 @@ def _under_laws(grid: Grid, record: Record, case: Case, output: int, recorded: b
         out,
         slopes,
     )
-    if recorded and record.of is None:
+    if recorded and record.lead is None:
         out += run.misread(laws, state)
     every = grid.substeps
     return _read(record, out[::every], slopes[:, ::every], None if recorded else output)

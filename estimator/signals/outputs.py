@@ -1,7 +1,7 @@
 """Recordings with several measured outputs, as a fit sees them: each output a recording, driven by the same torque.
 
 The recordings themselves come first, then their further outputs. These share the load torque, the initial state and
-the moments of events of the recording that they are of (``Record.of``). A further output is given in units in which
+the moments of events of the recording that they are of (``Record.lead``). A further output is given in units in which
 its noise is as large as the first output's: so a sum of squared errors weighs each by its own noise.
 """
 
@@ -49,7 +49,7 @@ def labels(records: Sequence[Record]) -> list[str]:
 def leads(records: Sequence[Record]) -> tuple[int, ...]:
     """Return where in a sequence the recording stands that each is, or is a further output of."""
     place = {id(record): i for i, record in enumerate(records)}
-    return tuple(place.get(id(record.of), i) for i, record in enumerate(records))
+    return tuple(place.get(id(record.lead), i) for i, record in enumerate(records))
 
 
 def by_output(records: Sequence[Record]) -> list[slice]:
@@ -69,6 +69,6 @@ def _alone(record: Record, channel: Channel, lead: Record) -> Record:
         kind=channel.kind,
         location=channel.location,
         channels=(),
-        of=lead,
+        lead=lead,
         label=channel.label,
     )

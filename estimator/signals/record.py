@@ -91,7 +91,7 @@ class Record:
         True sampling instant of the output less ``time_s`` [s]. None: on time.
     channels : tuple of Channel
         Further measured outputs.
-    of : Record, optional
+    lead : Record, optional
         The recording that this one is a further output of (``signals.outputs``); None: it is the recording itself.
     label : str
         Names the further output; empty for the first one.
@@ -113,7 +113,7 @@ class Record:
     imposed: FloatArray | None = None
     reference_nm: FloatArray | None = None
     channels: tuple[Channel, ...] = ()
-    of: Record | None = None
+    lead: Record | None = None
     label: str = ""
     unit: float = 1.0
 

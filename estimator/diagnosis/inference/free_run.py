@@ -102,6 +102,6 @@ class Unseen:
             problem = replace(hypothesis.plain.problem, use=tuple(between))
             plain = refitted(hypothesis, problem) if is_whole else hypothesis.plain
             outputs = on_recordings(replace(hypothesis, plain=plain), self.line, records, is_whole, between).outputs
-        pairs = [(out, record) for out, record in zip(outputs, records, strict=True) if record.of is None]
+        pairs = [(out, record) for out, record in zip(outputs, records, strict=True) if record.lead is None]
         errors = [(out - record.output)[record.okay & blocks(record)] for out, record in pairs]
         return float(np.sqrt(np.mean(np.concatenate(errors) ** 2)))

@@ -39,7 +39,7 @@ NOISE = {LOAD_SPEED: 0.02, SHAFT_TORQUE: 2.0, ACCELERATION: 3.0, LOAD_ANGLE: 2e-
 
 
 def true_output(bench: Bench, record: Record, output: Output, effects: Mapping[str, Mapping[str, float]]) -> FloatArray:
-    as_it = replace(record, kind=output[0], location=output[1], of=record)
+    as_it = replace(record, kind=output[0], location=output[1], lead=record)
     return simulate(grid_for(bench.model, [record]), as_it, flat_values(TWO_MASS, effects), START)
 
 
@@ -113,7 +113,7 @@ def test_a_filter_of_one_sensor_is_no_lag_of_the_torque_once_another_sensor_has_
 def test_outputs_of_one_recording_share_its_start_and_load() -> None:
     bench = with_output(LOAD_SPEED, *DRY)
     apart = outputs_apart(bench.records, noise_floor)
-    assert [each.of for each in apart] == [None, None, apart[0], apart[1]]
+    assert [each.lead for each in apart] == [None, None, apart[0], apart[1]]
     shared = nominal_unknowns(bench.model)
     alone, both = (make_problem(bench.model, records, shared) for records in (apart[:2], apart))
     assert fit(both).x.shape == fit(alone).x.shape
