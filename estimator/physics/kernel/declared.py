@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from estimator.abreast import like
 from estimator.compiled import assembled
@@ -13,6 +13,22 @@ from estimator.physics.layout import slot
 
 Total = Callable[..., float]
 """What the place gives, and parameters of the superset model, to the sum of the place's laws [Nm]."""
+
+
+Term = tuple[Callable[..., float], tuple[int, ...]]
+"""A law, and the places of its parameters."""
+
+
+class Sum(NamedTuple):
+    """What a function that is put together adds up: laws of a place, which are given one quantity or two."""
+
+    place: Place
+    given: int
+    terms: tuple[Term, ...]
+
+
+SUMS: dict[Total, Sum] = {}
+"""Of each function that is put together here, for who has to write it in another language."""
 
 
 def taken(places: Sequence[int]) -> Callable[..., Any]:
@@ -37,11 +53,20 @@ def total(place: Place, given: int = 1) -> Total:
         summed: Total = assembled(lambda x, p: like(0.0, x))
     else:
         summed = assembled(lambda x, y, p: like(0.0, x))
-    for entry in BUILT_IN.values():
-        if entry.acting is not None and entry.acting.place is place:
-            values = taken([slot(entry.name, parameter.name) for parameter in entry.parameters])
-            summed = with_law(summed, entry.acting.law, values, given)
+    terms = terms_of(place)
+    for law, slots in terms:
+        summed = with_law(summed, law, taken(slots), given)
+    SUMS[summed] = Sum(place, given, terms)
     return summed
+
+
+def terms_of(place: Place) -> tuple[Term, ...]:
+    """Return the laws that entries declare for a place, each with the places of its parameters."""
+    return tuple(
+        (entry.acting.law, tuple(slot(entry.name, parameter.name) for parameter in entry.parameters))
+        for entry in BUILT_IN.values()
+        if entry.acting is not None and entry.acting.place is place
+    )
 
 
 motor_drag = total(Place.MOTOR)

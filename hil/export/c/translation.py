@@ -9,6 +9,7 @@ import typing
 from collections.abc import Callable
 from typing import Any
 
+from estimator.physics.kernel.declared import SUMS, Sum
 from estimator.signals.record import FloatArray
 from hil.export.c.expressions import Expressions, NotTranslatable, Text
 from hil.export.c.types import PRELUDE, Type, c_name, definition, fields, of_hint
@@ -32,6 +33,8 @@ class Translation:
         of_one_number : bool
             Whether arrays stand for one number each: of functions that numpy carries out entry by entry.
         """
+        if function in SUMS:
+            return self._sum(SUMS[function])
         source = getattr(function, "py_func", function)
         if source not in self._names:
             module = source.__module__.rsplit(".", 1)[-1]
@@ -40,6 +43,21 @@ class Translation:
             self._names[source] = name, translated.returned
             self._functions.append(translated.c())
         return self._names[source]
+
+    def _sum(self, of: Sum) -> tuple[str, Type]:
+        """Write a sum of laws, where it has not been."""
+        if of not in self._names:
+            given = [f"given{i}" for i in range(of.given)]
+            terms = [
+                f"{self.function(law)[0]}({', '.join([*given, *(f'p.at[{place}]' for place in places)])})"
+                for law, places in of.terms
+            ]
+            name = f"laws_{of.place.name.lower()}"
+            arguments = ", ".join([*(f"double {each}" for each in given), "Array p"])
+            total = " + ".join(["0.0", *terms])
+            self._functions.append(f"static double {name}({arguments}) {{\n{INDENT}return {total};\n}}\n")
+            self._names[of] = name, float
+        return self._names[of]
 
     def structure(self, kind: Type) -> None:
         """Define a structure, and those in it, where they have not been."""
