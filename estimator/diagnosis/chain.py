@@ -124,7 +124,8 @@ def replay(model: DrivelineModel, record: Record, known: Own = NOTHING_KNOWN) ->
     output = np.concatenate([run.output for run, _ in runs])
     read = np.concatenate([rows for _, rows in runs])
     error = (output - record.output)[read]
-    return FreeRun(output, float(np.sqrt(np.mean(error**2))), runs[most][0].start)
+    further = tuple(np.concatenate(each) for each in zip(*(run.further for run, _ in runs), strict=True))
+    return FreeRun(output, float(np.sqrt(np.mean(error**2))), runs[most][0].start, further)
 
 
 def _replay(model: DrivelineModel, record: Record, known: Own) -> tuple[FreeRun, BoolArray]:

@@ -15,11 +15,12 @@ from estimator.physics.inputs import Case
 from estimator.physics.layout import LOAD, slot
 from estimator.physics.model import DrivelineModel
 from estimator.physics.own_scan import cells, scan, waves
-from estimator.physics.problem import Problem, make_problem, start_of, start_vector
+from estimator.physics.problem import Problem, case_of, make_problem, start_of, start_vector
 from estimator.physics.projector import Projector
 from estimator.physics.simulate import simulate_each
 from estimator.physics.start import Start
 from estimator.physics.unknowns import own_unknowns
+from estimator.signals.outputs import outputs_apart
 from estimator.signals.record import BoolArray, FloatArray, Record
 
 Own = Mapping[tuple[str, str], float]
@@ -40,11 +41,14 @@ class FreeRun:
         RMS of its error over the good samples.
     start : Start
         Load torque and initial state that were estimated.
+    further : tuple of ndarray, shape (N,)
+        Simulated further outputs, in the order of the recording's channels, each in its own unit.
     """
 
     output: FloatArray
     rms: float
     start: Start
+    further: tuple[FloatArray, ...] = ()
 
 
 def free_run(model: DrivelineModel, record: Record, known: Own = NOTHING_KNOWN) -> FreeRun:
@@ -68,7 +72,10 @@ def free_run(model: DrivelineModel, record: Record, known: Own = NOTHING_KNOWN) 
     result = settle(problem, known)
     start = start_of(problem, result.x, 0)
     whole = replace(start, load_torque_nm=start.load_torque_nm + float(problem.p[slot("", LOAD)]))
-    return FreeRun(result.outputs[0], result.rms, whole)
+    case = case_of(problem.local[0], problem.p, result.x)
+    views = outputs_apart([record], lambda _: 1.0)[1:]
+    further = tuple(simulate_each(problem.grid, view, [case])[0] for view in views)
+    return FreeRun(result.outputs[0], result.rms, whole, further)
 
 
 def settle(problem: Problem, known: Own = NOTHING_KNOWN) -> FitResult:

@@ -49,7 +49,8 @@ def simulate(
     (record,) = prepare_again([record], file.prepared, tell, keep_rows=True)
     run = ModelPlant(model.name, file.model, known_events(file.prepared, [recording])).run(record)
     column = simulated_column(record.kind, file.model.motion)
-    table = Table(out, {"time_s": record.time_s, column: run.output})
+    further = {f"{each.label}_sim": found for each, found in zip(record.channels, run.further, strict=True)}
+    table = Table(out, {"time_s": record.time_s, column: run.output, **further})
     publish(out.parent, {out.name: lambda path: csv_format.write(table, path)})
     error_unit, load_unit = output_unit(record.kind, file.model.motion), unit("torque", file.model.motion)
     if as_json:
