@@ -159,3 +159,8 @@ def range_of(records: Sequence[Record]) -> float:
 def turns_on(records: Sequence[Record]) -> bool:
     """Tell whether the motor turns on and on, and does not only go to and fro."""
     return range_of(records) > 2.0 * np.pi * MOST_TURNS
+
+
+def goes_round(records: Sequence[Record], motor_turns: float) -> bool:
+    """Tell whether the motor makes so many turns at least: over less nothing can be seen to recur."""
+    return range_of(records) >= 2.0 * np.pi * motor_turns

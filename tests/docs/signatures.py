@@ -11,6 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from estimator.physics.acting import Place
+from estimator.physics.catalogue import EFFECTS
 from estimator.physics.free_run import free_run
 from estimator.physics.grid import Grid, grid_for
 from estimator.physics.layout import flat_values
@@ -21,6 +23,7 @@ from tests.docs.bus import BUS, DRIVES, LINE, LOAD_NM, PERIOD_S, TIME_S, Drive, 
 from tests.docs.law_curves import (
     FAST,
     SPEEDS,
+    TORQUES,
     Curve,
     drag,
     during,
@@ -211,3 +214,58 @@ SHOWN: dict[str, Shown] = {
     ),
 }
 """Per effect: its size, the test that shows it, its law."""
+
+DRAWN: dict[Place, Callable[[str], Callable[[Values], Curve]]] = {
+    Place.MOTOR: friction,
+    Place.LOAD: lambda name: drag(name, SPEEDS),
+    Place.TORQUE: torque,
+}
+"""How the law of an entry is drawn by its place, where nothing else is said."""
+
+SHOWN |= {
+    "torque_bias": Shown(
+        {"offset_nm": 25.0, "time_constant_s": 2.0},
+        "cruise",
+        over_time("true torque less its reading [Nm]", 0.0, lambda v: v["offset_nm"] * (1.0 - fading(v))),
+    ),
+    "viscoelastic_shaft": Shown(
+        {"branch_share": 0.4, "relaxation_s": 0.02},
+        "cruise",
+        step_answer(
+            "torque by stiffness after a twist",
+            lambda t, v: np.where(
+                t >= 0.0, 1.0 + v["branch_share"] * np.exp(-np.maximum(t, 0.0) / v["relaxation_s"]), 0.0
+            ),
+        ),
+    ),
+    "gear_losses": Shown(
+        {"driving_share": 0.1, "back_share": 0.06},
+        "reversal",
+        lambda v: Curve(
+            "torque of the shaft [Nm]",
+            "torque at the load, forward [Nm]",
+            (("without", TORQUES, TORQUES), ("with", TORQUES, TORQUES - np.abs(TORQUES) * _losses(v))),
+        ),
+    ),
+    "gravity": Shown(
+        {"moment_nm": 60.0, "motor_turns_per_turn": 20.0},
+        "reversal",
+        over_turn(
+            "torque at the load [Nm]", lambda v, phi: v["moment_nm"] * np.sin(phi / v["motor_turns_per_turn"]), 20.0
+        ),
+    ),
+    "grounded_spring": Shown(
+        {"stiffness_nm_per_rad": 10.0},
+        "reversal",
+        over_turn("torque at the load [Nm]", lambda v, phi: v["stiffness_nm_per_rad"] * phi),
+    ),
+}
+SHOWN |= {
+    name: Shown(entry.example, "reversal", DRAWN[entry.acting.place](name))
+    for name, entry in EFFECTS.items()
+    if name not in SHOWN and entry.acting is not None and entry.acting.place in DRAWN
+}
+
+
+def _losses(values: Values) -> FloatArray:
+    return np.where(TORQUES > 0.0, values["driving_share"], values["back_share"])

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from estimator.physics.effect import WITH_SHAFT, Effect, EffectParameter, Element, Held, Start, Untestable
 from estimator.physics.model import DrivelineModel, Motion, unit
-from estimator.physics.motion import speed_sweeps, torque_scale
+from estimator.physics.motion import goes_round, speed_sweeps, torque_scale
 from estimator.signals.record import Record
 
 
@@ -24,6 +24,8 @@ def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
 
 def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
     """Need speeds at which twice per turn is near the resonance."""
+    if not goes_round(records, 0.5):
+        return Untestable("the motor makes less than half a turn: nothing recurs with its angle", "reversal")
     if any(speed_sweeps(record) for record in records):
         return None
     return Untestable("the speed hardly changes: twice per turn stays away from the resonance", "reversal")

@@ -26,8 +26,8 @@ def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...
 
 
 def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
-    """Return springs from soft to stiff: the error is not convex in the frequency of what swings on them."""
-    return [(0.03,), (0.2,), (1.0,)]
+    """Return springs from soft to stiff, close to each other: the error is not convex in what swings on them."""
+    return [(float(share),) for share in np.geomspace(0.03, 2.0, 9)]
 
 
 def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Held, Start, Untestable
 from estimator.physics.model import DrivelineModel, Motion, unit
-from estimator.physics.motion import torque_scale
+from estimator.physics.motion import goes_round, torque_scale
 from estimator.signals.record import Record
 
 
@@ -25,6 +25,8 @@ def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | N
     if model.gear_ratio is None:
         reason = "the model file has no [geometry] gear_ratio: the wheel's angle is unknown"
         return Untestable(reason, "reversal", needs="gear_ratio in the model file's [geometry]")
+    if not goes_round(records, model.gear_ratio):
+        return Untestable("the load makes less than a whole turn: nothing recurs with its angle", "reversal")
     return None
 
 

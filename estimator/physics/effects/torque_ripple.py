@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Held, Start, Untestable
 from estimator.physics.model import DrivelineModel, Motion, unit
-from estimator.physics.motion import speed_sweeps, torque_scale
+from estimator.physics.motion import goes_round, speed_sweeps, torque_scale
 from estimator.signals.record import Record
 
 ORDERS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 18, 20, 24, 30, 36, 48)
@@ -19,10 +19,14 @@ def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...
 
 
 def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
-    """Return two starts per order that machines show, one per cause; the order is a whole number and not fitted."""
+    """Return two starts per order that machines show, one per cause; the order is a whole number and not fitted.
+
+    One whose period the motor does not pass through once is any law of the angle, such as gravity.
+    """
     return [
         start
         for order in ORDERS
+        if goes_round(records, 1.0 / order)
         for start in (
             (0.5, Held(0.0), Held(float(order)), 0.0, 0.0),
             (Held(0.0), 0.5, Held(float(order)), 0.0, 0.0),
@@ -32,6 +36,8 @@ def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
 
 def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
     """Need the ripple to pass a frequency at which the line answers: a speed that changes much."""
+    if not goes_round(records, 1.0 / ORDERS[-1]):
+        return Untestable("the motor makes too little of a turn: nothing recurs with its angle", "reversal")
     if any(speed_sweeps(record) for record in records):
         return None
     return Untestable("the speed hardly changes: a ripple away from the resonance does not show", "reversal")

@@ -22,8 +22,8 @@ from estimator.physics.layout import flat, flat_values, slot
 from estimator.physics.model import Motion, Structure
 from estimator.physics.simulate import simulate
 from estimator.physics.start import Start
-from estimator.signals.record import FloatArray, Record
-from tests.estimator.physics.bench import TWO_MASS, assert_same_to_rounding, linear_record, model, random_steps
+from estimator.signals.record import FloatArray, OutputKind, Record
+from tests.estimator.physics.bench import TWO_MASS, assert_same_to_rounding, linear_record, model, random_steps, record
 
 # The table of CONTRACT.md, "The catalogue: names".
 CONTRACT = {
@@ -264,11 +264,13 @@ def test_a_declared_law_takes_the_parameters_of_its_entry(entry: Effect) -> None
 
 @entries
 def test_a_clear_reversal_can_tell_every_effect(entry: Effect, reversal: Record, forward: Record) -> None:
+    """With a gear by which the load makes a whole turn in it."""
     if entry.name == "torque_nonlinearity":  # of torques of one size there is a gain
         return
-    assert entry.testable(GEARED, [reversal]) is None
+    line = replace(GEARED, gear_ratio=0.5)
+    assert entry.testable(line, [reversal]) is None
     if entry.name != "inverter_gain_mismatch":  # which needs two inputs in every recording
-        assert entry.testable(GEARED, [forward, reversal]) is None
+        assert entry.testable(line, [forward, reversal]) is None
 
 
 @pytest.mark.parametrize(
@@ -285,6 +287,11 @@ def test_a_clear_reversal_can_tell_every_effect(entry: Effect, reversal: Record,
         ("cardan_second_order", "the speed hardly changes", "reversal"),
         ("speed_sign_blind", "the speed stays clear of standstill", "reversal"),
         ("load_imbalance", "the model file has no [geometry] gear_ratio", "reversal"),
+        ("eddy_drag", "the speed hardly varies", "reversal"),
+        ("asymmetric_friction", "the speed never changes sign", "reversal"),
+        ("gear_losses", "torque or speed never change sign", "reversal"),
+        ("torque_nonlinearity", "the torque is always of about one size", "reversal"),
+        ("torque_bias", "every recording is shorter than 8 s", "cruise"),
         ("inverter_gain_mismatch", "there is one torque input only", "cruise"),
     ],
 )
@@ -335,3 +342,26 @@ def test_what_acts_in_or_behind_the_shaft_needs_one() -> None:
 def test_the_catalogue_can_not_be_changed() -> None:
     with pytest.raises(TypeError):
         EFFECTS["mine"] = EFFECTS["backlash"]  # type: ignore[index]
+
+
+def test_what_recurs_with_an_angle_needs_a_whole_period() -> None:
+    """Over less it is any law of the angle, such as gravity."""
+    swing = record(random_steps(1000, 1), 0.3 * np.sin(0.02 * np.arange(1000)), kind=OutputKind.POSITION)
+    for name, least in (("cardan_second_order", "half a turn"), ("load_imbalance", "a whole turn")):
+        obstacle = EFFECTS[name].testable(GEARED, [swing])
+        assert obstacle is not None
+        assert f"less than {least}" in obstacle.reason
+    orders = {
+        start[2].value for start in EFFECTS["torque_ripple"].starts(GEARED, [swing]) if isinstance(start[2], Held)
+    }
+    assert min(orders) == 12.0  # 0.6 rad are 0.095 turns
+    assert EFFECTS["gravity"].testable(GEARED, [swing]) is None
+    assert EFFECTS["grounded_spring"].testable(GEARED, [swing]) is None
+
+
+@pytest.mark.parametrize("name", ["gravity", "grounded_spring"])
+def test_what_goes_to_and_fro_is_not_sought_where_the_motor_turns_on(name: str) -> None:
+    driven = record(random_steps(1000, 1), np.full(1000, 90.0))
+    obstacle = EFFECTS[name].testable(GEARED, [driven])
+    assert obstacle is not None
+    assert "makes more than 100 turns" in obstacle.reason
