@@ -7,7 +7,6 @@ import time
 from contextlib import suppress
 from typing import Protocol
 
-
 PAUSE_S = 0.002
 """After what was written [s]: lines that come faster, as those of a run without a clock, are written together."""
 

@@ -44,7 +44,7 @@ def with_room(segments: Cut, training: Iterable[str]) -> tuple[Cut, list[str]]:
 
 
 def _size(pieces: Sequence[Record]) -> int:
-    return len(pieces) * sum(piece.output.shape[0] for piece in pieces)
+    return len(pieces) * sum(int(piece.output.shape[0]) for piece in pieces)
 
 
 def _some(pieces: Sequence[Record], count: int) -> list[Record]:

@@ -54,6 +54,9 @@ STEP_S = 3600
 
 TRIES = 5
 
+BUSY = "busy machine|This machine was too busy"
+"""What a host says that this machine, and not the fault, has ended: it only has to have left the drives disarmed."""
+
 Meet = Callable[[Scene], None]
 
 
@@ -127,7 +130,7 @@ class Kind:
 
 KINDS: dict[str, Kind] = {
     "host killed (SIGKILL)": Kind(kill_host, by_themselves=True),
-    "host suspended (SIGSTOP), and on": Kind(suspend_host, "This machine was too busy", by_themselves=True),
+    "host suspended (SIGSTOP), and on": Kind(suspend_host, BUSY, by_themselves=True),
     "host interrupted (SIGINT)": Kind(stop_host, ""),
     "host's terminal gone (SIGHUP)": Kind(hang_up, ""),
     "bus connection cut": Kind(lambda scene: scene.bus.cut(), "CAN bus", by_themselves=True),
@@ -189,7 +192,7 @@ def run_one(kind: Kind, rig_path: Path, experiment: str, after_s: float, real_ti
             time.sleep(SUSPENDED_S)
         at.host.send_signal(signal.SIGCONT)
         said = _last_words(at.host, outcome)
-        if alive:  # one that has ended before, on a busy machine, only has to have left the drives disarmed
+        if alive and (kind.cause == BUSY or not re.search(BUSY, said)):
             outcome.said = (said or "ended") if kind.ends_it else ""
             _judge(kind, at, said, outcome)
     return outcome
