@@ -49,5 +49,6 @@ class MessageRate:
         if not LEAST <= per_cycle <= MOST:
             raise DeviceFault(
                 f"{self._where}: {per_cycle:g} TPDOs per SYNC in the last {CYCLES} cycles, expected one. Look for "
-                "another producer of SYNC, the transmission type of its TPDO, and a bus without room."
+                "another producer of SYNC, the transmission type of its TPDO, and a bus without room; a simulated one "
+                "answers late on a busy machine."
             )

@@ -14,8 +14,10 @@ order, as texts preceded by their lengths; the two checksums and ``schema``, whi
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -35,26 +37,48 @@ _NOT_SAID = CHECKSUMS | {"schema"}
 
 RIG_TEXT, RIG_CHECKSUM = "rig_file", "rig_sha256"
 
+_BLOCK_CELLS = 1 << 18
+"""Cells of a column that are turned into bytes at once."""
+
 _SHOWN = 12
 """Digits of a checksum that a message shows."""
 
 
 def data_sha256(columns: Mapping[str, Column]) -> str:
     """Return the checksum of columns, hexadecimal."""
-    digest = hashlib.sha256()
+    digest = DataDigest()
     for name in sorted(columns):
-        column, kind = columns[name], Kind.of(columns[name])
-        for text in (name, kind.value):
-            digest.update(_counted(text))
-        digest.update(_length(column.size))
-        digest.update(_cells(column, kind))
+        column = columns[name]
+        digest.begin(name, column.dtype, column.size)
+        for first in range(0, column.size, _BLOCK_CELLS):
+            digest.take(column[first : first + _BLOCK_CELLS])
     return digest.hexdigest()
 
 
-def said_sha256(table: Table) -> str:
-    """Return the checksum of units and metadata, hexadecimal."""
-    units = {name: unit for name, unit in table.units.items() if name in table.columns}
-    metadata = {key: value for key, value in table.metadata.items() if key not in _NOT_SAID}
+class DataDigest:
+    """The checksum of columns that come one after the other, in the order of their names, each in blocks."""
+
+    def __init__(self) -> None:
+        self._digest = hashlib.sha256()
+
+    def begin(self, name: str, dtype: np.dtype[Any], size: int) -> None:
+        """Begin a column of so many cells."""
+        for text in (name, Kind.of_dtype(dtype).value):
+            self._digest.update(_counted(text))
+        self._digest.update(_length(size))
+
+    def take(self, cells: Column) -> None:
+        """Take the next cells of the column."""
+        self._digest.update(_cells(cells, Kind.of(cells)))
+
+    def hexdigest(self) -> str:
+        """Return the checksum, hexadecimal."""
+        return self._digest.hexdigest()
+
+
+def said_sha256(units: Mapping[str, str], metadata: Mapping[str, str]) -> str:
+    """Return the checksum of units of columns that are there, and of metadata, hexadecimal."""
+    metadata = {key: value for key, value in metadata.items() if key not in _NOT_SAID}
     digest = hashlib.sha256()
     for entries in (units, metadata):
         digest.update(_length(len(entries)))
@@ -73,8 +97,12 @@ def sealed(table: Table) -> Table:
     """Return a table with its checksums among its metadata; one that says nothing of itself stays as it is."""
     if not (table.metadata or table.units):
         return table
-    checksums = {CHECKSUM: data_sha256(table.columns), SAID: said_sha256(table)}
+    checksums = {CHECKSUM: data_sha256(table.columns), SAID: said_sha256(_units_of(table), table.metadata)}
     return replace(table, metadata={**table.metadata, **checksums})
+
+
+def _units_of(table: Table) -> dict[str, str]:
+    return {name: unit for name, unit in table.units.items() if name in table.columns}
 
 
 def require_whole(table: Table) -> None:
@@ -85,15 +113,25 @@ def require_whole(table: Table) -> None:
     RecordingError
         With what was expected and what came.
     """
-    said = table.metadata
+    require_unchanged(table.path, table.metadata, _units_of(table), lambda: data_sha256(table.columns))
+
+
+def require_unchanged(path: Path, said: Mapping[str, str], units: Mapping[str, str], data: Callable[[], str]) -> None:
+    """Refuse metadata, units and data (given by their checksum) that are not what they were when they were written.
+
+    Raises
+    ------
+    RecordingError
+        As `require_whole`.
+    """
     problems = []
-    if CHECKSUM in said and (came := data_sha256(table.columns)) != said[CHECKSUM]:
+    if CHECKSUM in said and (came := data()) != said[CHECKSUM]:
         problems.append(
             f"expected the data it was written with, SHA-256 {said[CHECKSUM][:_SHOWN]}…, came {came[:_SHOWN]}…: "
             f"it is damaged, or was changed since. Take a copy that is whole; if you changed it yourself, remove "
-            f"{CHECKSUM} from what it says of itself (of a CSV: move {table.path.name}.json away)."
+            f"{CHECKSUM} from what it says of itself (of a CSV: move {path.name}.json away)."
         )
-    if SAID in said and (came := said_sha256(table)) != said[SAID]:
+    if SAID in said and (came := said_sha256(units, said)) != said[SAID]:
         problems.append(
             f"expected the units and metadata it was written with, SHA-256 {said[SAID][:_SHOWN]}…, came "
             f"{came[:_SHOWN]}…: what it says of itself is damaged, or was changed since. Take a copy that is whole; if "
@@ -106,7 +144,7 @@ def require_whole(table: Table) -> None:
             f"{came[:_SHOWN]}…: what it says of itself is damaged. Take a copy that is whole."
         )
     if problems:
-        raise RecordingError(table.path, *problems)
+        raise RecordingError(path, *problems)
 
 
 def _cells(column: Column, kind: Kind) -> bytes:

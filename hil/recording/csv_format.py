@@ -28,7 +28,7 @@ from hil.recording.bounds import require_columns
 from hil.recording.format_hints import FormatHints
 from hil.recording.kinds import Kind
 from hil.recording.request import Request
-from hil.recording.sidecar import SCHEMA_KEY, TYPES_KEY, UNITS_KEY, Sidecar, read_sidecar, write_sidecar
+from hil.recording.sidecar import Sidecar, as_metadata, read_sidecar, write_sidecar
 from hil.recording.table import Column, Table, line_of
 from hil.recording.text.cells import as_column, seconds_of
 from hil.recording.text.encoding import decoded
@@ -46,9 +46,6 @@ BLOCK_BYTES = 1 << 22
 
 TRAILING = "\0"
 """Stands for what follows a delimiter that ends a row."""
-
-TABLE_KEYS = frozenset({SCHEMA_KEY, UNITS_KEY, TYPES_KEY})
-"""Keys that have a meaning of their own in the file beside, and so can't be metadata."""
 
 
 def read(path: Path, request: Request) -> Table:
@@ -136,7 +133,7 @@ def _is_recognised(path: Path, table: Table) -> bool:
 def description_of(table: Table) -> Sidecar:
     """Return what has to stand beside a table that is written as CSV."""
     types = {name: Kind.of(column) for name, column in table.columns.items() if not _tells_its_kind(column)}
-    return Sidecar({key: value for key, value in table.metadata.items() if key not in TABLE_KEYS}, table.units, types)
+    return Sidecar(as_metadata(table.metadata), table.units, types)
 
 
 def _require_names(path: Path, form: TextForm) -> None:

@@ -24,7 +24,12 @@ class Kind(Enum):
     @staticmethod
     def of(column: Column) -> Kind:
         """Tell the kind of a column of a table."""
-        return _KINDS.get(column.dtype.kind, Kind.TEXT)
+        return Kind.of_dtype(column.dtype)
+
+    @staticmethod
+    def of_dtype(dtype: np.dtype[Any]) -> Kind:
+        """Tell the kind of a column by the type of its cells."""
+        return _KINDS.get(dtype.kind, Kind.TEXT)
 
 
 _KINDS = {"f": Kind.FLOAT, "i": Kind.INTEGER, "b": Kind.BOOLEAN}

@@ -41,6 +41,11 @@ class Sidecar:
         return not (self.metadata or self.units or self.types)
 
 
+def as_metadata(metadata: Mapping[str, str]) -> dict[str, str]:
+    """Leave out what has a meaning of its own in the file beside, and so can't be metadata."""
+    return {key: value for key, value in metadata.items() if key not in {SCHEMA_KEY, UNITS_KEY, TYPES_KEY}}
+
+
 def sidecar_of(recording: Path) -> Path:
     """Name the file beside a recording."""
     return recording.with_name(f"{recording.name}.json")

@@ -1,7 +1,7 @@
 """A recording as it is made: every sample leaves the program at once, the file gets its name when whole.
 
 While the run goes on, rows stand in ``<stem>.part.csv`` beside the target, one line each, handed to the
-operating system line by line by a thread of its own: whoever appends waits for no disk. What the disk has not taken
+operating system as they come by a thread of its own: whoever appends waits for no disk. What the disk has not taken
 yet waits in memory, `CAPACITY` samples at most. When the run ends, in any way Python can still act on (end, error,
 Ctrl-C), the rows become the recording, in its own format. What a harder end leaves:
 
@@ -14,19 +14,19 @@ Parquet could not do that itself: without its footer, written last, it can't be 
 
 from __future__ import annotations
 
-import logging
+import os
 from collections.abc import Mapping
+from io import FileIO
 from pathlib import Path
 from types import TracebackType
-from typing import Self, TextIO
+from typing import Self
 
 from hil.errors import RecordingError
 from hil.recording import columns
-from hil.recording.checksum import sealed
-from hil.recording.csv_format import description_of
 from hil.recording.description import OUTCOME
 from hil.recording.formats import read_table, writer_for
 from hil.recording.no_room import no_room
+from hil.recording.own_csv import HEADER, own_sidecar
 from hil.recording.publish import write_table
 from hil.recording.samples import cells_of
 from hil.recording.sidecar import write_sidecar
@@ -36,19 +36,17 @@ from hil.rig.sample import Sample
 
 CSV = ".csv"
 
-LOGGER = logging.getLogger(__name__)
-
 CAPACITY = 20_000
 """Samples that may wait for the disk: 200 s at 10 ms, some 10 MB."""
 
 DRAIN_S = 60.0
 """Time the disk has for them when the run is over [s]."""
 
-HEADER = ",".join(columns.UNITS) + "\n"
-"""First line of a part file."""
+LONGEST_ROW = 1 << 16
+"""Bytes; the disk tore at most one row."""
 
 
-def hold(file: TextIO) -> bool:
+def hold(file: FileIO) -> bool:
     """Hold a file for this process, and tell whether that could be; where the system can't, nobody can tell."""
     try:
         import fcntl
@@ -88,7 +86,7 @@ class RecordingWriter:
         self.path = Path(path)
         self.part_path = self.path.with_name(f"{self.path.stem}.part{CSV}")
         self._metadata = dict(metadata or {})
-        self._file: TextIO | None = None
+        self._file: FileIO | None = None
         self._patience_s = patience_s
         self._writing: WritingThread | None = None
 
@@ -108,18 +106,19 @@ class RecordingWriter:
                 f"expected a place to write, came: {error.strerror}. Choose another folder, or mend this one.",
             ) from error
         try:
-            self._file.write(HEADER)
+            self._begin(self._file)
         except OSError as error:
-            self._give_up(self._file)
+            self._file.close()
             self._file = None
+            self.part_path.unlink(missing_ok=True)
             raise no_room(self.path, "the recording", error) from error
         self._writing = WritingThread(self._file, CAPACITY)
         return self
 
-    def _opened(self) -> TextIO:
+    def _opened(self) -> FileIO:
         """Open the part file, a new one or one that a run has left which was killed before its first sample.
 
-        Line-buffered: each row reaches the operating system when it is appended. It is held while the run goes on.
+        Unbuffered: what the thread writes reaches the operating system at once. It is held while the run goes on.
 
         Raises
         ------
@@ -127,10 +126,10 @@ class RecordingWriter:
             If there is one with samples, or one that another run holds.
         """
         try:
-            file = self.part_path.open("x", buffering=1, encoding="utf-8", newline="\n")
+            file = self.part_path.open("xb", buffering=0)
         except FileExistsError:
-            file = self.part_path.open("r+", buffering=1, encoding="utf-8", newline="\n")
-            if not (hold(file) and HEADER.startswith(file.read(len(HEADER) + 1))):
+            file = self.part_path.open("rb+", buffering=0)
+            if not (hold(file) and HEADER.encode().startswith(file.read(len(HEADER) + 1))):
                 file.close()
                 raise
             file.seek(0)
@@ -139,13 +138,11 @@ class RecordingWriter:
         hold(file)
         return file
 
-    def _give_up(self, file: TextIO) -> None:
-        """Close a file that took nothing, and remove it."""
-        try:
-            file.close()
-        except OSError:  # it tries once more to write what did not fit
-            LOGGER.info("%s could not be written", self.part_path, exc_info=True)
-        self.part_path.unlink(missing_ok=True)
+    @staticmethod
+    def _begin(file: FileIO) -> None:
+        header = HEADER.encode()
+        while header:  # a disk that has too little room takes a part first
+            header = header[file.write(header) :]
 
     @property
     def kept(self) -> Path | None:
@@ -208,7 +205,7 @@ class RecordingWriter:
                 raise
             error.add_note(str(failure))  # what ended the run comes first
 
-    def _closed(self, file: TextIO) -> RecordingError | None:
+    def _closed(self, file: FileIO) -> RecordingError | None:
         """Have the disk take what waits, and close the file; give what keeps the recording from being whole.
 
         Raises
@@ -226,11 +223,7 @@ class RecordingWriter:
                 f"expected a disk that takes the last {writing.n_waiting} samples within {DRAIN_S:g} s, came one that "
                 "does not: they are lost. Choose another disk.",
             )
-        try:
-            file.close()
-        except OSError:  # it tries once more to write what did not fit
-            if writing.failed is None:
-                raise
+        file.close()
         if writing.failed is None:
             return None
         self._cut_torn_line()
@@ -242,16 +235,18 @@ class RecordingWriter:
 
     def _cut_torn_line(self) -> None:
         with self.part_path.open("rb+") as file:
-            file.truncate(file.read().rfind(b"\n") + 1)
+            begin = max(file.seek(0, os.SEEK_END) - LONGEST_ROW, 0)
+            file.seek(begin)
+            file.truncate(begin + file.read().rfind(b"\n") + 1)
 
     def _publish(self) -> None:
-        rows = read_table(self.part_path)
-        table = Table(self.path, rows.columns, columns.UNITS, self._metadata)
         if self.path.suffix.lower() == CSV:  # the part file is the recording: it only gets its name
             writer_for(self.path)
+            said = own_sidecar(self.part_path, self._metadata)
             self.part_path.rename(self.path)
-            write_sidecar(self.path, description_of(sealed(table)))
+            write_sidecar(self.path, said)
             return
+        table = Table(self.path, read_table(self.part_path).columns, columns.UNITS, self._metadata)
         try:
             write_table(table, self.path)
         except RecordingError as error:

@@ -2,27 +2,43 @@
 
 from __future__ import annotations
 
-import queue
 import threading
+import time
 from contextlib import suppress
-from typing import TextIO
+from typing import Protocol
+
+PAUSE_S = 0.002
+"""After what was written [s]: lines that come faster, as those of a run without a clock, are written together."""
+
+
+class Unbuffered(Protocol):
+    """A file that hands to the system what it is given, and tells how much of it that has taken."""
+
+    def write(self, data: bytes, /) -> int | None:
+        """Write, perhaps only the first bytes."""
+
+    def close(self) -> None:
+        """Close it."""
 
 
 class WritingThread:
-    """Writes lines in their order, from its making to `finish`.
+    """Writes lines in their order, all that wait at once, from its making to `finish`.
 
     Parameters
     ----------
     file
         Where to; its maker closes it, unless `finish` gives up. Nothing is written after an OSError.
     capacity
-        Lines that may wait.
+        Lines that may wait, those that are being written included.
     """
 
-    def __init__(self, file: TextIO, capacity: int) -> None:
+    def __init__(self, file: Unbuffered, capacity: int) -> None:
         self._file = file
-        self._lines: queue.Queue[str | None] = queue.Queue(capacity)
-        self._given_up = False
+        self._capacity = capacity
+        self._lines: list[str] = []
+        self._in_hand = 0
+        self._changed = threading.Condition()
+        self._ending = self._given_up = False
         self.n_written = 0
         self.failed: OSError | None = None
         self._thread = threading.Thread(target=self._run, name="recording", daemon=True)
@@ -31,38 +47,53 @@ class WritingThread:
     @property
     def n_waiting(self) -> int:
         """Lines that wait for the disk."""
-        return self._lines.qsize()
+        return len(self._lines) + self._in_hand
 
     def put(self, line: str, patience_s: float) -> bool:
         """Hand over one line; False if there is no room for it within a time [s]."""
-        try:
-            self._lines.put(line, timeout=patience_s) if patience_s > 0.0 else self._lines.put_nowait(line)
-        except queue.Full:
-            return False
+        with self._changed:
+            if not self._changed.wait_for(lambda: self.n_waiting < self._capacity, patience_s):
+                return False
+            self._lines.append(line)
+            if len(self._lines) == 1:
+                self._changed.notify_all()
         return True
 
     def finish(self, patience_s: float) -> bool:
         """End the thread when everything is written; False if that takes longer than a time [s]: it is given up."""
-        try:
-            self._lines.put(None, timeout=patience_s)
-            self._thread.join(patience_s)
-        except queue.Full:
-            pass
+        with self._changed:
+            self._ending = True
+            self._changed.notify_all()
+        self._thread.join(patience_s)
         self._given_up = self._thread.is_alive()
         return not self._given_up
 
     def _run(self) -> None:
-        while not self._given_up and (line := self._lines.get()) is not None:
+        while lines := self._next():
             if self.failed is None:
-                self._take(line)
+                self._write("".join(lines).encode("ascii"))
+            if self._given_up:
+                break
+            time.sleep(PAUSE_S)
         if self._given_up:
             with suppress(OSError):
                 self._file.close()
 
-    def _take(self, line: str) -> None:
+    def _next(self) -> list[str]:
+        """Wait for lines; none when all are written and no more will come."""
+        with self._changed:
+            self._in_hand = 0
+            self._changed.notify_all()
+            self._changed.wait_for(lambda: self._lines or self._ending)
+            lines, self._lines = self._lines, []
+            self._in_hand = len(lines)
+        return lines
+
+    def _write(self, data: bytes) -> None:
         try:
-            self._file.write(line)
+            while data:
+                taken = self._file.write(data) or 0
+                self.n_written += data.count(b"\n", 0, taken)
+                data = data[taken:]
         except OSError as error:
             self.failed = error
-        else:
-            self.n_written += 1

@@ -1,4 +1,8 @@
-"""The course of an on-line estimate, kept for a file: resonance at every kept sample, alarms, where it ended."""
+"""The course of an on-line estimate, kept for a file: resonance, alarms, where it ended.
+
+Its memory does not grow with the run: a course that has become long keeps every second estimate, then every fourth, and
+so on; the file says which. Alarms and states, of which there is at most one in a second, are all kept.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +23,10 @@ if TYPE_CHECKING:  # the estimator takes half a second to import, and a run with
 SCHEMA = "hil.online/1"
 
 COLUMNS = ("time_s", "resonance_hz", "resonance_std_hz", "damping", "damping_std")
-"""What is kept of every estimate: 40 bytes, 7 MB for an hour at 20 ms."""
+"""What is kept of an estimate: 40 bytes."""
+
+MOST = 1 << 17
+"""Estimates that are kept: 44 minutes at 20 ms, and a file of 14 MB at most."""
 
 
 def course_path(recording: Path) -> Path:
@@ -38,6 +45,7 @@ class Course:
 
     def __init__(self, chain: OnlineChain) -> None:
         self.samples = 0
+        self._estimates, self._every = 0, 1
         self.alarms: list[Alarm] = []
         self._settings, self._filter = chain.settings, chain.L
         self._columns = {name: array("d") for name in COLUMNS}
@@ -49,8 +57,10 @@ class Course:
         mode = estimate.resonance
         frequency_hz, damping = (math.nan, math.nan) if mode is None else (mode.frequency_hz, mode.damping)
         row = (estimate.time_s, frequency_hz, estimate.frequency_std_hz, damping, estimate.damping_std)
-        for column, value in zip(self._columns.values(), row, strict=True):
-            column.append(value)
+        if self._estimates % self._every == 0:
+            for column, value in zip(self._columns.values(), row, strict=True):
+                column.append(value)
+        self._count(1)
         if estimate.alarm is not None:
             self.alarms.append(estimate.alarm)
         self._enter(estimate.time_s, estimate.state)
@@ -60,7 +70,8 @@ class Course:
         """Keep the estimates of a block."""
         rows = (block.time_s, block.frequency_hz, block.frequency_std_hz, block.damping, block.damping_std)
         for column, values in zip(self._columns.values(), rows, strict=True):
-            column.frombytes(values.tobytes())
+            column.frombytes(values[-self._estimates % self._every :: self._every].tobytes())
+        self._count(len(block))
         self.alarms.extend(block.alarms)
         if len(block):
             self._last = block[len(block) - 1]
@@ -68,6 +79,13 @@ class Course:
         for k, (before, code) in enumerate(pairwise((None, *codes))):
             if code != before:
                 self._enter(float(block.time_s[k]), TrackingState(code))
+
+    def _count(self, estimates: int) -> None:
+        """Count estimates that were taken; keep every second one where they have become too many."""
+        self._estimates += estimates
+        while len(self._columns["time_s"]) >= MOST:
+            self._columns = {name: column[::2] for name, column in self._columns.items()}
+            self._every *= 2
 
     def _enter(self, time_s: float, state: TrackingState) -> None:
         """Keep when the tracking has come into another state."""
@@ -90,7 +108,7 @@ class Course:
                 "filter_L": None if self._filter is None else self._filter.tolist(),
             },
             "samples": self.samples,
-            "estimates": len(self._columns["time_s"]),
+            "estimates": self._estimates,
             "final": None if self._last is None else _final(self._last),
             "states": [{"from_s": time_s, "state": state.word} for time_s, state in self._states],
             "alarms": [alarm.as_json() for alarm in self.alarms],
@@ -99,7 +117,7 @@ class Course:
     def write(self, path: Path) -> None:
         """Write it all; numbers with all their digits, so that a replay can be compared to the bit."""
         columns = {name: [_number(value) for value in column] for name, column in self._columns.items()}
-        text = json.dumps(self.summary() | {"course": columns}, allow_nan=False)
+        text = json.dumps(self.summary() | {"every": self._every, "course": columns}, allow_nan=False)
         path.write_text(text + "\n", encoding="utf-8")
 
     @property

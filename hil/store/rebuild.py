@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hil.errors import RecordingError
-from hil.recording.formats import FORMATS, read_metadata, read_table
+from hil.recording.formats import FORMATS, read_metadata
 from hil.store.entry import RunEntry
-from hil.store.register import entry_of, is_run
+from hil.store.register import entry_at, is_run
 from hil.store.replace_damaged import replace_if_damaged
 from hil.store.results import attach_results
 from hil.store.run_store import RunStore
@@ -99,7 +99,7 @@ class _Entering:
         self._show(path)
         try:
             if is_run(read_metadata(path)):
-                self._enter(entry_of(read_table(path)))
+                self._enter(entry_at(path))
         except RecordingError as error:
             self.unreadable.append(str(error))
 

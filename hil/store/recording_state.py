@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from hil.errors import RecordingError
 from hil.recording.checksum import CHECKSUM
-from hil.recording.formats import read_table
+from hil.recording.facts import read_facts
 from hil.store.entry import RunEntry
 
 VERIFIED = "whole, checksum verified"
@@ -16,10 +16,10 @@ def recording_state(entry: RunEntry) -> str:
     if not entry.recording.exists():
         return "missing: it was moved or removed; 'hil runs rebuild' finds it again inside the store's folder"
     try:
-        table = read_table(entry.recording)
+        facts = read_facts(entry.recording)
     except RecordingError as error:
         return "; ".join(error.problems)
-    checksum = table.metadata.get(CHECKSUM, "")
+    checksum = facts.metadata.get(CHECKSUM, "")
     if checksum != entry.data_sha256:
         return "another recording under the same name: its checksum is not that of this run"
     return VERIFIED if checksum else UNPROVEN

@@ -6,12 +6,9 @@ import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 
-import numpy as np
-
-from hil.recording import columns
 from hil.recording.checksum import CHECKSUM, CHECKSUMS, RIG_CHECKSUM, RIG_TEXT
 from hil.recording.description import OUTCOME
-from hil.recording.formats import read_table
+from hil.recording.facts import Facts, facts_of, read_facts
 from hil.recording.table import Table
 from hil.store.entry import COMPLETE, RunEntry
 from hil.store.run_store import RunStore
@@ -53,7 +50,7 @@ def register_run(
         If the store can't be written. The recording is whole: ``hil runs rebuild`` enters it later.
     """
     recording = Path(recording)
-    entry = entry_of(read_table(recording), outcome)
+    entry = entry_at(recording, outcome)
     with RunStore(recording.parent if folder is None else folder) as store:
         run_id = store.add_run(entry)
         for kind, path in (results or {}).items():
@@ -63,17 +60,32 @@ def register_run(
 
 def entry_of(table: Table, outcome: str = COMPLETE) -> RunEntry:
     """Make the entry of a recording from what it says of itself; what ended it early, too, if nobody else knows."""
-    said = table.metadata
+    return _entry(facts_of(table), outcome)
+
+
+def entry_at(recording: Path, outcome: str = COMPLETE) -> RunEntry:
+    """Make the entry of a recording in a file; as `entry_of`, without holding its rows.
+
+    Raises
+    ------
+    RecordingError
+        If the recording can't be read.
+    """
+    return _entry(read_facts(recording), outcome)
+
+
+def _entry(facts: Facts, outcome: str) -> RunEntry:
+    said = facts.metadata
     rig_text = said.get(RIG_TEXT, "")
     eds = {key[len("eds_") : -len("_sha256")]: value for key, value in said.items() if _is_eds(key)}
     return RunEntry(
-        recording=table.path,
+        recording=facts.path,
         data_sha256=said.get(CHECKSUM, ""),
         experiment=said.get(EXPERIMENT, ""),
         started_utc=said.get(STARTED, ""),
-        duration_s=_duration_s(table),
-        samples=table.n_rows,
-        flagged=_flagged(table),
+        duration_s=facts.extent.duration_s,
+        samples=facts.extent.n_rows,
+        flagged=facts.extent.flagged,
         software_version=said.get(VERSION, ""),
         rig_name=_rig_name(rig_text),
         rig_text=rig_text,
@@ -98,16 +110,3 @@ def _rig_name(text: str) -> str:
     except (ValueError, RecursionError):  # a recording made before rig files were checked, or by another program
         return ""
     return name if isinstance(name, str) else ""
-
-
-def _duration_s(table: Table) -> float:
-    if columns.TIME not in table.columns or table.n_rows < 2:
-        return 0.0
-    time_s = table.numeric([columns.TIME])[columns.TIME]
-    return float((time_s[-1] - time_s[0]) * table.n_rows / (table.n_rows - 1))
-
-
-def _flagged(table: Table) -> int:
-    if columns.FLAGS not in table.columns:
-        return 0
-    return int(np.count_nonzero(table.numeric([columns.FLAGS])[columns.FLAGS]))

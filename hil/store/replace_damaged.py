@@ -12,10 +12,9 @@ from pathlib import Path
 
 from hil.errors import RecordingError
 from hil.inside import is_inside
-from hil.recording.formats import read_table
 from hil.store.connection import DamagedStore, open_database, told, transaction
 from hil.store.entry import RunEntry
-from hil.store.register import entry_of
+from hil.store.register import entry_at
 from hil.store.row_faults import faults_of, mended
 from hil.store.rows import insert_run
 from hil.store.run_store import store_of
@@ -118,7 +117,7 @@ def _read_again(database: sqlite3.Connection, folder: Path, salvaged: Salvaged) 
 
 def _entry(recording: Path, data_sha256: str) -> RunEntry | None:
     try:
-        entry = entry_of(read_table(recording))
+        entry = entry_at(recording)
     except RecordingError:  # the rebuilding that follows reads it again, and tells
         return None
     return entry if entry.data_sha256 == data_sha256 else None

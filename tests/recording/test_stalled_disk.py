@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import threading
+from io import FileIO
 from pathlib import Path
-from typing import TextIO
 
 import pytest
 
@@ -26,14 +27,14 @@ class Disk:
 class StalledFile:
     """A file on it."""
 
-    def __init__(self, file: TextIO, disk: Disk) -> None:
+    def __init__(self, file: FileIO, disk: Disk) -> None:
         self._file = file
         self._disk = disk
 
-    def write(self, line: str) -> int:
+    def write(self, data: bytes) -> int:
         self._disk.began.set()
         assert self._disk.goes_on.wait(60.0)
-        return self._file.write(line)
+        return self._file.write(data)
 
     def close(self) -> None:
         self._file.close()
@@ -79,12 +80,12 @@ def test_when_too_many_wait_the_run_ends_and_keeps_them(
 
     with pytest.raises(RecordingError, match="one for which 20 wait"):
         run()
-    assert appended == 21  # one is being written, twenty wait
+    assert appended == 20
     assert read_table(tmp_path / "run.csv").n_rows == appended
 
 
 def test_a_run_without_a_clock_waits_for_room(tmp_path: Path, disk: Disk, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(writer, "CAPACITY", 1)
+    monkeypatch.setattr(writer, "CAPACITY", 2)
     with RecordingWriter(tmp_path / "run.csv", patience_s=60.0) as recorder:
         recorder.append(sample(0))
         assert disk.began.wait(60.0)
@@ -103,3 +104,41 @@ def test_a_disk_that_hangs_for_good_does_not_hang_the_program(
             recorder.append(sample(0))
     disk.goes_on.set()
     assert disk.closed.wait(60.0)
+
+
+class _SmallDisk:
+    """A file on a disk with room for so many bytes, which takes what still fits."""
+
+    def __init__(self, file: FileIO, room: int) -> None:
+        self._file = file
+        self._room = room
+
+    def write(self, data: bytes) -> int:
+        if not self._room:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        taken = self._file.write(data[: self._room])
+        self._room -= taken
+        return taken
+
+    def close(self) -> None:
+        self._file.close()
+
+
+@pytest.mark.parametrize("rows", [0, 1, 5])
+def test_a_disk_that_takes_part_of_what_waits_keeps_the_rows_that_are_whole(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rows: int
+) -> None:
+    room = sum(len(writer._row(sample(k))) for k in range(rows)) + 7
+    monkeypatch.setattr(writer, "WritingThread", lambda file, capacity: WritingThread(_SmallDisk(file, room), capacity))
+    recorder = RecordingWriter(tmp_path / "run.csv", patience_s=0.0)
+
+    def run() -> None:
+        with recorder:
+            for k in range(9):
+                recorder.append(sample(k))
+
+    with pytest.raises(RecordingError, match=f"expected room for sample {rows + 1}, came: No space left"):
+        run()
+    assert recorder.n_samples == rows
+    assert (tmp_path / "run.csv").exists() == (rows > 0)
+    assert not rows or read_table(tmp_path / "run.csv").n_rows == rows

@@ -65,7 +65,7 @@ def test_a_recording_carries_units_metadata_and_checksum(tmp_path: Path, suffix:
     with RecordingWriter(tmp_path / f"run{suffix}", {"schema": "hil.recording/1", "rig": "bench"}) as writer:
         writer.append(sample(1))
     table = read_table(tmp_path / f"run{suffix}")
-    said = {"schema": "hil.recording/1", "rig": "bench", SAID: said_sha256(table)}
+    said = {"schema": "hil.recording/1", "rig": "bench", SAID: said_sha256(table.units, table.metadata)}
     assert dict(table.metadata) == {**said, CHECKSUM: data_sha256(table.columns)}
     assert dict(table.units) == dict(columns.UNITS)
 

@@ -13,6 +13,7 @@ import pytest
 from estimator.errors import BadSetting
 from estimator.signals.record import Record
 from hil.recording import RecordingWriter, read_record
+from hil.rig import live_course
 from hil.rig.build import open_devices
 from hil.rig.experiments.base import Phase
 from hil.rig.live import LiveEstimate, tracking_chain, tracking_settings
@@ -109,6 +110,42 @@ def test_what_a_run_says_of_its_excitation_its_replay_says_too(tmp_path: Path) -
     assert document["alarms"] == []
     assert (document["final"]["status"], document["final"]["state"]) == ("estimated", "watching")
     assert live.course.excitation == f"not excited for {on_s - off_s:.1f} of 75.0 s: no alarm then"
+
+
+@pytest.mark.parametrize(("most", "every"), [(401, 1), (400, 2), (256, 2), (64, 8)])
+def test_a_long_course_is_thinned_the_same_by_run_and_replay(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, most: int, every: int
+) -> None:
+    drive, whole = drives(22, 1, 8.0)[0], tmp_path / "whole.json"
+    play_record(drive, tracking_settings(), Pace(), lambda course, time_s: None).write(whole)
+    monkeypatch.setattr(live_course, "MOST", most)
+    live = LiveEstimate(tracking_chain(0.01))
+    for sample in driven(record=drive):
+        live(sample)
+    live.course.write(tmp_path / "live.json")
+    play_record(drive, tracking_settings(), Pace(4.0, sleep=lambda s: None), lambda course, time_s: None).write(
+        tmp_path / "replay.json"
+    )
+    assert (tmp_path / "live.json").read_bytes() == (tmp_path / "replay.json").read_bytes()
+    thinned, document = (json.loads((tmp_path / name).read_text()) for name in ("live.json", "whole.json"))
+    assert (thinned["every"], thinned["estimates"], document["every"]) == (every, 400, 1)
+    for name, column in thinned["course"].items():
+        assert column == document["course"][name][::every], name
+        assert len(column) < most
+
+
+def test_the_file_of_a_long_course_has_a_bound(tmp_path: Path) -> None:
+    course, chain = live_course.Course(tracking_chain(0.01)), tracking_chain(0.01)
+    drive = drives(22, 1, 8.0)[0]
+    block = chain.run_block(drive.time_s, chain.torque_of(drive), drive.output, drive.okay)
+    sizes = []
+    for estimates in (1.9 * live_course.MOST, 3.9 * live_course.MOST):
+        while course.summary()["estimates"] < estimates:
+            course.extend(block)
+        course.write(tmp_path / "long.json")
+        sizes.append((tmp_path / "long.json").stat().st_size)
+    assert max(sizes) < 14e6
+    assert sizes[1] < 1.1 * sizes[0]
 
 
 def test_an_estimate_without_excitation_says_so() -> None:

@@ -12,7 +12,7 @@ from estimator.diagnosis.preconditions.clipped import without_clipped
 from estimator.diagnosis.preconditions.exciting import require_excitation, require_signals
 from estimator.diagnosis.preconditions.model_values import model_warnings
 from estimator.diagnosis.preconditions.not_read import without_not_read
-from estimator.diagnosis.preconditions.room import require_room
+from estimator.diagnosis.preconditions.room import with_room
 from estimator.diagnosis.preconditions.thinned import thinned
 from estimator.diagnosis.preconditions.together import require_together
 from estimator.diagnosis.preconditions.units import require_plausible_units
@@ -57,7 +57,7 @@ def prepare(records: Sequence[Record], model: DrivelineModel, holdout: Sequence[
     Raises
     ------
     BadShape
-        No recording, recordings that do not belong together, or more than fit into memory.
+        No recording, or recordings that do not belong together.
     BadModel
         A recorded output that the structure does not have.
     NotExciting
@@ -71,12 +71,12 @@ def prepare(records: Sequence[Record], model: DrivelineModel, holdout: Sequence[
         for each in outputs_apart([record], lambda _: 1.0):
             output_state(each, model.structure)
         require_signals(record)
-    segments = cut(thinned(mended, model))
-    require_room(segments.records)
-    training = segments.of(record.name for record in records)
+    names = [record.name for record in records]
+    segments, few = with_room(cut(thinned(mended, model)), names)
+    training = segments.of(names)
     if not training:
-        raise NotExciting(" ".join(segments.warnings), tuple(record.name for record in records))
+        raise NotExciting(" ".join(segments.warnings), tuple(names))
     require_plausible_units(as_if_not_lost(segments.records), model)
-    warnings += [*model_warnings(model), *segments.warnings, *require_excitation(as_if_not_lost(training), model)]
+    warnings += [*model_warnings(model), *segments.warnings, *few, *require_excitation(as_if_not_lost(training), model)]
     unseen = segments.of(record.name for record in holdout)
     return Prepared(training, unseen, tuple(warnings), segments)

@@ -111,7 +111,7 @@ def hunts_of(view: Scene, rounds: int = 1, begun: Sequence[Hunt] = ()) -> list[H
         least = min(hunt.mean_square for hunt in hunts)
         near = [i for i, h in enumerate(hunts) if not h.stuck and h.mean_square <= IN_REACH**2 * least]
         further = [i for i in near if i not in at_rest]
-        for i, moved in zip(further, concurrently(again, [hunts[i] for i in further]), strict=True):
+        for i, moved in zip(further, each_of(view.result, again, [hunts[i] for i in further]), strict=True):
             had, hunts[i] = hunts[i].mean_square, moved
             if done + 1 >= LEAST_ROUNDS and moved.mean_square > (1.0 - WORTH_A_ROUND) * had:
                 at_rest.add(i)

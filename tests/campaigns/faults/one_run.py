@@ -11,7 +11,6 @@ from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import TextIO
 from unittest import mock
 
 from drivers.canopen.can_link import CanLink
@@ -20,7 +19,7 @@ from drivers.plc.plc import Plc
 from hil.config.rig_file import Rig
 from hil.errors import RecordingError
 from hil.recording import RecordingWriter, read_table, writer
-from hil.recording.writing_thread import WritingThread
+from hil.recording.writing_thread import Unbuffered, WritingThread
 from hil.rig import build
 from hil.rig.addresses import with_addresses
 from hil.rig.build import open_devices
@@ -73,15 +72,15 @@ class Outcome:
 class _FullDisk:
     """A file whose disk is full from a moment on."""
 
-    def __init__(self, file: TextIO, meets: _Moment) -> None:
+    def __init__(self, file: Unbuffered, meets: _Moment) -> None:
         self._file = file
         self._meets = meets
 
-    def write(self, line: str) -> int:
+    def write(self, data: bytes) -> int | None:
         if self._meets.due:
             self._meets.meet()
             raise OSError(errno.ENOSPC, "No space left on device")
-        return self._file.write(line)
+        return self._file.write(data)
 
     def close(self) -> None:
         self._file.close()
@@ -210,7 +209,7 @@ def _disk(kind: Kind, moment: _Moment) -> Iterator[None]:
     if kind.host != "disk":
         yield
         return
-    full = lambda file, capacity: WritingThread(_FullDisk(file, moment), capacity)  # type: ignore[arg-type]  # noqa: E731
+    full = lambda file, capacity: WritingThread(_FullDisk(file, moment), capacity)  # noqa: E731
     with mock.patch.object(writer, "WritingThread", full):
         yield
 

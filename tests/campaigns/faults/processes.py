@@ -13,6 +13,7 @@ import contextlib
 import random
 import re
 import signal
+import subprocess
 import sys
 import tempfile
 import time
@@ -31,7 +32,7 @@ from tests.campaigns.faults.disk import can_mount, disk
 from tests.campaigns.faults.one_run import Outcome
 from tests.campaigns.faults.rig import campaign_rig
 from tests.campaigns.faults.runs import asked_for, tried
-from tests.campaigns.faults.scene import PATIENCE_S, Place, Scene, States, scene
+from tests.campaigns.faults.scene import PATIENCE_S, NotBegun, Place, Scene, States, scene
 
 LIMIT_S = 0.25
 """Within this a dead host has to mean zero torque, with the defaults of a rig file."""
@@ -50,6 +51,11 @@ GAP_S = 0.5
 
 STEP_S = 3600
 """By how much the clock is set forward, or back [s]."""
+
+TRIES = 5
+
+BUSY = "busy machine|This machine was too busy"
+"""What a host says that this machine, and not the fault, has ended: it only has to have left the drives disarmed."""
 
 Meet = Callable[[Scene], None]
 
@@ -124,7 +130,7 @@ class Kind:
 
 KINDS: dict[str, Kind] = {
     "host killed (SIGKILL)": Kind(kill_host, by_themselves=True),
-    "host suspended (SIGSTOP), and on": Kind(suspend_host, "This machine was too busy", by_themselves=True),
+    "host suspended (SIGSTOP), and on": Kind(suspend_host, BUSY, by_themselves=True),
     "host interrupted (SIGINT)": Kind(stop_host, ""),
     "host's terminal gone (SIGHUP)": Kind(hang_up, ""),
     "bus connection cut": Kind(lambda scene: scene.bus.cut(), "CAN bus", by_themselves=True),
@@ -165,9 +171,9 @@ def run_one(kind: Kind, rig_path: Path, experiment: str, after_s: float, real_ti
     outcome = Outcome()
     with place_for(kind) as place, scene(rig_path, place, experiment, real_time) as at:
         time.sleep(after_s)
-        alive = at.host.poll() is None
         with CanLink.open(at.url) as link, contextlib.suppress(BusDown):
             states = States(link)
+            alive = at.host.poll() is None
             kind.meet(at)
             if not kind.ends_it:
                 time.sleep(LASTING_S)
@@ -177,7 +183,7 @@ def run_one(kind: Kind, rig_path: Path, experiment: str, after_s: float, real_ti
                 stop_host(at)
             if kind.meet is not kill_rig:
                 try:
-                    outcome.zero_s = states.await_no_torque(kind.by_themselves)
+                    outcome.zero_s = states.await_no_torque(lambda: kind.by_themselves or at.host.poll() is not None)
                 except TimeoutError as error:
                     outcome.problems.append(str(error))
         if kind.by_themselves and outcome.zero_s > LIMIT_S:
@@ -185,11 +191,33 @@ def run_one(kind: Kind, rig_path: Path, experiment: str, after_s: float, real_ti
         if kind.meet is suspend_host:
             time.sleep(SUSPENDED_S)
         at.host.send_signal(signal.SIGCONT)
-        _, said = at.host.communicate(timeout=PATIENCE_S)
-        outcome.said = (said or "ended") if kind.ends_it else ""
-        if alive:
+        said = _last_words(at.host, outcome)
+        if alive and (kind.cause == BUSY or not re.search(BUSY, said)):
+            outcome.said = (said or "ended") if kind.ends_it else ""
             _judge(kind, at, said, outcome)
     return outcome
+
+
+def begun(run: Callable[[], Outcome]) -> Outcome:
+    """Run, again if it did not come to begin: up to `TRIES` times."""
+    for number in range(1, TRIES + 1):
+        try:
+            return run()
+        except NotBegun as refused:
+            said = str(refused)
+            print(f"not begun, {number} of {TRIES} tries: {said.strip()}", file=sys.stderr, flush=True)
+    return Outcome(problems=[f"not begun: {said}"])
+
+
+def _last_words(host: subprocess.Popen[str], outcome: Outcome) -> str:
+    """Return what a host says until it ends; of one that does not, where each of its threads is."""
+    try:
+        return host.communicate(timeout=PATIENCE_S)[1]
+    except subprocess.TimeoutExpired:
+        host.send_signal(signal.SIGABRT)
+        said = host.communicate()[1]
+        outcome.problems.append(f"the host did not end within {PATIENCE_S:g} s: {said}")
+        return said
 
 
 def _judge(kind: Kind, at: Scene, said: str, outcome: Outcome) -> None:
@@ -209,7 +237,8 @@ def _judge(kind: Kind, at: Scene, said: str, outcome: Outcome) -> None:
 def main(arguments: list[str] | None = None) -> int:
     """Run the campaign."""
     asked = asked_for("tests.campaigns.faults.processes", 200, arguments)
-    signal.signal(signal.SIGHUP, signal.SIG_DFL)  # under nohup the hosts would outlive their terminals, too
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)  # under nohup the hosts would outlive their terminals, too,
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # and in the background of a shell ignore Ctrl-C
     with tempfile.TemporaryDirectory() as name:
         rig, kinds = campaign_rig(Path(name), by_the_clock=True), possible()
 
@@ -218,7 +247,7 @@ def main(arguments: list[str] | None = None) -> int:
             kind = list(kinds)[number % len(kinds)]
             experiment, real_time = drawn.choice(sorted(rig.experiments)), drawn.random() < 0.5
             after_s = drawn.uniform(0.0, 1.5)
-            outcome = run_one(kinds[kind], Path(name) / "rig.toml", experiment, after_s, real_time)
+            outcome = begun(lambda: run_one(kinds[kind], Path(name) / "rig.toml", experiment, after_s, real_time))
             return kind, f"after {after_s:.2f} s of {experiment}", outcome
 
         return tried(asked, one)

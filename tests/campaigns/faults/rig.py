@@ -67,8 +67,12 @@ PATIENT = (
 )
 """In simulated time only: the host's heartbeat is of the wall clock, and the machine may be busy."""
 
-LONG = (("duration_s = 0.6", "duration_s = 10.0"), ("duration_s = 1.0", "duration_s = 10.0"))
-"""By the wall clock only."""
+LONG = (
+    ("duration_s = 0.6", "duration_s = 10.0"),
+    ("duration_s = 1.0", "duration_s = 10.0"),
+    ("sdo_timeout_s = 0.2", "sdo_timeout_s = 1.0"),
+)
+"""By the wall clock only: what is looked at is how runs end, not whether a busy machine gets them to begin."""
 
 
 def campaign_rig(folder: Path, by_the_clock: bool = False) -> Rig:

@@ -6,6 +6,7 @@ import argparse
 import sys
 from collections import defaultdict
 from collections.abc import Callable
+from contextlib import suppress
 
 from tests.campaigns.faults.one_run import Outcome
 
@@ -20,13 +21,17 @@ def asked_for(program: str, runs: int, arguments: list[str] | None) -> argparse.
 
 
 def tried(asked: argparse.Namespace, one: Callable[[int], tuple[str, str, Outcome]]) -> int:
-    """Carry the runs out, each of which gives its fault, where it was met, and how it ended; 1 if one is wrong."""
+    """Carry the runs out, each of which gives its fault, where it was met, and how it ended; 1 if one is wrong.
+
+    Whoever interrupts it gets the table of those until then.
+    """
     outcomes: dict[str, list[Outcome]] = defaultdict(list)
-    for number in range(asked.first, asked.first + asked.runs):
-        kind, where, outcome = one(number)
-        outcomes[kind].append(outcome)
-        for problem in outcome.problems:
-            print(f"run {number}: {kind} {where}: {problem}", file=sys.stderr, flush=True)
+    with suppress(KeyboardInterrupt):
+        for number in range(asked.first, asked.first + asked.runs):
+            kind, where, outcome = one(number)
+            outcomes[kind].append(outcome)
+            for problem in outcome.problems:
+                print(f"run {number}: {kind} {where}: {problem}", file=sys.stderr, flush=True)
     return report(outcomes)
 
 

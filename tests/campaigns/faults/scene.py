@@ -7,7 +7,7 @@ import re
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,6 +19,10 @@ from tests.campaigns.faults.disk import Disk
 from tests.campaigns.faults.tcp_proxy import TcpProxy
 
 PATIENCE_S = 30.0
+
+
+class NotBegun(Exception):
+    """A host that ended before its drives were in operation, as on a machine that is too busy for it."""
 
 
 @dataclass
@@ -36,8 +40,8 @@ class Place:
 
     @property
     def environment(self) -> dict[str, str]:
-        """Of both processes."""
-        return {**os.environ, **({} if self.clock is None else self.clock.environment)}
+        """Of both processes, which tell where they are if they are aborted."""
+        return {**os.environ, "PYTHONFAULTHANDLER": "1", **({} if self.clock is None else self.clock.environment)}
 
 
 @dataclass
@@ -67,10 +71,10 @@ class States:
         if data[1:4] == b"\x41\x60\x00":
             self.answers[node_id] = state_of(int.from_bytes(data[4:6], "little"))
 
-    def await_no_torque(self, ask: bool) -> float:
+    def await_no_torque(self, may_ask: Callable[[], bool]) -> float:
         """Wait until neither drive is in a state that may carry torque; give how long that took [s].
 
-        Ask for the states, or listen to the answers the host gets when it disarms.
+        Ask for the states, or, where that would disturb a host, listen to the answers that it gets when it disarms.
 
         Raises
         ------
@@ -81,7 +85,7 @@ class States:
         while len(self.answers) < 2 or any(state in TORQUE_STATES for state in self.answers.values()):
             if time.monotonic() - began_s > PATIENCE_S:
                 raise TimeoutError(f"after {PATIENCE_S} s the drives are in {self.answers}")
-            for node_id in (1, 2) if ask else ():
+            for node_id in (1, 2) if may_ask() else ():
                 self.link.send(0x600 + node_id, b"\x40\x41\x60\x00\x00\x00\x00\x00")
             time.sleep(0.003)
         return time.monotonic() - began_s
@@ -131,5 +135,5 @@ def _await_operation(url: str, host: subprocess.Popen[str]) -> None:
             )
         while list(states.values()) != [PowerState.OPERATION_ENABLED] * 2:
             if host.poll() is not None:
-                raise AssertionError(host.communicate())
+                raise NotBegun(host.communicate()[1])
             time.sleep(0.01)

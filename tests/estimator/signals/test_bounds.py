@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import math
 import tracemalloc
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from estimator.diagnosis.preconditions.room import require_room
+from estimator.diagnosis.preconditions.room import MOST, with_room
+from estimator.diagnosis.segments import cut
 from estimator.diagnosis.unnamed.orders import LONGEST_TRAVEL, peaks
-from estimator.errors import BadSetting, BadShape
+from estimator.errors import BadSetting
 from estimator.identification.identify import identify
 from estimator.signals.decimate import MOST_FACTOR, Decimator
+from estimator.signals.part import sliced
 from estimator.signals.record import Record
 
 N = 3000
@@ -35,11 +39,28 @@ def test_samples_far_too_fast_for_the_models_are_refused_without_a_filter_for_th
     assert Decimator(0.02 / MOST_FACTOR, MOST_FACTOR).delay_samples > 0
 
 
-def test_more_recordings_than_a_fit_can_hold_are_refused() -> None:
+def named(count: int, samples: int = N) -> list[Record]:
+    whole = record(0.01)
+    return [replace(sliced(whole, slice(0, samples)), name=f"run_{i}") for i in range(count)]
+
+
+@pytest.mark.parametrize(("count", "samples"), [(50, N), (13, N), (200, 300), (800, 100)])
+def test_of_more_recordings_than_a_fit_can_hold_some_of_every_part_are_used(count: int, samples: int) -> None:
     """Fifty of 3000 rows took 7 GiB: each has unknowns of its own, and a fit every sample for every unknown."""
-    require_room([record(0.01)] * 30)
-    with pytest.raises(BadShape, match=r"50 recordings .* of 150000 samples in all: expected at most"):
-        require_room([record(0.01)] * 50)
+    records = named(count, samples)
+    segments, (warning,) = with_room(cut(records), [each.name for each in records])
+    used = [int(each.name.removeprefix("run_")) for each in segments.records]
+    assert used == sorted(set(used))
+    assert MOST / 2 < len(used) ** 2 * samples <= MOST
+    assert max(np.diff([-1, *used, count])) <= 2 * math.ceil(count / len(used))
+    assert warning.startswith(f"{len(used)} of {count} recordings are used")
+    assert len({i % 2 for i in used}) == len({i % 3 for i in used}) - 1 == 2  # kinds that take turns are all there
+
+
+def test_what_there_is_room_for_is_used_whole_and_what_is_held_back_takes_none() -> None:
+    records = named(50)
+    segments = cut(records)
+    assert with_room(segments, ["run_3", "run_5"]) == (segments, [])
 
 
 @pytest.mark.parametrize("travel_rad", [1e6, 1e9, 1e12])
