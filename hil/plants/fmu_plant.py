@@ -21,7 +21,7 @@ from estimator.diagnosis.segments import tiles
 from estimator.physics.free_run import FreeRun
 from estimator.physics.model import Motion
 from estimator.physics.start import Start
-from estimator.signals.record import FloatArray, Record
+from estimator.signals.record import FloatArray, OutputKind, Record
 from hil.errors import UsageError
 from hil.plants.names import Names, names
 
@@ -73,7 +73,8 @@ class FmuPlant:
         except Exception as error:
             raise UsageError(f"{path}: expected an FMU of FMI 1.0, 2.0 or 3.0, came: {error}") from error
         variables = {each.name: each for each in self._described.modelVariables}
-        self._names = names(mapped, variables)
+        self._mapped, self._known = tuple(mapped), tuple(variables)
+        names(mapped, variables)
         given = {name: each for name, each in variables.items() if each.causality == "input"}
         self._inputs = {name: float(each.start or 0.0) for name, each in given.items() if each.type in NUMBERS}
 
@@ -89,22 +90,23 @@ class FmuPlant:
         return FreeRun(output, float(np.sqrt(np.mean(error**2))), longest.start)
 
     def _run(self, record: Record) -> FreeRun:
-        unknown = _Unknown.of(self._names, record)
+        named = names(self._mapped, self._known, record.kind)
+        unknown = _Unknown.of(named, record)
         x = unknown.guess
-        output = self._simulated(record, unknown, x)
+        output = self._simulated(record, named, unknown, x)
         for _ in range(ROUNDS if x.size else 0):
-            moved = [self._simulated(record, unknown, x + SMALL * row) for row in np.eye(x.size)]
+            moved = [self._simulated(record, named, unknown, x + SMALL * row) for row in np.eye(x.size)]
             slopes = np.array([(each - output)[record.okay] / SMALL for each in moved]).T
             step = np.linalg.lstsq(slopes, (record.output - output)[record.okay], rcond=None)[0]
             x = x + step
-            output = self._simulated(record, unknown, x)
+            output = self._simulated(record, named, unknown, x)
             if np.abs(step).max() < SMALL * SMALL:
                 break
         error = (output - record.output)[record.okay]
-        load = float(x[0] * unknown.scale[0]) if self._names.load else float("nan")
+        load = float(x[0] * unknown.scale[0]) if named.load else float("nan")
         return FreeRun(output, float(np.sqrt(np.mean(error**2))), Start(load, 0.0, float("nan")))
 
-    def _simulated(self, record: Record, unknown: _Unknown, x: FloatArray) -> FloatArray:
+    def _simulated(self, record: Record, named: Names, unknown: _Unknown, x: FloatArray) -> FloatArray:
         values = dict(zip(unknown.names, (x * unknown.scale).tolist(), strict=True))
         held = {name: value for name, value in values.items() if name in self._inputs}
         start = {name: value for name, value in values.items() if name not in self._inputs}
@@ -120,18 +122,18 @@ class FmuPlant:
                     step_size=record.sample_time_s if kind == "CoSimulation" else None,
                     output_interval=record.sample_time_s,
                     start_values=start,
-                    input=self._given(record, since_s, held, kind),
-                    output=[self._names.output],
+                    input=self._given(record, named, since_s, held, kind),
+                    output=[named.output],
                 )
         except Exception as error:
             raise UsageError(f"{self.name}: expected an FMU that simulates {record.name}, came: {error}") from error
-        return np.asarray(np.interp(since_s, result["time"], result[self._names.output]), dtype=np.float64)
+        return np.asarray(np.interp(since_s, result["time"], result[named.output]), dtype=np.float64)
 
-    def _given(self, record: Record, since_s: FloatArray, held: dict[str, float], kind: str) -> Any:
+    def _given(self, record: Record, named: Names, since_s: FloatArray, held: dict[str, float], kind: str) -> Any:
         """Return FMPy's table of inputs; each torque is held until the next, in model exchange by a step."""
-        torques = record.torque_nm if len(self._names.torque) > 1 else record.total_torque_nm[:, np.newaxis]
+        torques = record.torque_nm if len(named.torque) > 1 else record.total_torque_nm[:, np.newaxis]
         still = {name: np.full(since_s.size, value) for name, value in self._inputs.items()}
-        columns = {"time": since_s, **still, **dict(zip(self._names.torque, torques.T, strict=False))}
+        columns = {"time": since_s, **still, **dict(zip(named.torque, torques.T, strict=False))}
         columns |= {name: np.full(since_s.size, value) for name, value in held.items()}
         rows = np.zeros(since_s.size, dtype=[(name, float) for name in columns])
         for name, values in columns.items():
@@ -157,9 +159,10 @@ class _Unknown:
         first = float(record.output[record.okay][0])
         scales = [(known.load, SHARE_OF_RANGE * torque or 1.0, 0.0)] if known.load else []
         size = SHARE_OF_RANGE * output or 1.0
+        measured = "angle" if record.kind is OutputKind.POSITION else "speed"
         for name in known.start:
-            is_speed = "speed" in name
-            scales.append((name, size if is_speed else SHARE_OF_RANGE * size, first / size if is_speed else 0.0))
+            is_measured = measured in name
+            scales.append((name, size if is_measured else SHARE_OF_RANGE * size, first / size if is_measured else 0.0))
         return cls(
             tuple(n for n, _, _ in scales), np.array([s for _, s, _ in scales]), np.array([g for *_, g in scales])
         )

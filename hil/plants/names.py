@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
+from estimator.signals.record import OutputKind
 from hil.errors import UsageError
 
 KEYS = ("torque", "output", "load", "start")
@@ -32,7 +33,11 @@ class Names:
     start: tuple[str, ...] = ("start.speed", "start.twist", "start.load_speed")
 
 
-def names(given: Sequence[str], known: Collection[str]) -> Names:
+OF_A_POSITION = Names(output="angle_motor", start=("start.angle", *Names().start))
+"""What a recorded position is held against."""
+
+
+def names(given: Sequence[str], known: Collection[str], kind: OutputKind = OutputKind.SPEED) -> Names:
     """Return the names that ``--map`` gives, the others as ``hil export fmu`` writes them.
 
     Parameters
@@ -41,6 +46,8 @@ def names(given: Sequence[str], known: Collection[str]) -> Names:
         ``KEY=NAME,...`` each.
     known : collection of str
         The variables that the FMU has.
+    kind : OutputKind
+        What is measured.
 
     Raises
     ------
@@ -52,7 +59,7 @@ def names(given: Sequence[str], known: Collection[str]) -> Names:
         if key not in KEYS or not sign:
             raise UsageError(f"--map {key}{sign}: expected KEY=NAME, KEY one of {', '.join(KEYS)}")
     mapped = {key: tuple(name.strip() for name in value.split(",") if name.strip()) for key, _, value in entries}
-    standard = Names()
+    standard = OF_A_POSITION if kind is OutputKind.POSITION else Names()
     found = replace(
         standard,
         torque=mapped.get("torque", tuple(name for name in standard.torque if name in known)),

@@ -34,6 +34,7 @@ def comparison_summary(comparisons: Sequence[Sequence[Comparison]]) -> Table:
 
 
 def _figures(each: Comparison) -> tuple[str, ...]:
-    used = f"{int(each.record.okay.sum())}/{each.record.okay.size}"
+    good, size = int(each.record.okay.sum()), each.record.okay.size
+    used = str(size) if good == size else f"{good}/{size}"
     figures = (each.rms, each.largest, each.fit_percent, each.load_torque)
     return (*map(shown, figures), used, shown_p(each.past_input.p_value))

@@ -80,7 +80,7 @@ def test_a_full_disk_takes_the_files_but_not_the_verdict(
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("hil.report.diagnosis_html.diagnosis_page", full)
+    monkeypatch.setattr("hil.report.diagnosis_files.write_model", full)
     out = tmp_path / "result"
     arguments = [str(bench_folder / "run_1.csv"), "--model", str(bench_folder / "drive.toml"), "--json"]
     assert run(["diagnose", *arguments, "--out", str(out)]) == 2
