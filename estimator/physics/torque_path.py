@@ -23,7 +23,7 @@ _LIMIT_SUM = slot("torque_saturation", "limit_sum_nm")
 _DEPTH = slot("torque_derating", "depth")
 _DERATING_TIME = slot("torque_derating", "time_constant_s")
 _HEATED = slot("torque_derating", "heating_nm")
-_DECLARED = [
+DECLARED = [
     (e.acting.law, [slot(e.name, each.name) for each in e.parameters], e.parameters[0].null)
     for e in BUILT_IN.values()
     if e.acting is not None and e.acting.place is Place.TORQUE
@@ -31,7 +31,7 @@ _DECLARED = [
 """Laws of entries at this place, where their parameters are, and at which value of the first they do nothing."""
 
 _WRITTEN = [_GAIN_M1, _GAIN_M2, _LIMIT_M1, _LIMIT_M2, _SHARPNESS, _LIMIT_SUM, _DEPTH, _DERATING_TIME, _HEATED]
-_PATH = np.array([*_WRITTEN, *(place for _, places, _ in _DECLARED for place in places)])
+_PATH = np.array([*_WRITTEN, *(place for _, places, _ in DECLARED for place in places)])
 """Where all stands that ``shaft_torque`` depends on."""
 
 
@@ -100,7 +100,7 @@ def shaft_torque_from(
         columns = [limited(torque, limit, p[_SHARPNESS]) for torque, limit in zip(torque_nm.T, limits, strict=False)]
         torque_nm = np.column_stack([*columns, torque_nm[:, limits.size :]])
     total: FloatArray = limited(functools.reduce(np.add, torque_nm.T), p[_LIMIT_SUM], p[_SHARPNESS])
-    for law, places, null in _DECLARED:
+    for law, places, null in DECLARED:
         if p[places[0]] != null:
             total = law(total, since_start_s, *p[places])
     if p[_DEPTH] == 0.0:

@@ -25,10 +25,13 @@ _OPERATORS = {
     ast.NotEq: "!=", ast.BitAnd: "&", ast.BitOr: "|",
 }  # fmt: skip
 _CONSTANTS = {math.inf: "INFINITY", -math.inf: "-INFINITY"}
+_OF_MATH = ("sin", "cos", "exp", "expm1", "log", "sqrt", "copysign", "ceil")
 _FUNCTIONS: dict[Any, str] = {
-    getattr(math, name): name for name in ("sin", "cos", "exp", "expm1", "log", "sqrt", "copysign", "ceil")
-} | {abs: "fabs", np.abs: "fabs", np.copysign: "copysign", min: "lesser", max: "greater", np.minimum: "lesser",
-     np.maximum: "greater"}  # fmt: skip
+    **{getattr(module, name): name for module in (math, np) for name in _OF_MATH},
+    **dict.fromkeys((abs, np.abs), "fabs"),
+    **dict.fromkeys((min, np.minimum), "lesser"),
+    **dict.fromkeys((max, np.maximum), "greater"),
+}
 _TRANSPARENT = (abreast.every, abreast.some, abreast.like, abreast.lent, np.asarray)
 """Functions that return their first argument where there is one number only."""
 

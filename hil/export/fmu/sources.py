@@ -46,7 +46,18 @@ def laws() -> str:
         unit.function(function)
     unit.function(torque_path.limited, of_one_number=True)
     head = "/* The laws of hil, translated from Python. The functions are named after their module. */\n"
-    return head + unit.text()
+    torque = _torque_laws(unit)  # before the text: it asks for functions
+    return head + unit.text() + torque
+
+
+def _torque_laws(unit: Translation) -> str:
+    """Return the C function of the laws that entries declare for the torque, one behind the other."""
+    lines = ["static double laws_torque(double torque, double time_s, Array p) {"]
+    for law, at, null in torque_path.DECLARED:
+        name, _ = unit.function(law, of_one_number=True)
+        values = ", ".join(["torque", "time_s", *(f"p.at[{place}]" for place in at)])
+        lines.append(f"    if (p.at[{at[0]}] != {_number(null)}) torque = {name}({values});")
+    return "\n".join((*lines, "    return torque;", "}", ""))
 
 
 def model_header(d: Driveline, token: str) -> str:

@@ -80,6 +80,7 @@ def continuous(d: Driveline) -> list[int]:
         "loading": p[slots.SLIDER] != 0.0,
         "vehicle_speed": p[slots.SLIP] > 0.0,
         "traction": p[slots.RELAXATION] > 0.0,
+        "relaxing": p[slots.RELAXING] > 0.0,
         "branch_twist": p[slots.BRANCH_INERTIA] > 0.0 or within,
         "branch_speed": p[slots.BRANCH_INERTIA] > 0.0 or within,
         "middle_twist": masses > 2,

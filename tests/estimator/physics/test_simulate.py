@@ -116,7 +116,9 @@ def test_the_output_is_a_state(kind: OutputKind, location: Location, state: int)
     ("kind", "location", "structure"),
     [
         (OutputKind.SPEED, Location.LOAD, Structure.ONE_MASS),
-        (OutputKind.POSITION, Location.LOAD, Structure.TWO_MASS),
+        (OutputKind.POSITION, Location.LOAD, Structure.ONE_MASS),
+        (OutputKind.TORQUE, Location.SHAFT, Structure.ONE_MASS),
+        (OutputKind.SPEED, Location.SHAFT, Structure.TWO_MASS),
         (OutputKind.FORCE, Location.MOTOR, Structure.TWO_MASS),
     ],
 )

@@ -87,11 +87,11 @@ static void passed(const History *past, double before, double begin, double end,
 
 /* ---- from the inverters' torques to the one on the shaft ---- */
 
-static double summed(const Driveline *d) {
+static double summed(Driveline *d) {
     const double *p = d->value + PARAMETER;
     double m1 = torque_path_limited(d->value[T_M1] * p[GAIN_M1], p[LIMIT_M1], p[LIMIT_SHARPNESS]);
     double m2 = torque_path_limited(d->value[T_M2] * p[GAIN_M2], p[LIMIT_M2], p[LIMIT_SHARPNESS]);
-    return torque_path_limited(m1 + m2, p[LIMIT_SUM], p[LIMIT_SHARPNESS]);
+    return laws_torque(torque_path_limited(m1 + m2, p[LIMIT_SUM], p[LIMIT_SHARPNESS]), d->value[TIME], parameters(d));
 }
 
 static double warmth(const Driveline *d) { /* 1: as warm as they get; heated by the torque's losses it is a state */
@@ -99,7 +99,7 @@ static double warmth(const Driveline *d) { /* 1: as warm as they get; heated by 
     return p[HEATED] > 0.0 ? d->value[STATE + WARMTH] : -expm1(-d->value[TIME] / p[DERATING_TIME]);
 }
 
-static double on_shaft(const Driveline *d) {
+static double on_shaft(Driveline *d) {
     double depth = d->value[PARAMETER + DEPTH];
     return depth == 0.0 ? summed(d) : summed(d) * (1.0 - depth * warmth(d));
 }
@@ -231,7 +231,7 @@ void driveline_update(Driveline *d) {
     drive = late ? rest[LAGGED] : supplied;
     State moving = rates_rates(made, conditions_with_torque(felt, drive), x, p);
     memcpy(rate, &moving, sizeof moving);
-    double read = sensing_reading(sensing_entry(x, OUTPUT), angle, p);
+    double read = sensing_reading(sensing_entry(x, OUTPUT, p), angle, p);
     if (p.at[FILTER] > 0.0)
         pass(read, rest[FILTERED], rest[FILTER_RISE], p.at[FILTER], p.at[FILTER_SHAPE], rate + FILTERED);
     if (p.at[HEATED] > 0.0) {
@@ -242,5 +242,5 @@ void driveline_update(Driveline *d) {
     v[SPEED_MOTOR] = x.speed;
     v[ANGLE_MOTOR] = x.angle;
     v[SPEED_LOAD] = MASSES == 1 ? x.speed : x.load_speed;
-    v[TORQUE_SHAFT] = MASSES == 1 ? 0.0 : rates_shaft_torques(made, moving.twist, felt, x, p).item0;
+    v[TORQUE_SHAFT] = MASSES == 1 ? 0.0 : rates_shaft_torques(made, moving.twist, felt, x, p).item0 + x.relaxing;
 }
