@@ -177,9 +177,6 @@ def run_one(kind: Kind, rig_path: Path, experiment: str, after_s: float, real_ti
             kind.meet(at)
             if not kind.ends_it:
                 time.sleep(LASTING_S)
-                alive = at.host.poll() is None
-                if not alive:
-                    outcome.problems.append("the run ended")
                 stop_host(at)
             if kind.meet is not kill_rig:
                 try:
@@ -192,10 +189,15 @@ def run_one(kind: Kind, rig_path: Path, experiment: str, after_s: float, real_ti
             time.sleep(SUSPENDED_S)
         at.host.send_signal(signal.SIGCONT)
         said = _last_words(at.host, outcome)
-        if alive and (kind.cause == BUSY or not re.search(BUSY, said)):
+        if alive and not _was_busy(kind, said):
             outcome.said = (said or "ended") if kind.ends_it else ""
             _judge(kind, at, said, outcome)
     return outcome
+
+
+def _was_busy(kind: Kind, said: str) -> bool:
+    """Tell whether a host names this machine, and not the fault."""
+    return re.search(BUSY, said) is not None and not (kind.cause and re.search(kind.cause, said))
 
 
 def begun(run: Callable[[], Outcome]) -> Outcome:
