@@ -166,7 +166,9 @@ def load_friction(wheel: float, vehicle: float, now: Conditions, p: FloatArray) 
 @inlined
 def load_angle(line: Line, x: State, p: FloatArray) -> float:
     """Return the angle of the load [rad]."""
-    angle = x.angle - x.twist - x.middle_twist
+    angle = x.angle - x.twist
+    if line.masses == 3:
+        angle -= x.middle_twist
     return angle - x.branch_twist if line.extended and is_within(p) else angle
 
 
