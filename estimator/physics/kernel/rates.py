@@ -16,7 +16,7 @@ from estimator.physics.kernel import slots
 from estimator.physics.kernel.conditions import line_share
 from estimator.physics.kernel.declared import held_by_angle, load_drag, motor_drag, shaft_loss
 from estimator.physics.kernel.line import Line
-from estimator.physics.kernel.sensing import angle_at_load, entry
+from estimator.physics.kernel.sensing import entry
 from estimator.physics.kernel.state_vector import SHAFT_TORQUE, Conditions, State
 from estimator.physics.laws import beyond_gap, dry_friction, smooth_sign
 from estimator.signals.record import FloatArray
@@ -194,7 +194,10 @@ def load_friction(wheel: float, vehicle: float, now: Conditions, p: FloatArray) 
 @inlined
 def load_angle(line: Line, x: State, p: FloatArray) -> float:
     """Return the angle of the load [rad]."""
-    return angle_at_load(x, p) if line.extended else x.angle - x.twist - x.middle_twist
+    angle = x.angle - x.twist
+    if line.masses == 3:
+        angle -= x.middle_twist
+    return angle - x.branch_twist if line.extended and is_within(p) else angle
 
 
 @inlined

@@ -47,13 +47,17 @@ EFFECTS: dict[str, Mapping[str, Mapping[str, float]]] = {
     "a brake that sticks": {"brake_drag": {"brake_nm": 30.0, "presliding_rad": 1e-4, "from_s": 0.5, "to_s": 1.503}},
     "a while": {"stiffness_change": {"change": -0.3, "from_s": 1.0, "to_s": 2.503}},
     "a brake": {"brake_drag": {"brake_nm": 30.0, "from_s": 0.5, "to_s": 1.503}},
+    "a branch that relaxes": {"viscoelastic_shaft": {"branch_share": 0.4, "relaxation_s": 0.02}},
+    "a spring to the ground": {"grounded_spring": {"stiffness_nm_per_rad": 300.0}},
+    "an offset": {"torque_bias": {"offset_nm": 9.0, "time_constant_s": 1.0}},
     "a ripple": {"torque_ripple": {"amplitude_nm": 2.0, "order": 6.0}},
 }
 WITHOUT_BRISTLES = {("stribeck_friction", "excess_nm"), ("stribeck_friction", "coulomb_nm")}
 """What bends the line unless friction is told by bristles."""
 
 LINES = {"one mass": ONE_MASS, "two masses": TWO_MASS, "three masses": THREE_MASS}
-OF_ONE_MASS = ("nothing", "delay", "lag", "filter", "drift", "a brake", "a brake that sticks", "a ripple")
+BESIDE_THE_LINE = ("delay", "lag", "filter", "drift", "an offset")
+OF_ONE_MASS = ("nothing", *BESIDE_THE_LINE, "a spring to the ground", "a brake", "a brake that sticks", "a ripple")
 
 
 def line_with(values: Mapping[str, float], effects: Mapping[str, Mapping[str, float]]) -> DrivelineModel:
@@ -119,7 +123,7 @@ def test_dry_friction_is_constant_on_one_side_of_zero(begun: float, ended: float
 
 
 def test_whatever_bends_in_the_catalogue_takes_the_sub_steps() -> None:
-    """By its place in no list: a new effect is not taken for linear before somebody says so."""
+    """A new effect is not taken for linear before its entry says so."""
     nulls = flat(model(TWO_MASS))
     elastic = Line(2, True, False, False)
     for name, entry in BUILT_IN.items():
