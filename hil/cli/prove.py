@@ -171,13 +171,13 @@ def real(
 def _real_cases(folder: Path) -> list[dict[str, Any]]:
     """Return what was made of real recordings; nothing where none were asked for."""
     from hil.errors import UsageError
-    from hil.parse_json import parse_json
+    from hil.parse_json import read_json
 
     path = folder / "real.json"
     if not path.exists():
         return []
     try:
-        cases: list[dict[str, Any]] = parse_json(path.read_text(encoding="utf-8"))["cases"]
+        cases: list[dict[str, Any]] = read_json(path)["cases"]
     except (ValueError, KeyError, TypeError) as error:
         raise UsageError(f"{path}: expected what hil prove real has written, came: {error}. Remove it.") from error
     return cases

@@ -17,7 +17,7 @@ from hil import __version__
 from hil.commission.record import Status, StepRecord, now_utc
 from hil.errors import UsageError
 from hil.inside import is_inside
-from hil.parse_json import parse_json
+from hil.parse_json import read_json
 
 SCHEMA: Final = "hil.commission/1"
 FILE_NAME: Final = "commission.json"
@@ -113,7 +113,7 @@ def load_state(folder: Path, names: Iterable[str]) -> State | None:
     if not path.exists():
         return None
     try:
-        document = parse_json(path.read_text(encoding="utf-8"))
+        document = read_json(path)
         if document["schema"] != SCHEMA:
             raise ValueError(f"schema {document['schema']!r}")
         steps = {name: _step(folder, document["steps"].get(name)) for name in names}

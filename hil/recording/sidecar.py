@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from hil.errors import RecordingError
-from hil.parse_json import parse_json
+from hil.parse_json import read_json
 from hil.recording.kinds import Kind
 from hil.recording.no_room import no_room
 
@@ -77,7 +77,7 @@ def write_sidecar(recording: Path, said: Sidecar, needed: bool = False) -> None:
 def is_sidecar(path: Path) -> bool:
     """Whether a file is one of ours."""
     try:
-        content = parse_json(path.read_text(encoding="utf-8"))
+        content = read_json(path)
     except (OSError, ValueError):
         return False
     return isinstance(content, dict) and content.get(SCHEMA_KEY) == SCHEMA
@@ -95,7 +95,7 @@ def read_sidecar(recording: Path) -> Sidecar:
     if not path.is_file():
         return Sidecar()
     try:
-        content = parse_json(path.read_text(encoding="utf-8"))
+        content = read_json(path)
         if not isinstance(content, dict) or content.get(SCHEMA_KEY) != SCHEMA:
             return Sidecar()
         types = {name: Kind(kind) for name, kind in _texts(content.get(TYPES_KEY)).items()}

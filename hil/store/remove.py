@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from hil.errors import RecordingError, UsageError
-from hil.parse_json import parse_json
+from hil.parse_json import read_json
 from hil.recording.checksum import CHECKSUM
 from hil.recording.formats import FORMATS, read_metadata
 from hil.recording.sidecar import is_sidecar
@@ -71,7 +71,7 @@ def remove_files(entry: RunEntry) -> list[Path]:
 
 def _is_course(path: Path) -> bool:
     try:
-        document = parse_json(path.read_text(encoding="utf-8"))
+        document = read_json(path)
     except (OSError, ValueError):
         return False
     return isinstance(document, dict) and document.get("schema") == ONLINE_SCHEMA

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from hil.errors import HilError
-from hil.parse_json import parse_json
+from hil.parse_json import read_json
 from hil.store.entry import DIAGNOSIS, IDENTIFICATION, ONLINE, Attachment
 from hil.store.run_store import RunStore, store_of
 
@@ -93,7 +93,7 @@ def _has(attachments: Sequence[Attachment], kind: str, path: Path) -> bool:
 def recordings_named(path: Path) -> frozenset[str]:
     """Return the recordings, by stem, that a diagnosis.json or identification.json speaks of."""
     try:
-        document = parse_json(path.read_text(encoding="utf-8"))
+        document = read_json(path)
     except (OSError, ValueError):  # not one of ours, or damaged: it names none
         return frozenset()
     return frozenset(_names(document if isinstance(document, dict) else {}))

@@ -22,13 +22,14 @@ from drivers.resources import data_file
 from hil.cli.main import run
 from hil.config.problems import read_toml
 from hil.errors import InputError, RecordingError, RigFileError
-from hil.parse_json import parse_json
+from hil.parse_json import LARGEST_BYTES, parse_json, read_json
 from hil.recording import Table, read_table, write_table
 from hil.recording.sidecar import sidecar_of
 from hil.rig import replay as replaying
 from hil.rig.blf_file import CONTAINER_BYTES
 from hil.rig.replay import replay
 from hil.rig.trace_file import read_frames
+from hil.store.results import recordings_named
 from tests.rig.serving import small_rig
 
 DEEP = 3000
@@ -78,6 +79,18 @@ def test_what_is_no_file_of_a_person_is_refused_and_not_read_to_its_end(tmp_path
         path.write_bytes(b"# comment\n" * (2 << 20))
     with pytest.raises(RigFileError, match="expected a readable TOML file"):
         read_toml(path, RigFileError)
+
+
+def test_json_is_not_read_to_the_end_of_a_file_that_has_none(tmp_path: Path) -> None:
+    endless = tmp_path / "run.csv.json"
+    endless.symlink_to("/dev/zero")
+    with pytest.raises(ValueError, match=f"more than {LARGEST_BYTES >> 20} MB"):
+        read_json(endless)
+    large = tmp_path / "large.json"
+    large.write_bytes(b"[" + b" " * LARGEST_BYTES + b"]")
+    with pytest.raises(ValueError, match=f"more than {LARGEST_BYTES >> 20} MB"):
+        read_json(large)
+    assert recordings_named(large) == frozenset()
 
 
 JSON = {

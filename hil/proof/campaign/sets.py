@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from hil.errors import RecordingError
-from hil.parse_json import parse_json
+from hil.parse_json import read_json
 from hil.proof.campaign.run import write_summary
 from hil.proof.campaign.statistics import Row
 
@@ -37,7 +37,7 @@ def _rows(path: Path) -> list[Row]:
             path, f"expected the scoreboard of an opened set, it is not there. hil prove open {path.parent}"
         )
     try:
-        rows: list[Row] = parse_json(path.read_text(encoding="utf-8"))["cases"]
+        rows: list[Row] = read_json(path)["cases"]
     except (ValueError, KeyError, TypeError) as error:
         raise RecordingError(path, f"expected a scoreboard with its cases, came another file ({error}).") from error
     return rows

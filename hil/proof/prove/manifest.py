@@ -15,7 +15,7 @@ from typing import Any
 
 from hil.errors import UsageError
 from hil.inside import is_inside, is_plain
-from hil.parse_json import parse_json
+from hil.parse_json import read_json
 from hil.proof.seal import SealBroken, canonical_json
 
 CASES, SEALED, VERDICTS = "cases", "sealed", "verdicts"
@@ -91,7 +91,7 @@ def read_list(path: Path, advice: str) -> dict[str, Any]:
         If there is none, it is damaged, or a name in it is more than that; with advice.
     """
     try:
-        listed = parse_json(path.read_text(encoding="utf-8"))
+        listed = read_json(path)
     except OSError as error:
         raise UsageError(f"{path}: expected a list of cases, can't be read: {error.strerror}; {advice}") from error
     except ValueError as error:

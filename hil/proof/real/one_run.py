@@ -12,7 +12,7 @@ import numpy as np
 
 from estimator.diagnosis.holdout import blocks
 from estimator.signals.record import BoolArray
-from hil.parse_json import parse_json
+from hil.parse_json import read_json
 from hil.proof.command import CommandFailed
 from hil.proof.real.ask import AFTER, BEFORE, Answer, ask
 from hil.proof.real.black_box.compare import Split, compare
@@ -53,7 +53,7 @@ def make_run(folder: Path, case: CaseFile, run: RunEntry, data: Path, out: Path,
     asked, key = (_key(folder, names) for names in ((CASE, MODEL), (CASE, MODEL, TRUTH)))
     kept = out / KEPT
     if kept.exists():
-        content = parse_json(kept.read_text(encoding="utf-8"))
+        content = read_json(kept)
         if content["key"] == key and content["run"]["fault"] is None:
             return run_from(content["run"])
     began = time.perf_counter()

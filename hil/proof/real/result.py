@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from hil.parse_json import parse_json
+from hil.parse_json import read_json
 from hil.proof.real.judge import Agreement
 from hil.report.numbers import json_number
 
@@ -133,7 +133,7 @@ def read_results(path: Path) -> list[RealResult]:
     ValueError
         If the file is of another schema.
     """
-    content = parse_json(path.read_text(encoding="utf-8"))
+    content = read_json(path)
     if content.get("schema") != SCHEMA:
         raise ValueError(f"{path}: expected the schema {SCHEMA}, came {content.get('schema')!r}. Make it again.")
     return [_result(case) for case in content["cases"]]

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from hil.errors import UsageError
-from hil.parse_json import parse_json
+from hil.parse_json import read_json
 from hil.proof.prove.make import Progress
 from hil.proof.wire.concealed import WIRED
 from hil.proof.wire.drive import Row, drive
@@ -56,7 +56,7 @@ def read_rows(out: Path) -> list[Row]:
     if not path.exists():
         return []
     try:
-        data = parse_json(path.read_text(encoding="utf-8"))
+        data = read_json(path)
         rows: list[Row] = data["rigs"]
     except (ValueError, KeyError, TypeError) as error:
         raise UsageError(

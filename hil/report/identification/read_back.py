@@ -18,7 +18,7 @@ from estimator.identification.online.adaptation import Adaptation
 from estimator.signals.record import FloatArray
 from hil.config.problems import validate
 from hil.errors import FileProblem, UsageError
-from hil.parse_json import parse_json
+from hil.parse_json import read_json
 
 
 class _Part(BaseModel):
@@ -131,7 +131,7 @@ def _chosen(path: Path, entries: Sequence[_Recording], run: str | None, option: 
 
 def _json(path: Path) -> dict[str, Any]:
     try:
-        found = parse_json(path.read_text(encoding="utf-8"))
+        found = read_json(path)
     except OSError as cause:
         raise FileProblem(path, f"the file | expected identification.json | came: {cause.strerror}") from cause
     except UnicodeDecodeError as cause:

@@ -54,7 +54,7 @@ STEP_S = 3600
 
 TRIES = 5
 
-BUSY = "busy machine|This machine was too busy"
+BUSY = "busy machine|This machine was too busy|RPDO timeout"
 """What a host says that this machine, and not the fault, has ended: it only has to have left the drives disarmed."""
 
 Meet = Callable[[Scene], None]
