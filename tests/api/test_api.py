@@ -66,7 +66,7 @@ def test_a_recording_as_a_table_and_a_picture(recording: Path) -> None:
 
 
 def test_a_diagnosis_shows_and_saves_itself(model: Path, recording: Path, tmp_path: Path) -> None:
-    result = hil.diagnose(recording, model)
+    result = hil.diagnose(recording, model, budget_s=300)
     assert result.verdict == "no_mismatch"
     assert repr(result).startswith("<Nothing is missing")
     assert "no mismatch" in result._repr_html_()

@@ -34,7 +34,8 @@ def test_compare_and_simulate_give_the_error_of_the_diagnosis(
 ) -> None:
     recording, model, out = tmp_path / "run_1.csv", bench.model(tmp_path / "drive.toml"), tmp_path / "out"
     flagged(recording)
-    assert run(["diagnose", str(recording), "--model", str(model), "--out", str(out)]) == 0
+    command = ["diagnose", str(recording), "--model", str(model), "--out", str(out), "--budget-s", "300"]
+    assert run(command) == 0
     told = json.loads((out / "diagnosis.json").read_text())["fit"]["augmented"]
     augmented = str(out / "augmented.toml")
     used = tomllib.loads(Path(augmented).read_text())["prepared"]["recordings"][0]
