@@ -15,7 +15,7 @@ from estimator.physics.effects import (
 from estimator.physics.kernel import slots
 from estimator.physics.kernel.conditions import line_share
 from estimator.physics.kernel.declared import held_by_angle, load_drag, motor_drag, shaft_loss
-from estimator.physics.kernel.line import Line
+from estimator.physics.kernel.line import Line, is_within
 from estimator.physics.kernel.sensing import entry
 from estimator.physics.kernel.state_vector import SHAFT_TORQUE, Conditions, State
 from estimator.physics.laws import beyond_gap, dry_friction, smooth_sign
