@@ -200,7 +200,7 @@ def test_a_wrong_line_is_refused_by_its_key(tmp_path: Path, line: str, said: str
         ),
         (
             "[signals]\nspeed = { column = 'v', at = 'roof' }",
-            "signals.speed.at | expected 'motor' or 'load' | came 'roof'",
+            "signals.speed.at | expected 'motor', 'load' or 'shaft' | came 'roof'",
         ),
         (
             "[signals]\nspeed = { column = 'v', scale = 0 }",

@@ -86,6 +86,7 @@ def test_the_text_is_strict_json_of_the_contract(diagnosis: Diagnosis) -> None:
         "holdout_retuned": 1.38,
         "holdout_augmented": 0.0533,
         "noise_floor": 0.0502,
+        "outputs": [],
     }
     assert content["parameters"]["b_L"] == {
         "nominal": 0.9,

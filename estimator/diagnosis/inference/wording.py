@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from estimator.diagnosis.inference.data_sheet import in_words
 from estimator.diagnosis.inference.verdict import Decision
 from estimator.diagnosis.phrases import PLACE_NAMES, times
 from estimator.diagnosis.result import Fit, FoundEffect, Remainder, Stray, UntestableEffect, Verdict
+
+SURE = 0.999
+"""Probability from which a sentence gives no more digits."""
 
 
 def statement(
@@ -26,13 +30,21 @@ def statement(
         parts.append(f"Too small to count, but seen: {', '.join(each.name for each in decision.traces)}.")
     twins = sorted({twin for effect in effects for twin in effect.indistinguishable_from})
     if twins:
-        parts.append(f"From torque and speed alone this can't be told from {' or '.join(twins)}.")
+        parts.append(f"From these recordings this can't be told from {' or '.join(twins)}.")
     tests = sorted({entry.suggested_test for entry in untestable if not entry.needs})
     if tests:
         names = ", ".join(entry.name for entry in untestable if not entry.needs)
         parts.append(f"These recordings can't tell {names}; a {' or '.join(tests)} test would.")
     parts += [f"Without {entry.needs}, {entry.name} can't be told." for entry in untestable if entry.needs]
     return " ".join(parts)
+
+
+def _sure(effects: Sequence[FoundEffect]) -> str:
+    """Say how probable the least probable of the effects is; nothing of faults that are seen in the readings."""
+    least = min((each.probability for each in effects if not math.isnan(each.probability)), default=math.nan)
+    if math.isnan(least):
+        return ""
+    return f" (probability {least:.3f})" if least < SURE else f" (probability above {SURE})"
 
 
 def _wrong_values(fit: Fit, strays: Sequence[Stray]) -> str:
@@ -63,9 +75,9 @@ def _headline(decision: Decision, effects: Sequence[FoundEffect], fit: Fit) -> s
         )
     if effects:
         found = "; ".join(effect.statement for effect in effects)
-        part = "part of it" if decision.verdict is Verdict.PARTLY_EXPLAINED else "all of it"
+        part = "part of the mismatch" if decision.verdict is Verdict.PARTLY_EXPLAINED else "the mismatch"
         return (
-            f"The model leaves something out, and this explains {part}: {found}. The free-run error falls from "
+            f"Missing in the model{_sure(effects)}: {found}. This explains {part}: the free-run error falls from "
             f"{fit.retuned:.3g} to {fit.augmented:.3g} {fit.unit}, on samples not used for the fit from "
             f"{fit.holdout_retuned:.3g} to {fit.holdout_augmented:.3g} {fit.unit}."
         )

@@ -94,7 +94,7 @@ def test_a_speed_sampled_late_is_the_speed_of_that_moment(plain, rng):
     """Off-grid sampling is exact: a driveline stopped at each instant anew has the same speeds."""
     torques = 100.0 * rng.choice([-1.0, 1.0], 40)
     instants = np.sort(rng.uniform(0.0, 0.45, 40))  # the last ones after the last torque has begun
-    speeds, _ = _sample(TruthDriveline(plain, 20.0), torques, 0.5 * torques, instants)
+    speeds, _, _ = _sample(TruthDriveline(plain, 20.0), torques, 0.5 * torques, instants)
     for instant, speed in list(zip(instants, speeds, strict=True))[::5]:
         fresh, whole = TruthDriveline(plain, 20.0), min(int(instant / 0.01), 39)
         for torque in torques[:whole]:
