@@ -164,3 +164,22 @@ def turns_on(records: Sequence[Record]) -> bool:
 def goes_round(records: Sequence[Record], motor_turns: float) -> bool:
     """Tell whether the motor makes so many turns at least: over less nothing can be seen to recur."""
     return range_of(records) >= 2.0 * np.pi * motor_turns
+
+
+PLACES, FEWEST_PASSES = 50, 4.0
+"""Places that the range of an angle is divided into, and how often it must be passed for them to be compared."""
+
+
+def speed_by_place(record: Record) -> float:
+    """Return the share of the speed's variance that goes with where the motor is: 1 where a motion only repeats.
+
+    What depends on the speed is not separable from what depends on the angle then. 0 for a motion that goes on and on.
+    """
+    angle, speed = motor_angle(record), np.abs(measured_speed(record))
+    seen = np.isfinite(speed)
+    angle, speed = angle[seen], speed[seen]
+    if float(np.abs(np.diff(angle)).sum()) < FEWEST_PASSES * float(np.ptp(angle)) or float(np.var(speed)) == 0.0:
+        return 0.0
+    place = np.digitize(angle, np.linspace(angle.min(), angle.max(), PLACES))
+    mean = np.bincount(place, speed) / np.maximum(np.bincount(place), 1)
+    return 1.0 - float(np.mean((speed - mean[place]) ** 2) / np.var(speed))

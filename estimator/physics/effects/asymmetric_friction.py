@@ -8,8 +8,11 @@ from estimator.compiled import compiled
 from estimator.physics.acting import Acting, Place
 from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start, Untestable
 from estimator.physics.model import DrivelineModel, Motion, unit
-from estimator.physics.motion import reverses, speed_scale, torque_scale
+from estimator.physics.motion import reverses, speed_by_place, speed_scale, torque_scale
 from estimator.signals.record import Record
+
+BY_PLACE = 0.5
+"""Share of the speed's variance that may go with the place: beyond it most of the law would be a torque over it."""
 
 
 @compiled
@@ -29,10 +32,13 @@ def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
 
 
 def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
-    """Need motion in both directions."""
-    if any(reverses(record) for record in records):
-        return None
-    return Untestable("the speed never changes sign: not separable from viscous friction", "reversal")
+    """Need motion in both directions, and at each place at different speeds."""
+    both = [record for record in records if reverses(record)]
+    if not both:
+        return Untestable("the speed never changes sign: not separable from viscous friction", "reversal")
+    if min(speed_by_place(record) for record in both) > BY_PLACE:
+        return Untestable("each place is passed at one speed: not separable from a torque over the angle", "reversal")
+    return None
 
 
 def sentence(values: Mapping[str, float], motion: Motion) -> str:

@@ -5,7 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from estimator.physics.motion import measured_speed, reverses, speed_scale, torque_reverses, torque_scale
+from estimator.physics.motion import (
+    measured_speed,
+    reverses,
+    speed_by_place,
+    speed_scale,
+    torque_reverses,
+    torque_scale,
+)
 from estimator.signals.record import OutputKind
 from tests.estimator.physics.bench import record
 
@@ -86,3 +93,14 @@ def test_a_short_pulse_is_measured_by_its_peak_and_rest_by_one() -> None:
     torque[100:103] = -400.0
     assert torque_scale([record(torque)]) == 400.0
     assert speed_scale([record(torque, torque)]) == 400.0
+
+
+def test_a_swing_that_repeats_passes_each_place_at_one_speed() -> None:
+    swing = np.cos(2.0 * np.pi * TIME_S)
+    assert speed_by_place(record(np.ones(500), swing, kind=OutputKind.POSITION)) > 0.9
+
+
+def test_swings_of_different_speed_and_a_motion_that_goes_on_do_not() -> None:
+    slow_then_fast = np.cos(2.0 * np.pi * np.where(TIME_S < 2.5, TIME_S, 2.5 + 4.0 * (TIME_S - 2.5)))
+    assert speed_by_place(record(np.ones(500), slow_then_fast, kind=OutputKind.POSITION)) < 0.5
+    assert speed_by_place(record(np.ones(500), TIME_S + np.sin(TIME_S), kind=OutputKind.POSITION)) == 0.0
