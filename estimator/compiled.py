@@ -33,12 +33,11 @@ def _digest() -> str:
 
 
 def _cache_folder() -> Path:
-    base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(base) / "hil" / f"kernel-{_digest()}"
+    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "hil"
+    return Path(os.environ.get("NUMBA_CACHE_DIR") or cache) / f"kernel-{_digest()}"
 
 
-if not os.environ.get("NUMBA_CACHE_DIR"):
-    vars(numba_config)["CACHE_DIR"] = str(_cache_folder())  # numba defines its settings at run time
+vars(numba_config)["CACHE_DIR"] = str(_cache_folder())  # numba defines its settings at run time
 
 compile_undisturbed()
 

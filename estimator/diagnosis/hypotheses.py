@@ -9,6 +9,7 @@ import numpy as np
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Untestable
 from estimator.physics.model import DrivelineModel, Motion
+from estimator.physics.motion import turns_on
 from estimator.signals.record import BoolArray, Record
 
 Effects = frozenset[str]
@@ -31,14 +32,16 @@ def with_effect(effects: Effects, name: str) -> Effects:
 def open_hypotheses(model: DrivelineModel, records: Sequence[Record]) -> tuple[tuple[str, ...], dict[str, Untestable]]:
     """Sort the catalogue into effects that the recordings can tell and those they can't, with the reason.
 
-    Effects that make no sense in the model's structure, or that the model already has, are in neither.
+    Effects that make no sense in the model's structure or for such a motion, or that the model already has, are in
+    neither.
     """
     testable, untestable = [], {}
     for name in (*EFFECTS, *model.laws):
         entry = EFFECTS[name]
         fits = model.structure in entry.structures and all(record.kind in entry.kinds for record in records)
         turns = model.motion is Motion.ROTATION or not entry.phases
-        if not (fits and turns) or name in model.effects or entry.recognised:
+        swings = not (entry.swinging and turns_on(records))
+        if not (fits and turns and swings) or name in model.effects or entry.recognised:
             continue
         obstacle = entry.testable(model, records)
         if obstacle is None:

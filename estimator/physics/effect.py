@@ -258,6 +258,8 @@ class Effect:
         True where it changes the conditions of the motion all the time, by an angle or by the time.
     timed : bool
         True where the simulated line depends on the time since its recording began; an event does by itself.
+    swinging : bool
+        True where it makes sense for a load that swings only, and not for one that turns on and on.
     shows_start : frozenset[str]
         What else of a joint's start matters with it: ``twist``, ``preload``.
     recognised : bool
@@ -298,6 +300,7 @@ class Effect:
     linear: bool = False
     waving: bool = False
     timed: bool = False
+    swinging: bool = False
     shows_start: frozenset[str] = frozenset()
     recognised: bool = False
 

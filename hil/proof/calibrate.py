@@ -25,7 +25,7 @@ from threadpoolctl import threadpool_limits
 
 from estimator.diagnosis.chain import mechanical, read_through
 from estimator.diagnosis.inference.calibration import LEAST_SHARE, TEST_LIMITS, THRESHOLDS_FILE
-from estimator.diagnosis.inference.posterior import probability_of
+from estimator.diagnosis.inference.posterior import Score, probability_of
 from estimator.diagnosis.inference.read_again import searched as searched_for
 from estimator.diagnosis.inference.remainder import chance
 from estimator.diagnosis.preconditions import prepare
@@ -71,7 +71,7 @@ class World:
     strong: str
     there: list[str]
     claims: list[Claim]
-    scores: list[tuple[list[str], float]]
+    scores: list[tuple[list[str], float, bool]]
     tests: dict[str, float]
     samples: int
     cpu_s: float
@@ -99,7 +99,8 @@ class World:
         """Return the probability of an effect under some thresholds."""
         shares = (key for key, limit in TEST_LIMITS.items() if limit.is_share)
         lost = max(0.0, *(self.beyond_chance(key) - thresholds.limits[key] for key in shares))
-        return probability_of(claim.names, self.scores, thresholds.divisor + self.samples * lost)
+        scores = [Score(frozenset(effects), score, plausible) for effects, score, plausible in self.scores]
+        return probability_of(claim.names, scores, thresholds.divisor + self.samples * lost)
 
     def named(self, thresholds: Thresholds) -> list[Claim]:
         """Return the effects that are named under some thresholds."""
@@ -135,7 +136,7 @@ def searched(which: str, seed: int) -> World | None:
         NOTHING if strong in recognised else strong,
         sorted(there | {*known}),
         [Claim(each.name, sorted(each.names), each.share) for each in found.beliefs],
-        [(sorted(effects), score) for effects, score in found.scores],
+        [(sorted(each.effects), each.score, each.is_plausible) for each in found.scores],
         {test.key: test.value for test in found.tests if test.key},
         found.best.plain.residual.size,
         round(time.process_time() - began, 2),

@@ -6,14 +6,13 @@ recordings more probable than the line itself does with its values free.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from estimator.diagnosis.hypotheses import NOTHING
-from estimator.diagnosis.inference.likelihood import Hypothesis, covariance, fitted
+from estimator.diagnosis.inference.likelihood import Hypothesis, choices_of, covariance, fitted
 from estimator.diagnosis.inference.remainder import tests
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.result import Stray
@@ -34,7 +33,7 @@ class FreeLine:
     Attributes
     ----------
     score : float
-        That of a hypothesis (``likelihood``), the choice of what is wrong among the line's values paid for.
+        That of a hypothesis (``likelihood``): a value that is wrong is chosen among all values and effects.
     leaves_noise : bool
         Whether what it leaves passes for noise: then no physics need be missing.
     strays : tuple of Stray
@@ -63,7 +62,7 @@ def free_line(search: Search) -> FreeLine | None:
     strays = _strays(search.nothing(), found)
     if not strays:
         return None
-    chosen = math.log(math.comb(sum(trusted), len(strays)))
+    chosen = choices_of(frozenset(stray.name for stray in strays), hypotheses + sum(trusted))
     return FreeLine(found.score + 2.0 * chosen, not any(test.failed for test in tests(found)), strays)
 
 

@@ -4,8 +4,9 @@ The free-run error of a hypothesis is the output of the line under these disturb
 
     error = line(torque reading's noise + its drift, load's walk) + coloured + white reading noise
 
-Torque noise is white, its drift and the coloured reading noise are of first order, the load's walk is a random one. A
-Kalman filter of this model whitens the error; the model's sizes and times are estimated with each hypothesis.
+Torque noise is white, and as large as a gap makes it where a torque was not read; its drift and the coloured reading
+noise are of first order, the load's walk is a random one. A Kalman filter of this model whitens the error; the model's
+sizes and times are estimated with each hypothesis.
 
 Each measured output has disturbances of its own, and the log-likelihoods of all outputs are added up. What they have in
 common, a load that walks, then counts once for each: a composite likelihood (Varin, Reid and Firth, Statistica Sinica
@@ -29,6 +30,7 @@ from estimator.physics.model import Structure
 from estimator.physics.motion import torque_scale
 from estimator.signals.outputs import by_output
 from estimator.signals.record import BoolArray, FloatArray, Location, OutputKind, Record
+from estimator.signals.stand_in import stand_in_variance
 
 
 class Size(IntEnum):
@@ -237,18 +239,37 @@ def whitener_of(result: FitResult, sizes: FloatArray) -> Whitener:
     problem = result.problem
     return joined(
         [
-            whitener(_line_of(result, part), sizes_of(sizes, i), problem.records[0].sample_time_s, problem.use[part])
+            whitener(
+                _line_of(result, part),
+                sizes_of(sizes, i),
+                problem.records[0].sample_time_s,
+                problem.use[part],
+                _unread(problem.records[part]),
+            )
             for i, part in enumerate(by_output(problem.records))
         ]
     )
+
+
+def _unread(records: Sequence[Record]) -> list[FloatArray]:
+    return [stand_in_variance(record) for record in records]
 
 
 def _line_of(result: FitResult, part: slice) -> Line:
     return line_of(result, result.problem.records[part.start])
 
 
-def whitener(line: Line, sizes: FloatArray, period_s: float, use: Sequence[BoolArray]) -> Whitener:
-    """Return the filter of a noise model, ``sizes`` of shape (7,) as `Size` says."""
+def whitener(
+    line: Line,
+    sizes: FloatArray,
+    period_s: float,
+    use: Sequence[BoolArray],
+    unread: Sequence[FloatArray] | None = None,
+) -> Whitener:
+    """Return the filter of a noise model, ``sizes`` of shape (7,) as `Size` says.
+
+    ``unread`` is the variance of each recording's torque where it was not read, shapes (N_i,); None: all was read.
+    """
     white, coloured, colour_s, torque, drift, drift_s, walk = np.exp(sizes)
     n = line.h.size
     m = n + 3  # drift, walk, coloured
@@ -261,13 +282,15 @@ def whitener(line: Line, sizes: FloatArray, period_s: float, use: Sequence[BoolA
     q[n + 2, n + 2] = coloured**2 * (1.0 - kept_colour**2)
     prior[n, n], prior[n + 2, n + 2] = drift**2, coloured**2
     h[:n], h[n + 1], h[n + 2] = line.h, line.direct, 1.0
-    seen: dict[bytes, tuple[FloatArray, FloatArray]] = {}
-    for mask in use:
-        if mask.tobytes() not in seen:
-            gains, spread = np.empty((mask.size, m)), np.empty(mask.size)
-            fill_gains(f, h, q, white**2, prior, np.asarray(mask), gains, spread)
-            seen[mask.tobytes()] = gains, spread
-    each = [seen[mask.tobytes()] for mask in use]
+    at_input = np.concatenate([line.torque, np.zeros(3)])
+    seen: dict[tuple[bytes, bytes], tuple[FloatArray, FloatArray]] = {}
+    each = []
+    for mask, variance in zip(use, unread or [np.zeros(mask.size) for mask in use], strict=True):
+        key = mask.tobytes(), variance.tobytes()
+        if key not in seen:
+            seen[key] = np.empty((mask.size, m)), np.empty(mask.size)
+            fill_gains(f, h, q, white**2, prior, np.asarray(mask), at_input, variance, *seen[key])
+        each.append(seen[key])
     count = len(use)
     return Whitener((f,) * count, (h,) * count, tuple(g for g, _ in each), tuple(s for _, s in each), tuple(use))
 
@@ -307,7 +330,8 @@ def estimated(
         rows = slice(first, first + sum(int(each.sum()) for each in use))
         line, period_s, first = _line_of(result, part), problem.records[0].sample_time_s, rows.stop
         begun = starts(mine, bounds) if is_anew else [mine]
-        tried = [estimate(line, error[rows], each, bounds, period_s, use, rounds) for each in begun]
+        unread = _unread(problem.records[part])
+        tried = [estimate(line, error[rows], each, bounds, period_s, use, rounds, unread) for each in begun]
         best, value = min(tried, key=lambda each: each[1])
         found.append(best)
         whole += value
@@ -322,6 +346,7 @@ def estimate(
     period_s: float,
     use: Sequence[BoolArray],
     rounds: int = 10,
+    unread: Sequence[FloatArray] | None = None,
 ) -> tuple[FloatArray, float]:
     """Return the most probable noise model of an error and its minus twice log-posterior, by Fisher scoring.
 
@@ -331,10 +356,12 @@ def estimate(
         Stacked errors of the samples that count.
     begun : ndarray, shape (7,)
         Where the iteration begins.
+    unread : sequence of ndarray, shapes (N_i,)
+        Variance of the torque where it was not read (`whitener`).
     """
 
     def at(sizes: FloatArray) -> tuple[float, FloatArray, FloatArray]:
-        filtered = whitener(line, sizes, period_s, use)
+        filtered = whitener(line, sizes, period_s, use, unread)
         innovations = filtered(error)
         logs = np.concatenate(
             [np.log(spread[mask]) for spread, mask in zip(filtered.spread, filtered.use, strict=True)]

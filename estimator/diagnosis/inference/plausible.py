@@ -122,12 +122,12 @@ def _most_torque(records: Sequence[Record]) -> float:
 
 
 def _is_stuck(values: Mapping[str, Mapping[str, float]], records: Sequence[Record]) -> bool:
-    """Tell whether a torque against the motion is above all torque that was applied."""
+    """Tell whether a torque against the motion is above all torque that was applied; what waves is not against it."""
     most = _most_torque(records)
     return any(
         values[name].get(parameter.name, 0.0) > most
         for name in values
-        if EFFECTS[name].element in (Element.MOTOR, Element.LOAD)
+        if EFFECTS[name].element in (Element.MOTOR, Element.LOAD) and not EFFECTS[name].phases
         for parameter in EFFECTS[name].parameters
         if parameter.dimension == "torque" and parameter.null == 0.0  # that of a limit is beyond all torque
     )

@@ -11,6 +11,7 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,6 +19,14 @@ from estimator.diagnosis.hypotheses import Effects
 from estimator.diagnosis.inference.likelihood import Hypothesis
 from estimator.diagnosis.inference.plausible import GRADE
 from estimator.physics.catalogue import EFFECTS
+
+
+class Score(NamedTuple):
+    """The score of a set of effects, and whether its values are all a case of their effect."""
+
+    effects: frozenset[str]
+    score: float
+    is_plausible: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +58,7 @@ class Belief:
 def beliefs(
     best: Hypothesis,
     visited: Mapping[Effects, Hypothesis],
-    plausible: Mapping[Effects, Hypothesis],
+    scores: Sequence[Score],
     share: Mapping[str, float],
     tempered: float,
     alike_within: float,
@@ -61,8 +70,8 @@ def beliefs(
     ----------
     visited : mapping of set to Hypothesis
         All that were fitted to their end, the sets without each effect of the best among them.
-    plausible : mapping of set to Hypothesis
-        Those among them whose values are all a case of their effect.
+    scores : sequence of Score
+        Of the same sets.
     share : mapping of str to float
         Of each effect of the best set (``shares``).
     tempered : float
@@ -73,7 +82,7 @@ def beliefs(
         The same over what the effect itself explains.
     """
     found = []
-    scores = [(effects, each.score) for effects, each in plausible.items()]
+    plausible = {each.effects: visited[each.effects] for each in scores if each.is_plausible}
     for name in sorted(best.effects):
         without = visited[best.effects - {name}]
         within = max(alike_within, alike_share * (without.score - best.score))
@@ -158,16 +167,20 @@ def _alike(name: str, best: Hypothesis, visited: Mapping[Effects, Hypothesis], w
     return tuple(sorted((near | equivalent) - best.effects))
 
 
-def probability_of(names: Collection[str], scores: Sequence[tuple[Collection[str], float]], tempered: float) -> float:
+def probability_of(names: Collection[str], scores: Sequence[Score], tempered: float) -> float:
     """Return the probability that one of some effects is there, over all sets that were fitted.
+
+    A set with values that are no case of its effects is evidence of something else: against the effects it does
+    without, and for none that it holds.
 
     Parameters
     ----------
-    scores : sequence of (set of effects, float)
     tempered : float
         By which differences of scores are divided.
     """
-    values = np.array([score for _, score in scores])
+    holds = [any(name in names for name in each.effects) for each in scores]
+    counted = [(each.score, has) for each, has in zip(scores, holds, strict=True) if each.is_plausible or not has]
+    values = np.array([score for score, _ in counted])
     weights = np.exp(-0.5 * (values - values.min()) / tempered)
-    there = np.array([any(name in names for name in effects) for effects, _ in scores])
+    there = np.array([has for _, has in counted])
     return float(weights[there].sum() / weights.sum())

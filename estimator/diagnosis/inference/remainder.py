@@ -30,6 +30,9 @@ FEWEST = 50
 CHANCE = 4.0
 """Standard deviations of what noise shows by chance that a share may be beyond its limit."""
 
+FEWEST_PERIODS = 5
+"""Times that a wave repeats in a recording to be a line: what is slower is drift."""
+
 CHANGE_S = 1.0
 EDGE = 0.02
 """Distance from the bound of a disturbance's logarithm within which it has reached it."""
@@ -121,9 +124,9 @@ def _driven_by(record: Record) -> FloatArray:
 
 
 def _line(error: FloatArray) -> float:
-    """Return the largest power at one frequency over the mean power."""
+    """Return the largest power at one frequency over the mean power; of what repeats often enough to be a line."""
     power = np.abs(np.fft.rfft(error))[1:] ** 2
-    return float(power.max() / power.mean())
+    return float(power[FEWEST_PERIODS - 1 :].max() / power.mean())
 
 
 def _change(errors: Sequence[FloatArray], records: Sequence[Record], power: float) -> float:

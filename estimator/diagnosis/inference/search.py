@@ -269,11 +269,6 @@ class Search:
         """Return the better of two fits of a set, where both are plausible; else the one that is."""
         return other if self.is_plausible(other) and (other.score < one.score or not self.is_plausible(one)) else one
 
-    @property
-    def plausible(self) -> dict[Effects, Hypothesis]:
-        """The sets that were fitted to their end whose values are all a case of their effect."""
-        return {effects: each for effects, each in self.visited.items() if self.is_plausible(each)}
-
     def is_plausible(self, hypothesis: Hypothesis) -> bool:
         """Tell whether the values of every effect are a case of it."""
         return is_plausible(hypothesis, self.model, self.records)

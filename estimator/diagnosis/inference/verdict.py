@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimator.diagnosis.hypotheses import Effects
 from estimator.diagnosis.inference.calibration import (
     ALIKE_SHARE,
     ALIKE_WITHIN,
@@ -20,7 +19,16 @@ from estimator.diagnosis.inference.calibration import (
 from estimator.diagnosis.inference.disturbances import reading_noise
 from estimator.diagnosis.inference.likelihood import Hypothesis
 from estimator.diagnosis.inference.plausible import GRADE
-from estimator.diagnosis.inference.posterior import Belief, beliefs, fall, free_rms, levels, shares, shares_with_grade
+from estimator.diagnosis.inference.posterior import (
+    Belief,
+    Score,
+    beliefs,
+    fall,
+    free_rms,
+    levels,
+    shares,
+    shares_with_grade,
+)
 from estimator.diagnosis.inference.remainder import Test, tests
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.result import Verdict
@@ -67,15 +75,15 @@ class Grounds:
     beliefs : tuple of Belief
         Of every effect of the best set that is large enough to be told from another way of sampling.
     tests : tuple of Test
-    scores : tuple of (set of effects, float)
-        Of all plausible sets that were fitted to their end.
+    scores : tuple of Score
+        Of all sets that were fitted to their end.
     """
 
     best: Hypothesis
     nothing: Hypothesis
     beliefs: tuple[Belief, ...]
     tests: tuple[Test, ...]
-    scores: tuple[tuple[Effects, float], ...]
+    scores: tuple[Score, ...]
 
 
 def tempered_by(tests: Sequence[Test], samples: int, factor: float) -> float:
@@ -98,9 +106,9 @@ def grounds(search: Search) -> Grounds:
     tempered = tempered_by(examined, best.plain.residual.size, TEMPERED * best.outputs)
     graded = GRADE in best.effects
     share = shares_with_grade(best, search.visited, nothing) if graded else shares(search.path)
-    found = beliefs(best, search.visited, search.plausible, share, tempered, ALIKE_WITHIN, ALIKE_SHARE)
+    scores = tuple(Score(effects, h.score, search.is_plausible(h)) for effects, h in search.visited.items())
+    found = beliefs(best, search.visited, scores, share, tempered, ALIKE_WITHIN, ALIKE_SHARE)
     resolved = tuple(each for each in found if search.is_resolved(best, each.name))
-    scores = tuple((effects, each.score) for effects, each in search.plausible.items())
     return Grounds(best, nothing, resolved, examined, scores)
 
 

@@ -59,6 +59,8 @@ def fill_gains(
     r: float,
     prior: FloatArray,
     observed: BoolArray,
+    at_input: FloatArray,
+    unread: FloatArray,
     gains: FloatArray,
     spread: FloatArray,
 ) -> None:
@@ -68,8 +70,11 @@ def fill_gains(
     ----------
     f, q, prior : ndarray, shape (m, m)
         Transition, covariance of what drives it, and covariance of the first state.
-    h : ndarray, shape (m,)
+    h, at_input : ndarray, shape (m,)
+        How the output shows the state, and how an input held for a sample moves it.
     observed : ndarray of bool, shape (N,)
+    unread : ndarray, shape (N,)
+        Variance of the input where it was not read; 0 elsewhere.
     """
     m = h.shape[0]
     p, half, ph = prior.copy(), np.empty((m, m)), np.empty(m)
@@ -87,6 +92,11 @@ def fill_gains(
             spread[t] = np.inf
         if not settled:
             settled = predict(f, q, p, half, before) and observed[t]
+        if unread[t] > 0.0:
+            settled = False
+            for i in range(m):
+                for j in range(m):
+                    p[i, j] += unread[t] * at_input[i] * at_input[j]
 
 
 @compiled

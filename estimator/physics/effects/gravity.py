@@ -8,9 +8,9 @@ from collections.abc import Mapping, Sequence
 from estimator.abreast import every
 from estimator.compiled import compiled
 from estimator.physics.acting import Acting, Place
-from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Held, Start, Untestable
+from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Held, Start
 from estimator.physics.model import DrivelineModel, Motion, unit
-from estimator.physics.motion import MOST_TURNS, range_of, torque_scale, turns_on
+from estimator.physics.motion import range_of, torque_scale
 from estimator.signals.record import Record
 
 SWINGS_RAD = (1.0, 2.0, 4.0, 8.0)
@@ -35,15 +35,6 @@ def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
     if model.gear_ratio is not None:
         return [(1.0, Held(1.0))]
     return [(1.0, 1.0 / swing) for swing in SWINGS_RAD]
-
-
-def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
-    """Need a load that swings; one that turns on and on has an imbalance."""
-    if not turns_on(records):
-        return None
-    return Untestable(
-        f"the motor makes more than {MOST_TURNS:g} turns: a load that turns on has an imbalance", "reversal"
-    )
 
 
 def sentence(values: Mapping[str, float], motion: Motion) -> str:
@@ -72,7 +63,7 @@ EFFECT = Effect(
     phases={"phase_rad": "moment_nm"},
     scales=scales,
     starts=starts,
-    testable=testable,
     sentence=sentence,
     waving=True,
+    swinging=True,
 )

@@ -8,9 +8,9 @@ import numpy as np
 
 from estimator.compiled import compiled
 from estimator.physics.acting import Acting, Place
-from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start, Untestable
+from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start
 from estimator.physics.model import DrivelineModel, Motion, unit
-from estimator.physics.motion import MOST_TURNS, range_of, torque_scale, turns_on
+from estimator.physics.motion import range_of, torque_scale
 from estimator.signals.record import Record
 
 
@@ -28,13 +28,6 @@ def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...
 def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
     """Return springs from soft to stiff, close to each other: the error is not convex in what swings on them."""
     return [(float(share),) for share in np.geomspace(0.03, 2.0, 9)]
-
-
-def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
-    """Need a motion that a spring would allow."""
-    if not turns_on(records):
-        return None
-    return Untestable(f"the motor makes more than {MOST_TURNS:g} turns, which no spring would let it", "reversal")
 
 
 def sentence(values: Mapping[str, float], motion: Motion) -> str:
@@ -57,7 +50,7 @@ EFFECT = Effect(
     resembles=("gravity", "road_grade"),
     scales=scales,
     starts=starts,
-    testable=testable,
     sentence=sentence,
     linear=True,
+    swinging=True,
 )

@@ -22,8 +22,8 @@ def _cache_folder() -> str:
     digest = hashlib.sha256(numba.__version__.encode())
     for path in sorted(Path(__file__).parent.glob("*.py")):
         digest.update(path.read_bytes())
-    base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return str(Path(base) / "hil" / f"truth-{digest.hexdigest()[:16]}")
+    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "hil"
+    return str(Path(os.environ.get("NUMBA_CACHE_DIR") or cache) / f"truth-{digest.hexdigest()[:16]}")
 
 
 _CACHE_FOLDER = _cache_folder()
@@ -33,7 +33,7 @@ _settings: Any = numba_config  # its attributes come from the environment at run
 def compiled(function: Function) -> Function:
     """Compile a function to machine code; other users of numba keep their own cache folder."""
     before = _settings.CACHE_DIR
-    _settings.CACHE_DIR = os.environ.get("NUMBA_CACHE_DIR") or _CACHE_FOLDER
+    _settings.CACHE_DIR = _CACHE_FOLDER
     try:
         return cast(Function, numba.njit(cache=True, nogil=True, error_model="numpy")(function))
     finally:

@@ -62,6 +62,14 @@ def test_gravity_on_an_arm_is_named_with_its_moment(gear_ratio: float | None) ->
 
 @pytest.mark.campaign
 @pytest.mark.timeout(600)
+def test_gravity_is_named_on_an_arc_so_small_that_it_pulls_less_than_its_moment() -> None:
+    result = diagnosed(lambda angle: 24.0 * np.sin(angle), None)
+    assert [effect.name for effect in result.effects] == ["gravity"], result.statement
+    assert result.effects[0].parameters["moment_nm"].value == pytest.approx(24.0, rel=0.1)
+
+
+@pytest.mark.campaign
+@pytest.mark.timeout(600)
 def test_a_spring_to_the_ground_is_named_with_its_stiffness() -> None:
     result = diagnosed(lambda angle: 4.0 * (angle - 0.3), None)
     assert [effect.name for effect in result.effects] == ["grounded_spring"], result.statement

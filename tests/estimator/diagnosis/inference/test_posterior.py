@@ -9,7 +9,7 @@ import pytest
 
 from estimator.diagnosis.inference import remainder
 from estimator.diagnosis.inference.likelihood import Hypothesis
-from estimator.diagnosis.inference.posterior import levels, probability_of, shares, shares_with_grade
+from estimator.diagnosis.inference.posterior import Score, levels, probability_of, shares, shares_with_grade
 from estimator.diagnosis.inference.verdict import tempered_by
 
 
@@ -64,11 +64,19 @@ def test_without_effects_nothing_is_shared_out() -> None:
 
 
 def test_a_probability_sums_over_all_sets_that_hold_the_effect_or_a_look_alike() -> None:
-    scores = [([], 6.0), (["lag"], 0.0), (["filter"], 0.0), (["brake", "lag"], 0.0)]
+    sets = (([], 6.0), (["lag"], 0.0), (["filter"], 0.0), (["brake", "lag"], 0.0))
+    scores = [Score(frozenset(effects), score) for effects, score in sets]
     one = probability_of({"lag"}, scores, 1.0)
     assert one == pytest.approx(2.0 / (3.0 + 0.0498), rel=1e-3)
     assert probability_of({"lag", "filter"}, scores, 1.0) > one
     assert probability_of({"lag", "filter"}, scores, 10.0) < probability_of({"lag", "filter"}, scores, 1.0)
+
+
+def test_a_set_without_an_effect_counts_against_it_even_with_values_that_are_no_case_of_their_effects() -> None:
+    """Something else is there, that neither is: the effect is not needed for it."""
+    scores = [Score(frozenset({"lag", "brake"}), 0.0), Score(frozenset({"brake"}), -20.0, is_plausible=False)]
+    assert probability_of({"lag"}, scores, 1.0) < 1e-4
+    assert probability_of({"brake"}, scores, 1.0) == 1.0
 
 
 def left_over(value: float, most: float, is_share: bool = True) -> remainder.Test:

@@ -36,8 +36,11 @@ def result() -> FitResult:
     return fit(make_problem(model(TWO_MASS), [record], ()))
 
 
-def covariance(line: Line, sizes: FloatArray, count: int) -> FloatArray:
-    """Covariance of the error over so many samples: what each disturbance of each sample does to all later ones."""
+def covariance(line: Line, sizes: FloatArray, count: int, unread: FloatArray | float = 0.0) -> FloatArray:
+    """Covariance of the error over so many samples: what each disturbance of each sample does to all later ones.
+
+    ``unread`` is the variance of the torque where it was not read.
+    """
     white, coloured, colour_s, torque, drift, drift_s, walk = np.exp(sizes)
     k = np.arange(count)
     apart = np.abs(k[:, None] - k[None, :]) * SAMPLE_TIME_S
@@ -51,7 +54,7 @@ def covariance(line: Line, sizes: FloatArray, count: int) -> FloatArray:
 
     at_motor, at_load = answer(line.torque), answer(line.load)
     walked = walk**2 * SAMPLE_TIME_S * np.minimum(k[:, None], k[None, :])
-    torques = torque**2 * np.eye(count) + drift**2 * np.exp(-apart / drift_s)
+    torques = torque**2 * np.eye(count) + np.diag(np.broadcast_to(unread, count)) + drift**2 * np.exp(-apart / drift_s)
     readings = white**2 * np.eye(count) + coloured**2 * np.exp(-apart / colour_s)
     found: FloatArray = at_motor @ torques @ at_motor.T + at_load @ walked @ at_load.T + readings
     return found
@@ -64,8 +67,9 @@ def test_innovations_are_those_of_the_covariance_written_out(result: FitResult, 
     use[list(missing)] = False
     line = line_of(result)
     signals = np.random.default_rng(2).standard_normal((int(use.sum()), 3))
-    filtered = whitener(line, SIZES, SAMPLE_TIME_S, [use])
-    lower = cholesky(covariance(line, SIZES, count)[np.ix_(use, use)], lower=True)
+    unread = np.where(np.isin(np.arange(count), missing), 900.0, 0.0)
+    filtered = whitener(line, SIZES, SAMPLE_TIME_S, [use], [unread])
+    lower = cholesky(covariance(line, SIZES, count, unread)[np.ix_(use, use)], lower=True)
     np.testing.assert_allclose(filtered(signals), solve_triangular(lower, signals, lower=True), rtol=2e-4, atol=1e-4)
     spread = np.concatenate([each[rows] for each, rows in zip(filtered.spread, filtered.use, strict=True)])
     assert np.log(spread).sum() == pytest.approx(np.log(np.diag(lower)).sum(), abs=5e-4)
