@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -19,8 +20,16 @@ from estimator.diagnosis.inference.free_run import Unseen
 from estimator.diagnosis.inference.likelihood import SAME, Hypothesis, fitted, of_first_outputs
 from estimator.diagnosis.inference.posterior import free_rms
 from estimator.diagnosis.inference.read_again import searched
+from estimator.diagnosis.inference.remainder import tests
 from estimator.diagnosis.inference.search import Search
-from estimator.diagnosis.inference.unnamed import Law, beside_rival, best_law, hunts_around, weighed_against
+from estimator.diagnosis.inference.unnamed import (
+    Law,
+    at_place,
+    beside_rival,
+    best_law,
+    hunts_around,
+    weighed_against,
+)
 from estimator.diagnosis.inference.verdict import Decision, decide
 from estimator.diagnosis.inference.wording import statement
 from estimator.diagnosis.phrases import law_in_words
@@ -52,10 +61,6 @@ SMALLEST_P = 1e-300
 
 SEARCH_SHARE = 0.7
 """Share of the budget for the search; the rest is for laws without a name and the free runs of the answer."""
-
-LOCATING_ROUNDS, LOOKING_ROUNDS = 6, 2
-"""Rounds of the search for a law without a name: where nothing is named it locates the mismatch, else it says what is
-left."""
 
 
 def answer(ready: Prepared, model: DrivelineModel, progress: Progress, budget_s: float) -> Diagnosis:
@@ -142,20 +147,33 @@ def _looked_at(search: Search, decision: Decision, is_over: Callable[[], bool]) 
     law: Law | None = None
     if decision.failed or decision.named:
         nothing = of_first_outputs(decision.nothing)
-        hunts = hunts_around(nothing, LOOKING_ROUNDS if decision.named else LOCATING_ROUNDS)
+        hunts = hunts_around(nothing)
         law = best_law(nothing, hunts)
-        decision = weighed_against(decision, law)
+        decision = weighed_against(decision, law, partial(at_place, search, decision))
     line = free_line(search) if decision.failed or decision.named else None
     if line is not None:
         decision = beside_rival(decision, line.score, lambda each: True)
     if decision.verdict not in (Verdict.EXPLAINED, Verdict.PARTLY_EXPLAINED):
         strays = line.strays if line is not None and line.leaves_noise else ()
         return _Seen(replace(decision, named=()), decision.nothing, hunts, law, strays)
+    decision = _without_doubted(search, decision)
     believed = _with_names_alone(search, decision)
     is_left = bool(decision.failed) and not is_over()
     first = of_first_outputs(believed)
-    left = best_law(first, hunts_around(first, LOOKING_ROUNDS)) if is_left else None
+    left = best_law(first, hunts_around(first)) if is_left else None
     return _Seen(decision, believed, hunts, left)
+
+
+def _without_doubted(search: Search, decision: Decision) -> Decision:
+    """Return a decision on what is left by the effects that are established, and not by those that are doubted, too."""
+    established = decision.best
+    for name in sorted(established.effects - {each.name for each in (*decision.named, *decision.traces)}):
+        established = search.without(established, name)
+    if established is decision.best:
+        return decision
+    failed = tuple(test for test in tests(established) if test.failed)
+    verdict = Verdict.PARTLY_EXPLAINED if failed else Verdict.EXPLAINED
+    return replace(decision, verdict=verdict, failed=failed)
 
 
 def _with_names_alone(search: Search, decision: Decision) -> Hypothesis:

@@ -22,6 +22,10 @@ LEAST_PROBABILITY: float = THRESHOLDS["least_probability"]
 """Probability from which an effect is named."""
 
 
+MOST_OF_IT: float = THRESHOLDS["most_of_it"]
+"""Share of what a law without a name gains that names at its place must gain, to be the same law in other words."""
+
+
 @dataclass(frozen=True, slots=True)
 class Limit:
     """The most that a test may find in noise; ``is_share`` where it finds a share of the innovations' variance."""

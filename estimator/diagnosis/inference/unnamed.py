@@ -14,10 +14,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimator.diagnosis.inference.calibration import LEAST_PROBABILITY, LEAST_SHARE, TEMPERED
+from estimator.diagnosis.inference.calibration import LEAST_PROBABILITY, LEAST_SHARE, MOST_OF_IT, TEMPERED
 from estimator.diagnosis.inference.disturbances import estimated, reading_noise
 from estimator.diagnosis.inference.likelihood import ROUNDS, Hypothesis, of_first_outputs
 from estimator.diagnosis.inference.posterior import Belief, free_rms
+from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.inference.verdict import Decision, tempered_by
 from estimator.diagnosis.result import Verdict
 from estimator.diagnosis.unnamed import Hunt, hunts_of, scene
@@ -25,6 +26,9 @@ from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
 from estimator.physics.jacobian import changes
 from estimator.physics.problem import outputs_at, own_part
+
+LOOKING_ROUNDS = 6
+"""Rounds of the search for a law without a name, at most."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,10 +52,10 @@ class Law:
     rms: float
 
 
-def hunts_around(hypothesis: Hypothesis, rounds: int) -> list[Hunt]:
+def hunts_around(hypothesis: Hypothesis) -> list[Hunt]:
     """Look for the best law at every element beside a hypothesis."""
     noise = float(reading_noise(hypothesis.sizes)[0])
-    return hunts_of(scene(hypothesis.plain, noise, hypothesis.filter), rounds)
+    return hunts_of(scene(hypothesis.plain, noise, hypothesis.filter), LOOKING_ROUNDS)
 
 
 def best_law(hypothesis: Hypothesis, hunts: Sequence[Hunt]) -> Law | None:
@@ -105,24 +109,39 @@ def _rms(hunt: Hunt) -> float:
     return math.sqrt(max(left, 0.0) / count)
 
 
-MOST_OF_IT = 0.5
-"""Share of what a law without a name gains that names at its place must gain, to be the same law in other words."""
+def at_place(search: Search, decision: Decision, element: Element) -> Hypothesis:
+    """Return the best set without the effects that act elsewhere or are doubted; of the first output."""
+    best = decision.best
+    here = {each.name for each in (*decision.named, *decision.traces) if element in _elements(each)}
+    for name in sorted(best.effects - here):
+        best = search.without(best, name)
+    return of_first_outputs(best)
 
 
-def weighed_against(decision: Decision, law: Law | None) -> Decision:
+def acts_at(beliefs: Sequence[Belief], element: Element) -> bool:
+    """Tell whether one of some effects acts at an element, or one that it can't be told from."""
+    return any(element in _elements(each) for each in beliefs)
+
+
+def gain_of_names(alone: Hypothesis, nothing: Hypothesis, law: Law) -> float:
+    """Return what names at the place of a law without a name gain by themselves, over what the law gains."""
+    return (nothing.score - alone.score) / (nothing.score - law.score)
+
+
+def weighed_against(decision: Decision, law: Law | None, alone: Callable[[Element], Hypothesis]) -> Decision:
     """Return a decision in which a law without a name has its share of the probability.
 
-    ``law`` is the best beside no effect at all. In as far as it makes the recordings more probable than the best set of
-    names, what these explain is there, and they are not. At its own place a law without a name is a name's law in
-    another form, where the names gain most of what it gains. One that leaves the free-run error as it was is a trace,
-    and no other explanation of what the names explain. Laws without a name are sought in the first output alone, and
-    weighed by what it says.
+    ``law`` is the best beside no effect at all; ``alone`` returns the best set without what acts elsewhere. In as far
+    as the law makes the recordings more probable than the best set of names, what these explain is there, and they are
+    not. At its own place a law without a name is a name's law in another form, where the names there gain most of what
+    it gains. One that leaves the free-run error as it was is a trace, and no other explanation of what the names
+    explain. Laws without a name are sought in the first output alone, and weighed by what it says.
     """
     best, nothing = of_first_outputs(decision.best), of_first_outputs(decision.nothing)
     if law is None or 1.0 - (law.rms / free_rms(nothing)) ** 2 < LEAST_SHARE:
         return decision
-    gained, by_law = (nothing.score - score for score in (best.score, law.score))
-    same, first = gained >= MOST_OF_IT * by_law, replace(decision, best=best, nothing=nothing)
+    same = acts_at(decision.named, law.element) and gain_of_names(alone(law.element), nothing, law) >= MOST_OF_IT
+    first = replace(decision, best=best, nothing=nothing)
     weighed = beside_rival(first, law.score, lambda each: not (same and law.element in _elements(each)))
     return replace(weighed, best=decision.best, nothing=decision.nothing)
 

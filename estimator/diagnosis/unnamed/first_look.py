@@ -16,7 +16,7 @@ from estimator.diagnosis.unnamed.hunt import NO_LAW, RIDGE, Found, Hunt, cost, r
 from estimator.diagnosis.unnamed.laws import Law
 from estimator.diagnosis.unnamed.pursuit import pursue
 from estimator.diagnosis.unnamed.scene import Scene
-from estimator.diagnosis.unnamed.strays import apart_from_neighbours, strays
+from estimator.diagnosis.unnamed.strays import apart_from_neighbours, near, strays
 from estimator.physics.effect import Element
 from estimator.signals.correlation import effective_samples
 
@@ -79,10 +79,11 @@ def _without_strays(hunt: Hunt) -> Hunt:
     """Take single readings that are off for the law, where that is worth a coefficient each.
 
     They have pulled the fit away from the others: a slow error that is no reason to doubt them. What of the rest stands
-    apart from its neighbours tells how many samples are independent.
+    apart from its neighbours tells how many samples are independent. A torque that is missing for a moment stands out
+    in the innovations, too, and not in what is read.
     """
     errors = hunt.ground.split(hunt.ground.error)
-    off = strays(errors)
+    off = [seen & near(read) for seen, read in zip(strays(errors), strays(hunt.view.as_read), strict=True)]
     count = sum(int(each.sum()) for each in off)
     rest = [np.where(each, 0.0, error) for each, error in zip(off, errors, strict=True)]
     rows = hunt.ground.error.size

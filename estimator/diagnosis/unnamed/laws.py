@@ -7,6 +7,7 @@ A name is a formula, which takes a coefficient, or a phrase, which begins with a
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -78,16 +79,23 @@ LAGS = frozenset({*SHAFT_TORQUE_LAGS, *RELAXATIONS, *TORQUE_LAGS, *READING_LAGS}
 """Laws that are linear systems with a time of their own."""
 
 
+def _rate_of(signal: Law, motion: Motion) -> FloatArray:
+    return rate(signal(motion), motion)
+
+
 def _drag_laws(name: str, speed: Law) -> dict[str, Law]:
-    """Return what may brake a mass, as functions of its speed and of time."""
+    """Return what may brake a mass, as functions of its speed and of time, and an inertia that goes with its speed."""
     laws: dict[str, Law] = {
         f"sign({name})": lambda m: sign(speed(m)),
         f"{name} |{name}|": lambda m: speed(m) * np.abs(speed(m)),
         f"{name}^3": lambda m: speed(m) ** 3,
         f"|{name}|": lambda m: np.abs(speed(m)),
+        f"d{name}/dt |{name}|": lambda m: rate(speed(m), m) * np.abs(speed(m)),
+        f"d{name}/dt {name}^2": lambda m: rate(speed(m), m) * speed(m) ** 2,
     }
     for share in (0.05, 0.15, 0.4):
         laws[f"{name} / (1 + ({name} / {share:g} top)^2)"] = _of(peaked, speed, share)
+        laws[f"d{name}/dt / (1 + (w_M / {share:g} top)^2)"] = _with(at_low_speed, partial(_rate_of, speed), share)
         laws[f"sign({name}) exp(-|{name}| / {share:g} top)"] = _of(fading, speed, share)
     for time_s in (3.0, 10.0, 30.0):
         laws[f"{name} exp(-t / {time_s:g} s)"] = _with(decaying, speed, time_s)

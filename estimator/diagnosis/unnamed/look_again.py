@@ -125,10 +125,11 @@ def _solution(hunt: Hunt, terms: int) -> tuple[FloatArray, FloatArray]:
     columns = path.columns[:, path.term < terms]
     design = np.hstack([ground.jacobian, columns])
     scale = np.maximum(np.linalg.norm(design, axis=0), np.finfo(float).tiny)
-    low, high = bounds(result.problem)
+    x, (low, high) = result.x, bounds(result.problem)
+    below, above = (np.subtract(end, x, out=np.zeros(x.size), where=x != end) for end in (low, high))  # a limit of inf
     free, open_edge = np.full(columns.shape[1], np.inf), 1e-12  # an unknown at its bound has no room but must have some
-    lower = np.concatenate([np.minimum(low - result.x, -open_edge), -free]) * scale
-    upper = np.concatenate([np.maximum(high - result.x, open_edge), free]) * scale
+    lower = np.concatenate([np.minimum(below, -open_edge), -free]) * scale
+    upper = np.concatenate([np.maximum(above, open_edge), free]) * scale
     order = unbounded_first(lower, upper, np.ones(scale.size, dtype=bool))
     target = np.concatenate([ground.raw, np.zeros(scale.size)])
     r, along = factored(np.vstack([(design / scale)[:, order], RIDGE * np.eye(scale.size)]), target)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -51,6 +51,11 @@ class Scene:
     def errors(self) -> list[FloatArray]:
         """Measured less simulated output on these rows, per recording."""
         return [self.rows(i, line.error[:, np.newaxis])[:, 0] for i, line in enumerate(self.cut)]
+
+    @property
+    def as_read(self) -> list[FloatArray]:
+        """The same without the filter."""
+        return replace(self, filter=None).errors
 
 
 def scene(result: FitResult, floor: float, whitening: Filter | None = None) -> Scene:

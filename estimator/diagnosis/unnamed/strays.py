@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from scipy import stats
-from scipy.ndimage import median_filter
+from scipy.ndimage import maximum_filter1d, median_filter
 
 from estimator.signals.record import BoolArray, FloatArray
 
@@ -35,3 +35,9 @@ def apart_from_neighbours(error: FloatArray) -> FloatArray:
     ends = NEIGHBOURS // 2
     apart[:ends] = apart[-ends:] = 0.0
     return apart
+
+
+def near(off: BoolArray) -> BoolArray:
+    """Tell which values stand next to one that is off, shape (B,): a filter answers to it for some samples."""
+    found: BoolArray = maximum_filter1d(off.astype(np.int8), NEIGHBOURS, mode="constant").astype(np.bool_)
+    return found

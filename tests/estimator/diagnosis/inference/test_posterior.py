@@ -64,8 +64,8 @@ def test_without_effects_nothing_is_shared_out() -> None:
 
 
 def test_a_probability_sums_over_all_sets_that_hold_the_effect_or_a_look_alike() -> None:
-    sets = (([], 6.0), (["lag"], 0.0), (["filter"], 0.0), (["brake", "lag"], 0.0))
-    scores = [Score(frozenset(effects), score) for effects, score in sets]
+    sets = {"": 6.0, "lag": 0.0, "filter": 0.0, "brake lag": 0.0}
+    scores = [Score(frozenset(effects.split()), score) for effects, score in sets.items()]
     one = probability_of({"lag"}, scores, 1.0)
     assert one == pytest.approx(2.0 / (3.0 + 0.0498), rel=1e-3)
     assert probability_of({"lag", "filter"}, scores, 1.0) > one
