@@ -1,10 +1,9 @@
 """``python -m hil.proof.calibrate --seeds A..B --judge C..D --out DIR``: thresholds of a verdict, by simulation.
 
 Every world is searched once; what its decision rests on is kept in ``DIR/SET_SEED.json``: scores of all sets of effects
-that were fitted, shares, tests of what is left, and what the names gain over a law without a name at their place. The
-thresholds follow from these, again and again without another search: limits of the tests, and of what names must gain
-there, from worlds of which all is explained, the divisor of scores by likelihood of what is there, the least
-probability from the share of names that may be false. Other seeds judge them. ``--write`` puts them where
+that were fitted, shares, tests of what is left. The thresholds follow from these, again and again without another
+search: limits of the tests from worlds of which all is explained, the divisor of scores by likelihood of what is there,
+the least probability from the share of names that may be false. Other seeds judge them. ``--write`` puts them where
 the decision reads them, with this command.
 """
 
@@ -26,19 +25,9 @@ from threadpoolctl import threadpool_limits
 
 from estimator.diagnosis.chain import mechanical, read_through
 from estimator.diagnosis.inference.calibration import LEAST_SHARE, TEST_LIMITS, THRESHOLDS_FILE
-from estimator.diagnosis.inference.likelihood import of_first_outputs
 from estimator.diagnosis.inference.posterior import Score, probability_of
-from estimator.diagnosis.inference.read_again import Found
 from estimator.diagnosis.inference.read_again import searched as searched_for
 from estimator.diagnosis.inference.remainder import chance
-from estimator.diagnosis.inference.unnamed import (
-    acts_at,
-    at_place,
-    best_law,
-    gain_of_names,
-    hunts_around,
-)
-from estimator.diagnosis.inference.verdict import decide
 from estimator.diagnosis.preconditions import prepare
 from estimator.errors import EstimatorError
 from hil.proof.campaign.kinds import parse_seeds
@@ -50,7 +39,7 @@ MOST_FALSE = 0.01
 """Share of named effects that may not be there."""
 
 MOST_REFUSED = 0.01
-"""Share of worlds of which all is explained that one test, or a law without a name, may refuse."""
+"""Share of worlds of which all is explained that one test may refuse."""
 
 OTHER_FORMS = {"most_predictable": 0.03, "most_dependent": 0.015}
 """Shares of the innovations' variance that machines leave by the form of their laws alone: simulated worlds are nearer
@@ -84,7 +73,6 @@ class World:
     claims: list[Claim]
     scores: list[tuple[list[str], float, bool]]
     tests: dict[str, float]
-    of_law: float | None
     samples: int
     cpu_s: float
 
@@ -122,10 +110,9 @@ class World:
 
 @dataclass(frozen=True, slots=True)
 class Thresholds:
-    """What a decision is made by: limits of the tests, share of a law's gain, divisor of scores, least probability."""
+    """What a decision is made by: limits of the tests, divisor of scores, least probability."""
 
     limits: dict[str, float]
-    most_of_it: float = 0.0
     divisor: float = 1.0
     least_probability: float = 0.0
 
@@ -141,7 +128,6 @@ def searched(which: str, seed: int) -> World | None:
     line, chain = mechanical(model), read_through(ready.records)
     with threadpool_limits(1, user_api="blas"):  # as a diagnosis does
         whole = searched_for(chain, line)
-        of_law = _gain_over_a_law(whole)
     found, recognised = whole.grounds, {finding.name for finding in whole.chain.findings}
     there = {name for name in case.specimen.sizes if name != NOTHING} - recognised
     return World(
@@ -152,20 +138,9 @@ def searched(which: str, seed: int) -> World | None:
         [Claim(each.name, sorted(each.names), each.share) for each in found.beliefs],
         [(sorted(each.effects), each.score, each.is_plausible) for each in found.scores],
         {test.key: test.value for test in found.tests if test.key},
-        of_law,
         found.best.plain.residual.size,
         round(time.process_time() - began, 2),
     )
-
-
-def _gain_over_a_law(found: Found) -> float | None:
-    """Return what names gain over the best law without a name, where it is at their place; None where it is not."""
-    decision = decide(found.search, found.grounds)
-    nothing = of_first_outputs(decision.nothing)
-    law = best_law(nothing, hunts_around(nothing)) if decision.named else None
-    if law is None or not acts_at(decision.named, law.element):
-        return None
-    return gain_of_names(at_place(found.search, decision, law.element), nothing, law)
 
 
 def kept(place: Path, which: str, seed: int) -> World | None:
@@ -190,11 +165,9 @@ def calibrated(worlds: Sequence[World]) -> Thresholds:
         )
         for key in TEST_LIMITS
     }
-    of_laws = [world.of_law for world in explained if world.of_law is not None]
-    most_of_it = min(float(np.quantile(of_laws, MOST_REFUSED)), 1.0)
-    divisor = _most_probable(lambda divisor: _surprise(worlds, Thresholds(limits, most_of_it, divisor)))
-    least = _least_probability(worlds, Thresholds(limits, most_of_it, divisor))
-    return Thresholds(limits, most_of_it, divisor, least)
+    divisor = _most_probable(lambda divisor: _surprise(worlds, Thresholds(limits, divisor)))
+    least = _least_probability(worlds, Thresholds(limits, divisor))
+    return Thresholds(limits, divisor, least)
 
 
 def _most_probable(surprise: Callable[[float], float]) -> float:
@@ -255,7 +228,6 @@ def written(thresholds: Thresholds, command: str) -> str:
         f"# {command}",
         f"tempered = {thresholds.divisor:.3g}",
         f"least_probability = {thresholds.least_probability:.4g}",
-        f"most_of_it = {thresholds.most_of_it:.3g}",
         *(f"{key} = {limit:.3g}" for key, limit in thresholds.limits.items()),
     ]
     return "\n".join(lines) + "\n"

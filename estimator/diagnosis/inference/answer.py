@@ -15,7 +15,7 @@ from estimator.diagnosis.chain import mechanical, read_through
 from estimator.diagnosis.hypotheses import Progress, open_hypotheses
 from estimator.diagnosis.inference.data_sheet import free_line
 from estimator.diagnosis.inference.disturbances import reading_noise
-from estimator.diagnosis.inference.figures import FreeRuns, courses_of, effects_of, figures_of, free_runs
+from estimator.diagnosis.inference.figures import FreeRuns, courses_of, effects_of, figures_of, free_runs, traces_of
 from estimator.diagnosis.inference.free_run import Unseen
 from estimator.diagnosis.inference.likelihood import SAME, Hypothesis, fitted, of_first_outputs
 from estimator.diagnosis.inference.posterior import free_rms
@@ -106,7 +106,7 @@ def _said(
         parameters=retuned_parameters(runs.estimate, line, decision.verdict is not Verdict.UNEXPLAINED),
         load_torque=load_torques(runs.estimate, line),
         timing_s={},
-        augmented=augmented_model(runs.estimate, model, effects),
+        augmented=augmented_model(runs.estimate, model, (*effects, *traces_of(runs, decision))),
         traces=courses_of(runs),
         discrepancy=_discrepancy(seen, line) if mismatch.detected else None,
         remainder=remainder,
@@ -122,7 +122,7 @@ class _Seen:
     Attributes
     ----------
     believed : Hypothesis
-        What the answer is of, and the augmented model holds: the effects that are named, and no others.
+        What the answer is of, and the augmented model holds: the effects that are named, and traces.
     hunts : list of Hunt
         The search for a law beside no effect at all; empty where it was not made.
     law : Law or None
@@ -156,32 +156,23 @@ def _looked_at(search: Search, decision: Decision, is_over: Callable[[], bool]) 
     if decision.verdict not in (Verdict.EXPLAINED, Verdict.PARTLY_EXPLAINED):
         strays = line.strays if line is not None and line.leaves_noise else ()
         return _Seen(replace(decision, named=()), decision.nothing, hunts, law, strays)
-    decision = _without_doubted(search, decision)
-    believed = _with_names_alone(search, decision)
+    decision, believed = _without_doubted(search, decision)
     is_left = bool(decision.failed) and not is_over()
     first = of_first_outputs(believed)
     left = best_law(first, hunts_around(first)) if is_left else None
     return _Seen(decision, believed, hunts, left)
 
 
-def _without_doubted(search: Search, decision: Decision) -> Decision:
-    """Return a decision on what is left by the effects that are established, and not by those that are doubted, too."""
+def _without_doubted(search: Search, decision: Decision) -> tuple[Decision, Hypothesis]:
+    """Return a decision on the effects that are established, traces among them, and the set of these."""
     established = decision.best
     for name in sorted(established.effects - {each.name for each in (*decision.named, *decision.traces)}):
         established = search.without(established, name)
-    if established is decision.best:
-        return decision
-    failed = tuple(test for test in tests(established) if test.failed)
-    verdict = Verdict.PARTLY_EXPLAINED if failed else Verdict.EXPLAINED
-    return replace(decision, verdict=verdict, failed=failed)
-
-
-def _with_names_alone(search: Search, decision: Decision) -> Hypothesis:
-    """Return the best set without what is doubted in it or no more than a trace."""
-    believed = decision.best
-    for name in sorted(decision.best.effects - {each.name for each in decision.named}):
-        believed = search.without(believed, name)
-    return _steps_from_their_moment(search, believed)
+    if established is not decision.best:
+        failed = tuple(test for test in tests(established) if test.failed)
+        verdict = Verdict.PARTLY_EXPLAINED if failed else Verdict.EXPLAINED
+        decision = replace(decision, verdict=verdict, failed=failed)
+    return decision, _steps_from_their_moment(search, established)
 
 
 def _steps_from_their_moment(search: Search, believed: Hypothesis) -> Hypothesis:

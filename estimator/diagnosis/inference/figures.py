@@ -137,6 +137,16 @@ def effects_of(runs: FreeRuns, decision: Decision) -> tuple[FoundEffect, ...]:
     return (*named, *acquired_effects(runs.chain, before, runs.chain.errors(runs.final.outputs)))
 
 
+def traces_of(runs: FreeRuns, decision: Decision) -> tuple[FoundEffect, ...]:
+    """Return the traces that what is believed holds."""
+    traces = tuple(each for each in decision.traces if each.name in runs.believed.effects)
+    if not traces:
+        return ()
+    return found_effects(
+        replace(decision, best=runs.believed, named=traces), runs.estimate, runs.covariance, runs.unseen.line
+    )
+
+
 def courses_of(runs: FreeRuns) -> tuple[Trace, ...]:
     """Return the simulations of every recording, for plots; those kept out of the fit last."""
     line, kept_out, grid = runs.unseen.line, runs.unseen.records, runs.retuned.problem.grid

@@ -37,16 +37,25 @@ ROUNDING = 1e-6
 """Share of a value by which a fit may end beyond a bound."""
 
 
-def is_plausible(hypothesis: Hypothesis, model: DrivelineModel, records: Sequence[Record]) -> bool:
-    """Tell whether the values of every effect are a case of it."""
-    plain = hypothesis.plain
-    values = {name: plain.values_of(name) for name in hypothesis.effects - {GRADE}}
-    if any(EFFECTS[name].implausible(model, records, values[name]) for name in values):
-        return False
-    edges = all(has_edge(name, plain) for name in values if EFFECTS[name].event)
+def is_possible(hypothesis: Hypothesis, records: Sequence[Record]) -> bool:
+    """Tell whether a machine can be so: its input is on, it is not stuck, no load walks so far, events take place."""
+    values, plain = _values_of(hypothesis), hypothesis.plain
     if GRADE in hypothesis.effects and _walk(hypothesis, records) > _most_torque(records):
         return False
-    return edges and _is_driven(plain, records) and not _is_stuck(values, records) and _is_described(hypothesis, model)
+    edges = all(has_edge(name, plain) for name in values if EFFECTS[name].event)
+    return edges and _is_driven(plain, records) and not _is_stuck(values, records)
+
+
+def is_plausible(hypothesis: Hypothesis, model: DrivelineModel, records: Sequence[Record]) -> bool:
+    """Tell whether a machine can be so, and the values of every effect are a case of it."""
+    values = _values_of(hypothesis)
+    if any(EFFECTS[name].implausible(model, records, values[name]) for name in values):
+        return False
+    return is_possible(hypothesis, records) and _is_described(hypothesis, model)
+
+
+def _values_of(hypothesis: Hypothesis) -> dict[str, Mapping[str, float]]:
+    return {name: hypothesis.plain.values_of(name) for name in hypothesis.effects - {GRADE}}
 
 
 def loosened(hypothesis: Hypothesis, model: DrivelineModel) -> FitResult | None:
@@ -122,12 +131,12 @@ def _most_torque(records: Sequence[Record]) -> float:
 
 
 def _is_stuck(values: Mapping[str, Mapping[str, float]], records: Sequence[Record]) -> bool:
-    """Tell whether a torque against the motion is above all torque that was applied; what waves is not against it."""
+    """Tell whether a torque against the motion is above all torque that was applied; where it swings it need not be."""
     most = _most_torque(records)
     return any(
         values[name].get(parameter.name, 0.0) > most
         for name in values
-        if EFFECTS[name].element in (Element.MOTOR, Element.LOAD) and not EFFECTS[name].phases
+        if EFFECTS[name].element in (Element.MOTOR, Element.LOAD) and not EFFECTS[name].swinging
         for parameter in EFFECTS[name].parameters
         if parameter.dimension == "torque" and parameter.null == 0.0  # that of a limit is beyond all torque
     )

@@ -71,7 +71,7 @@ def beliefs(
     visited : mapping of set to Hypothesis
         All that were fitted to their end, the sets without each effect of the best among them.
     scores : sequence of Score
-        Of the same sets.
+        Of those of the same sets that a machine can be.
     share : mapping of str to float
         Of each effect of the best set (``shares``).
     tempered : float

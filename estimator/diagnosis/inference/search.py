@@ -13,7 +13,8 @@ from estimator.diagnosis.inference.descent import extended
 from estimator.diagnosis.inference.disturbances import Limits, limits_of
 from estimator.diagnosis.inference.likelihood import Hypothesis, compared, fitted
 from estimator.diagnosis.inference.looks import Answers, Look, screen
-from estimator.diagnosis.inference.plausible import GRADE, is_plausible, loosened, may_be_loose
+from estimator.diagnosis.inference.plausible import GRADE, is_plausible, is_possible, loosened, may_be_loose
+from estimator.diagnosis.inference.posterior import Score
 from estimator.diagnosis.inherit import forgetting, inheriting, kept, line_values, placed
 from estimator.diagnosis.screening import promising
 from estimator.physics.catalogue import EFFECTS
@@ -272,6 +273,12 @@ class Search:
     def is_plausible(self, hypothesis: Hypothesis) -> bool:
         """Tell whether the values of every effect are a case of it."""
         return is_plausible(hypothesis, self.model, self.records)
+
+    @property
+    def scores(self) -> tuple[Score, ...]:
+        """Of all sets that were fitted to their end and that a machine can be."""
+        possible = {effects: each for effects, each in self.visited.items() if is_possible(each, self.records)}
+        return tuple(Score(effects, each.score, self.is_plausible(each)) for effects, each in possible.items())
 
     def is_resolved(self, hypothesis: Hypothesis, name: str) -> bool:
         """Tell whether an effect is large enough to be told from another way of sampling."""

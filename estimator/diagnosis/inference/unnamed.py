@@ -14,7 +14,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimator.diagnosis.inference.calibration import LEAST_PROBABILITY, LEAST_SHARE, MOST_OF_IT, TEMPERED
+from estimator.diagnosis.inference.calibration import (
+    LEAST_PROBABILITY,
+    LEAST_SHARE,
+    MOST_AT_PLACE,
+    MOST_ELSEWHERE,
+    TEMPERED,
+)
 from estimator.diagnosis.inference.disturbances import estimated, reading_noise
 from estimator.diagnosis.inference.likelihood import ROUNDS, Hypothesis, of_first_outputs
 from estimator.diagnosis.inference.posterior import Belief, free_rms
@@ -133,14 +139,16 @@ def weighed_against(decision: Decision, law: Law | None, alone: Callable[[Elemen
 
     ``law`` is the best beside no effect at all; ``alone`` returns the best set without what acts elsewhere. In as far
     as the law makes the recordings more probable than the best set of names, what these explain is there, and they are
-    not. At its own place a law without a name is a name's law in another form, where the names there gain most of what
-    it gains. One that leaves the free-run error as it was is a trace, and no other explanation of what the names
+    not, unless they gain nearly as much. At its own place a law without a name is a name's law in another form, where
+    the names there gain most of what it gains. One that leaves the free-run error as it was is a trace, and no other explanation of what the names
     explain. Laws without a name are sought in the first output alone, and weighed by what it says.
     """
     best, nothing = of_first_outputs(decision.best), of_first_outputs(decision.nothing)
     if law is None or 1.0 - (law.rms / free_rms(nothing)) ** 2 < LEAST_SHARE:
         return decision
-    same = acts_at(decision.named, law.element) and gain_of_names(alone(law.element), nothing, law) >= MOST_OF_IT
+    if gain_of_names(best, nothing, law) >= MOST_ELSEWHERE:
+        return decision
+    same = acts_at(decision.named, law.element) and gain_of_names(alone(law.element), nothing, law) >= MOST_AT_PLACE
     first = replace(decision, best=best, nothing=nothing)
     weighed = beside_rival(first, law.score, lambda each: not (same and law.element in _elements(each)))
     return replace(weighed, best=decision.best, nothing=decision.nothing)

@@ -76,7 +76,7 @@ class Grounds:
         Of every effect of the best set that is large enough to be told from another way of sampling.
     tests : tuple of Test
     scores : tuple of Score
-        Of all sets that were fitted to their end.
+        Of all sets that were fitted to their end and that a machine can be.
     """
 
     best: Hypothesis
@@ -106,7 +106,7 @@ def grounds(search: Search) -> Grounds:
     tempered = tempered_by(examined, best.plain.residual.size, TEMPERED * best.outputs)
     graded = GRADE in best.effects
     share = shares_with_grade(best, search.visited, nothing) if graded else shares(search.path)
-    scores = tuple(Score(effects, h.score, search.is_plausible(h)) for effects, h in search.visited.items())
+    scores = search.scores
     found = beliefs(best, search.visited, scores, share, tempered, ALIKE_WITHIN, ALIKE_SHARE)
     resolved = tuple(each for each in found if search.is_resolved(best, each.name))
     return Grounds(best, nothing, resolved, examined, scores)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
 from estimator.abreast import every
 from estimator.compiled import compiled
 from estimator.physics.acting import Acting, Place
@@ -37,6 +39,15 @@ def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
     return [(1.0, 1.0 / swing) for swing in SWINGS_RAD]
 
 
+def implausible(model: DrivelineModel, records: Sequence[Record], values: Mapping[str, float]) -> str:
+    """Refuse what changes, over the load's swing, by more than the torque does from end to end, however it hangs."""
+    swing = min(range_of(records) / values["motor_turns_per_turn"], 2.0 * math.pi)
+    most = max(float(np.abs(record.total_torque_nm).max()) for record in records)
+    if values["moment_nm"] * (1.0 - math.cos(0.5 * swing)) <= 2.0 * most:
+        return ""
+    return f"{values['moment_nm']:.3g} Nm over {swing:.2g} rad is more than all torque that was applied"
+
+
 def sentence(values: Mapping[str, float], motion: Motion) -> str:
     """Say what was found."""
     geared = f", {values['motor_turns_per_turn']:.3g} motor turns a turn" if values["motor_turns_per_turn"] != 1 else ""
@@ -63,6 +74,7 @@ EFFECT = Effect(
     phases={"phase_rad": "moment_nm"},
     scales=scales,
     starts=starts,
+    implausible=implausible,
     sentence=sentence,
     waving=True,
     swinging=True,

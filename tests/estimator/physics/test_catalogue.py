@@ -365,3 +365,11 @@ def test_what_holds_a_load_that_swings_is_no_hypothesis_where_it_turns_on(name: 
     testable, untestable = open_hypotheses(GEARED, [driven])
     assert name not in testable
     assert name not in untestable
+
+
+def test_gravity_may_have_a_larger_moment_than_all_torque_on_a_small_arc_only() -> None:
+    torque = np.full(1000, 5.0)
+    for swing_rad, expected in ((0.6, True), (9.0, False)):
+        to_and_fro = record(torque, 0.5 * swing_rad * np.sin(0.05 * np.arange(1000)), kind=OutputKind.POSITION)
+        found = EFFECTS["gravity"].implausible(GEARED, [to_and_fro], {"moment_nm": 50.0, "motor_turns_per_turn": 1.0})
+        assert (not found) is expected

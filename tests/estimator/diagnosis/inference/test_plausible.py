@@ -46,7 +46,6 @@ def hypothesis_with(values: Mapping[str, Mapping[str, float]]) -> Hypothesis:
         ("torque_derating", {"depth": 0.99, "time_constant_s": 1.0}, False),  # off in the end
         ("coulomb_friction_motor", {"friction_nm": 1e5}, False),  # above all torque
         ("tyre_slip", {"grip_nm": 1e5, "creep_rad_s": 5.0}, True),  # a limit may be
-        ("gravity", {"moment_nm": 1e5}, True),  # the load swings on a small arc
     ],
 )
 def test_values_that_are_no_case_of_an_effect(name: str, values: Mapping[str, float], expected: bool) -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from estimator.diagnosis.hypotheses import everything, open_hypotheses
 from estimator.diagnosis.inference import remainder
-from estimator.diagnosis.inference.calibration import MOST_OF_IT
+from estimator.diagnosis.inference.calibration import MOST_AT_PLACE, MOST_ELSEWHERE
 from estimator.diagnosis.inference.posterior import free_rms
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.inference.unnamed import Law, best_law, hunts_around, weighed_against
@@ -72,34 +72,32 @@ def law(decision: Decision, element: Element, better: float) -> Law:
     return Law(element, (("T", 1.0),), decision.best.score - better, 0.1)
 
 
-def test_a_name_falls_to_a_law_elsewhere_that_is_more_probable(friction: Decision) -> None:
-    after = weighed(friction, law(friction, Element.SHAFT, 100.0))
+def more(decision: Decision, most: float) -> float:
+    """By how much a law gains more than the names where they gain a share ``most`` of it."""
+    return (1.0 / most - 1.0) * (decision.nothing.score - decision.best.score)
+
+
+def test_a_name_falls_to_a_law_elsewhere_that_gains_more(friction: Decision) -> None:
+    after = weighed(friction, law(friction, Element.SHAFT, 1.1 * more(friction, MOST_ELSEWHERE)))
     assert after.named == ()
     assert after.verdict is Verdict.UNEXPLAINED
     assert [each.name for each in after.doubted] == ["coulomb_friction_motor"]
     assert after.doubted[0].probability < 0.01
 
 
-def test_a_name_stands_against_a_law_that_is_less_probable_and_against_one_at_its_own_place(friction: Decision) -> None:
+@pytest.mark.parametrize("better", [-100.0, 0.0, 100.0])
+def test_a_name_stands_against_a_law_that_gains_hardly_more(friction: Decision, better: float) -> None:
+    """A law of many terms follows the form of what is there more closely."""
+    assert better < more(friction, MOST_ELSEWHERE)
     assert weighed(friction, None) is friction
-    for rival in (law(friction, Element.SHAFT, -100.0), law(friction, Element.MOTOR, 100.0)):
-        after = weighed(friction, rival)
-        assert after.verdict is Verdict.EXPLAINED
-        assert [each.name for each in after.named] == ["coulomb_friction_motor"]
+    assert weighed(friction, law(friction, Element.SHAFT, better)) is friction
 
 
-def test_a_name_that_gains_too_little_of_what_a_law_at_its_place_gains_is_another_law(friction: Decision) -> None:
-    gained = friction.nothing.score - friction.best.score
-    as_much = gained / MOST_OF_IT - gained
-    after = weighed(friction, law(friction, Element.MOTOR, 1.1 * as_much))
-    assert after.verdict is Verdict.UNEXPLAINED
-    assert weighed(friction, law(friction, Element.MOTOR, 0.9 * as_much)).named == friction.named
-
-
-def test_as_probable_as_the_name_it_takes_half_of_the_probability(friction: Decision) -> None:
-    (after,) = weighed(friction, law(friction, Element.SHAFT, 0.0)).doubted
-    (before,) = friction.named
-    assert after == replace(before, probability=pytest.approx(0.5 * before.probability))
+def test_a_name_stands_against_a_law_at_its_own_place_that_gains_somewhat_more(friction: Decision) -> None:
+    for times, stands in ((0.9, True), (1.1, False)):
+        after = weighed(friction, law(friction, Element.MOTOR, times * more(friction, MOST_AT_PLACE)))
+        assert (after.named == friction.named) is stands
+        assert (after.verdict is Verdict.UNEXPLAINED) is not stands
 
 
 def test_what_is_no_better_than_the_nominal_model_takes_nothing(friction: Decision) -> None:
