@@ -388,3 +388,34 @@ def test_outputs_that_no_structure_has_are_refused(keys: dict[str, Any], expecte
         signals(**keys)
     (line,) = problem_lines(SignalsConfig, caught.value)
     assert expected in line
+
+
+LOAD = {"load": {"column": "torque_ref_nm", "scale": -2.0}}
+
+
+def test_a_measured_load_torque_is_an_input(changed: Changed) -> None:
+    read = np.linspace(1.0, 9.0, 40)
+    read[[0, 7]] = np.nan
+    record = to_record(changed(torque_ref_nm=read), signals(**LOAD))
+    due = -2.0 * read
+    due[[0, 7]] = due[[1, 6]]  # held, at the start the first one
+    np.testing.assert_array_equal(record.known_load_nm, due)
+    assert np.flatnonzero(~record.okay).tolist() == [0, 7]
+    assert record.torque_okay is None
+    assert to_record(changed(), SignalsConfig()).known_load_nm == 0.0
+
+
+def test_a_load_torque_is_no_output_too(changed: Changed) -> None:
+    assert to_record(changed(torque_ref_nm=np.arange(40.0)), signals(outputs=BOTH, **LOAD)).channels == ()
+
+
+def test_a_load_torque_without_a_number_is_refused(changed: Changed) -> None:
+    with pytest.raises(RecordingError, match="torque_ref_nm: expected a load torque, came no number"):
+        to_record(changed(torque_ref_nm=np.full(40, np.nan)), signals(**LOAD))
+
+
+def test_a_joint_has_no_load() -> None:
+    with pytest.raises(ValidationError) as caught:
+        signals(position={"column": "x"}, force={"column": "F"}, **LOAD)
+    (line,) = problem_lines(SignalsConfig, caught.value)
+    assert "no such key beside an imposed motion" in line
