@@ -197,7 +197,7 @@ class PdoCodec:
                 f"Correct the mapping in 0x{layout.mapping_index:04X}."
             )
         self.indices = tuple(mapped.index for mapped in layout.objects)
-        self._positions = {mapped.index: n for n, mapped in enumerate(layout.objects)}
+        self._positions = {(mapped.index, mapped.subindex): n for n, mapped in enumerate(layout.objects)}
 
     def _type_of(self, mapped: MappedObject, types: Mapping[tuple[int, int], IntegerType]) -> IntegerType:
         kind = types.get((mapped.index, mapped.subindex))
@@ -209,7 +209,7 @@ class PdoCodec:
             )
         return kind
 
-    def position(self, index: int) -> int:
+    def position(self, index: int, subindex: int = 0) -> int:
         """Place of an object among the unpacked values.
 
         Raises
@@ -217,12 +217,13 @@ class PdoCodec:
         ConfigMismatch
             If this PDO does not carry the object.
         """
-        if index not in self._positions:
+        if (index, subindex) not in self._positions:
+            at = f":{subindex:02X}" if subindex else ""
             raise ConfigMismatch(
-                f"{self._where} does not map 0x{index:04X}, which is needed; it {self.layout}. "
+                f"{self._where} does not map 0x{index:04X}{at}, which is needed; it {self.layout}. "
                 f"Map it in 0x{self.layout.mapping_index:04X} of the EDS."
             )
-        return self._positions[index]
+        return self._positions[index, subindex]
 
     def pack(self, values: tuple[int, ...]) -> bytes:
         """Build the frame's data from the objects' values, in mapping order.

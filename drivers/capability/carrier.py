@@ -53,6 +53,15 @@ RESERVED_COB_IDS: Final = (
 """Identifiers that no PDO may have (CiA 301, table 38: restricted), and SYNC's."""
 
 
+ObjectId = tuple[int, int]
+"""Index and subindex of an object."""
+
+
+def object_name(index: int, subindex: int) -> str:
+    """Name an object: ``0x6077``, or ``0x60E5:01``."""
+    return f"0x{index:04X}:{subindex:02X}" if subindex else f"0x{index:04X}"
+
+
 def is_reserved(cob_id: int) -> bool:
     """Whether an identifier is none for a PDO."""
     return any(cob_id in taken for taken in RESERVED_COB_IDS)
@@ -118,9 +127,9 @@ class Carrier:
     mapped_here: bool
     fixed: frozenset[tuple[int, int]]
 
-    def carries(self, index: int) -> bool:
-        """Whether an object is mapped, by its index."""
-        return any((mapped.index, mapped.subindex) == (index, 0) for mapped in self.layout.objects)
+    def carries(self, index: int, subindex: int = 0) -> bool:
+        """Whether an object is mapped."""
+        return any((mapped.index, mapped.subindex) == (index, subindex) for mapped in self.layout.objects)
 
     @property
     def mapping_is_fixed(self) -> bool:
@@ -176,7 +185,7 @@ def as_described(
     sheet: DataSheet,
     direction: Direction,
     number: int,
-    wanted: Collection[int],
+    wanted: Collection[ObjectId],
     taken: Collection[int] = (),
     also: Collection[int] = (),
 ) -> Carrier:
@@ -187,7 +196,7 @@ def as_described(
     sheet, direction, number
         The PDO.
     wanted
-        What is wanted, by index; a TPDO may carry more.
+        What is wanted; a TPDO may carry more.
     taken
         Identifiers that it can't have.
     also
@@ -199,8 +208,8 @@ def as_described(
         If it does not, or can't be used.
     """
     described = _described(sheet, direction, number)
-    carried = {mapped.index for mapped in described.objects if mapped.subindex == 0}
-    more = {mapped.index for mapped in described.objects} - {*wanted, *also, *FILLERS}
+    carried = {(mapped.index, mapped.subindex) for mapped in described.objects}
+    more = {mapped.index for mapped in described.objects} - {*(index for index, _ in wanted), *also, *FILLERS}
     if not carried & {*wanted} or (direction is RPDO and more):
         raise Unusable(str(described))
     for mapped in described.objects:
@@ -220,11 +229,11 @@ def _require_known(sheet: DataSheet, direction: Direction, mapped: MappedObject)
 
 
 def map_here(
-    sheet: DataSheet, direction: Direction, number: int, wanted: Sequence[int], taken: Collection[int] = ()
+    sheet: DataSheet, direction: Direction, number: int, wanted: Sequence[ObjectId], taken: Collection[int] = ()
 ) -> Carrier:
     """Take a PDO and have it map all of the objects wanted; parameters and errors as `as_described`."""
     mapping = direction.mapping + number
-    objects = tuple(_mappable(sheet, direction, index) for index in wanted)
+    objects = tuple(_mappable(sheet, direction, *each) for each in wanted)
     if sum(mapped.length_bits for mapped in objects) > 8 * MAX_PDO_BYTES:
         raise Unusable(f"more than {MAX_PDO_BYTES} bytes for {', '.join(map(str, objects))}")
     for n in range(len(objects) + 1):
@@ -239,15 +248,15 @@ def map_here(
     return _carrier(sheet, direction, number, objects, described, taken, mapped_here=True)
 
 
-def _mappable(sheet: DataSheet, direction: Direction, index: int) -> MappedObject:
-    entry = sheet.entry(index)
+def _mappable(sheet: DataSheet, direction: Direction, index: int, subindex: int) -> MappedObject:
+    entry, name = sheet.entry(index, subindex), object_name(index, subindex)
     if entry is None or entry.kind is None or entry.kind.bits is None:
-        raise Unusable(f"0x{index:04X} is not there, or of no known type")
+        raise Unusable(f"{name} is not there, or of no known type")
     if not entry.mappable:
-        raise Unusable(f"0x{index:04X} has PDOMapping=0")
+        raise Unusable(f"{name} has PDOMapping=0")
     if entry.access not in direction.access:
-        raise Unusable(f"0x{index:04X} has AccessType {entry.access}, which no {direction.name} carries")
-    return MappedObject(index, 0, entry.kind.bits)
+        raise Unusable(f"{name} has AccessType {entry.access}, which no {direction.name} carries")
+    return MappedObject(index, subindex, entry.kind.bits)
 
 
 def _carrier(

@@ -22,6 +22,7 @@ from drivers.capability.carrier import (
     TPDO,
     Carrier,
     Direction,
+    ObjectId,
     Unusable,
     as_described,
     cob_id_of,
@@ -41,12 +42,12 @@ class CarrierSearch:
     carriers: tuple[Carrier, ...]
     others: tuple[str, ...] = ()
 
-    def carries(self, index: int) -> bool:
-        """Whether an object is carried, by its index."""
-        return any(carrier.carries(index) for carrier in self.carriers)
+    def carries(self, index: int, subindex: int = 0) -> bool:
+        """Whether an object is carried."""
+        return any(carrier.carries(index, subindex) for carrier in self.carriers)
 
 
-def find_carriers(sheet: DataSheet, direction: Direction, *choices: Sequence[int]) -> CarrierSearch:
+def find_carriers(sheet: DataSheet, direction: Direction, *choices: Sequence[ObjectId]) -> CarrierSearch:
     """Find the PDOs that carry certain objects; one is better than several.
 
     Parameters
@@ -56,7 +57,7 @@ def find_carriers(sheet: DataSheet, direction: Direction, *choices: Sequence[int
     direction
         Which way the objects go.
     *choices
-        What is to be carried, by index, in the order in which this program would map it; the best choice first.
+        What is to be carried, in the order in which this program would map it; the best choice first.
     """
     best, *_ = found = [_one(sheet, direction, wanted) for wanted in choices]
     one = next((search for search in found if search.carriers), None)
@@ -64,6 +65,13 @@ def find_carriers(sheet: DataSheet, direction: Direction, *choices: Sequence[int
         return CarrierSearch(one.carriers, one.others or best.others)
     several = (_several(sheet, direction, wanted) for wanted in choices)
     return CarrierSearch(next(filter(None, several), ()), best.others)
+
+
+def find_further(sheet: DataSheet, wanted: Sequence[ObjectId], used: Sequence[Carrier]) -> CarrierSearch:
+    """Find the TPDOs that carry further objects, where those in ``used`` do not carry them; these stay as they are."""
+    left = [each for each in wanted if not any(carrier.carries(*each) for carrier in used)]
+    others = () if not left else _one(sheet, TPDO, left[:1]).others
+    return CarrierSearch(_several(sheet, TPDO, left, used), others)
 
 
 def strangers(sheet: DataSheet, carriers: Sequence[Carrier]) -> Iterator[int]:
@@ -91,12 +99,12 @@ def _numbers(sheet: DataSheet, direction: Direction) -> Iterator[int]:
             yield number
 
 
-def _one(sheet: DataSheet, direction: Direction, wanted: Sequence[int]) -> CarrierSearch:
+def _one(sheet: DataSheet, direction: Direction, wanted: Sequence[ObjectId]) -> CarrierSearch:
     """Find one PDO for all of it."""
 
     def described(number: int) -> Carrier:
         carrier = as_described(sheet, direction, number, wanted, _held(sheet, direction, number))
-        if not all(map(carrier.carries, wanted)):
+        if not all(carrier.carries(*each) for each in wanted):
             raise Unusable(str(carrier.described))
         return carrier
 
@@ -122,24 +130,32 @@ def _first(take: Callable[[int], Carrier], base: int, numbers: Sequence[int]) ->
     return CarrierSearch((), tuple(refused))
 
 
-def _several(sheet: DataSheet, direction: Direction, wanted: Sequence[int]) -> tuple[Carrier, ...]:
-    """Find PDOs that carry it together: each the one with the most of what is left; none if something is left.
+def _several(
+    sheet: DataSheet, direction: Direction, wanted: Sequence[ObjectId], used: Sequence[Carrier] = ()
+) -> tuple[Carrier, ...]:
+    """Find PDOs, none of those used, that carry it together: each the one with the most of what is left.
 
-    It may be one: an RPDO with the mode of operation in it is used if none can be mapped without.
+    None if something is left. It may be one: an RPDO with the mode of operation in it is used if none can be mapped
+    without.
     """
     left, chosen = list(wanted), list[Carrier]()
     while left:
-        parts = [(sum(map(part.carries, left)), part) for part in _parts(sheet, direction, wanted, left, chosen)]
+        found = _parts(sheet, direction, wanted, left, [*used, *chosen])
+        parts = [(sum(part.carries(*each) for each in left), part) for part in found]
         if not parts:
             return ()
         _, best = max(parts, key=itemgetter(0))  # the first of equals
         chosen.append(best)
-        left = [index for index in left if not best.carries(index)]
+        left = [each for each in left if not best.carries(*each)]
     return tuple(chosen)
 
 
 def _parts(
-    sheet: DataSheet, direction: Direction, wanted: Sequence[int], left: Sequence[int], chosen: Sequence[Carrier]
+    sheet: DataSheet,
+    direction: Direction,
+    wanted: Sequence[ObjectId],
+    left: Sequence[ObjectId],
+    chosen: Sequence[Carrier],
 ) -> Iterator[Carrier]:
     """List the PDOs that could carry some of what is left: as they are, or with as much of it mapped as fits."""
     used = {carrier.layout.communication_index for carrier in chosen}
@@ -154,7 +170,7 @@ def _parts(
         for way in ways:
             with suppress(Unusable, ConfigMismatch):
                 carrier = way()
-                if any(map(carrier.carries, left)):
+                if any(carrier.carries(*each) for each in left):
                     yield carrier
                     break
 

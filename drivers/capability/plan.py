@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from drivers.capability.ability import Abilities, Ability, abilities
-from drivers.capability.carrier import RPDO, TPDO, Carrier, Direction
-from drivers.capability.carrier_search import CarrierSearch, find_carriers, strangers
+from drivers.capability.carrier import RPDO, TPDO, Carrier, Direction, ObjectId, object_name
+from drivers.capability.carrier_search import CarrierSearch, find_carriers, find_further, strangers
 from drivers.capability.function import Function, Part, Without
 from drivers.capability.table import EVENT_TIMER, TABLE
 from drivers.datasheet.sheet import DataSheet
@@ -31,12 +31,18 @@ class DrivePlan:
         What it has of each function.
     command, feedback
         The search for RPDOs and for TPDOs.
+    channels
+        Further objects that are to be recorded.
+    further
+        The search for the TPDOs that carry those which the feedback's do not carry.
     """
 
     sheet: DataSheet
     abilities: Abilities
     command: CarrierSearch
     feedback: CarrierSearch
+    channels: tuple[ObjectId, ...]
+    further: CarrierSearch
 
     def has(self, function: Function) -> bool:
         """Whether the drive has a function."""
@@ -51,7 +57,7 @@ class DrivePlan:
     @property
     def carriers(self) -> tuple[Carrier, ...]:
         """The PDOs found."""
-        return (*self.command.carriers, *self.feedback.carriers)
+        return (*self.command.carriers, *self.feedback.carriers, *self.further.carriers)
 
     @property
     def strangers(self) -> tuple[int, ...]:
@@ -94,41 +100,60 @@ class DrivePlan:
             )
         return search.carriers
 
+    def channel_carriers(self) -> tuple[Carrier, ...]:
+        """Give the TPDOs that carry the further objects to be recorded; those of the feedback may be among them.
 
-def plan_drive(sheet: DataSheet) -> DrivePlan:
-    """Find how a drive can be used; what it lacks is in the plan."""
+        Raises
+        ------
+        ConfigMismatch
+            If there is none for one of them.
+        """
+        carriers = (*self.feedback.carriers, *self.further.carriers)
+        lacking = [each for each in self.channels if not any(carrier.carries(*each) for carrier in carriers)]
+        if lacking:
+            raise ConfigMismatch(
+                f"{self.sheet.kind} {self.sheet.path}: expected a TPDO that maps "
+                f"{', '.join(object_name(*each) for each in lacking)}, or that can be mapped and is not used, found "
+                f"{'; '.join(self.further.others) or 'no TPDO'}. Record another object."
+            )
+        return tuple(each for each in carriers if any(each.carries(*channel) for channel in self.channels))
+
+
+def plan_drive(sheet: DataSheet, channels: Sequence[ObjectId] = ()) -> DrivePlan:
+    """Find how a drive can be used, further objects recorded; what it lacks is in the plan."""
     found = abilities(sheet)
     command = find_carriers(sheet, RPDO, *_choices(found))
     if not all(command.carries(part.index) for part in found[Function.TORQUE_OFFSET].parts):
         found[Function.TORQUE_OFFSET] = replace(found[Function.TORQUE_OFFSET], parts=())
-    feedback = find_carriers(sheet, TPDO, _indices(found, FEEDBACK))
+    feedback = find_carriers(sheet, TPDO, _objects(found, FEEDBACK))
     found[Function.RPDO_DEADLINE] = _deadline(sheet, found[Function.RPDO_DEADLINE], command)
-    return DrivePlan(sheet, found, command, feedback)
+    further = find_further(sheet, channels, feedback.carriers)
+    return DrivePlan(sheet, found, command, feedback, tuple(channels), further)
 
 
 def wanted_names(plan: DrivePlan, functions: tuple[Function, ...]) -> str:
     """Name what a PDO has to carry: ``0x6041, 0x6077, 0x606C``."""
-    return ", ".join(f"0x{index:04X}" for index in _indices(plan.abilities, functions))
+    return ", ".join(object_name(*each) for each in _objects(plan.abilities, functions))
 
 
-def _choices(found: Abilities) -> Iterator[list[int]]:
+def _choices(found: Abilities) -> Iterator[list[ObjectId]]:
     """List what RPDOs may carry: with the torque offset, where there is one, or with the sum, which needs less room."""
     if found[Function.TORQUE_OFFSET].given:
-        yield _indices(found, COMMAND)
-    yield _indices(found, tuple(each for each in COMMAND if each is not Function.TORQUE_OFFSET))
+        yield _objects(found, COMMAND)
+    yield _objects(found, tuple(each for each in COMMAND if each is not Function.TORQUE_OFFSET))
 
 
-def _indices(found: Abilities, functions: tuple[Function, ...]) -> list[int]:
-    return list(_each_index(found, functions))
+def _objects(found: Abilities, functions: tuple[Function, ...]) -> list[ObjectId]:
+    return [(part.index, part.subindex) for part in _each_part(found, functions)]
 
 
-def _each_index(found: Abilities, functions: tuple[Function, ...]) -> Iterator[int]:
+def _each_part(found: Abilities, functions: tuple[Function, ...]) -> Iterator[Part]:
     for function in functions:
         ability = found[function]
         if ability.given:
-            yield ability.parts[0].index
+            yield ability.parts[0]
         elif ability.capability.without is Without.REFUSED:
-            yield ability.capability.ways[0][0].index
+            yield ability.capability.ways[0][0]
 
 
 def _deadline(sheet: DataSheet, ability: Ability, command: CarrierSearch) -> Ability:

@@ -16,12 +16,13 @@ from drivers.canopen.can_link import CanLink
 from drivers.canopen.heartbeat import NMT_COB_ID, NmtCommand, NmtState, nmt_frame
 from drivers.canopen.sdo import SdoChannel
 from drivers.canopen.sdo_node import SdoNode
+from drivers.capability.carrier import ObjectId
 from drivers.errors import CommandRefused, ConfigMismatch, DriverError
 from drivers.inverter.check import Difference, configurable_differences, fixed_differences, remarks
 from drivers.inverter.cia402 import Command
 from drivers.inverter.commissioned import CommissionedValue, commissioned_values
 from drivers.inverter.drive_settings import drive_settings
-from drivers.inverter.feedback import FeedbackReceiver, InverterFeedback
+from drivers.inverter.feedback import InverterFeedback
 from drivers.inverter.follow_watch import FollowWatch
 from drivers.inverter.health import InverterHealth
 from drivers.inverter.pdo_setup import set_up_pdos
@@ -66,7 +67,10 @@ class Inverter:
         node = SdoNode(settings.node_id, self._pdos.eds.dictionary)
         link.network.add_node(node)
         self._sdo = SdoChannel(node, self._pdos.eds, self._where, settings.sdo_timeout_s)
-        self._feedback = self._subscribe_feedback()
+        self._feedback = self._pdos.receiver()
+        self._channels = self._pdos.channel_receiver()
+        for cob_id, take in (*self._feedback.subscriptions, *self._channels.subscriptions):
+            link.subscribe(cob_id, take)
         self._health = InverterHealth(link, settings, self._pdos.rpdos)
         self._monitor = self._health.monitor
         self._power = PowerControl(self._sdo, settings, self._torque_objects(), self._health.error_code)
@@ -193,6 +197,7 @@ class Inverter:
             self._sdo.download_confirmed(setting.index, setting.subindex, setting.value)
         self._link.beat()  # the drive watches its host from now on, and not from some later heartbeat
         self._feedback.start_anew()
+        self._channels.start_anew()
         self._monitor.forget_lost_host()
         self._monitor.await_state(
             NmtState.OPERATIONAL, self.settings.nmt_timeout_s, ask=lambda: self._send_nmt(NmtCommand.START)
@@ -245,6 +250,26 @@ class Inverter:
             None if none came in ``timeout_s``.
         """
         return self._feedback.await_after(after_ns, timeout_s)
+
+    def await_channels(self, after_ns: int, timeout_s: float) -> tuple[int | None, ...]:
+        """Wait for the further objects to be recorded that were received after ``after_ns`` [ns].
+
+        Returns
+        -------
+        tuple of int or None
+            The count of each of ``settings.channels``; None for one that did not come in ``timeout_s``.
+        """
+        return self._channels.await_after(after_ns, timeout_s)
+
+    def read_channel(self, channel: ObjectId) -> int:
+        """Read the count of a further object over SDO.
+
+        Raises
+        ------
+        DeviceTimeout, ConfigMismatch
+            If the node does not answer, or lacks the object.
+        """
+        return self._sdo.upload(*channel)
 
     def quick_stop(self) -> None:
         """Stop as the quick stop option code 0x605A has it, confirmed by statusword and torque actual value.
@@ -359,12 +384,6 @@ class Inverter:
         offset = self._plan.sheet.entry(TORQUE_OFFSET)
         there = offset is not None and offset.writable and (TORQUE_OFFSET, 0) in self._pdos.eds.types()
         return (TARGET_TORQUE, TORQUE_OFFSET) if there else (TARGET_TORQUE,)
-
-    def _subscribe_feedback(self) -> FeedbackReceiver:
-        receiver = self._pdos.receiver()
-        for cob_id, take in receiver.subscriptions:
-            self._link.subscribe(cob_id, take)
-        return receiver
 
     def _send_nmt(self, command: NmtCommand) -> None:
         self._link.send(NMT_COB_ID, nmt_frame(command, self.settings.node_id))

@@ -5,14 +5,16 @@ A run on the bus and the replay of a bus trace read the same frames by these.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from drivers.canopen.pdo_map import PdoCodec
-from drivers.capability.carrier import RPDO, TPDO, Direction
+from drivers.capability.carrier import RPDO, TPDO, Carrier
 from drivers.capability.carrier_search import MODES_OF_OPERATION
 from drivers.capability.plan import DrivePlan, plan_drive
 from drivers.capability.speed_unit import speed_scale
 from drivers.datasheet.file import EdsFile
+from drivers.inverter.channels import ChannelReceiver
 from drivers.inverter.cia402 import Command
 from drivers.inverter.feedback import FeedbackReceiver
 from drivers.inverter.settings import InverterSettings
@@ -22,15 +24,15 @@ from drivers.torque_guard import GuardedTorque
 CONTROLWORD, TARGET_TORQUE, TORQUE_OFFSET = 0x6040, 0x6071, 0x60B2
 
 
-def codecs(eds: EdsFile, direction: Direction, where: str) -> tuple[PdoCodec, ...]:
-    """Build packers and unpackers of the PDOs that carry torque command (RPDO) or feedback (TPDO) in a run.
+def codecs(eds: EdsFile, carriers: Iterable[Carrier], where: str) -> tuple[PdoCodec, ...]:
+    """Build packers and unpackers of PDOs.
 
     Raises
     ------
     ConfigMismatch
-        If there are none, and none can be mapped.
+        If a mapped object is none that this program reads.
     """
-    return tuple(eds.codec(carrier.layout, where) for carrier in plan_drive(eds.sheet).pdos(direction))
+    return tuple(eds.codec(carrier.layout, where) for carrier in carriers)
 
 
 class InverterPdos:
@@ -55,15 +57,17 @@ class InverterPdos:
     Raises
     ------
     ConfigMismatch
-        If the EDS can't be read, the drive lacks what it can't do without, or nobody says its unit of speed.
+        If the EDS can't be read, the drive lacks what it can't do without, no TPDO can carry a further object to be
+        recorded, or nobody says its unit of speed.
     """
 
     def __init__(self, settings: InverterSettings) -> None:
         where = settings.where
         self.eds = EdsFile(settings.eds_path, settings.node_id)
-        self.plan: DrivePlan = plan_drive(self.eds.sheet)
-        self._rpdos = codecs(self.eds, RPDO, where)
-        self._tpdos = codecs(self.eds, TPDO, where)
+        self.plan: DrivePlan = plan_drive(self.eds.sheet, settings.channels)
+        self._rpdos = codecs(self.eds, self.plan.pdos(RPDO), where)
+        self._tpdos = codecs(self.eds, self.plan.pdos(TPDO), where)
+        self._channel_tpdos = codecs(self.eds, self.plan.channel_carriers(), where)
         self.rpdos = tuple(codec.layout.cob_id for codec in self._rpdos)
         self.velocity: VelocityScale = speed_scale(self.plan, settings.speed_unit, where)
         self._torque = TorqueScale(settings.rated_torque_nm)
@@ -78,6 +82,10 @@ class InverterPdos:
     def receiver(self) -> FeedbackReceiver:
         """Build what reads the TPDOs' frames in SI units."""
         return FeedbackReceiver(self._tpdos, self._torque, self.velocity)
+
+    def channel_receiver(self) -> ChannelReceiver:
+        """Build what reads the further objects in the TPDOs' frames."""
+        return ChannelReceiver(self._channel_tpdos, self.plan.channels)
 
     def counts(self, torque: GuardedTorque) -> TorqueCounts:
         """Turn a command into counts; base and PRBS are summed where the drive has one object for both.

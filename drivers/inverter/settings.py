@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from drivers.canopen.heartbeat import HOST_NODE_ID
+from drivers.capability.carrier import ObjectId
 from drivers.capability.speed_unit import SpeedUnit
 from drivers.inverter.acceptance import Acceptance
 from drivers.inverter.cia402 import TorqueMode
@@ -52,6 +53,8 @@ class InverterSettings:
         What one count of 0x6076 is; CiA 402 has a thousandth [Nm].
     accepted
         What the drive lacks and somebody has accepted, by name.
+    channels
+        Further objects to be recorded in each cycle.
     sdo_timeout_s
         Longest wait for an SDO answer [s].
     mode_timeout_s
@@ -78,6 +81,7 @@ class InverterSettings:
     speed_unit: SpeedUnit | None = None
     rated_torque_unit_nm: float = 1e-3
     accepted: Mapping[str, Acceptance] = field(default_factory=dict)
+    channels: tuple[ObjectId, ...] = ()
     sdo_timeout_s: float = 0.5
     mode_timeout_s: float = 2.0
     state_timeout_s: float = 2.0

@@ -16,8 +16,10 @@ What is done about pymodbus 3.16.1 here:
 
 from __future__ import annotations
 
+import asyncio
 import logging
-from collections.abc import Awaitable, Sequence
+from collections.abc import Awaitable, Callable, Sequence
+from functools import partial
 from typing import Final
 
 from pymodbus.constants import ExcCodes
@@ -77,7 +79,7 @@ class _Decoder(DecodePDU):
 
 
 class ModbusLink:
-    """One connection to one Modbus TCP server, for one device id.
+    """One connection to one Modbus TCP server, for one device id; it carries one request at a time.
 
     Parameters
     ----------
@@ -91,7 +93,7 @@ class ModbusLink:
         How the connection is secured; None for plain Modbus TCP.
     """
 
-    __slots__ = ("_device_id", "_dial", "_host", "_port", "_security", "_timeout_s")
+    __slots__ = ("_device_id", "_dial", "_host", "_port", "_security", "_timeout_s", "_turn")
 
     def __init__(
         self, host: str, port: int, device_id: int, timeout_s: float, security: ClientSecurity | None = None
@@ -102,6 +104,7 @@ class ModbusLink:
         self._timeout_s = timeout_s
         self._security = security
         self._dial: Dial | None = None
+        self._turn = asyncio.Lock()
 
     @property
     def place(self) -> str:
@@ -151,7 +154,7 @@ class ModbusLink:
             RegisterKind.INPUT_REGISTER: dial.client.read_input_registers,
         }
         what = f"reading {count} {kind.value}(s) from address {address}"
-        request = requests[kind](address, count=count, device_id=self._device_id)
+        request = partial(requests[kind], address, count=count, device_id=self._device_id)
         answer = await self._answer(dial, what, request, READ_CODE[kind])
         came = answer.bits if kind.is_bit else answer.registers
         expected = (count + 7) // 8 * 8 if kind.is_bit else count  # bits travel in whole bytes
@@ -171,9 +174,9 @@ class ModbusLink:
         what = f"writing {list(words)} to {kind.value} {address}"
         if kind is RegisterKind.COIL:
             bits = [bool(word) for word in words]
-            request = dial.client.write_coils(address, bits, device_id=self._device_id)
+            request = partial(dial.client.write_coils, address, bits, device_id=self._device_id)
         elif kind is RegisterKind.HOLDING_REGISTER:
-            request = dial.client.write_registers(address, list(words), device_id=self._device_id)
+            request = partial(dial.client.write_registers, address, list(words), device_id=self._device_id)
         else:
             raise self._wrong_answer(what, "a kind that Modbus can write", kind.value)
         answer = await self._answer(dial, what, request, WRITE_CODE[kind])
@@ -189,13 +192,21 @@ class ModbusLink:
             )
         return self._dial
 
-    async def _answer(self, dial: Dial, what: str, request: Awaitable[ModbusPDU], function_code: int) -> ModbusPDU:
-        """Wait for the answer and see that it is one."""
+    async def _answer(
+        self, dial: Dial, what: str, request: Callable[[], Awaitable[ModbusPDU]], function_code: int
+    ) -> ModbusPDU:
+        """Wait for the requests before, ask, wait for the answer and see that it is one."""
+        async with self._turn:
+            return await self._answer_to(dial, what, request, function_code)
+
+    async def _answer_to(
+        self, dial: Dial, what: str, request: Callable[[], Awaitable[ModbusPDU]], function_code: int
+    ) -> ModbusPDU:
         framer = _framer(dial)
         framer.begin()
         try:
             with dial.asking():
-                answer = await request
+                answer = await request()
         except ModbusException as cause:  # its one way to say: nothing came
             raise self._foreign_answer(dial, what) or self._no_answer(dial, what) from cause
         dial.answered = True

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from enum import Enum
 from types import TracebackType
 from typing import Final, Self, TypeVar
@@ -341,6 +341,17 @@ class Plc:
                 f"{self._link.place}: {'; '.join(wrong)}, as register map {self._map.name!r} says. "
                 "Check [plc] host and port of the rig file, or give the map of this PLC."
             )
+
+    async def read_channels(self, names: Sequence[str]) -> tuple[float, ...]:
+        """Read registers that hold numbers, each in the register's own unit.
+
+        Raises
+        ------
+        BusDown, DeviceTimeout, ProtocolViolation, DeviceFault
+            If one can't be read, or means nothing.
+        """
+        values = await self._registers.read(names)
+        return tuple(float(values[name]) for name in names)
 
     async def read_registers(self) -> tuple[Reading, ...]:
         """Read every register of the map, in the order of the map; what can't be believed says so and is kept.

@@ -1,7 +1,7 @@
 """Units a register map may use, and what one of them is in the unit the driver works in.
 
-The driver works in SI: rad/s, Nm, and 1 for counts, states and bits. A map says in ``unit`` what its values are in
-after ``scale``; what is not in this table is refused when the map is taken over, and nothing is guessed.
+The driver works in SI: rad/s, Nm, rad, rad/s^2, and 1 for counts, states and bits. A map says in ``unit`` what its
+values are in after ``scale``; what is not in this table is refused when the map is taken over, and nothing is guessed.
 """
 
 from __future__ import annotations
@@ -23,6 +23,8 @@ IN_SI: Final[Mapping[str, Mapping[str, float]]] = MappingProxyType(
             "1/s": RAD_PER_TURN,
         },
         "Nm": {"Nm": 1.0, "kNm": 1000.0},
+        "rad": {"rad": 1.0, "deg": RAD_PER_TURN / 360.0},
+        "rad/s^2": {"rad/s^2": 1.0},
         "1": {"1": 1.0},
     }
 )

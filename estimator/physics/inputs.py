@@ -74,7 +74,8 @@ def inputs_of(records: Sequence[Record], of: Sequence[int], cases: Sequence[Case
 def load_of(case: Case, record: Record) -> FloatArray:
     """Return the load torque of a case over time, shape (N,) [Nm]."""
     extra_nm = 0.0 if case.extra_load_nm is None else case.extra_load_nm
-    return np.broadcast_to(case.start.load_torque_nm + _common(case) + extra_nm, record.time_s.shape)
+    constant_nm = case.start.load_torque_nm + _common(case)
+    return np.broadcast_to(constant_nm + extra_nm + record.known_load_nm, record.time_s.shape)
 
 
 def _common(case: Case) -> float:

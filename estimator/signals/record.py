@@ -84,6 +84,9 @@ class Record:
         False where a torque was not read, or not to be trusted, and ``torque_nm`` holds a stand-in. None: all read.
     reference_nm : ndarray, shape (N,), optional
         Torque that was asked for, of all inputs together [Nm]; NaN where not known. None: not recorded.
+    load_nm : ndarray, shape (N,), optional
+        Measured torque of a load machine, held over each period as ``torque_nm``; a positive one is against it [Nm;
+        translation N]. It acts at the load, beside the constant load torque. None: not measured.
     imposed : ndarray, shape (N,), optional
         Motion that a bench imposes on a joint [rad; translation m]; the output is then the torque it takes, which
         ``torque_nm`` holds too. None: the torque acts and the motion is measured.
@@ -112,6 +115,7 @@ class Record:
     offset_s: FloatArray | None = None
     imposed: FloatArray | None = None
     reference_nm: FloatArray | None = None
+    load_nm: FloatArray | None = None
     channels: tuple[Channel, ...] = ()
     lead: Record | None = None
     label: str = ""
@@ -120,7 +124,12 @@ class Record:
     def __post_init__(self) -> None:
         n = self.time_s.shape[0]
         shapes = {"torque_nm": self.torque_nm.shape[:1], "output": self.output.shape, "okay": self.okay.shape}
-        optional = {"offset_s": self.offset_s, "imposed": self.imposed, "reference_nm": self.reference_nm}
+        optional = {
+            "offset_s": self.offset_s,
+            "imposed": self.imposed,
+            "reference_nm": self.reference_nm,
+            "load_nm": self.load_nm,
+        }
         shapes |= {name: values.shape for name, values in optional.items() if values is not None}
         shapes |= {f"output {channel.label}": channel.output.shape for channel in self.channels}
         for name, shape in shapes.items():
@@ -137,6 +146,11 @@ class Record:
         if not (np.isfinite(self.torque_nm).all() and np.isfinite(self.output[self.okay]).all()):
             raise BadShape(
                 f"recording {self.name}: torque or unmasked output holds NaN or infinity. "
+                "Mask such samples with okay = False and hold the last torque."
+            )
+        if self.load_nm is not None and not np.isfinite(self.load_nm).all():
+            raise BadShape(
+                f"recording {self.name}: load_nm holds NaN or infinity. "
                 "Mask such samples with okay = False and hold the last torque."
             )
         if self.imposed is not None and not np.isfinite(self.imposed).all():
@@ -174,6 +188,11 @@ class Record:
         began = self.time_s[0] if self.began_s is None else self.began_s
         since: FloatArray = self.time_s - began
         return since
+
+    @property
+    def known_load_nm(self) -> FloatArray | float:
+        """Measured torque of a load machine, shape (N,) [Nm]; 0 where none is measured."""
+        return 0.0 if self.load_nm is None else self.load_nm
 
     @property
     @once

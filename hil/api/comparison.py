@@ -8,6 +8,7 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from estimator.diagnosis.preconditions.channels import with_usable_channels
 from hil.api.diagnosis import Recordings, records_of, sources_of
 from hil.api.models import Model, as_file
 from hil.api.record import DRAWN
@@ -34,14 +35,15 @@ class ComparisonResult:
     made: Provenance
 
     def to_dataframe(self) -> pandas.DataFrame:
-        """Return a row per recording and model: errors, fit, load torque, p-value."""
+        """Return a row per recording, model and output: errors, fit, load torque, p-value."""
         import pandas
 
         rows = [
             (each.record.name, each.model, each.rms, each.largest, each.fit_percent, each.load_torque,
              each.past_input.p_value)
             for of_recording in self.comparisons
-            for each in of_recording
+            for of_model in of_recording
+            for each in of_model.outputs
         ]  # fmt: skip
         names = ["recording", "model", "rms", "largest", "fit_percent", "load_torque", "past_input_p_value"]
         return pandas.DataFrame(rows, columns=names).set_index(["recording", "model"])
@@ -73,7 +75,8 @@ class ComparisonResult:
         rows = [
             (each.record.name, each.model, shown(each.rms, each.unit), shown(each.fit_percent, "%"))
             for of_recording in self.comparisons
-            for each in of_recording
+            for of_model in of_recording
+            for each in of_model.outputs
         ]
         table = html.table(("recording", "model", "RMS error", "NRMSE fit"), rows, numbers=(2, 3))
         return f"<div><b>{escape(repr(self)[1:-1])}</b>{table}</div>"
@@ -92,7 +95,7 @@ def compare(models: Model | Sequence[Model], recordings: Recordings) -> Comparis
     files = [as_file(each) for each in given]
     records = records_of(recordings, files[0])
     prepared = next((file.prepared for file in files if file.prepared is not None), None)
-    ready = prepare_again(records, prepared, lambda _line: None)
+    ready, _ = with_usable_channels(prepare_again(records, prepared, lambda _line: None))
     names = [Path(each).name if isinstance(each, Path | str) else f"model {i}" for i, each in enumerate(given, start=1)]
     sources = sources_of(records)
     plants = [

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from drivers.datasheet.check import EdsReport
     from drivers.plc.reading import Reading
     from hil.config.rig_file import Rig
-    from hil.rig.check import Finding
+    from hil.rig.check import ChannelReading, Finding
 
 app = typer.Typer(add_completion=False)
 
@@ -140,6 +140,8 @@ def _print(name: str, findings: tuple[Finding, ...]) -> None:
     for finding in findings:
         if finding.registers:
             console.print(_register_table(finding))
+    if any(finding.channels for finding in findings):
+        console.print(_channel_table(findings))
     for finding in findings:
         for line in (*finding.notes, *_details(finding)):
             console.print(f"{finding.device}: {line}", markup=False, highlight=False, soft_wrap=True)
@@ -168,6 +170,21 @@ def _register_table(finding: Finding) -> RichTable:
     return table
 
 
+def _channel_table(findings: tuple[Finding, ...]) -> RichTable:
+    """Lay out what each further channel reads."""
+    from rich.table import Table
+
+    table = Table(title="channels", title_justify="left")
+    for column in ("column", "what", "source", "value", "unit"):
+        table.add_column(column, justify="right" if column == "value" else "left", overflow="fold")
+    for each in (each for finding in findings for each in finding.channels):
+        channel = each.channel
+        shown = "not read" if each.value is None else f"{each.value:.6g}"
+        what = f"{channel.kind.value}, {channel.at.value}"
+        table.add_row(channel.column, what, channel.source, shown, channel.unit)
+    return table
+
+
 def _document(rig: Rig | None, findings: tuple[Finding, ...], reports: tuple[EdsReport, ...]) -> dict[str, Any]:
     from hil.report.eds_findings import eds_section
 
@@ -191,7 +208,21 @@ def _device(finding: Finding) -> dict[str, Any]:
         "remarks": list(finding.remarks),
         "commissioned": [asdict(each) for each in finding.commissioned],
         "protections": [asdict(each) for each in finding.protections],
-    } | ({"registers": [_register(each) for each in finding.registers]} if finding.registers else {})
+        **({"registers": [_register(each) for each in finding.registers]} if finding.registers else {}),
+        **({"channels": [_channel(each) for each in finding.channels]} if finding.channels else {}),
+    }
+
+
+def _channel(reading: ChannelReading) -> dict[str, Any]:
+    channel = reading.channel
+    return {
+        "column": channel.column,
+        "kind": channel.kind.value,
+        "at": channel.at.value,
+        "source": channel.source,
+        "value": reading.value,
+        "unit": channel.unit,
+    }
 
 
 def _register(reading: Reading) -> dict[str, Any]:

@@ -126,8 +126,10 @@ def _trace(source: Path, rig: Path | None, every: bool, channel: str | None) -> 
             f"{source}: expected --rig RIG beside a bus trace: its EDS files say which bits are torque and speed, "
             "came none."
         )
-    samples = list(replay(source, read_rig(rig), whole=every, channel=channel))
-    return table_of(samples, source, replay_metadata(rig, source, samples[0].t_ns if samples else 0))
+    described = read_rig(rig)
+    samples = list(replay(source, described, whole=every, channel=channel))
+    said = replay_metadata(rig, source, samples[0].t_ns if samples else 0)
+    return table_of(samples, source, said, described.channel_units)
 
 
 def _document(source: Path, target: Path, table: Table, lost: list[str]) -> dict[str, Any]:

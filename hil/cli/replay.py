@@ -144,7 +144,8 @@ def _play_trace(
     samples = list(replayed(path, rig, whole=every, channel=channel))  # all of them before any is written
     course = play_samples(samples, rig.period_s, settings, pace, _show(pace), filter_l)
     if out is not None:
-        with RecordingWriter(out, replay_metadata(rig_path, path, samples[0].t_ns)) as recorder:
+        said = replay_metadata(rig_path, path, samples[0].t_ns)
+        with RecordingWriter(out, said, channel_units=rig.channel_units) as recorder:
             for sample in samples:
                 recorder.append(sample)
     flagged = sum(bool(sample.flags) for sample in samples)

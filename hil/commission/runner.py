@@ -198,7 +198,7 @@ class Runner:
             "pace": self.conditions.pace,
         }
         path.parent.mkdir(parents=True, exist_ok=True)
-        recorder = RecordingWriter(path, metadata, disk_patience_s(pacer))
+        recorder = RecordingWriter(path, metadata, disk_patience_s(pacer), rig.channel_units)
         with (
             stop_on_signals(stop),
             recorder,

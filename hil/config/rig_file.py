@@ -20,12 +20,15 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from drivers.capability.plan import plan_drive
 from drivers.datasheet.file import EdsFile
 from drivers.errors import ConfigMismatch
 from drivers.plc.map_needs import require_usable
-from drivers.plc.register_map import RegisterMapError, load_register_map
+from drivers.plc.register_map import RegisterMap, RegisterMapError, load_register_map
 from drivers.plc.types import PrbsSource
+from drivers.resources import data_file
 from drivers.torque_guard import ErrorLimits, GuardLimits
+from hil.config.channel_table import ChannelTable
 from hil.config.experiment_tables import EVEN_SHARE, AnyExperiment
 from hil.config.guard_table import GuardTable
 from hil.config.inverter_table import InvertersTable, NodeId
@@ -103,13 +106,15 @@ class VehicleTable(Table):
 class SimulationTable(Table):
     """What the simulated rig is, where `hil sim` and `hil demo` stand in for the real one.
 
-    ``model`` is a model file relative to the rig file; without it the default two-mass bus counts.
+    ``model`` is a model file relative to the rig file; without it the default two-mass bus counts. ``channel_noise``
+    has the standard deviation of each channel's reading, by its column and in its unit; 0 where it has none.
     """
 
     model: ExistingFile | None = None
     seed: Annotated[int, Field(ge=0)]
     speed_noise_rad_s: NotNegative
     torque_noise_permille: NotNegative
+    channel_noise: dict[str, NotNegative] = Field(default_factory=dict)
     plc_security: SimulatedPlcSecurityTable | None = None
 
 
@@ -125,6 +130,7 @@ class Rig(Table):
     guard: GuardTable
     prbs: PrbsTable
     vehicle: VehicleTable
+    channels: list[ChannelTable] = Field(default_factory=list)
     experiments: dict[str, AnyExperiment] = Field(default_factory=dict)
     simulation: SimulationTable | None = None
 
@@ -139,6 +145,16 @@ class Rig(Table):
         """Node id of the heartbeat of `hil monitor`."""
         given = self.can.monitor_node_id
         return self._free_node_ids(self.host_node_id)[0] if given is None else given
+
+    @property
+    def channel_units(self) -> dict[str, str]:
+        """Column and unit of each channel, in the order of a recording."""
+        return {channel.column: channel.unit for channel in self.channels}
+
+    @property
+    def register_map(self) -> RegisterMap:
+        """The PLC's register map, read anew."""
+        return load_register_map(self.plc.map or data_file("plc.toml"))
 
     @property
     def of_monitor(self) -> Self:
@@ -207,6 +223,7 @@ class Rig(Table):
                 *self._guard_faults(),
                 *self._deadline_faults(),
                 *self._node_faults(),
+                *self._channel_faults(),
                 *self._prbs_faults(),
                 *self._experiment_faults(),
                 *self._security_faults(),
@@ -243,6 +260,18 @@ class Rig(Table):
                 yield Fault(f"can.{name}", f"another node id than {', '.join(map(str, used))}", node_id)
             elif node_id is not None:
                 used.append(node_id)
+
+    def _channel_faults(self) -> Iterator[Fault]:
+        """See that every channel has a column of its own."""
+        names = [channel.column for channel in self.channels]
+        for number, name in enumerate(names):
+            if name in names[:number]:
+                yield Fault(f"channels.{number}.column", "another column than the channels before it", name)
+        noisy = {} if self.simulation is None else self.simulation.channel_noise
+        for name in (name for name in noisy if name not in names):
+            yield Fault(
+                f"simulation.channel_noise.{name}", f"a column of [[channels]] ({', '.join(names)})", noisy[name]
+            )
 
     def _security_faults(self) -> Iterator[Fault]:
         """See that the simulated PLC wants TLS if, and only if, the host speaks it."""
@@ -317,7 +346,25 @@ def read_rig(path: Path | str) -> Rig:
             _require_eds(file, f"inverters.{name}.eds", table.eds, table.node_id)
     if rig.plc.map is not None:
         _require_map(rig.plc.map)
+    if faults := list(_channel_faults(rig)):
+        raise RigFileError(file, *faults)
     return rig
+
+
+def _channel_faults(rig: Rig) -> Iterator[str]:
+    """Say which channel neither a TPDO nor the register map can give."""
+    for number, channel in enumerate(rig.channels):
+        key = f"channels.{number}"
+        if channel.object_id is None:
+            if fault := channel.register_fault(rig.register_map):
+                yield f"{key}.register | {fault}"
+            continue
+        table: InverterTable = getattr(rig.inverters, channel.inverter or "")
+        plan = plan_drive(EdsFile(table.eds, table.node_id).sheet, [channel.object_id])
+        try:
+            plan.channel_carriers()
+        except ConfigMismatch as cause:
+            yield f"{key}.object | {cause}"
 
 
 def _require_eds(file: Path, key: str, eds: Path, node_id: int) -> None:

@@ -24,6 +24,7 @@ _WORDS = {
     SampleFlag.PLC_STALE: "PLC silent",
     SampleFlag.M1_LIMITED: "m1 in its internal limit",
     SampleFlag.M2_LIMITED: "m2 in its internal limit",
+    SampleFlag.CHANNEL_LOST: "a channel not read",
     NO_VALUE: "no value",
 }
 

@@ -101,7 +101,8 @@ class RecordedRun:
         metadata
             What else the recording shall say of itself.
         """
-        recorder = RecordingWriter(self._path, {**run_metadata(self._rig_path, self._name), **metadata}, 0.0)
+        said = {**run_metadata(self._rig_path, self._name), **metadata}
+        recorder = RecordingWriter(self._path, said, 0.0, self._rig.channel_units)
         self._live = self._estimate()
         reason, stopped = None, False
         try:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from estimator.diagnosis.preconditions.channels import with_usable_channels
 from estimator.signals.record import Record
 from hil.config.model_file import ModelFile, Prepared, read_model_for_recordings
 from hil.errors import UsageError
@@ -54,7 +55,9 @@ def compared(
     read = read_records(recordings, signals, on_bench, dbc, tell)
     if reads is not None:
         tell_scales(read, recordings, reads.model, signals, dbc, tell)
-    records = prepare_again(read, prepared, tell)
+    records, unusable = with_usable_channels(prepare_again(read, prepared, tell))
+    for line in unusable:
+        tell(line)
     by_model = [_of_model(path, files.get(path), records, recordings, mapped, trust) for path in models]
     return [list(of_recording) for of_recording in zip(*by_model, strict=True)]
 

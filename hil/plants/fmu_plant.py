@@ -135,6 +135,13 @@ class FmuPlant:
         still = {name: np.full(since_s.size, value) for name, value in self._inputs.items()}
         columns = {"time": since_s, **still, **dict(zip(named.torque, torques.T, strict=False))}
         columns |= {name: np.full(since_s.size, value) for name, value in held.items()}
+        if record.load_nm is not None:
+            if named.load not in self._inputs:
+                raise UsageError(
+                    f"{self.name}: recording {record.name} has a measured load torque: expected an FMU with an input "
+                    f"for it, came none named {named.load!r}. Name it: --map load=NAME, or take load out of [signals]."
+                )
+            columns[named.load] = columns[named.load] + record.load_nm
         rows = np.zeros(since_s.size, dtype=[(name, float) for name in columns])
         for name, values in columns.items():
             rows[name] = values

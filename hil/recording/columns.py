@@ -11,8 +11,9 @@ TORQUE_M2: Final = "torque_m2_nm"
 SPEED: Final = "speed_rad_s"
 REFERENCE: Final = "torque_ref_nm"
 FLAGS: Final = "flags"
-COUNTING_FLAGS: Final = (0, 16, 32, 48)
-"""Flags of rows that count: good ones, and those in which a drive's internal limit acts and the torque is read."""
+COUNTING_FLAGS: Final = tuple(range(0, 128, 16))
+"""Flags of rows that count: good ones, those in which a drive's internal limit acts and the torque is read, and those
+in which a further channel, which is NaN there, was not read."""
 
 
 UNITS: Final = MappingProxyType(
@@ -29,7 +30,8 @@ UNITS: Final = MappingProxyType(
         "age_s": "s",
     }
 )
-"""Column to unit, in the order a recording of the rig has them; ``flags`` is a bit field without unit."""
+"""Column to unit, in the order a recording of the rig has them, before the channels of its rig file; ``flags`` is a bit
+field without unit."""
 
 COMMENTS: Final = MappingProxyType(
     {
@@ -40,7 +42,7 @@ COMMENTS: Final = MappingProxyType(
         SPEED: "motor speed from the resolver (0x606C)",
         "prbs_nm": "PRBS part of the torque reference (0x60B2)",
         FLAGS: "quality: 0 good, 1 m1 stale, 2 m2 stale, 4 cycle late, 8 PLC stale, 16 m1 in its internal limit, "
-        "32 m2 in its internal limit, added up",
+        "32 m2 in its internal limit, 64 a further channel not read, added up",
         "torque_ref_m1_nm": "torque reference of inverter m1",
         "torque_ref_m2_nm": "torque reference of inverter m2",
         "age_s": "age of the oldest value of the row",

@@ -20,16 +20,17 @@ from hil.recording.damaged import damaged
 from hil.recording.kinds import Column
 from hil.recording.sidecar import Sidecar, as_metadata
 
-HEADER = ",".join(columns.UNITS) + "\n"
-"""First line of such a recording."""
+HEADER = ",".join(columns.UNITS)
+"""Begin of the first line of such a recording; the channels of its rig file follow."""
+
+LONGEST_HEADER = 1 << 16
+"""Bytes."""
 
 BLOCK_BYTES = 1 << 20
 """Text that is parsed at once."""
 
 HELD_BYTES = 1 << 25
 """Cells that are held at once; a recording with more of them is read several times."""
-
-_TYPES = {name: pa.int64() if name == columns.FLAGS else pa.float64() for name in columns.UNITS}
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,8 +60,18 @@ class Extent:
 
 def is_own(path: Path) -> bool:
     """Whether a file begins as a recording of this rig in CSV does."""
+    own = HEADER.split(",")
+    return _names(path)[: len(own)] == own
+
+
+def _names(path: Path) -> list[str]:
+    """Read the names of the columns."""
     with path.open("rb") as file:
-        return file.read(len(HEADER)) == HEADER.encode("ascii")
+        return file.readline(LONGEST_HEADER).decode("utf-8", "replace").rstrip("\n").split(",")
+
+
+def _type(name: str) -> pa.DataType:
+    return pa.int64() if name == columns.FLAGS else pa.float64()
 
 
 def extent(path: Path) -> Extent:
@@ -89,14 +100,14 @@ def data_sha256_at(path: Path, n_rows: int) -> str:
     pyarrow.ArrowInvalid
         If a row is not as the rig writes it.
     """
-    digest, names = DataDigest(), sorted(columns.UNITS)
+    digest, names = DataDigest(), sorted(_names(path))
     at_once = max(HELD_BYTES // (8 * max(n_rows, 1)), 1)
     for first in range(0, len(names), at_once):
         _take(digest, path, names[first : first + at_once], n_rows)
     return digest.hexdigest()
 
 
-def own_sidecar(path: Path, metadata: Mapping[str, str]) -> Sidecar:
+def own_sidecar(path: Path, metadata: Mapping[str, str], units: Mapping[str, str]) -> Sidecar:
     """Return what has to stand beside a recording of this rig: metadata, units and checksums.
 
     Raises
@@ -108,14 +119,14 @@ def own_sidecar(path: Path, metadata: Mapping[str, str]) -> Sidecar:
         data = data_sha256_at(path, extent(path).n_rows)
     except pa.ArrowInvalid as error:
         raise damaged(path, "the rows that were written", error) from error
-    checksums = {CHECKSUM: data, SAID: said_sha256(columns.UNITS, metadata)}
-    return Sidecar(as_metadata({**metadata, **checksums}), columns.UNITS)
+    checksums = {CHECKSUM: data, SAID: said_sha256(units, metadata)}
+    return Sidecar(as_metadata({**metadata, **checksums}), units)
 
 
 def _take(digest: DataDigest, path: Path, names: Sequence[str], n_rows: int) -> None:
     """Give some columns to a digest: the first of them as it is read, the others when it is."""
     held: dict[str, list[Column]] = {name: [] for name in names[1:]}
-    digest.begin(names[0], np.dtype(_TYPES[names[0]].to_pandas_dtype()), n_rows)
+    digest.begin(names[0], np.dtype(_type(names[0]).to_pandas_dtype()), n_rows)
     for first, *others in _blocks(path, names):
         digest.take(first)
         for blocks, block in zip(held.values(), others, strict=True):
@@ -132,7 +143,9 @@ def _blocks(path: Path, names: Sequence[str]) -> Iterator[list[Column]]:
         path,
         pa.csv.ReadOptions(use_threads=False, block_size=BLOCK_BYTES),
         pa.csv.ParseOptions(newlines_in_values=False, ignore_empty_lines=False, quote_char=False),
-        pa.csv.ConvertOptions(column_types=_TYPES, include_columns=names, null_values=[]),
+        pa.csv.ConvertOptions(
+            column_types={name: _type(name) for name in names}, include_columns=names, null_values=[]
+        ),
     ) as rows:
         for block in rows:
             if block.num_rows:

@@ -13,7 +13,7 @@ from hil.rig.sample import Sample
 
 
 def cells_of(sample: Sample) -> tuple[float | int, ...]:
-    """Return one sample in the order of ``columns.UNITS``; the flags are an integer, all else is float."""
+    """Return one sample in the order of ``columns.UNITS``, then its channels; the flags alone are an integer."""
     return (
         float(sample.time_s),
         float(sample.torque_ref_nm),
@@ -25,11 +25,14 @@ def cells_of(sample: Sample) -> tuple[float | int, ...]:
         float(sample.torque_ref_m1_nm),
         float(sample.torque_ref_m2_nm),
         sample.age_ns / 1e9,
+        *map(float, sample.channels),
     )
 
 
-def table_of(samples: Iterable[Sample], path: Path, metadata: Mapping[str, str]) -> Table:
-    """Make a table of samples; a row each.
+def table_of(
+    samples: Iterable[Sample], path: Path, metadata: Mapping[str, str], channel_units: Mapping[str, str] | None = None
+) -> Table:
+    """Make a table of samples, a row each, with a column of each channel of theirs.
 
     Raises
     ------
@@ -37,11 +40,12 @@ def table_of(samples: Iterable[Sample], path: Path, metadata: Mapping[str, str])
         If there is none.
     """
     rows = [cells_of(sample) for sample in samples]
-    kinds = {name: np.int64 if name == columns.FLAGS else np.float64 for name in columns.UNITS}
+    units = {**columns.UNITS, **(channel_units or {})}
+    kinds = {name: np.int64 if name == columns.FLAGS else np.float64 for name in units}
     cells = zip(*rows, strict=True) if rows else [() for _ in kinds]
     return Table(
         path,
         {name: np.array(column, dtype=kind) for (name, kind), column in zip(kinds.items(), cells, strict=True)},
-        columns.UNITS,
+        units,
         metadata,
     )

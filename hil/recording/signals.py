@@ -11,7 +11,7 @@ whoever wrote the model file, and no fault of the acquisition that a diagnosis c
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -25,6 +25,7 @@ from hil.recording.formats import read_table
 from hil.recording.resample import Series, resampled
 from hil.recording.scales import Role, scale_of, with_sign, wrapped_at
 from hil.recording.signals_config import (
+    LoadSignal,
     MaskRange,
     MeasuredOutput,
     OutputSignal,
@@ -100,7 +101,7 @@ def to_record(table: Table, signals: SignalsConfig, tell: Tell | None = None) ->
     scales = [scale_of(table, torque.column, Role.TORQUE, torque.given_scale) for torque in torques]
     scale = scale_of(table, output.column, Role(kind.value), output.given_scale)
     further = signals.further()
-    signed: list[TorqueSignal | OutputSignal] = [*torques, output, *further]
+    signed: list[TorqueSignal | LoadSignal | OutputSignal] = [*signals.inputs(), output, *further]
     for signal in signed:
         numbers[signal.column] = _signed(table, signal, numbers[signal.column])
     if tell is not None:
@@ -114,7 +115,8 @@ def to_record(table: Table, signals: SignalsConfig, tell: Tell | None = None) ->
         torque_nm = np.column_stack([numbers[torque.column] * by for torque, by in zip(torques, scales, strict=True)])
         measured = numbers[output.column] * scale
         channels = [_channel(table, each, numbers[each.column]) for each in further]
-    counted = trusted.all(axis=1) & np.logical_and.reduce([~flagged, *masks.values()])
+        load_nm, load_read = _load(table, signals, numbers)
+    counted = trusted.all(axis=1) & load_read & np.logical_and.reduce([~flagged, *masks.values()])
     okay = counted & np.isfinite(measured)
     _require_sizes(
         table, [*((torque.column, torque_nm[:, k]) for k, torque in enumerate(torques)), (output.column, measured)]
@@ -133,8 +135,24 @@ def to_record(table: Table, signals: SignalsConfig, tell: Tell | None = None) ->
         location=output.at,
         torque_okay=None if read.all() else read,
         reference_nm=_reference(table, signals),
+        load_nm=load_nm,
         channels=tuple(channels),
     )
+
+
+def _load(
+    table: Table, signals: SignalsConfig, numbers: Mapping[str, FloatArray]
+) -> tuple[FloatArray | None, NDArray[np.bool_]]:
+    """Return the measured torque of a load machine, held where it was not read, and where it was."""
+    signal = signals.load
+    if signal is None:
+        return None, np.ones(table.n_rows, dtype=np.bool_)
+    measured = numbers[signal.column] * scale_of(table, signal.column, Role.TORQUE, signal.given_scale)
+    read = np.isfinite(measured)
+    if not read.any():
+        raise RecordingError(table.path, f"column {signal.column}: expected a load torque, came no number at all.")
+    _require_sizes(table, [(signal.column, measured)])
+    return _held(measured[:, np.newaxis], read[:, np.newaxis])[:, 0], read
 
 
 def _channel(table: Table, signal: MeasuredOutput, values: FloatArray) -> Channel:
@@ -143,7 +161,7 @@ def _channel(table: Table, signal: MeasuredOutput, values: FloatArray) -> Channe
     return Channel(signal.kind, signal.at, signal.column, measured, np.isfinite(measured))
 
 
-def _signed(table: Table, signal: TorqueSignal | OutputSignal, values: FloatArray) -> FloatArray:
+def _signed(table: Table, signal: TorqueSignal | LoadSignal | OutputSignal, values: FloatArray) -> FloatArray:
     """Return a reading with its sign.
 
     Raises
@@ -166,7 +184,9 @@ def _signed(table: Table, signal: TorqueSignal | OutputSignal, values: FloatArra
 def _units_used(table: Table, signals: SignalsConfig) -> Iterator[str]:
     """Say which columns were brought to SI units by the units that the file gives them."""
     kind, output = signals.output()
-    roles: list[tuple[TorqueSignal | OutputSignal, Role]] = [(torque, Role.TORQUE) for torque in signals.torques()]
+    roles: list[tuple[TorqueSignal | LoadSignal | OutputSignal, Role]] = [
+        (torque, Role.TORQUE) for torque in signals.inputs()
+    ]
     roles += [(output, Role(kind.value)), *((each, Role(each.kind.value)) for each in signals.further())]
     for signal, role in roles:
         factor = scale_of(table, signal.column, role, signal.given_scale)

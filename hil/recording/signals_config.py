@@ -76,6 +76,10 @@ class TorqueSignal(_Scaled):
     """One torque input [Nm; translation N]; the inputs are summed."""
 
 
+class LoadSignal(_Scaled):
+    """The measured torque of a load machine [Nm; translation N]; a positive one is against positive torque inputs."""
+
+
 class OutputSignal(_Scaled):
     """The measured output [rad/s, rad, Nm; translation m/s, m, N] and where it is measured."""
 
@@ -122,6 +126,8 @@ class SignalsConfig(_Strict):
     speed, position, force
         The output: one of them; none for the contract's motor speed. For a joint on a bench ``position`` is the imposed
         motion, and the output is ``force`` or, without it, the sum of ``torque``.
+    load
+        A further input: the torque that a load machine puts on the load.
     outputs
         All measured outputs, or those beyond the one that ``speed`` or ``position`` names. The first speed or position
         among them is the recording's output; the others are further ones.
@@ -138,6 +144,7 @@ class SignalsConfig(_Strict):
     speed: OutputSignal | None = None
     position: OutputSignal | None = None
     force: OutputSignal | None = None
+    load: LoadSignal | None = None
     outputs: list[MeasuredOutput] = []
     mask: list[MaskRange] = []
     format: FormatHints = FormatHints()
@@ -149,6 +156,8 @@ class SignalsConfig(_Strict):
         if len(given) > 1 and given != ["position", "force"]:
             expected = "one of speed, position, force (position and force together: an imposed motion)"
             refuse([Fault("", expected, " and ".join(given))])
+        if self.load is not None and self.names_bench:
+            refuse([Fault("load", "no such key beside an imposed motion, which needs no load", self.load.column)])
         if self.outputs and not given and not self.is_own_recording and self._first_of_outputs is None:
             expected = "a speed or a position among them, or speed = { ... } for one"
             refuse([Fault("outputs", expected, ", ".join(output.kind.value for output in self.outputs))])
@@ -186,7 +195,7 @@ class SignalsConfig(_Strict):
     def further(self) -> list[MeasuredOutput]:
         """Return the outputs beyond the first one, each column once."""
         first = self.output()[1]
-        taken = {first.column, *(torque.column for torque in self.torques())}
+        taken = {first.column, *(torque.column for torque in self.inputs())}
         others = [each for each in self.outputs if each.column not in taken]
         return list({each.column: each for each in others}.values())
 
@@ -209,18 +218,22 @@ class SignalsConfig(_Strict):
         own = [TorqueSignal(column=name) for name in (columns.TORQUE_M1, columns.TORQUE_M2)]
         return self.torque or own
 
+    def inputs(self) -> list[TorqueSignal | LoadSignal]:
+        """Return all that drives: the torques, and the load's where that is measured."""
+        return [*self.torques(), *([] if self.load is None else [self.load])]
+
     def output(self) -> tuple[OutputKind, OutputSignal]:
         """Return kind and column of the output, the contract's motor speed where none is named."""
         return next(iter(self._outputs()), (OutputKind.SPEED, OutputSignal(column=columns.SPEED)))
 
     def columns(self) -> list[str]:
         """Return the names of all columns that are needed, but for the time."""
-        named = [signal.column for signal in (*self.torques(), self.output()[1], *self.further())]
+        named = [signal.column for signal in (*self.inputs(), self.output()[1], *self.further())]
         return list(dict.fromkeys([*named, *(mask.column for mask in self.mask)]))
 
     def held(self) -> list[str]:
         """Return the names of those whose last value counts until the next: as it is said, and what only masks."""
-        signals = [*self.torques(), self.output()[1], *self.further()]
+        signals = [*self.inputs(), self.output()[1], *self.further()]
         roles = {signal.column for signal in signals}
         return [*(signal.column for signal in signals if signal.hold), *(set(self.columns()) - roles)]
 

@@ -26,7 +26,7 @@ from hil.recording import columns
 from hil.recording.description import OUTCOME
 from hil.recording.formats import read_table, writer_for
 from hil.recording.no_room import no_room
-from hil.recording.own_csv import HEADER, own_sidecar
+from hil.recording.own_csv import own_sidecar
 from hil.recording.publish import write_table
 from hil.recording.samples import cells_of
 from hil.recording.sidecar import write_sidecar
@@ -71,6 +71,8 @@ class RecordingWriter:
     metadata : mapping of str to str
         What the recording shall say of itself; more can be said until it is closed, by `describe`. CSV has no
         place for it: there it is in a file beside the recording (`hil.recording.sidecar`).
+    channel_units : mapping of str to str
+        Column and unit of each channel of its samples.
     patience_s : float
         How long `append` may wait for room where `CAPACITY` samples wait already [s]: 0 in a run on the wall clock.
 
@@ -81,11 +83,16 @@ class RecordingWriter:
     """
 
     def __init__(
-        self, path: Path | str, metadata: Mapping[str, str] | None = None, patience_s: float = DRAIN_S
+        self,
+        path: Path | str,
+        metadata: Mapping[str, str] | None = None,
+        patience_s: float = DRAIN_S,
+        channel_units: Mapping[str, str] | None = None,
     ) -> None:
         self.path = Path(path)
         self.part_path = self.path.with_name(f"{self.path.stem}.part{CSV}")
         self._metadata = dict(metadata or {})
+        self._units = {**columns.UNITS, **(channel_units or {})}
         self._file: FileIO | None = None
         self._patience_s = patience_s
         self._writing: WritingThread | None = None
@@ -129,7 +136,7 @@ class RecordingWriter:
             file = self.part_path.open("xb", buffering=0)
         except FileExistsError:
             file = self.part_path.open("rb+", buffering=0)
-            if not (hold(file) and HEADER.encode().startswith(file.read(len(HEADER) + 1))):
+            if not (hold(file) and self._header.startswith(file.read(len(self._header) + 1))):
                 file.close()
                 raise
             file.seek(0)
@@ -138,9 +145,12 @@ class RecordingWriter:
         hold(file)
         return file
 
-    @staticmethod
-    def _begin(file: FileIO) -> None:
-        header = HEADER.encode()
+    @property
+    def _header(self) -> bytes:
+        return (",".join(self._units) + "\n").encode()
+
+    def _begin(self, file: FileIO) -> None:
+        header = self._header
         while header:  # a disk that has too little room takes a part first
             header = header[file.write(header) :]
 
@@ -169,7 +179,7 @@ class RecordingWriter:
         if self._file is None or self._writing is None:
             raise RecordingError(self.path, "expected an open writer, came one that is closed. Use it by 'with'.")
         self._raise_if_failed(self._writing)
-        if not self._writing.put(_row(sample), self._patience_s):
+        if not self._writing.put(self._row(sample), self._patience_s):
             raise RecordingError(
                 self.path,
                 f"expected a disk that takes samples as they come, came one for which {CAPACITY} wait. They are kept "
@@ -242,11 +252,11 @@ class RecordingWriter:
     def _publish(self) -> None:
         if self.path.suffix.lower() == CSV:  # the part file is the recording: it only gets its name
             writer_for(self.path)
-            said = own_sidecar(self.part_path, self._metadata)
+            said = own_sidecar(self.part_path, self._metadata, self._units)
             self.part_path.rename(self.path)
             write_sidecar(self.path, said)
             return
-        table = Table(self.path, read_table(self.part_path).columns, columns.UNITS, self._metadata)
+        table = Table(self.path, read_table(self.part_path).columns, self._units, self._metadata)
         try:
             write_table(table, self.path)
         except RecordingError as error:
@@ -255,7 +265,13 @@ class RecordingWriter:
             raise RecordingError(self.path, *others, f"{last} {kept}") from error
         self.part_path.unlink()
 
-
-def _row(sample: Sample) -> str:
-    """Format one row in the order of ``columns.UNITS``; a float as the shortest decimal that reads back to it."""
-    return ",".join(map(repr, cells_of(sample))) + "\n"
+    def _row(self, sample: Sample) -> str:
+        """Format one row in the order of the header; a float as the shortest decimal that reads back to it."""
+        cells = cells_of(sample)
+        if len(cells) != len(self._units):
+            raise RecordingError(
+                self.path,
+                f"expected samples with {len(self._units)} cells, one for each of {', '.join(self._units)}, came one "
+                f"with {len(cells)}. Give the channels of the rig file that the samples are of.",
+            )
+        return ",".join(map(repr, cells)) + "\n"

@@ -1,10 +1,10 @@
-"""Recordings against their free-run simulations, in figures."""
+"""Recordings against their free-run simulations, in figures; each measured output by itself."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,10 +12,11 @@ import numpy as np
 from estimator.identification.offline.blocks import block_of
 from estimator.identification.offline.validation import CorrelationTest, residual_tests
 from estimator.physics.model import Motion
-from estimator.signals.record import FloatArray, Record
+from estimator.signals.outputs import outputs_apart
+from estimator.signals.record import FloatArray, OutputKind, Record
 from hil.plants.plant import Plant
 from hil.provenance import Provenance
-from hil.report.numbers import json_number
+from hil.report.numbers import json_number, shown
 from hil.report.wording import output_unit
 
 SCHEMA = "hil.compare/1"
@@ -23,12 +24,14 @@ SCHEMA = "hil.compare/1"
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """A recording, its simulation by one model, and how far they differ.
+    """One output of a recording, its simulation by one model, and how far they differ.
 
     Attributes
     ----------
     model : str
         Name of the model.
+    record : Record
+        The recording; of a further output with that alone (``Record.label``).
     simulated : ndarray, shape (N,)
         In ``unit``.
     rms, largest : float
@@ -40,6 +43,8 @@ class Comparison:
         no better than a constant. NaN for an output that does not move.
     past_input, itself : CorrelationTest
         Of the error with the past torque, which a complete model leaves none of, and with its own past.
+    further : tuple of Comparison
+        Those of the recording's further outputs that the model simulates.
     """
 
     model: str
@@ -53,6 +58,12 @@ class Comparison:
     fit_percent: float
     past_input: CorrelationTest
     itself: CorrelationTest
+    further: tuple[Comparison, ...] = ()
+
+    @property
+    def outputs(self) -> tuple[Comparison, ...]:
+        """Those of all outputs, the recording's own first."""
+        return (self, *self.further)
 
     @property
     def error(self) -> FloatArray:
@@ -61,10 +72,25 @@ class Comparison:
 
 
 def compare_record(plant: Plant, record: Record) -> Comparison:
-    """Simulate a recording and measure the error."""
+    """Simulate a recording and measure the error of each output; one that a plant does not simulate is left out."""
     run = plant.run(record)
+    views = outputs_apart([record], lambda _: 1.0)[1:]
+    load = run.start.load_torque_nm
+    pairs = zip(views, run.further, strict=True) if run.further else ()
+    further = tuple(_compared(plant, view, _from_its_zero(view, found), load) for view, found in pairs)
+    return replace(_compared(plant, record, run.output, load), further=further)
+
+
+def _from_its_zero(record: Record, simulated: FloatArray) -> FloatArray:
+    """Return a further output as simulated; an angle from its sensor's own zero, which nothing else tells."""
+    if record.kind is not OutputKind.POSITION:
+        return simulated
+    return simulated + float(np.mean((record.output - simulated)[record.okay]))
+
+
+def _compared(plant: Plant, record: Record, simulated: FloatArray, load_torque: float) -> Comparison:
     okay = record.okay
-    error = record.output - run.output
+    error = record.output - simulated
     past_input, _, itself = residual_tests(error, record, block_of(record.sample_time_s))
     spread = float(np.std(record.output[okay]))
     rms = float(np.sqrt(np.mean(error[okay] ** 2)))
@@ -72,21 +98,34 @@ def compare_record(plant: Plant, record: Record) -> Comparison:
         plant.name,
         plant.motion,
         record,
-        run.output,
+        simulated,
         output_unit(record.kind, plant.motion),
         rms,
         float(np.max(np.abs(error[okay]))),
-        run.start.load_torque_nm,
+        load_torque,
         100.0 * (1.0 - rms / spread) if spread > 0 else float("nan"),
         past_input,
         itself,
     )
 
 
+def by_output(comparisons: Sequence[Comparison]) -> dict[str, list[Comparison]]:
+    """Return those of several recordings by output: the first one's under an empty name, then each further one's."""
+    found: dict[str, list[Comparison]] = {"": []}
+    for each in (output for comparison in comparisons for output in comparison.outputs):
+        found.setdefault(each.record.label, []).append(each)
+    return found
+
+
 def together(comparisons: Sequence[Comparison]) -> float:
     """Return the RMS of the error over all samples of several recordings, as ``hil diagnose`` gives it."""
     squares = sum(each.rms**2 * int(each.record.okay.sum()) for each in comparisons)
     return float(np.sqrt(squares / sum(int(each.record.okay.sum()) for each in comparisons)))
+
+
+def shown_error(value: float, each: Comparison, unit_above: str) -> str:
+    """Return an error in words, with its unit where that is not the one above its column."""
+    return shown(value) if each.unit == unit_above else shown(value, each.unit)
 
 
 def comparison_text(comparisons: Sequence[Sequence[Comparison]], made: Provenance | None = None) -> str:
@@ -101,27 +140,40 @@ def comparison_text(comparisons: Sequence[Sequence[Comparison]], made: Provenanc
     content: dict[str, Any] = {
         "schema": SCHEMA,
         "recordings": _recordings(by_model[0]),
-        "models": {of[0].model: {"rms": json_number(together(of)), "recordings": _recordings(of)} for of in by_model},
+        "models": {of[0].model: _model(of) for of in by_model},
     }
     if made is not None:
         content["made"] = made.document()
     return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
+def _model(comparisons: Sequence[Comparison]) -> dict[str, Any]:
+    first, *others = by_output(comparisons).items()
+    content = {"rms": json_number(together(first[1])), "recordings": _recordings(comparisons)}
+    if others:
+        content["outputs"] = {label: {"unit": of[0].unit, "rms": json_number(together(of))} for label, of in others}
+    return content
+
+
 def _recordings(comparisons: Sequence[Comparison]) -> dict[str, Any]:
     return {
-        each.record.name: {
-            "unit": each.unit,
-            "rms": json_number(each.rms),
-            "largest": json_number(each.largest),
-            "load_torque": json_number(each.load_torque),
-            "fit_percent": json_number(each.fit_percent),
-            "samples_used": int(each.record.okay.sum()),
-            "samples": int(each.record.okay.size),
-            "residual": {
-                "past_input_p_value": json_number(each.past_input.p_value),
-                "autocorrelation_p_value": json_number(each.itself.p_value),
-            },
-        }
+        each.record.name: _output(each)
+        | {"load_torque": json_number(each.load_torque)}
+        | ({"outputs": {of.record.label: _output(of) for of in each.further}} if each.further else {})
         for each in comparisons
+    }
+
+
+def _output(each: Comparison) -> dict[str, Any]:
+    return {
+        "unit": each.unit,
+        "rms": json_number(each.rms),
+        "largest": json_number(each.largest),
+        "fit_percent": json_number(each.fit_percent),
+        "samples_used": int(each.record.okay.sum()),
+        "samples": int(each.record.okay.size),
+        "residual": {
+            "past_input_p_value": json_number(each.past_input.p_value),
+            "autocorrelation_p_value": json_number(each.itself.p_value),
+        },
     }

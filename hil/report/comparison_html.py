@@ -11,7 +11,7 @@ from estimator.identification.offline.validation import CorrelationTest
 from estimator.physics.model import unit
 from hil.provenance import Provenance
 from hil.report import page as html
-from hil.report.comparison import Comparison, together
+from hil.report.comparison import Comparison, by_output, shown_error, together
 from hil.report.figures import MODEL_STYLES, Line, Panel, Style, input_lines, spectrum_figure, time_figure
 from hil.report.identification.residuals import correlation_figure
 from hil.report.made import made_section
@@ -37,10 +37,18 @@ def comparison_page(comparisons: Sequence[Sequence[Comparison]], made: Provenanc
     count = len(comparisons)
     title = f"{' and '.join(models)} against {count} recording{'s' if count > 1 else ''}"
     first = comparisons[0][0]
-    rows = [(each.record.name, each.model, *_figures(each)) for of_recording in comparisons for each in of_recording]
+    rows = [
+        (each.record.name, each.model, *_figures(each, first.unit))
+        for of_recording in comparisons
+        for of_model in of_recording
+        for each in of_model.outputs
+    ]
     if count > 1:
-        by_model = zip(*comparisons, strict=True)
-        rows += [("together", of[0].model, shown(together(of)), *[""] * 5) for of in by_model]
+        rows += [
+            (" ".join(("together", label)), of[0].model, shown_error(together(of), of[0], first.unit), *[""] * 5)
+            for of_model in zip(*comparisons, strict=True)
+            for label, of in by_output(of_model).items()
+        ]
     if len(models) == 1:
         rows = [(name, *rest) for name, _, *rest in rows]
     headings = (
@@ -58,43 +66,60 @@ def comparison_page(comparisons: Sequence[Sequence[Comparison]], made: Provenanc
     )
 
 
-def _figures(each: Comparison) -> tuple[str, ...]:
+def _figures(each: Comparison, unit_above: str) -> tuple[str, ...]:
     used = f"{int(each.record.okay.sum())} of {each.record.okay.size}"
-    figures = (each.rms, each.largest, each.fit_percent, each.load_torque)
-    return (*map(shown, figures), used, shown_p(each.past_input.p_value))
+    load = "" if each.record.label else shown(each.load_torque)
+    errors = (shown_error(value, each, unit_above) for value in (each.rms, each.largest))
+    return (*errors, shown(each.fit_percent), load, used, shown_p(each.past_input.p_value))
 
 
 def _recording(of_recording: Sequence[Comparison], number: int, recordings: int) -> str:
-    first = of_recording[0]
-    record = first.record
-    panels = comparison_panels(of_recording)
-    errors = panels[-1].lines
+    record = of_recording[0].record
+    spectra = [
+        spectrum_figure(f"spectrum-{number}-{k}", record.sample_time_s, _output_panels(of)[-1].lines, of[0].unit)
+        for k, of in enumerate(_each_output(of_recording))
+    ]
     return html.section(
         f"Recording {record.name}",
-        time_figure(f"time-{number}", record.time_s, panels, recordings),
+        time_figure(f"time-{number}", record.time_s, comparison_panels(of_recording), recordings),
         "<h3>Spectrum of the error</h3>",
-        spectrum_figure(f"spectrum-{number}", record.sample_time_s, errors, first.unit),
+        *spectra,
         "<h3>Does the error go with the torque?</h3>",
         html.paragraph(RESIDUALS, "note"),
         correlation_figure(f"residual-{number}", _tests(of_recording)),
     )
 
 
+def _each_output(of_recording: Sequence[Comparison]) -> list[list[Comparison]]:
+    """Return a recording's comparisons by output, of the models that simulate it."""
+    return list(by_output(of_recording).values())
+
+
 def comparison_panels(of_recording: Sequence[Comparison]) -> tuple[Panel, ...]:
-    """Return torques, measured and simulated outputs, and the errors of all models."""
+    """Return torques, then of each output measured and simulated, and the errors of all models."""
     first = of_recording[0]
+    outputs = (panel for of in _each_output(of_recording) for panel in _output_panels(of))
+    return (Panel(torque_axis(first.motion), input_lines(first.record.torque_nm)), *outputs)
+
+
+def _output_panels(of_output: Sequence[Comparison]) -> tuple[Panel, Panel]:
+    first = of_output[0]
     record = first.record
+    name = f"{record.label}: " if record.label else ""
     measured = Line("measured", np.where(record.okay, record.output, np.nan), Style.MEASURED)
-    styles = [MODEL_STYLES[i % len(MODEL_STYLES)] for i in range(len(of_recording))]
-    pairs = list(zip(of_recording, styles, strict=True))
+    styles = [MODEL_STYLES[i % len(MODEL_STYLES)] for i in range(len(of_output))]
+    pairs = list(zip(of_output, styles, strict=True))
     simulated = [Line(each.model, each.simulated, style) for each, style in pairs]
     errors = [Line(each.model, each.error, style) for each, style in pairs]
     return (
-        Panel(torque_axis(first.motion), input_lines(record.torque_nm)),
-        Panel(f"{quantity(first.unit)} [{first.unit}]", (measured, *simulated)),
-        Panel(f"error [{first.unit}]", tuple(errors)),
+        Panel(f"{name}{quantity(first.unit)} [{first.unit}]", (measured, *simulated)),
+        Panel(f"{name}error [{first.unit}]", tuple(errors)),
     )
 
 
 def _tests(of_recording: Sequence[Comparison]) -> list[tuple[str, CorrelationTest]]:
-    return [(f"{each.model}: error with the past torque", each.past_input) for each in of_recording]
+    return [
+        (" ".join((f"{each.model}:", each.record.label, "error with the past torque")), each.past_input)
+        for of in _each_output(of_recording)
+        for each in of
+    ]

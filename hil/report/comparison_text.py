@@ -8,12 +8,12 @@ from rich.markup import escape
 from rich.table import Table
 
 from estimator.physics.model import unit
-from hil.report.comparison import Comparison, together
+from hil.report.comparison import Comparison, by_output, shown_error, together
 from hil.report.numbers import shown, shown_p
 
 
 def comparison_summary(comparisons: Sequence[Sequence[Comparison]]) -> Table:
-    """Return one line per recording and model, and one of all recordings for each model."""
+    """Return one line per recording, model and output, and one of all recordings for each model and output."""
     several, first = len(comparisons[0]) > 1, comparisons[0][0]
     load = f"load [{unit('torque', first.motion)}]"
     headings = ("free run", *(("model",) if several else ()), f"RMS [{first.unit}]", "largest", "fit [%]", load,
@@ -24,17 +24,19 @@ def comparison_summary(comparisons: Sequence[Sequence[Comparison]]) -> Table:
     for column in table.columns[: 2 if several else 1]:
         column.no_wrap = True
     for of_recording in comparisons:
-        for each in of_recording:
-            table.add_row(each.record.name, *((each.model,) if several else ()), *_figures(each))
+        for each in (output for of_model in of_recording for output in of_model.outputs):
+            table.add_row(each.record.name, *((each.model,) if several else ()), *_figures(each, first.unit))
     if len(comparisons) > 1:
         for of_model in zip(*comparisons, strict=True):
-            rms = shown(together(of_model))
-            table.add_row("together", *((of_model[0].model,) if several else ()), rms)
+            for label, of in by_output(of_model).items():
+                rms = shown_error(together(of), of[0], first.unit)
+                table.add_row(" ".join(("together", label)), *((of[0].model,) if several else ()), rms)
     return table
 
 
-def _figures(each: Comparison) -> tuple[str, ...]:
+def _figures(each: Comparison, unit_above: str) -> tuple[str, ...]:
     good, size = int(each.record.okay.sum()), each.record.okay.size
     used = str(size) if good == size else f"{good}/{size}"
-    figures = (each.rms, each.largest, each.fit_percent, each.load_torque)
-    return (*map(shown, figures), used, shown_p(each.past_input.p_value))
+    errors = (shown_error(value, each, unit_above) for value in (each.rms, each.largest))
+    load = "" if each.record.label else shown(each.load_torque)
+    return (*errors, shown(each.fit_percent), load, used, shown_p(each.past_input.p_value))

@@ -18,6 +18,7 @@ from drivers.resources import data_file
 from drivers.torque_guard import TorqueGuard
 from hil.config.rig_file import InverterTable, PlcTable, Rig
 from hil.errors import UsageError
+from hil.rig.channels import Channels
 from hil.rig.plc_loop import PlcLoop
 from hil.simulator.loopback import is_simulated_bus
 
@@ -34,6 +35,7 @@ class Devices:
     guard: TorqueGuard
     plc_loop: PlcLoop
     plc: Plc
+    channels: Channels
 
 
 @contextmanager
@@ -61,7 +63,8 @@ def open_devices(rig: Rig, least_host_timeout_ms: int = 0) -> Iterator[Devices]:
     with CanLink.open(rig.can.url) as link, PlcLoop() as loop:
         m1, m2 = (Inverter(link, _watching(inverter_settings(name, rig), least_host_timeout_ms)) for name in NAMES)
         with connected_plc(rig.plc, loop) as plc:
-            yield Devices(link, m1, m2, TorqueGuard(rig.guard_limits), loop, plc)
+            channels = Channels(rig.channels, rig.register_map, {"m1": m1, "m2": m2}, loop, plc)
+            yield Devices(link, m1, m2, TorqueGuard(rig.guard_limits), loop, plc, channels)
 
 
 def _watching(settings: InverterSettings, least_ms: int) -> InverterSettings:
@@ -137,6 +140,7 @@ def inverter_settings(name: str, rig: Rig) -> InverterSettings:
         sdo_timeout_s=table.sdo_timeout_s,
         mode_timeout_s=table.mode_timeout_s,
         state_timeout_s=table.state_timeout_s,
+        channels=tuple(each.object_id for each in rig.channels if each.inverter == name and each.object_id is not None),
     )
 
 

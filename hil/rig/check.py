@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
@@ -21,6 +21,7 @@ from drivers.inverter.protection import Protection
 from drivers.plc.reader import Backoff, PlcReader
 from drivers.plc.reading import Reading
 from drivers.plc.types import PlcStatus
+from hil.config.channel_table import ChannelTable
 from hil.config.rig_file import InverterTable, PlcTable, Rig
 from hil.rig.build import inverter_settings, plc_client
 from hil.rig.fitness import Needs, reasons_against
@@ -42,6 +43,22 @@ class Verdict(Enum):
     AGREES = "agrees"
     DIFFERS = "differs"
     FAILED = "failed"
+
+
+@dataclass(frozen=True, slots=True)
+class ChannelReading:
+    """What a channel reads.
+
+    Attributes
+    ----------
+    channel
+        As the rig file has it.
+    value
+        In SI units; None where its register could not be read.
+    """
+
+    channel: ChannelTable
+    value: float | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +85,8 @@ class Finding:
         What stands between a dead host and torque.
     registers
         What the registers of a PLC hold.
+    channels
+        What the further channels of the rig file read at this device.
     """
 
     device: str
@@ -79,6 +98,7 @@ class Finding:
     commissioned: tuple[CommissionedValue, ...] = ()
     protections: tuple[Protection, ...] = ()
     registers: tuple[Reading, ...] = ()
+    channels: tuple[ChannelReading, ...] = ()
 
 
 def check_rig(rig: Rig, prove_stop: bool = False) -> tuple[Finding, ...]:
@@ -92,7 +112,7 @@ def check_rig(rig: Rig, prove_stop: bool = False) -> tuple[Finding, ...]:
         Whether an inverter that agrees is to show that it stops without its host (`Inverter.prove_stop`): it is
         configured for that and left disabled, and no torque is commanded.
     """
-    return (*_can(rig, prove_stop), _plc(rig.plc))
+    return (*_can(rig, prove_stop), _plc(rig))
 
 
 def _can(rig: Rig, prove_stop: bool) -> tuple[Finding, ...]:
@@ -133,10 +153,25 @@ def _inverter(link: CanLink, name: str, rig: Rig, prove_stop: bool) -> Finding:
             inverter.remarks(),
             (*_rate(table, rig.can.url), *inverter.commissioned()),
             inverter.protections(),
+            channels=tuple(_objects_read(inverter, name, rig)),
         )
 
     address = _node(table)
     return _or_failed(name, address, compare)
+
+
+def _objects_read(inverter: Inverter, name: str, rig: Rig) -> Iterator[ChannelReading]:
+    for channel in rig.channels:
+        if channel.inverter == name and channel.object_id is not None:
+            yield ChannelReading(channel, inverter.read_channel(channel.object_id) * (channel.scale or 1.0))
+
+
+def _registers_read(registers: Sequence[Reading], rig: Rig) -> Iterator[ChannelReading]:
+    read = {each.name: each.value for each in registers}
+    for channel in rig.channels:
+        if channel.register_name is not None:
+            value = read[channel.register_name]
+            yield ChannelReading(channel, None if value is None else float(value) * channel.factor(rig.register_map))
 
 
 def _eds_note(path: Path | None) -> tuple[str, ...]:
@@ -162,9 +197,9 @@ def _node(table: InverterTable) -> str:
     return f"node {table.node_id}"
 
 
-def _plc(table: PlcTable) -> Finding:
+def _plc(rig: Rig) -> Finding:
     def compare() -> Finding:
-        registers, status, refusals = asyncio.run(_asked(table))
+        registers, status, refusals = asyncio.run(_asked(rig.plc))
         differences = tuple(
             Difference(
                 "plc",
@@ -184,9 +219,10 @@ def _plc(table: PlcTable) -> Finding:
             differences,
             notes,
             registers=registers,
+            channels=tuple(_registers_read(registers, rig)),
         )
 
-    address = f"{table.host}:{table.port}"
+    address = f"{rig.plc.host}:{rig.plc.port}"
     return _or_failed("plc", address, compare)
 
 

@@ -16,6 +16,7 @@ from drivers.inverter.inverter import Inverter, InverterFeedback
 from drivers.message_rate import MessageRate
 from drivers.torque_guard import Evidence, Measured, TorqueGuard, TorqueRequest
 from hil.errors import RunAborted
+from hil.rig.channels import Channels
 from hil.rig.pacing import NS_PER_S, Tick
 from hil.rig.sample import Sample, SampleFlag
 from hil.rig.timing import RunTiming
@@ -70,9 +71,11 @@ class Cycle:
         How long the inverters may take to answer a SYNC [s].
     timing
         Takes note of when cycles begin and answers come; a new one by default.
+    channels
+        What else is read; nothing by default.
     """
 
-    __slots__ = ("_answer_timeout_ns", "_first_ns", "_guard", "_link", "_m1", "_m2", "timing")
+    __slots__ = ("_answer_timeout_ns", "_channels", "_first_ns", "_guard", "_link", "_m1", "_m2", "timing")
 
     def __init__(
         self,
@@ -83,6 +86,7 @@ class Cycle:
         period_ns: int,
         answer_timeout_s: float,
         timing: RunTiming | None = None,
+        channels: Channels | None = None,
     ) -> None:
         self._link = link
         self._m1 = _Station("m1", m1, SampleFlag.M1_STALE, SampleFlag.M1_LIMITED)
@@ -91,6 +95,7 @@ class Cycle:
         self.timing = timing or RunTiming(period_ns)
         self._answer_timeout_ns = round(answer_timeout_s * NS_PER_S)
         self._first_ns: int | None = None
+        self._channels = channels
 
     @property
     def speed_rad_s(self) -> float:
@@ -146,15 +151,24 @@ class Cycle:
         self._m2.inverter.command(command_m2)
         sync_ns = self._link.sync()
         self.timing.begin(tick, sync_ns)
-        flags |= self._await_answers(sync_ns, tick.now_ns)
+        waited_ns, stale = self._await_answers(sync_ns, tick.now_ns)
         self._guard.compare(tick.due_ns, self._m1.measured, self._m2.measured)
-        return self._sample(tick, request, time_s, sync_ns, flags)
+        channels = self._read_channels(sync_ns, waited_ns)
+        if any(map(math.isnan, channels)):
+            flags |= SampleFlag.CHANNEL_LOST
+        return self._sample(tick, request, time_s, sync_ns, flags | stale, channels)
 
-    def _await_answers(self, sync_ns: int, now_ns: int) -> SampleFlag:
+    def _await_answers(self, sync_ns: int, now_ns: int) -> tuple[int, SampleFlag]:
         """Wait for both: they answer the same SYNC, and the time they have is one and the same."""
         age_m1_ns, flag_m1 = self._await_answer(self._m1, sync_ns, 0, now_ns)
-        _, flag_m2 = self._await_answer(self._m2, sync_ns, age_m1_ns, now_ns)
-        return flag_m1 | flag_m2 if flag_m1 or flag_m2 else SampleFlag.GOOD
+        age_m2_ns, flag_m2 = self._await_answer(self._m2, sync_ns, age_m1_ns, now_ns)
+        return max(age_m1_ns, age_m2_ns), flag_m1 | flag_m2 if flag_m1 or flag_m2 else SampleFlag.GOOD
+
+    def _read_channels(self, sync_ns: int, waited_ns: int) -> tuple[float, ...]:
+        """Read the further channels in the time that the inverters have left."""
+        if self._channels is None:
+            return ()
+        return self._channels.read(sync_ns, (self._answer_timeout_ns - waited_ns) / NS_PER_S)
 
     def _await_answer(self, station: _Station, sync_ns: int, waited_ns: int, now_ns: int) -> tuple[int, SampleFlag]:
         """Wait for one; return how long after the SYNC the waiting ended [ns], and what is against the answer."""
@@ -226,7 +240,15 @@ class Cycle:
     def _age_ns(self, now_ns: int) -> int:
         return now_ns - min(self._last_ns(self._m1), self._last_ns(self._m2))
 
-    def _sample(self, tick: Tick, request: TorqueRequest, time_s: float, sync_ns: int, flags: SampleFlag) -> Sample:
+    def _sample(
+        self,
+        tick: Tick,
+        request: TorqueRequest,
+        time_s: float,
+        sync_ns: int,
+        flags: SampleFlag,
+        channels: tuple[float, ...],
+    ) -> Sample:
         return Sample(
             cycle=tick.cycle,
             t_ns=sync_ns,
@@ -239,4 +261,5 @@ class Cycle:
             speed_rad_s=self.speed_rad_s,
             age_ns=self._age_ns(tick.now_ns),
             flags=flags,
+            channels=channels,
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Protocol
@@ -20,6 +21,13 @@ from hil.rig.timing import RunTiming
 
 SLEPT_THROUGH = SampleFlag.LATE | SampleFlag.M1_STALE | SampleFlag.M2_STALE
 """Flags of a cycle this machine was too late for: there was no SYNC, and the torque stood."""
+
+
+def unread(sample: Sample) -> Sample:
+    """Return a sample whose channels were not read."""
+    if not sample.channels:
+        return sample
+    return replace(sample, channels=(math.nan,) * len(sample.channels), flags=sample.flags | SampleFlag.CHANNEL_LOST)
 
 
 class Recorder(Protocol):
@@ -170,13 +178,14 @@ class Drive:
 
     def _stand_in(self, last: Sample, cycle: int) -> Sample:
         """Build the sample of a cycle that did not take place: the last values, flagged."""
-        return replace(
+        stand_in = replace(
             last,
             cycle=cycle,
             time_s=self._seconds(cycle - self._phase_from),
             age_ns=last.age_ns + (cycle - last.cycle) * self.pacer.period_ns,
             flags=last.flags | SLEPT_THROUGH,
         )
+        return unread(stand_in)
 
     def _append(self, sample: Sample) -> None:
         self.recorder.append(sample)

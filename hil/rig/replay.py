@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -22,10 +22,11 @@ from drivers.canopen.can_link import SYNC_COB_ID, FrameCallback
 from drivers.errors import ProtocolViolation
 from drivers.inverter.pdos import InverterPdos
 from drivers.inverter.settings import InverterSettings
+from hil.config.channel_table import ChannelTable
 from hil.config.rig_file import Rig
 from hil.errors import RecordingError
 from hil.rig.build import inverter_settings
-from hil.rig.drive import SLEPT_THROUGH
+from hil.rig.drive import SLEPT_THROUGH, unread
 from hil.rig.pacing import NS_PER_S, answer_timeout_ns, period_ns, periods_used_up
 from hil.rig.sample import Sample, SampleFlag
 from hil.rig.trace_file import read_frames
@@ -46,11 +47,15 @@ class _Station:
     def __init__(self, settings: InverterSettings, stale: SampleFlag, limited: SampleFlag) -> None:
         self._pdos = InverterPdos(settings)
         self._receiver = self._pdos.receiver()
+        self._channels = self._pdos.channel_receiver()
         self._stale, self._limited = stale, limited
         self._answered = False
         self._remark = SampleFlag.GOOD
         self.commands = {cob_id: partial(self._take_command, cob_id) for cob_id in self._pdos.rpdos}
-        self.answers = {cob_id: partial(self._take_answer, take) for cob_id, take in self._receiver.subscriptions}
+        self.answers: list[tuple[int, FrameCallback]] = [
+            *((cob_id, partial(self._take_answer, take)) for cob_id, take in self._receiver.subscriptions),
+            *self._channels.subscriptions,
+        ]
         self._target_nm, self._offset_nm = 0.0, 0.0 if self.has_offset else math.nan
         self.torque_ref_nm, self.prbs_nm = 0.0, 0.0
         self.torque_nm, self.speed_rad_s = math.nan, math.nan
@@ -68,6 +73,7 @@ class _Station:
 
     def begin(self) -> None:
         self._receiver.start_anew()  # what several TPDOs share is all of this cycle
+        self._channels.start_anew()
         if self.has_offset:
             self.torque_ref_nm, self.prbs_nm = self._target_nm + self._offset_nm, self._offset_nm
         else:  # the sum is all that was on the bus
@@ -81,6 +87,11 @@ class _Station:
             self.torque_nm, self.speed_rad_s = feedback.torque_nm, feedback.speed_rad_s
             self._remark = self._limited if feedback.limited else SampleFlag.GOOD
             self._answered = True
+
+    @property
+    def channels(self) -> tuple[int | None, ...]:
+        """Counts of the further objects of this cycle; None for one that did not come."""
+        return self._channels.latest
 
     def end(self) -> SampleFlag:
         """Close the cycle; the flag it deserves."""
@@ -118,12 +129,16 @@ class _Reader:
     clock: _Clock
     m1: _Station
     m2: _Station
+    tables: Sequence[ChannelTable]
     _sync_ns: int | None = None
     _cycle: int = 0
     _flags: SampleFlag = field(default=SampleFlag.GOOD)
 
     def samples(self, frames: Iterable[Frame]) -> Iterator[Sample]:
-        commands, answers = {**self.m1.commands, **self.m2.commands}, {**self.m1.answers, **self.m2.answers}
+        commands = {**self.m1.commands, **self.m2.commands}
+        answers: dict[int, list[FrameCallback]] = {}
+        for of, take in (*self.m1.answers, *self.m2.answers):
+            answers.setdefault(of, []).append(take)
         for cob_id, data, t_ns in frames:
             if cob_id == SYNC_COB_ID:
                 yield from self._end()
@@ -131,7 +146,8 @@ class _Reader:
             elif cob_id in commands:
                 commands[cob_id](data)
             elif cob_id in answers and self._sync_ns is not None and self.clock.in_time(t_ns - self._sync_ns):
-                answers[cob_id](data, t_ns)
+                for take in answers[cob_id]:
+                    take(data, t_ns)
         yield from self._end()
 
     def _begin(self, sync_ns: int) -> None:
@@ -143,7 +159,9 @@ class _Reader:
     def _end(self) -> Iterator[Sample]:
         if self._sync_ns is None:
             return
-        flags = self._flags | self.m1.end() | self.m2.end()
+        channels = tuple(self._channels())
+        lost = SampleFlag.CHANNEL_LOST if any(map(math.isnan, channels)) else SampleFlag.GOOD
+        flags = self._flags | self.m1.end() | self.m2.end() | lost
         yield Sample(
             cycle=self._cycle,
             t_ns=self._sync_ns,
@@ -156,7 +174,15 @@ class _Reader:
             speed_rad_s=self.m1.speed_rad_s,
             age_ns=max(self.m1.cycles_old, self.m2.cycles_old) * self.clock.period_ns,
             flags=flags,
+            channels=channels,
         )
+
+    def _channels(self) -> Iterator[float]:
+        """Give the channels of this cycle; those of the PLC are not on this bus."""
+        counts = {"m1": iter(self.m1.channels), "m2": iter(self.m2.channels)}
+        for table in self.tables:
+            count = None if table.inverter is None else next(counts[table.inverter])
+            yield math.nan if count is None or table.scale is None else count * table.scale
 
 
 def replay(path: Path, rig: Rig, whole: bool = False, channel: str | None = None) -> Iterator[Sample]:
@@ -194,7 +220,7 @@ def replay(path: Path, rig: Rig, whole: bool = False, channel: str | None = None
             "expected the PRBS in an object of its own (0x60B2), by which the measured part is known, came drives that "
             "get base torque and PRBS as one sum (0x6071). For every cycle: --all.",
         )
-    every = _Reader(clock, m1, m2).samples(read_frames(path, channel))
+    every = _Reader(clock, m1, m2, rig.channels).samples(read_frames(path, channel))
     chosen = every if whole else _measured(path, every)
     try:
         yield from _evenly(path, chosen, period)
@@ -243,7 +269,7 @@ def _evenly(path: Path, samples: Iterable[Sample], period: int) -> Iterator[Samp
                 )
             for missing in range(last.cycle + 1, sample.cycle):
                 age_ns = last.age_ns + (missing - last.cycle) * period
-                stand_in = replace(last, cycle=missing, age_ns=age_ns, flags=last.flags | SLEPT_THROUGH)
+                stand_in = unread(replace(last, cycle=missing, age_ns=age_ns, flags=last.flags | SLEPT_THROUGH))
                 yield _at(stand_in, first, period)
         yield _at(sample, first, period)
         last = sample

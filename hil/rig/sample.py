@@ -16,10 +16,11 @@ class SampleFlag(IntFlag):
     PLC_STALE = 8
     M1_LIMITED = 16  # an internal limit of m1 acts (statusword bit 11): less torque than asked for, read as ever
     M2_LIMITED = 32
+    CHANNEL_LOST = 64  # a further channel was not read in this cycle, and is NaN
 
 
-REMARKS = SampleFlag.M1_LIMITED | SampleFlag.M2_LIMITED
-"""Flags of samples that count all the same: what was read is what was."""
+REMARKS = SampleFlag.M1_LIMITED | SampleFlag.M2_LIMITED | SampleFlag.CHANNEL_LOST
+"""Flags of samples whose torque and speed count all the same: what was read is what was."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +28,8 @@ class Sample:
     """One SYNC cycle. SI units; ``time_s`` counts from the first recorded cycle, ``t_ns`` is host time.
 
     ``torque_*_nm`` and ``speed_rad_s`` are NaN where a device has never answered yet. ``age_ns`` is the age
-    of the oldest of the values at the end of the cycle.
+    of the oldest of the values at the end of the cycle. ``channels`` are the further ones of the rig file, in its
+    order; NaN where one was not read in this cycle.
     """
 
     cycle: int
@@ -41,6 +43,7 @@ class Sample:
     speed_rad_s: float
     age_ns: int
     flags: SampleFlag
+    channels: tuple[float, ...] = ()
 
     @property
     def counts(self) -> bool:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from estimator.physics.model import DrivelineModel
-from estimator.physics.stepper import Stepper
+from estimator.signals.record import Location, OutputKind
+from hil.simulator.sensed_driveline import SensedDriveline
 
 
 class DrivelinePlant:
@@ -24,13 +25,23 @@ class DrivelinePlant:
 
     def __init__(self, model: DrivelineModel, period_s: float) -> None:
         self._period_s = period_s
-        self._stepper = Stepper(model, period_s)
+        self._stepper = SensedDriveline(model, period_s)
         self._compile()
 
     @property
     def speed_rad_s(self) -> float:
         """True motor speed now [rad/s]."""
         return self._stepper.speed_rad_s
+
+    def measured(self, kind: OutputKind, at: Location) -> float:
+        """Return what a sensor there shows now [rad/s, rad, Nm, rad/s^2].
+
+        Raises
+        ------
+        BadModel
+            If the structure has no such output.
+        """
+        return self._stepper.measured(kind, at)
 
     def advance(self, torque_nm: tuple[float, float], duration_s: float) -> None:
         """Let the driveline run with both torques held [Nm] for one period.

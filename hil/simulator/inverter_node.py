@@ -79,6 +79,7 @@ class InverterNode:
         self._faults = settings.faults
         self._lock = RLock()  # frames are taken in one thread, the heartbeat is sent by another
         self._eds = EdsFile(settings.eds_path, settings.node_id)
+        self._sensors = settings.sensors
         self._identity = {1: settings.identity[0], 2: settings.identity[1]}
         self._device = InverterDevice(settings, power_on_values(self._eds), velocity_scale(self._eds, settings), seed)
         self._random = np.random.default_rng([seed, settings.node_id, _STALE_STREAM])
@@ -311,7 +312,9 @@ class InverterNode:
 
     def _on_read(self, *, index: int, subindex: int, od: Any) -> int | None:
         value = self._device.read(index, subindex)
-        if value is None and index == 0x1018 and self._eds.sheet.value(index, subindex) is None:
+        if (index, subindex) in self._sensors:
+            value = self._sensed(index, subindex)
+        elif value is None and index == 0x1018 and self._eds.sheet.value(index, subindex) is None:
             value = self._identity.get(subindex)
         return None if value is None else fitting(value, od.data_type)
 
@@ -333,7 +336,13 @@ class InverterNode:
                 self._looking = Ticker(LOOK_EVERY_S, self._look_by_the_clock, f"host watch of node {self._node_id}")
 
     def _source(self, index: int, subindex: int) -> Callable[[], int]:
+        if (index, subindex) in self._sensors:
+            return partial(self._sensed, index, subindex)
         return self._device.reader(index) or partial(self._value, index, subindex)
+
+    def _sensed(self, index: int, subindex: int) -> int:
+        """Read a further sensor as its converter does: saturating."""
+        return fitting(self._sensors[index, subindex](), self._eds.integer_type(index, subindex))
 
     def _value(self, index: int, subindex: int) -> int:
         entry = self._eds.sheet.entry(index, subindex)

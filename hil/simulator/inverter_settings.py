@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from drivers.capability.carrier import ObjectId
 from drivers.capability.speed_unit import SpeedUnit
 from drivers.inverter.cia402 import TorqueMode
 from hil.simulator.torque_limits import DriveLimits
@@ -138,6 +140,8 @@ class SimulatedInverter:
         Unit of its velocity actual value where its EDS has none.
     rated_torque_unit_nm
         What one count of its object 0x6076 is [Nm].
+    sensors
+        What reads the objects of further sensors at it, in counts.
     faults
         What is wrong with it.
     """
@@ -151,4 +155,5 @@ class SimulatedInverter:
     identity: tuple[int, int] = (0, 0)
     speed_unit: SpeedUnit | None = None
     rated_torque_unit_nm: float = 1e-3
+    sensors: Mapping[ObjectId, Callable[[], int]] = field(default_factory=dict)
     faults: InverterFaults = InverterFaults()

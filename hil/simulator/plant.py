@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import Protocol
+from typing import Protocol, runtime_checkable
+
+from estimator.signals.record import Location, OutputKind
 
 
 class Plant(Protocol):
@@ -15,6 +17,14 @@ class Plant(Protocol):
 
     def advance(self, torque_nm: tuple[float, float], duration_s: float) -> None:
         """Let the plant run with both inverters' torques held [Nm] for ``duration_s`` [s]."""
+
+
+@runtime_checkable
+class SensedPlant(Plant, Protocol):
+    """A driveline with further places to measure at."""
+
+    def measured(self, kind: OutputKind, at: Location) -> float:
+        """Return what a sensor there shows now [rad/s, rad, Nm, rad/s^2]."""
 
 
 class RigidPlant:

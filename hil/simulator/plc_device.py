@@ -153,6 +153,7 @@ class PlcDevice:
         "_permissive",
         "_prbs",
         "_seen_s",
+        "_sensed",
         "_setup",
         "_time_s",
     )
@@ -168,6 +169,7 @@ class PlcDevice:
         self._clutch = _clutch_in(self._drive_mode)
         self._permissive = True
         self._prbs: PlcPrbs | None = None
+        self._sensed: dict[str, Value] = {}
         self._held: dict[str, Value] = {
             "host_count": 0,
             "drive_mode_request": self._drive_mode.value,
@@ -221,10 +223,16 @@ class PlcDevice:
                 self._cycle()
             self._fail()
 
+    def show(self, sensed: Mapping[str, Value]) -> None:
+        """Take what further sensors read now, by register name."""
+        with self._lock:
+            self._sensed = dict(sensed)
+
     def values(self) -> dict[str, Value]:
         """Take a snapshot of everything the PLC shows, by register name."""
         with self._lock:
             return {
+                **self._sensed,
                 **IDENTITY,
                 **self._held,
                 "permissive": self._permits(),

@@ -7,6 +7,7 @@ another one.
 from __future__ import annotations
 
 import uuid
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from types import TracebackType
@@ -16,12 +17,12 @@ import can
 
 from drivers.canopen.can_link import open_bus
 from drivers.canopen.inline_bus import InlineBus
-from drivers.plc.register_map import load_register_map
-from drivers.resources import data_file
+from drivers.capability.carrier import ObjectId
 from hil.config.rig_file import InverterTable, Rig, SimulationTable
 from hil.errors import UsageError
 from hil.simulator.bus_faults import BusFaults
 from hil.simulator.can_bridge import CanBridge
+from hil.simulator.channel_sensors import ChannelSensors
 from hil.simulator.faulty_wire import FaultyWire
 from hil.simulator.inverter_settings import InverterFaults, SimulatedInverter
 from hil.simulator.loopback import IN_PROCESS, SOCKETCAN, Address, bus_address
@@ -69,7 +70,8 @@ class RigServer:
     Raises
     ------
     UsageError
-        If the rig file has no ``[simulation]``, or an address is not on this machine.
+        If the rig file has no ``[simulation]``, or channels that the driveline does not have, or an address is not on
+        this machine.
     BusDown
         On entry, if an address can't be served at.
     """
@@ -99,6 +101,7 @@ class RigServer:
         self._bus_url = bus_url
         self._modbus = modbus
         self._stack = ExitStack()
+        self._sensors = ChannelSensors(rig, plant, self._seed)
         self.plc = PlcDevice(_plc_setup(rig), self._faults.plc)
 
     @property
@@ -139,6 +142,7 @@ class RigServer:
             self._real_time,
         )
         stack.enter_context(slaves)
+        slaves.add_sensor(self._sense)
         slaves.add_step_callback(self._step_plc)
         slaves.add_torque_from(self._plc_torque_nm)
         if self._bridged is not None:
@@ -155,12 +159,16 @@ class RigServer:
         return InlineBus(devices)
 
     def _serve_plc(self, stack: ExitStack) -> None:
-        register_map = load_register_map(self._rig.plc.map or data_file("plc.toml"))
+        self.plc.show(self._sensors.registers())
         self.plc_server = PlcServer(
-            self.plc, register_map, self._modbus.host, self._modbus.port, plc_security(self._simulation)
+            self.plc, self._rig.register_map, self._modbus.host, self._modbus.port, plc_security(self._simulation)
         )
         stack.enter_context(self.plc_server)
         self._modbus = Address(self._modbus.host, self.plc_server.port)
+
+    def _sense(self) -> None:
+        self._sensors.sample()
+        self.plc.show(self._sensors.registers())
 
     def _step_plc(self, time_s: float) -> None:
         self.plc.step(self._rig.period_s)
@@ -173,8 +181,8 @@ class RigServer:
     def _inverters(self) -> tuple[SimulatedInverter, SimulatedInverter]:
         tables = self._rig.inverters
         return (
-            _inverter(tables.m1, self._simulation, self._faults.m1),
-            _inverter(tables.m2, self._simulation, self._faults.m2),
+            _inverter(tables.m1, self._simulation, self._faults.m1, self._sensors.objects("m1")),
+            _inverter(tables.m2, self._simulation, self._faults.m2, self._sensors.objects("m2")),
         )
 
 
@@ -200,7 +208,12 @@ def plc_security(simulation: SimulationTable) -> PlcSecurity | None:
     return None if table is None else PlcSecurity(table.credentials, table.roles)
 
 
-def _inverter(table: InverterTable, simulation: SimulationTable, faults: InverterFaults) -> SimulatedInverter:
+def _inverter(
+    table: InverterTable,
+    simulation: SimulationTable,
+    faults: InverterFaults,
+    sensors: Mapping[ObjectId, Callable[[], int]],
+) -> SimulatedInverter:
     return SimulatedInverter(
         node_id=table.node_id,
         rated_torque_nm=table.rated_torque_nm,
@@ -210,6 +223,7 @@ def _inverter(table: InverterTable, simulation: SimulationTable, faults: Inverte
         identity=(table.vendor_id, table.product_code),
         speed_unit=None if table.speed_unit is None else table.speed_unit.speed_unit,
         rated_torque_unit_nm=table.rated_torque_unit.nm,
+        sensors=sensors,
         faults=faults,
     )
 

@@ -55,6 +55,7 @@ class SimulatedRig:
         self._plant = plant
         self._period_s = period_s
         self._callbacks: list[StepCallback] = []
+        self._sensors: list[Callable[[], None]] = []
         self._added: TorqueSource = lambda: (0.0, 0.0)
         self._steps = 0
         self._link = CanLink(bus)
@@ -80,6 +81,10 @@ class SimulatedRig:
     def add_step_callback(self, callback: StepCallback) -> None:
         """Have ``callback(time_s)`` called after each step, in the rig's own thread."""
         self._callbacks.append(callback)
+
+    def add_sensor(self, sample: Callable[[], None]) -> None:
+        """Have ``sample()`` called at each SYNC, before any node answers it."""
+        self._sensors.append(sample)
 
     def add_torque_from(self, source: TorqueSource) -> None:
         """Let another controller add to both torque references, past CANopen, such as a PLC its own PRBS."""
@@ -115,6 +120,8 @@ class SimulatedRig:
                 node.add_torque(added_nm)
         for node in self._nodes:
             node.step(t_ns, speed_rad_s, self._period_s)
+        for sample in self._sensors:
+            sample()
         for node in self._nodes:
             node.send_feedback()
         self._plant.advance(self.torque_nm, self._period_s)

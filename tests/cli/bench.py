@@ -39,6 +39,13 @@ def speed(torque: np.ndarray, start: float, dry: float = 0.0) -> np.ndarray:
     return w
 
 
+def angle(path: Path, w: np.ndarray) -> np.ndarray:
+    """Angle of a recording from its speed ``w`` without noise: J dw + b w dt = (T - T_0) dt, summed up."""
+    torque = 2.0 * np.loadtxt(path, delimiter=",", skiprows=1)[:, 1]
+    driven = np.concatenate([[0.0], np.cumsum(torque[:-1] - LOAD) * DT])
+    return (driven - J * (w - w[0])) / B
+
+
 def record(
     path: Path, seed: int, *, noise: float = 0.0, dry: float = 0.0, n: int = 1500, reverse: bool = True
 ) -> np.ndarray:

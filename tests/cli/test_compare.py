@@ -51,6 +51,54 @@ def test_figures_and_plots_are_written(inputs: list[str], tmp_path: Path, capsys
     assert "drive.toml against 2 recordings" in page
 
 
+OUTPUTS = """
+[signals]
+outputs = [
+    { kind = "speed", at = "motor", column = "speed_rad_s" },
+    { kind = "position", at = "motor", column = "angle_rad" },
+    { kind = "acceleration", at = "motor", column = "dead_rad_s2" },
+]
+"""
+
+
+@pytest.fixture
+def two_outputs(tmp_path: Path) -> list[str]:
+    """A drive whose angle is read too, by an encoder with a zero of its own, and an accelerometer that is dead."""
+    for seed in (1, 2):
+        path = tmp_path / f"run_{seed}.csv"
+        speed = bench.record(path, seed, noise=NOISE, n=600)
+        angle = 5.0 + bench.angle(path, speed) + 0.01 * np.random.default_rng(seed).normal(size=speed.size)
+        lines = path.read_text().splitlines()
+        columns = ["angle_rad,dead_rad_s2", *(f"{each:.12g},0.25" for each in angle)]
+        path.write_text("\n".join(f"{line},{more}" for line, more in zip(lines, columns, strict=True)) + "\n")
+    model = bench.model(tmp_path / "drive.toml", bench.MODEL + OUTPUTS)
+    return [str(model), str(tmp_path / "run_1.csv"), str(tmp_path / "run_2.csv")]
+
+
+def test_each_output_has_its_figures(two_outputs: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["compare", *two_outputs, "--json"]) == 0
+    said = capsys.readouterr()
+    content = json.loads(said.out)
+    for name in ("run_1", "run_2"):
+        assert content["recordings"][name]["rms"] == pytest.approx(NOISE, rel=0.1)
+        (figures,) = content["recordings"][name]["outputs"].values()
+        assert figures["unit"] == "rad"
+        assert figures["rms"] == pytest.approx(0.01, rel=0.2)  # its zero is no error
+        assert figures["samples_used"] == 600
+        assert 0.0 <= figures["residual"]["past_input_p_value"] <= 1.0
+    together = content["models"]["drive.toml"]["outputs"]["angle_rad"]
+    assert together["rms"] == pytest.approx(0.01, rel=0.2)
+    assert "the output dead_rad_s2 is not used: it stays at 0.25" in said.err
+
+
+def test_each_output_is_drawn(two_outputs: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["compare", *two_outputs, "--out", str(tmp_path / "result")]) == 0
+    assert "run_1:angle_rad" in capsys.readouterr().out
+    page = (tmp_path / "result" / "compare.html").read_text()
+    assert page.count('class="plotly-graph-div"') == 2 * (1 + 2 + 1)  # over time, a spectrum each, residuals
+    assert "angle_rad: error [rad]" in page
+
+
 @pytest.mark.parametrize(
     ("position", "text", "said"),
     [

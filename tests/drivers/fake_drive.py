@@ -17,6 +17,7 @@ from drivers.canopen.can_link import CanLink
 from drivers.canopen.heartbeat import HeartbeatProducer, NmtState
 from drivers.canopen.pdo_map import PdoCodec
 from drivers.capability.carrier import RPDO, TPDO
+from drivers.capability.plan import plan_drive
 from drivers.datasheet.file import EdsFile
 from drivers.inverter.cia402 import STATUSWORD_STATE_BITS, PowerState, StatusBit, command_of, next_state
 from drivers.inverter.inverter import Inverter, InverterSettings
@@ -56,7 +57,9 @@ class FakeDrive:
         self.controlword = 0
         self.torque = 0
         self.pending: dict[int, int] = {}
-        self.rpdos, self.tpdos = (codecs(self.eds, direction, "fake") for direction in (RPDO, TPDO))
+        self.rpdos, self.tpdos = (
+            codecs(self.eds, plan_drive(self.eds.sheet).pdos(direction), "fake") for direction in (RPDO, TPDO)
+        )
         self.producer: HeartbeatProducer | None = None
         link.subscribe(0x600 + node_id, lambda data, t_ns: self.take_sdo(data))
         link.subscribe(0x000, lambda data, t_ns: self.take_nmt(data[0]))

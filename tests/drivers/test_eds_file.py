@@ -76,11 +76,11 @@ def test_pdo_layouts_come_from_the_eds_with_the_node_id_put_in() -> None:
 
 
 def test_changed_mapping_changes_the_layout(edited: Edited) -> None:
-    search = find_carriers(edited("0x60770010", "0x60740010").sheet, TPDO, (0x6041, 0x606C))
+    search = find_carriers(edited("0x60770010", "0x60740010").sheet, TPDO, ((0x6041, 0), (0x606C, 0)))
     (carrier,) = search.carriers
     assert carrier.mapped_here  # 0x6074 is no object of it
 
-    search = find_carriers(edited("0x60770010", "0x60780010").sheet, TPDO, (0x6041, 0x6078))
+    search = find_carriers(edited("0x60770010", "0x60780010").sheet, TPDO, ((0x6041, 0), (0x6078, 0)))
     (carrier,) = search.carriers
     assert tuple(mapped.index for mapped in carrier.layout.objects) == (0x6041, 0x6078, 0x606C)
 

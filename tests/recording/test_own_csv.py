@@ -35,7 +35,7 @@ def test_the_checksum_is_that_of_the_table(
     monkeypatch.setattr(own_csv, "HELD_BYTES", held_bytes)
     monkeypatch.setattr(own_csv, "BLOCK_BYTES", block_bytes)
     path = tmp_path / "run.csv"
-    path.write_text(own_csv.HEADER + 100 * ROW, "utf-8")
+    path.write_text(own_csv.HEADER + "\n" + 100 * ROW, "utf-8")
     assert own_csv.data_sha256_at(path, own_csv.extent(path).n_rows) == data_sha256(read_table(path).columns)
 
 
@@ -90,7 +90,7 @@ def test_the_cells_in_memory_do_not_grow_with_the_recording(tmp_path: Path, monk
     most = []
     for n_rows in (20_000, 80_000):
         path = tmp_path / f"{n_rows}.csv"
-        path.write_text(own_csv.HEADER + n_rows * row, "utf-8")
+        path.write_text(own_csv.HEADER + "\n" + n_rows * row, "utf-8")
         held.clear()
         own_csv.data_sha256_at(path, n_rows)
         most.append(max(held))

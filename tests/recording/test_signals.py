@@ -17,7 +17,7 @@ from hil.errors import InputError, RecordingError, UsageError
 from hil.recording import SignalsConfig, Table, read_record, read_records, write_table
 from hil.recording.columns import COUNTING_FLAGS
 from hil.recording.signals import to_record
-from hil.rig.sample import REMARKS, SampleFlag
+from hil.rig.sample import REMARKS
 
 Changed = Callable[..., Table]
 
@@ -83,10 +83,10 @@ def test_the_reference_is_taken_along_where_a_recording_of_the_rig_has_it(change
 def test_rows_in_which_a_limit_of_the_drive_acts_count(changed: Changed) -> None:
     """Their torque was read; any other flag, an unknown one too, is a row that is missing."""
     flags = np.zeros(40, dtype=np.int64)
-    flags[10:16] = (16, 32, 48, 17, 64, 1)
+    flags[10:17] = (16, 32, 48, 17, 128, 1, 64)
     record = to_record(changed(flags=flags), SignalsConfig())
-    assert record.okay[10:16].tolist() == [True, True, True, False, False, False]
-    assert set(COUNTING_FLAGS) == {int(SampleFlag(0)), *(int(flag) for flag in REMARKS), int(REMARKS)}
+    assert record.okay[10:17].tolist() == [True, True, True, False, False, False, True]
+    assert set(COUNTING_FLAGS) == {bits for bits in range(256) if not bits & ~int(REMARKS)}
 
 
 def test_flags_of_a_foreign_recording_mean_nothing(changed: Changed) -> None:
@@ -388,3 +388,34 @@ def test_outputs_that_no_structure_has_are_refused(keys: dict[str, Any], expecte
         signals(**keys)
     (line,) = problem_lines(SignalsConfig, caught.value)
     assert expected in line
+
+
+LOAD = {"load": {"column": "torque_ref_nm", "scale": -2.0}}
+
+
+def test_a_measured_load_torque_is_an_input(changed: Changed) -> None:
+    read = np.linspace(1.0, 9.0, 40)
+    read[[0, 7]] = np.nan
+    record = to_record(changed(torque_ref_nm=read), signals(**LOAD))
+    due = -2.0 * read
+    due[[0, 7]] = due[[1, 6]]  # held, at the start the first one
+    np.testing.assert_array_equal(record.known_load_nm, due)
+    assert np.flatnonzero(~record.okay).tolist() == [0, 7]
+    assert record.torque_okay is None
+    assert to_record(changed(), SignalsConfig()).known_load_nm == 0.0
+
+
+def test_a_load_torque_is_no_output_too(changed: Changed) -> None:
+    assert to_record(changed(torque_ref_nm=np.arange(40.0)), signals(outputs=BOTH, **LOAD)).channels == ()
+
+
+def test_a_load_torque_without_a_number_is_refused(changed: Changed) -> None:
+    with pytest.raises(RecordingError, match="torque_ref_nm: expected a load torque, came no number"):
+        to_record(changed(torque_ref_nm=np.full(40, np.nan)), signals(**LOAD))
+
+
+def test_a_joint_has_no_load() -> None:
+    with pytest.raises(ValidationError) as caught:
+        signals(position={"column": "x"}, force={"column": "F"}, **LOAD)
+    (line,) = problem_lines(SignalsConfig, caught.value)
+    assert "no such key beside an imposed motion" in line

@@ -13,7 +13,7 @@ from hil.errors import RecordingError
 from hil.recording import RecordingWriter, columns, read_record, read_table
 from hil.recording.checksum import CHECKSUM, SAID, data_sha256, said_sha256
 from hil.recording.formats import FORMATS
-from hil.recording.writer import HEADER
+from hil.recording.own_csv import HEADER
 from hil.rig.sample import Sample, SampleFlag
 
 WRITABLE = [suffix for suffix, form in FORMATS.items() if form.write]
@@ -183,7 +183,7 @@ def test_what_is_kept_is_known_when_the_run_is_over(tmp_path: Path) -> None:
     assert writer.kept == tmp_path / "run.csv"
 
 
-@pytest.mark.parametrize("left", [HEADER, HEADER[:-1], HEADER[:7], ""])
+@pytest.mark.parametrize("left", [HEADER + "\n", HEADER, HEADER[:7], ""])
 def test_a_part_file_without_a_sample_blocks_no_name(tmp_path: Path, left: str) -> None:
     (tmp_path / "run.part.csv").write_text(left)
     with RecordingWriter(tmp_path / "run.csv") as writer:

@@ -98,7 +98,8 @@ def _setting(result: FitResult, record: Record, angle: FloatArray) -> Setting:
 
 def _load(result: FitResult, index: int, constant_nm: float) -> FloatArray:
     """Return the load torque of one recording at a fit, shape (N,)."""
-    load = np.full(result.problem.records[index].time_s.size, constant_nm)
+    record = result.problem.records[index]
+    load = np.full(record.time_s.size, constant_nm) + record.known_load_nm
     extra = result.problem.local[index].extra_load(result.local_of(index))
     return load if extra is None else load + extra
 

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
 from estimator.physics.motion import measured_speed
-from estimator.signals.record import BoolArray, Channel, FloatArray, Location, OutputKind, Record
+from estimator.signals.record import BoolArray, Channel, FloatArray, IntArray, Location, OutputKind, Record
 
 FEWEST_GOOD = 0.5
 """Share of the recording's good rows that a channel must have read."""
@@ -31,12 +32,30 @@ SMOOTH_S = 0.2
 """Width of the mean over which channels are compared: below a driveline's first mode both ends move as one."""
 
 
+LAG_STEP_S, LAGS = 0.01, 30
+"""Steps in which a channel's lag is sought [s], and how many of them either way."""
+
+BLOCKS = 8
+"""Parts of a recording in which a channel's lag is estimated, each by itself."""
+
+DEAD_S = 0.5
+"""Time for which a reading that does not change at all is dead, where it should [s]."""
+
+MOVED = 0.5
+"""Range, over its spread, of what a channel should go like, from which a reading should change."""
+
+CLEARLY = 6.0
+"""Standard errors by which a lag must change over a recording: 1 in 1000 by chance, with as many degrees of freedom."""
+
+
 def with_usable_channels(records: Sequence[Record]) -> tuple[list[Record], list[str]]:
     """Return recordings with the further outputs that a fit can use, and what is wrong with the others."""
     kept, warnings = [], []
     for record in records:
         usable: list[Channel] = []
         for channel in record.channels:
+            channel, dead = _without_dead(record, channel)
+            warnings += [f"recording {record.name}: the output {channel.label} {said}" for said in dead]
             fault = _fault(record, channel, usable)
             if fault:
                 warnings.append(f"recording {record.name}: the output {channel.label} is not used: {fault}")
@@ -44,6 +63,24 @@ def with_usable_channels(records: Sequence[Record]) -> tuple[list[Record], list[
                 usable.append(channel)
         kept.append(replace(record, channels=tuple(usable)) if record.channels else record)
     return kept, warnings
+
+
+def _without_dead(record: Record, channel: Channel) -> tuple[Channel, list[str]]:
+    """Return a channel without the stretches in which its sensor stood still though the motor did not, and which."""
+    read = channel.output[channel.okay]
+    if read.size == 0 or np.ptp(read) == 0.0:  # never read, or dead throughout: for `_fault` to say
+        return channel, []
+    like, okay, said = _goes_like(record, channel), channel.okay.copy(), []
+    least = max(2, round(DEAD_S / record.sample_time_s))
+    ends = np.flatnonzero(np.diff(channel.output) != 0.0) + 1
+    for first, end in pairwise([0, *ends.tolist(), channel.output.size]):
+        if end - first >= least and np.ptp(like[first:end]) > MOVED * np.nanstd(like):
+            okay[first:end] = False
+            said.append(
+                f"stays at {channel.output[first]:g} from {record.time_s[first]:g} to {record.time_s[end - 1]:g} s, "
+                "where the motor moves: dead there, and not used there."
+            )
+    return replace(channel, okay=okay), said
 
 
 def _fault(record: Record, channel: Channel, others: Sequence[Channel]) -> str:
@@ -58,14 +95,14 @@ def _fault(record: Record, channel: Channel, others: Sequence[Channel]) -> str:
     for label, other in (("the recording's first output", record.output), *((o.label, o.output) for o in others)):
         if np.nanmax(np.abs(other[good] - values)) <= SAME * spread:
             return f"it is the same signal as {label}. Name each sensor once."
-    return _turned(record, channel, good)
-
-
-def _turned(record: Record, channel: Channel, good: BoolArray) -> str:
     like = _goes_like(record, channel)
     seen = good & np.isfinite(like)
     width = max(1, round(SMOOTH_S / record.sample_time_s))
-    mine, its = (_smooth(np.where(seen, each, 0.0), width)[seen] for each in (channel.output, like))
+    mine, its = (_smooth(np.where(seen, each, 0.0), width) for each in (channel.output, like))
+    return _turned(channel, mine[seen], its[seen]) or _off_clock(record, mine, its, seen)
+
+
+def _turned(channel: Channel, mine: FloatArray, its: FloatArray) -> str:
     mine, its = mine - mine.mean(), its - its.mean()
     both = float(np.linalg.norm(mine) * np.linalg.norm(its))
     alike = float(mine @ its) / both if both else 0.0
@@ -79,6 +116,42 @@ def _turned(record: Record, channel: Channel, good: BoolArray) -> str:
                 f"Multiply its scale by {1.0 / ratio:.4g}, the gear's ratio."
             )
     return ""
+
+
+def _off_clock(record: Record, mine: FloatArray, its: FloatArray, seen: BoolArray) -> str:
+    """Say by how much the clock of a channel runs at another rate than that of the first output.
+
+    A sensor that is elsewhere in the line lags by as much at the end as at the beginning; one that has another clock
+    does not.
+    """
+    shifts = max(1, round(LAG_STEP_S / record.sample_time_s)) * np.arange(-LAGS, LAGS + 1)
+    rows = np.flatnonzero(seen)[shifts[-1] : -shifts[-1]]
+    blocks = [each[(each >= shifts[-1]) & (each < its.size - shifts[-1])] for each in np.array_split(rows, BLOCKS)]
+    if min(block.size for block in blocks) < shifts.size:  # too short to tell
+        return ""
+    lags = [record.sample_time_s * _lag(mine, its, block, shifts) for block in blocks]
+    times = [float(record.time_s[block].mean()) for block in blocks]
+    (rate, _), spread = np.polyfit(times, lags, 1, cov=True)
+    apart_s = abs(float(rate)) * float(record.time_s[-1] - record.time_s[0])
+    if abs(rate) <= CLEARLY * float(np.sqrt(spread[0, 0])) or apart_s <= record.sample_time_s:
+        return ""
+    return (
+        f"its clock and that of the first output run apart by {abs(rate) * 1e6:.0f} ppm, {apart_s:.3g} s over the "
+        "recording. Record both by one device, or bring them to one clock before."
+    )
+
+
+def _lag(mine: FloatArray, its: FloatArray, rows: IntArray, shifts: IntArray) -> float:
+    """Return the lag of the highest correlation over some rows, between its neighbours by a parabola [samples]."""
+    own = mine[rows] - mine[rows].mean()
+    other = [its[rows - shift] - its[rows - shift].mean() for shift in shifts]
+    likeness = np.array([own @ each / (np.linalg.norm(each) or 1.0) for each in other])
+    best = int(np.argmax(likeness))
+    if 0 < best < likeness.size - 1:
+        before, top, after = likeness[best - 1 : best + 2]
+        off = 0.5 * (before - after) / (before - 2.0 * top + after)
+        return float(shifts[best] + off * (shifts[1] - shifts[0]))
+    return float(shifts[best])
 
 
 def _goes_like(record: Record, channel: Channel) -> FloatArray:

@@ -26,5 +26,5 @@ def driven(record: Record, line: DrivelineModel, grid: Grid, from_hz: float = 0.
         spectrum = np.fft.rfft(detrend(torque))
         spectrum[(frequency < from_hz) | (frequency > to_hz)] = 0.0
         torque = np.fft.irfft(spectrum, torque.size)
-    alone = replace(record, torque_nm=torque[:, np.newaxis], torque_okay=None, offset_s=None)
+    alone = replace(record, torque_nm=torque[:, np.newaxis], load_nm=None, torque_okay=None, offset_s=None)
     return simulate(grid, alone, flat(line), Start(0.0, 0.0, 0.0))

@@ -90,6 +90,7 @@ def thin(record: Record, factor: int) -> Record:
         offset_s=None if record.offset_s is None else record.offset_s[kept],
         imposed=None if record.imposed is None else record.imposed[kept],
         reference_nm=None if record.reference_nm is None else _blocks(record.reference_nm, factor).mean(axis=1),
+        load_nm=None if record.load_nm is None else _blocks(record.load_nm, factor).mean(axis=1),
         channels=tuple(replace(each, output=each.output[kept], okay=each.okay[kept]) for each in record.channels),
     )
 

@@ -54,6 +54,7 @@ def _differenced(record: Record, output: FloatArray) -> Record:
         torque_okay=None,
         offset_s=None,
         reference_nm=None,
+        load_nm=None,
     )
 
 

@@ -59,7 +59,10 @@ def record(job: Job, grants: RealTimeGrants) -> RunSummary:
     plan = plan_run(job.rig, job.experiment)
     stop, timing = StopRequest(), RunTiming(job.pacer.period_ns)
     recorder = RecordingWriter(
-        job.out, {**job.metadata, "real_time": json.dumps(grants.as_json())}, disk_patience_s(job.pacer)
+        job.out,
+        {**job.metadata, "real_time": json.dumps(grants.as_json())},
+        disk_patience_s(job.pacer),
+        job.rig.channel_units,
     )
     observers = () if job.live is None else (job.live,)
     ended_by = COMPLETE

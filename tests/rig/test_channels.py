@@ -1,0 +1,151 @@
+"""Further channels of a rig file: mapped, read, recorded and checked over the real protocols."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hil.config.rig_file import read_rig
+from hil.errors import RigFileError, UsageError
+from hil.recording import RecordingWriter, read_table
+from hil.recording.signals import read_record
+from hil.recording.signals_config import SignalsConfig
+from hil.rig.build import open_devices
+from hil.rig.check import Verdict, check_rig
+from hil.rig.plan import plan_run
+from hil.rig.sample import SampleFlag
+from hil.rig.session import run_plan
+from hil.rig.stop import StopRequest
+from hil.simulator.fault_spec import rig_faults
+from hil.simulator.plant import RigidPlant
+from hil.simulator.rig_server import RigServer, required_simulation
+from hil.simulator.simulation_model import simulation_model
+from tests.rig.sensed import CHANNELS, sensed_rig, served_with_sensors, write_rig
+from tests.rig.serving import ANY_PORT, Samples, fast, run_once
+
+OUTPUTS = SignalsConfig.model_validate(
+    {
+        "outputs": [
+            {"kind": "speed", "at": "motor", "column": "speed_rad_s"},
+            {"kind": "speed", "at": "load", "column": "speed_load_rad_s"},
+            {"kind": "torque", "at": "shaft", "column": "torque_shaft_nm"},
+        ]
+    }
+)
+
+
+def test_a_run_records_each_channel_in_si_units(tmp_path: Path) -> None:
+    rig, path = sensed_rig(tmp_path), tmp_path / "run.csv"
+    with served_with_sensors(rig) as at, open_devices(at) as devices:
+        plan = plan_run(at, "reversal")
+        with RecordingWriter(path, channel_units=at.channel_units) as recorder:
+            run_plan(devices, plan, fast(at), recorder, StopRequest(), lambda phase, time_s: None)
+    table = read_table(path)
+    assert {name: table.units[name] for name in at.channel_units} == at.channel_units
+    read = table.numeric([*at.channel_units, "speed_rad_s", "torque_m1_nm", "torque_m2_nm", "flags"])
+    assert set(read["flags"]) == {0.0}
+    line = simulation_model(required_simulation(rig)).values()
+    torque = read["torque_m1_nm"] + read["torque_m2_nm"]
+    motor, shaft, pulling = read["speed_rad_s"][1:], read["torque_shaft_nm"][1:], torque[:-1]
+    due = (pulling - shaft - line["b_M"] * motor) / line["J_M"]  # the row's torque acts from then on
+    assert np.ptp(due) > 100.0
+    np.testing.assert_allclose(read["accel_rad_s2"][1:], due, atol=1.0)  # a count of the shaft's torque is 0.1 Nm
+    load = read["speed_load_rad_s"]
+    np.testing.assert_allclose(load, np.round(load, 3), atol=1e-9)  # a count is 0.001 rad/s
+    due = load[0] + np.cumsum(shaft - line["b_L"] * load[1:]) * rig.period_s / line["J_L"]
+    np.testing.assert_allclose(load[1:], due, atol=0.05)
+    record = read_record(path, OUTPUTS)
+    assert [channel.label for channel in record.channels] == ["speed_load_rad_s", "torque_shaft_nm"]
+    assert all(channel.okay.all() for channel in record.channels)
+
+
+def test_a_channel_is_that_of_the_sync_of_its_row(tmp_path: Path) -> None:
+    samples = Samples()
+    at_motor = CHANNELS.replace('at = "load"', 'at = "motor"')
+    with served_with_sensors(sensed_rig(tmp_path, at_motor)) as at:
+        run_once(at, samples, experiment="reversal")
+    motor, second = samples.column("speed_rad_s"), [row.channels[0] for row in samples.rows]
+    assert np.ptp(motor) > 1.0
+    np.testing.assert_allclose(second, motor, atol=0.0015)
+
+
+def test_a_channel_that_is_lost_is_missing_in_its_own_column_alone(tmp_path: Path) -> None:
+    samples = Samples()
+    with served_with_sensors(sensed_rig(tmp_path), rig_faults(["bus.lose@1=0.01"], 0.01)) as at:
+        run_once(at, samples, experiment="reversal", pacer=fast(at, 0.05))
+    lost = [row for row in samples.rows if row.flags is SampleFlag.CHANNEL_LOST]
+    assert lost
+    assert all(row.counts and any(map(math.isnan, row.channels)) for row in lost)
+    assert all(math.isfinite(row.torque_m2_nm) for row in lost)
+    whole = [row for row in samples.rows if not row.flags & SampleFlag.CHANNEL_LOST]
+    assert all(map(math.isfinite, (value for row in whole for value in row.channels)))
+
+
+def test_a_check_shows_what_each_channel_reads(tmp_path: Path) -> None:
+    with served_with_sensors(sensed_rig(tmp_path)) as at:
+        findings = check_rig(at)
+    assert {finding.verdict for finding in findings} == {Verdict.AGREES}
+    read = {each.channel.column: each for finding in findings for each in finding.channels}
+    assert set(read) == set(at.channel_units)
+    assert read["speed_load_rad_s"].value == 0.0
+    assert read["speed_load_rad_s"].channel.source == "m2 0x60E5:01"
+    assert read["accel_rad_s2"].channel.source == "PLC register acceleration"
+
+
+def test_a_writer_that_does_not_know_the_channels_refuses_their_samples(tmp_path: Path) -> None:
+    samples = Samples()
+    with served_with_sensors(sensed_rig(tmp_path)) as at:
+        run_once(at, samples)
+    with (
+        pytest.raises(Exception, match="expected samples with 10 cells"),
+        RecordingWriter(tmp_path / "a.csv") as writer,
+    ):
+        writer.append(samples.rows[0])
+
+
+def test_a_driveline_without_such_places_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="speed_load_rad_s"):
+        RigServer(RigidPlant(10.0, 0.5), sensed_rig(tmp_path), "virtual:none", ANY_PORT)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ("object = 0x2100", "object = 0x2101", r"channels\.2\.object \| .*0x2101.*is not there"),
+        ("object = 0x2100", "object = 0x6502", r"channels\.2\.object \| .*0x6502 has PDOMapping=0"),
+        ('"acceleration"\n\n', '"accel"\n\n', r"channels\.1\.register \| expected one of the registers.*came 'accel'"),
+        ('"acceleration"\n\n', '"speed_limit"\n\n', r"channels\.1\.register \| .*in rad/s\^2.*came one in rad/s$"),
+        ('"acceleration"\n\n', '"permissive"\n\n', r"channels\.1\.register \| .*holds a number.*of type bool"),
+        ("subindex = 1\nscale = 0.001", "subindex = 1", r"channels\.0\.scale \| expected this key beside object"),
+        ('inverter = "m2"\nobject = 0x2100', 'register = "acceleration"\nobject = 0x2100', r"channels\.2 \| .*either"),
+        ('"torque_shaft_nm"', '"torque_shaft"', r"channels\.2\.column \| expected a name that ends in _nm"),
+        ('"torque_shaft_nm"', '"torque_m1_nm"', r"channels\.2\.column \| .*every recording has"),
+        ('at = "shaft"', 'at = "motor"', r"channels\.2\.kind \| .*came 'torque at the motor'"),
+        ("scale = 0.1", "scale = 0.0", r"channels\.2\.scale \| expected a number other than 0"),
+        (
+            'register = "acceleration"',
+            'register = "acceleration"\nsubindex = 3',
+            r"channels\.1\.subindex \| .*register",
+        ),
+        ('column = "accel_rad_s2"', 'column = "Accel"', r"channels\.1\.column"),
+    ],
+)
+def test_a_channel_that_can_not_be_is_refused_with_its_key(tmp_path: Path, old: str, new: str, expected: str) -> None:
+    assert CHANNELS.count(old) == 1
+    path = write_rig(tmp_path, CHANNELS.replace(old, new))
+    with pytest.raises(RigFileError, match=expected) as refusal:
+        read_rig(path)
+    assert str(path) in str(refusal.value)
+
+
+def test_a_column_can_be_given_once(tmp_path: Path) -> None:
+    with pytest.raises(RigFileError, match=r"channels\.3\.column \| expected another column"):
+        read_rig(write_rig(tmp_path, CHANNELS + CHANNELS.split("\n\n")[0]))
+
+
+def test_a_drive_without_a_free_tpdo_is_refused_before_anything_is_connected(tmp_path: Path) -> None:
+    with pytest.raises(RigFileError, match=r"channels\.0\.object \| .*TPDO that maps 0x60E5:01.*not used"):
+        read_rig(write_rig(tmp_path, tpdos=1))
