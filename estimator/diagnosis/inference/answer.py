@@ -103,7 +103,7 @@ def _said(
         timing_s={},
         augmented=augmented_model(runs.estimate, model, effects),
         traces=courses_of(runs),
-        discrepancy=_discrepancy(seen, line) if mismatch.detected else None,
+        discrepancy=_discrepancy(seen, line) if mismatch.detected and line.plant is None else None,
         remainder=remainder,
         strays=seen.strays,
         slight=tuple(Slight(each.name, each.share, values_of(each.name)) for each in decision.traces),

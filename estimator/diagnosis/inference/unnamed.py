@@ -49,7 +49,9 @@ class Law:
 
 
 def hunts_around(hypothesis: Hypothesis, rounds: int) -> list[Hunt]:
-    """Look for the best law at every element beside a hypothesis."""
+    """Look for the best law at every element beside a hypothesis; inside a plant simulated elsewhere for none."""
+    if hypothesis.plain.problem.grid.plant is not None:
+        return []
     noise = float(reading_noise(hypothesis.sizes)[0])
     return hunts_of(scene(hypothesis.plain, noise, hypothesis.filter), rounds)
 

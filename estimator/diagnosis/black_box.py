@@ -1,0 +1,137 @@
+"""A plant that another program simulates: its torques pass through a torque path, its speed through a sensor.
+
+Both are those of the compiled simulation, without a line of their own. On a free inertia of 1 kg m^2 the change of speed
+over a period is the mean torque that reached the shaft in it. Turned round, an inertia that is driven by the change of
+a speed moves at that speed, and the sensor shows of it what it would of the plant's.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from estimator.physics.catalogue import BUILT_IN
+from estimator.physics.effect import Effect, Element
+from estimator.physics.grid import Grid
+from estimator.physics.inputs import Case, load_of
+from estimator.physics.kernel import state_vector
+from estimator.physics.layout import flat, slot
+from estimator.physics.model import DrivelineModel, Parameter, Structure
+from estimator.physics.simulate import simulate, simulate_each
+from estimator.physics.start import Start
+from estimator.signals.once import once
+from estimator.signals.record import FloatArray, OutputKind, Record
+
+Simulated = Callable[[Record, FloatArray, FloatArray, Start], FloatArray]
+"""Recording, torque of its inputs (N, M) [Nm], load torque (N,) [Nm], initial state to the true output (N,)."""
+
+FINER = 4
+"""Steps to a sample where the torque is late by parts of one."""
+
+MOST_KEPT = 4
+"""Outputs of the plant that are kept: a sensor's unknowns do not move it."""
+
+_FREE = DrivelineModel(Structure.ONE_MASS, {"J_M": Parameter(1.0, 0.0), "b_M": Parameter(0.0, 0.0)})
+_GRID = Grid(Structure.ONE_MASS, 1, 0.0)
+
+
+def acts_around(entry: Effect) -> bool:
+    """Tell whether an effect acts at the inputs or outputs of a plant, whatever is inside it."""
+    return entry.profile or entry.element in (Element.TORQUE_PATH, Element.SPEED_SENSOR, Element.ACQUISITION)
+
+
+def _slots(elements: Collection[Element]) -> list[int]:
+    entries = (entry for entry in BUILT_IN.values() if entry.element in elements)
+    return [slot(entry.name, parameter.name) for entry in entries for parameter in entry.parameters]
+
+
+_INPUT, _SENSOR = _slots((Element.TORQUE_PATH, Element.ACQUISITION)), _slots((Element.SPEED_SENSOR,))
+_LATE = [slot("transport_delay", "delay_s"), slot("actuator_lag", "time_constant_s"), slot("clock_drift", "rate")]
+
+
+@dataclass
+class BlackBox:
+    """A plant simulated by another program, with the catalogue's effects at its inputs and its output.
+
+    Attributes
+    ----------
+    run : callable
+        The plant alone.
+    starts : collection of str
+        What of the initial state it can be given: names of attributes of ``Start``.
+    """
+
+    run: Simulated
+    starts: Collection[str]
+    _known: dict[bytes, FloatArray] = field(default_factory=dict)
+    _alone: threading.Lock = field(default_factory=threading.Lock)
+
+    def simulated(self, record: Record, cases: Sequence[Case]) -> FloatArray:
+        """Simulate the recorded output of a recording, as its sensor shows it, under each case; shape (K, N)."""
+        return np.array([self._read(record, case) for case in cases])
+
+    def _read(self, record: Record, case: Case) -> FloatArray:
+        output = self._output(record, case)
+        if record.kind is not OutputKind.SPEED:
+            return output
+        p = _with(case.p, _SENSOR)
+        rising = np.append(np.diff(output), 0.0) / record.sample_time_s
+        moved = replace(record, torque_nm=rising[:, np.newaxis])
+        found: FloatArray = simulate_each(_GRID, moved, [Case(p, Start(0.0, 0.0, float(output[0])))])[0]
+        return found
+
+    def _output(self, record: Record, case: Case) -> FloatArray:
+        steps = FINER if (case.p[_LATE] != 0.0).any() else 1
+        fine = _finer(record) if steps > 1 else record
+        torque, load = _applied(fine, case.p), np.repeat(load_of(case, record), steps)
+        settable = [float(getattr(case.start, name)) for name in self.starts]
+        key = np.concatenate([[fine.sample_time_s], torque.ravel(), load, settable]).tobytes()
+        with self._alone:  # most FMUs allow one simulation at a time
+            if key not in self._known:
+                while len(self._known) >= MOST_KEPT:
+                    self._known.pop(next(iter(self._known)))
+                self._known[key] = self.run(fine, torque, load, case.start)[::steps]
+            return self._known[key]
+
+
+def _with(p: FloatArray, places: Sequence[int]) -> FloatArray:
+    """Return the parameters of a free inertia with those at some places."""
+    free = flat(_FREE)
+    free[places] = p[places]
+    return free
+
+
+def _applied(record: Record, p: FloatArray) -> FloatArray:
+    """Return the torque of each input that reaches the shaft, in the mean of each period, shape (N, M) [Nm].
+
+    The inputs act on one shaft: what becomes of their sum on its way is added to the first.
+    """
+    path = _with(p, _INPUT)
+    if (path == flat(_FREE)).all():
+        return record.torque_nm
+    speed = simulate(_GRID, record, path, Start(0.0, 0.0, 0.0), output=state_vector.SPEED)
+    mean = np.diff(speed) / record.sample_time_s
+    applied = record.torque_nm.copy()
+    applied[:-1, 0] += mean - record.total_torque_nm[:-1]
+    return applied
+
+
+@once
+def _finer(record: Record) -> Record:
+    """Return a recording at ``FINER`` steps to a sample, its torque held."""
+    period_s = record.sample_time_s / FINER
+    return replace(
+        record,
+        sample_time_s=period_s,
+        time_s=record.time_s[0] + period_s * np.arange(FINER * record.time_s.size),
+        torque_nm=np.repeat(record.torque_nm, FINER, axis=0),
+        output=np.repeat(record.output, FINER),
+        okay=np.repeat(record.okay, FINER),
+        torque_okay=None,
+        offset_s=None,
+        reference_nm=None,
+        channels=(),
+    )
