@@ -1,24 +1,31 @@
 """A plant that another program simulates: its torques pass through a torque path, its speed through a sensor.
 
-Both are those of the compiled simulation, without a line of their own. On a free inertia of 1 kg m^2 the change of speed
-over a period is the mean torque that reached the shaft in it. Turned round, an inertia that is driven by the change of
-a speed moves at that speed, and the sensor shows of it what it would of the plant's.
+Both are those of the compiled simulation, without a line of their own. On a free inertia of 1 kg m^2 the change of
+speed over a period is the mean torque that reached the shaft in it. Turned round, an inertia that is driven by the
+change of a speed moves at that speed, and the sensor shows of it what it would of the plant's.
+
+The plant's own simulation takes long. What a changed parameter changes is simulated on a line that answers much as the
+plant does, and added to the plant's output without the change (space mapping: Bandler and others, IEEE Trans. MTT
+42(12), 1994). So derivatives and first looks are those of that line; every output that is compared with a recording is
+the plant's.
 """
 
 from __future__ import annotations
 
 import threading
+from collections import deque
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from estimator.physics.catalogue import BUILT_IN
 from estimator.physics.effect import Effect, Element
-from estimator.physics.grid import Grid
+from estimator.physics.grid import Grid, grid_for
 from estimator.physics.inputs import Case, load_of
 from estimator.physics.kernel import state_vector
-from estimator.physics.layout import flat, slot
+from estimator.physics.layout import LOAD, NOMINAL, flat, slot
 from estimator.physics.model import DrivelineModel, Parameter, Structure
 from estimator.physics.simulate import simulate, simulate_each
 from estimator.physics.start import Start
@@ -28,11 +35,14 @@ from estimator.signals.record import FloatArray, OutputKind, Record
 Simulated = Callable[[Record, FloatArray, FloatArray, Start], FloatArray]
 """Recording, torque of its inputs (N, M) [Nm], load torque (N,) [Nm], initial state to the true output (N,)."""
 
-FINER = 4
+FINER = 2
 """Steps to a sample where the torque is late by parts of one."""
 
 MOST_KEPT = 4
 """Outputs of the plant that are kept: a sensor's unknowns do not move it."""
+
+MOST_AROUND = 32
+"""Outputs of each recording that changes are added to."""
 
 _FREE = DrivelineModel(Structure.ONE_MASS, {"J_M": Parameter(1.0, 0.0), "b_M": Parameter(0.0, 0.0)})
 _GRID = Grid(Structure.ONE_MASS, 1, 0.0)
@@ -49,7 +59,27 @@ def _slots(elements: Collection[Element]) -> list[int]:
 
 
 _INPUT, _SENSOR = _slots((Element.TORQUE_PATH, Element.ACQUISITION)), _slots((Element.SPEED_SENSOR,))
+_EFFECT_AT = {
+    slot(name, parameter.name): name for name, entry in BUILT_IN.items() for parameter in entry.parameters
+} | {slot("", name): "" for name in (*NOMINAL, LOAD)}
+_STATE = tuple(each.name for each in fields(Start))
 _LATE = [slot("transport_delay", "delay_s"), slot("actuator_lag", "time_constant_s"), slot("clock_drift", "rate")]
+
+
+@dataclass(frozen=True, slots=True)
+class _Known:
+    """A case of which the output is known; shape (N,)."""
+
+    case: Case
+    output: FloatArray
+
+    def is_near(self, case: Case, has_start: bool) -> bool:
+        """Tell whether a case differs from this one by a single effect, or one number of load or initial state."""
+        if self.case.extra_load_nm is not case.extra_load_nm:
+            return False
+        changed = {_EFFECT_AT[i] for i in np.flatnonzero(self.case.p != case.p).tolist()}
+        moved = [name for name in _STATE if getattr(self.case.start, name) != getattr(case.start, name)]
+        return len(changed) + len(moved) <= 1 and (has_start or not {*moved} - {"load_torque_nm"})
 
 
 @dataclass
@@ -62,16 +92,39 @@ class BlackBox:
         The plant alone.
     starts : collection of str
         What of the initial state it can be given: names of attributes of ``Start``.
+    line : DrivelineModel
+        A line that answers much as it does.
+    has_start : bool
+        Whether the initial state of that line means the same.
     """
 
     run: Simulated
     starts: Collection[str]
+    line: DrivelineModel
+    has_start: bool
     _known: dict[bytes, FloatArray] = field(default_factory=dict)
+    _around: WeakKeyDictionary[Record, deque[_Known]] = field(default_factory=WeakKeyDictionary)
     _alone: threading.Lock = field(default_factory=threading.Lock)
 
     def simulated(self, record: Record, cases: Sequence[Case]) -> FloatArray:
-        """Simulate the recorded output of a recording, as its sensor shows it, under each case; shape (K, N)."""
-        return np.array([self._read(record, case) for case in cases])
+        """Simulate the recorded output of a recording, as its sensor shows it, under each case; shape (K, N).
+
+        One case is simulated by the plant; of several, what they change.
+        """
+        around = self._around.setdefault(record, deque(maxlen=MOST_AROUND))
+        if len(cases) == 1:
+            output = self._read(record, cases[0])
+            around.append(_Known(cases[0], output))
+            return output[np.newaxis]
+        return np.array([self._near(record, tuple(around), case) for case in cases])
+
+    def _near(self, record: Record, around: Sequence[_Known], case: Case) -> FloatArray:
+        known = next((each for each in reversed(around) if each.is_near(case, self.has_start)), None)
+        if known is None:
+            return self._read(record, case)
+        before, after = simulate_each(grid_for(self.line, [record]), record, [known.case, case])
+        changed: FloatArray = known.output + (after - before)
+        return changed
 
     def _read(self, record: Record, case: Case) -> FloatArray:
         output = self._output(record, case)

@@ -14,6 +14,7 @@ from estimator.physics.model import DrivelineModel, Load
 from estimator.physics.start import Start
 from estimator.signals.record import FloatArray, OutputKind, Record
 from hil.plants.fmu_plant import FmuPlant
+from hil.plants.names import OF_A_POSITION, Names
 
 STARTS = ("speed_rad_s", "twist_rad", "load_speed_rad_s")
 """What of an initial state the names of ``--map start=`` stand for, in this order; of a position the angle first."""
@@ -42,7 +43,9 @@ def fmu_line(fmu: FmuPlant, records: Sequence[Record]) -> DrivelineModel:
         return fmu.simulated(record, named, torque_nm, values)
 
     line = equivalent_line([_answered(fmu, record) for record in records])
-    return replace(line, plant=BlackBox(run, tuple(starts.values())), load=Load.OWN if named.load else 0.0)
+    is_alike = {*named.start} <= {*Names().start, *OF_A_POSITION.start}
+    plant = BlackBox(run, tuple(starts.values()), line, is_alike)
+    return replace(line, plant=plant, load=Load.OWN if named.load else 0.0)
 
 
 def _answered(fmu: FmuPlant, record: Record) -> Record:

@@ -38,6 +38,11 @@ SHARE_OF_RANGE = 0.1
 """Scale of a load or an initial state, over the range of the torque or the output."""
 
 
+def is_fmu(path: Path) -> bool:
+    """Tell whether a path is that of an FMU."""
+    return path.suffix.lower() == ".fmu"
+
+
 class FmuPlant:
     """The model in an FMU.
 
