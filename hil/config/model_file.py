@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import os
+import tomllib
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
@@ -202,6 +203,11 @@ def read_signals(path: Path) -> SignalsConfig:
         return _SignalsDocument.model_validate(read_toml(path, ModelFileError)).signals
     except ValidationError as error:
         raise ModelFileError(path, *problem_lines(_SignalsDocument, error)) from error
+
+
+def signals_of(text: str) -> SignalsConfig:
+    """Return what a ``[signals]`` table says."""
+    return _SignalsDocument.model_validate(tomllib.loads(text)).signals
 
 
 def read_model_for_recordings(path: Path | str, trust_laws: bool = False) -> ModelFile:
