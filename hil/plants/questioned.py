@@ -36,7 +36,7 @@ class Asked:
 
 def questioned(
     asked: Asked, recordings: Sequence[Path], dbc: Path | None, tell: Tell
-) -> tuple[ModelFile, list[Record]]:
+) -> tuple[ModelFile, tuple[Record, ...]]:
     """Read a model and recordings.
 
     Raises

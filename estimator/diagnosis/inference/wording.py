@@ -77,11 +77,12 @@ def _left(decision: Decision, remainder: Remainder) -> str:
 
 
 def _headline(decision: Decision, effects: Sequence[FoundEffect], fit: Fit) -> str:
+    is_fixed = decision.nothing.plain.problem.grid.plant is not None
+    model = "the model" if is_fixed else "re-tuned inside its tolerances, the nominal model"
     if decision.verdict is Verdict.NO_MISMATCH:
         return (
-            "Nothing is missing: re-tuned inside its tolerances, the nominal model leaves nothing but the noise and "
-            f"slow drift of the readings (free-run error {fit.retuned:.3g} {fit.unit}, noise {fit.noise_floor:.3g} "
-            f"{fit.unit})."
+            f"Nothing is missing: {model} leaves nothing but the noise and slow drift of the readings (free-run error "
+            f"{fit.retuned:.3g} {fit.unit}, noise {fit.noise_floor:.3g} {fit.unit})."
         )
     if effects:
         found = "; ".join(effect.statement for effect in effects)
@@ -92,6 +93,5 @@ def _headline(decision: Decision, effects: Sequence[FoundEffect], fit: Fit) -> s
             f"{fit.holdout_retuned:.3g} to {fit.holdout_augmented:.3g} {fit.unit}."
         )
     return (
-        "Something is missing in the model, and no effect of the catalogue explains it: re-tuned inside its "
-        f"tolerances, the model leaves {_errors(fit)}."
+        f"Something is missing in the model, and no effect of the catalogue explains it: {model} leaves {_errors(fit)}."
     )
