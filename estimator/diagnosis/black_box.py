@@ -35,8 +35,8 @@ from estimator.signals.record import FloatArray, OutputKind, Record
 Simulated = Callable[[Record, FloatArray, FloatArray, Start], FloatArray]
 """Recording, torque of its inputs (N, M) [Nm], load torque (N,) [Nm], initial state to the true output (N,)."""
 
-FINER = 2
-"""Steps to a sample where the torque is late by parts of one."""
+FINER = 4
+"""Steps to a sample where a torque is late by parts of one, or the output filtered within one."""
 
 MOST_KEPT = 4
 """Outputs of the plant that are kept: a sensor's unknowns do not move it."""
@@ -63,7 +63,16 @@ _EFFECT_AT = {
     slot(name, parameter.name): name for name, entry in BUILT_IN.items() for parameter in entry.parameters
 } | {slot("", name): "" for name in (*NOMINAL, LOAD)}
 _STATE = tuple(each.name for each in fields(Start))
-_LATE = [slot("transport_delay", "delay_s"), slot("actuator_lag", "time_constant_s"), slot("clock_drift", "rate")]
+_WITHIN = [
+    slot(name, key)
+    for name, key in (
+        ("transport_delay", "delay_s"),
+        ("actuator_lag", "time_constant_s"),
+        ("clock_drift", "rate"),
+        ("speed_filter", "time_constant_s"),
+    )
+]
+"""What acts within a sample."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,26 +136,28 @@ class BlackBox:
         return changed
 
     def _read(self, record: Record, case: Case) -> FloatArray:
-        output = self._output(record, case)
-        if record.kind is not OutputKind.SPEED:
-            return output
-        p = _with(case.p, _SENSOR)
-        rising = np.append(np.diff(output), 0.0) / record.sample_time_s
-        moved = replace(record, torque_nm=rising[:, np.newaxis])
-        found: FloatArray = simulate_each(_GRID, moved, [Case(p, Start(0.0, 0.0, float(output[0])))])[0]
-        return found
-
-    def _output(self, record: Record, case: Case) -> FloatArray:
-        steps = FINER if (case.p[_LATE] != 0.0).any() else 1
+        """Return what the sensor shows of the plant's output, shape (N,)."""
+        steps = FINER if (case.p[_WITHIN] != 0.0).any() else 1
         fine = _finer(record) if steps > 1 else record
-        torque, load = _applied(fine, case.p), np.repeat(load_of(case, record), steps)
+        output = self._output(fine, case, np.repeat(load_of(case, record), steps))
+        if record.kind is not OutputKind.SPEED:
+            return output[::steps]
+        rising = np.append(np.diff(output), 0.0) / fine.sample_time_s
+        moved = replace(fine, torque_nm=rising[:, np.newaxis])
+        begun = Case(_with(case.p, _SENSOR), Start(0.0, 0.0, float(output[0])))
+        found: FloatArray = simulate_each(_GRID, moved, [begun])[0]
+        return found[::steps]
+
+    def _output(self, record: Record, case: Case, load: FloatArray) -> FloatArray:
+        """Return the plant's own output, shape (N,), of the case's torques and load, shape (N,) [Nm]."""
+        torque = _applied(record, case.p)
         settable = [float(getattr(case.start, name)) for name in self.starts]
-        key = np.concatenate([[fine.sample_time_s], torque.ravel(), load, settable]).tobytes()
+        key = np.concatenate([[record.sample_time_s], torque.ravel(), load, settable]).tobytes()
         with self._alone:  # most FMUs allow one simulation at a time
             if key not in self._known:
                 while len(self._known) >= MOST_KEPT:
                     self._known.pop(next(iter(self._known)))
-                self._known[key] = self.run(fine, torque, load, case.start)[::steps]
+                self._known[key] = self.run(record, torque, load, case.start)
             return self._known[key]
 
 
@@ -174,17 +185,18 @@ def _applied(record: Record, p: FloatArray) -> FloatArray:
 
 @once
 def _finer(record: Record) -> Record:
-    """Return a recording at ``FINER`` steps to a sample, its torque held."""
+    """Return a recording at ``FINER`` steps to a sample, its torque held, its output on straight lines."""
     period_s = record.sample_time_s / FINER
+    time_s = record.time_s[0] + period_s * np.arange(FINER * record.time_s.size)
     return replace(
         record,
         sample_time_s=period_s,
-        time_s=record.time_s[0] + period_s * np.arange(FINER * record.time_s.size),
+        time_s=time_s,
         torque_nm=np.repeat(record.torque_nm, FINER, axis=0),
-        output=np.repeat(record.output, FINER),
+        output=np.interp(time_s, record.time_s, record.output),
         okay=np.repeat(record.okay, FINER),
         torque_okay=None,
-        offset_s=None,
+        offset_s=None if record.offset_s is None else np.repeat(record.offset_s, FINER),
         reference_nm=None,
         channels=(),
     )
