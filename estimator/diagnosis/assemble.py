@@ -155,9 +155,13 @@ def profile_size(result: FitResult, cov: FloatArray, model: DrivelineModel) -> d
 def retuned_parameters(result: FitResult, model: DrivelineModel, whole: bool) -> dict[str, Retuned]:
     """Return every nominal parameter before and after; one trusted exactly stays what it was.
 
+    Of a plant simulated elsewhere there are none.
+
     Without the ``whole`` physics in the fit its intervals are what the nominal values are trusted to: how far a
     parameter bends to follow what is left out, no covariance of the errors tells.
     """
+    if model.plant is not None:
+        return {}
     cov = reported_covariance(result)
     fitted = {
         shared.name: (

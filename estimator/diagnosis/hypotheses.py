@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from estimator.diagnosis.black_box import acts_around
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Untestable
 from estimator.physics.model import DrivelineModel, Motion
@@ -32,8 +33,8 @@ def with_effect(effects: Effects, name: str) -> Effects:
 def open_hypotheses(model: DrivelineModel, records: Sequence[Record]) -> tuple[tuple[str, ...], dict[str, Untestable]]:
     """Sort the catalogue into effects that the recordings can tell and those they can't, with the reason.
 
-    Effects that make no sense in the model's structure or for such a motion, or that the model already has, are in
-    neither.
+    Effects that make no sense in the model's structure or for such a motion, that act inside a plant simulated
+    elsewhere, or that the model already has, are in neither.
     """
     testable, untestable = [], {}
     for name in (*EFFECTS, *model.laws):
@@ -41,7 +42,8 @@ def open_hypotheses(model: DrivelineModel, records: Sequence[Record]) -> tuple[t
         fits = model.structure in entry.structures and all(record.kind in entry.kinds for record in records)
         turns = model.motion is Motion.ROTATION or not entry.phases
         swings = not (entry.swinging and turns_on(records))
-        if not (fits and turns and swings) or name in model.effects or entry.recognised:
+        reached = model.plant is None or acts_around(entry)
+        if not (fits and turns and swings and reached) or name in model.effects or entry.recognised:
             continue
         obstacle = entry.testable(model, records)
         if obstacle is None:

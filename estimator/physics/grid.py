@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from estimator.errors import BadModel
 from estimator.physics.law_name import LawName
-from estimator.physics.model import DrivelineModel, Structure, natural_frequencies_rad_s
+from estimator.physics.model import DrivelineModel, Plant, Structure, natural_frequencies_rad_s
 from estimator.physics.motion import reverses, speed_scale
 from estimator.signals.record import FloatArray, Record
 
@@ -33,12 +33,16 @@ parameters: on a real drive fits from different starts then ended up to 10 % apa
 
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """How a model is integrated on a set of recordings: sub-steps per period, width of a sign change, its own laws."""
+    """How a model is integrated on a set of recordings: sub-steps per period, width of a sign change, its own laws.
+
+    One with a ``plant`` is simulated by that.
+    """
 
     structure: Structure
     substeps: int
     sign_width: float
     laws: tuple[LawName, ...] = ()
+    plant: Plant | None = None
 
     def active(self, p: FloatArray) -> list[LawName]:
         """Return the user's laws that a parameter vector switches on."""
@@ -85,7 +89,7 @@ def _too_fast(values: Mapping[str, float], fastest_rad_s: float, period_s: float
 def grid_for(model: DrivelineModel, records: Sequence[Record]) -> Grid:
     """Choose the integration grid for a model on a set of recordings of one sampling period."""
     substeps = substeps_for(model.values(), records[0].sample_time_s)
-    return Grid(model.structure, substeps, SIGN_WIDTH * _slow_scale(records), model.laws)
+    return Grid(model.structure, substeps, SIGN_WIDTH * _slow_scale(records), model.laws, model.plant)
 
 
 def _slow_scale(records: Sequence[Record]) -> float:

@@ -17,15 +17,19 @@ recordings share it, or what it is.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from estimator.errors import BadModel
 from estimator.physics.law_name import LawName
-from estimator.signals.record import FloatArray
+from estimator.signals.record import FloatArray, Record
+
+if TYPE_CHECKING:
+    from estimator.physics.inputs import Case
 
 
 class Structure(Enum):
@@ -142,6 +146,17 @@ class EffectValue:
     tolerance: float = 0.0
 
 
+class Plant(Protocol):
+    """A line that is simulated elsewhere, as by another program: its structure and values are not known here."""
+
+    @property
+    def starts(self) -> Collection[str]:
+        """What of the initial state can be set: names of attributes of ``start.Start``."""
+
+    def simulated(self, record: Record, cases: Sequence[Case]) -> FloatArray:
+        """Simulate the recorded output of a recording, as its sensor shows it, under each case; shape (K, N)."""
+
+
 @dataclass(frozen=True, slots=True)
 class DrivelineModel:
     """A driveline as the model file describes it.
@@ -158,6 +173,9 @@ class DrivelineModel:
         The constant load torque: unknown, of each recording or of all of them together, or its value [Nm].
     laws : tuple of LawName
         A user's own laws, which no other model has (``own_law.named``).
+    plant : Plant or None
+        What simulates the line in the place of its equations: structure and parameters are then those of a line that
+        answers much as it does, by which noise, scales and starts are judged.
 
     Raises
     ------
@@ -172,6 +190,7 @@ class DrivelineModel:
     gear_ratio: float | None = None
     load: Load | float = Load.OWN
     laws: tuple[LawName, ...] = ()
+    plant: Plant | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "effects", {self.own(name): values for name, values in self.effects.items()})

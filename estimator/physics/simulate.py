@@ -124,6 +124,8 @@ def simulate_each(
     ndarray, shape (len(cases), N)
     """
     wanted = output_state(record, grid.structure) if output is None else output
+    if grid.plant is not None and output is None:
+        return grid.plant.simulated(record, cases)
     if grid.structure is Structure.JOINT:
         imposed = joint.imposed_in(record)
         return np.array([_joint_output(record, imposed, case, wanted) for case in cases])
@@ -202,7 +204,7 @@ def go_together(grid: Grid, records: Sequence[Record], lines: Sequence[FloatArra
     moved : sequence of int
         Places of parameters that may also have other values.
     """
-    if grid.structure is Structure.JOINT or any(grid.active(p) for p in lines):
+    if grid.structure is Structure.JOINT or grid.plant is not None or any(grid.active(p) for p in lines):
         return False
     p = np.array(lines)
     acts = (p != 0.0).any(axis=0)

@@ -266,8 +266,17 @@ def local_basis(
     count = shape.shape[0]
     all_scales = np.array(scale + [1.0] * len(own) + [0.05 * t_scale] * count)
     all_guesses = np.array(guess + [unknown.start for unknown in own] + [0.0] * count)
-    held = () if has_own_load else (LOAD_TORQUE,)
+    held = (*(() if has_own_load else (LOAD_TORQUE,)), *_not_settable(model, has_angle, len(scale)))
     return LocalBasis(model.structure, has_angle, all_scales, all_guesses / all_scales, own, shape, held)
+
+
+def _not_settable(model: DrivelineModel, has_angle: bool, count: int) -> tuple[int, ...]:
+    """Return which of the first ``count`` unknowns are states that a plant simulated elsewhere can't start from."""
+    if model.plant is None:
+        return ()
+    angle = ("angle_rad",) if has_angle else ()
+    states = ("speed_rad_s", *angle, "twist_rad", "load_speed_rad_s", "middle_twist_rad", "middle_speed_rad_s")
+    return tuple(i for i, name in enumerate(states, start=1) if i < count and name not in model.plant.starts)
 
 
 def shared_load(model: DrivelineModel, records: Sequence[Record]) -> Shared:

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from hil.cli.dbc_option import Dbc, tell
+from hil.cli.fmu_options import Mapped, TrustFmu
 from hil.cli.trust_option import TrustLaws
 
 app = typer.Typer(add_completion=False)
@@ -22,17 +23,8 @@ def compare(
         typer.Option("--model", metavar="MODEL", help="A further model in the same plots; may be given several times."),
     ] = None,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Folder for compare.html and compare.json.")] = None,
-    mapped: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--map",
-            metavar="KEY=NAME,...",
-            help="Variables of an FMU: torque=T1,T2 (one: their sum), output=w, load=T_L and start=w0,... (estimated).",
-        ),
-    ] = None,
-    trust_fmu: Annotated[
-        bool, typer.Option("--trust-fmu", help="Run the program in an FMU; without it FMUs are refused.")
-    ] = False,
+    mapped: Mapped = None,
+    trust_fmu: TrustFmu = False,
     dbc: Dbc = None,
     trust_laws: TrustLaws = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the figures as JSON.")] = False,
@@ -44,7 +36,8 @@ def compare(
     """
     from rich.console import Console
 
-    from hil.plants.compare import Trust, compared
+    from hil.plants.compare import compared
+    from hil.plants.trust import Trust
     from hil.provenance import provenance
     from hil.report.comparison import comparison_text
     from hil.report.comparison_html import comparison_page

@@ -11,6 +11,7 @@ import typer
 from typer.core import TyperCommand
 
 from hil.cli.dbc_option import Dbc, tell
+from hil.cli.fmu_options import Mapped, TrustFmu
 from hil.cli.importing import without_collecting
 from hil.cli.jobs_option import Jobs
 from hil.cli.silence import is_silent
@@ -50,7 +51,7 @@ app = typer.Typer(add_completion=False)
 )
 def diagnose(
     recordings: Annotated[list[Path], typer.Argument(metavar="REC", help="Recordings to explain.")],
-    model: Annotated[Path, typer.Option("--model", metavar="MODEL", help="Model file to question.")],
+    model: Annotated[Path, typer.Option("--model", metavar="MODEL", help="Model file to question, or an FMU.")],
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the results.")],
     holdout: Annotated[
         list[Path] | None,
@@ -66,21 +67,30 @@ def diagnose(
         ),
     ] = None,
     dbc: Dbc = None,
+    signals: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help=r"File with the \[signals] to read recordings by, where the model is an FMU."
+        ),
+    ] = None,
+    mapped: Mapped = None,
+    trust_fmu: TrustFmu = False,
     trust_laws: TrustLaws = False,
     jobs: Jobs = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print diagnosis.json instead of the summary.")] = False,
 ) -> None:
     """Say where simulation and recordings differ, and which physics the model left out.
 
-    Writes DIR/diagnosis.json, DIR/augmented.toml and DIR/report.html.
+    Writes DIR/diagnosis.json, DIR/augmented.toml and DIR/report.html. Of an FMU, what acts at its inputs and outputs is
+    sought, and no augmented.toml written.
     """
     with without_collecting():
         from rich.console import Console
 
         from estimator.diagnosis.diagnose import diagnose as diagnose_records
-        from hil.config.model_file import read_model_for_recordings
+        from hil.plants.questioned import Asked, questioned
+        from hil.plants.trust import Trust
         from hil.provenance import provenance
-        from hil.recording import read_records
         from hil.recording.cure import with_the_line_to_write
         from hil.report.diagnosis_files import publish_diagnosis
         from hil.report.diagnosis_json import diagnosis_text
@@ -90,9 +100,9 @@ def diagnose(
         from hil.store.entry import DIAGNOSIS, MODEL
 
     require_folder(out)
-    file = read_model_for_recordings(model, trust_laws)
     every = [*recordings, *(holdout or ())]
-    records = read_records(every, file.signals, file.on_bench, dbc, tell)
+    asked = Asked(model, signals, mapped or (), Trust(trust_laws, trust_fmu))
+    file, records = questioned(asked, every, dbc, tell)
     training, kept_back = records[: len(recordings)], records[len(recordings) :]
     with with_the_line_to_write(every, file.signals, dbc), progress_bar() as progress:
         diagnosis = diagnose_records(training, file.model, kept_back, progress, budget_s)
@@ -105,7 +115,7 @@ def diagnose(
             typer.echo(text, nl=False)
         else:
             Console().print(diagnosis_summary(diagnosis))
-    results = {DIAGNOSIS: out / "diagnosis.json", MODEL: out / "augmented.toml"}
+    results = {DIAGNOSIS: out / "diagnosis.json", **({} if file.is_foreign else {MODEL: out / "augmented.toml"})}
     for complaint in attach_to_runs(every, results):
         typer.echo(complaint, err=True)
     if not as_json:

@@ -47,6 +47,8 @@ def look(
         typer.echo(line)
     if model is not None:
         _tell_scales(file, model, dbc)
+    elif found.roles.torques and found.roles.output is not None:
+        _tell_scales_alone(found, dbc)
 
 
 def _tell_scales(file: Path, model: Path, dbc: Path | None) -> None:
@@ -59,6 +61,23 @@ def _tell_scales(file: Path, model: Path, dbc: Path | None) -> None:
     known = read_model_for_recordings(model)
     record = read_record(file, known.signals, known.on_bench, dbc, tell)
     tell_scales([record], [file], known.model, known.signals, dbc, tell)
+
+
+def _tell_scales_alone(found: Look, dbc: Path | None) -> None:
+    """Read a recording by the lines that were found and tell which scale can't be, with the line that cures it."""
+    from hil.cli.dbc_option import tell
+    from hil.config.model_file import signals_of
+    from hil.errors import RecordingError
+    from hil.plants.scales import tell_scales_alone
+    from hil.recording import read_record
+
+    signals = signals_of("\n".join(found.signals)) if found.signals else None
+    try:
+        record = read_record(found.path, signals, dbc=dbc)
+    except RecordingError as error:
+        tell(f"by these lines the file can't be read yet: {error}")
+        return
+    tell_scales_alone(record, found.path, signals, dbc, tell)
 
 
 def _size(found: Look) -> str:

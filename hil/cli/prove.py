@@ -115,15 +115,19 @@ def open_(
 ) -> None:
     """Open the seals, check that nothing was changed, score the verdicts; writes DIR/scoreboard.html and .json."""
     from hil.proof.prove.judge_set import judge_set
+    from hil.proof.prove.manifest import CASES
     from hil.proof.prove.scoreboard import PAGE, REAL, WIRE, Board, scoreboard_files
     from hil.proof.prove.vault import parse_key
     from hil.proof.wire.run import read_rows
+    from hil.provenance import provenance
     from hil.report.outputs import publish
 
     secret = parse_key(_key_text(key, key_file))
     with _progress() as progress:
         rows = judge_set(folder, secret, jobs, progress, verdicts)
-    publish(folder, scoreboard_files(Board(rows, read_rows(folder / WIRE), _real_cases(folder / REAL))))
+    shown = folder / CASES
+    made = provenance(sorted(shown.rglob("*.toml")), sorted(shown.rglob("*.csv")))
+    publish(folder, scoreboard_files(Board(rows, read_rows(folder / WIRE), _real_cases(folder / REAL), made)))
     for row in rows:
         if not row["success"]:
             found = row["fault"] or ", ".join(row.get("named", ())) or row.get("verdict")

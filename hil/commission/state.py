@@ -37,6 +37,8 @@ class State:
         Record of every step, by name, in order.
     notes
         What was decided about the whole, such as keeping results after the rig file was changed.
+    made
+        What the report was made from (``hil.provenance``); None before there is one.
     """
 
     folder: Path
@@ -46,6 +48,7 @@ class State:
     steps: dict[str, StepRecord]
     started_utc: str = field(default_factory=now_utc)
     notes: list[dict[str, str]] = field(default_factory=list)
+    made: dict[str, Any] | None = None
 
     @property
     def path(self) -> Path:
@@ -63,6 +66,7 @@ class State:
             "started_utc": self.started_utc,
             "updated_utc": now_utc(),
             "notes": self.notes,
+            "made": self.made,
             "steps": {name: record.as_json() for name, record in self.steps.items()},
         }
 
@@ -125,6 +129,7 @@ def load_state(folder: Path, names: Iterable[str]) -> State | None:
             steps=steps,
             started_utc=document["started_utc"],
             notes=document["notes"],
+            made=document.get("made"),
         )
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise UsageError(

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import os
+import tomllib
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
@@ -140,6 +141,11 @@ class ModelFile:
         """True for a joint: its recordings are of an imposed motion and the torque it takes."""
         return self.model.structure is Structure.JOINT
 
+    @property
+    def is_foreign(self) -> bool:
+        """True for a plant that another program simulates: no file can hold it."""
+        return self.model.plant is not None
+
 
 def read_model(path: Path | str, trust_laws: bool = False) -> ModelFile:
     """Read a model file; its own laws are the model's, and no other model has them.
@@ -177,6 +183,31 @@ def read_model(path: Path | str, trust_laws: bool = False) -> ModelFile:
     if document is None or model is None or problems:
         raise ModelFileError(path, *problems)
     return ModelFile(model, document.signals, moved(document.laws, path), document.prepared)
+
+
+class _SignalsDocument(BaseModel):
+    model_config = ConfigDict(strict=True, extra="ignore", frozen=True)
+
+    signals: SignalsConfig
+
+
+def read_signals(path: Path) -> SignalsConfig:
+    """Read the ``[signals]`` of a file that may hold more, such as a model.
+
+    Raises
+    ------
+    ModelFileError
+        With one line for every fault.
+    """
+    try:
+        return _SignalsDocument.model_validate(read_toml(path, ModelFileError)).signals
+    except ValidationError as error:
+        raise ModelFileError(path, *problem_lines(_SignalsDocument, error)) from error
+
+
+def signals_of(text: str) -> SignalsConfig:
+    """Return what a ``[signals]`` table says."""
+    return _SignalsDocument.model_validate(tomllib.loads(text)).signals
 
 
 def read_model_for_recordings(path: Path | str, trust_laws: bool = False) -> ModelFile:

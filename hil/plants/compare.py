@@ -3,30 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from estimator.diagnosis.preconditions.channels import with_usable_channels
 from estimator.signals.record import Record
 from hil.config.model_file import ModelFile, Prepared, read_model_for_recordings
 from hil.errors import UsageError
-from hil.plants.fmu_plant import FmuPlant
+from hil.plants.fmu_plant import FmuPlant, is_fmu
 from hil.plants.plant import ModelPlant, Plant
 from hil.plants.prepared import known_events, prepare_again
 from hil.plants.scales import tell_scales
+from hil.plants.trust import Trust
 from hil.recording import read_records
 from hil.recording.signals import Tell
 from hil.report.comparison import Comparison, compare_record
-
-FMU = ".fmu"
-
-
-@dataclass(frozen=True, slots=True)
-class Trust:
-    """What code may run: that of a model file's own laws, and that in an FMU."""
-
-    laws: bool = False
-    fmu: bool = False
 
 
 def compared(
@@ -48,7 +38,7 @@ def compared(
         For what can't be read, is not trusted, or does not fit together.
     """
     _require_own_names(models)
-    files = {path: read_model_for_recordings(path, trust.laws) for path in models if path.suffix.lower() != FMU}
+    files = {path: read_model_for_recordings(path, trust.laws) for path in models if not is_fmu(path)}
     reads = next(iter(files.values()), None)
     signals, on_bench = (None, False) if reads is None else (reads.signals, reads.on_bench)
     prepared: Prepared | None = next((file.prepared for file in files.values() if file.prepared is not None), None)

@@ -9,7 +9,7 @@ import shutil
 import sys
 import tempfile
 import weakref
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
@@ -36,6 +36,11 @@ NUMBERS = ("Real", "Float64", "Float32")
 
 SHARE_OF_RANGE = 0.1
 """Scale of a load or an initial state, over the range of the torque or the output."""
+
+
+def is_fmu(path: Path) -> bool:
+    """Tell whether a path is that of an FMU."""
+    return path.suffix.lower() == ".fmu"
 
 
 class FmuPlant:
@@ -90,7 +95,7 @@ class FmuPlant:
         return FreeRun(output, float(np.sqrt(np.mean(error**2))), longest.start)
 
     def _run(self, record: Record) -> FreeRun:
-        named = names(self._mapped, self._known, record.kind)
+        named = self.named(record.kind)
         unknown = _Unknown.of(named, record)
         x = unknown.guess
         output = self._simulated(record, named, unknown, x)
@@ -106,8 +111,42 @@ class FmuPlant:
         load = float(x[0] * unknown.scale[0]) if named.load else float("nan")
         return FreeRun(output, float(np.sqrt(np.mean(error**2))), Start(load, 0.0, float("nan")))
 
+    def named(self, kind: OutputKind) -> Names:
+        """Return which of its variables are what, for a kind of output."""
+        return names(self._mapped, self._known, kind)
+
+    def is_input(self, name: str) -> bool:
+        """Tell whether a variable is an input, which may change over time."""
+        return name in self._inputs
+
     def _simulated(self, record: Record, named: Names, unknown: _Unknown, x: FloatArray) -> FloatArray:
-        values = dict(zip(unknown.names, (x * unknown.scale).tolist(), strict=True))
+        values: dict[str, FloatArray | float] = dict(zip(unknown.names, (x * unknown.scale).tolist(), strict=True))
+        if record.load_nm is not None:
+            if named.load not in self._inputs:
+                raise UsageError(
+                    f"{self.name}: recording {record.name} has a measured load torque: expected an FMU with an input "
+                    f"for it, came none named {named.load!r}. Name it: --map load=NAME, or take load out of [signals]."
+                )
+            values[named.load] = values.get(named.load, 0.0) + record.load_nm
+        return self.simulated(record, named, record.torque_nm, values)
+
+    def simulated(
+        self, record: Record, named: Names, torque_nm: FloatArray, values: Mapping[str, FloatArray | float]
+    ) -> FloatArray:
+        """Simulate the output of a recording, shape (N,).
+
+        Parameters
+        ----------
+        torque_nm : ndarray, shape (N, M)
+            Torque of each of the recording's inputs [Nm].
+        values : mapping
+            Of inputs over time, shape (N,), or constant; of parameters.
+
+        Raises
+        ------
+        UsageError
+            Where the FMU fails.
+        """
         held = {name: value for name, value in values.items() if name in self._inputs}
         start = {name: value for name, value in values.items() if name not in self._inputs}
         since_s = record.time_s - record.time_s[0]
@@ -122,26 +161,26 @@ class FmuPlant:
                     step_size=record.sample_time_s if kind == "CoSimulation" else None,
                     output_interval=record.sample_time_s,
                     start_values=start,
-                    input=self._given(record, named, since_s, held, kind),
+                    input=self._given(torque_nm, named, since_s, held, kind),
                     output=[named.output],
                 )
         except Exception as error:
             raise UsageError(f"{self.name}: expected an FMU that simulates {record.name}, came: {error}") from error
         return np.asarray(np.interp(since_s, result["time"], result[named.output]), dtype=np.float64)
 
-    def _given(self, record: Record, named: Names, since_s: FloatArray, held: dict[str, float], kind: str) -> Any:
+    def _given(
+        self,
+        torque_nm: FloatArray,
+        named: Names,
+        since_s: FloatArray,
+        held: Mapping[str, FloatArray | float],
+        kind: str,
+    ) -> Any:
         """Return FMPy's table of inputs; each torque is held until the next, in model exchange by a step."""
-        torques = record.torque_nm if len(named.torque) > 1 else record.total_torque_nm[:, np.newaxis]
+        torques = torque_nm if len(named.torque) > 1 else torque_nm.sum(axis=1, keepdims=True)
         still = {name: np.full(since_s.size, value) for name, value in self._inputs.items()}
         columns = {"time": since_s, **still, **dict(zip(named.torque, torques.T, strict=False))}
-        columns |= {name: np.full(since_s.size, value) for name, value in held.items()}
-        if record.load_nm is not None:
-            if named.load not in self._inputs:
-                raise UsageError(
-                    f"{self.name}: recording {record.name} has a measured load torque: expected an FMU with an input "
-                    f"for it, came none named {named.load!r}. Name it: --map load=NAME, or take load out of [signals]."
-                )
-            columns[named.load] = columns[named.load] + record.load_nm
+        columns |= {name: np.broadcast_to(value, since_s.size) for name, value in held.items()}
         rows = np.zeros(since_s.size, dtype=[(name, float) for name in columns])
         for name, values in columns.items():
             rows[name] = values

@@ -72,6 +72,7 @@ def result_document(state: Mapping[str, Any], folder: str, report: str | None) -
             name: {key: record[key] for key in ("status", "because", "attempt", "findings")}
             for name, record in steps.items()
         },
+        "made": state.get("made"),
     }
 
 

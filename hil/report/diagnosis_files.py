@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from estimator.diagnosis.result import Diagnosis
@@ -23,7 +23,7 @@ def publish_diagnosis(
     paths: Sequence[Path | None],
     made: Provenance,
 ) -> None:
-    """Write the files of a diagnosis, all or none.
+    """Write the files of a diagnosis, all or none; of a plant that another program simulates no augmented model.
 
     Parameters
     ----------
@@ -32,11 +32,11 @@ def publish_diagnosis(
     """
     text, prepared = diagnosis_text(diagnosis, made), prepared_by(diagnosis, records, paths)
     augmented, page = diagnosis.augmented, diagnosis_page(diagnosis, made, prepared.one_in)
-    publish(
-        folder,
-        {
-            "diagnosis.json": lambda path: path.write_text(text, encoding="utf-8"),
-            "augmented.toml": lambda path: write_model(path, augmented, file.signals, file.laws, prepared),
-            "report.html": lambda path: path.write_text(page, encoding="utf-8"),
-        },
-    )
+    files: dict[str, Callable[[Path], object]] = {
+        "diagnosis.json": lambda path: path.write_text(text, encoding="utf-8"),
+        "augmented.toml": lambda path: write_model(path, augmented, file.signals, file.laws, prepared),
+        "report.html": lambda path: path.write_text(page, encoding="utf-8"),
+    }
+    if file.is_foreign:
+        del files["augmented.toml"]
+    publish(folder, files)

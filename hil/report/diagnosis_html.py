@@ -2,7 +2,7 @@
 
 From the top: verdict and statement, the fit in figures, what was recognised in the acquisition, the physics found with
 its law over its data, where the mismatch is (place, time, frequency), the recordings with their simulations and errors,
-the rivals and why each lost, what these tests can't tell, and the parameters.
+the effects that were rejected and why, those that these tests neither find nor exclude, and the parameters.
 """
 
 from __future__ import annotations
@@ -214,7 +214,7 @@ def _effect(diagnosis: Diagnosis, effect: FoundEffect) -> list[str]:
     ]
     if effect.indistinguishable_from:
         rivals = listed(effect.indistinguishable_from)
-        pieces.append(html.paragraph(f"These recordings can't tell it from {rivals}.", "warning"))
+        pieces.append(html.paragraph(f"These recordings could as well be explained by {rivals}.", "warning"))
     for number, (name, profile) in enumerate(effect.profiles.items()):
         pieces.append(f"<h3>{escape(effect.name)} over time in {escape(name)}</h3>")
         div = f"profile-{effect.name}-{number}"
@@ -299,8 +299,8 @@ def _rivals(diagnosis: Diagnosis) -> str:
         return ""
     rows = [(rival.name, rival.reason, shown(rival.delta_bic)) for rival in diagnosis.rejected]
     return html.section(
-        "Rivals, and why each lost",
-        html.table(("effect", "why it lost", "ΔBIC to the explanation"), rows, numbers=(2,)),
+        "Rejected effects",
+        html.table(("effect", "why it was rejected", "ΔBIC to the explanation"), rows, numbers=(2,)),
     )
 
 
@@ -308,7 +308,7 @@ def _untestable(diagnosis: Diagnosis) -> str:
     if not diagnosis.untestable:
         return ""
     rows = [(entry.name, entry.reason, entry.cure) for entry in diagnosis.untestable]
-    return html.section("What these recordings can't tell", html.table(("effect", "why", "what would tell"), rows))
+    return html.section("Neither found nor excluded", html.table(("effect", "why", "what would show it"), rows))
 
 
 def _parameters(diagnosis: Diagnosis) -> str:

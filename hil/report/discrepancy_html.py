@@ -28,8 +28,8 @@ def law_pictures(diagnosis: Diagnosis, name: str) -> list[str]:
     for number, picture in enumerate(diagnosis.discrepancy.pictures):
         if picture.name == name:
             text = (
-                f"Over {picture.signal}: the line is the law, the points are what the recordings ask for where it "
-                "acts, estimated without knowing its form. Bars are 95 % intervals from pass to pass."
+                f"Over {picture.signal}: the line is the law, the points are estimates from the recordings that do "
+                "not assume its form. Bars are their 95 % intervals, from the spread between passes."
             )
             pieces += [law_figure(f"law-{number}", picture), html.paragraph(text, "note")]
     return pieces
@@ -69,13 +69,13 @@ def _places(diagnosis: Diagnosis, seen: Discrepancy, drawn: Sequence[Trace]) -> 
     ]
     text = (
         "What would have to act at one place to explain the error of the re-tuned model by itself, with its 95 % band. "
-        "At the true place a simple input does it; elsewhere it must be wild, and its likelihood falls behind. "
-        "● the likeliest places. A shaft torque that stays is invisible and returns to zero here."
+        "At the true place a simple input explains it; at the others it must vary wildly and is less likely. "
+        "● the likeliest places. A constant shaft torque does not show in the output and decays to zero here."
     )
     marked = {trace.name: worth_marking(trace, diagnosis.mismatch.time_s.get(trace.name, ())) for trace in drawn}
     figure = course_figure("equivalent", seen.equivalents, names, marked, stretches_for(3 * len(names)))
     return [
-        "<h3>As a torque or an error of the reading, over time</h3>",
+        "<h3>What would have to act, and where</h3>",
         html.paragraph(text, "note"),
         html.table(("place", "size (RMS)", "log-likelihood behind the best"), rows, numbers=(1, 2)),
         figure,
@@ -132,6 +132,6 @@ def frequency(diagnosis: Diagnosis) -> str:
                 "note",
             ),
             response_figure("response", seen.responses),
-            html.table(("chance of so large a difference", "nominal re-tuned", "augmented"), tests, numbers=(1, 2)),
+            html.table(("p-value of the difference", "nominal re-tuned", "augmented"), tests, numbers=(1, 2)),
         ]
     return html.section("Over frequency", *pieces)

@@ -95,14 +95,14 @@ def headline(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict is Verdict.EXPLAINED:
         return f"Missing in the model: {listed(found)}"
     if diagnosis.verdict is Verdict.PARTLY_EXPLAINED:
-        return f"Missing in the model: {listed(found)}, and a remainder that is more than noise"
+        return f"Missing in the model: {listed(found)}; what is left is more than noise"
     if diagnosis.verdict is Verdict.NO_MISMATCH:
         return "Nothing is missing: the nominal model, re-tuned, explains the recordings"
     if found:
-        return f"Missing in the model: {listed(found)}, and more that no entry of the catalogue explains"
+        return f"Missing in the model: {listed(found)}; the rest no effect of the catalogue explains"
     if diagnosis.strays:
-        return f"Further from nominal than trusted: {listed([stray.name for stray in diagnosis.strays])}"
-    return "Something is missing that no entry of the catalogue explains"
+        return f"No physics need be missing, but the data sheet is off: {listed([s.name for s in diagnosis.strays])}"
+    return "Something is missing, and no effect of the catalogue explains it"
 
 
 def _sure(effect: FoundEffect) -> str:

@@ -86,6 +86,12 @@ def test_result_for_scripts_and_report(tmp_path: Path, capsys: pytest.CaptureFix
     assert result["steps"]["signs"]["because"] == "not under test"
     assert {finding["within"] for finding in result["steps"]["noise"]["findings"]} == {True}
     page = Path(result["report"]).read_text(encoding="utf-8")
+    kept = json.loads(Path(result["report"]).with_name("commission.json").read_text(encoding="utf-8"))
+    assert result["made"] == kept["made"]
+    assert result["made"]["command"].startswith("hil commission ")
+    assert result["made"]["models"][0]["file"] == str(rig.source.path)
+    assert all(each["sha256"] in page for each in result["made"]["recordings"])
+    assert result["made"]["recordings"]
     assert "Noise at standstill" in page
     assert "speed noise (RMS)" in page
     assert "not under test" in page

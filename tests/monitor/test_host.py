@@ -12,9 +12,12 @@ from datetime import UTC, datetime
 from multiprocessing.connection import Connection
 from pathlib import Path
 
+from drivers.canopen.can_link import CanLink
+from drivers.canopen.heartbeat import HEARTBEAT_COB_ID
 from hil.config.rig_file import read_rig
 from hil.monitor.host import Job, SessionStop
 from hil.monitor.messages import Ended, Health, Kind, Lost, Notice, Over, Ready, Report, Reset, Samples, Start
+from hil.monitor.opening import open_rig
 from hil.monitor.outbox import Outbox
 from hil.monitor.recorded_run import recording_path
 from hil.monitor.source import RigSource
@@ -24,6 +27,9 @@ from tests.monitor.fake_source import sample
 from tests.rig.serving import served
 
 PATIENCE_S = 60.0
+
+OPERATIONAL = b"\x05"
+"""State in a heartbeat: CiA 301, NMT operational."""
 
 
 @contextmanager
@@ -44,6 +50,25 @@ def await_report(source: RigSource, seen: list[Report], kind: type[Report]) -> R
             return found[-1]
         time.sleep(0.02)
     raise AssertionError(f"no {kind} in {[type(report).__name__ for report in seen]}")
+
+
+def test_its_heartbeat_has_a_node_id_of_its_own(rig_path: Path, tmp_path: Path) -> None:
+    """As ``hil monitor`` opens a rig: drives and other hosts can tell its heartbeat from that of ``hil run``."""
+    rig = read_rig(rig_path)
+    heard: dict[int, list[bytes]] = {rig.monitor_node_id: [], rig.host_node_id: []}
+    with served(rig, bus_url="ws://127.0.0.1:0/") as (server, at), CanLink.open(server.bus_url) as observer:
+        for node_id, frames in heard.items():
+            observer.subscribe(HEARTBEAT_COB_ID + node_id, lambda data, t_ns, to=frames: to.append(data))
+        addressed = with_addresses(at, server.bus_url, str(server.modbus))
+        opening = open_rig(rig_path, addressed, tmp_path, simulate=False, model=None)
+        with opening.source as source:
+            await_report(source, [], Health)
+            until = time.monotonic() + PATIENCE_S
+            while not heard[rig.monitor_node_id] and time.monotonic() < until:
+                time.sleep(0.02)
+    assert rig.monitor_node_id != rig.host_node_id
+    assert heard[rig.monitor_node_id][0] == OPERATIONAL
+    assert heard[rig.host_node_id] == []
 
 
 def test_it_listens_tells_its_health_and_resets(rig_path: Path, tmp_path: Path) -> None:

@@ -65,8 +65,8 @@ def test_the_page_says_everything_from_the_verdict_down(diagnosis: Diagnosis) ->
         "Recording run_1",
         "Recording run_2",
         "Recording unseen",
-        "Rivals, and why each lost",
-        "What these recordings can't tell",
+        "Rejected effects",
+        "Neither found nor excluded",
         "Parameters of the model",
     ]
     told = (
@@ -80,7 +80,7 @@ def test_the_page_says_everything_from_the_verdict_down(diagnosis: Diagnosis) ->
         "1.5 to 6.2 s, 17 to 22.1 s",
         "T_S = k e + c",
         "0.02 … 0.022",
-        "can't tell it from shaft_hysteresis",
+        "could as well be explained by shaft_hysteresis",
         "Over shaft torque k·twist: the line is the law",
         "a function of twist + twist^2 d twist/dt",
         "6.25 to 12.5 Hz (218 ×)",
@@ -111,7 +111,7 @@ def test_a_nominal_value_that_is_off_is_the_headline(diagnosis: Diagnosis) -> No
     strays = (Stray("J_L", 1.11, 0.04), Stray("k", 1.07, 0.04))
     off = replace(diagnosis, verdict=Verdict.UNEXPLAINED, effects=(), strays=strays)
     text = read(diagnosis_page(off)).text
-    assert "Further from nominal than trusted: J_L and k" in text
+    assert "No physics need be missing, but the data sheet is off: J_L and k" in text
     assert "Something is missing" not in text
 
 
@@ -119,7 +119,7 @@ def test_a_nominal_value_that_is_off_is_the_headline(diagnosis: Diagnosis) -> No
     ("verdict", "headline"),
     [
         (Verdict.NO_MISMATCH, "Nothing is missing"),
-        (Verdict.UNEXPLAINED, "Something is missing that no entry of the catalogue explains"),
+        (Verdict.UNEXPLAINED, "Something is missing, and no effect of the catalogue explains it"),
     ],
 )
 def test_the_other_answers_are_pages_too(diagnosis: Diagnosis, verdict: Verdict, headline: str) -> None:
@@ -142,7 +142,7 @@ def test_the_other_answers_are_pages_too(diagnosis: Diagnosis, verdict: Verdict,
 
 
 def test_effects_that_explain_only_a_part_are_told_as_such(diagnosis: Diagnosis) -> None:
-    assert "and more that no entry of the catalogue explains" in diagnosis_page(
+    assert "; the rest no effect of the catalogue explains" in diagnosis_page(
         replace(diagnosis, verdict=Verdict.UNEXPLAINED)
     )
 

@@ -31,7 +31,7 @@ from estimator.diagnosis.inference.unnamed import (
     weighed_against,
 )
 from estimator.diagnosis.inference.verdict import Decision, decide
-from estimator.diagnosis.inference.wording import statement
+from estimator.diagnosis.inference.wording import statement, tests_in_words
 from estimator.diagnosis.phrases import law_in_words
 from estimator.diagnosis.preconditions import Prepared
 from estimator.diagnosis.result import (
@@ -108,7 +108,7 @@ def _said(
         timing_s={},
         augmented=augmented_model(runs.estimate, model, (*effects, *traces_of(runs, decision))),
         traces=courses_of(runs),
-        discrepancy=_discrepancy(seen, line) if mismatch.detected else None,
+        discrepancy=_discrepancy(seen, line) if mismatch.detected and line.plant is None else None,
         remainder=remainder,
         strays=seen.strays,
         slight=tuple(Slight(each.name, each.share, values_of(each.name)) for each in decision.traces),
@@ -256,14 +256,14 @@ def _rejected(search: Search, decision: Decision) -> tuple[RejectedEffect, ...]:
     fitted = [
         RejectedEffect(
             name,
-            "the recordings are less probable with it in the place of, or beside, what was chosen",
+            "fitted: neither in the place of what was found nor in addition does it explain the recordings better",
             min(best - score, 0.0) if name not in decision.best.effects else 0.0,
         )
         for name, score in sorted(search.rivals.items(), key=lambda item: item[1])
         if name not in named
     ]
     looked_at = [
-        RejectedEffect(name, "a first look at the innovations promises too little for a fit", best - nothing)
+        RejectedEffect(name, "not fitted: alone it would remove next to nothing of the error", best - nothing)
         for name in search.names
         if name not in named and name not in search.rivals and name not in decision.best.effects
     ]
@@ -276,7 +276,7 @@ def _remainder(seen: _Seen) -> Remainder | None:
     if not decision.failed:
         return None
     noise, left = noise_of(decision.best), free_rms(believed)
-    said = law_in_words(law.terms) if law is not None else "; ".join(test.name for test in decision.failed)
+    said = tests_in_words(decision.failed) if law is None else law_in_words(law.element, law.terms)
     return Remainder(
         share=max(left**2 - noise**2, 0.0) / free_rms(decision.nothing) ** 2,
         times_noise=left / noise,

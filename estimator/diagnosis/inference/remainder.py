@@ -38,9 +38,9 @@ EDGE = 0.02
 """Distance from the bound of a disturbance's logarithm within which it has reached it."""
 
 DISTURBANCES = {
-    Size.TORQUE: "the torque reading's noise",
-    Size.DRIFT: "the torque reading's drift",
-    Size.WALK: "the load's slow change",
+    Size.TORQUE: "is more than the noise of a torque reading",
+    Size.DRIFT: "is more than the drift of a torque reading",
+    Size.WALK: "is more than the slow change of a load",
 }
 
 
@@ -48,6 +48,7 @@ DISTURBANCES = {
 class Test:
     """One property that noise has: how far an error is from it, and the most that noise shows.
 
+    ``name`` says what an error that fails it does.
     ``is_share`` where the value is the share of the error's variance that is no noise: information about the laws, in
     the units of a score over the number of samples, that no hypothesis has found. Differences of scores count by it.
     ``key`` is the limit's name where it is calibrated.
@@ -72,10 +73,10 @@ def tests(best: Hypothesis) -> tuple[Test, ...]:
     whole = np.concatenate(errors)
     power = float(whole @ whole) / whole.size
     limited = (
-        ("most_predictable", "predictable from its own past", 1.0 - unpredictable(errors) ** 2 / power),
-        ("most_dependent", "dependent on torque, speed or angle", _dependent(best, whole)),
-        ("most_line", "a line in its spectrum", max(_line(each) for each in errors)),
-        ("most_change", "changing over time", _change(errors, problem.records, power)),
+        ("most_predictable", "is correlated over time", 1.0 - unpredictable(errors) ** 2 / power),
+        ("most_dependent", "depends on torque, speed or angle", _dependent(best, whole)),
+        ("most_line", "has a line in its spectrum", max(_line(each) for each in errors)),
+        ("most_change", "changes in size over time", _change(errors, problem.records, power)),
     )
     bounded = (Test(name, float(_is_at_bound(best, size)), 0.5) for size, name in _bounded(best))
     return (

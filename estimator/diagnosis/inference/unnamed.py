@@ -59,7 +59,9 @@ class Law:
 
 
 def hunts_around(hypothesis: Hypothesis) -> list[Hunt]:
-    """Look for the best law at every element beside a hypothesis."""
+    """Look for the best law at every element beside a hypothesis; inside a plant simulated elsewhere for none."""
+    if hypothesis.plain.problem.grid.plant is not None:
+        return []
     noise = float(reading_noise(hypothesis.sizes)[0])
     return hunts_of(scene(hypothesis.plain, noise, hypothesis.filter), LOOKING_ROUNDS)
 
@@ -140,8 +142,9 @@ def weighed_against(decision: Decision, law: Law | None, alone: Callable[[Elemen
     ``law`` is the best beside no effect at all; ``alone`` returns the best set without what acts elsewhere. In as far
     as the law makes the recordings more probable than the best set of names, what these explain is there, and they are
     not, unless they gain nearly as much. At its own place a law without a name is a name's law in another form, where
-    the names there gain most of what it gains. One that leaves the free-run error as it was is a trace, and no other explanation of what the names
-    explain. Laws without a name are sought in the first output alone, and weighed by what it says.
+    the names there gain most of what it gains. One that leaves the free-run error as it was is a trace, and no other
+    explanation of what the names explain. Laws without a name are sought in the first output alone, and weighed by what
+    it says.
     """
     best, nothing = of_first_outputs(decision.best), of_first_outputs(decision.nothing)
     if law is None or 1.0 - (law.rms / free_rms(nothing)) ** 2 < LEAST_SHARE:

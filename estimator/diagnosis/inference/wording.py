@@ -6,8 +6,9 @@ import math
 from collections.abc import Sequence
 
 from estimator.diagnosis.inference.data_sheet import in_words
+from estimator.diagnosis.inference.remainder import Test
 from estimator.diagnosis.inference.verdict import Decision
-from estimator.diagnosis.phrases import PLACE_NAMES, times
+from estimator.diagnosis.phrases import times
 from estimator.diagnosis.result import Fit, FoundEffect, Remainder, Stray, UntestableEffect, Verdict
 
 SURE = 0.999
@@ -27,15 +28,15 @@ def statement(
     if remainder is not None and not strays:
         parts.append(_left(decision, remainder))
     if decision.traces:
-        parts.append(f"Too small to count, but seen: {', '.join(each.name for each in decision.traces)}.")
+        parts.append(f"Seen, but too small to matter: {', '.join(each.name for each in decision.traces)}.")
     twins = sorted({twin for effect in effects for twin in effect.indistinguishable_from})
     if twins:
-        parts.append(f"From these recordings this can't be told from {' or '.join(twins)}.")
+        parts.append(f"These recordings could as well be explained by {' or '.join(twins)}.")
     tests = sorted({entry.suggested_test for entry in untestable if not entry.needs})
     if tests:
         names = ", ".join(entry.name for entry in untestable if not entry.needs)
-        parts.append(f"These recordings can't tell {names}; a {' or '.join(tests)} test would.")
-    parts += [f"Without {entry.needs}, {entry.name} can't be told." for entry in untestable if entry.needs]
+        parts.append(f"Neither found nor excluded by these recordings: {names}. Record a {' or a '.join(tests)}.")
+    parts += [f"Neither found nor excluded without {e.needs}: {e.name}." for e in untestable if e.needs]
     return " ".join(parts)
 
 
@@ -47,31 +48,41 @@ def _sure(effects: Sequence[FoundEffect]) -> str:
     return f" (probability {least:.3f})" if least < SURE else f" (probability above {SURE})"
 
 
+def _errors(fit: Fit) -> str:
+    """Say what the re-tuned nominal model leaves."""
+    return f"a free-run error of {fit.retuned:.3g} {fit.unit} at a noise of {fit.noise_floor:.3g} {fit.unit}"
+
+
 def _wrong_values(fit: Fit, strays: Sequence[Stray]) -> str:
-    left = f"{fit.retuned:.3g} {fit.unit} against a noise of {fit.noise_floor:.3g} {fit.unit}"
     return (
-        f"Inside its tolerances the nominal model leaves {left}, but no physics need be missing: the same line "
-        f"explains the recordings to the noise with {in_words(strays)}. Check the data sheet, or widen the tolerance "
-        "where it is a guess, and diagnose again."
+        f"No physics need be missing, but the data sheet is off: with {in_words(strays)} the nominal line explains the "
+        f"recordings to the noise. Inside its tolerances it leaves {_errors(fit)}. Check the data sheet, or widen the "
+        "tolerance where it is a guess, and diagnose again."
     )
 
 
+def tests_in_words(failed: Sequence[Test]) -> str:
+    """Say what an error does that noise does not, as the end of a sentence that begins with "it"."""
+    names = [test.name for test in failed]
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+
+
 def _left(decision: Decision, remainder: Remainder) -> str:
-    law = ""
-    if remainder.element is not None:
-        law = f", and looks most like {remainder.law} at the {PLACE_NAMES[remainder.element]}"
+    share, noise = f"{remainder.share:.0%}".replace("%", " %"), times(remainder.times_noise)
+    law = "" if remainder.element is None else f"; it {remainder.law}"
     return (
-        f"What is left, {times(remainder.times_noise)} times the reading's noise, is more than noise and drift: it is "
-        f"{', '.join(test.name for test in decision.failed)}{law}."
+        f"{share} of the squared error is left, {noise} times the noise, and it is not noise: it "
+        f"{tests_in_words(decision.failed)}{law}."
     )
 
 
 def _headline(decision: Decision, effects: Sequence[FoundEffect], fit: Fit) -> str:
+    is_fixed = decision.nothing.plain.problem.grid.plant is not None
+    model = "the model" if is_fixed else "re-tuned inside its tolerances, the nominal model"
     if decision.verdict is Verdict.NO_MISMATCH:
         return (
-            "Nothing is missing: re-tuned inside its tolerances, the nominal model leaves nothing but the noise and "
-            f"slow drift of the readings (free-run error {fit.retuned:.3g} {fit.unit}, noise {fit.noise_floor:.3g} "
-            f"{fit.unit})."
+            f"Nothing is missing: {model} leaves nothing but the noise and slow drift of the readings (free-run error "
+            f"{fit.retuned:.3g} {fit.unit}, noise {fit.noise_floor:.3g} {fit.unit})."
         )
     if effects:
         found = "; ".join(effect.statement for effect in effects)
@@ -82,6 +93,5 @@ def _headline(decision: Decision, effects: Sequence[FoundEffect], fit: Fit) -> s
             f"{fit.holdout_retuned:.3g} to {fit.holdout_augmented:.3g} {fit.unit}."
         )
     return (
-        f"There is a mismatch that no entry of the catalogue explains: the re-tuned nominal model leaves "
-        f"{fit.retuned:.3g} {fit.unit} against a noise of {fit.noise_floor:.3g} {fit.unit}."
+        f"Something is missing in the model, and no effect of the catalogue explains it: {model} leaves {_errors(fit)}."
     )

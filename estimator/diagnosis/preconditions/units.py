@@ -161,8 +161,7 @@ def _refuse_per_mille(record: Record, line: DrivelineModel, found: Inertia) -> N
     tolerance = _tolerance(line)
     if (1.0 - tolerance) / MARGIN <= found.ratio <= (1.0 + tolerance) * MARGIN:
         return
-    read = record.torque_nm[np.isfinite(record.torque_nm).all(axis=1)]
-    if np.abs(read - np.round(read)).max() > WHOLE or np.unique(read).size < FEWEST_VALUES:
+    if not are_whole_numbers(record):
         return
     if not both_bands_agree(record, line, grid_or_none(record, line), found.ratio):
         return
@@ -177,6 +176,12 @@ def _refuse_per_mille(record: Record, line: DrivelineModel, found: Inertia) -> N
         "or its tolerance.",
         Cure(record.name, torque=scale),
     )
+
+
+def are_whole_numbers(record: Record) -> bool:
+    """Tell whether the torques of a recording are whole numbers, more than a few levels that were asked for."""
+    read = record.torque_nm[np.isfinite(record.torque_nm).all(axis=1)]
+    return bool(np.abs(read - np.round(read)).max() <= WHOLE) and np.unique(read).size >= FEWEST_VALUES
 
 
 def _is_of_the_torque_path(record: Record, line: DrivelineModel, found: Inertia) -> bool:

@@ -37,7 +37,7 @@ def step(
 
 def sentence(values: Mapping[str, float], motion: Motion) -> str:
     """Say what was found."""
-    return f"the torque follows its reading with a lag of {1e3 * values['time_constant_s']:.3g} ms"
+    return f"the torque follows its reading with a lag of {1e3 * values['time_constant_s']:.3g} ms (time constant)"
 
 
 EFFECT = Effect(

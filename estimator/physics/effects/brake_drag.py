@@ -33,7 +33,7 @@ def retold(
 
 def sentence(values: Mapping[str, float], motion: Motion) -> str:
     """Say what was found."""
-    return f"a brake drags with {values['brake_nm']:.3g} {unit('torque', motion)} for a while"
+    return f"a brake drags with {values['brake_nm']:.3g} {unit('torque', motion)} during a part of the recording"
 
 
 EFFECT = Effect(

@@ -50,7 +50,8 @@ def implausible(model: DrivelineModel, records: Sequence[Record], values: Mappin
 
 def sentence(values: Mapping[str, float], motion: Motion) -> str:
     """Say what was found."""
-    geared = f", {values['motor_turns_per_turn']:.3g} motor turns a turn" if values["motor_turns_per_turn"] != 1 else ""
+    turns = values["motor_turns_per_turn"]
+    geared = f", {turns:.3g} motor turns to one turn of the load" if turns != 1.0 else ""
     return f"gravity pulls at the load with up to {values['moment_nm']:.3g} {unit('torque', motion)}{geared}"
 
 

@@ -30,7 +30,7 @@ def described(
 
 def sentence(values: Mapping[str, float], motion: Motion) -> str:
     """Say what was found."""
-    return f"the load's inertia changes by {values['change_kg_m2']:+.3g} {unit('inertia', motion)} at a moment"
+    return f"the load's inertia changes by {values['change_kg_m2']:+.3g} {unit('inertia', motion)} during the recording"
 
 
 EFFECT = Effect(

@@ -48,7 +48,7 @@ def sentence(values: Mapping[str, float], motion: Motion) -> str:
     gain = values[f"gain_{wrong}"]
     return (
         f"the true torque of inverter {wrong} is {gain:.3g} times its reading; or that of {right} is {1.0 / gain:.3g} "
-        "times, with every inertia, stiffness and friction changed alike: their ratio is what the recordings tell"
+        "times, with every inertia, stiffness and friction scaled by the same: the recordings determine only the ratio"
     )
 
 

@@ -69,7 +69,7 @@ def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | N
 def sentence(values: Mapping[str, float], motion: Motion) -> str:
     """Say what was found."""
     torque = unit("torque", motion)
-    return f"the load torque wanders by {values['grade_rms_nm']:.3g} {torque} (rms) over time, as a road's grade does"
+    return f"the load torque varies slowly by {values['grade_rms_nm']:.3g} {torque} (rms), as on a road with grades"
 
 
 EFFECT = Effect(

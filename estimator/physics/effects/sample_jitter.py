@@ -19,7 +19,7 @@ def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...
 
 def sentence(values: Mapping[str, float], motion: Motion) -> str:
     """Say what was found."""
-    return f"the samples were taken off their time by {1e3 * values['jitter_s']:.3g} ms (rms)"
+    return f"the sampling instants jitter by {1e3 * values['jitter_s']:.3g} ms (rms)"
 
 
 EFFECT = Effect(

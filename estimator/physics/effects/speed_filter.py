@@ -24,7 +24,8 @@ def step(
 
 def sentence(values: Mapping[str, float], motion: Motion) -> str:
     """Say what was found."""
-    return f"the speed is read through a low-pass filter of {1e3 * values['time_constant_s']:.3g} ms"
+    time_ms = 1e3 * values["time_constant_s"]
+    return f"the speed is read through a low-pass filter with a time constant of {time_ms:.3g} ms"
 
 
 EFFECT = Effect(

@@ -29,7 +29,7 @@ def described(
 
 def sentence(values: Mapping[str, float], motion: Motion) -> str:
     """Say what was found."""
-    return f"the shaft's stiffness changes by {values['change']:+.1%} at a moment"
+    return f"the shaft's stiffness changes by {values['change']:+.1%} during the recording"
 
 
 EFFECT = Effect(

@@ -49,13 +49,11 @@ def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | N
 
 def sentence(values: Mapping[str, float], motion: Motion) -> str:
     """Say what was found."""
-    offset = f"{values['offset_nm']:.3g} {unit('torque', motion)}"
+    side = "above" if values["offset_nm"] > 0.0 else "below"
+    offset = f"{abs(values['offset_nm']):.3g} {unit('torque', motion)} {side} its reading"
     if values["time_constant_s"] <= 0.0:
-        return f"the true torque is its reading and {offset} all along"
-    return (
-        f"the true torque comes to be its reading and {offset}, with a time constant of "
-        f"{values['time_constant_s']:.3g} s"
-    )
+        return f"the true torque is {offset}"
+    return f"the true torque drifts to {offset}, with a time constant of {values['time_constant_s']:.3g} s"
 
 
 EFFECT = Effect(

@@ -46,10 +46,10 @@ def sentence(values: Mapping[str, float], motion: Motion) -> str:
     loss, tilt = values["curvature_per_nm"], values["asymmetry_per_nm"]
     torque = unit("torque", motion)
     if tilt == 0.0:
-        return f"the true torque grows less than its reading: by {100.0 * loss:.2%} at 100 {torque}"
+        return f"the true torque differs from its reading by {-100.0 * loss:+.2%} at 100 {torque}"
     return (
-        f"the true torque grows less than its reading: by {100.0 * (loss + tilt):.2%} at 100 {torque}, "
-        f"by {100.0 * (loss - tilt):.2%} at -100 {torque}"
+        f"the true torque differs from its reading by {-100.0 * (loss + tilt):+.2%} at 100 {torque} and by "
+        f"{-100.0 * (loss - tilt):+.2%} at -100 {torque}"
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
@@ -18,11 +19,11 @@ from hil.report.outputs import publish
 if TYPE_CHECKING:
     from rich.console import Console
 
-REPORT = "commissioning.html"
+REPORT, MODEL = "commissioning.html", "model.toml"
 
 
 def write_report(state: State) -> None:
-    """Write the commissioning report into the folder of the job.
+    """Write the commissioning report into the folder of the job, and into the state what it was made from.
 
     Raises
     ------
@@ -33,9 +34,12 @@ def write_report(state: State) -> None:
 
     runs = [run for record in state.steps.values() for run in record.runs if run.recording]
     recordings = [path for run in runs if (path := state.folder / str(run.recording)).is_file()]
-    made = provenance(recordings=recordings)
+    models = [path for path in (Path(state.rig_path), state.folder / MODEL) if path.is_file()]
+    made = provenance(models, recordings)
     page = commission_page(state.document(), {step.name: step.title for step in STEPS}, made)
     publish(state.folder, {REPORT: lambda path: path.write_text(page, encoding="utf-8")})
+    state.made = made.document()
+    state.save()
 
 
 def print_plan(job: Job, console: Console, as_json: bool) -> None:

@@ -16,7 +16,9 @@ from hil.proof.campaign.statistics import Rate, Row, banded, coverage, quantiles
 from hil.proof.prove.scoreboard_cases import cases_table
 from hil.proof.prove.scoreboard_real import real_section
 from hil.proof.prove.scoreboard_wire import wire_section
+from hil.provenance import Provenance
 from hil.report import page as html
+from hil.report.made import made_section
 
 SCHEMA = "hil.scoreboard/1"
 PAGE, DATA = "scoreboard.html", "scoreboard.json"
@@ -44,11 +46,14 @@ class Board:
         Rows of `hil.proof.wire.run.run_wire`.
     real
         Cases of ``real.json`` (`hil.proof.real.result`).
+    made
+        Model files and recordings of the sealed cases.
     """
 
     sealed: Sequence[Row]
     wire: Sequence[Row] = ()
     real: Sequence[Mapping[str, Any]] = ()
+    made: Provenance | None = None
 
 
 def scoreboard_files(board: Board) -> dict[str, Callable[[Path], object]]:
@@ -71,6 +76,7 @@ def scoreboard_json(board: Board) -> dict[str, Any]:
         "cases": [dict(row) for row in rows],
         "wire": [dict(row) for row in board.wire],
         "real": [dict(case) for case in board.real],
+        "made": None if board.made is None else board.made.document(),
     }
 
 
@@ -87,6 +93,7 @@ def scoreboard_page(board: Board) -> str:
         *([real_section(board.real, REAL)] if board.real else []),
         html.section("What was named", f'<div class="wide">{confusion_of(rows)}</div>'),
         html.section("Every case", cases_table(rows)),
+        made_section(board.made),
     ]
     return html.page("Scoreboard", sections, FOOTER, plots=False)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 
 from estimator.diagnosis.phrases import PLACE_NAMES, is_phrase, law_in_words
@@ -12,17 +14,34 @@ A_PHRASE, A_FORMULA = ("a function of T", 27.5), ("T^3", -3.22e-7)
 
 
 @pytest.mark.parametrize(
-    ("terms", "said"),
+    ("element", "terms", "said"),
     [
-        ([A_FORMULA], "-3.22e-07 T^3"),
-        ([A_PHRASE], "a function of T"),
-        ([A_PHRASE, A_FORMULA], "a function of T - 3.22e-07 T^3"),
-        ([A_FORMULA, A_PHRASE], "-3.22e-07 T^3 and a function of T"),
-        ([("|w|", 2.0), ("w", 1.5), ("w^3", -1.0), ("dw/dt", 9.0)], "2 |w| + 1.5 w - 1 w^3"),  # the first three
+        (Element.SPEED_SENSOR, [("w", -0.316)], "looks as if the speed read 31.6 % low"),
+        (Element.SPEED_SENSOR, [("dw/dt", -0.012)], "looks as if the speed were read 12 ms late"),
+        (Element.TORQUE_PATH, [("T", 0.05)], "looks as if the torque were 5 % above its reading"),
+        (Element.TORQUE_PATH, [("T_2", 0.05)], "goes with the torque of input 2, in the torque path"),
+        (Element.SHAFT, [("d twist/dt |w_M|", 3e-7)], "goes with the twist rate and the motor speed, in the shaft"),
+        (Element.MOTOR, [A_FORMULA, A_PHRASE], "goes with the torque, at the motor"),
+        (
+            Element.LOAD,
+            [("a load step at 3.1 s in run_1", 4.0)],
+            "looks like a load step at 3.1 s in run_1, at the load",
+        ),
+        (
+            Element.SPEED_SENSOR,
+            [("|w|", 2.0), ("a wave 2 times per motor turn", 1.5), ("dw/dt", 1.0), ("T", 9.0)],  # the first three
+            "goes with the speed and the acceleration and looks like a wave 2 times per motor turn, in the reading",
+        ),
     ],
 )
-def test_a_law_is_a_readable_sum(terms: list[tuple[str, float]], said: str) -> None:
-    assert law_in_words(terms) == said
+def test_a_law_is_said_by_what_it_goes_with(element: Element, terms: list[tuple[str, float]], said: str) -> None:
+    assert law_in_words(element, terms) == said
+
+
+@pytest.mark.parametrize(("element", "name"), [(element, name) for element, laws in LAWS.items() for name in laws])
+def test_no_formula_is_said(element: Element, name: str) -> None:
+    said = law_in_words(element, [(name, 0.5)])
+    assert not re.search(r"w_|\^|\||\b[Tt]\b", said), said
 
 
 @pytest.mark.parametrize("element", Element)

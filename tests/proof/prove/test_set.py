@@ -23,6 +23,7 @@ from hil.proof.prove.manifest import CASES, COMMITMENTS, SEALED, VERDICTS, VERDI
 from hil.proof.prove.scoreboard import Board, scoreboard_files
 from hil.proof.prove.vault import new_key, parse_key
 from hil.proof.seal import SealBroken
+from hil.provenance import provenance
 from tests.proof.conftest import recordings_of
 
 SEED, COUNT = 5, 2
@@ -141,7 +142,9 @@ def test_answers_are_scored_against_the_truth(proof: Path, tool: Tool, tmp_path:
     assert [row["kind"] for row in rows] == [each.kind.name for each in draw(COUNT, SEED)]
     assert {row["outcome"] for row in rows} == {"abstained"}
     assert rows[0]["fresh_over_floor"] == pytest.approx([2.0, 2.0, 2.0], rel=1e-6)  # 0.1 over 0.05 rad/s
-    for name, write in scoreboard_files(Board(rows)).items():
+    shown = proof / "cases"
+    made = provenance(sorted(shown.rglob("*.toml")), sorted(shown.rglob("*.csv")))
+    for name, write in scoreboard_files(Board(rows, made=made)).items():
         write(tmp_path / name)
     page = (tmp_path / "scoreboard.html").read_text()
     for row in rows:
@@ -152,6 +155,8 @@ def test_answers_are_scored_against_the_truth(proof: Path, tool: Tool, tmp_path:
     assert data["schema"] == "hil.scoreboard/1"
     assert data["false_claims"]["hits"] == 0
     assert len(data["cases"]) == COUNT
+    assert len(data["made"]["models"]) == COUNT
+    assert {each["sha256"] in page for each in data["made"]["recordings"]} == {True}
 
 
 def test_answering_goes_on_where_it_was_interrupted(proof: Path, tool: Tool) -> None:

@@ -65,5 +65,5 @@ def test_a_wrong_stiffness_is_no_missing_physics() -> None:
     assert [stray.name for stray in found.strays] == ["k"]
     assert (found.verdict, found.effects) == (Verdict.UNEXPLAINED, ())
     assert found.mismatch.element is Element.SHAFT
-    assert "no physics need be missing" in found.statement
+    assert "No physics need be missing, but the data sheet is off" in found.statement
     assert "k 30 % above its nominal value (trusted to 5 %)" in found.statement

@@ -85,8 +85,10 @@ def test_a_law_of_no_entry_is_located_and_described_without_a_name() -> None:
     assert answer.unnamed.rms_after < 0.5 * answer.unnamed.rms_before
     assert answer.remainder is not None
     assert answer.remainder.element is Element.SHAFT
-    assert "twist |w_M|" in answer.remainder.law
-    assert "twist |w_M|" in answer.statement
+    said = answer.remainder.law
+    assert said.startswith("goes with the twist")
+    assert said.endswith("in the shaft")
+    assert f"; it {said}." in answer.statement
 
 
 def test_when_its_time_is_up_the_answer_says_what_was_not_tried() -> None:

@@ -1,0 +1,203 @@
+"""A plant that another program simulates: its torques pass through a torque path, its speed through a sensor.
+
+Both are those of the compiled simulation, without a line of their own. On a free inertia of 1 kg m^2 the change of
+speed over a period is the mean torque that reached the shaft in it. Turned round, an inertia that is driven by the
+change of a speed moves at that speed, and the sensor shows of it what it would of the plant's.
+
+The plant's own simulation takes long. What a changed parameter changes is simulated on a line that answers much as the
+plant does, and added to the plant's output without the change (space mapping: Bandler and others, IEEE Trans. MTT
+42(12), 1994). So derivatives and first looks are those of that line; every output that is compared with a recording is
+the plant's.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, field, fields, replace
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from estimator.physics.catalogue import BUILT_IN
+from estimator.physics.effect import Effect, Element
+from estimator.physics.grid import Grid, grid_for
+from estimator.physics.inputs import Case, load_of
+from estimator.physics.kernel import state_vector
+from estimator.physics.layout import LOAD, NOMINAL, flat, slot
+from estimator.physics.model import DrivelineModel, Parameter, Structure
+from estimator.physics.simulate import simulate, simulate_each
+from estimator.physics.start import Start
+from estimator.signals.once import once
+from estimator.signals.record import FloatArray, OutputKind, Record
+
+Simulated = Callable[[Record, FloatArray, FloatArray, Start], FloatArray]
+"""Recording, torque of its inputs (N, M) [Nm], load torque (N,) [Nm], initial state to the true output (N,)."""
+
+FINER = 4
+"""Steps to a sample where a torque is late by parts of one, or the output filtered within one."""
+
+MOST_KEPT = 4
+"""Outputs of the plant that are kept: a sensor's unknowns do not move it."""
+
+MOST_AROUND = 32
+"""Outputs of each recording that changes are added to."""
+
+_FREE = DrivelineModel(Structure.ONE_MASS, {"J_M": Parameter(1.0, 0.0), "b_M": Parameter(0.0, 0.0)})
+_GRID = Grid(Structure.ONE_MASS, 1, 0.0)
+
+
+def acts_around(entry: Effect) -> bool:
+    """Tell whether an effect acts at the inputs or outputs of a plant, whatever is inside it."""
+    return entry.profile or entry.element in (Element.TORQUE_PATH, Element.SPEED_SENSOR, Element.ACQUISITION)
+
+
+def _slots(elements: Collection[Element]) -> list[int]:
+    entries = (entry for entry in BUILT_IN.values() if entry.element in elements)
+    return [slot(entry.name, parameter.name) for entry in entries for parameter in entry.parameters]
+
+
+_INPUT, _SENSOR = _slots((Element.TORQUE_PATH, Element.ACQUISITION)), _slots((Element.SPEED_SENSOR,))
+_EFFECT_AT = {
+    slot(name, parameter.name): name for name, entry in BUILT_IN.items() for parameter in entry.parameters
+} | {slot("", name): "" for name in (*NOMINAL, LOAD)}
+_STATE = tuple(each.name for each in fields(Start))
+_WITHIN = [
+    slot(name, key)
+    for name, key in (
+        ("transport_delay", "delay_s"),
+        ("actuator_lag", "time_constant_s"),
+        ("clock_drift", "rate"),
+        ("speed_filter", "time_constant_s"),
+    )
+]
+"""What acts within a sample."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Known:
+    """A case of which the output is known; shape (N,)."""
+
+    case: Case
+    output: FloatArray
+
+    def is_near(self, case: Case, has_start: bool) -> bool:
+        """Tell whether a case differs from this one by a single effect, or one number of load or initial state."""
+        if self.case.extra_load_nm is not case.extra_load_nm:
+            return False
+        changed = {_EFFECT_AT[i] for i in np.flatnonzero(self.case.p != case.p).tolist()}
+        moved = [name for name in _STATE if getattr(self.case.start, name) != getattr(case.start, name)]
+        return len(changed) + len(moved) <= 1 and (has_start or not {*moved} - {"load_torque_nm"})
+
+
+@dataclass
+class BlackBox:
+    """A plant simulated by another program, with the catalogue's effects at its inputs and its output.
+
+    Attributes
+    ----------
+    run : callable
+        The plant alone.
+    starts : collection of str
+        What of the initial state it can be given: names of attributes of ``Start``.
+    line : DrivelineModel
+        A line that answers much as it does.
+    has_start : bool
+        Whether the initial state of that line means the same.
+    """
+
+    run: Simulated
+    starts: Collection[str]
+    line: DrivelineModel
+    has_start: bool
+    _known: dict[bytes, FloatArray] = field(default_factory=dict)
+    _around: WeakKeyDictionary[Record, deque[_Known]] = field(default_factory=WeakKeyDictionary)
+    _alone: threading.Lock = field(default_factory=threading.Lock)
+
+    def simulated(self, record: Record, cases: Sequence[Case]) -> FloatArray:
+        """Simulate the recorded output of a recording, as its sensor shows it, under each case; shape (K, N).
+
+        One case is simulated by the plant; of several, what they change.
+        """
+        around = self._around.setdefault(record, deque(maxlen=MOST_AROUND))
+        if len(cases) == 1:
+            output = self._read(record, cases[0])
+            around.append(_Known(cases[0], output))
+            return output[np.newaxis]
+        return np.array([self._near(record, tuple(around), case) for case in cases])
+
+    def _near(self, record: Record, around: Sequence[_Known], case: Case) -> FloatArray:
+        known = next((each for each in reversed(around) if each.is_near(case, self.has_start)), None)
+        if known is None:
+            return self._read(record, case)
+        before, after = simulate_each(grid_for(self.line, [record]), record, [known.case, case])
+        changed: FloatArray = known.output + (after - before)
+        return changed
+
+    def _read(self, record: Record, case: Case) -> FloatArray:
+        """Return what the sensor shows of the plant's output, shape (N,)."""
+        steps = FINER if (case.p[_WITHIN] != 0.0).any() else 1
+        fine = _finer(record) if steps > 1 else record
+        output = self._output(fine, case, np.repeat(load_of(case, record), steps))
+        if record.kind is not OutputKind.SPEED:
+            return output[::steps]
+        rising = np.append(np.diff(output), 0.0) / fine.sample_time_s
+        moved = replace(fine, torque_nm=rising[:, np.newaxis], load_nm=None)
+        begun = Case(_with(case.p, _SENSOR), Start(0.0, 0.0, float(output[0])))
+        found: FloatArray = simulate_each(_GRID, moved, [begun])[0]
+        return found[::steps]
+
+    def _output(self, record: Record, case: Case, load: FloatArray) -> FloatArray:
+        """Return the plant's own output, shape (N,), of the case's torques and load, shape (N,) [Nm]."""
+        torque = _applied(record, case.p)
+        settable = [float(getattr(case.start, name)) for name in self.starts]
+        key = np.concatenate([[record.sample_time_s], torque.ravel(), load, settable]).tobytes()
+        with self._alone:  # most FMUs allow one simulation at a time
+            if key not in self._known:
+                while len(self._known) >= MOST_KEPT:
+                    self._known.pop(next(iter(self._known)))
+                self._known[key] = self.run(record, torque, load, case.start)
+            return self._known[key]
+
+
+def _with(p: FloatArray, places: Sequence[int]) -> FloatArray:
+    """Return the parameters of a free inertia with those at some places."""
+    free = flat(_FREE)
+    free[places] = p[places]
+    return free
+
+
+def _applied(record: Record, p: FloatArray) -> FloatArray:
+    """Return the torque of each input that reaches the shaft, in the mean of each period, shape (N, M) [Nm].
+
+    The inputs act on one shaft: what becomes of their sum on its way is added to the first.
+    """
+    path = _with(p, _INPUT)
+    if (path == flat(_FREE)).all():
+        return record.torque_nm
+    speed = simulate(_GRID, replace(record, load_nm=None), path, Start(0.0, 0.0, 0.0), output=state_vector.SPEED)
+    mean = np.diff(speed) / record.sample_time_s
+    applied = record.torque_nm.copy()
+    applied[:-1, 0] += mean - record.total_torque_nm[:-1]
+    return applied
+
+
+@once
+def _finer(record: Record) -> Record:
+    """Return a recording at ``FINER`` steps to a sample, its torque held, its output on straight lines."""
+    period_s = record.sample_time_s / FINER
+    time_s = record.time_s[0] + period_s * np.arange(FINER * record.time_s.size)
+    return replace(
+        record,
+        sample_time_s=period_s,
+        time_s=time_s,
+        torque_nm=np.repeat(record.torque_nm, FINER, axis=0),
+        output=np.interp(time_s, record.time_s, record.output),
+        okay=np.repeat(record.okay, FINER),
+        torque_okay=None,
+        offset_s=None if record.offset_s is None else np.repeat(record.offset_s, FINER),
+        reference_nm=None,
+        load_nm=None,
+        channels=(),
+    )

@@ -1,0 +1,55 @@
+"""The model that ``hil diagnose`` questions, a model file or an FMU, and the recordings as it reads them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from estimator.signals.record import Record
+from hil.config.model_file import ModelFile, read_model_for_recordings, read_signals
+from hil.errors import UsageError
+from hil.plants.fmu_line import fmu_line
+from hil.plants.fmu_plant import FmuPlant, is_fmu
+from hil.plants.trust import Trust
+from hil.recording import read_records
+from hil.recording.signals import Tell
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """What was given on the command line.
+
+    Attributes
+    ----------
+    signals : Path or None
+        File with the ``[signals]`` that recordings are read by; a model file has its own.
+    mapped : sequence of str
+        Variables of an FMU (``names``).
+    """
+
+    model: Path
+    signals: Path | None
+    mapped: Sequence[str]
+    trust: Trust
+
+
+def questioned(
+    asked: Asked, recordings: Sequence[Path], dbc: Path | None, tell: Tell
+) -> tuple[ModelFile, tuple[Record, ...]]:
+    """Read a model and recordings.
+
+    Raises
+    ------
+    UsageError, ModelFileError, RecordingError
+        For what can't be read, is not trusted, or does not fit together.
+    """
+    if is_fmu(asked.model):
+        fmu = FmuPlant(asked.model, asked.mapped, asked.trust.fmu)
+        signals = None if asked.signals is None else read_signals(asked.signals)
+        records = read_records(recordings, signals, False, dbc, tell)
+        return ModelFile(fmu_line(fmu, records), signals), records
+    if asked.signals is not None:
+        raise UsageError(f"--signals {asked.signals}: expected with an FMU; a model file has its own [signals]")
+    file = read_model_for_recordings(asked.model, asked.trust.laws)
+    return file, read_records(recordings, file.signals, file.on_bench, dbc, tell)

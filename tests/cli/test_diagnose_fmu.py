@@ -1,0 +1,81 @@
+"""``hil diagnose`` with an FMU: what acts at its inputs and outputs is named, and it runs only where it is trusted."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hil.cli.main import run
+from tests.cli import bench
+
+LATE = 3
+"""Samples by which the torque acts later than it was read."""
+
+
+@pytest.fixture
+def fmu(tmp_path: Path) -> str:
+    (tmp_path / "drive.toml").write_text(bench.MODEL)
+    assert run(["export", "fmu", str(tmp_path / "drive.toml"), "--out", str(tmp_path / "drive.fmu")]) == 0
+    return str(tmp_path / "drive.fmu")
+
+
+def late(path: Path) -> str:
+    """Write a recording under other names, its torque read earlier than it acted."""
+    bench.record(path, 1, noise=0.02, n=800)
+    time, first, second, speed = np.loadtxt(path, delimiter=",", skiprows=1).T
+    rows = slice(0, time.size - LATE)
+    columns = [time[rows], (first + second)[LATE:], speed[rows]]
+    np.savetxt(path, np.column_stack(columns), delimiter=",", header="t,T,w", comments="", fmt="%.12g")
+    return str(path)
+
+
+SIGNALS = """[signals]
+time = { column = "t" }
+torque = [{ column = "T" }]
+speed = { column = "w" }
+"""
+
+
+def test_what_acts_at_an_input_is_named(fmu: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    recording, out = late(tmp_path / "run_1.csv"), tmp_path / "out"
+    (tmp_path / "signals.toml").write_text(SIGNALS)
+    mapped = [word for each in ("torque=T_M1", "output=speed_motor", "start=start.speed") for word in ("--map", each)]
+    given = ["--signals", str(tmp_path / "signals.toml"), "--trust-fmu", *mapped, "--budget-s", "60"]
+    assert run(["diagnose", recording, "--model", fmu, "--out", str(out), *given]) == 0
+    found = json.loads((out / "diagnosis.json").read_text())
+    assert [effect["name"] for effect in found["effects"]] == ["transport_delay"]
+    delay = found["effects"][0]["parameters"]["delay_s"]["value"]
+    assert delay == pytest.approx(LATE * bench.DT, rel=0.05)
+    assert found["fit"]["augmented"] == pytest.approx(0.02, rel=0.15)
+    assert found["parameters"] == {}  # nothing inside an FMU is re-tuned
+    assert [each["file"] for each in found["made"]["models"]] == [fmu]
+    assert {path.name for path in out.iterdir()} == {"diagnosis.json", "report.html"}
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        ([], "runs only where you trust it: --trust-fmu"),
+        (["--trust-fmu", "--map", "output=w"], "expected a variable of the FMU, came 'w'. It has: "),
+        (["--trust-fmu", "--signals", "none.toml"], "none.toml"),
+    ],
+)
+def test_what_is_not_trusted_or_named_is_refused(
+    more: list[str], said: str, fmu: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bench.record(tmp_path / "run_1.csv", 1, n=300)
+    assert run(["diagnose", str(tmp_path / "run_1.csv"), "--model", fmu, "--out", str(tmp_path / "out"), *more]) == 2
+    assert said in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_model_file_has_its_own_signals(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    model, recording = tmp_path / "drive.toml", tmp_path / "run_1.csv"
+    model.write_text(bench.MODEL)
+    bench.record(recording, 1, n=300)
+    given = ["--model", str(model), "--signals", str(model), "--out", str(tmp_path / "out")]
+    assert run(["diagnose", str(recording), *given]) == 2
+    assert "a model file has its own [signals]" in capsys.readouterr().err
