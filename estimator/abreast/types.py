@@ -82,10 +82,10 @@ def _in_every_lane(builder: Any, value: Any, vector: Any) -> Any:
 
 
 @lower_cast(types.Number, lanes)
-def _number_in_every_lane(context: Any, builder: Any, came: Any, wanted: Any, value: Any) -> Any:
-    return _in_every_lane(builder, context.cast(builder, value, came, types.float64), NUMBERS)
+def _number_in_every_lane(context: Any, builder: Any, got: Any, wanted: Any, value: Any) -> Any:
+    return _in_every_lane(builder, context.cast(builder, value, got, types.float64), NUMBERS)
 
 
 @lower_cast(types.Boolean, mask)
-def _answer_in_every_lane(context: Any, builder: Any, came: Any, wanted: Any, value: Any) -> Any:
+def _answer_in_every_lane(context: Any, builder: Any, got: Any, wanted: Any, value: Any) -> Any:
     return _in_every_lane(builder, value, YES_OR_NO)

@@ -54,7 +54,7 @@ class Imposed(NamedTuple):
 def imposed_in(record: Record) -> Imposed:
     """Return the imposed motion of a recording, which is the same in every simulation of it."""
     if record.imposed is None:
-        raise ValueError(f"recording {record.name}: a joint is simulated from an imposed motion, came none")
+        raise ValueError(f"recording {record.name}: a joint is simulated from an imposed motion, got none")
     return Imposed(record.imposed - record.imposed[0], _rate(record))
 
 

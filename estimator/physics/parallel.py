@@ -62,7 +62,7 @@ def work_on(cores: int) -> None:
     """
     global _cores
     if cores < 1:
-        raise ValueError(f"cores: expected 1 or more, came {cores}")
+        raise ValueError(f"cores: expected 1 or more, got {cores}")
     _cores = _Cores(cores)
 
 

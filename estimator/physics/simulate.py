@@ -53,9 +53,9 @@ def output_state(record: Record, structure: Structure) -> int:
         Where the structure has no such output.
     """
     if (record.imposed is not None) != (structure is Structure.JOINT):
-        came = "an imposed motion" if record.imposed is not None else f"{record.kind.value} as the output"
+        got = "an imposed motion" if record.imposed is not None else f"{record.kind.value} as the output"
         raise BadModel(
-            f"recording {record.name}: came {came}, expected the torque under an imposed motion for a joint, and a "
+            f"recording {record.name}: got {got}, expected the torque under an imposed motion for a joint, and a "
             f"measured motion for every other structure; the model is a {structure.value}. Correct the structure."
         )
     if structure is Structure.JOINT:

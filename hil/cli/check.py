@@ -59,7 +59,7 @@ def check(
     from hil.rig.check import check_rig
 
     if rig is None and not eds:
-        raise UsageError("expected a rig file, an EDS with --eds, or both, came neither. See: hil check --help")
+        raise UsageError("expected a rig file, an EDS with --eds, or both, got neither. See: hil check --help")
     if rig is None and (bus or modbus or prove_stop):
         raise UsageError("--bus, --modbus and --prove-stop concern the rig's devices: expected a rig file beside them")
     if proof is not None:

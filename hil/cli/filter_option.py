@@ -44,7 +44,7 @@ def with_filter(settings: Settings, path: Path | None, run: str | None) -> Onlin
 
     if path is None:
         if run is not None:
-            raise UsageError(f"--filter-run {run}: expected --filter FILE with it, came none")
+            raise UsageError(f"--filter-run {run}: expected --filter FILE with it, got none")
         return OnlineSetup(settings)
     from hil.report.identification.read_back import identified
 

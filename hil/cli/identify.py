@@ -83,7 +83,7 @@ def identify(
     file = None if model is None else read_model_for_recordings(model, trust_laws)
     if model is not None and file is not None and file.on_bench:
         raise ModelFileError(
-            model, "structure | expected a driveline, which torque moves | came 'joint': diagnose or simulate it"
+            model, "structure | expected a driveline, which torque moves | got 'joint': diagnose or simulate it"
         )
     records = read_records(recordings, None if file is None else file.signals, dbc=dbc, tell=tell)
     if file is not None:

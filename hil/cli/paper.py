@@ -84,7 +84,7 @@ def paper(
     if model is not None:
         from hil.errors import UsageError
 
-        raise UsageError("hil paper: expected recordings with --model, came none: the simulated rig has its own model.")
+        raise UsageError("hil paper: expected recordings with --model, got none: the simulated rig has its own model.")
     with tempfile.TemporaryDirectory(prefix="hil-paper-") as workshop:
         driven = _drive(Path(workshop), seed, duration)
         from hil.figures.experiments import driven_models
@@ -110,7 +110,7 @@ def _drive(workshop: Path, seed: int, duration_s: float) -> list[Driven]:
     from hil.rig.stop import StopRequest, stop_on_signals
 
     if not 0.0 < duration_s < float("inf"):
-        raise UsageError(f"--duration: expected a number of seconds above 0, came {duration_s:g}")
+        raise UsageError(f"--duration: expected a number of seconds above 0, got {duration_s:g}")
     stop = StopRequest()
     with stop_on_signals(stop), _bar(EXPERIMENTS, duration_s) as progress:
         return drive_all(workshop, seed, EXPERIMENTS, duration_s, stop, progress)

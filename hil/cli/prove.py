@@ -179,7 +179,7 @@ def _real_cases(folder: Path) -> list[dict[str, Any]]:
     try:
         cases: list[dict[str, Any]] = read_json(path)["cases"]
     except (ValueError, KeyError, TypeError) as error:
-        raise UsageError(f"{path}: expected what hil prove real has written, came: {error}. Remove it.") from error
+        raise UsageError(f"{path}: expected what hil prove real has written, got: {error}. Remove it.") from error
     return cases
 
 

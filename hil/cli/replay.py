@@ -72,7 +72,7 @@ def replay(
     from hil.store.alarms import statements
 
     if speed is not None and not speed > 0:
-        raise UsageError(f"--speed: expected a multiple of real time above 0, came {speed:g}")
+        raise UsageError(f"--speed: expected a multiple of real time above 0, got {speed:g}")
     settings, pace = tracking_settings(sample_time), Pace(speed)
     settings, filter_l = with_filter(settings, filter_of, filter_run)
     begun_s = time.perf_counter()
@@ -103,11 +103,11 @@ def replay(
 def _require(path: Path, what: str, needed: dict[str, object], senseless: dict[str, object]) -> None:
     for option, value in needed.items():
         if value is None:
-            raise UsageError(f"{path}: expected {option} with {what}, came none")
+            raise UsageError(f"{path}: expected {option} with {what}, got none")
     for option, value in senseless.items():
         if value is not None:
             hint = " To rewrite a recording: hil convert." if option == "--out" else ""
-            raise UsageError(f"{path}: expected no {option} with {what}, came one.{hint}")
+            raise UsageError(f"{path}: expected no {option} with {what}, got one.{hint}")
 
 
 def _play_recording(

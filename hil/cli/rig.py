@@ -88,7 +88,7 @@ def new(
         "speed_rad_s": speed_rad_s,
     }
     if not yes and not sys.stdin.isatty():
-        raise UsageError("expected someone at a terminal to ask, or --yes, came neither. See: hil rig new --help")
+        raise UsageError("expected someone at a terminal to ask, or --yes, got neither. See: hil rig new --help")
     drive = None if eds is None else new_drive(eds, file, simulated)
     ask = None if yes else _asker(simulated)
     told = {key: text for key, text in given.items() if text is not None}
@@ -132,6 +132,6 @@ def _asker(simulated: bool) -> Ask:
         try:
             return input(f"{question.asks}{f' [{default}]' if default else ''}: ")
         except EOFError as end:
-            raise UsageError(f"{question.asks}: expected an answer, came the end of the input") from end
+            raise UsageError(f"{question.asks}: expected an answer, got the end of the input") from end
 
     return ask

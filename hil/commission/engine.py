@@ -178,7 +178,7 @@ class Commissioning:
         if stops and answer.what is What.GO:
             first = stops[0]
             raise RunAborted(
-                f"step {step.name}: {first.what}: expected {first.expected}, came {first.measured}. {first.advice}. "
+                f"step {step.name}: {first.what}: expected {first.expected}, got {first.measured}. {first.advice}. "
                 f"Then call again; it goes on from here. To go on without: --skip {step.name} --because TEXT."
             )
         return answer

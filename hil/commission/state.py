@@ -84,7 +84,7 @@ class State:
             part.replace(self.path)
         except OSError as error:
             raise UsageError(
-                f"{self.path}: expected room for the state, came: {error.strerror or error}. The one before it is "
+                f"{self.path}: expected room for the state, got: {error.strerror or error}. The one before it is "
                 "kept; make room and call again."
             ) from error
         finally:
@@ -128,7 +128,7 @@ def load_state(folder: Path, names: Iterable[str]) -> State | None:
         )
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise UsageError(
-            f"{path}: expected the state of a commissioning ({SCHEMA}), came a file that can't be read as one: "
+            f"{path}: expected the state of a commissioning ({SCHEMA}), got a file that can't be read as one: "
             f"{error}. Move it away to begin anew in this folder (its recordings stay), or choose another by --out."
         ) from error
 

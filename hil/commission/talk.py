@@ -71,7 +71,7 @@ class Script:
         """
         if not self.yes:
             raise UsageError(
-                f"step {step} commands torque: expected someone at a terminal to ask, or --yes, came neither. What was "
+                f"step {step} commands torque: expected someone at a terminal to ask, or --yes, got neither. What was "
                 "done up to here is kept; read the plan by --dry-run, then call again with --yes."
             )
         return GO
@@ -142,7 +142,7 @@ class Person:
         """Ask until one of the words comes; `SKIP` asks for a reason until there is one."""
         expected = " or ".join(word for word in words if word)
         while (word := self.ask(question).strip().lower()) not in words:
-            question = f"  expected {expected}, came {word or 'nothing'}\n{question.splitlines()[-1]}"
+            question = f"  expected {expected}, got {word or 'nothing'}\n{question.splitlines()[-1]}"
         if words[word] is not What.SKIP:
             return Answer(words[word])
         question = "  Because: "

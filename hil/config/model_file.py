@@ -194,7 +194,7 @@ def read_model_for_recordings(path: Path | str, trust_laws: bool = False) -> Mod
             raise ModelFileError(
                 path,
                 "signals | expected position (the imposed motion) and torque or force (what it takes) for a joint | "
-                "came neither or one of them: name both columns in [signals]",
+                "got neither or one of them: name both columns in [signals]",
             )
         return file
     names_output = file.signals is not None and file.signals.names_output
@@ -202,7 +202,7 @@ def read_model_for_recordings(path: Path | str, trust_laws: bool = False) -> Mod
         raise ModelFileError(
             path,
             f"motion | expected 'rotation', since recordings are read by their {columns.SPEED} where [signals] names "
-            "no speed, position or force | came 'translation': correct it, or name the column in [signals]",
+            "no speed, position or force | got 'translation': correct it, or name the column in [signals]",
         )
     return file
 

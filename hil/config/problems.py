@@ -1,4 +1,4 @@
-"""All faults of a hand-written TOML file at once, one line each: ``key | expected ... | came ...``.
+"""All faults of a hand-written TOML file at once, one line each: ``key | expected ... | got ...``.
 
 Two steps serve every file of this program, each with the error class of the file at hand:
 
@@ -56,7 +56,7 @@ class Fault:
 
     key: str
     expected: str
-    came: object
+    got: object
 
 
 def refuse(faults: Iterable[Fault]) -> None:
@@ -95,20 +95,20 @@ def read_toml(path: Path, error: type[FileProblem]) -> dict[str, Any]:
     try:
         content = _content(path)
     except OSError as cause:
-        raise error(path, f"the file | expected a readable TOML file | came: {cause.strerror}") from cause
+        raise error(path, f"the file | expected a readable TOML file | got: {cause.strerror}") from cause
     try:
         tables = tomllib.loads(content.decode("utf-8").removeprefix(BYTE_ORDER_MARK))
         problems = list(_beyond_64_bit(tables))
     except UnicodeDecodeError as cause:
         line = content.count(b"\n", 0, cause.start) + 1
         byte = content[cause.start]
-        raise error(path, f"line {line} | expected UTF-8 text | came byte 0x{byte:02x}: save as UTF-8") from cause
+        raise error(path, f"line {line} | expected UTF-8 text | got byte 0x{byte:02x}: save as UTF-8") from cause
     except tomllib.TOMLDecodeError as cause:
         raise error(path, _toml_problem(str(cause))) from cause
     except RecursionError:
-        raise error(path, "the file | expected tables | came some nested too deep") from None
+        raise error(path, "the file | expected tables | got some nested too deep") from None
     except ValueError as cause:  # a whole number of thousands of digits
-        raise error(path, f"the file | expected whole numbers of 64 bit | came: {cause}") from cause
+        raise error(path, f"the file | expected whole numbers of 64 bit | got: {cause}") from cause
     if problems:
         raise error(path, *problems)
     return tables
@@ -172,14 +172,14 @@ def validate(model: type[Model], data: Mapping[str, Any], path: Path, error: typ
 
 
 def problem_lines(model: type[BaseModel], cause: ValidationError) -> list[str]:
-    """Put a validation error into lines ``key | expected ... | came ...``, one per fault."""
+    """Put a validation error into lines ``key | expected ... | got ...``, one per fault."""
     return [line for detail in cause.errors() for line in _lines(model, detail)]
 
 
 def _toml_problem(message: str) -> str:
     match = TOML_PLACE.match(message)
     what, place = (match["what"], match["place"]) if match else (message, "the file")
-    return f"{place} | expected TOML | came: {what}"
+    return f"{place} | expected TOML | got: {what}"
 
 
 def _lines(model: type[BaseModel], detail: ErrorDetails) -> Iterator[str]:
@@ -188,22 +188,22 @@ def _lines(model: type[BaseModel], detail: ErrorDetails) -> Iterator[str]:
     table = ModelWalk.along(model, where)
     if kind == ACROSS_KEYS:
         for fault in context["faults"]:
-            yield _line((*table.keys, fault.key), fault.expected, _shown(fault.came))
+            yield _line((*table.keys, fault.key), fault.expected, _shown(fault.got))
     elif kind == "missing":
         yield _line(table.keys, "this key", "nothing: add it")
     elif kind == "extra_forbidden":
         known = ", ".join(ModelWalk.along(model, where[:-1]).known_keys())
         yield _line(table.keys, f"one of the known keys ({known})", "this unknown key: mend or remove it")
     elif kind in ("union_tag_invalid", "union_tag_not_found"):
-        came = repr(context["tag"]) if "tag" in context else "nothing: add it"
-        yield _line((*table.keys, context["discriminator"].strip("'")), f"one of {table.known_tags()}", came)
+        got = repr(context["tag"]) if "tag" in context else "nothing: add it"
+        yield _line((*table.keys, context["discriminator"].strip("'")), f"one of {table.known_tags()}", got)
     else:
         yield _line(table.keys, _expected(detail), _shown(detail["input"]))
 
 
-def _line(keys: Iterable[int | str], expected: str, came: str) -> str:
+def _line(keys: Iterable[int | str], expected: str, got: str) -> str:
     key = ".".join(str(part) for part in keys if part != "") or "the file"
-    return f"{key} | expected {expected} | came {came}"
+    return f"{key} | expected {expected} | got {got}"
 
 
 def _expected(detail: ErrorDetails) -> str:

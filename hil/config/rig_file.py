@@ -308,7 +308,7 @@ def read_rig(path: Path | str) -> Rig:
     Raises
     ------
     RigFileError
-        Naming every fault of the file, or of EDS and register map it names: line or key, expected, came.
+        Naming every fault of the file, or of EDS and register map it names: line or key, expected, got.
     """
     file = Path(path)
     rig = validate(Rig, read_toml(file, RigFileError), file, RigFileError)
@@ -325,7 +325,7 @@ def _require_eds(file: Path, key: str, eds: Path, node_id: int) -> None:
     try:
         EdsFile(eds, node_id)
     except ConfigMismatch as cause:
-        raise RigFileError(file, f"{key} | expected an EDS | came: {cause}") from cause
+        raise RigFileError(file, f"{key} | expected an EDS | got: {cause}") from cause
 
 
 def _require_map(path: Path) -> None:

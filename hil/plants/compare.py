@@ -81,4 +81,4 @@ def _require_own_names(models: Sequence[Path]) -> None:
     names = [path.name for path in models]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
-        raise UsageError(f"--model {twice}: expected models of different file names, came it twice. Rename one.")
+        raise UsageError(f"--model {twice}: expected models of different file names, got it twice. Rename one.")

@@ -71,7 +71,7 @@ class FmuPlant:
             self._described = self._fmpy.read_model_description(str(path))
             self._fmpy.extract(str(path), unzipdir=self._folder)
         except Exception as error:
-            raise UsageError(f"{path}: expected an FMU of FMI 1.0, 2.0 or 3.0, came: {error}") from error
+            raise UsageError(f"{path}: expected an FMU of FMI 1.0, 2.0 or 3.0, got: {error}") from error
         variables = {each.name: each for each in self._described.modelVariables}
         self._mapped, self._known = tuple(mapped), tuple(variables)
         names(mapped, variables)
@@ -126,7 +126,7 @@ class FmuPlant:
                     output=[named.output],
                 )
         except Exception as error:
-            raise UsageError(f"{self.name}: expected an FMU that simulates {record.name}, came: {error}") from error
+            raise UsageError(f"{self.name}: expected an FMU that simulates {record.name}, got: {error}") from error
         return np.asarray(np.interp(since_s, result["time"], result[named.output]), dtype=np.float64)
 
     def _given(self, record: Record, named: Names, since_s: FloatArray, held: dict[str, float], kind: str) -> Any:
@@ -173,6 +173,6 @@ def _fmpy() -> Any:
         import fmpy
     except ModuleNotFoundError as error:
         raise UsageError(
-            "expected FMPy, which simulates FMUs, came none. Install it: pip install 'hil-driveline[fmu]'"
+            "expected FMPy, which simulates FMUs, got none. Install it: pip install 'hil-driveline[fmu]'"
         ) from error
     return fmpy

@@ -171,7 +171,7 @@ def _rows(path: Path, text: str, form: TextForm) -> tuple[bytes, tuple[int, ...]
         line += sum(number <= line for number in skipped)
         raise RecordingError(
             path,
-            f"line {line}: expected a row, came an empty line. Remove it; a missing sample is nan.",
+            f"line {line}: expected a row, got an empty line. Remove it; a missing sample is nan.",
         )
     if form.delimiter == BLANKS:
         body = re.sub(r"[ \t]+", " ", re.sub(r"(?m)^[ \t]+|[ \t]+$", "", body))
@@ -203,14 +203,14 @@ def _broken_line(rows: bytes, form: TextForm, skipped: tuple[int, ...]) -> str:
     for row, line in enumerate(lines):
         number = line_of(row, form.first_row_line, skipped)
         if line.count('"') % 2:
-            return f"line {number}: expected every quoted cell to end on its line, came one that does not"
+            return f"line {number}: expected every quoted cell to end on its line, got one that does not"
         count = len(split(line, form.delimiter) or [""])
         if count != form.width:
             cut = row + 1 == len(lines) and count < form.width
             cure = "the file is truncated: remove its last line or record again" if cut else "mend that line"
             where = "as in the header" if form.header_line else "as in most lines"
-            return f"line {number}: expected {form.width} cells {where}, came {count}; {cure}"
-    return f"expected lines shorter than {BLOCK_BYTES} bytes, came a longer one"
+            return f"line {number}: expected {form.width} cells {where}, got {count}; {cure}"
+    return f"expected lines shorter than {BLOCK_BYTES} bytes, got a longer one"
 
 
 def _tells_its_kind(column: Column) -> bool:
@@ -232,7 +232,7 @@ def _cells(table: Table, path: Path, name: str) -> Iterable[str]:
     if broken is not None:
         raise RecordingError(
             path,
-            f"column {name}, row {broken + 1}: expected a text of one line, came one with a line break. "
+            f"column {name}, row {broken + 1}: expected a text of one line, got one with a line break. "
             "CSV can't hold it: write Parquet.",
         )
     return map(_quoted, texts)

@@ -98,13 +98,13 @@ def writer_for(path: Path, replace: bool = False) -> Callable[[Table, Path], Non
     known = FORMATS.get(path.suffix.lower())
     if known is None or known.write is None:
         writable = ", ".join(suffix for suffix, form in FORMATS.items() if form.write)
-        raise RecordingError(path, f"expected a name that ends in one of {writable}, came {path.suffix!r}")
+        raise RecordingError(path, f"expected a name that ends in one of {writable}, got {path.suffix!r}")
     if not replace:
         _require_new(path, known)
     elif path.is_dir():
-        raise RecordingError(path, "expected the name of a recording, came a folder. Choose another name.")
+        raise RecordingError(path, "expected the name of a recording, got a folder. Choose another name.")
     if not path.parent.is_dir():
-        raise RecordingError(path, f"expected an existing folder, came {path.parent}. Make it first.")
+        raise RecordingError(path, f"expected an existing folder, got {path.parent}. Make it first.")
     return known.write
 
 
@@ -118,7 +118,7 @@ def format_of(path: Path) -> Format:
     """
     known = FORMATS.get(path.suffix.lower())
     if known is None:
-        raise RecordingError(path, f"expected a recording ({', '.join(FORMATS)}), came {path.suffix!r}")
+        raise RecordingError(path, f"expected a recording ({', '.join(FORMATS)}), got {path.suffix!r}")
     _require_readable(path, known)
     return known
 
@@ -126,22 +126,22 @@ def format_of(path: Path) -> Format:
 def _require_readable(path: Path, known: Format) -> None:
     try:
         if known.apart and path.exists() and not path.is_file():  # these are read from their end, and a pipe has none
-            raise RecordingError(path, "expected a file, came a folder, a pipe or a device. Name a recording.")
+            raise RecordingError(path, "expected a file, got a folder, a pipe or a device. Name a recording.")
         with path.open("rb"):
             pass
     except OSError as error:
-        raise RecordingError(path, f"expected a readable file, came: {error.strerror}") from error
+        raise RecordingError(path, f"expected a readable file, got: {error.strerror}") from error
 
 
 def _require_new(path: Path, known: Format) -> None:
     try:
         if path.exists():
             raise RecordingError(
-                path, "expected a new name, came one that exists: a recording is never overwritten. Move it away."
+                path, "expected a new name, got one that exists: a recording is never overwritten. Move it away."
             )
         if known.beside is not None and (beside := known.beside(path)).exists():
             raise RecordingError(
-                beside, "expected a new name, came one that exists: it describes another recording. Move it away."
+                beside, "expected a new name, got one that exists: it describes another recording. Move it away."
             )
     except OSError as error:
-        raise RecordingError(path, f"expected a place to write, came: {error.strerror or error}") from error
+        raise RecordingError(path, f"expected a place to write, got: {error.strerror or error}") from error

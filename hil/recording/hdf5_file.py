@@ -78,7 +78,7 @@ def _require_self_contained(path: Path, file: Any) -> None:
     outside = file.id.links.visit(look, info=True)
     if outside is not None:
         raise RecordingError(
-            path, f"{text_of(outside)}: expected data in this file, came a reference to another file. Copy it in."
+            path, f"{text_of(outside)}: expected data in this file, got a reference to another file. Copy it in."
         )
     require_cells(path, cells)
 

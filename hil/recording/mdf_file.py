@@ -51,7 +51,7 @@ def require_mdf(path: Path, content: bytes) -> None:
     if len(content) < IDENTIFICATION_BYTES or start not in (FINISHED, UNFINISHED):
         raise RecordingError(
             path,
-            f"expected a whole MDF file, one that begins with {FINISHED.decode()!r}, came one that begins "
+            f"expected a whole MDF file, one that begins with {FINISHED.decode()!r}, got one that begins "
             f"with {start!r}",
         )
 

@@ -85,7 +85,7 @@ def _write(
     on_loss(lost)
     plain = changed(kept, metadata={key: value for key, value in kept.metadata.items() if key not in CHECKSUMS})
     if still := losses(plain, written(plain)):
-        raise RecordingError(path, *(f"expected it to stay as it was written, came: {what}" for what in still))
+        raise RecordingError(path, *(f"expected it to stay as it was written, got: {what}" for what in still))
 
 
 def _publish(part: Path, path: Path, form: Format) -> None:

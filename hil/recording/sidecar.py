@@ -101,7 +101,7 @@ def read_sidecar(recording: Path) -> Sidecar:
         types = {name: Kind(kind) for name, kind in _texts(content.get(TYPES_KEY)).items()}
     except (OSError, ValueError) as error:
         raise RecordingError(
-            path, f"expected the description of {recording.name}, came: {error}. Mend it, or move it away."
+            path, f"expected the description of {recording.name}, got: {error}. Mend it, or move it away."
         ) from error
     return Sidecar(_texts(content), _texts(content.get(UNITS_KEY)), types, found=True)
 

@@ -157,7 +157,7 @@ def _signed(table: Table, signal: TorqueSignal | OutputSignal, values: FloatArra
     if end is not None:
         raise RecordingError(
             table.path,
-            f"column {signal.column}: expected a reading with a sign, came one that jumps between 0 and {end:g}: it "
+            f"column {signal.column}: expected a reading with a sign, got one that jumps between 0 and {end:g}: it "
             f"was stored with a sign and read without. Write {{ column = {signal.column!r}, wraps_at = {end:g} }}.",
         )
     return values
@@ -262,7 +262,7 @@ def _require_sizes(table: Table, signals: Iterable[tuple[str, FloatArray]]) -> N
         if largest != 0.0 and not SMALLEST <= largest <= GREATEST:
             problems.append(
                 f"column {name}: expected a signal in SI units, the largest value between {SMALLEST:g} and "
-                f"{GREATEST:g}, came {largest:g}. Check its unit, and its scale in [signals]"
+                f"{GREATEST:g}, got {largest:g}. Check its unit, and its scale in [signals]"
             )
     if problems:
         raise RecordingError(table.path, *problems)
@@ -272,7 +272,7 @@ def _require_period(table: Table, period_s: float) -> None:
     if not SHORTEST_S <= period_s <= LONGEST_S:
         raise RecordingError(
             table.path,
-            f"expected a sampling period between {SHORTEST_S:g} and {LONGEST_S:g} s, came {period_s:g} s. Check the "
+            f"expected a sampling period between {SHORTEST_S:g} and {LONGEST_S:g} s, got {period_s:g} s. Check the "
             "unit of its time, and its scale in [signals]",
         )
 
@@ -282,6 +282,6 @@ def _require_samples(table: Table, okay: NDArray[np.bool_]) -> None:
     if usable < FEWEST_SAMPLES:
         raise RecordingError(
             table.path,
-            f"expected {FEWEST_SAMPLES} usable samples or more, came {usable} of {okay.size} rows "
+            f"expected {FEWEST_SAMPLES} usable samples or more, got {usable} of {okay.size} rows "
             "(the others are nan, flagged or masked). Record longer or mend the mask.",
         )

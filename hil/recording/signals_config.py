@@ -67,8 +67,8 @@ class TimeSignal(_Strict):
     @model_validator(mode="after")
     def _is_one_of_two(self) -> Self:
         if (self.column is None) == (self.sample_time_s is None):
-            came = "neither" if self.column is None else "both"
-            refuse([Fault("", "either column or sample_time_s", came)])
+            got = "neither" if self.column is None else "both"
+            refuse([Fault("", "either column or sample_time_s", got)])
         return self
 
 

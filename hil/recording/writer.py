@@ -97,13 +97,13 @@ class RecordingWriter:
         except FileExistsError as error:
             raise RecordingError(
                 self.part_path,
-                "expected no such file, came one left by a run that was killed, or that goes on. "
+                "expected no such file, got one left by a run that was killed, or that goes on. "
                 "It is a recording up to that moment: rename it to keep it, or remove it.",
             ) from error
         except OSError as error:
             raise RecordingError(
                 self.path,
-                f"expected a place to write, came: {error.strerror}. Choose another folder, or mend this one.",
+                f"expected a place to write, got: {error.strerror}. Choose another folder, or mend this one.",
             ) from error
         try:
             self._begin(self._file)
@@ -167,12 +167,12 @@ class RecordingWriter:
             If the writer is not open, or the disk has not taken a sample before this one, or too many wait for it.
         """
         if self._file is None or self._writing is None:
-            raise RecordingError(self.path, "expected an open writer, came one that is closed. Use it by 'with'.")
+            raise RecordingError(self.path, "expected an open writer, got one that is closed. Use it by 'with'.")
         self._raise_if_failed(self._writing)
         if not self._writing.put(_row(sample), self._patience_s):
             raise RecordingError(
                 self.path,
-                f"expected a disk that takes samples as they come, came one for which {CAPACITY} wait. They are kept "
+                f"expected a disk that takes samples as they come, got one for which {CAPACITY} wait. They are kept "
                 "if it takes them now; choose another disk.",
             )
 
@@ -220,7 +220,7 @@ class RecordingWriter:
         if not drained:
             raise RecordingError(
                 self.path,
-                f"expected a disk that takes the last {writing.n_waiting} samples within {DRAIN_S:g} s, came one that "
+                f"expected a disk that takes the last {writing.n_waiting} samples within {DRAIN_S:g} s, got one that "
                 "does not: they are lost. Choose another disk.",
             )
         file.close()

@@ -78,7 +78,7 @@ def _require_acceptances(rig: Rig) -> None:
             if not acceptance.is_by_a_person:
                 raise UsageError(
                     f"rig {rig.name!r}, inverters.{name}.accepted.{key}: expected the name of who accepts it, and in "
-                    f"words why, came {acceptance.by!r}, {acceptance.why!r}. Nobody has filled it in."
+                    f"words why, got {acceptance.by!r}, {acceptance.why!r}. Nobody has filled it in."
                 )
 
 

@@ -120,7 +120,7 @@ class PlcPrbs:
         except DriverError as failure:
             cause = "" if error is None else f" What ended the run: {error or type(error).__name__}"
             raise RunAborted(
-                f"PLC: expected its own PRBS generator confirmed off, came: {failure} Switch it off at the PLC before "
+                f"PLC: expected its own PRBS generator confirmed off, got: {failure} Switch it off at the PLC before "
                 f"the drives are armed again.{cause}"
             ) from error
 
@@ -159,7 +159,7 @@ class PlcPrbs:
         try:
             self._holds = self._change.result(self._patience_s)
         except DriverError as error:
-            raise RunAborted(f"PLC: expected its PRBS generator to do as told, came: {error}") from error
+            raise RunAborted(f"PLC: expected its PRBS generator to do as told, got: {error}") from error
         except TimeoutError:
             return  # under way; the PLC's silence is the watch's to see
         self._change, self._since_ns = None, tick.now_ns

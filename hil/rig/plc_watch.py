@@ -111,7 +111,7 @@ class PlcWatch:
         try:
             status = self._poll.result(self._patience_s)
         except DriverError as error:
-            raise RunAborted(f"PLC: expected its status, came: {error}") from error
+            raise RunAborted(f"PLC: expected its status, got: {error}") from error
         except TimeoutError:
             return None  # under way; its age speaks when it takes too long
         self._poll = None

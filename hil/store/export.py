@@ -44,16 +44,16 @@ def export_runs(runs: Sequence[Run], path: Path) -> None:
     """
     write = _WRITERS.get(path.suffix.lower())
     if write is None:
-        raise UsageError(f"{path}: expected a name that ends in one of {', '.join(_WRITERS)}, came {path.suffix!r}")
+        raise UsageError(f"{path}: expected a name that ends in one of {', '.join(_WRITERS)}, got {path.suffix!r}")
     if path.exists():
-        raise UsageError(f"{path}: expected a new name, came one that exists. Move it away.")
+        raise UsageError(f"{path}: expected a new name, got one that exists. Move it away.")
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         write(runs, part)
         part.rename(path)
     except OSError as error:
         raise UsageError(
-            f"{path}: expected room for the export, came: {error.strerror or error}. Make room, or choose another "
+            f"{path}: expected room for the export, got: {error.strerror or error}. Make room, or choose another "
             "place."
         ) from error
     finally:

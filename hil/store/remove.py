@@ -31,7 +31,7 @@ def require_own(entry: RunEntry) -> None:
         raise UsageError(f"{error}\nNothing was deleted; delete the file yourself.") from error
     if not is_run(said) or said.get(CHECKSUM, "") != entry.data_sha256:
         raise UsageError(
-            f"{path}: expected the recording of this run, came another file. Nothing was deleted; delete it yourself, "
+            f"{path}: expected the recording of this run, got another file. Nothing was deleted; delete it yourself, "
             "or leave --with-recording out."
         )
 
@@ -62,7 +62,7 @@ def remove_files(entry: RunEntry) -> list[Path]:
             continue
         except OSError as error:
             raise UsageError(
-                f"{path}: expected a file that can be deleted, came: {error.strerror or error}. The run is out of the "
+                f"{path}: expected a file that can be deleted, got: {error.strerror or error}. The run is out of the "
                 "store; delete the file yourself."
             ) from error
         removed.append(path)

@@ -54,7 +54,7 @@ def level_of(given: str | None) -> str:
     """
     source, level = ("--log-level", given) if given is not None else (VARIABLE, os.environ.get(VARIABLE) or DEFAULT)
     if level.lower() not in LEVELS:
-        raise UsageError(f"{source}: expected one of {', '.join(LEVELS)}, came {level!r}")
+        raise UsageError(f"{source}: expected one of {', '.join(LEVELS)}, got {level!r}")
     return level.lower()
 
 

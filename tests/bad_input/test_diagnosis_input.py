@@ -94,8 +94,8 @@ def test_a_model_in_another_unit_is_refused_like_a_recording(refused: Refused, d
 
 NON_PHYSICAL = {
     "nan": ("parameters.J_M.value", "nan"),
-    "0.0": ("parameters.J_M.value: expected a finite number greater than 0, came 0.0", "0.0"),
-    "-2.0": ("parameters.J_M.value: expected a finite number greater than 0, came -2.0", "-2.0"),
+    "0.0": ("parameters.J_M.value: expected a finite number greater than 0, got 0.0", "0.0"),
+    "-2.0": ("parameters.J_M.value: expected a finite number greater than 0, got -2.0", "-2.0"),
     "inf": ("parameters.J_M.value", "inf"),
 }
 

@@ -146,7 +146,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     unknown = [name for name in options.parts if name not in parts]
     if unknown:
-        parser.error(f"expected {', '.join(parts)}, came {', '.join(unknown)}")
+        parser.error(f"expected {', '.join(parts)}, got {', '.join(unknown)}")
     sys.stdout.write(f"{time.strftime('%Y-%m-%d')}, {machine()}")
     for name in options.parts or parts:
         sys.stdout.write(f"\n### {name.capitalize()}\n\n{parts[name](options.pairs)}")

@@ -88,7 +88,7 @@ def served_here(rig: Rig) -> Iterator[Rig]:
 def served_elsewhere(rig: Rig) -> Iterator[Rig]:
     """Serve a rig from a process of its own (``hil sim``), over loopback; yields it at its addresses."""
     if rig.period_s != read_rig(EXAMPLE).period_s:
-        raise ValueError(f"expected the example's period, came {rig.period_s:g} s: hil sim reads the example's file")
+        raise ValueError(f"expected the example's period, got {rig.period_s:g} s: hil sim reads the example's file")
     command = [
         sys.executable,
         "-m",
@@ -110,5 +110,5 @@ def served_elsewhere(rig: Rig) -> Iterator[Rig]:
 def _addresses(line: Callable[[], str]) -> tuple[str, str]:
     word, bus, modbus = line().split()
     if word != "ready":
-        raise RuntimeError(f"hil sim: expected its line 'ready', came {word!r}")
+        raise RuntimeError(f"hil sim: expected its line 'ready', got {word!r}")
     return bus.removeprefix("bus="), modbus.removeprefix("modbus=")

@@ -133,7 +133,7 @@ def padasip(pairs: int, given: str | None) -> list[tuple[str, ...]]:
     """Return the lines of RLS and OEFO beside padasip's RLS; none, and a hint, where there is no padasip."""
     python = python_with_padasip(given)
     if python is None:
-        sys.stderr.write(f"padasip: expected it in this Python or in another, came neither. {HINT}\n")
+        sys.stderr.write(f"padasip: expected it in this Python or in another, got neither. {HINT}\n")
         return []
     lines = []
     for estimator in (Rls(MODEL.orders, DecreasingGain()), oefo()):

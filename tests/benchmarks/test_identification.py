@@ -156,7 +156,7 @@ def test_coverage_of_the_tests_driveline() -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["speed"], "expected buses, clean, healthy, accuracy, coverage, truth, paper, came speed"),
+        (["speed"], "expected buses, clean, healthy, accuracy, coverage, truth, paper, got speed"),
         (["--buses", "0"], "expected 1 or more"),
         (["--jobs", "0"], "expected 1 or more"),
     ],

@@ -52,7 +52,7 @@ def test_plan_keeps_the_vehicle_for_less_than_forty_minutes(tmp_path: Path, caps
         (["--because", "so"], "expected a reason"),
         (["--skip", "coffee", "--because", "tired"], "expected one of devices, limits"),
         (["--repeat", "coffee"], "expected one of devices, limits"),
-        (["--skip", "noise", "--because", "so", "--repeat", "noise"], "came both"),
+        (["--skip", "noise", "--because", "so", "--repeat", "noise"], "got both"),
     ],
 )
 def test_wrong_use_is_refused_and_nothing_written(

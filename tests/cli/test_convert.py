@@ -77,7 +77,7 @@ def test_an_existing_file_is_replaced_only_by_force(source: Path, tmp_path: Path
         (["run.csv", "nowhere/out.h5"], "expected an existing folder"),
         (["run.csv", "out.h5", "--encoding", "klingon"], "--encoding: expected a text encoding such as"),
         (["run.csv", "out.h5", "--delimiter", "1"], "--delimiter: expected a character that can't be part"),
-        (["run.csv", "out.h5", "--all"], "expected a bus trace with --rig, --all or --channel, came a recording"),
+        (["run.csv", "out.h5", "--all"], "expected a bus trace with --rig, --all or --channel, got a recording"),
         (["run.blf", "out.h5"], "expected --rig RIG beside a bus trace"),
     ],
 )

@@ -67,7 +67,7 @@ def test_an_unknown_level_is_refused(
     options = ["--log-level", "loud"] if where == "option" else []
     assert run([*options, "effects"], keep_log=True) == 2
     error = capsys.readouterr().err
-    assert "expected one of debug, info, warning, error, off, came 'loud'" in error
+    assert "expected one of debug, info, warning, error, off, got 'loud'" in error
     assert ("--log-level" if where == "option" else "HIL_LOG") in error
 
 

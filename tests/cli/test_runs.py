@@ -214,8 +214,8 @@ def test_a_damaged_store_is_told_and_rebuilt(folder: Path, capsys: Capture) -> N
     [
         ([], "expected a store of runs, there is none"),
         (["show", "1"], "expected a store of runs, there is none"),
-        (["rebuild", "--store", "nowhere"], "expected an existing folder, came nowhere"),
-        (["--since", "yesterday"], "--since: expected a date such as 2026-11-21, came 'yesterday'"),
+        (["rebuild", "--store", "nowhere"], "expected an existing folder, got nowhere"),
+        (["--since", "yesterday"], "--since: expected a date such as 2026-11-21, got 'yesterday'"),
     ],
 )
 def test_a_look_makes_no_store(

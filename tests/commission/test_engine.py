@@ -118,7 +118,7 @@ def test_repeating_what_another_with_torque_builds_on_says_so(world: World, monk
 
 def test_blocking_finding_ends_it_and_is_done_again(world: World) -> None:
     world.findings["first"] = [Finding("sign", "forward", "backward", False, "Swap two phases", blocking=True)]
-    with pytest.raises(RunAborted, match=r"step first: sign: expected forward, came backward\. Swap two phases"):
+    with pytest.raises(RunAborted, match=r"step first: sign: expected forward, got backward\. Swap two phases"):
         world.call()
     assert world.state().steps["first"].status is Status.BLOCKED
     assert world.call() == list(NAMES)
@@ -223,7 +223,7 @@ def test_answer_that_is_none_is_told_what_would_be() -> None:
     assert Person(ask).may_command("any", True) == Answer(What.SKIP, "no torque today")
     go = "  Go? [y]es, [s]kip, [q]uit: "
     assert asked[0].endswith(go)
-    assert asked[1:3] == [f"  expected y or yes or s or q, came {came}\n{go}" for came in ("what?", "nothing")]
+    assert asked[1:3] == [f"  expected y or yes or s or q, got {got}\n{go}" for got in ("what?", "nothing")]
     assert asked[3:] == ["  Because: ", "  A reason is needed, it is recorded. Because: "]
 
 

@@ -155,5 +155,5 @@ def test_a_controlword_without_one_before_it_may_be_a_reset() -> None:
 
 
 def test_a_code_of_no_state_is_told_by_its_own_bits() -> None:
-    with pytest.raises(ProtocolViolation, match=r"0x6041 is 0xFF10: .* came 0x00\.|0x6041 is 0xFF2A: .* came 0x2A\."):
+    with pytest.raises(ProtocolViolation, match=r"0x6041 is 0xFF10: .* got 0x00\.|0x6041 is 0xFF2A: .* got 0x2A\."):
         state_of(0xFF2A)

@@ -85,8 +85,8 @@ def test_a_csv_changed_by_hand_is_refused_with_both_checksums(tmp_path: Path, to
     expected = read_metadata(path)[CHECKSUM]
     table = read_table(path)
     path.write_text(path.read_text(encoding="utf-8").replace("gear 3", "gear 9", 1), encoding="utf-8")
-    came = data_sha256({**table.columns, "gear": as_text([*table.columns["gear"].tolist()[:3], "gear 9"])})
-    with pytest.raises(RecordingError, match=rf"SHA-256 {expected[:12]}…, came (?!{came[:12]})\w+….*run\.csv\.json"):
+    got = data_sha256({**table.columns, "gear": as_text([*table.columns["gear"].tolist()[:3], "gear 9"])})
+    with pytest.raises(RecordingError, match=rf"SHA-256 {expected[:12]}…, got (?!{got[:12]})\w+….*run\.csv\.json"):
         read_table(path)
     sidecar_of(path).unlink()  # the cure the message gives
     assert read_table(path).columns["gear"][3] == "gear 9"
@@ -149,7 +149,7 @@ def test_a_full_disk_leaves_what_was_there(tmp_path: Path, told: Table, suffix: 
     if existing:
         write_table(old, path)
     before = {file.name: file.read_bytes() for file in tmp_path.iterdir()}
-    refusal = pytest.raises(RecordingError, match=rf"run{suffix}.*: expected room for the .*, came: .*File too large")
+    refusal = pytest.raises(RecordingError, match=rf"run{suffix}.*: expected room for the .*, got: .*File too large")
     with refusal, largest_file(1000):
         write_table(told, path, replace=True)
     assert {file.name: file.read_bytes() for file in tmp_path.iterdir()} == before
@@ -172,13 +172,13 @@ def test_a_full_disk_at_the_end_of_a_run_costs_the_description_and_no_sample(tmp
 @pytest.mark.parametrize("suffix", WRITABLE)
 def test_a_place_that_takes_no_file_is_told(told: Table, suffix: str) -> None:
     path = Path(f"/proc/run{suffix}")
-    with pytest.raises(RecordingError, match=rf"/proc/run{suffix}: expected room for the recording, came: "):
+    with pytest.raises(RecordingError, match=rf"/proc/run{suffix}: expected room for the recording, got: "):
         write_table(told, path)
 
 
 def test_a_folder_that_can_not_be_written_is_told(tmp_path: Path, told: Table) -> None:
     (tmp_path / "taken.h5").mkdir()
-    with pytest.raises(RecordingError, match="came a folder"):
+    with pytest.raises(RecordingError, match="got a folder"):
         write_table(told, tmp_path / "taken.h5", replace=True)
     shutil.rmtree(tmp_path / "taken.h5")
     assert list(tmp_path.iterdir()) == []

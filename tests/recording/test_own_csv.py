@@ -51,7 +51,7 @@ def test_the_facts_are_those_of_the_table(recorded: Path) -> None:
     [
         ("\n0.05,", "\n0.06,", "expected the data it was written with"),
         ("\n0.05,", "\nx,", "expected the data it was written with"),
-        ("\n0.05,", "\n0.05,1.0,", "line 7: expected 10 cells as in the header, came 11"),
+        ("\n0.05,", "\n0.05,1.0,", "line 7: expected 10 cells as in the header, got 11"),
     ],
 )
 def test_a_changed_recording_is_refused_as_the_table_is(recorded: Path, before: str, after: str, said: str) -> None:

@@ -92,7 +92,7 @@ def test_rows_in_which_a_limit_of_the_drive_acts_count(changed: Changed) -> None
 def test_flags_of_a_foreign_recording_mean_nothing(changed: Changed) -> None:
     table = changed(flags=np.ones(40, dtype=np.int64))
     assert to_record(table, signals(torque=[{"column": "torque_m1_nm"}])).okay.all()
-    with pytest.raises(RecordingError, match="came 0 of 40 rows"):
+    with pytest.raises(RecordingError, match="got 0 of 40 rows"):
         to_record(table, SignalsConfig())
 
 
@@ -129,7 +129,7 @@ def test_missing_columns_are_named_together(changed: Changed) -> None:
 def test_too_few_usable_samples_are_refused(changed: Changed) -> None:
     speed = np.full(40, np.nan)
     speed[:9] = 1.0
-    with pytest.raises(RecordingError, match="expected 10 usable samples or more, came 9 of 40 rows"):
+    with pytest.raises(RecordingError, match="expected 10 usable samples or more, got 9 of 40 rows"):
         to_record(changed(speed_rad_s=speed), SignalsConfig())
 
 
@@ -145,9 +145,9 @@ def with_time(changed: Changed, time_s: np.ndarray) -> Table:
         (
             5,
             0.0,
-            "line 7, column time_s: expected a time greater than in the row before, came 0 s after 0.04 s",
+            "line 7, column time_s: expected a time greater than in the row before, got 0 s after 0.04 s",
         ),
-        (5, np.nan, "line 7, column time_s: expected a time greater than in the row before, came nan s"),
+        (5, np.nan, "line 7, column time_s: expected a time greater than in the row before, got nan s"),
         (39, 0.41, "line 41, column time_s: expected a uniform step of 0.01 s within 50%"),
     ],
 )
@@ -188,7 +188,7 @@ def test_jitter_of_time_stamps_is_no_fault(changed: Changed) -> None:
 
 def test_one_row_has_no_period(own_table: Table) -> None:
     table = Table(own_table.path, {name: column[:1] for name, column in own_table.columns.items()})
-    with pytest.raises(RecordingError, match="expected two rows or more, came 1"):
+    with pytest.raises(RecordingError, match="expected two rows or more, got 1"):
         to_record(table, SignalsConfig())
 
 
@@ -245,7 +245,7 @@ def test_recordings_are_read_in_order(three_runs: list[Path]) -> None:
 
 def test_the_same_samples_under_two_names_are_refused(three_runs: list[Path]) -> None:
     three_runs[2].write_bytes(three_runs[0].read_bytes())
-    with pytest.raises(UsageError, match=r"run_2\.csv: expected samples of its own, came those of .*run_0\.csv"):
+    with pytest.raises(UsageError, match=r"run_2\.csv: expected samples of its own, got those of .*run_0\.csv"):
         read_records(three_runs)
 
 
@@ -263,7 +263,7 @@ def test_all_faulty_recordings_are_named(three_runs: list[Path]) -> None:
 
 
 def test_two_recordings_of_one_name_are_refused(three_runs: list[Path]) -> None:
-    with pytest.raises(UsageError, match="came 'run_1' twice"):
+    with pytest.raises(UsageError, match="got 'run_1' twice"):
         read_records([*three_runs, three_runs[1]])
 
 

@@ -99,7 +99,7 @@ def test_a_disk_that_hangs_for_good_does_not_hang_the_program(
     tmp_path: Path, disk: Disk, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(writer, "DRAIN_S", 0.01)
-    with pytest.raises(RecordingError, match=r"the last \d+ samples within 0.01 s, came one that does not"):
+    with pytest.raises(RecordingError, match=r"the last \d+ samples within 0.01 s, got one that does not"):
         with RecordingWriter(tmp_path / "run.csv") as recorder:
             recorder.append(sample(0))
     disk.goes_on.set()
@@ -137,7 +137,7 @@ def test_a_disk_that_takes_part_of_what_waits_keeps_the_rows_that_are_whole(
             for k in range(9):
                 recorder.append(sample(k))
 
-    with pytest.raises(RecordingError, match=f"expected room for sample {rows + 1}, came: No space left"):
+    with pytest.raises(RecordingError, match=f"expected room for sample {rows + 1}, got: No space left"):
         run()
     assert recorder.n_samples == rows
     assert (tmp_path / "run.csv").exists() == (rows > 0)

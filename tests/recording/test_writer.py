@@ -150,7 +150,7 @@ def test_a_recording_that_cannot_be_made_is_refused_before_the_run(tmp_path: Pat
 
 def test_a_place_that_cannot_be_written_is_refused_before_the_run(tmp_path: Path) -> None:
     with (
-        pytest.raises(RecordingError, match="expected a place to write, came: File name too long"),
+        pytest.raises(RecordingError, match="expected a place to write, got: File name too long"),
         RecordingWriter(tmp_path / f"{'x' * 249}.csv"),
     ):
         pass
@@ -169,7 +169,7 @@ def test_a_recording_there_is_no_room_for_stays_in_the_part_file(tmp_path: Path)
     path = tmp_path / "run.parquet"
     (tmp_path / f".run.parquet.{os.getpid()}.part").mkdir()
     writer = RecordingWriter(path)
-    with pytest.raises(RecordingError, match=r"run\.parquet: expected room for the recording, came: .*run\.part\.csv"):
+    with pytest.raises(RecordingError, match=r"run\.parquet: expected room for the recording, got: .*run\.part\.csv"):
         with writer:
             writer.append(sample(1))
     assert writer.kept == tmp_path / "run.part.csv"
@@ -214,7 +214,7 @@ def test_nor_is_one_taken_from_a_run_that_has_just_begun(tmp_path: Path) -> None
 def test_a_disk_that_is_full_from_the_start_is_told_with_the_name_and_leaves_nothing(tmp_path: Path) -> None:
     from tests.recording.test_damage import largest_file
 
-    refusal = pytest.raises(RecordingError, match=r"run\.csv: expected room for the recording, came: .*too large")
+    refusal = pytest.raises(RecordingError, match=r"run\.csv: expected room for the recording, got: .*too large")
     with refusal, largest_file(10), RecordingWriter(tmp_path / "run.csv"):
         pass
     assert list(tmp_path.iterdir()) == []

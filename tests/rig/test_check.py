@@ -84,7 +84,7 @@ def test_plc_that_answers_with_other_identifiers_is_told_as_such(fault: str) -> 
     with served(faults=rig_faults([f"plc.{fault}@0"], 0.01)) as (_, rig):
         plc = check_rig(rig)[-1]
     assert plc.verdict is Verdict.FAILED
-    assert "expected an answer with transaction id 1, unit id 1, came transaction id" in plc.notes[0]
+    assert "expected an answer with transaction id 1, unit id 1, got transaction id" in plc.notes[0]
 
 
 def test_drive_in_fault_is_a_note_not_a_difference() -> None:

@@ -68,6 +68,6 @@ def test_a_beat_that_fails_meanwhile_ends_the_run_before_a_torque() -> None:
         devices.plc.close()
         with (
             HostBeat(devices.plc_loop, devices.plc) as beat,
-            pytest.raises(RunAborted, match="host's beats, came: PLC"),
+            pytest.raises(RunAborted, match="host's beats, got: PLC"),
         ):
             beat.hand_over()

@@ -102,7 +102,7 @@ def test_effect_text_is_read() -> None:
 
 @pytest.mark.parametrize("text", ["backlash:gap_rad", "backlash:gap_rad=", "backlash:gap_rad=wide"])
 def test_effect_parameter_that_is_no_number_is_refused(text: str) -> None:
-    with pytest.raises(UsageError, match="expected key=number, came 'gap_rad"):
+    with pytest.raises(UsageError, match="expected key=number, got 'gap_rad"):
         EffectSpec.parse(text)
 
 

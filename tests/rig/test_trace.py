@@ -136,8 +136,8 @@ def test_trace_of_a_run_without_a_clock_has_one_period_per_sync(written: Callabl
     ("rows", "reason"),
     [
         ([], "expected SYNC"),
-        ([*cycle(0, 1, prbs=0), *cycle(10, 1, prbs=0)], "measured part .* came none"),
-        ([*cycle(0, 1), *cycle(10, 1, prbs=0), *cycle(20, 1), *cycle(30, 1)], "came a second"),
+        ([*cycle(0, 1, prbs=0), *cycle(10, 1, prbs=0)], "measured part .* got none"),
+        ([*cycle(0, 1), *cycle(10, 1, prbs=0), *cycle(20, 1), *cycle(30, 1)], "got a second"),
         ([*cycle(0, 1), (3, TPDO_M1, b"\x00"), *cycle(10, 1)], "frame of 1 bytes.*rig file is not the one"),
     ],
 )
@@ -227,13 +227,13 @@ def test_log_of_several_channels_asks_which_and_never_merges_them(
 ) -> None:
     path = two_buses(tmp_path / f"two{suffix}")
     one, two = NAMES[suffix]
-    with pytest.raises(RecordingError, match=rf"came channels {one} \(40 frames\), {two} \(40 frames\)\. Say which"):
+    with pytest.raises(RecordingError, match=rf"got channels {one} \(40 frames\), {two} \(40 frames\)\. Say which"):
         list(replay(path, small_rig()))
     wanted = list(replay(written(*CYCLES), small_rig()))
     for name in MEASURED:
         assert column(list(replay(path, small_rig(), channel=one)), name) == column(wanted, name)
     assert set(column(list(replay(path, small_rig(), channel=two)), "torque_m1_nm")) == {77 * RATED_NM / 1000.0}
-    with pytest.raises(RecordingError, match=rf"expected channel 'can7', came channels {one} \(40 frames\)"):
+    with pytest.raises(RecordingError, match=rf"expected channel 'can7', got channels {one} \(40 frames\)"):
         list(replay(path, small_rig(), channel="can7"))
 
 

@@ -222,6 +222,6 @@ def test_of_two_faults_the_later_one_tells_how_it_answers() -> None:
 def test_what_the_program_does_not_accept_changes_nothing(name: str, value: Value) -> None:
     device = PlcDevice()
     before = device.values()
-    with pytest.raises(ValueRefusedError, match=f"PLC register {name}: expected .*, came {value!r}"):
+    with pytest.raises(ValueRefusedError, match=f"PLC register {name}: expected .*, got {value!r}"):
         device.write({"prbs_divider": 9, "drive_mode_request": "parallel", name: value})
     assert device.values() == before

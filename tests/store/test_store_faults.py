@@ -46,7 +46,7 @@ def test_what_is_no_store_at_all(tmp_path: Path, record: Record, content: bytes)
     record("a.csv")
     store_of(tmp_path).write_bytes(content)
     if content:
-        with pytest.raises(StoreError, match=r"expected a whole store of runs, came a damaged one.*hil runs rebuild"):
+        with pytest.raises(StoreError, match=r"expected a whole store of runs, got a damaged one.*hil runs rebuild"):
             RunStore(tmp_path).__enter__()
     result = rebuild(tmp_path)
     assert (result.before, result.found) == (0, 1)
@@ -90,7 +90,7 @@ def test_a_newer_store_is_refused_and_left_alone(filled: Path, version: int) -> 
     database.close()
     before = store_of(filled).read_bytes()
     for attempt in (lambda: names(filled), lambda: rebuild(filled)):
-        with pytest.raises(StoreError, match=f"version {len(MIGRATIONS)} or older, came version {version}"):
+        with pytest.raises(StoreError, match=f"version {len(MIGRATIONS)} or older, got version {version}"):
             attempt()
     assert store_of(filled).read_bytes() == before
 

@@ -206,7 +206,7 @@ def test_a_simulated_rig_on_a_bus_of_the_kernel_says_when_there_is_none() -> Non
     ("url", "faults", "wanted"),
     [
         ("socketcan:can0", RigFaults(), r"expected ws://HOST:PORT/"),  # real drives may be on it
-        (f"socketcan:{INTERFACE}", RigFaults(bus=BusFaults(off_at_step=5)), "came faults of the bus"),
+        (f"socketcan:{INTERFACE}", RigFaults(bus=BusFaults(off_at_step=5)), "got faults of the bus"),
     ],
 )
 def test_a_simulated_rig_is_not_served_where_it_must_not_be(url: str, faults: RigFaults, wanted: str) -> None:

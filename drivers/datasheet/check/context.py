@@ -53,8 +53,8 @@ def at_key(
 ) -> EdsFinding:
     """Say something about a key of a section; ``found`` is put before the value as written, if there is one."""
     written = section.keys.get(key.lower())
-    came = f"{found} {written.value!r}".lstrip() if quote and written is not None and written.value else found
-    return EdsFinding(severity, section.line_of(key), f"[{section.name}] {key}", expected, came or "nothing", advice)
+    got = f"{found} {written.value!r}".lstrip() if quote and written is not None and written.value else found
+    return EdsFinding(severity, section.line_of(key), f"[{section.name}] {key}", expected, got or "nothing", advice)
 
 
 def at_section(severity: Severity, section: EdsSection, expected: str, found: str, advice: str) -> EdsFinding:

@@ -54,7 +54,7 @@ def run(
         predict(rig_file, experiment, as_json, trust_laws)
         return
     if out is None:
-        raise UsageError("hil run: expected --out REC, a recording to write, or --dry-run; came neither.")
+        raise UsageError("hil run: expected --out REC, a recording to write, or --dry-run; got neither.")
     from hil.cli.pace import pacer_for, scheduling
     from hil.cli.run.job import Job, record
     from hil.cli.run.live import live_estimate

@@ -32,7 +32,7 @@ def live_estimate(
 
     if course_path(recording).exists():
         raise UsageError(
-            f"{course_path(recording)}: expected no such file, came one of an earlier run. Move it away, or choose "
+            f"{course_path(recording)}: expected no such file, got one of an earlier run. Move it away, or choose "
             "another name with --out."
         )
     try:

@@ -23,7 +23,7 @@ def rebuild(store: Folder = HERE, as_json: AsJson = False) -> None:
     from hil.store.run_store import store_of
 
     if not store.is_dir():
-        raise StoreError(store_of(store), f"expected an existing folder, came {store}")
+        raise StoreError(store_of(store), f"expected an existing folder, got {store}")
     result = rebuilt(store)
     for problem in result.unreadable:
         typer.echo(f"not entered: {problem}", err=True)

@@ -61,7 +61,7 @@ def _nominal(job: Job) -> DrivelineModel:
     document = job.evidence("validation").get("model")
     if document is None:
         raise UsageError(
-            f"commissioning in {job.folder}: expected a model from the validation, or one given by --model, came "
+            f"commissioning in {job.folder}: expected a model from the validation, or one given by --model, got "
             "neither. Repeat the validation (--repeat validation), or skip this step."
         )
     return model_from_json(document)

@@ -44,7 +44,7 @@ def cruises(job: Job) -> list[Any]:
     runs = [run for run in job.runs_of("experiments") if run.name.startswith("cruise")]
     if len(runs) < 2:
         raise UsageError(
-            f"commissioning in {job.folder}: expected PRBS runs to work with, came {len(runs)} (experiments is "
+            f"commissioning in {job.folder}: expected PRBS runs to work with, got {len(runs)} (experiments is "
             f"{job.state.steps['experiments'].status.value}). Drive them: --repeat experiments; or skip this step."
         )
     return runs

@@ -60,8 +60,8 @@ class Expressions:
 
     def refused(self, node: ast.AST) -> NotTranslatable:
         """Return the error that names what can't be translated."""
-        came = ast.unparse(node).splitlines()[0]
-        return NotTranslatable(f"{self._where}: expected what C can be written for, came {came!r}")
+        got = ast.unparse(node).splitlines()[0]
+        return NotTranslatable(f"{self._where}: expected what C can be written for, got {got!r}")
 
     def text(self, node: ast.expr) -> Text:
         """Return C text and type of an expression."""

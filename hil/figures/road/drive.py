@@ -122,7 +122,7 @@ def _plan(rig: Rig, conditions: Conditions, duration_s: float) -> Plan:
     plan = plan_run(rig.model_copy(update={"prbs": prbs}), EXPERIMENT)
     table = experiment_table(rig, EXPERIMENT)
     if not isinstance(table, CruiseTable):
-        raise UsageError(f"rig {rig.name!r}, experiments.{EXPERIMENT}: expected kind = 'cruise', came {table.kind!r}")
+        raise UsageError(f"rig {rig.name!r}, experiments.{EXPERIMENT}: expected kind = 'cruise', got {table.kind!r}")
     inertia, period_s, speed = rig.vehicle.inertia_kg_m2, rig.period_s, conditions.speed_rad_s
     cruise = Cruise(speed, duration_s, inertia, table.torque_nm, period_s)
     law = PedalCruise(cruise, conditions.pedal_nm, period_s, np.random.default_rng([conditions.seed, 1]))

@@ -54,7 +54,7 @@ def read_results(path: Path) -> dict[tuple[str, int], Row]:
             rows[row["kind"], row["seed"]] = row
         except (ValueError, KeyError, TypeError) as error:
             raise RecordingError(
-                path, f"line {number}: expected one case as JSON with kind and seed, came {line[:40]!r}. Remove it."
+                path, f"line {number}: expected one case as JSON with kind and seed, got {line[:40]!r}. Remove it."
             ) from error
     return rows
 

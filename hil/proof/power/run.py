@@ -122,23 +122,23 @@ def _multiples(text: str) -> tuple[float, ...]:
     try:
         multiples = tuple(float(word) for word in text.split(","))
     except ValueError:
-        raise argparse.ArgumentTypeError(f"expected numbers with commas, came {text!r}") from None
+        raise argparse.ArgumentTypeError(f"expected numbers with commas, got {text!r}") from None
     if min(multiples) < LEAST_MULTIPLE:
-        raise argparse.ArgumentTypeError(f"expected {LEAST_MULTIPLE:g} or more each, came {text!r}")
+        raise argparse.ArgumentTypeError(f"expected {LEAST_MULTIPLE:g} or more each, got {text!r}")
     return multiples
 
 
 def _alpha(text: str) -> float:
     alpha = float(text)
     if not 0.0 < alpha < 1.0:
-        raise argparse.ArgumentTypeError(f"expected a probability between 0 and 1, came {text}")
+        raise argparse.ArgumentTypeError(f"expected a probability between 0 and 1, got {text}")
     return alpha
 
 
 def _samples(text: str) -> int:
     duration_s = float(text)
     if not 1.0 <= duration_s <= DURATION_S:
-        raise argparse.ArgumentTypeError(f"expected 1 to {DURATION_S:g} s, came {text}")
+        raise argparse.ArgumentTypeError(f"expected 1 to {DURATION_S:g} s, got {text}")
     return round(duration_s / PERIOD_S)
 
 
@@ -185,7 +185,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error(str(error))
     if (other := made_otherwise(study, [*bounds.values(), *results.values()])) is not None:
         parser.error(
-            f"--out {options.out}: expected a study of alpha {study.alpha:g} and {study.samples} samples, came one of "
+            f"--out {options.out}: expected a study of alpha {study.alpha:g} and {study.samples} samples, got one of "
             f"{other['alpha']:g} and {other['samples']}. Choose another folder."
         )
     try:

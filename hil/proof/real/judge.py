@@ -61,7 +61,7 @@ def _entry(diagnosis: Mapping[str, Any], place: str) -> Mapping[str, Any] | None
         case ["load_torque"]:
             loads = list(diagnosis["load_torque"].values())
             return _table(loads[0]) if len(loads) == 1 else None
-    raise ValueError(f"expected parameters.NAME, effects.NAME.NAME or load_torque, came {place}")
+    raise ValueError(f"expected parameters.NAME, effects.NAME.NAME or load_torque, got {place}")
 
 
 def _table(value: Any) -> Mapping[str, Any] | None:

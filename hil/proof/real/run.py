@@ -179,7 +179,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = _parser()
     options = parse_work(parser, arguments)
     if options.data is None:
-        parser.error("--data: expected the folder of the recordings, came neither it nor HIL_DATA")
+        parser.error("--data: expected the folder of the recordings, got neither it nor HIL_DATA")
 
     def tell(message: str, share: float) -> None:
         sys.stdout.write(f"[{share:4.0%}] {message}\n")

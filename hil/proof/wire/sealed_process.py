@@ -132,5 +132,5 @@ def _meet(pipes: _Pipes) -> SealedProcess:
     line = pipes.answer()
     ready = _READY.fullmatch(line)
     if ready is None:
-        raise RunAborted(f"sealed rig: expected 'ready bus=... modbus=... commitment=...', came {line!r}")
+        raise RunAborted(f"sealed rig: expected 'ready bus=... modbus=... commitment=...', got {line!r}")
     return SealedProcess(ready["bus"], ready["modbus"], ready["commitment"], pipes)

@@ -73,7 +73,7 @@ def serve(challenge: Challenge, rig: Rig, bus_url: str, modbus: str, asked: Text
 def _answer(asked: str, challenge: Challenge) -> str:
     if asked == OPEN:
         return json.dumps(challenge.seal.opened())
-    return json.dumps({"error": f"expected the line {OPEN!r} or the end of input, came {asked!r}"})
+    return json.dumps({"error": f"expected the line {OPEN!r} or the end of input, got {asked!r}"})
 
 
 def _tell(told: TextIO, line: str) -> None:

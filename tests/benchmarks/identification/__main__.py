@@ -63,7 +63,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     unknown = [name for name in options.parts if name not in parts]
     if unknown:
-        parser.error(f"expected {', '.join(parts)}, came {', '.join(unknown)}")
+        parser.error(f"expected {', '.join(parts)}, got {', '.join(unknown)}")
     if options.buses < 1 or options.jobs < 1:
         parser.error(f"--buses {options.buses}, --jobs {options.jobs}: expected 1 or more of each")
     for name in options.parts or ("buses",):

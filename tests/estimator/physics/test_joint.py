@@ -216,11 +216,11 @@ def test_a_joint_has_a_spring_and_a_damper_and_no_mode() -> None:
 
 def test_structure_and_recording_must_agree() -> None:
     bench = recording(up_and_down(0.1))
-    with pytest.raises(BadModel, match=r"came an imposed motion, expected .* the model is a two_mass"):
+    with pytest.raises(BadModel, match=r"got an imposed motion, expected .* the model is a two_mass"):
         output_state(bench, Structure.TWO_MASS)
-    with pytest.raises(BadModel, match="came force as the output, expected the torque under an imposed motion"):
+    with pytest.raises(BadModel, match="got force as the output, expected the torque under an imposed motion"):
         output_state(replace(bench, imposed=None), Structure.JOINT)
-    with pytest.raises(ValueError, match="imposed motion, came none"):
+    with pytest.raises(ValueError, match="imposed motion, got none"):
         joint.imposed_in(replace(bench, imposed=None))
 
 

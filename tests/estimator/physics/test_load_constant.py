@@ -79,5 +79,5 @@ def test_of_one_recording_alone_a_shared_load_is_its_own_and_a_known_one_is_kept
 
 
 def test_a_load_that_is_no_number_is_refused() -> None:
-    with pytest.raises(BadModel, match=r"load\.constant: expected 'own', 'shared' or a finite number, came nan"):
+    with pytest.raises(BadModel, match=r"load\.constant: expected 'own', 'shared' or a finite number, got nan"):
         with_load(float("nan"))

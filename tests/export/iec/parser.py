@@ -38,7 +38,7 @@ class Parser(Statements):
 
     def _pou(self) -> None:
         kind = self._next().text
-        self._require(kind in ("FUNCTION_BLOCK", "PROGRAM"), f"expected TYPE or a POU, came {kind!r}")
+        self._require(kind in ("FUNCTION_BLOCK", "PROGRAM"), f"expected TYPE or a POU, got {kind!r}")
         self._block = Block(self._new_name(), kind == "PROGRAM")
         while self._now.text in SECTIONS:
             self._section()
@@ -112,5 +112,5 @@ class Parser(Statements):
     def _literal(self, kind: str) -> str:
         signed = self._tokens[self._place + (self._now.text == "-")]
         is_literal = signed.kind in ("int", "real") or self._now.text in ("TRUE", "FALSE")
-        self._require(is_literal, f"expected a literal, came {self._now.text}")
+        self._require(is_literal, f"expected a literal, got {self._now.text}")
         return self._typed(self._unary(), kind).c

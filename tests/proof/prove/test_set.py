@@ -217,7 +217,7 @@ def test_verdicts_and_their_list_changed_together_are_told_by_the_digest_that_wa
     listed = json.loads((proof / VERDICTS_LIST).read_text())
     listed["cases"]["case_001"]["diagnose_s"] = 99.0
     (proof / VERDICTS_LIST).write_text(json.dumps(listed))
-    with pytest.raises(SealBroken, match="came others"):
+    with pytest.raises(SealBroken, match="got others"):
         judge_set(proof, KEY, 1, silent, digest)
 
 

@@ -97,7 +97,7 @@ def test_a_transfer_that_broke_off_goes_on(site, tmp_path):
 
 def test_a_wrong_file_does_not_take_the_place_and_is_not_gone_on_with(site, tmp_path):
     _, (message,) = had(entry(b"something else", site.url("/a.csv")), tmp_path)
-    assert f"came {hashlib.sha256(CONTENT).hexdigest()}" in message
+    assert f"got {hashlib.sha256(CONTENT).hexdigest()}" in message
     assert list((tmp_path / "set").iterdir()) == []
 
 

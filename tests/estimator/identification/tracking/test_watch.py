@@ -97,8 +97,8 @@ def test_false_alarms_come_no_more_often_than_stated(prbs_nm: Callable[[float], 
     courses = [play(each, watch) for each in drives(8, number, duration_s, prbs_nm=prbs_nm)]
     watched_s = sum(float((course.state == TrackingState.WATCHING).sum()) * 0.02 for course in courses)
     assert watched_s > 0.3 * duration_s * number
-    came = sum(not alarm.settled for course in courses for alarm in course.alarms)
-    assert came <= poisson.ppf(0.999, stated * watched_s / 3600.0)
+    got = sum(not alarm.settled for course in courses for alarm in course.alarms)
+    assert got <= poisson.ppf(0.999, stated * watched_s / 3600.0)
 
 
 def test_a_statistic_is_standard_normal_where_nothing_changes() -> None:
