@@ -1,7 +1,8 @@
 """One way to compile: numba with a disk cache that a changed law can't outlive.
 
-numba keys its cache by the file of the outermost function alone, so a kernel would go on using the old code of a law
-that lives in another file. Here the cache folder carries the digest of every source file beside which code is compiled.
+numba keys its cache by the file of the outermost function alone, so a kernel would keep using the old code of a law
+that lives in another file. Here the cache folder carries the digest of every source file next to which code is
+compiled.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """pymodbus's framer for Modbus TCP, which says what it passed over.
 
 An answer whose transaction or unit identifier is not the request's is skipped by pymodbus with a line in its log, and
-its user is told that none came (3.16.1). Which ones came stands here, so that the wait can end with the right cause.
+its user learns that none came (3.16.1). Which ones came stands here, so that the wait can end with the right cause.
 """
 
 from __future__ import annotations

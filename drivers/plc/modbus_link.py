@@ -2,7 +2,7 @@
 
 What is done about pymodbus 3.16.1 here:
 
-- a failed connection and a lost answer come back as values or as one catch-all exception: they are told apart
+- a failed connection and a lost answer come back as values or as one catch-all exception: they are distinguished
   here, into `BusDown`, `DeviceTimeout` and `ProtocolViolation`;
 - it does not count the registers of an answer: they are counted here;
 - an answer it can't decode raises in the event loop, where nobody can catch it: `_Decoder` turns it into a

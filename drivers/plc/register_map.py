@@ -152,7 +152,7 @@ def _problems(cause: ValidationError) -> Iterator[str]:
         if detail["type"] == "missing":
             yield f"{key} | expected this key | got nothing: add it"
         elif detail["type"] == "extra_forbidden":
-            yield f"{key} | expected no such key | got this unknown key: mend or remove it"
+            yield f"{key} | expected no such key | got this unknown key: fix or remove it"
         else:
             expected = detail["msg"].removeprefix("Input should be ")
             got = "a table" if isinstance(detail["input"], Mapping) else repr(detail["input"])
@@ -168,8 +168,7 @@ def _overlaps(registers: Mapping[str, Register]) -> Iterator[str]:
         for (before, first), (name, register) in pairwise(of_kind):
             if register.address < first.end:
                 yield (
-                    f"registers.{name}.address | expected {first.end} or more, behind {before} | "
-                    f"got {register.address}"
+                    f"registers.{name}.address | expected {first.end} or more, behind {before} | got {register.address}"
                 )
 
 

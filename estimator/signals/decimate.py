@@ -178,7 +178,7 @@ class Decimator:
         return {"counters": self._counters.copy(), "level": self._level.copy(), "window": self._window.copy()}
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Go on from a state of a decimator with the same settings."""
+        """Continue from a state of a decimator with the same settings."""
         self._counters[:], self._level[:], self._window[:] = state["counters"], state["level"], state["window"]
 
 

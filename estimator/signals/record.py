@@ -75,7 +75,7 @@ class Record:
     output : ndarray, shape (N,)
         Measured output [rad/s, rad, Nm; translation m/s, m, N].
     okay : ndarray of bool, shape (N,)
-        False where the sample must not be used; time goes on there.
+        False where the sample must not be used; time advances there.
     kind, location
         What the output is, and where it is measured.
     began_s : float, optional

@@ -61,7 +61,7 @@ def check(
     if rig is None and not eds:
         raise UsageError("expected a rig file, an EDS with --eds, or both, got neither. See: hil check --help")
     if rig is None and (bus or modbus or prove_stop):
-        raise UsageError("--bus, --modbus and --prove-stop concern the rig's devices: expected a rig file beside them")
+        raise UsageError("--bus, --modbus and --prove-stop concern the rig's devices: expected a rig file next to them")
     if proof is not None:
         _require_proof(proof, prove_stop)
     rig_file = None if rig is None else with_addresses(read_rig(rig), bus, modbus)
@@ -105,13 +105,13 @@ def _refuse(reports: tuple[EdsReport, ...], rig: Rig | None, findings: tuple[Fin
     if unusable := [each for each in reports if not each.usable]:
         raise InputError(
             f"{'; '.join(f'EDS {each.path} is {verdict(each)}' for each in unusable)}: see above. "
-            "Mend a copy of the file, or take the one of the drive's firmware version."
+            "Fix a copy of the file, or take the one of the drive's firmware version."
         )
     bad = [finding.device for finding in findings if finding.verdict is not Verdict.AGREES]
     if rig is not None and bad:
         raise ConfigMismatch(
             f"rig {rig.name!r}: {', '.join(bad)}: expected all there and as described, see above. "
-            "Correct the rig file, or mend or connect the device it describes."
+            "Correct the rig file, or fix or connect the device it describes."
         )
 
 

@@ -65,7 +65,7 @@ def convert(
 
 
 def _require_room(target: Path, force: bool) -> None:
-    """Refuse before anything is read; whatever else can be wrong with the name is told by what writes."""
+    """Refuse before anything is read; whatever else can be wrong with the name is reported by what writes."""
     from hil.errors import UsageError
 
     if target.is_file() and not force:
@@ -123,7 +123,7 @@ def _trace(source: Path, rig: Path | None, every: bool, channel: str | None) -> 
 
     if rig is None:
         raise UsageError(
-            f"{source}: expected --rig RIG beside a bus trace: its EDS files say which bits are torque and speed, "
+            f"{source}: expected --rig RIG besides a bus trace: its EDS files say which bits are torque and speed, "
             "got none."
         )
     samples = list(replay(source, read_rig(rig), whole=every, channel=channel))

@@ -150,7 +150,7 @@ def _see_help(error: BaseException) -> str:
 
 
 def _complain(text: str) -> None:
-    """Say what went wrong; where the terminal is gone nobody can be told, and the exit status says it alone."""
+    """Say what went wrong; where the terminal is gone nobody can be informed, and the exit status says it alone."""
     with contextlib.suppress(OSError):
         print(text, file=sys.stderr, flush=True)  # noqa: T201 - the one place that speaks of errors
 

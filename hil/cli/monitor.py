@@ -113,7 +113,7 @@ def _view(opening: Opening, out: Path, page: str, picture: tuple[Path, float] | 
 def _close(opening: Opening, view: MonitorApp) -> None:
     """Say how every run went, then end as the view ended.
 
-    Where the terminal has gone, which is told as an interruption, nobody can be told.
+    Where the terminal has gone, which is reported as an interruption, nobody can be informed.
     """
     from hil.monitor.outcome import outcome
 
@@ -126,7 +126,7 @@ def _close(opening: Opening, view: MonitorApp) -> None:
     if opening.state.ended is not None and opening.state.ended.error is not None:
         raise RunAborted(opening.state.ended.error)
     if view.return_code:
-        raise RuntimeError("the view ended by a defect of its own, told above; the rig was ended as by q")
+        raise RuntimeError("the view ended by a defect of its own, reported above; the rig was ended as by q")
     if view.interrupted:
         raise KeyboardInterrupt
 

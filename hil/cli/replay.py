@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from estimator.identification.identify import Settings
     from estimator.signals.record import FloatArray
     from hil.rig.live_course import Course
-    from hil.rig.live_replay import Pace, Told
+    from hil.rig.live_replay import OnCourse, Pace
 
 SCHEMA = "hil.replay/1"
 
@@ -151,7 +151,7 @@ def _play_trace(
     return course, {"recording": None if out is None else str(out), "recorded": len(samples), "flagged": flagged}
 
 
-def _show(pace: Pace) -> Told:
+def _show(pace: Pace) -> OnCourse:
     """Return what shows the estimate as it goes: on a terminal, where the eye can follow."""
     from rich.console import Console
 

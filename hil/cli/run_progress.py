@@ -58,5 +58,5 @@ class RunProgress:
             return
         self._shown = (phase, time_s)
         measured_s = time_s if phase is Phase.MEASURE else None
-        told = "" if estimate is None else statement(estimate)
-        self._bar.update(self._task, description=f"{self._name}: {phase.value}", completed=measured_s, estimate=told)
+        shown = "" if estimate is None else statement(estimate)
+        self._bar.update(self._task, description=f"{self._name}: {phase.value}", completed=measured_s, estimate=shown)

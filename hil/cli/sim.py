@@ -1,4 +1,4 @@
-"""``hil sim``: serve the simulated slaves until told to stop."""
+"""``hil sim``: serve the simulated slaves until stopped."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def sim(
         list[str] | None,
         typer.Option(
             metavar="SPEC",
-            help=f"Let a device fail, where told after S seconds of simulated time: {escape(known_faults())}. "
+            help=f"Let a device fail, where given after S seconds of simulated time: {escape(known_faults())}. "
             "May be repeated.",
         ),
     ] = None,

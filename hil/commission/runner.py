@@ -39,7 +39,7 @@ RUNS = "runs"
 
 
 class Shows(Protocol):
-    """Shows how a run goes on."""
+    """Shows how a run continues."""
 
     def show(self, phase: Phase, time_s: float) -> None:
         """Take note of one cycle: its phase and the time since the phase began [s]."""
@@ -149,7 +149,7 @@ class Runner:
         speed_rad_s
             Speed the vehicle was last seen at.
         note
-            Told of the run, also of one that was ended early.
+            Called with the summary of a run, also of one that was ended early.
 
         Raises
         ------
@@ -230,7 +230,7 @@ def _banded(plan: Plan, prediction: Prediction, least_margin_rad_s: float) -> Pl
 
 
 def _enter_ended(path: Path, error: BaseException) -> None:
-    """Enter what there is of a run that was ended early; what ended it is told first."""
+    """Enter what there is of a run that was ended early; what ended it is reported first."""
     if not path.exists():
         return
     try:

@@ -1,6 +1,6 @@
 """The state file of a commissioning: ``commission.json`` (schema ``hil.commission/1``), whole after every change.
 
-It is written beside itself and moved over the old one, so that neither an interruption nor a full disk nor the end of
+It is written next to itself and moved over the old one, so that neither an interruption nor a full disk nor the end of
 power leaves half of it.
 """
 
@@ -30,7 +30,7 @@ class State:
     Attributes
     ----------
     folder
-        Where the file and everything beside it is.
+        Where the file and everything next to it is.
     rig_name, rig_path, rig_text
         The rig file as of the last call.
     steps

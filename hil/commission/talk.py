@@ -38,7 +38,7 @@ class Talk(Protocol):
         ...
 
     def after(self, step: str, outside: int, blocked: bool) -> Answer:
-        """Ask how to go on after a step with findings outside their limits."""
+        """Ask how to continue after a step with findings outside their limits."""
         ...
 
     def keep_results(self, changes: Sequence[str]) -> Answer:
@@ -77,7 +77,7 @@ class Script:
         return GO
 
     def after(self, step: str, outside: int, blocked: bool) -> Answer:
-        """Go on; what blocks ends the commissioning all the same."""
+        """Continue; what blocks ends the commissioning all the same."""
         return GO
 
     def keep_results(self, changes: Sequence[str]) -> Answer:
@@ -125,7 +125,7 @@ class Person:
         if not outside or (self.yes and not blocked):
             return GO
         if blocked:
-            question = "  This has to be mended first. [r]epeat, [s]kip with a reason, [q]uit: "
+            question = "  This has to be fixed first. [r]epeat, [s]kip with a reason, [q]uit: "
             return self._answer(question, {"r": What.REPEAT, "s": What.SKIP, "q": What.QUIT, "": What.QUIT})
         question = "  Go [o]n, [r]epeat, [q]uit: "
         return self._answer(question, {"o": What.GO, "": What.GO, "r": What.REPEAT, "q": What.QUIT})

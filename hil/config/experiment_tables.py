@@ -1,4 +1,4 @@
-"""The tables ``[experiments.NAME]``: one class per kind, told apart by ``kind``.
+"""The tables ``[experiments.NAME]``: one class per kind, distinguished by ``kind``.
 
 Torques are of both inverters together. What every kind has:
 

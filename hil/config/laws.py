@@ -107,7 +107,7 @@ def _function(name: str, text: str, folder: Path) -> Callable[..., object]:
     try:
         with _searched_first(folder):
             module = importlib.import_module(module_name)
-    except Exception as error:  # a user's module may fail in any way: it is told as its own
+    except Exception as error:  # a user's module may fail in any way: it is reported as its own
         raise BadModel(
             f"laws.{name}.function | expected module {module_name!r} in {folder} or installed | "
             f"got {type(error).__name__}: {error}"
@@ -136,7 +136,7 @@ def _offered() -> Iterable[OwnLaw]:
     for point in entry_points(group=GROUP):
         try:
             law = point.load()
-        except Exception as error:  # another package's code may fail in any way: it is told as its own
+        except Exception as error:  # another package's code may fail in any way: it is reported as its own
             raise BadModel(
                 f"laws.{point.name} | expected entry point {point.value} to load | got {type(error).__name__}: {error}"
             ) from error

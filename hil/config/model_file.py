@@ -1,7 +1,7 @@
 """The model file, ``hil.model/1``: a driveline as a person writes it down, and as a diagnosis hands it back.
 
 What a file may hold is in the contract; what makes a model is in ``estimator.physics.model``. Faults of both
-kinds are reported together, so that a file is mended in one go: a value of the wrong type is replaced by a
+kinds are reported together, so that a file is fixed in one go: a value of the wrong type is replaced by a
 neutral one while the rest of the model is checked.
 """
 
@@ -100,7 +100,7 @@ class Prepared(_Strict):
 
     Attributes
     ----------
-    mended : bool
+    fixed : bool
         Whether wrapped positions are put together, and what was cut off, held or interpolated does not count.
     one_in : int
         To one in how many samples recordings are thinned.

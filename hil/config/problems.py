@@ -52,7 +52,7 @@ WORDS: Final[Mapping[str, str]] = {
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """One broken rule across keys: the key to mend (dotted, from the validator's own table), and why."""
+    """One broken rule across keys: the key to fix (dotted, from the validator's own table), and why."""
 
     key: str
     expected: str
@@ -193,7 +193,7 @@ def _lines(model: type[BaseModel], detail: ErrorDetails) -> Iterator[str]:
         yield _line(table.keys, "this key", "nothing: add it")
     elif kind == "extra_forbidden":
         known = ", ".join(ModelWalk.along(model, where[:-1]).known_keys())
-        yield _line(table.keys, f"one of the known keys ({known})", "this unknown key: mend or remove it")
+        yield _line(table.keys, f"one of the known keys ({known})", "this unknown key: fix or remove it")
     elif kind in ("union_tag_invalid", "union_tag_not_found"):
         got = repr(context["tag"]) if "tag" in context else "nothing: add it"
         yield _line((*table.keys, context["discriminator"].strip("'")), f"one of {table.known_tags()}", got)

@@ -35,7 +35,7 @@ def drive_all(
     stop
         Ends the run under way, and all, when requested.
     progress
-        Gives what is told of every cycle of an experiment, by its number from 0.
+        Gives the callback for every cycle of an experiment, by its number from 0.
 
     Raises
     ------
@@ -61,5 +61,5 @@ def driven_models(driven: Sequence[Driven], settings: Settings) -> list[LocalMod
 def recorded_models(
     records: Sequence[Record], settings: Settings, expected: DrivelineModel | None = None
 ) -> list[LocalModel]:
-    """Identify from recordings; beside them what a two-mass model file expects."""
+    """Identify from recordings; next to them what a two-mass model file expects."""
     return [LocalModel.with_expected(record, identify(record, settings), expected) for record in records]

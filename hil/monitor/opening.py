@@ -130,9 +130,7 @@ def _shaft(model: Path | None, rig: Rig | None, trust_laws: bool) -> Shaft | Non
     if model is not None:
         shaft = Shaft.of_model(read_model(model, trust_laws).model, model.name)
         if shaft is None:
-            raise UsageError(
-                f"{model}: expected structure 'two_mass' and motion 'rotation' for the twist, got another"
-            )
+            raise UsageError(f"{model}: expected structure 'two_mass' and motion 'rotation' for the twist, got another")
         return shaft
     if rig is None or rig.simulation is None:
         return None

@@ -52,7 +52,7 @@ class RecordedRun:
     name
         Which experiment.
     outbox
-        Told of every sample and of beginning and end.
+        Called with every sample and of beginning and end.
     setup
         What estimates.
     """
@@ -86,7 +86,7 @@ class RecordedRun:
         watch: Callable[[int], None],
         metadata: Mapping[str, str],
     ) -> None:
-        """Run it to its end, and tell how it went; what ends it early is told, not raised.
+        """Run it to its end, and tell how it went; what ends it early is reported, not raised.
 
         Parameters
         ----------
@@ -140,7 +140,7 @@ class RecordedRun:
         run_plan(devices, plan, pacer, recorder, stop, lambda phase, time_s: None, timing, observers)
 
     def _estimate(self) -> LiveEstimate | None:
-        """Make the estimate that is kept beside the recording, as `hil run` does; None where there can be none."""
+        """Make the estimate that is kept next to the recording, as `hil run` does; None where there can be none."""
         try:
             return LiveEstimate(tracking_chain(self._rig.period_s, *self._setup))
         except EstimatorError:  # the view, which has the same chain, says why there is no estimate
@@ -173,7 +173,7 @@ class RecordedRun:
             return None
 
     def _kept_course(self) -> Path | None:
-        """Write resonance and alarms beside the recording; None where there are none or the disk does not take them."""
+        """Write resonance and alarms next to the recording; None where there are none or they can't be written."""
         if self._live is None:
             return None
         path = course_path(self._path)

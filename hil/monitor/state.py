@@ -81,7 +81,7 @@ class LiveState:
 
     @property
     def activity(self) -> Activity:
-        """What is going on."""
+        """What is happening."""
         return self._headline.activity
 
     @property
@@ -98,7 +98,7 @@ class LiveState:
         self._headline = replace(self._headline, message=text)
 
     def stopping(self, text: str) -> None:
-        """Note that the run has been told to stop."""
+        """Note that the run has been ordered to stop."""
         if self.is_driving:
             self._headline = replace(self._headline, activity=Activity.STOPPING, message=text)
 

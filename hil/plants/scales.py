@@ -1,4 +1,4 @@
-"""Scales that do not fit a model, told with the line that cures them where nothing is refused."""
+"""Scales that do not fit a model, reported with the line that cures them where nothing is refused."""
 
 from __future__ import annotations
 

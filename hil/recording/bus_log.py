@@ -61,9 +61,7 @@ def _database(path: Path, dbc: Path) -> Path:
         size = dbc.stat().st_size
         database = load_can_database(dbc) if size <= LARGEST_DBC_BYTES else None
     except Exception as error:
-        raise RecordingError(
-            path, f"--dbc {dbc}: expected a DBC file, got: {type(error).__name__}: {error}"
-        ) from error
+        raise RecordingError(path, f"--dbc {dbc}: expected a DBC file, got: {type(error).__name__}: {error}") from error
     if database is None or not database.frames:
         raise RecordingError(path, f"--dbc {dbc}: expected a DBC file that describes messages, got one without any")
     return dbc

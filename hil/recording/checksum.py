@@ -1,4 +1,4 @@
-"""A checksum of what a recording holds, the same in every format, by which damage is told.
+"""A checksum of what a recording holds, the same in every format, by which damage is recognised.
 
 SHA-256 over the columns in the order of their names. Of each: its name, the word for its kind (`hil.recording.kinds`)
 and its cells; a float as IEEE 754 binary64 and an integer as 64 bit two's complement, both little-endian, a truth

@@ -3,11 +3,11 @@
 - What form a file has is recognised (`hil.recording.text.recognise`) or set by hand; pyarrow parses it.
 
 - Floats are written as the shortest decimal that reads back to the same bits, integers without a point; that
-  difference is how a reader tells them apart, so that CSV to Parquet and back loses nothing. Units, metadata and the
-  kind of columns whose cells do not tell it stand in a file beside (`hil.recording.sidecar`); without that file text
+  difference is how a reader distinguishes them, so that CSV to Parquet and back loses nothing. Units, metadata and the
+  kind of columns whose cells do not tell it stand in a file next to (`hil.recording.sidecar`); without that file text
   that looks like a number becomes one, and an empty cell among numbers is NaN.
 - A last line without line end is taken (RFC 4180 allows it): a file cut inside its very last number can't be
-  told from a whole one. A cut anywhere else leaves a row with cells missing, and is refused.
+  distinguished from a whole one. A cut anywhere else leaves a row with cells missing, and is refused.
 - A quoted cell must end on its line, so that a row is a line and every fault has its number.
 """
 
@@ -107,7 +107,7 @@ def form_of(text: str, hints: FormatHints) -> TextForm:
 
 
 def write(table: Table, path: Path) -> None:
-    """Write a table as CSV, and what it says of itself beside it.
+    """Write a table as CSV, and what it says of itself next to it.
 
     Raises
     ------
@@ -131,7 +131,7 @@ def _is_recognised(path: Path, table: Table) -> bool:
 
 
 def description_of(table: Table) -> Sidecar:
-    """Return what has to stand beside a table that is written as CSV."""
+    """Return what has to stand next to a table that is written as CSV."""
     types = {name: Kind.of(column) for name, column in table.columns.items() if not _tells_its_kind(column)}
     return Sidecar(as_metadata(table.metadata), table.units, types)
 
@@ -207,7 +207,7 @@ def _broken_line(rows: bytes, form: TextForm, skipped: tuple[int, ...]) -> str:
         count = len(split(line, form.delimiter) or [""])
         if count != form.width:
             cut = row + 1 == len(lines) and count < form.width
-            cure = "the file is truncated: remove its last line or record again" if cut else "mend that line"
+            cure = "the file is truncated: remove its last line or record again" if cut else "fix that line"
             where = "as in the header" if form.header_line else "as in most lines"
             return f"line {number}: expected {form.width} cells {where}, got {count}; {cure}"
     return f"expected lines shorter than {BLOCK_BYTES} bytes, got a longer one"

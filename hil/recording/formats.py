@@ -24,7 +24,7 @@ class Format:
     """How one kind of file is read and written.
 
     ``write`` is None for a format that is only read, ``metadata`` for one whose metadata come with the table alone.
-    ``beside`` names the file that belongs to a recording in a format that has no place for all there is to say.
+    ``next to`` names the file that belongs to a recording in a format that has no place for all there is to say.
     ``tables`` reads a table for each time of a format that may have several.
     ``apart`` is True where a compiled library parses it: in a process of its own (`hil.recording.apart`).
     """
@@ -32,7 +32,7 @@ class Format:
     read: Callable[[Path, Request], Table]
     write: Callable[[Table, Path], None] | None
     metadata: Callable[[Path], Mapping[str, str]] | None = None
-    beside: Callable[[Path], Path] | None = None
+    companion: Callable[[Path], Path] | None = None
     apart: bool = True
     tables: Callable[[Path, Request], list[Table]] | None = None
 
@@ -139,9 +139,9 @@ def _require_new(path: Path, known: Format) -> None:
             raise RecordingError(
                 path, "expected a new name, got one that exists: a recording is never overwritten. Move it away."
             )
-        if known.beside is not None and (beside := known.beside(path)).exists():
+        if known.companion is not None and (companion := known.companion(path)).exists():
             raise RecordingError(
-                beside, "expected a new name, got one that exists: it describes another recording. Move it away."
+                companion, "expected a new name, got one that exists: it describes another recording. Move it away."
             )
     except OSError as error:
         raise RecordingError(path, f"expected a place to write, got: {error.strerror or error}") from error

@@ -89,7 +89,7 @@ def text_of(name: bytes | str) -> str:
 
 
 def write_whole(path: Path, fill: Callable[[Any], None], header: bytes = b"") -> None:
-    """Write a file; it is made in memory, so that a full disk is told by Python, in words, and not by HDF5.
+    """Write a file; it is made in memory, so that a full disk is reported by Python, in words, and not by HDF5.
 
     Parameters
     ----------

@@ -31,7 +31,7 @@ DAMAGED = (
     struct.error,
     zlib.error,
 )
-"""What asammdf raises, beside its own, on a file that is cut or damaged."""
+"""What asammdf raises, besides its own, on a file that is cut or damaged."""
 
 FINISHED, UNFINISHED = b"MDF     ", b"UnFinMF "
 """Identification of a file whose writer came to its end, and of one whose did not (ASAM MDF 4.1, 5.5)."""

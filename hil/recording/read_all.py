@@ -23,7 +23,7 @@ def read_records(
     Raises
     ------
     UsageError
-        If two have the same name: results are told by it; or the same samples: they would count twice as
+        If two have the same name: results are reported by it; or the same samples: they would count twice as
         evidence, and held out they would prove nothing.
     RecordingError
         If one can't be read, or has another sampling period than the first.

@@ -1,7 +1,7 @@
 """From a table to the estimator's ``Record``, by the contract's columns or by ``[signals]`` of a model file.
 
 A row is a missing sample (``okay`` False) where torque or output is NaN, where the rig flagged it, or where a
-mask says so. Time goes on there, so the simulation needs a torque: the last good value is held where the
+mask says so. Time advances there, so the simulation needs a torque: the last good value is held where the
 reading is not to be trusted (NaN, flagged, outside a mask on that very column). A mask on another column says
 that the model does not hold there, not that the torque was misread; the torque stays as recorded.
 
@@ -45,11 +45,11 @@ SAME_PERIOD = 1e-6
 """Share by which the steps of a recording may differ from a period it is said to have."""
 
 FEWEST_SAMPLES = 10
-"""A recording with fewer usable samples can't carry a constant load, an initial state and anything beside."""
+"""A recording with fewer usable samples can't carry a constant load, an initial state and anything next to."""
 
 
 Tell = Callable[[str], None]
-"""Takes one line of what was recognised, left out or mended."""
+"""Takes one line of what was recognised, left out or fixed."""
 
 
 def read_record(
@@ -72,7 +72,7 @@ def read_record(
     dbc : Path, optional
         What the frames of a logged CAN bus mean.
     tell : callable, optional
-        Told what was recognised in the file, and what was done to it.
+        Called with what was recognised in the file, and what was done to it.
 
     Returns
     -------
@@ -283,5 +283,5 @@ def _require_samples(table: Table, okay: NDArray[np.bool_]) -> None:
         raise RecordingError(
             table.path,
             f"expected {FEWEST_SAMPLES} usable samples or more, got {usable} of {okay.size} rows "
-            "(the others are nan, flagged or masked). Record longer or mend the mask.",
+            "(the others are nan, flagged or masked). Record longer or fix the mask.",
         )

@@ -46,7 +46,7 @@ class Table:
     first_line : int or None
         Line of the first row in a text file; None where rows have no lines.
     remarks : tuple of str
-        What its reader recognised, had to leave out or mend, one line each.
+        What its reader recognised, had to leave out or fix, one line each.
     skipped : tuple of int
         Lines after the first row that are no rows, ascending.
     master : str or None
@@ -168,7 +168,7 @@ def _is_measurement(cell: str) -> bool:
 
 
 def _hint(cell: str) -> str:
-    """Say what to do about a bad cell whose cause can be told."""
+    """Say what to do about a bad cell whose cause is known."""
     if _is_measurement(cell.replace(",", ".", 1)):
         return ". Write decimals with a point"
     try:

@@ -1,6 +1,6 @@
 """A recording as it is made: every sample leaves the program at once, the file gets its name when whole.
 
-While the run goes on, rows stand in ``<stem>.part.csv`` beside the target, one line each, handed to the
+While the run continues, rows stand in ``<stem>.part.csv`` next to the target, one line each, handed to the
 operating system as they come by a thread of its own: whoever appends waits for no disk. What the disk has not taken
 yet waits in memory, `CAPACITY` samples at most. When the run ends, in any way Python can still act on (end, error,
 Ctrl-C), the rows become the recording, in its own format. What a harder end leaves:
@@ -70,7 +70,7 @@ class RecordingWriter:
         The recording to make; its suffix chooses the format.
     metadata : mapping of str to str
         What the recording shall say of itself; more can be said until it is closed, by `describe`. CSV has no
-        place for it: there it is in a file beside the recording (`hil.recording.sidecar`).
+        place for it: there it is in a file next to the recording (`hil.recording.sidecar`).
     patience_s : float
         How long `append` may wait for room where `CAPACITY` samples wait already [s]: 0 in a run on the wall clock.
 
@@ -97,13 +97,13 @@ class RecordingWriter:
         except FileExistsError as error:
             raise RecordingError(
                 self.part_path,
-                "expected no such file, got one left by a run that was killed, or that goes on. "
+                "expected no such file, got one left by a run that was killed, or that continues. "
                 "It is a recording up to that moment: rename it to keep it, or remove it.",
             ) from error
         except OSError as error:
             raise RecordingError(
                 self.path,
-                f"expected a place to write, got: {error.strerror}. Choose another folder, or mend this one.",
+                f"expected a place to write, got: {error.strerror}. Choose another folder, or fix this one.",
             ) from error
         try:
             self._begin(self._file)
@@ -118,7 +118,7 @@ class RecordingWriter:
     def _opened(self) -> FileIO:
         """Open the part file, a new one or one that a run has left which was killed before its first sample.
 
-        Unbuffered: what the thread writes reaches the operating system at once. It is held while the run goes on.
+        Unbuffered: what the thread writes reaches the operating system at once. It is held while the run lasts.
 
         Raises
         ------

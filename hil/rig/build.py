@@ -43,7 +43,7 @@ def open_devices(rig: Rig, least_host_timeout_ms: int = 0) -> Iterator[Devices]:
     Parameters
     ----------
     least_host_timeout_ms
-        The drives, when they are configured, are told to wait for the host's heartbeat at least so long [ms]; see
+        The drives, when they are configured, are ordered to wait for the host's heartbeat at least so long [ms]; see
         `hil.rig.pacing.heartbeat_patience_ms`.
 
     Raises

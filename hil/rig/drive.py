@@ -87,7 +87,7 @@ class Drive:
     stop
         Ends the run at the next cycle when requested.
     progress
-        Told of every cycle.
+        Called with every cycle.
     observers
         Given every sample.
     """

@@ -1,7 +1,7 @@
 """Listening: SYNC at the rig's period with both drives disarmed, so that a rig at rest can be watched.
 
 The inverters are configured as for a run (PDO layout, heartbeat, option codes; NMT OPERATIONAL) and never armed:
-their power stages stay off, no torque is commanded, no RPDO is sent. What does not answer is told, not raised: a
+their power stages stay off, no torque is commanded, no RPDO is sent. What does not answer is reported, not raised: a
 drive may be switched on later. Only the loss of the bus itself ends it.
 """
 

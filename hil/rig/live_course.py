@@ -30,7 +30,7 @@ MOST = 1 << 17
 
 
 def course_path(recording: Path) -> Path:
-    """Return where the course of a run stands: beside its recording."""
+    """Return where the course of a run stands: next to its recording."""
     return recording.with_suffix(".online.json")
 
 

@@ -123,4 +123,4 @@ class PlcWatch:
             read = " and ".join(f"{speed_rad_s:.1f}" for speed_rad_s in speeds_rad_s)  # one may read a speed long past
             reasons.append(f"speed is {read} rad/s, expected at most {self._latest.speed_limit_rad_s:g} rad/s")
         if reasons:
-            raise RunAborted(f"PLC: {'; '.join(reasons)}. The run was ended at zero torque; mend the cause, run again.")
+            raise RunAborted(f"PLC: {'; '.join(reasons)}. The run was ended at zero torque; fix the cause, run again.")

@@ -58,7 +58,7 @@ class _Station:
 
     @property
     def has_offset(self) -> bool:
-        """Whether base torque and PRBS can be told apart."""
+        """Whether base torque and PRBS can be distinguished."""
         return self._pdos.has_offset
 
     def _take_command(self, cob_id: int, data: bytes) -> None:

@@ -1,4 +1,4 @@
-"""Every frame of a run's bus, recorded beside its samples by python-can's own writers.
+"""Every frame of a run's bus, recorded next to its samples by python-can's own writers.
 
 The cycle only puts a frame into a queue; a thread of its own writes, twenty times a second. The times are those of
 the samples: the host's monotonic clock, stamped once, shifted to the time of day at which the trace began.

@@ -94,9 +94,7 @@ class _Asked:
                 )
             return 0.0
         if not self.kind.timed:
-            raise UsageError(
-                f"fault {self.text!r}: expected no moment, got {self.at_s!r}: it is there from the start."
-            )
+            raise UsageError(f"fault {self.text!r}: expected no moment, got {self.at_s!r}: it is there from the start.")
         try:
             at_s = float(self.at_s)
         except ValueError:

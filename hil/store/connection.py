@@ -48,7 +48,7 @@ def open_database(path: Path) -> sqlite3.Connection:
     StoreError
         If it can't be opened, is another program's, or was made by a newer version of this one.
     """
-    with told(path):
+    with in_words(path):
         connection = sqlite3.connect(path, timeout=BUSY_S, isolation_level=None)
         try:
             connection.row_factory = sqlite3.Row
@@ -83,7 +83,7 @@ def transaction(path: Path, connection: sqlite3.Connection) -> Iterator[None]:
     StoreError
         If the database does not take it; then nothing of it is there.
     """
-    with told(path):
+    with in_words(path):
         connection.execute("BEGIN IMMEDIATE")
         try:
             yield
@@ -94,7 +94,7 @@ def transaction(path: Path, connection: sqlite3.Connection) -> Iterator[None]:
 
 
 @contextmanager
-def told(path: Path) -> Iterator[None]:
+def in_words(path: Path) -> Iterator[None]:
     """Say what SQLite's errors in the block mean, and what to do.
 
     Raises
@@ -130,7 +130,7 @@ def _in_words(path: Path, error: sqlite3.Error) -> StoreError:
     if code in _UNWRITABLE:
         return StoreError(
             path,
-            f"expected a folder and a file that can be written, got: {error}. Mend their permissions, or copy the "
+            f"expected a folder and a file that can be written, got: {error}. Fix their permissions, or copy the "
             "folder to where they can.",
         )
     if code in _BUSY:

@@ -1,4 +1,4 @@
-"""Take a recording away, with what stands beside it."""
+"""Take a recording away, with what stands next to it."""
 
 from __future__ import annotations
 
@@ -52,10 +52,10 @@ def remove_files(entry: RunEntry) -> list[Path]:
     require_own(entry)
     recording = entry.recording
     known = FORMATS.get(recording.suffix.lower())
-    beside = [] if known is None or known.beside is None else [known.beside(recording)]
+    companion = [] if known is None or known.companion is None else [known.companion(recording)]
     course = recording.with_name(f"{recording.stem}{ONLINE_SUFFIX}")
     removed = []
-    for path in (*filter(is_sidecar, beside), *([course] if _is_course(course) else []), recording):
+    for path in (*filter(is_sidecar, companion), *([course] if _is_course(course) else []), recording):
         try:
             path.unlink()
         except FileNotFoundError:

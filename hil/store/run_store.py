@@ -11,7 +11,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from hil.errors import StoreError, UsageError
-from hil.store.connection import open_database, told, transaction
+from hil.store.connection import in_words, open_database, transaction
 from hil.store.entry import Run, RunEntry
 from hil.store.filters import RunFilter
 from hil.store.rows import insert_run, read_runs
@@ -137,7 +137,7 @@ class RunStore:
     def find(self, wanted: RunFilter | None = None) -> list[Run]:
         """Return the runs that are asked for, all without a filter, oldest first; attachments without documents."""
         condition, values = (wanted or RunFilter()).where()
-        with told(self.path):
+        with in_words(self.path):
             return read_runs(self._database, self.folder, condition, values, with_documents=False)
 
     def get(self, run_id: int) -> Run:
@@ -148,7 +148,7 @@ class RunStore:
         UsageError
             If there is no such run.
         """
-        with told(self.path):
+        with in_words(self.path):
             found = read_runs(self._database, self.folder, "runs.id = ?", [run_id])
         if not found:
             raise self._no_such(run_id)

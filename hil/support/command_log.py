@@ -34,7 +34,7 @@ BYTES: Final = 1_000_000
 """A log is rotated here; an ordinary command writes about 300 bytes."""
 
 KEPT: Final = 4
-"""Older logs beside the newest."""
+"""Older logs next to the newest."""
 
 LOGGER: Final = logging.getLogger("hil")
 
@@ -60,7 +60,7 @@ def level_of(given: str | None) -> str:
 
 @contextmanager
 def logged(command: str, arguments: Sequence[str], level: str) -> Iterator[None]:
-    """Keep the log while a command runs; whatever it raises is logged and goes on its way."""
+    """Keep the log while a command runs; whatever it raises is logged and continues its way."""
     handler = None if level == "off" else _opened(level)
     if handler is None:
         yield

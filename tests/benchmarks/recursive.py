@@ -110,22 +110,24 @@ def beside_padasip(pairs: int, python: str, estimator: RecursiveEstimator) -> Co
     return Comparison(tuple(mine for mine, _ in both), tuple(other for _, other in both), None, None)
 
 
-def per_sample(comparison: Comparison, n: int, what: str, beside: str, limit: str, *, inverse: bool) -> tuple[str, ...]:
+def per_sample(
+    comparison: Comparison, n: int, what: str, companion: str, limit: str, *, inverse: bool
+) -> tuple[str, ...]:
     """Return a line of the table: processor time per sample, and the ratio as the limit counts it."""
     here, there = (median(each.processor_s for each in side) / n * 1e6 for side in (comparison.ours, comparison.theirs))
     ratio, (low, high) = comparison.processor_ratio, comparison.spread
     if inverse:
         ratio, low, high = 1 / ratio, 1 / high, 1 / low
-    return (what, beside, f"{here:.3g} us", f"{there:.3g} us", f"{ratio:.3g}", f"{low:.3g} to {high:.3g}", limit)
+    return (what, companion, f"{here:.3g} us", f"{there:.3g} us", f"{ratio:.3g}", f"{low:.3g} to {high:.3g}", limit)
 
 
 def update(pairs: int) -> list[tuple[str, ...]]:
     """Return the lines of OEFO beside C."""
     lines = []
     for flags in C_FLAGS:
-        beside = " ".join(["C, gcc -O3", *flags])
+        companion = " ".join(["C, gcc -O3", *flags])
         comparison = beside_c(pairs, data(BLOCK), BLOCKS, flags)
-        lines.append(per_sample(comparison, BLOCK * BLOCKS, "OEFO, in blocks", beside, "at most 2", inverse=True))
+        lines.append(per_sample(comparison, BLOCK * BLOCKS, "OEFO, in blocks", companion, "at most 2", inverse=True))
     return lines
 
 

@@ -158,7 +158,7 @@ def test_everything_is_in_it_and_listed(state: Path, tmp_path: Path, capsys: pyt
     assert {"canopen", "numpy", "pymodbus"} <= set(versions["packages"])
 
 
-def test_the_last_run_is_told_without_notes_and_secrets(state: Path, tmp_path: Path) -> None:
+def test_the_last_run_is_reported_without_notes_and_secrets(state: Path, tmp_path: Path) -> None:
     for number, name in enumerate(("first", "last")):
         recording = tmp_path / f"{name}.csv"
         recording.write_text("time_s\n0.0\n", encoding="utf-8")

@@ -84,9 +84,9 @@ def test_a_full_disk_takes_the_files_but_not_the_verdict(
     out = tmp_path / "result"
     arguments = [str(bench_folder / "run_1.csv"), "--model", str(bench_folder / "drive.toml"), "--json"]
     assert run(["diagnose", *arguments, "--out", str(out)]) == 2
-    told = capsys.readouterr()
-    assert json.loads(told.out)["effects"][0]["name"] == "coulomb_friction_motor"
-    assert "No space left on device. Make room there" in told.err
+    reported = capsys.readouterr()
+    assert json.loads(reported.out)["effects"][0]["name"] == "coulomb_friction_motor"
+    assert "No space left on device. Make room there" in reported.err
     assert not out.exists()
 
 

@@ -200,7 +200,7 @@ def test_the_terminal_says_why_a_compared_estimate_is_invalid(capsys: pytest.Cap
     assert "run_1, riv:" not in printed
 
 
-def test_a_torque_that_moves_the_speed_next_to_nothing_is_told(
+def test_a_torque_that_moves_the_speed_next_to_nothing_is_reported(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     weak = write(tmp_path / "weak.csv", 1, prbs_nm=2.0)

@@ -1,4 +1,4 @@
-"""``hil run --trace`` and ``hil replay``: the trace beside the recording, and the recording back from the trace."""
+"""``hil run --trace`` and ``hil replay``: the trace next to the recording, and the recording back from the trace."""
 
 from __future__ import annotations
 

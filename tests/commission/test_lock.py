@@ -58,7 +58,7 @@ def test_folder_is_free_once_its_holder_has_ended_however_it_did(killed: bool, t
         assert (tmp_path / LOCK).exists()
 
 
-def test_folder_that_takes_no_file_is_told_by_name(tmp_path: Path) -> None:
+def test_folder_that_takes_no_file_is_reported_by_name(tmp_path: Path) -> None:
     (tmp_path / LOCK).mkdir()
     with pytest.raises(UsageError, match=f"{LOCK}: expected a place to write to, got: "), sole_use(tmp_path):
         pass

@@ -248,7 +248,7 @@ def test_a_wrong_addition_is_refused_by_its_key(tmp_path: Path, added: str, said
     assert any(line.startswith(said) for line in lines), lines
 
 
-def test_every_fault_is_told_at_once(tmp_path: Path) -> None:
+def test_every_fault_is_reported_at_once(tmp_path: Path) -> None:
     text = ONE_MASS.replace("1.6", "'x'").replace("b_M", "bM").replace('"rotation"', "3")
     assert [line.split(" |")[0].split(":")[0] for line in refusal(tmp_path, f"{text}[effects.gremlins]")] == [
         "motion",
@@ -331,7 +331,7 @@ def test_what_is_written_reads_back_the_same(
     assert file.signals == signals
 
 
-def test_a_second_writing_replaces_the_first_and_leaves_nothing_beside(tmp_path: Path) -> None:
+def test_a_second_writing_replaces_the_first_and_leaves_nothing_next_to(tmp_path: Path) -> None:
     model = read_model(write(tmp_path, ONE_MASS)).model
     write_model(tmp_path / "model.toml", replace(model, motion=Motion.TRANSLATION))
     assert read_model(tmp_path / "model.toml").model.motion is Motion.TRANSLATION

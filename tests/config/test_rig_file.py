@@ -142,7 +142,7 @@ WRONG = [
     ),
     (
         ("experiments.cruise", "torque_nm", "581.0"),
-        "experiments.cruise.torque_nm | expected at most 580, what guard.sum_limit_nm leaves beside the PRBS",
+        "experiments.cruise.torque_nm | expected at most 580, what guard.sum_limit_nm leaves besides the PRBS",
     ),
     (
         ("experiments.cruise", "slew_nm_per_s", "4001.0"),
@@ -150,7 +150,7 @@ WRONG = [
     ),
     (
         ("experiments.reversal", "share_m1", "0.69"),
-        "experiments.reversal.torque_nm | expected at most 492.754, what inverters.m1.torque_limit_nm leaves beside",
+        "experiments.reversal.torque_nm | expected at most 492.754, what inverters.m1.torque_limit_nm leaves next to",
     ),
     (
         ("experiments.tip", "share_m1", "0.0"),
@@ -274,7 +274,7 @@ def test_simulation_and_experiments_may_be_left_out(tmp_path: Path) -> None:
 
 
 class TestFilesItNames:
-    def test_they_are_looked_for_beside_it(self, tmp_path: Path) -> None:
+    def test_they_are_looked_for_next_to_it(self, tmp_path: Path) -> None:
         (tmp_path / "drive.eds").write_text(data_file("inverter.eds").read_text("utf-8"), "utf-8")
         (tmp_path / "map.toml").write_text(data_file("plc.toml").read_text("utf-8"), "utf-8")
         path = changed(tmp_path, (r'^# eds = "inverter.eds"', 'eds = "drive.eds"'), (r"^# map = .plc", 'map = "map'))
@@ -295,9 +295,7 @@ class TestFilesItNames:
         self, change: tuple[str, str], key: str, tmp_path: Path
     ) -> None:
         (problem,) = problems_of(changed(tmp_path, change))
-        assert re.match(
-            rf"{key} \| expected an existing file, looked for {tmp_path}/none9*\.\w+ \| got 'none", problem
-        )
+        assert re.match(rf"{key} \| expected an existing file, looked for {tmp_path}/none9*\.\w+ \| got 'none", problem)
 
     def test_a_path_that_is_no_text_is_named(self, tmp_path: Path) -> None:
         (problem,) = problems_of(changed(tmp_path, (r'^# eds = "inverter.eds"', "eds = 5")))

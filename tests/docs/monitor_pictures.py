@@ -45,7 +45,7 @@ SHOWN_S = 24.0
 
 
 class Played(FakeSource):
-    """Says the bus's health again and again, as a rig does that goes on; ends when it is told to."""
+    """Says the bus's health again and again, as a rig does that continues; ends when it is ordered to."""
 
     _last: Sequence[Report] = ()
 

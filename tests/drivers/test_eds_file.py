@@ -204,5 +204,5 @@ def test_data_file_that_is_not_shipped_is_refused() -> None:
 
 
 def test_wheel_comes_before_checkout() -> None:
-    """An installed package must not read a folder beside it."""
+    """An installed package must not read a folder next to it."""
     assert resources._FOLDERS[0].parts[-2:] == ("drivers", "eds")

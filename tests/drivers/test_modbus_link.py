@@ -97,7 +97,7 @@ WELL = b"\x03\x04\x12\x34\xab\xcd"
         (lambda request: 2 * frame(request, WELL, transaction=4711), "transaction id 4711, unit id 1"),
     ],
 )
-def test_an_answer_with_other_identifiers_is_told_as_such(answer: Answer, got: str) -> None:
+def test_an_answer_with_other_identifiers_is_reported_as_such(answer: Answer, got: str) -> None:
     with pytest.raises(ProtocolViolation, match=rf"transaction id 1, unit id 1, got {got}"):
         read_from(answer)
 

@@ -77,7 +77,7 @@ def test_a_key_with_a_password_is_refused_and_nobody_is_asked(tmp_path: Path) ->
         (ssl.SSLError(1, "what OpenSSL has no reason for"), "the handshake failed .*no reason for"),
     ],
 )
-def test_a_failure_without_a_known_reason_is_told_as_it_came(cause: Exception | None, said: str) -> None:
+def test_a_failure_without_a_known_reason_is_reported_as_it_came(cause: Exception | None, said: str) -> None:
     failure = tls_failure("PLC at 127.0.0.1:802", cause)
     with pytest.raises(ConfigMismatch, match=f"^PLC at 127.0.0.1:802: expected a TLS connection .*got: .*{said}"):
         raise failure

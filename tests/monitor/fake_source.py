@@ -1,4 +1,4 @@
-"""A source that says what a test has it say, and remembers what it was told."""
+"""A source that says what a test has it say, and remembers what it was sent."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ def read(tmp_path: Path, content: str | bytes, hints: FormatHints | None = None)
     return csv_format.read(path, Request(hints or FormatHints()))
 
 
-def test_integers_floats_and_text_are_told_apart_by_their_cells(tmp_path: Path) -> None:
+def test_integers_floats_and_text_are_reported_apart_by_their_cells(tmp_path: Path) -> None:
     table = read(tmp_path, "a,b,c\n1,1.0,x\n-2,nan,\n")
     assert table.columns["a"].dtype == np.int64
     assert table.columns["a"].tolist() == [1, -2]
@@ -69,7 +69,7 @@ def test_spaces_around_names_and_cells_do_not_count(tmp_path: Path) -> None:
         ("a,,c\n1,2,3\n", "line 1: cell 2 of the header is empty"),
         ("a,b\n", "the file is empty or truncated"),
         ("a,b", "the file is empty or truncated"),
-        ("a,b\n1,2\n3,4,5\n6,7\n", "line 3: expected 2 cells as in the header, got 3; mend that line"),
+        ("a,b\n1,2\n3,4,5\n6,7\n", "line 3: expected 2 cells as in the header, got 3; fix that line"),
         ("a,b\n1,2\n3,4\n5", "line 4: expected 2 cells as in the header, got 1; the file is truncated"),
         ('a,b\n1,2\n3,"4\n5,6\n', "line 3: expected every quoted cell to end on its line"),
         ('a,b\n1,"2\n3"\n5,6\n', "line 2: expected every quoted cell to end on its line"),

@@ -62,8 +62,8 @@ def test_a_changed_recording_is_refused_as_the_table_is(recorded: Path, before: 
 
 
 def test_a_changed_description_is_refused(recorded: Path) -> None:
-    beside = sidecar_of(recorded)
-    beside.write_text(beside.read_text("utf-8").replace("cruise", "bruise"), "utf-8")
+    companion = sidecar_of(recorded)
+    companion.write_text(companion.read_text("utf-8").replace("cruise", "bruise"), "utf-8")
     with pytest.raises(RecordingError, match="expected the units and metadata it was written with"):
         read_facts(recorded)
 

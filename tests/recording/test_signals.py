@@ -151,7 +151,7 @@ def with_time(changed: Changed, time_s: np.ndarray) -> Table:
         (39, 0.41, "line 41, column time_s: expected a uniform step of 0.01 s within 50%"),
     ],
 )
-def test_a_time_that_does_not_go_on_evenly_is_refused_by_line(
+def test_a_time_that_does_not_continue_evenly_is_refused_by_line(
     changed: Changed, row: int, value: float, said: str
 ) -> None:
     time_s = np.arange(40) * 0.01
@@ -354,7 +354,7 @@ def test_the_first_speed_is_the_output_and_the_others_are_further_ones(changed: 
 @pytest.mark.parametrize(
     ("keys", "first", "further"),
     [
-        ({"outputs": BOTH[1:]}, "speed_rad_s", ["torque_ref_nm"]),  # beside the contract's motor speed
+        ({"outputs": BOTH[1:]}, "speed_rad_s", ["torque_ref_nm"]),  # next to the contract's motor speed
         ({"outputs": [*BOTH, BOTH[1]]}, "speed_rad_s", ["torque_ref_nm"]),
         ({"outputs": BOTH, "position": {"column": "age_s"}}, "age_s", ["speed_rad_s", "torque_ref_nm"]),
         ({"outputs": BOTH, "torque": [{"column": "torque_ref_nm"}]}, "speed_rad_s", []),  # an input is no output

@@ -60,7 +60,7 @@ FORMS: dict[str, tuple[str, str]] = {
     "a delimiter at the end of all lines": (text("t,T,n,", end=","), "a delimiter ends every row"),
     "a delimiter at the end of the rows": (text("t,T,n", end=","), "a delimiter ends every row"),
     "a delimiter at the end of the header": (text("t,T,n,"), ""),
-    "nothing beside": (text("t,T,n"), ""),
+    "nothing next to": (text("t,T,n"), ""),
 }
 
 
@@ -215,13 +215,13 @@ def test_a_share_of_a_rated_value_needs_a_scale_and_the_message_says_which(
         read_record(path, SIGNALS)
 
 
-def test_swapped_columns_are_told_by_their_units(tmp_path: Path) -> None:
+def test_swapped_columns_are_reported_by_their_units(tmp_path: Path) -> None:
     path = written(tmp_path, text("t,T,n", "s,rad/s,Nm"))
     with pytest.raises(RecordingError, match=r"column T: expected a torque, got a speed in rad/s. Are two columns sw"):
         read_record(path, SIGNALS)
 
 
-def test_a_reading_stored_with_sign_and_read_without_is_told_with_the_line_that_cures_it(tmp_path: Path) -> None:
+def test_a_reading_stored_with_sign_and_read_without_is_reported_with_the_line_that_cures_it(tmp_path: Path) -> None:
     raw = np.round(TORQUE * 10.0).astype(np.int16).astype(np.uint16) * 0.1
     rows = [f"{t:.2f},{a:.1f},{b:.3f}" for t, a, b in zip(TIME, raw, SPEED, strict=True)]
     path = written(tmp_path, "\n".join(["t,T,n", *rows]))

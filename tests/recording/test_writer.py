@@ -54,8 +54,8 @@ def test_a_run_is_recorded_to_the_bit(tmp_path: Path, suffix: str) -> None:
         for k in range(30):
             writer.append(sample(k))
     check(path, 30)
-    beside = {f"{path.name}.json"} if suffix == ".csv" else set()
-    assert {file.name for file in tmp_path.iterdir()} == {path.name} | beside
+    companion = {f"{path.name}.json"} if suffix == ".csv" else set()
+    assert {file.name for file in tmp_path.iterdir()} == {path.name} | companion
     record = read_record(path)
     assert record.okay.tolist() == [k not in (0, 3) for k in range(30)]
 
@@ -205,13 +205,13 @@ def test_one_with_anything_else_in_it_does(tmp_path: Path, left: str) -> None:
 
 def test_nor_is_one_taken_from_a_run_that_has_just_begun(tmp_path: Path) -> None:
     with RecordingWriter(tmp_path / "run.csv") as first:
-        with pytest.raises(RecordingError, match="that goes on"), RecordingWriter(tmp_path / "run.csv"):
+        with pytest.raises(RecordingError, match="that continues"), RecordingWriter(tmp_path / "run.csv"):
             pass
         first.append(sample(0))
     check(tmp_path / "run.csv", 1)
 
 
-def test_a_disk_that_is_full_from_the_start_is_told_with_the_name_and_leaves_nothing(tmp_path: Path) -> None:
+def test_a_disk_that_is_full_from_the_start_is_reported_with_the_name_and_leaves_nothing(tmp_path: Path) -> None:
     from tests.recording.test_damage import largest_file
 
     refusal = pytest.raises(RecordingError, match=r"run\.csv: expected room for the recording, got: .*too large")

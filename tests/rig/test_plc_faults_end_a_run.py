@@ -57,7 +57,7 @@ def test_from_the_start_on_nothing_is_armed(fault: str) -> None:
 
 
 def test_a_host_whose_beats_stop_loses_the_permissive(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The cycle goes on and reads the PLC, but its watchdog stands still, from the measured part on."""
+    """The cycle continues and reads the PLC, but its watchdog stands still, from the measured part on."""
     stopped: list[bool] = []
     beat = Plc.beat
 

@@ -1,4 +1,4 @@
-"""The PLC as the cycle sees it: polled beside it, aged in its time, judged in every cycle."""
+"""The PLC as the cycle sees it: polled next to it, aged in its time, judged in every cycle."""
 
 from __future__ import annotations
 

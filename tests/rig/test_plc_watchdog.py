@@ -25,7 +25,7 @@ async def beat_once(at: Address) -> None:
 
 
 def lose_a_host(server: RigServer) -> None:
-    """A host beats once and goes; simulated time goes on until the PLC has withdrawn the permissive."""
+    """A host beats once and goes; simulated time advances until the PLC has withdrawn the permissive."""
     asyncio.run(beat_once(server.modbus))
     with CanLink.open(server.bus_url) as link:
         for _ in range(round(1.5 * HOST_TIMEOUT_S / 0.01)):

@@ -41,7 +41,7 @@ def test_run_over_tcp_and_nothing_left_behind() -> None:
     assert threading.active_count() == before
 
 
-def test_free_ports_are_told() -> None:
+def test_free_ports_are_reported() -> None:
     with server() as served:
         assert served.modbus.port > 0
         assert served.bus_url.startswith("ws://127.0.0.1:")

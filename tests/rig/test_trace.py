@@ -1,4 +1,4 @@
-"""A run's bus trace beside its samples, and the samples rebuilt from it: torque and speed the same to the bit."""
+"""A run's bus trace next to its samples, and the samples rebuilt from it: torque and speed the same to the bit."""
 
 from __future__ import annotations
 
@@ -315,7 +315,7 @@ class _FullDisk:
         pass
 
 
-def test_disk_that_fills_up_is_told_and_the_cycle_goes_on(tmp_path: Path) -> None:
+def test_disk_that_fills_up_is_reported_and_the_cycle_continues(tmp_path: Path) -> None:
     trace = BusTrace(tmp_path / "a.log")
     trace.__enter__()
     trace._writer.stop()

@@ -1,4 +1,4 @@
-"""Drives that give another torque than they are asked for, from the moment on or from the start: told, and ended."""
+"""Drives that give another torque than they are asked for, from some moment on or from the start: reported, ended."""
 
 from __future__ import annotations
 

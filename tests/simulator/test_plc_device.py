@@ -67,7 +67,7 @@ def test_a_refused_mode_is_requested_and_not_taken() -> None:
     assert device.clutch is ClutchState.OPEN
 
 
-def test_the_clutch_closes_when_told_and_stays() -> None:
+def test_the_clutch_closes_when_ordered_and_stays() -> None:
     device = PlcDevice(faults=PlcFaults(clutch_closes_at_s=1.0))
     device.step(0.99)
     assert device.clutch is ClutchState.OPEN
@@ -78,7 +78,7 @@ def test_the_clutch_closes_when_told_and_stays() -> None:
     assert device.clutch is ClutchState.CLOSED
 
 
-def test_the_permissive_goes_when_told_and_stays_away() -> None:
+def test_the_permissive_goes_when_ordered_and_stays_away() -> None:
     device = PlcDevice(faults=PlcFaults(permissive_withdrawn_at_s=0.5))
     device.step(0.49)
     assert device.values()["permissive"] is True

@@ -212,9 +212,9 @@ def test_a_store_moves_with_its_folder(tmp_path: Path, record: Record) -> None:
 
 def test_results_go_with_a_registration(tmp_path: Path, record: Record) -> None:
     path = record("a.csv")
-    beside = tmp_path / "a.online.json"
-    beside.write_text(json.dumps({"final": {}}), encoding="utf-8")
-    number = register_run(path, results={"online": beside})
+    companion = tmp_path / "a.online.json"
+    companion.write_text(json.dumps({"final": {}}), encoding="utf-8")
+    number = register_run(path, results={"online": companion})
     with RunStore(tmp_path) as store:
         assert [attachment.kind for attachment in store.get(number).attachments] == ["online"]
 

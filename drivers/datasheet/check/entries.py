@@ -87,7 +87,7 @@ def _compact(context: EdsContext, section: EdsSection) -> Iterator[EdsFinding]:
         return
     if count and read_number(section.get("SubNumber") or "0"):
         advice = "Leave one; both are read, a sub-index described counts before CompactSubObj."
-        yield at_key(Severity.WARNING, section, "SubNumber", "0 beside CompactSubObj", "", advice)
+        yield at_key(Severity.WARNING, section, "SubNumber", "0 next to CompactSubObj", "", advice)
     names = context.text.section(f"{section.name}Name")
     named = None if names is None else read_number(names.get("NrOfEntries") or "")
     if names is not None and (named is None or named > count):

@@ -23,7 +23,7 @@ DEVICE_TYPE = 0x1000
 DRIVE_PROFILE = 402
 
 ALWAYS_USED = frozenset(index for index, _ in GUARDING)
-"""What counts of every drive, beside what the plan uses."""
+"""What counts of every drive, besides what the plan uses."""
 
 
 def check_needs(context: EdsContext) -> Iterator[EdsFinding]:

@@ -38,7 +38,7 @@ def _count(context: EdsContext, direction: Direction, count_key: str) -> Iterato
 def _pair(context: EdsContext, direction: Direction, communication: int, mapping: int) -> Iterator[EdsFinding]:
     for one, other in ((communication, mapping), (mapping, communication)):
         if one in context.objects and other not in context.objects:
-            expected = f"{hexadecimal(other)} beside it, for a {direction.name} has both"
+            expected = f"{hexadecimal(other)} next to it, for a {direction.name} has both"
             advice = "Describe both; this PDO is not used."
             yield at_section(Severity.WARNING, context.objects[one].section, expected, "none", advice)
     if communication in context.objects:

@@ -181,9 +181,9 @@ def _identity(context: EdsContext) -> Iterator[EdsFinding]:
     section = context.text.section("DeviceInfo")
     for key, subindex in _IDENTITY.items():
         entry = context.entry(0x1018, subindex)
-        told = None if section is None else read_number(section.get(key) or "")
+        given = None if section is None else read_number(section.get(key) or "")
         default = None if entry is None else entry.value(context.node_id)
-        if section is not None and entry is not None and None not in (told, default) and told != default:
+        if section is not None and entry is not None and None not in (given, default) and given != default:
             expected = f"0x{default:08X}, the default of 0x1018:{subindex:02X} (line {entry.section.line})"
             advice = "Correct one; the rig file says which drive it is."
             yield at_key(Severity.WARNING, section, key, expected, "", advice)

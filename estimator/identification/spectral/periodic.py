@@ -24,7 +24,7 @@ from estimator.signals.record import BoolArray, FloatArray, Record
 from estimator.signals.settings import Requirement, require
 
 FEWEST_PERIODS = 2
-"""From one alone, noise can't be told from response."""
+"""From one alone, noise can't be distinguished from response."""
 
 EXCITED = 1e-3
 """Amplitude of a line, against the median line, from which on it counts as excited."""

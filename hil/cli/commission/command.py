@@ -88,7 +88,7 @@ def _to_its_report(job: Job, talk: Talk, asked: Asked, console: Console, as_json
         reported = True
         try:
             write_report(job.state)
-        except UsageError as trouble:  # what ended the job is what has to be told first
+        except UsageError as trouble:  # what ended the job is what has to be reported first
             error.add_note(f"Its report is missing: {trouble}")
             reported = False
         print_result(job.state, console, as_json, reported)

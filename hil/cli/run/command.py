@@ -28,11 +28,11 @@ def run(
     trace: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE", help="Bus trace beside it: every frame; .blf, .log (candump) or .asc; a new file."
+            metavar="FILE", help="Bus trace next to it: every frame; .blf, .log (candump) or .asc; a new file."
         ),
     ] = None,
     estimate: Annotated[
-        bool, typer.Option(help="Estimate while driving; its course goes beside the recording: .online.json.")
+        bool, typer.Option(help="Estimate while driving; its course goes next to the recording: .online.json.")
     ] = True,
     filter_of: FilterOf = None,
     filter_run: FilterRun = None,

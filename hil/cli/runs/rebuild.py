@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def rebuild(store: Folder = HERE, as_json: AsJson = False) -> None:
-    """Bring the store up to what is in the folder: enter recordings, find moved ones, mend a damaged store.
+    """Bring the store up to what is in the folder: enter recordings, find moved ones, fix a damaged store.
 
     What can still be read of a damaged store is kept, notes and results included; the damaged file is put aside.
     """

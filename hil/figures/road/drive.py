@@ -83,7 +83,7 @@ def drive(
     stop
         Ends it at the next cycle when requested.
     progress
-        Told of every cycle.
+        Called with every cycle.
 
     Raises
     ------
@@ -106,7 +106,7 @@ def drive(
 
 
 def _loaded(rig: Rig, conditions: Conditions) -> tuple[Bus, TwoMassLine]:
-    """Load the rig's bus: what turns at the wheels is small beside the mass, which is taken to be all of J_L."""
+    """Load the rig's bus: what turns at the wheels is small besides the mass, which is taken to be all of J_L."""
     values = simulation_model(required_simulation(rig)).values()
     metres_per_rad = WHEEL_RADIUS_M / GEAR_RATIO
     mass_kg = values["J_L"] / metres_per_rad**2 + conditions.payload_kg

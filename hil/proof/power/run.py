@@ -1,9 +1,9 @@
-"""``python -m hil.proof.power --effects A,B --seeds A..B --out DIR``: how small an effect is found, beside the bound.
+"""``python -m hil.proof.power --effects A,B --seeds A..B --out DIR``: how small an effect is found, next to the bound.
 
 For every effect and seed the smallest sizes that the best possible tests find are computed from the noise-free truth;
 then ``hil diagnose`` is run on multiples of one of them, with noise drawn anew each time. ``DIR/bounds.jsonl`` has a
 line per bus, ``DIR/results.jsonl`` one per trial, ``DIR/summary.md``, ``DIR/summary.json`` and ``DIR/power.svg`` what
-they add up to, ``DIR/cases/EFFECT/SEED/MULTIPLE`` the files of each trial. Called again, it goes on where it was
+they add up to, ``DIR/cases/EFFECT/SEED/MULTIPLE`` the files of each trial. Called again, it continues where it was
 interrupted; trials in which the command failed are run again.
 """
 
@@ -83,10 +83,10 @@ def run_study(
     trying = [partial(attempt, study, bounds[bus], multiple, out, options.limit_s) for bus, multiple in missing]
     for done, row in enumerate(appended(trying, out / RESULTS, options.jobs), start=1):
         results[row["kind"], row["seed"]] = row
-        _tell(f"[{done}/{len(missing)}] {row['kind']} {row['seed']}: {_told(row)}, {row['diagnose_s']:.1f} s")
+        _tell(f"[{done}/{len(missing)}] {row['kind']} {row['seed']}: {_in_words(row)}, {row['diagnose_s']:.1f} s")
 
 
-def _told(row: Row) -> str:
+def _in_words(row: Row) -> str:
     named = row["fault"] or ", ".join(row["named"]) or row["verdict"]
     return f"{'found' if row['found'] else 'not found'} ({named})"
 
@@ -145,7 +145,7 @@ def _samples(text: str) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="python -m hil.proof.power",
-        description="Find how small an effect the public command names, beside the best possible tests.",
+        description="Find how small an effect the public command names, next to the best possible tests.",
         epilog="Example: python -m hil.proof.power --effects backlash --seeds 1..10 --out out/power",
     )
     parser.add_argument(

@@ -52,7 +52,7 @@ def judge_set(folder: Path, key: bytes, jobs: int, progress: Progress, verdicts:
     Returns
     -------
     list of dict
-        One row per case, as a campaign's (``hil.proof.campaign.score``), with ``case``, its name, beside.
+        One row per case, as a campaign's (``hil.proof.campaign.score``), with ``case``, its name, next to.
 
     Raises
     ------

@@ -1,8 +1,8 @@
 """``python -m hil.proof.real.download --to DIR [NAME...]``: the recordings, from where they are published.
 
 Every file is checked against its SHA-256 before it takes its place; one that is there and right is not fetched again.
-A transfer that broke off goes on from where it stopped. Where a file can't be had, the message says what to download by
-hand and where to put it.
+A transfer that broke off continues from where it stopped. Where a file can't be had, the message says what to download
+by hand and where to put it.
 """
 
 from __future__ import annotations
@@ -124,8 +124,8 @@ def _by_hand(entry: RecordingEntry, path: Path, why: str) -> str:
         steps.append(f"put it at {path}")
     else:
         steps.append(f"run python -m hil.proof.real.convert {origin.convert.value} FILE {path}")
-    told = [f"{entry.path}: not downloaded: {why}", f"  By hand: {', '.join(steps)}.", f"  SHA-256 {entry.sha256}"]
-    return "\n".join(told)
+    lines = [f"{entry.path}: not downloaded: {why}", f"  By hand: {', '.join(steps)}.", f"  SHA-256 {entry.sha256}"]
+    return "\n".join(lines)
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -15,7 +15,7 @@ RANGE_NOT_SATISFIABLE = 416
 
 
 class FetchFailed(Exception):
-    """A file could not be had; what was is kept, and the next try goes on from there."""
+    """A file could not be had; what was is kept, and the next try continues from there."""
 
 
 def fetch(url: str, part: Path) -> None:

@@ -13,7 +13,7 @@ from hil.proof.real.truth_file import Goal, KnownValue
 
 @dataclass(frozen=True, slots=True)
 class Agreement:
-    """One known thing beside what was found.
+    """One known thing besides what was found.
 
     Attributes
     ----------

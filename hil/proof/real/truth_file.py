@@ -73,7 +73,7 @@ class Goal(Table):
 
 
 class TruthFile(Table):
-    """What is known of a machine beside its recordings."""
+    """What is known of a machine next to its recordings."""
 
     schema_: Literal["hil.real-truth/1"] = Field(alias="schema")
     source: Text

@@ -1,4 +1,4 @@
-"""Failures in recordings: what can be read and yet not be believed, or not told from."""
+"""Failures in recordings: what can be read and yet not be believed, or not distinguished from."""
 
 from __future__ import annotations
 

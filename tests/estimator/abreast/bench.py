@@ -65,4 +65,4 @@ def of_five(function: Any, rows: Any, out: Any) -> None:
 
 
 WAYS = (of_one, of_two, of_three, of_four, of_five)
-"""Compiled code is told its arguments one by one."""
+"""Compiled code is given its arguments one by one."""

@@ -48,7 +48,7 @@ def test_dry_friction_at_the_load_is_against_the_loads_motion() -> None:
 def against_bristles(held_nm: Callable[[float], float], presliding_rad: float) -> FloatArray:
     """Solve a load held by bristles, one more state: dT/dt = s (w - |w| T / T_c), s = T_c / x_b.
 
-    They are told by their deflection: T = T_c z / x_b, dz/dt = w - |w| z / x_b. A brake begins with straight ones.
+    They are described by their deflection: T = T_c z / x_b, dz/dt = w - |w| z / x_b. A brake begins with straight ones.
     """
 
     def rhs(t: float, x: FloatArray, torque: float) -> FloatArray:
@@ -254,7 +254,7 @@ def test_friction_brakes_the_wheel_and_air_the_vehicle() -> None:
     assert_same(kernel_output(effects, measured()), expected, kernel_output({"tyre_slip": tyre}, measured()))
 
 
-def test_a_road_acts_beside_the_constant_load() -> None:
+def test_a_road_acts_next_to_the_constant_load() -> None:
     profile = 40.0 * np.sin(2.0 * np.pi * TIME_S / 1.5)
     steps = Held.of(profile, SAMPLE_TIME_S)
     line = two_mass(drag=lambda t, w: steps.at(t))

@@ -40,7 +40,7 @@ EFFECTS: dict[str, Mapping[str, Mapping[str, float]]] = {
     "lag": {"actuator_lag": {"time_constant_s": 0.02}},
     "filter": {"speed_filter": {"time_constant_s": 0.03}},
     "drift": {"clock_drift": {"rate": 0.01}},
-    "mode beside": {"extra_torsional_mode": {"inertia_kg_m2": 0.3, "frequency_hz": 12.0, "damping_ratio": 0.05}},
+    "mode next to": {"extra_torsional_mode": {"inertia_kg_m2": 0.3, "frequency_hz": 12.0, "damping_ratio": 0.05}},
     "dry friction": {"coulomb_friction_motor": {"friction_nm": 20.0}, "coulomb_friction_load": {"friction_nm": 9.0}},
     "bristles": {"stribeck_friction": BRISTLES, "coulomb_friction_load": {"friction_nm": 9.0}},
     "bristles at the load": {"coulomb_friction_load": {"friction_nm": 9.0, "presliding_rad": 1e-3}},
@@ -53,7 +53,7 @@ EFFECTS: dict[str, Mapping[str, Mapping[str, float]]] = {
     "a ripple": {"torque_ripple": {"amplitude_nm": 2.0, "order": 6.0}},
 }
 WITHOUT_BRISTLES = {("stribeck_friction", "excess_nm"), ("stribeck_friction", "coulomb_nm")}
-"""What bends the line unless friction is told by bristles."""
+"""What makes the line nonlinear unless friction is described by bristles."""
 
 LINES = {"one mass": ONE_MASS, "two masses": TWO_MASS, "three masses": THREE_MASS}
 BESIDE_THE_LINE = ("delay", "lag", "filter", "drift", "an offset")

@@ -62,7 +62,7 @@ def test_shared_or_known_it_leaves_dry_friction_to_be_seen(load: Load | float) -
     assert free.free_count - result.free_count == (1 if load is Load.SHARED else 2)
 
 
-def test_dry_friction_is_told_in_one_direction_where_the_load_is_known_or_shared_by_both() -> None:
+def test_dry_friction_is_reported_in_one_direction_where_the_load_is_known_or_shared_by_both() -> None:
     def tells(load: Load | float, *records: Record) -> bool:
         return "coulomb_friction_motor" in open_hypotheses(with_load(load), records)[0]
 

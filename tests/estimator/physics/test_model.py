@@ -57,7 +57,7 @@ def test_a_tolerance_is_a_share_below_one(tolerance: float) -> None:
         one_mass(J_M=Parameter(2.0, tolerance))
 
 
-def test_every_fault_is_told_at_once() -> None:
+def test_every_fault_is_reported_at_once() -> None:
     with pytest.raises(BadModel) as refusal:
         DrivelineModel(
             Structure.ONE_MASS,

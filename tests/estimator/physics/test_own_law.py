@@ -195,7 +195,7 @@ def test_a_definition_without_sense_is_refused(
         OwnLaw("mine", square, element, parameters)
 
 
-def test_functions_of_arrays_are_told_from_functions_of_numbers() -> None:
+def test_functions_of_arrays_are_reported_from_functions_of_numbers() -> None:
     assert law(square).takes_arrays
     assert not law(square_by_cases).takes_arrays
     for function in (square, square_by_cases):

@@ -12,7 +12,7 @@ from estimator.physics.effect import Effect
 from estimator.physics.effects.stiffness_nonlinearity import factor
 from estimator.physics.model import Motion
 
-# What each sentence is told, and the numbers that must stand in it; the rest is reported in the table alone.
+# What each sentence is given, and the numbers that must stand in it; the rest is reported in the table alone.
 TOLD: dict[str, tuple[dict[str, float], list[str]]] = {
     "inverter_gain_mismatch": ({"gain_m1": 1.0, "gain_m2": 0.876}, ["m2", "0.876"]),
     "torque_derating": (
@@ -90,7 +90,7 @@ def test_the_sentence_tells_its_numbers_with_their_units(entry: Effect) -> None:
         ("cardan_second_order", {"amplitude_nm": 0.0, "angle_rad": 0.0, "share": 0.0456}, "4.56% of its torque"),
     ],
 )
-def test_of_several_causes_the_one_found_is_told(name: str, values: dict[str, float], said: str) -> None:
+def test_of_several_causes_the_one_found_is_reported(name: str, values: dict[str, float], said: str) -> None:
     assert said in EFFECTS[name].sentence(values, Motion.ROTATION)
 
 
@@ -101,7 +101,7 @@ def test_the_sentence_of_a_translation_speaks_of_newtons_and_metres(entry: Effec
 
 
 @pytest.mark.parametrize(("share", "word"), [(0.25, "25% stiffer"), (-0.25, "25% softer")])
-def test_a_shaft_of_two_stages_is_told_as_one(share: float, word: str) -> None:
+def test_a_shaft_of_two_stages_is_reported_as_one(share: float, word: str) -> None:
     values = {"hardening_per_rad2": 0.0, "shape": 1.0, "stage_share": share, "stage_rad": 0.0123}
     said = EFFECTS["stiffness_nonlinearity"].sentence(values, Motion.ROTATION)
     assert word in said

@@ -118,7 +118,7 @@ def test_side_by_side_is_one_by_one(values: Mapping[str, float], effects: Effect
 
 
 def test_lines_of_several_makes_in_any_order_are_each_as_alone() -> None:
-    """Sliders, gaps, waves and linear ones: each is done beside its kin, wherever these stand."""
+    """Sliders, gaps, waves and linear ones: each is done next to its kin, wherever these stand."""
     makes = [BESIDE_A_SHAFT["slider"], BESIDE_A_SHAFT["gap"], EVERYWHERE["ripple"], {}]
     grid, rec = Grid(Structure.TWO_MASS, SUBSTEPS, 0.02), record(random_steps(400, seed=7), np.ones(400))
     cases = [case for effects in makes for case in cases_of(flat(line_with(TWO_MASS, effects)), 400)]
@@ -128,7 +128,7 @@ def test_lines_of_several_makes_in_any_order_are_each_as_alone() -> None:
     assert_same_to_rounding(together, alone)
 
 
-def test_lines_that_are_fed_alike_beside_others() -> None:
+def test_lines_that_are_fed_alike_next_to_others() -> None:
     """As the columns of a Jacobian: most have the lag of the first, one has another, one another torque."""
     line = line_with(TWO_MASS, BESIDE_A_SHAFT["gap behind a lag"])
     grid, rec = Grid(line.structure, SUBSTEPS, 0.02), record(random_steps(400, seed=7), np.ones(400))
@@ -163,7 +163,7 @@ def test_a_mode_within_a_line_that_bends(place: str) -> None:
     )
 
 
-def test_what_has_its_beginning_in_common_goes_on_from_there() -> None:
+def test_what_has_its_beginning_in_common_continues_from_there() -> None:
     """Lines that crack at different moments: each is as the first one until shortly before its own."""
     effects = SLIDER | {"stiffness_change": {"change": -0.3, "from_s": 0.0, "to_s": 0.0}}
     line = model(TWO_MASS, effects=effects)

@@ -1,4 +1,4 @@
-"""A step is told from its moment on, whichever way round a fit found it."""
+"""A step is distinguished from its moment on, whichever way round a fit found it."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class TestFromTheirMoment:
         assert first == pytest.approx((AT_S, LAST_S), abs=0.02)
         assert second == pytest.approx((0.0, LAST_S))
 
-    def test_told_from_its_moment_it_stays(self, records: list[Record]) -> None:
+    def test_distinguished_from_its_moment_it_stays(self, records: list[Record]) -> None:
         told = from_their_moment(the_other_way_round(SOUND, records, [(0.0, AT_S), (0.0, 0.0)]), SOUND)
         assert from_their_moment(told, SOUND) is told
 

@@ -1,8 +1,8 @@
 """Reads Structured Text into the typed tree; whatever the standard would refuse, or leaves open, is refused.
 
 Checked here and in what it is built on, as a PLC's compiler does: every name is declared, before it is used, once (case
-is not told), and no word of the standard; constants, inputs and loop counters are not written to; types are never mixed
-without a conversion; literals fit their type; calls name inputs that there are.
+does not matter), and no word of the standard; constants, inputs and loop counters are not written to; types are never
+mixed without a conversion; literals fit their type; calls name inputs that there are.
 
 Source: IEC 61131-3, edition 2, annexes B.1.3, B.1.4 and B.1.5.
 """

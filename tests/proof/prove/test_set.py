@@ -154,7 +154,7 @@ def test_answers_are_scored_against_the_truth(proof: Path, tool: Tool, tmp_path:
     assert len(data["cases"]) == COUNT
 
 
-def test_answering_goes_on_where_it_was_interrupted(proof: Path, tool: Tool) -> None:
+def test_answering_continues_where_it_was_interrupted(proof: Path, tool: Tool) -> None:
     def interrupt(what: str, done: int, total: int) -> None:
         raise KeyboardInterrupt
 
@@ -212,7 +212,9 @@ def test_a_case_changed_before_it_is_answered_is_not_answered(proof: Path, tool:
         answer(proof, 1, silent)
 
 
-def test_verdicts_and_their_list_changed_together_are_told_by_the_digest_that_was_kept(proof: Path, tool: Tool) -> None:
+def test_verdicts_and_their_list_changed_together_are_reported_by_the_digest_that_was_kept(
+    proof: Path, tool: Tool
+) -> None:
     digest = answer(proof, 1, silent)
     listed = json.loads((proof / VERDICTS_LIST).read_text())
     listed["cases"]["case_001"]["diagnose_s"] = 99.0

@@ -79,7 +79,7 @@ def test_any_blocks_are_the_whole_to_the_bit(drive: Record, size: int) -> None:
 
 
 @pytest.mark.parametrize("at", [333, 5300])
-def test_goes_on_from_a_saved_state_to_the_bit(drive: Record, at: int, tmp_path: object) -> None:
+def test_continues_from_a_saved_state_to_the_bit(drive: Record, at: int, tmp_path: object) -> None:
     signals = (drive.time_s, drive.total_torque_nm, drive.output, drive.okay)
     first, second = chain(), chain()
     first.run_block(*(values[:at] for values in signals))

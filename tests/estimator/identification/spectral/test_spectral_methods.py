@@ -130,8 +130,8 @@ def test_a_noiseless_periodic_response_is_exact() -> None:
     np.testing.assert_allclose(estimate.response, (0.5 * q + 0.2 * q**2) / (1 - q + 0.6 * q**2), rtol=1e-8)
 
 
-def test_the_transient_is_told_from_the_response() -> None:
-    """From a swing that is as large as all that the input does, without noise: no window tells the two apart."""
+def test_the_transient_is_reported_from_the_response() -> None:
+    """From a swing that is as large as all that the input does, without noise: no window distinguishes the two."""
     rng, n = np.random.default_rng(3), 1000
     u = rng.normal(size=n)
     a, b = [1.0, -1.78, 0.95 * 0.95], [0.0, 0.02, 0.01]

@@ -1,4 +1,4 @@
-"""Changes of the driveline are found and told; what is no change is none."""
+"""Changes of the driveline are found and reported; what is no change is none."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def play(record: Record, watch: WatchSettings | None = None) -> OnlineTrajectory
 
 
 @pytest.mark.parametrize("drop", [0.1, 0.2])
-def test_a_stiffness_drop_is_found_and_told(drop: float) -> None:
+def test_a_stiffness_drop_is_found_and_reported(drop: float) -> None:
     before, after = Line(), Line(CHANGE_S, k=4200.0 * (1.0 - drop))
     for record in drives(4, 4, 80.0, (before, after)):
         first, settled = play(record).alarms
@@ -60,8 +60,8 @@ def test_a_drift_that_continues_is_alarmed_again(share_in_10_s: float) -> None:
         assert found[0].time_s > begin_s
         settled = [alarm.after.value for alarm in alarms if alarm.settled]
         assert (np.sign(np.diff([Line().resonance[0], *settled])) == np.sign(share_in_10_s)).all()
-        told = [begin_s, *(alarm.time_s for alarm in found), end_s]
-        moved = np.diff(np.sqrt([lines[int(t) - 1].k for t in told])) / np.sqrt(4200.0)
+        reported = [begin_s, *(alarm.time_s for alarm in found), end_s]
+        moved = np.diff(np.sqrt([lines[int(t) - 1].k for t in reported])) / np.sqrt(4200.0)
         assert len(found) >= 2
         assert np.abs(moved).max() < 0.04 if abs(share_in_10_s) < 0.02 else np.abs(moved).max() < 0.09
 
