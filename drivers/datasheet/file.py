@@ -1,7 +1,7 @@
 """A drive's EDS or DCF (CiA 306) as the drivers use it: data types, values and PDO codecs of its objects.
 
 The chain is `drivers.datasheet.text` (lines), `objects` (objects), `dictionary` (the ``canopen`` library's own form)
-and `sheet` (what is asked for). What a file has wrong is an error as soon as it is asked for; `drivers.datasheet.check`
+and `sheet` (what is asked for). What a file has wrong is an error as soon as it is asked for; `drivers.eds_check`
 says it all beforehand.
 """
 

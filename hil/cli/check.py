@@ -15,7 +15,7 @@ from hil.errors import InputError, UsageError
 if TYPE_CHECKING:
     from rich.table import Table as RichTable
 
-    from drivers.datasheet.check import EdsReport
+    from drivers.eds_check import EdsReport
     from drivers.plc.reading import Reading
     from hil.config.rig_file import Rig
     from hil.rig.check import Finding
@@ -53,7 +53,7 @@ def check(
     With --eds, check such a file line by line against CiA 306 and against what this program needs of a drive:
     exit status 2 if it can't be used. Without RIG no device is looked for.
     """
-    from drivers.datasheet.check import check_eds
+    from drivers.eds_check import check_eds
     from hil.config.rig_file import read_rig
     from hil.rig.addresses import with_addresses
     from hil.rig.check import check_rig

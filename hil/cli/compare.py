@@ -44,8 +44,8 @@ def compare(
     """
     from rich.console import Console
 
-    from hil.plants.compare import Trust, compared
     from hil.provenance import provenance
+    from hil.report.compared import Trust, compared
     from hil.report.comparison import comparison_text
     from hil.report.comparison_html import comparison_page
     from hil.report.comparison_text import comparison_summary

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import importlib
+import os
 import sys
 from collections.abc import Sequence
 from enum import IntEnum
@@ -158,4 +159,8 @@ def _complain(text: str) -> None:
 def main() -> None:
     """Entry point of the console script ``hil``."""
     interrupt_on_signals()
+    if "_HIL_COMPLETE" in os.environ:  # a shell asks what can stand where the cursor is
+        from hil.cli.completion import complete
+
+        complete()
     sys.exit(run(sys.argv[1:], keep_log=True))

@@ -28,10 +28,10 @@ from hil.rig.metadata import run_metadata
 from hil.rig.pacing import Pacer, disk_patience_s, heartbeat_patience_ms
 from hil.rig.plan import Plan, plan_run
 from hil.rig.realtime import RealTimeGrants
-from hil.rig.sample import Sample
 from hil.rig.session import run_plan
 from hil.rig.stop import StopRequest, stop_on_signals
 from hil.rig.timing import RunTiming
+from hil.sample import Sample
 from hil.store import register_run
 
 RUNS = "runs"

@@ -24,8 +24,8 @@ from estimator.physics.law_name import LawName
 from estimator.physics.model import DrivelineModel, EffectValue, Load, Motion, Parameter, Structure, parameter_unit
 from hil.config.file_schema import FileKind, schema_line
 from hil.config.laws import LawTable, laws_of, moved
-from hil.config.problems import Fault, problem_lines, read_toml, refuse
 from hil.errors import ModelFileError
+from hil.problems import Fault, problem_lines, read_toml, refuse
 from hil.recording import columns
 from hil.recording.signals_config import SignalsConfig
 

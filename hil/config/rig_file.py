@@ -1,7 +1,7 @@
 """The rig file: one TOML file that says what is connected, and what it may be asked to do.
 
 Strict and frozen: a number is no text, an unknown key is a fault, and nothing that limits torque has a
-default. Rules that hold across keys stand next to the keys they concern; `hil.config.problems` reports all
+default. Rules that hold across keys stand next to the keys they concern; `hil.problems` reports all
 faults at once. Those across tables are looked at once every table is right by itself.
 
 The base torque of an experiment is that of both inverters together and is split evenly between them, unless its
@@ -32,9 +32,9 @@ from hil.config.inverter_table import InvertersTable, NodeId
 from hil.config.inverter_table import InverterTable as InverterTable
 from hil.config.plc_tables import PlcTable as PlcTable
 from hil.config.plc_tables import SimulatedPlcSecurityTable
-from hil.config.problems import Fault, read_toml, refuse, validate
 from hil.config.table import ExistingFile, NotNegative, Positive, Table, Text
 from hil.errors import RigFileError
+from hil.problems import Fault, read_toml, refuse, validate
 
 
 class PrbsTarget(Enum):

@@ -16,7 +16,7 @@ from estimator.identification.tracking.alarm import Alarm
 from hil.monitor.ring import Ring
 from hil.monitor.snapshot import ComplexArray, Estimation, History, Model
 from hil.rig.live import USUAL, LiveEstimate, OnlineSetup, tracking_chain
-from hil.rig.sample import Sample
+from hil.sample import Sample
 
 HISTORY_EVERY_NS = 250_000_000
 """Time between two points of the history [ns]."""

@@ -13,7 +13,7 @@ from enum import Enum
 
 from drivers.plc.types import PlcStatus
 from hil.rig.experiments.base import Phase
-from hil.rig.sample import Sample
+from hil.sample import Sample
 
 
 @dataclass(frozen=True, slots=True)

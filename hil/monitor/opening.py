@@ -24,8 +24,8 @@ from hil.report.outputs import require_folder
 from hil.rig.dry_run import dry_run
 from hil.rig.live import USUAL, OnlineSetup
 from hil.rig.replay import replay
-from hil.rig.sample import Sample
 from hil.rig.trace import is_trace
+from hil.sample import Sample
 from hil.simulator.rig_server import required_simulation
 from hil.simulator.simulation_model import simulation_model
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hil.monitor.ring import Ring
-from hil.rig.sample import REMARKS, Sample, SampleFlag
+from hil.sample import REMARKS, Sample, SampleFlag
 
 WINDOW_S = 10.0
 """What the counts reach back [s]: short enough that what is over goes away, a thousand cycles at 10 ms."""

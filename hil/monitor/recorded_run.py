@@ -23,10 +23,10 @@ from hil.rig.live_course import course_path
 from hil.rig.metadata import run_metadata
 from hil.rig.pacing import NS_PER_S, RealTimePacer, period_ns
 from hil.rig.plan import Plan, plan_run
-from hil.rig.sample import Sample
 from hil.rig.session import run_plan
 from hil.rig.stop import StopRequest
 from hil.rig.timing import RunTiming
+from hil.sample import Sample
 from hil.store import register_run
 from hil.store.alarms import found_changes
 from hil.store.entry import COMPLETE, ONLINE

@@ -16,7 +16,7 @@ from hil.monitor.messages import Began, Order, Over, Report, Samples
 from hil.recording import columns
 from hil.recording.formats import read_table
 from hil.rig.experiments.base import Phase
-from hil.rig.sample import Sample, SampleFlag
+from hil.sample import Sample, SampleFlag
 
 NS_PER_S = 1_000_000_000
 

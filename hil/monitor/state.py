@@ -18,7 +18,7 @@ from hil.monitor.ring import Ring
 from hil.monitor.snapshot import Activity, Headline, Signals, Snapshot
 from hil.rig.experiments.base import Phase
 from hil.rig.live import USUAL, OnlineSetup
-from hil.rig.sample import Sample
+from hil.sample import Sample
 
 WINDOWS_S = (1.0, 2.0, 5.0, 10.0, 20.0, 60.0)
 """What the plots of the signals may reach back [s]: from single levels of the PRBS to a whole tip-in."""

@@ -11,7 +11,7 @@ from typing import Annotated, Self
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from estimator.signals.record import Location, OutputKind
-from hil.config.problems import Fault, refuse
+from hil.problems import Fault, refuse
 from hil.recording import columns
 from hil.recording.format_hints import FormatHints
 from hil.recording.request import Request

@@ -32,7 +32,7 @@ from hil.recording.samples import cells_of
 from hil.recording.sidecar import write_sidecar
 from hil.recording.table import Table
 from hil.recording.writing_thread import WritingThread
-from hil.rig.sample import Sample
+from hil.sample import Sample
 
 CSV = ".csv"
 

@@ -10,9 +10,9 @@ from pathlib import Path
 from urllib.parse import parse_qsl, urlsplit
 
 from drivers.canopen.can_link import CanLink
-from drivers.datasheet.check import check_eds
 from drivers.datasheet.file import EdsFile
 from drivers.datasheet.finding import Severity
+from drivers.eds_check import check_eds
 from drivers.errors import DeviceFault, DriverError, ProtocolViolation
 from drivers.inverter.check import Difference
 from drivers.inverter.commissioned import CommissionedValue

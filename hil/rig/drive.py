@@ -14,9 +14,9 @@ from hil.rig.pacing import NS_PER_S, Pacer, Tick
 from hil.rig.plan import Plan
 from hil.rig.plc_prbs import PlcPrbs
 from hil.rig.plc_watch import PlcWatch
-from hil.rig.sample import Sample, SampleFlag
 from hil.rig.stop import StopRequest
 from hil.rig.timing import RunTiming
+from hil.sample import Sample, SampleFlag
 
 SLEPT_THROUGH = SampleFlag.LATE | SampleFlag.M1_STALE | SampleFlag.M2_STALE
 """Flags of a cycle this machine was too late for: there was no SYNC, and the torque stood."""

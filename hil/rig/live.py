@@ -21,7 +21,7 @@ from estimator.signals.record import FloatArray
 from hil.rig.experiments.base import Phase
 from hil.rig.live_course import Course
 from hil.rig.pacing import NS_PER_S, period_ns
-from hil.rig.sample import Sample
+from hil.sample import Sample
 
 FORGETTING = 0.995
 """lambda_1: a sample 200 kept ones old, 4 s at 20 ms, weighs a third. A stiffness that drops is followed in seconds."""

@@ -15,7 +15,7 @@ from estimator.identification.identify import Settings
 from estimator.signals.record import FloatArray, Record
 from hil.rig.live import LiveEstimate, tracking_chain
 from hil.rig.live_course import Course
-from hil.rig.sample import Sample
+from hil.sample import Sample
 
 BLOCK_SAMPLES = 10_000
 """Samples of a block when nothing has to be waited for."""

@@ -18,7 +18,7 @@ from hil.errors import RunAborted
 from hil.rig.fitness import Needs, changes
 from hil.rig.pacing import NS_PER_S, Tick
 from hil.rig.plc_loop import PlcLoop
-from hil.rig.sample import SampleFlag
+from hil.sample import SampleFlag
 
 POLL_EVERY_NS = NS_PER_S // 10
 """Time between two polls [ns]: a clutch takes longer than this to close."""

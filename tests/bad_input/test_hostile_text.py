@@ -14,15 +14,15 @@ import numpy as np
 import pytest
 
 from drivers.canopen.pdo_map import MAX_MAPPED, read_layout
-from drivers.datasheet.check.check import check_eds
 from drivers.datasheet.number import octal_matters, read_formula, read_number
+from drivers.eds_check.check import check_eds
 from drivers.errors import ConfigMismatch
 from drivers.plc.register_map import RegisterMapError, load_register_map
 from drivers.resources import data_file
 from hil.cli.main import run
-from hil.config.problems import read_toml
 from hil.errors import InputError, RecordingError, RigFileError
 from hil.parse_json import LARGEST_BYTES, parse_json, read_json
+from hil.problems import read_toml
 from hil.recording import Table, read_table, write_table
 from hil.recording.sidecar import sidecar_of
 from hil.rig import replay as replaying

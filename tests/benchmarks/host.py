@@ -20,8 +20,8 @@ from hil.rig.excitation import NO_TORQUE
 from hil.rig.fitness import Needs
 from hil.rig.pacing import Pacer
 from hil.rig.plc_watch import PlcWatch
-from hil.rig.sample import SampleFlag
 from hil.rig.stop import StopRequest
+from hil.sample import SampleFlag
 from hil.simulator.loopback import Address
 from hil.simulator.plant import RigidPlant
 from hil.simulator.rig_server import RigServer

@@ -14,8 +14,8 @@ from hil.commission.finding import Finding, stated
 from hil.commission.record import RunRecord, Status, StepRecord
 from hil.commission.registry import STEPS
 from hil.commission.state import State
+from hil.commission.text import findings_table, result_document, result_lines
 from hil.report.commission_html import commission_page
-from hil.report.commission_text import findings_table, result_document, result_lines
 
 TITLES = {step.name: step.title for step in STEPS}
 OUTSIDE = Finding("gain <m2>", "equal within ±2 %", "3.1 ± 0.4 %", False, "Calibrate one")

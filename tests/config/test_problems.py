@@ -8,9 +8,9 @@ from typing import Annotated, Literal, Self
 import pytest
 from pydantic import Field, model_validator
 
-from hil.config.problems import LONGEST_VALUE, Fault, read_toml, refuse, validate
 from hil.config.table import Table
 from hil.errors import FileProblem, ModelFileError, RigFileError
+from hil.problems import LONGEST_VALUE, Fault, read_toml, refuse, validate
 
 
 class Column(Table):

@@ -150,7 +150,7 @@ WRONG = [
     ),
     (
         ("experiments.reversal", "share_m1", "0.69"),
-        "experiments.reversal.torque_nm | expected at most 492.754, what inverters.m1.torque_limit_nm leaves next to",
+        "experiments.reversal.torque_nm | expected at most 492.754, what inverters.m1.torque_limit_nm leaves besides",
     ),
     (
         ("experiments.tip", "share_m1", "0.0"),

@@ -22,10 +22,10 @@ from hil.rig.experiments.base import Phase
 from hil.rig.pacing import FreePacer, period_ns
 from hil.rig.plan import plan_run
 from hil.rig.realtime import real_time
-from hil.rig.sample import Sample
 from hil.rig.session import run_plan
 from hil.rig.stop import StopRequest
 from hil.rig.timing import RunTiming
+from hil.sample import Sample
 from hil.simulator.loopback import Address
 from hil.simulator.plant_factory import plant_for
 from hil.simulator.rig_server import RigServer

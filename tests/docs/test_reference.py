@@ -23,7 +23,7 @@ from hil.proof.seal import seal
 from hil.proof.wire.challenge import CONCEALED
 from hil.recording.columns import UNITS
 from hil.recording.formats import FORMATS
-from hil.rig.sample import SampleFlag
+from hil.sample import SampleFlag
 from tests.cli import bench
 from tests.docs.pages import DOCS, ROOT, blocks, pages
 

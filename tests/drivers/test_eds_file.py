@@ -14,8 +14,8 @@ from drivers import resources
 from drivers.capability.carrier import TPDO
 from drivers.capability.carrier_search import find_carriers
 from drivers.capability.plan import plan_drive
-from drivers.datasheet.check import check_eds
 from drivers.datasheet.file import EdsFile
+from drivers.eds_check import check_eds
 from drivers.errors import ConfigMismatch
 from drivers.resources import data_file
 from drivers.scaling import IntegerType

@@ -11,8 +11,8 @@ from drivers.canopen.can_link import CanLink
 from drivers.canopen.pdo_map import COB_ID_INVALID
 from drivers.capability.carrier import RPDO
 from drivers.capability.plan import plan_drive
-from drivers.datasheet.check import check_eds
 from drivers.datasheet.file import EdsFile
+from drivers.eds_check import check_eds
 from drivers.errors import ConfigMismatch
 from drivers.inverter.inverter import Inverter
 from hil.cli.main import run as command

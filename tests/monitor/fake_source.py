@@ -16,7 +16,7 @@ from hil.monitor.messages import (
     Report,
     TimingHealth,
 )
-from hil.rig.sample import Sample, SampleFlag
+from hil.sample import Sample, SampleFlag
 
 PERIOD_S = 0.01
 

@@ -9,7 +9,7 @@ from estimator.identification.tracking.state import TrackingState
 from estimator.physics.twist import Shaft
 from hil.monitor.live_estimation import LiveEstimation
 from hil.rig.live import LiveEstimate, OnlineSetup, tracking_chain, tracking_settings
-from hil.rig.sample import Sample, SampleFlag
+from hil.sample import Sample, SampleFlag
 from hil.simulator.simulation_model import DEFAULT_BUS
 from tests.estimator.identification.tracking import roads
 from tests.estimator.identification.tracking.drives import drives

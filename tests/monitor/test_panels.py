@@ -17,7 +17,7 @@ from hil.monitor.panel import LEAST_WIDTH, Draw, drawn
 from hil.monitor.snapshot import Activity, History, Model, Snapshot
 from hil.monitor.state import LiveState
 from hil.rig.experiments.base import Phase
-from hil.rig.sample import SampleFlag
+from hil.sample import SampleFlag
 from tests.monitor.fake_source import PERIOD_S, health, node, sample
 
 DRAWN: tuple[Draw, ...] = (

@@ -25,9 +25,9 @@ from hil.rig.drive import Observer, Recorder
 from hil.rig.experiments.base import Phase
 from hil.rig.live import USUAL, OnlineSetup, tracking_settings
 from hil.rig.live_replay import Pace, play_record
-from hil.rig.sample import Sample
 from hil.rig.stop import StopRequest
 from hil.rig.timing import RunTiming
+from hil.sample import Sample
 from hil.simulator.simulation_model import DEFAULT_BUS
 from hil.store import RunStore
 from hil.store.entry import ONLINE

@@ -15,8 +15,8 @@ from hil.monitor.replay_source import ReplaySource, recorded_samples
 from hil.recording.writer import RecordingWriter
 from hil.rig.build import open_devices
 from hil.rig.experiments.base import Phase
-from hil.rig.sample import Sample, SampleFlag
 from hil.rig.trace import BusTrace
+from hil.sample import Sample, SampleFlag
 from tests.monitor.fake_source import sample
 from tests.rig.serving import Samples as Recorded
 from tests.rig.serving import run, served

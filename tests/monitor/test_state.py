@@ -13,7 +13,7 @@ from hil.monitor.outcome import outcome
 from hil.monitor.snapshot import Activity
 from hil.monitor.state import WINDOWS_S, LiveState
 from hil.rig.experiments.base import Phase
-from hil.rig.sample import SampleFlag
+from hil.sample import SampleFlag
 from hil.simulator.simulation_model import DEFAULT_BUS
 from tests.monitor.fake_source import PERIOD_S, sample
 

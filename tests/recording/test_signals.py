@@ -12,12 +12,12 @@ import scipy.io
 from pydantic import ValidationError
 
 from estimator.signals.record import Location, OutputKind
-from hil.config.problems import problem_lines
 from hil.errors import InputError, RecordingError, UsageError
+from hil.problems import problem_lines
 from hil.recording import SignalsConfig, Table, read_record, read_records, write_table
 from hil.recording.columns import COUNTING_FLAGS
 from hil.recording.signals import to_record
-from hil.rig.sample import REMARKS, SampleFlag
+from hil.sample import REMARKS, SampleFlag
 
 Changed = Callable[..., Table]
 

@@ -14,7 +14,7 @@ from hil.recording import RecordingWriter, columns, read_record, read_table
 from hil.recording.checksum import CHECKSUM, SAID, data_sha256, said_sha256
 from hil.recording.formats import FORMATS
 from hil.recording.writer import HEADER
-from hil.rig.sample import Sample, SampleFlag
+from hil.sample import Sample, SampleFlag
 
 WRITABLE = [suffix for suffix, form in FORMATS.items() if form.write]
 

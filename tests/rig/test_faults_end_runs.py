@@ -13,7 +13,7 @@ import pytest
 from drivers.errors import BusDown, ConfigMismatch, DeviceFault, DeviceTimeout, DriverError, ProtocolViolation
 from hil.errors import RunAborted
 from hil.rig.drive import RunSummary
-from hil.rig.sample import SampleFlag
+from hil.sample import SampleFlag
 from hil.simulator.fault_spec import rig_faults
 from hil.simulator.rig_server import RigServer
 from tests.rig.observer import assert_disarmed

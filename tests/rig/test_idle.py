@@ -9,8 +9,8 @@ import pytest
 from drivers.errors import BusDown
 from hil.rig.build import open_devices
 from hil.rig.idle import Listening
-from hil.rig.sample import SampleFlag
 from hil.rig.timing import RunTiming
+from hil.sample import SampleFlag
 from hil.simulator.inverter_settings import FaultAtStep, InverterFaults
 from hil.simulator.rig_server import RigFaults
 from tests.rig.observer import assert_disarmed

@@ -19,10 +19,10 @@ from hil.rig.experiments.base import Phase
 from hil.rig.live import LiveEstimate, tracking_chain, tracking_settings
 from hil.rig.live_replay import Pace, play_record, play_samples
 from hil.rig.plan import plan_run
-from hil.rig.sample import Sample, SampleFlag
 from hil.rig.session import run_plan
 from hil.rig.stop import StopRequest
 from hil.rig.trace import is_trace
+from hil.sample import Sample, SampleFlag
 from tests.estimator.identification.tracking.drives import drives
 from tests.rig.observer import assert_disarmed
 from tests.rig.serving import Samples, fast, served

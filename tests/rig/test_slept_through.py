@@ -9,7 +9,7 @@ import pytest
 from hil.errors import RunAborted
 from hil.rig.drive import SLEPT_THROUGH
 from hil.rig.pacing import FreePacer, Tick
-from hil.rig.sample import SampleFlag
+from hil.sample import SampleFlag
 from tests.rig.observer import assert_disarmed
 from tests.rig.serving import Samples, fast, run_once, served
 

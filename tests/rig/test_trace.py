@@ -10,8 +10,8 @@ import pytest
 
 from hil.errors import RecordingError
 from hil.rig.replay import replay
-from hil.rig.sample import Sample, SampleFlag
 from hil.rig.trace import SUFFIXES, BusTrace
+from hil.sample import Sample, SampleFlag
 from hil.simulator.fault_spec import rig_faults
 from hil.simulator.inverter_settings import InverterFaults
 from hil.simulator.rig_server import RigFaults

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from drivers.errors import CommandRefused, WrongTorque
-from hil.rig.sample import SampleFlag
+from hil.sample import SampleFlag
 from hil.simulator.fault_spec import rig_faults
 from tests.rig.observer import assert_disarmed
 from tests.rig.serving import Samples, changed, run_once, served, small_rig

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from hil.cli.completers import experiment_names
 from hil.cli.filter_option import FilterOf, FilterRun
 from hil.cli.pace import Pace, PaceOption
 from hil.cli.trust_option import TrustLaws
@@ -15,7 +16,12 @@ from hil.errors import UsageError
 
 def run(
     rig: Annotated[Path, typer.Argument(metavar="RIG", help="Rig file.")],
-    experiment: Annotated[str, typer.Argument(metavar="EXPERIMENT", help="Name of an experiment of the rig file.")],
+    experiment: Annotated[
+        str,
+        typer.Argument(
+            metavar="EXPERIMENT", help="Name of an experiment of the rig file.", autocompletion=experiment_names
+        ),
+    ],
     out: Annotated[
         Path | None, typer.Option(metavar="REC", help="Recording to write, .csv or .parquet; a new file.")
     ] = None,

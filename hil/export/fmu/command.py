@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from hil.config.model_file import read_model, read_model_for_recordings
-from hil.config.problems import read_toml
 from hil.errors import ModelFileError, UsageError
 from hil.export.fmu import package
 from hil.export.fmu.driveline import begun, driveline
+from hil.problems import read_toml
 from hil.recording import read_record
 from hil.recording.signals_config import SignalsConfig
 from hil.report.outputs import publish

@@ -7,8 +7,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from hil.config.problems import read_toml, validate
 from hil.config.table import Positive, Table, Text
+from hil.problems import read_toml, validate
 from hil.proof.real.case_file import TRUTH, RealFileError
 
 

@@ -16,9 +16,9 @@ from estimator.identification.identify import Settings
 from estimator.identification.linear_model import Orders
 from estimator.identification.online.adaptation import Adaptation
 from estimator.signals.record import FloatArray
-from hil.config.problems import validate
 from hil.errors import FileProblem, UsageError
 from hil.parse_json import read_json
+from hil.problems import validate
 
 
 class _Part(BaseModel):

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 from drivers.canopen.pdo_map import COB_ID_EXTENDED, COB_ID_INVALID, MAX_MAPPED, MAX_PDO_BYTES, MappedObject
 from drivers.capability.carrier import FILLERS, MULTIPLEX, PDO_NUMBERS, RPDO, TPDO, Direction, is_reserved
-from drivers.datasheet.check.context import EdsContext, at_key, at_section, hexadecimal
 from drivers.datasheet.finding import EdsFinding, Severity
 from drivers.datasheet.number import read_number
 from drivers.datasheet.objects import EdsEntry, EdsObject
+from drivers.eds_check.context import EdsContext, at_key, at_section, hexadecimal
 
 _AS_MAPPED = "The maker's own mapping counts."
 

@@ -6,11 +6,11 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from drivers.datasheet.check.context import EdsContext, at_file, at_key, at_section, hexadecimal
 from drivers.datasheet.finding import EdsFinding, Severity
 from drivers.datasheet.number import read_number
 from drivers.datasheet.objects import sub_sections
 from drivers.datasheet.text import EdsSection
+from drivers.eds_check.context import EdsContext, at_file, at_key, at_section, hexadecimal
 
 MANDATORY = (0x1000, 0x1001, 0x1018)
 """Objects every CANopen device has (CiA 301): device type, error register, identity."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from drivers.datasheet.check.context import EdsContext, at_key, at_section
 from drivers.datasheet.finding import EdsFinding, Severity
 from drivers.datasheet.number import read_number
 from drivers.datasheet.objects import (
@@ -18,6 +17,7 @@ from drivers.datasheet.objects import (
 )
 from drivers.datasheet.text import EdsSection
 from drivers.datasheet.types import DATA_TYPES
+from drivers.eds_check.context import EdsContext, at_key, at_section
 
 PRE_DEFINED_ERROR_FIELD = 0x1003
 """Its sub-index 0 counts the errors there are, not the sub-indices."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from drivers.datasheet.check.context import EdsContext, at_key
 from drivers.datasheet.finding import EdsFinding, Severity
+from drivers.eds_check.context import EdsContext, at_key
 from drivers.inverter.cia402 import TorqueMode
 from drivers.inverter.drive_settings import NODES, SYNC_COUNTER_OVERFLOW
 

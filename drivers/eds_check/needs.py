@@ -9,8 +9,8 @@ from drivers.capability.ability import Ability, Shortcoming
 from drivers.capability.function import Function, Without
 from drivers.capability.speed_unit import described_scale, speed_unit_line, unit_in_words
 from drivers.capability.table import SYNC_COB_ID
-from drivers.datasheet.check.context import EdsContext, at_file, at_key, at_section, hexadecimal
 from drivers.datasheet.finding import EdsFinding, Severity
+from drivers.eds_check.context import EdsContext, at_file, at_key, at_section, hexadecimal
 from drivers.inverter.drive_settings import (
     ABORT_CONNECTION,
     EMCY_COB_ID_OBJECT,

@@ -21,8 +21,8 @@ from typing import Any, Final, TypeVar
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails, PydanticCustomError
 
-from hil.config.model_walk import ModelWalk
 from hil.errors import FileProblem
+from hil.model_walk import ModelWalk
 
 Model = TypeVar("Model", bound=BaseModel)
 

@@ -9,8 +9,8 @@ from drivers.capability.carrier import RPDO, TPDO, Carrier, Direction, is_reserv
 from drivers.capability.carrier_search import CarrierSearch
 from drivers.capability.function import Function
 from drivers.capability.plan import COMMAND, FEEDBACK, wanted_names
-from drivers.datasheet.check.context import EdsContext, at_file, at_key, at_section, hexadecimal
 from drivers.datasheet.finding import EdsFinding, Severity
+from drivers.eds_check.context import EdsContext, at_file, at_key, at_section, hexadecimal
 
 
 def check_carriers(context: EdsContext) -> Iterator[EdsFinding]:

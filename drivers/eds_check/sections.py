@@ -5,12 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from drivers.datasheet.check.context import EdsContext, at_file, at_key, at_section
 from drivers.datasheet.finding import EdsFinding, Severity
 from drivers.datasheet.number import read_number
 from drivers.datasheet.objects import OBJECT_SECTION, SUB_SECTION
 from drivers.datasheet.sheet import BIT_RATES_KBIT_S, NODE_IDS
 from drivers.datasheet.text import EdsSection
+from drivers.eds_check.context import EdsContext, at_file, at_key, at_section
 
 BAUD_RATES = (10, 20, 50, 125, 250, 500, 800, 1000)
 """kbit/s, each with a flag ``BaudRate_10`` in DeviceInfo."""

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from drivers.datasheet.check.context import EdsContext, at_key
 from drivers.datasheet.dictionary import read_octets, read_real
 from drivers.datasheet.finding import EdsFinding, Severity
 from drivers.datasheet.number import octal_matters, read_formula, read_number
 from drivers.datasheet.objects import EdsEntry
 from drivers.datasheet.types import OCTET_STRING, DataType
+from drivers.eds_check.context import EdsContext, at_key
 
 _LIMITS = ("LowLimit", "HighLimit")
 _TEXT_KEYS = ("parametername", "denotation", "defaultvalue", "parametervalue", "accesstype")
