@@ -9,7 +9,7 @@ from contextlib import suppress
 
 from estimator.diagnosis.diagnose import diagnose
 from estimator.errors import EstimatorError
-from estimator.identification.identify import Settings
+from estimator.identification.settings import Settings
 from hil.rig.live import tracking_settings
 from hil.rig.live_replay import Pace, play_record
 from tests.benchmarks.cases import make

@@ -14,6 +14,7 @@ from estimator.physics import catalogue, joint, own_law_run
 from estimator.physics.grid import Grid
 from estimator.physics.inputs import Case, inputs_of, load_of
 from estimator.physics.kernel import integration, many, side_by_side, state_vector
+from estimator.physics.kernel.makes import Masses
 from estimator.physics.layout import slot
 from estimator.physics.model import Structure
 from estimator.physics.motion import motor_angle
@@ -21,7 +22,11 @@ from estimator.physics.parallel import PARTS, concurrently
 from estimator.physics.start import Start
 from estimator.signals.record import FloatArray, IntArray, Location, OutputKind, Record
 
-MASSES = {Structure.ONE_MASS: 1, Structure.TWO_MASS: 2, Structure.THREE_MASS: 3}
+MASSES: dict[Structure, Masses] = {
+    Structure.ONE_MASS: (1,),
+    Structure.TWO_MASS: (1, 2),
+    Structure.THREE_MASS: (1, 2, 3),
+}
 """How many inertias the kernel has for a structure."""
 
 _OUTPUT_STATE = {

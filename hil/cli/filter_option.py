@@ -14,7 +14,7 @@ import typer
 from hil.errors import UsageError
 
 if TYPE_CHECKING:
-    from estimator.identification.identify import Settings
+    from estimator.identification.settings import Settings
     from hil.rig.live import OnlineSetup
 
 FilterOf = Annotated[

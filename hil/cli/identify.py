@@ -15,8 +15,8 @@ from hil.cli.trust_option import TrustLaws
 
 if TYPE_CHECKING:
     from estimator.identification.compare import Compared
-    from estimator.identification.identify import Settings
     from estimator.identification.offline.orders import OrderChoice
+    from estimator.identification.settings import Settings
     from estimator.identification.study import Study
     from estimator.physics.model import DrivelineModel
     from estimator.signals.record import Record
@@ -62,7 +62,7 @@ def identify(
     recording, and DIR/report.html.
     """
     from estimator.identification.compare import compare
-    from estimator.identification.identify import Settings
+    from estimator.identification.settings import Settings
     from hil.config.model_file import read_model_for_recordings
     from hil.errors import ModelFileError
     from hil.plants.scales import tell_scales

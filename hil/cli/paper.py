@@ -13,7 +13,7 @@ import typer
 from hil.cli.trust_option import TrustLaws
 
 if TYPE_CHECKING:
-    from estimator.identification.identify import Settings
+    from estimator.identification.settings import Settings
     from hil.figures.local_model import LocalModel
     from hil.figures.numbers import Row
     from hil.figures.road.drive import Driven
@@ -68,8 +68,8 @@ def paper(
     CANopen and Modbus; all of it takes half a minute. The same seed makes the same files. Writes DIR/fig2, fig4 and
     fig5 as .svg and .pdf, DIR/report.html, DIR/paper.json, and the recordings with their rig file.
     """
-    from estimator.identification.identify import Settings
     from estimator.identification.linear_model import Orders
+    from estimator.identification.settings import Settings
     from hil.figures.drawn.style import require_matplotlib
     from hil.provenance import provenance
     from hil.report.outputs import require_folder

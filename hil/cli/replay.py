@@ -14,7 +14,7 @@ from hil.cli.trust_option import TrustLaws
 from hil.errors import UsageError
 
 if TYPE_CHECKING:
-    from estimator.identification.identify import Settings
+    from estimator.identification.settings import Settings
     from estimator.signals.record import FloatArray
     from hil.rig.live_course import Course
     from hil.rig.live_replay import OnCourse, Pace

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from estimator.identification.identify import Settings
+from estimator.identification.settings import Settings
 from hil.errors import UsageError
 from hil.export.identification_file import plc_estimator
 from hil.export.plc_estimator import PlcEstimator

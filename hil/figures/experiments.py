@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from estimator.identification.identify import Settings, identify
+from estimator.identification.identify import identify
+from estimator.identification.settings import Settings
 from estimator.physics.model import DrivelineModel
 from estimator.signals.record import Record
 from hil.figures.local_model import TRUTH, LocalModel, Reference

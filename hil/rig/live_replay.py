@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimator.identification.identify import Settings
+from estimator.identification.settings import Settings
 from estimator.signals.record import FloatArray, Record
 from hil.rig.live import LiveEstimate, tracking_chain
 from hil.rig.live_course import Course

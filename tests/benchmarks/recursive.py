@@ -26,13 +26,13 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from estimator.identification.identify import Settings
 from estimator.identification.online.adaptation import DecreasingGain, DecreasingThenConstantTrace
 from estimator.identification.online.oefo import Oefo
 from estimator.identification.online.recursive import RecursiveEstimator, Trajectory
 from estimator.identification.online.registry import ESTIMATORS, Setup
 from estimator.identification.online.rls import Rls
 from estimator.identification.online.two_mass import TwoMass
+from estimator.identification.settings import Settings
 from estimator.signals.record import FloatArray, Record
 from hil.rig.live import tracking_settings
 from hil.rig.live_replay import Pace, play_record

@@ -19,8 +19,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from scipy.stats import poisson
 
-from estimator.identification.identify import Settings
 from estimator.identification.online.chain import OnlineChain
+from estimator.identification.settings import Settings
 from estimator.identification.tracking.watch_settings import WatchSettings
 from estimator.signals.record import Record
 from hil.rig.live import tracking_settings

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from estimator.identification.identify import Settings
+from estimator.identification.settings import Settings
 from estimator.signals.record import Record
 from hil.cli.main import run
 from hil.export.filling import Precision, project

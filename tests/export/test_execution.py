@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from estimator.identification.identify import Settings
 from estimator.identification.linear_model import Orders
 from estimator.identification.online.adaptation import Adaptation
 from estimator.identification.online.chain import OnlineChain
 from estimator.identification.online.recursive import Status
+from estimator.identification.settings import Settings
 from estimator.signals.record import FloatArray
 from hil.export.filling import Precision
 from hil.export.plc_estimator import PlcEstimator

@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 
 from estimator.compiled import compiled, woven
 from estimator.physics.kernel import integration
+from estimator.physics.kernel.makes import Masses
 from estimator.signals.record import FloatArray
 
 
 class Setting(NamedTuple):
     """What the kernel is told alike in every block, and room for its answers; see ``integration.integrate``."""
 
-    masses: int
+    masses: Masses
     sample_time_s: float
     substeps: int
     sign_width: float

@@ -26,7 +26,7 @@ from estimator.physics.kernel.conditions import (
 from estimator.physics.kernel.feed import begun_feed, fed, is_late
 from estimator.physics.kernel.line import Line, is_bristled, is_within
 from estimator.physics.kernel.linear import WORTHWHILE_SAMPLES, Answers, answers, has_dry_friction, is_linear, led_on
-from estimator.physics.kernel.makes import for_its_make
+from estimator.physics.kernel.makes import Masses, for_its_make
 from estimator.physics.kernel.rates import read_out
 from estimator.physics.kernel.sensing import entry, reading, shown, smoothed
 from estimator.physics.kernel.state_vector import (
@@ -171,7 +171,7 @@ def integrate_made(
 
 @compiled
 def integrate(
-    masses: int,
+    masses: Masses,
     sample_time_s: float,
     substeps: int,
     sign_width: float,
@@ -193,8 +193,8 @@ def integrate(
 
     Parameters
     ----------
-    masses : int
-        1, 2 or 3.
+    masses : tuple of int
+        An entry for each of them, 1 to 3.
     sample_time_s : float
         Sampling period [s].
     substeps : int
@@ -224,7 +224,8 @@ def integrate(
         before ``first`` is taken from it, and where it is longer that before the next sample is left in it.
     """
     given = (sample_time_s, substeps, sign_width, first, start_s, lent(torque), lent(load), lent(angle), lent(p))
-    for_its_make(masses, integrate_made, lent(p), *given, lent(state), output, sensor, lent(out), lent(slopes))
+    given_back = (lent(state), output, sensor, lent(out), lent(slopes))
+    for_its_make(len(masses), integrate_made, lent(p), (*given, *given_back))
 
 
 @brief

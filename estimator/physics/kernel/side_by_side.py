@@ -19,7 +19,7 @@ from estimator.physics.kernel.contact import stepped
 from estimator.physics.kernel.feed import begun_feed, fed, is_late
 from estimator.physics.kernel.line import Line, is_bristled, is_elastic
 from estimator.physics.kernel.linear import is_linear
-from estimator.physics.kernel.makes import for_its_make
+from estimator.physics.kernel.makes import Masses, for_its_make
 from estimator.physics.kernel.rates import read_out
 from estimator.physics.kernel.sensing import reading, shown, smoothed
 from estimator.physics.kernel.state_vector import (
@@ -46,12 +46,12 @@ FEEDING = np.array([slots.DELAY, slots.DELAYED_BEFORE, slots.DRIFT, slots.LAG, s
 
 
 @compiled
-def go_side_by_side(masses: int, p: FloatArray, rows: IntArray) -> bool:
+def go_side_by_side(masses: Masses, p: FloatArray, rows: IntArray) -> bool:
     """Tell whether some of the lines, a row of parameters each, are simulated side by side."""
     first = p[rows[0]]
     if rows.size == 1 or not IS_COMPILED:
         return False
-    if is_linear(Line(masses, masses == 1 or is_elastic(first), False, False), first):
+    if is_linear(Line(len(masses), len(masses) == 1 or is_elastic(first), False, False), first):
         return False
     return leading_kin(p, rows) == rows.size
 
@@ -212,7 +212,7 @@ def advance(
 
 @compiled
 def integrate_side_by_side(
-    masses: int,
+    masses: Masses,
     sample_time_s: float,
     substeps: int,
     sign_width: float,
@@ -252,7 +252,7 @@ def integrate_side_by_side(
     given = (sample_time_s, substeps, sign_width, first, start_s, mean, rise, loads, angle)
     filtering = sensor and p[rows[0], slots.FILTER] > 0.0
     them = (in_lanes(p, rows), in_lanes(state, rows), low_passes(rows, p, sample_time_s / substeps))
-    for_its_make(masses, advance, p[rows[0]], *given, p[rows[0]], *them, output, filtering, values)
+    for_its_make(len(masses), advance, p[rows[0]], (*given, p[rows[0]], *them, output, filtering, values))
     for lane in range(rows.size):
         own = p[rows[lane]]
         for k in range(first, torque.shape[1]):

@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 
 from estimator.identification.best import BestEstimate, Verdict, best_estimate
-from estimator.identification.identify import Identification, Settings
+from estimator.identification.identify import Identification
 from estimator.identification.identify import identify as identify_record
 from estimator.identification.modes.modes import Mode
 from estimator.identification.online.recursive import Status as OnlineStatus
+from estimator.identification.settings import Settings
 from hil.commission.analysis.measured import of_repeats
 from hil.commission.finding import Finding
 from hil.commission.readings import record_of, rounded

@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 
 from estimator.errors import NotExciting
-from estimator.identification.identify import Settings
 from estimator.identification.linear_model import Orders
 from estimator.identification.modes.modes import Mode
 from estimator.identification.offline.output_error import fit_output_error
+from estimator.identification.settings import Settings
 from estimator.signals.decimate import decimate
 from estimator.signals.record import FloatArray, Record
 from hil.commission.analysis import amplitude

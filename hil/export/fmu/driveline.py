@@ -63,7 +63,7 @@ class Driveline:
     @property
     def masses(self) -> int:
         """How many inertias it has."""
-        return MASSES[self.structure]
+        return len(MASSES[self.structure])
 
 
 def driveline(name: str, model: DrivelineModel, period_s: float, sensor_at: Location = Location.MOTOR) -> Driveline:

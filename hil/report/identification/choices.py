@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
-from estimator.identification.identify import Settings
 from estimator.identification.linear_model import Orders
 from estimator.identification.offline.orders import OrderChoice, select_orders
 from estimator.identification.online.registry import ESTIMATORS, Entry
 from estimator.identification.online.two_mass import TwoMass
+from estimator.identification.settings import Settings
 from estimator.physics.model import DrivelineModel, Structure
 from estimator.signals.decimate import decimate
 from estimator.signals.record import Record

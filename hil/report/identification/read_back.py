@@ -12,9 +12,9 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from estimator.errors import BadSetting
-from estimator.identification.identify import Settings
 from estimator.identification.linear_model import Orders
 from estimator.identification.online.adaptation import Adaptation
+from estimator.identification.settings import Settings
 from estimator.signals.record import FloatArray
 from hil.errors import FileProblem, UsageError
 from hil.parse_json import read_json

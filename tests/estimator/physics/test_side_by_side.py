@@ -196,10 +196,10 @@ def test_recordings_of_different_lengths_side_by_side() -> None:
 def test_what_is_linear_or_another_make_goes_alone() -> None:
     rows = np.arange(3)
     bent = np.array([flat(model(TWO_MASS, effects=SLIDER))] * 3)
-    assert go_side_by_side(2, bent, rows)
-    assert not go_side_by_side(2, bent, rows[:1])
-    assert not go_side_by_side(2, np.array([flat(model(TWO_MASS))] * 3), rows)
+    assert go_side_by_side((1, 2), bent, rows)
+    assert not go_side_by_side((1, 2), bent, rows[:1])
+    assert not go_side_by_side((1, 2), np.array([flat(model(TWO_MASS))] * 3), rows)
     other = bent.copy()
     other[2, slot("backlash", "gap_rad")] = 0.01
-    assert not go_side_by_side(2, other, rows)
-    assert go_side_by_side(2, other, rows[:2])
+    assert not go_side_by_side((1, 2), other, rows)
+    assert go_side_by_side((1, 2), other, rows[:2])
