@@ -24,7 +24,7 @@ class Format:
     """How one kind of file is read and written.
 
     ``write`` is None for a format that is only read, ``metadata`` for one whose metadata come with the table alone.
-    ``next to`` names the file that belongs to a recording in a format that has no place for all there is to say.
+    ``companion`` names the file that belongs to a recording in a format that has no place for all there is to say.
     ``tables`` reads a table for each time of a format that may have several.
     ``apart`` is True where a compiled library parses it: in a process of its own (`hil.recording.apart`).
     """
