@@ -84,7 +84,7 @@ class OwnLaw:
         shape: time since the recording began [s], speeds [rad/s], twist [rad] and torque reading [Nm] to a torque [Nm]
         or, at the sensor, an error of the reading. At the null of its first parameter it returns 0.
     element : Element
-        Motor or load: the torque acts against positive motion. Shaft: it is carried beside spring and damper. Speed
+        Motor or load: the torque acts against positive motion. Shaft: it is carried next to spring and damper. Speed
         sensor: it is added to the reading.
     parameters : tuple of OwnParameter
         The first one decides: its interval must exclude its null for the law to be believed.
@@ -170,7 +170,7 @@ class OwnLaw:
         try:
             with np.errstate(all="ignore"):
                 found = self._called(arguments, values)
-        except Exception as error:  # whatever a user's function may raise is told as its own
+        except Exception as error:  # whatever a user's function may raise is reported as its own
             raise BadModel(f"{self._where}: failed with {type(error).__name__}: {error}") from error
         bad = ~np.isfinite(found) & np.isfinite(arguments).all(axis=0)
         if bad.any():

@@ -53,7 +53,7 @@ def workers() -> int:
 
 
 def work_on(cores: int) -> None:
-    """Work on so many cores from the next call on; what is under way goes on as it began.
+    """Work on so many cores from the next call on; what is under way continues as it began.
 
     Raises
     ------

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from estimator.abreast import LANES
 from estimator.errors import BadModel
+from estimator.lanes import LANES
 from estimator.physics import catalogue, joint, own_law_run
 from estimator.physics.grid import Grid
 from estimator.physics.inputs import Case, inputs_of, load_of
@@ -45,7 +45,7 @@ _SENSED = (state_vector.SPEED, state_vector.LOAD_SPEED)
 """What the effects of a speed sensor act on."""
 
 LENGTHS_DIFFER = 1.1
-"""Length of the longest recording over the mean of all from which they go each by itself: the others would go on to
+"""Length of the longest recording over the mean of all from which they go each by itself: the others would continue to
 its end."""
 
 
@@ -231,7 +231,7 @@ def simulate_together(grid: Grid, records: Sequence[Record], of: Sequence[int], 
     Returns
     -------
     ndarray, shape (len(cases), N)
-        As long as the longest recording; shorter ones go on under the torques they ended with.
+        As long as the longest recording; shorter ones continue under the torques they ended with.
     """
     wanted, given = output_state(records[0], grid.structure), inputs_of(records, of, cases)
     out = np.empty((len(cases), given.torque.shape[1]))

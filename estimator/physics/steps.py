@@ -1,6 +1,7 @@
-"""A step told from its moment on: what changed is what comes after, where the other way round explains as much.
+"""A step distinguished from its moment on: what changed is what comes after, where the other way round explains as
+much.
 
-A payload that grows at 12 s, and one that was smaller until 12 s beside a larger nominal inertia, are one and the same
+A payload that grows at 12 s, and one that was smaller until 12 s next to a larger nominal inertia, are one and the same
 motion. A fit ends in either; people expect the first.
 """
 
@@ -131,7 +132,7 @@ recording is dry friction, which others that do not reverse hide; half a second 
 def has_edge(name: str, result: FitResult) -> bool:
     """Tell whether an event begins or ends inside a recording.
 
-    Where it would be another effect if it acted all along, not a glimpse of it counts, beside whole recordings.
+    Where it would be another effect if it acted all along, not a glimpse of it counts, next to whole recordings.
     """
     acting = [
         (to_s - from_s, inside(record, from_s) or inside(record, to_s))

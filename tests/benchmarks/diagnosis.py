@@ -1,8 +1,8 @@
-"""``python -m tests.benchmarks.diagnosis``: what a whole diagnosis takes: time beside scipy's fit, growth, memory.
+"""``python -m tests.benchmarks.diagnosis``: what a whole diagnosis takes: time next to scipy's fit, growth, memory.
 
-Time is told as a share of what scipy takes for the fit of the nominal parameters alone (``tests.benchmarks.fit``), in
-turn. Growth is that of processor time, both cores together, because it does not count what else the machine does: the
-exponent between two lengths, 1 for a time in proportion. Memory is the peak of a process of its own.
+Time is reported as a share of what scipy takes for the fit of the nominal parameters alone (``tests.benchmarks.fit``),
+in turn. Growth is that of processor time, both cores together, because it does not count what else the machine does:
+the exponent between two lengths, 1 for a time in proportion. Memory is the peak of a process of its own.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Speed of the recursive estimators: beside the same algorithm in C, beside padasip, sample by sample, in replay.
+"""Speed of the recursive estimators: next to the same algorithm in C, next to padasip, sample by sample, in replay.
 
 ``python -m tests.benchmarks.recursive [update] [padasip] [single] [replay] [memory] [--pairs N] [--padasip PYTHON]``
 
@@ -122,7 +122,7 @@ def per_sample(
 
 
 def update(pairs: int) -> list[tuple[str, ...]]:
-    """Return the lines of OEFO beside C."""
+    """Return the lines of OEFO next to C."""
     lines = []
     for flags in C_FLAGS:
         companion = " ".join(["C, gcc -O3", *flags])
@@ -132,7 +132,7 @@ def update(pairs: int) -> list[tuple[str, ...]]:
 
 
 def padasip(pairs: int, given: str | None) -> list[tuple[str, ...]]:
-    """Return the lines of RLS and OEFO beside padasip's RLS; none, and a hint, where there is no padasip."""
+    """Return the lines of RLS and OEFO next to padasip's RLS; none, and a hint, where there is no padasip."""
     python = python_with_padasip(given)
     if python is None:
         sys.stderr.write(f"padasip: expected it in this Python or in another, got neither. {HINT}\n")

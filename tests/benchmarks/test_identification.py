@@ -83,7 +83,7 @@ def test_the_reference_is_one_of_the_peers() -> None:
     assert REFERENCE in {peer.name for peer in PEERS}
 
 
-def test_every_method_is_asked_about_a_bus_and_told_in_the_tables(judged: Judged) -> None:
+def test_every_method_is_asked_about_a_bus_and_reported_in_the_tables(judged: Judged) -> None:
     told = tables([judged])
     assert judged.seed == 3
     assert all(name in told for name in judged.answers)

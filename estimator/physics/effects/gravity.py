@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from estimator.abreast import every
 from estimator.compiled import compiled
+from estimator.lanes import every
 from estimator.physics.acting import Acting, Place
 from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Held, Start, Untestable
 from estimator.physics.model import DrivelineModel, Motion, unit

@@ -11,8 +11,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from estimator.abreast import lent
 from estimator.compiled import brief, compiled, inlined
+from estimator.lanes import borrowed
 from estimator.physics.kernel import slots
 from estimator.physics.kernel.bristles import bent, rubbed
 from estimator.physics.kernel.conditions import (
@@ -223,9 +223,19 @@ def integrate(
         Where it has room: slope of the output just before and just after each sample [unit of the output / s]. That
         before ``first`` is taken from it, and where it is longer that before the next sample is left in it.
     """
-    given = (sample_time_s, substeps, sign_width, first, start_s, lent(torque), lent(load), lent(angle), lent(p))
-    given_back = (lent(state), output, sensor, lent(out), lent(slopes))
-    for_its_make(len(masses), integrate_made, lent(p), (*given, *given_back))
+    given = (
+        sample_time_s,
+        substeps,
+        sign_width,
+        first,
+        start_s,
+        borrowed(torque),
+        borrowed(load),
+        borrowed(angle),
+        borrowed(p),
+    )
+    given_back = (borrowed(state), output, sensor, borrowed(out), borrowed(slopes))
+    for_its_make(len(masses), integrate_made, borrowed(p), (*given, *given_back))
 
 
 @brief

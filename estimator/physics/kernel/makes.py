@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from estimator.compiled import woven
+from estimator.compiled import ir_inlined
 from estimator.physics.kernel import slots
 from estimator.physics.kernel.line import Line, is_elastic, is_extended
 from estimator.signals.record import FloatArray
@@ -21,7 +21,7 @@ Masses = tuple[int, ...]
 """An entry for each mass. Its length is a part of its type, so that only makes of so many masses are compiled."""
 
 
-@woven
+@ir_inlined
 def for_its_make(masses: int, made: Made, p: FloatArray, given: tuple[Any, ...]) -> None:
     """Call what is compiled for the make of the line that has these parameters, of 1, 2 or 3 masses."""
     if masses == 1:
@@ -32,7 +32,7 @@ def for_its_make(masses: int, made: Made, p: FloatArray, given: tuple[Any, ...])
         _for_its_shaft(3, made, p, given)
 
 
-@woven
+@ir_inlined
 def _for_its_shaft(masses: int, made: Made, p: FloatArray, given: tuple[Any, ...]) -> None:
     if is_elastic(p):
         _for_its_states(masses, True, made, p, given)
@@ -40,7 +40,7 @@ def _for_its_shaft(masses: int, made: Made, p: FloatArray, given: tuple[Any, ...
         _for_its_states(masses, False, made, p, given)
 
 
-@woven
+@ir_inlined
 def _for_its_states(masses: int, elastic: bool, made: Made, p: FloatArray, given: tuple[Any, ...]) -> None:
     if is_extended(p):
         made(Line(masses, elastic, not elastic, True), *given)

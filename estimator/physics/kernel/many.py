@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from estimator.abreast import LANES
 from estimator.compiled import compiled
+from estimator.lanes import LANES
 from estimator.physics.kernel.integration import integrate, with_mode
 from estimator.physics.kernel.makes import Masses
 from estimator.physics.kernel.side_by_side import go_side_by_side, integrate_side_by_side, kin_together, leading_kin

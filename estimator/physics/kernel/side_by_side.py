@@ -1,6 +1,6 @@
 """Up to eight simulations side by side, as a Jacobian takes them: one instruction for all.
 
-The laws are those of one simulation (``rates``), compiled for numbers abreast. What torque comes through a delay or a
+The laws are those of one simulation (``rates``), compiled for numbers in lanes. What torque comes through a delay or a
 lag does not depend on the motion, and is worked out before. A line whose output is differentiated takes its simulations
 one by one, and so does a linear one: it adds up what it knows.
 """
@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from estimator.abreast import LANES, abreast, lent
 from estimator.compiled import IS_COMPILED, compiled, inlined
+from estimator.lanes import LANES, as_lanes, borrowed
 from estimator.physics.catalogue import BUILT_IN
 from estimator.physics.kernel import slots
 from estimator.physics.kernel.bristles import bent, rubbed
@@ -174,8 +174,8 @@ def advance(
     out_lanes: FloatArray,
 ) -> None:
     """Simulate lines of one make; ``one_of_them`` is the parameters of one."""
-    torque, rise, load, p = abreast(torque_lanes), abreast(rise_lanes), abreast(load_lanes), abreast(p_lanes)
-    start, out, filters = abreast(state_lanes), abreast(out_lanes), abreast(low_lanes)
+    torque, rise, load, p = as_lanes(torque_lanes), as_lanes(rise_lanes), as_lanes(load_lanes), as_lanes(p_lanes)
+    start, out, filters = as_lanes(state_lanes), as_lanes(out_lanes), as_lanes(low_lanes)
     h = sample_time_s / substeps
     length = 1.0 / substeps
     waving = is_waving(one_of_them)
@@ -243,9 +243,9 @@ def integrate_side_by_side(
     p, state, out
         As there, a row each: (K, layout.SIZE), (K, STATES), (K, N).
     """
-    rows, torque, load, angle = lent(rows), lent(torque), lent(load), lent(angle)
-    fed_by, loaded_by = lent(fed_by), lent(loaded_by)
-    p, state, out = lent(p), lent(state), lent(out)
+    rows, torque, load, angle = borrowed(rows), borrowed(torque), borrowed(load), borrowed(angle)
+    fed_by, loaded_by = borrowed(fed_by), borrowed(loaded_by)
+    p, state, out = borrowed(p), borrowed(state), borrowed(out)
     values = np.empty((torque.shape[1], LANES))
     mean, rise = supplied_lanes(sample_time_s, substeps, first, start_s, rows, torque, fed_by, p, state)
     loads = in_lanes(load, loaded_by[rows])

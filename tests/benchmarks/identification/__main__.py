@@ -1,4 +1,4 @@
-"""How right the identified models are, over many buses, beside other tools.
+"""How right the identified models are, over many buses, next to other tools.
 
 ``python -m tests.benchmarks.identification [buses] [clean] [healthy] [accuracy] [coverage] [truth] [paper]
 [--buses N] ...``
@@ -30,7 +30,7 @@ BUSES, FIRST_SEED = 200, 0
 
 
 def buses_part(options: argparse.Namespace, world: World, name: str) -> str:
-    """Judge every method; write the JSON beside where it is wanted."""
+    """Judge every method; write the JSON next to where it is wanted."""
     seeds = range(options.seed, options.seed + options.buses)
     judged = judge_all(seeds, world, options.jobs)
     if options.json is not None:

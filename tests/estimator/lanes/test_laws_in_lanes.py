@@ -19,7 +19,7 @@ from estimator.physics.effects import (
     tyre_slip,
     warming_friction,
 )
-from tests.estimator.abreast.bench import in_both_ways
+from tests.estimator.lanes.bench import in_both_ways
 
 EITHER_SIDE = (-25.0, -0.7, -0.01, 0.0, 0.3, 0.625, 1.0, 45.0)
 SIZES = (0.0, 1e-3, 0.4, 1.0, 3.0, 50.0)

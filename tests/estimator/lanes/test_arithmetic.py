@@ -1,4 +1,4 @@
-"""Numbers abreast are reckoned with as one is."""
+"""Arithmetic in lanes is that of single numbers."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numba
 import numpy as np
 import pytest
 
-from estimator.abreast import choose, every, like, some
-from tests.estimator.abreast.bench import in_both_ways
+from estimator.lanes import choose, every, like, some
+from tests.estimator.lanes.bench import in_both_ways
 
 RNG = np.random.default_rng(5)
 X, Y = RNG.normal(0.0, 3.0, 64), RNG.normal(0.0, 3.0, 64)

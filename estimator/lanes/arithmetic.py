@@ -9,8 +9,8 @@ from typing import Any
 
 from llvmlite import ir
 
-from estimator.abreast.tools import defined_once, lower_builtin, signature, type_callable, types
-from estimator.abreast.types import LANES, NUMBERS, LanesType, MaskType, lanes, mask
+from estimator.lanes.tools import defined_once, lower_builtin, signature, type_callable, types
+from estimator.lanes.types import LANES, NUMBERS, LanesType, MaskType, lanes, mask
 
 Make = Callable[..., Any]
 """From an instruction builder and the arguments' values to the result's."""

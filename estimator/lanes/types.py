@@ -1,4 +1,4 @@
-"""The types that compiled code has for numbers, for yes and no, and for rows of numbers abreast."""
+"""The types that compiled code has for numbers, for yes and no, and for rows of numbers in lanes."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from typing import Any
 
 from llvmlite import ir
 
-from estimator.abreast.tools import Conversion, PrimitiveModel, lower_cast, register_model, types
+from estimator.lanes.tools import Conversion, PrimitiveModel, lower_cast, register_model, types
 
 LANES = 8
-"""Numbers abreast: one register of the widest instructions there are today, two or four of others."""
+"""Numbers in lanes: one register of the widest instructions there are today, two or four of others."""
 
 NUMBERS = ir.VectorType(ir.DoubleType(), LANES)
 BITS = ir.VectorType(ir.IntType(64), LANES)
@@ -18,7 +18,7 @@ ADDRESS = ir.IntType(8).as_pointer()
 
 
 class LanesType(types.Type):
-    """Numbers abreast. A single number is one of it that is the same in every lane."""
+    """Numbers in lanes. A single number is one of it that is the same in every lane."""
 
     def __init__(self) -> None:
         super().__init__("Lanes")

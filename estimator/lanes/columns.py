@@ -5,14 +5,14 @@ from __future__ import annotations
 import operator
 from typing import Any
 
-from estimator.abreast.tools import intrinsic, lower_builtin, signature, type_callable, types
-from estimator.abreast.types import ADDRESS, LANES, NUMBERS, ColumnsType, columns, lanes
+from estimator.lanes.tools import intrinsic, lower_builtin, signature, type_callable, types
+from estimator.lanes.types import ADDRESS, LANES, NUMBERS, ColumnsType, columns, lanes
 
 BYTES = 8
 
 
 @intrinsic
-def abreast(typingctx: Any, array: Any) -> Any:
+def as_lanes(typingctx: Any, array: Any) -> Any:
     """Return the rows of an array (n, LANES) to be read and set as lanes; whoever uses them keeps the array."""
     if not (isinstance(array, types.Array) and array.layout == "C" and array.ndim == 2):
         return None

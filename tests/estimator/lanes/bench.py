@@ -1,4 +1,4 @@
-"""A function of numbers called once with eight of each abreast, and eight times with one."""
+"""A function of numbers called once with eight of each in lanes, and eight times with one."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from typing import Any
 import numba
 import numpy as np
 
-from estimator.abreast import LANES, abreast
+from estimator.lanes import LANES, as_lanes
 from estimator.signals.record import FloatArray
 
 
 def in_both_ways(function: Callable[..., Any], arguments: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
-    """Return a compiled function's results, shape (N,), abreast and one by one, for arguments of shape (N,) each.
+    """Return a compiled function's results, shape (N,), in lanes and one by one, for arguments of shape (N,) each.
 
     Raises
     ------
@@ -30,36 +30,36 @@ def in_both_ways(function: Callable[..., Any], arguments: Sequence[FloatArray]) 
 
 @numba.njit(error_model="numpy")
 def of_one(function: Any, rows: Any, out: Any) -> None:
-    to, x = abreast(out), abreast(rows[0])
+    to, x = as_lanes(out), as_lanes(rows[0])
     for i in range(out.shape[0]):
         to[i] = function(x[i])
 
 
 @numba.njit(error_model="numpy")
 def of_two(function: Any, rows: Any, out: Any) -> None:
-    to, x, y = abreast(out), abreast(rows[0]), abreast(rows[1])
+    to, x, y = as_lanes(out), as_lanes(rows[0]), as_lanes(rows[1])
     for i in range(out.shape[0]):
         to[i] = function(x[i], y[i])
 
 
 @numba.njit(error_model="numpy")
 def of_three(function: Any, rows: Any, out: Any) -> None:
-    to, x, y, z = abreast(out), abreast(rows[0]), abreast(rows[1]), abreast(rows[2])
+    to, x, y, z = as_lanes(out), as_lanes(rows[0]), as_lanes(rows[1]), as_lanes(rows[2])
     for i in range(out.shape[0]):
         to[i] = function(x[i], y[i], z[i])
 
 
 @numba.njit(error_model="numpy")
 def of_four(function: Any, rows: Any, out: Any) -> None:
-    to, x, y, z, u = abreast(out), abreast(rows[0]), abreast(rows[1]), abreast(rows[2]), abreast(rows[3])
+    to, x, y, z, u = as_lanes(out), as_lanes(rows[0]), as_lanes(rows[1]), as_lanes(rows[2]), as_lanes(rows[3])
     for i in range(out.shape[0]):
         to[i] = function(x[i], y[i], z[i], u[i])
 
 
 @numba.njit(error_model="numpy")
 def of_five(function: Any, rows: Any, out: Any) -> None:
-    to, x, y, z = abreast(out), abreast(rows[0]), abreast(rows[1]), abreast(rows[2])
-    u, v = abreast(rows[3]), abreast(rows[4])
+    to, x, y, z = as_lanes(out), as_lanes(rows[0]), as_lanes(rows[1]), as_lanes(rows[2])
+    u, v = as_lanes(rows[3]), as_lanes(rows[4])
     for i in range(out.shape[0]):
         to[i] = function(x[i], y[i], z[i], u[i], v[i])
 

@@ -7,8 +7,8 @@ from typing import Any
 
 from llvmlite import ir
 
-from estimator.abreast.tools import intrinsic, overload, register_jitable, types
-from estimator.abreast.types import BITS, LANES, NUMBERS, lanes
+from estimator.lanes.tools import intrinsic, overload, register_jitable, types
+from estimator.lanes.types import BITS, LANES, NUMBERS, lanes
 
 LARGEST = 708.0
 """Beyond this the exponential leaves the range of a number; it stays at its end."""

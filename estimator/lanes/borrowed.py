@@ -1,4 +1,4 @@
-"""Arrays lent to compiled code, which counts no references to them: whoever lends one keeps it meanwhile.
+"""Arrays borrowed by compiled code, which counts no references to them: the owner keeps each meanwhile.
 
 numba counts every hand that an array passes through, inlined calls included, and each count is an atomic instruction.
 In a simulation they took seven tenths of the time; and where two threads simulate with rows of one array, the cores
@@ -11,12 +11,12 @@ from __future__ import annotations
 
 from typing import Any, TypeVar
 
-from estimator.abreast.tools import cgutils, intrinsic, overload, types
+from estimator.lanes.tools import cgutils, intrinsic, overload, types
 
-Lent = TypeVar("Lent")
+Borrowed = TypeVar("Borrowed")
 
 
-def lent(array: Lent) -> Lent:
+def borrowed(array: Borrowed) -> Borrowed:
     """Return an array without its owner, who keeps it until compiled code is done with it; of Python, the array."""
     return array
 
@@ -31,8 +31,8 @@ def _without_owner(typingctx: Any, array: Any) -> Any:
     return array(array), made
 
 
-@overload(lent, strict=False)
-def _lent(array: Any) -> Any:
+@overload(borrowed, strict=False)
+def _borrowed(array: Any) -> Any:
     if isinstance(array, types.Array):
         return lambda array: _without_owner(array)
     return None

@@ -1,4 +1,4 @@
-"""Which way to go, of one number or of many abreast.
+"""Which way to go, of one number or of many in lanes.
 
 ``if`` asks one question. Lanes give an answer each: ``choose`` takes of two values, both worked out, the one each lane
 asks for; ``every`` and ``some`` tell whether anything has to be worked out at all.
@@ -10,8 +10,8 @@ from typing import Any
 
 from llvmlite import ir
 
-from estimator.abreast.tools import intrinsic, overload, types
-from estimator.abreast.types import LANES, MaskType, lanes, mask
+from estimator.lanes.tools import intrinsic, overload, types
+from estimator.lanes.types import LANES, MaskType, lanes, mask
 
 
 def choose(condition: bool, value: float, other: float) -> float:
