@@ -8,6 +8,7 @@ from __future__ import annotations
 from contextlib import suppress
 
 from estimator.diagnosis.diagnose import diagnose
+from estimator.diagnosis.first_use import compile_named, signatures
 from estimator.errors import EstimatorError
 from estimator.identification.settings import Settings
 from hil.rig.live import tracking_settings
@@ -19,6 +20,8 @@ SHORT_S = 4.0
 
 def main() -> None:
     """Run the truth, the diagnosis and both on-line chains over a few seconds."""
+    for masses in (2, 3, 1):
+        compile_named(masses, *(kernel.__name__ for kernel in signatures(masses)))
     case = make("backlash", 1, SHORT_S)
     with suppress(EstimatorError):  # so short they need not tell anything: all there is to compile has been by then
         diagnose(case.records, case.model)

@@ -30,7 +30,7 @@ def texts() -> Iterator[tuple[str, str]]:
 
 
 def found(better: dict[str, str], text: str) -> Iterator[tuple[int, str, str]]:
-    """Yield line, word, and what to say instead; each part of a name (``is_told``) is a word."""
+    """Yield line, word, and what to say instead; each part of a name (as of ``is_late``) is a word."""
     for word, say in better.items():
         for hit in re.finditer(rf"(?<![A-Za-z])(?:{word})(?![a-z])", text, re.IGNORECASE):
             yield text.count("\n", 0, hit.start()) + 1, hit[0], say

@@ -173,7 +173,7 @@ class Step:
     lasting: bool = False
 
     def turned(self, nominal: float, size: float) -> tuple[float, float]:
-        """Return value and size of the same step told the other way round: changed is what was not."""
+        """Return value and size of the same step expressed the other way round: changed is what was not."""
         after = nominal * (1.0 + size) if self.relative else nominal + size
         return after, nominal / after - 1.0 if self.relative else -size
 

@@ -15,7 +15,7 @@ from hil.commission.finding import Finding
 RESULT_SCHEMA = "hil.commission_result/1"
 
 MARKS = MappingProxyType({True: ("within", "green"), False: ("OUTSIDE", "bold red"), None: ("–", "")})
-"""What stands for within, outside, and no limit or not told; the word says it, not the colour."""
+"""What stands for within, outside, and no limit or not known; the word says it, not the colour."""
 
 
 def findings_table(title: str, findings: Sequence[Finding]) -> Table:
@@ -25,9 +25,9 @@ def findings_table(title: str, findings: Sequence[Finding]) -> Table:
         table.add_column(column, overflow="fold")
     for finding in findings:
         word, style = MARKS[finding.within]
-        told = word if finding.within is not None or finding.expected == "–" else "can't tell"
+        verdict = word if finding.within is not None or finding.expected == "–" else "can't tell"
         row = (finding.what, finding.expected, finding.measured)
-        table.add_row(*(Text(cell) for cell in row), Text(told, style=style))
+        table.add_row(*(Text(cell) for cell in row), Text(verdict, style=style))
         if finding.advice and finding.within is not True:
             table.add_row(Text(""), Text(f"→ {finding.advice}", style="italic"), Text(""), Text(""))
     return table
@@ -82,7 +82,7 @@ def result_lines(document: Mapping[str, Any]) -> Iterator[str]:
     yield ""
     if open_steps:
         to_go = "1 step" if len(open_steps) == 1 else f"{len(open_steps)} steps"
-        yield f"not complete: it goes on with {open_steps[0]} at the next call, {to_go} to go"
+        yield f"not complete: it continues with {open_steps[0]} at the next call, {to_go} to go"
     else:
         yield f"complete: {_outside(document['outside'])}, {document['driven_s'] / 60.0:.1f} min driven"
     if skipped:

@@ -48,7 +48,7 @@ BLOCKS = 100
 PEER_SAMPLES = 100_000
 
 HINT = "python -m venv /tmp/peers && /tmp/peers/bin/pip install padasip==1.2.2, then --padasip /tmp/peers/bin/python"
-COLUMNS = ("one update", "beside", "here", "there", "ratio", "pair by pair", "limit")
+COLUMNS = ("one update", "next to", "here", "there", "ratio", "pair by pair", "limit")
 C_FLAGS: tuple[tuple[str, ...], ...] = ((), ("-march=native",))
 
 
@@ -68,7 +68,7 @@ def again_and_again(estimator: RecursiveEstimator, samples: Data, times: int) ->
     return run
 
 
-def beside_c(pairs: int, samples: Data, times: int, flags: Sequence[str] = ()) -> Comparison:
+def against_c(pairs: int, samples: Data, times: int, flags: Sequence[str] = ()) -> Comparison:
     """Compare OEFO on a block with the same algorithm in C, in turn."""
     ours = again_and_again(oefo(), samples, times)
     law = DecreasingThenConstantTrace().law
@@ -100,7 +100,7 @@ def padasip_took(python: str, folder: Path, samples: Data) -> Taken:
     return Taken(*json.loads(done.stdout)["taken_s"])
 
 
-def beside_padasip(pairs: int, python: str, estimator: RecursiveEstimator) -> Comparison:
+def against_padasip(pairs: int, python: str, estimator: RecursiveEstimator) -> Comparison:
     """Compare an estimator on blocks with padasip's recursive least squares, in turn."""
     ours = again_and_again(estimator, data(BLOCK), PEER_SAMPLES // BLOCK)
     samples = data(PEER_SAMPLES)
@@ -126,7 +126,7 @@ def update(pairs: int) -> list[tuple[str, ...]]:
     lines = []
     for flags in C_FLAGS:
         companion = " ".join(["C, gcc -O3", *flags])
-        comparison = beside_c(pairs, data(BLOCK), BLOCKS, flags)
+        comparison = against_c(pairs, data(BLOCK), BLOCKS, flags)
         lines.append(per_sample(comparison, BLOCK * BLOCKS, "OEFO, in blocks", companion, "at most 2", inverse=True))
     return lines
 
@@ -139,7 +139,7 @@ def padasip(pairs: int, given: str | None) -> list[tuple[str, ...]]:
         return []
     lines = []
     for estimator in (Rls(MODEL.orders, DecreasingGain()), oefo()):
-        comparison = beside_padasip(pairs, python, estimator)
+        comparison = against_padasip(pairs, python, estimator)
         what = f"{estimator.name.upper()}, in blocks"
         lines.append(per_sample(comparison, PEER_SAMPLES, what, "padasip's RLS", "at least 100", inverse=False))
     return lines

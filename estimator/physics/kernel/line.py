@@ -43,19 +43,19 @@ def is_elastic(p: FloatArray) -> bool:
 
 @inlined
 def is_bristled(p: FloatArray) -> bool:
-    """Tell whether dry friction, at the motor or at the load, bends before it slides."""
+    """Tell whether dry friction, at the motor or at the load, deflects before it slides."""
     return is_bristled_at_motor(p) or is_bristled_at_load(p)
 
 
 @inlined
 def is_bristled_at_motor(p: FloatArray) -> bool:
-    """Tell whether dry friction at the motor bends before it slides."""
+    """Tell whether dry friction at the motor deflects before it slides."""
     return some(p[slots.COULOMB_PRESLIDING] > 0.0) or some(p[slots.STRIBECK_PRESLIDING] > 0.0)
 
 
 @inlined
 def is_bristled_at_load(p: FloatArray) -> bool:
-    """Tell whether dry friction at the load bends before it slides, that of a brake included."""
+    """Tell whether dry friction at the load deflects before it slides, that of a brake included."""
     return some(p[slots.COULOMB_LOAD_PRESLIDING] > 0.0) or some(p[slots.BRAKE_PRESLIDING] > 0.0)
 
 

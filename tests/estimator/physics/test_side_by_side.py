@@ -151,7 +151,7 @@ def test_kin_follow_each_other() -> None:
 
 
 @pytest.mark.parametrize("place", ["between_kg_m2", "behind_kg_m2"])
-def test_a_mode_within_a_line_that_bends(place: str) -> None:
+def test_a_mode_within_a_nonlinear_line(place: str) -> None:
     line = model(TWO_MASS, effects=SLIDER)
     p = flat(line)
     p[slot("extra_torsional_mode", place)] = 0.3

@@ -14,7 +14,7 @@ RECORDS = [record(np.zeros(3001), np.zeros(3001))]  # 30 s at 10 ms
 
 
 @pytest.mark.parametrize(
-    ("name", "key", "told", "not_told"),
+    ("name", "key", "reported", "too_small"),
     [
         ("actuator_lag", "time_constant_s", 1.1e-3, 0.9e-3),
         ("speed_filter", "time_constant_s", 1.1e-3, 0.9e-3),
@@ -23,11 +23,11 @@ RECORDS = [record(np.zeros(3001), np.zeros(3001))]  # 30 s at 10 ms
     ],
 )
 def test_a_tenth_of_the_sampling_period_is_the_least_that_is_reported(
-    name: str, key: str, told: float, not_told: float
+    name: str, key: str, reported: float, too_small: float
 ) -> None:
     unresolved = EFFECTS[name].unresolved
-    assert unresolved(LINE, RECORDS, {key: told}) == ""
-    assert "less than a tenth of the sampling period" in unresolved(LINE, RECORDS, {key: not_told})
+    assert unresolved(LINE, RECORDS, {key: reported}) == ""
+    assert "less than a tenth of the sampling period" in unresolved(LINE, RECORDS, {key: too_small})
 
 
 def test_a_wheel_at_the_edge_of_its_bounds_is_none() -> None:
