@@ -93,7 +93,7 @@ def identify(
 
 def _read(
     recordings: Sequence[Path], model: Path | None, dbc: Path | None, trust_laws: bool
-) -> tuple[list[Record], DrivelineModel | None]:
+) -> tuple[Sequence[Record], DrivelineModel | None]:
     """Read the recordings, as a model file says where there is one, and that."""
     from hil.config.model_file import read_model_for_recordings
     from hil.errors import ModelFileError

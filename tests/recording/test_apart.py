@@ -123,10 +123,9 @@ def test_a_compressed_mat_file_is_unpacked_no_further_than_allowed(tmp_path: Pat
     head = flags + shape + name + (9).to_bytes(4, "little") + (n_bytes & 0xFFFFFFFF).to_bytes(4, "little")
     packing = zlib.compressobj(9)
     element = (14).to_bytes(4, "little") + ((len(head) + n_bytes) & 0xFFFFFFFF).to_bytes(4, "little") + head
-    packed = packing.compress(element)
-    for _ in range(n_bytes >> 24):
-        packed += packing.compress(bytes(1 << 24))
-    packed += packing.flush()
+    packed = packing.compress(element) + packing.flush(zlib.Z_FULL_FLUSH)
+    zeros = packing.compress(bytes(1 << 24)) + packing.flush(zlib.Z_FULL_FLUSH)  # stands alone, so it can be repeated
+    packed += zeros * (n_bytes >> 24) + packing.flush()
     with path.open("wb") as file:
         file.write(b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM")
         file.write((15).to_bytes(4, "little") + len(packed).to_bytes(4, "little") + packed)
