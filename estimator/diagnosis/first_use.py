@@ -55,8 +55,8 @@ def signatures(masses: int) -> dict[Any, tuple[Any, ...]]:
 
 
 SIDE_BY_SIDE: tuple[tuple[tuple[Any, ...], tuple[Any, ...]], ...] = (
-    ((integrate,), (integrate_side_by_side,)),
-    ((integrate_each,), (linearise, least, run_filter, run_smoother)),
+    ((integrate,), (integrate_side_by_side, least)),
+    ((integrate_each,), (linearise, run_filter, run_smoother)),
 )
 """What one process compiles while the other does, callers last."""
 

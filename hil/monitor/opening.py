@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from drivers.errors import DriverError
-from estimator.identification.online.chain import decimation_factor
+from estimator.identification.chain import decimation_factor
 from estimator.identification.online.regression import checked_filter
 from estimator.physics.twist import Shaft
 from hil.config.model_file import read_model

@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any
 from estimator.identification.tracking.state import TrackingState
 
 if TYPE_CHECKING:  # the estimator takes half a second to import, and a run without an estimate has no use for it
-    from estimator.identification.online.chain import OnlineChain
-    from estimator.identification.online.online_estimate import OnlineEstimate, OnlineTrajectory
+    from estimator.identification.chain import OnlineChain
+    from estimator.identification.online_estimate import OnlineEstimate, OnlineTrajectory
     from estimator.identification.tracking.alarm import Alarm
 
 SCHEMA = "hil.online/1"

@@ -19,7 +19,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from scipy.stats import poisson
 
-from estimator.identification.online.chain import OnlineChain
+from estimator.identification.chain import OnlineChain
 from estimator.identification.settings import Settings
 from estimator.identification.tracking.watch_settings import WatchSettings
 from estimator.signals.record import Record

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from estimator.identification.chain import OnlineChain
 from estimator.identification.online.adaptation import ConstantForgetting
-from estimator.identification.online.chain import OnlineChain
 from hil.cli.main import run
 from hil.config.rig_file import read_rig
 from hil.recording import read_record

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from estimator.identification.chain import OnlineChain
 from estimator.identification.linear_model import Orders
 from estimator.identification.online.adaptation import Adaptation
-from estimator.identification.online.chain import OnlineChain
 from estimator.identification.online.recursive import Status
 from estimator.identification.settings import Settings
 from estimator.signals.record import FloatArray

@@ -12,9 +12,9 @@ import pytest
 from scipy.stats import poisson
 
 from estimator.errors import BadSetting
+from estimator.identification.chain import OnlineChain
 from estimator.identification.online.adaptation import ConstantForgetting
-from estimator.identification.online.chain import OnlineChain
-from estimator.identification.online.online_estimate import OnlineTrajectory
+from estimator.identification.online_estimate import OnlineTrajectory
 from estimator.identification.settings import Settings
 from estimator.identification.tracking.state import TrackingState
 from estimator.identification.tracking.watch import ChangeWatch

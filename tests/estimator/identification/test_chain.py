@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from estimator.errors import BadSetting, BadShape
+from estimator.identification.chain import OnlineChain
 from estimator.identification.identify import identify
 from estimator.identification.online.adaptation import ConstantForgetting
-from estimator.identification.online.chain import OnlineChain
-from estimator.identification.online.online_estimate import OnlineTrajectory
+from estimator.identification.online_estimate import OnlineTrajectory
 from estimator.identification.settings import Settings
 from estimator.identification.tracking.state import TrackingState
 from estimator.identification.tracking.watch_settings import WatchSettings

@@ -22,8 +22,8 @@ import numpy as np
 from estimator.errors import BadSetting, BadShape
 from estimator.identification.excitation import SAMPLES_PER_PARAMETER
 from estimator.identification.online.oefo import Filtering, Oefo
-from estimator.identification.online.online_estimate import OnlineEstimate, OnlineTrajectory
 from estimator.identification.online.recursive import RecursiveEstimator
+from estimator.identification.online_estimate import OnlineEstimate, OnlineTrajectory
 from estimator.identification.settings import Settings
 from estimator.identification.tracking.follow import Follower
 from estimator.identification.tracking.tracker import Tracker
