@@ -29,7 +29,8 @@ def c_files(d: Driveline, version: str) -> tuple[dict[str, str], list[str], str]
     number = version[0]
     headers = {name: text for name, text in _headers().items() if name.startswith(f"fmi{number}")}
     functions = f"fmi{number}Functions.h"
-    own = {name: sources.own(name) for name in ("driveline.c", "driveline.h", f"fmi{number}.c")}
+    own = {name: sources.own(name) for name in ("driveline.c", "driveline.h")}
+    own[f"fmi{number}.c"] = sources.interface(number)
     stubs = sources.stubs(headers[f"fmi{number}FunctionTypes.h"], functions, own[f"fmi{number}.c"])
     files = {**headers, **own, "laws.h": sources.laws(), "stubs.c": stubs}
     text = "".join((*files.values(), sources.model_header(d, "")))
