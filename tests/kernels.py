@@ -1,4 +1,4 @@
-"""``python -m tests.kernels``: compile what most tests need, once and on one core, while lint has the other.
+"""``python -m tests.kernels``: compile what most tests need, once, while lint is at work.
 
 In a fresh clone two workers would compile the same kernels at the same time.
 """
@@ -8,7 +8,7 @@ from __future__ import annotations
 from contextlib import suppress
 
 from estimator.diagnosis.diagnose import diagnose
-from estimator.diagnosis.first_use import compile_named, signatures
+from estimator.diagnosis.first_use import compile_kernels
 from estimator.errors import EstimatorError
 from estimator.identification.settings import Settings
 from hil.rig.live import tracking_settings
@@ -21,7 +21,7 @@ SHORT_S = 4.0
 def main() -> None:
     """Run the truth, the diagnosis and both on-line chains over a few seconds."""
     for masses in (2, 3, 1):
-        compile_named(masses, *(kernel.__name__ for kernel in signatures(masses)))
+        compile_kernels(masses)
     case = make("backlash", 1, SHORT_S)
     with suppress(EstimatorError):  # so short they need not tell anything: all there is to compile has been by then
         diagnose(case.records, case.model)
