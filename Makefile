@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN    := .venv/bin
 READY  := .venv/.ready
 
-.PHONY: setup demo prove test kernels campaign bench docs lint lock clean
+.PHONY: setup demo prove test kernels campaign bench docs lint dist lock clean
 
 setup: $(READY)
 
@@ -17,7 +17,7 @@ $(READY): requirements.lock pyproject.toml
 demo: $(READY)
 	$(BIN)/hil demo
 
-# Sealed cases, answered by the public command and opened: out/proof/scoreboard.html. Goes on where it was interrupted.
+# Sealed cases, answered by the public command and opened: out/proof/scoreboard.html. Continues where it was interrupted.
 prove: $(READY)
 	$(BIN)/hil prove --out out/proof
 
@@ -52,8 +52,17 @@ docs: $(READY)
 lint: $(READY)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/python tools/words.py
 	$(BIN)/lint-imports
 	$(BIN)/mypy
+
+# Wheel and sdist in dist/, and a trial of the wheel in an empty environment, with the declared ranges and not the lock.
+dist: $(READY)
+	rm -rf dist out/dist
+	$(BIN)/python -m hatchling build
+	$(PYTHON) -m venv out/dist
+	out/dist/bin/python -m pip install --quiet --disable-pip-version-check dist/*.whl
+	cd out/dist && bin/hil --version && bin/hil effects backlash
 
 lock:   # needs `pip install uv`; writes names, versions and hashes only
 	uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-emit-find-links \

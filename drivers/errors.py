@@ -26,7 +26,7 @@ class CommandRefused(DriverError, ValueError):
     """The torque guard refused a command: the caller is at fault.
 
     Examples: a torque above the limit, a step faster than the allowed rate, feedback that is too old.
-    To do: lower the request or mend the source of the stale feedback; the drive is at zero torque.
+    To do: lower the request or fix the source of the stale feedback; the drive is at zero torque.
     """
 
 
@@ -41,7 +41,7 @@ class ConfigMismatch(DriverError):
 class DeviceFault(DriverError):
     """The device reports a fault (CiA 402 FAULT state, EMCY, PLC permissive withdrawn).
 
-    To do: read the cause in the message at the device, mend it, reset the fault, start again.
+    To do: read the cause in the message at the device, fix it, reset the fault, start again.
     """
 
 

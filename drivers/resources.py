@@ -1,6 +1,6 @@
 """Where the project's data files are: EDS and register map.
 
-An installed wheel carries them in ``drivers/eds``; a checkout keeps them in ``eds`` beside the packages,
+An installed wheel carries them in ``drivers/eds``; a checkout keeps them in ``eds`` next to the packages,
 where a bus engineer looks for them.
 """
 

@@ -127,20 +127,20 @@ class TorqueError:
                 each = f"m1 {m1.torque_nm:g} for {asked_m1_nm:g} Nm, m2 {m2.torque_nm:g} for {asked_m2_nm:g} Nm"
                 yield f"{fault}: {each}"
 
-    def _fault(self, t_ns: int, part: int, came: Measured, error_nm: float) -> Iterator[str]:
-        counts = [self._count(t_ns, part, lag, came, error_nm) for lag in SAMPLED]
+    def _fault(self, t_ns: int, part: int, got: Measured, error_nm: float) -> Iterator[str]:
+        counts = [self._count(t_ns, part, lag, got, error_nm) for lag in SAMPLED]
         if max(counts) >= self._most and min(counts) >= self._most / 2.0:
             where, key = _NAMES[part]
-            low, high = self._range(part, SAMPLED[0], came.limited)
+            low, high = self._range(part, SAMPLED[0], got.limited)
             yield (
-                f"{where}: torque actual value 0x6077 is {came.torque_nm:g} Nm, expected {_shown(low, high)} as "
+                f"{where}: torque actual value 0x6077 is {got.torque_nm:g} Nm, expected {_shown(low, high)} as "
                 f"commanded, within {error_nm:g} Nm ({key})"
             )
 
-    def _count(self, t_ns: int, part: int, lag: int, came: Measured, error_nm: float) -> int:
-        low, high = self._range(part, lag, came.limited)
-        outside = not low - error_nm <= came.torque_nm <= high + error_nm
-        return self._outside[part, lag].take(t_ns, outside and not (came.repeated and self._moves(part)))
+    def _count(self, t_ns: int, part: int, lag: int, got: Measured, error_nm: float) -> int:
+        low, high = self._range(part, lag, got.limited)
+        outside = not low - error_nm <= got.torque_nm <= high + error_nm
+        return self._outside[part, lag].take(t_ns, outside and not (got.repeated and self._moves(part)))
 
     def _moves(self, part: int) -> bool:
         return any(torques_nm[part] != self._commands[-1][part] for torques_nm in self._commands)

@@ -231,7 +231,7 @@ class TorqueGuard:
         if faults:
             self.disable()
             raise CommandRefused(
-                f"torque guard: {'; '.join(faults)}. The guard is now disabled: send zero torque, mend the "
+                f"torque guard: {'; '.join(faults)}. The guard is now disabled: send zero torque, fix the "
                 "cause, enable it again."
             )
         self._error.commanded(request.total_m1_nm, request.total_m2_nm)

@@ -1,7 +1,8 @@
 """One way to compile: numba with a disk cache that a changed law can't outlive.
 
-numba keys its cache by the file of the outermost function alone, so a kernel would go on using the old code of a law
-that lives in another file. Here the cache folder carries the digest of every source file beside which code is compiled.
+numba keys its cache by the file of the outermost function alone, so a kernel would keep using the old code of a law
+that lives in another file. Here the cache folder carries the digest of every source file next to which code is
+compiled.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from estimator.undisturbed import compile_undisturbed
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
-PACKAGES = ("abreast", "signals", "identification", "physics", "diagnosis/line")
+PACKAGES = ("lanes", "signals", "identification", "physics", "diagnosis/line")
 """Packages that hold compiled code, or constants that it freezes."""
 
 
@@ -54,17 +55,17 @@ def inlined(function: Function) -> Function:
     """Compile a function into whatever calls it: what is constant there is worked out once, and no call is left.
 
     Of an array that is handed over, references are still counted, two atomic operations per array and call. A loop
-    hands over what owns nothing: arrays that are lent (``estimator.abreast.lent``), or parts of a record
+    hands over what owns nothing: borrowed arrays (``estimator.lanes.borrowed``), or parts of a record
     (``estimator.identification.online.memory``).
     """
     return cast(Function, numba.njit(cache=True, nogil=True, error_model="numpy", forceinline=True)(function))
 
 
-def woven(function: Function) -> Function:
+def ir_inlined(function: Function) -> Function:
     """Compile a function as a part of each compiled one that calls it, and never by itself.
 
     What calls a kernel takes the kernel's whole code in and works on it anew. Where several small functions stand in
-    between, each would; they are woven into one.
+    between, each would; so they are inlined before anything is compiled.
     """
     return cast(Function, numba.njit(nogil=True, error_model="numpy", inline="always")(function))
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from hil.api import Record, compare, diagnose, read, read_model
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 __all__ = ["Record", "compare", "diagnose", "read", "read_model"]
 

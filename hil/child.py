@@ -1,6 +1,6 @@
 """Processes that this program starts: none of them imports a module from the folder it happens to be in.
 
-Python looks for modules in the working folder first, for ``-m`` and ``-c`` alike: a ``pickle.py`` beside somebody's
+Python looks for modules in the working folder first, for ``-m`` and ``-c`` alike: a ``pickle.py`` next to somebody's
 recordings would be run. ``-P`` (PYTHONSAFEPATH) leaves that out. A process that needs no folder gets an empty one.
 """
 

@@ -39,7 +39,7 @@ class FileProblem(InputError):
     path
         The file at fault.
     problems
-        One line each: ``place: expected ..., came ...``.
+        One line each: ``place: expected ..., got ...``.
     """
 
     def __init__(self, path: Path | str, *problems: str) -> None:

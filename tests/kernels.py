@@ -1,4 +1,4 @@
-"""``python -m tests.kernels``: compile what most tests need, once and on one core, while lint has the other.
+"""``python -m tests.kernels``: compile what most tests need, once, while lint is at work.
 
 In a fresh clone two workers would compile the same kernels at the same time.
 """
@@ -8,8 +8,9 @@ from __future__ import annotations
 from contextlib import suppress
 
 from estimator.diagnosis.diagnose import diagnose
+from estimator.diagnosis.first_use import compile_kernels
 from estimator.errors import EstimatorError
-from estimator.identification.identify import Settings
+from estimator.identification.settings import Settings
 from hil.rig.live import tracking_settings
 from hil.rig.live_replay import Pace, play_record
 from tests.benchmarks.cases import make
@@ -19,6 +20,8 @@ SHORT_S = 4.0
 
 def main() -> None:
     """Run the truth, the diagnosis and both on-line chains over a few seconds."""
+    for masses in (2, 3, 1):
+        compile_kernels(masses)
     case = make("backlash", 1, SHORT_S)
     with suppress(EstimatorError):  # so short they need not tell anything: all there is to compile has been by then
         diagnose(case.records, case.model)

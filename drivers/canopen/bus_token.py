@@ -2,7 +2,7 @@
 
 Every program of this machine, and every page in its browser, can reach a port of it. A served bus takes only those who
 name its token, as the path of its URL: ``ws://127.0.0.1:54701/TOKEN/``. It is made anew for each server, and kept in a
-file of the user's own, so that a rig file that names the port alone goes on working for that user.
+file of the user's own, so that a rig file that names the port alone keeps working for that user.
 """
 
 from __future__ import annotations

@@ -213,7 +213,7 @@ class CanLink:
         BusDown
             If the bus is gone; from then on at every call.
         ProtocolViolation
-            If a frame could not be read; once, receiving goes on.
+            If a frame could not be read; once, receiving continues.
         """
         self._raise_if_down()
         violation, self._violation = self._violation, None

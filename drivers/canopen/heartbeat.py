@@ -132,7 +132,7 @@ class HeartbeatProducer:
             self._stop.wait(self.period_s)
 
     def beat(self) -> None:
-        """Send one now, beside those of the period."""
+        """Send one now, besides those of the period."""
         self._send(self._cob_id, bytes((self._state(),)))
 
     def stop(self) -> None:

@@ -142,7 +142,7 @@ class NodeMonitor:
         """
         if self._emergency is not None:
             raise DeviceFault(
-                f"{self._where}: {self._emergency}, expected none. Mend the cause at the drive, reset the fault."
+                f"{self._where}: {self._emergency}, expected none. Fix the cause at the drive, reset the fault."
             )
         with self._changed:
             state = self._heartbeat.state
@@ -150,7 +150,7 @@ class NodeMonitor:
         if self._expected is not None and state is not self._expected:
             cause = "Something else reset or stopped the drive"
             if self._past_emergency is not None:
-                cause = f"It told {self._past_emergency}, and took that back"
+                cause = f"It sent {self._past_emergency}, and its end"
             raise DeviceFault(
                 f"{self._where}: NMT state is {_title(state)}, expected {self._expected.title}. {cause}; "
                 "configure it again."

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TypeVar
+from typing import Protocol, TypeVar
 
+from canopen.objectdictionary import ObjectDictionary
 from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
 from drivers.canopen.sdo_node import SdoNode, SdoSilence
-from drivers.datasheet.file import EdsFile
 from drivers.errors import ConfigMismatch, DeviceTimeout, ProtocolViolation
+from drivers.scaling import IntegerType
 
 T = TypeVar("T")
 
@@ -17,6 +18,19 @@ T = TypeVar("T")
 def object_name(index: int, subindex: int = 0) -> str:
     """Name an object in a message: ``0x1018:01``."""
     return f"0x{index:04X}:{subindex:02X}"
+
+
+class ObjectTypes(Protocol):
+    """What the node's data sheet says of its objects; `drivers.datasheet.file.EdsFile` does."""
+
+    @property
+    def dictionary(self) -> ObjectDictionary:
+        """Every object there is."""
+        ...
+
+    def integer_type(self, index: int, subindex: int = 0) -> IntegerType:
+        """Return an object's type; `ConfigMismatch` if it has none or is no integer."""
+        ...
 
 
 class SdoChannel:
@@ -34,7 +48,7 @@ class SdoChannel:
         How long to wait for each answer [s].
     """
 
-    def __init__(self, node: SdoNode, eds: EdsFile, where: str, timeout_s: float) -> None:
+    def __init__(self, node: SdoNode, eds: ObjectTypes, where: str, timeout_s: float) -> None:
         self._client = node.sdo
         self._client.RESPONSE_TIMEOUT = timeout_s
         self._eds = eds

@@ -2,7 +2,7 @@
 
 ``canopen``'s client takes the acknowledgement of any write for that of its own. An answer that comes after its
 request was given up (time-out, Ctrl-C) would then confirm another object than the one it belongs to, or give an old
-value of the same one. SDO frames have no number. So two things tell answers apart:
+value of the same one. SDO frames have no number. So two things distinguish answers:
 
 - the object they name, their multiplexer, must be the one asked for;
 - while a request is unanswered, the next one waits until the node has answered a probe, a read of one of the objects

@@ -1,7 +1,7 @@
 """Another controller on the bus: a frame that comes in, with an identifier that only this program sends.
 
 CAN hands no node its own frames. So a SYNC, an NMT command, the host's heartbeat, an RPDO or an SDO request to one of
-the drives that *arrives* is somebody else's, and a torque may be too. It can't be told from ours by the drive.
+the drives that *arrives* is somebody else's, and a torque may be too. It can't be distinguished from ours by the drive.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Which PDOs carry what: one that maps it all, one that this program maps, or several. No bus.
 
-A maker's own PDOs seldom carry torque command and feedback in one frame each. So the search goes on to the first PDO
+A maker's own PDOs seldom carry torque command and feedback in one frame each. So the search continues to the first PDO
 whose parameters can be written and whose mapping has room; the host maps it then at every configuration, in the order
 of CiA 301, 7.5.2.36. Where no PDO takes it all, as with mappings that are fixed, several share it: CiA 402 itself
 names such, each with controlword or statusword and one value more.

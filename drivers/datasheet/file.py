@@ -1,7 +1,7 @@
 """A drive's EDS or DCF (CiA 306) as the drivers use it: data types, values and PDO codecs of its objects.
 
 The chain is `drivers.datasheet.text` (lines), `objects` (objects), `dictionary` (the ``canopen`` library's own form)
-and `sheet` (what is asked for). What a file has wrong is an error as soon as it is asked for; `drivers.datasheet.check`
+and `sheet` (what is asked for). What a file has wrong is an error as soon as it is asked for; `drivers.eds_check`
 says it all beforehand.
 """
 
@@ -72,9 +72,9 @@ class EdsFile:
         """
         code = getattr(self.dictionary.get_variable(index, subindex), "data_type", None)
         if code not in _INTEGER_CODES:
-            came = "no such object" if code is None else f"data type 0x{code:04X}"
+            got = "no such object" if code is None else f"data type 0x{code:04X}"
             raise ConfigMismatch(
-                f"EDS {self.path}: expected an integer object 0x{index:04X}:{subindex:02X}, found {came}. "
+                f"EDS {self.path}: expected an integer object 0x{index:04X}:{subindex:02X}, found {got}. "
                 "Use the EDS of the drive's firmware version."
             )
         return IntegerType(code)

@@ -39,7 +39,7 @@ class Formula:
     Attributes
     ----------
     constant
-        What stands beside the node id.
+        What stands next to the node id.
     of_node_id
         Whether the node id is added.
     node_id_first

@@ -5,7 +5,7 @@ it is left over from somebody's tool.
 
 Read with the tolerance that vendors' files need: a missing ObjectType is VAR (CiA 306), or RECORD where
 there are sub-indices; a blank PDOMapping is 0; ``CompactSubObj`` is written out. What is wrong is for
-`drivers.datasheet.check` to tell; here it is None, and whoever needs it refuses.
+`drivers.eds_check` to tell; here it is None, and whoever needs it refuses.
 """
 
 from __future__ import annotations

@@ -211,7 +211,7 @@ class _Reader:
             return
         place = f"[{self._here.name}]"
         if not equals or not name:
-            self._warn(number, "key=value", repr(line), "It is left out; mend the line.", place)
+            self._warn(number, "key=value", repr(line), "It is left out; fix the line.", place)
             return
         value = _INLINE_COMMENT.split(value, maxsplit=1)[0].strip()
         value = "" if value.startswith(";") else value

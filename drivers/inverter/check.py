@@ -49,7 +49,7 @@ class Difference:
 
 
 def fixed_differences(sdo: SdoChannel, plan: DrivePlan, settings: InverterSettings) -> Iterator[Difference]:
-    """Compare what configuring can't mend: identity, scales, limits, modes."""
+    """Compare what configuring can't fix: identity, scales, limits, modes."""
     yield from _identity(sdo, plan, settings)
     if plan.has(Function.RATED_TORQUE):
         yield from _rated_torque(sdo, settings)
@@ -76,7 +76,7 @@ def configurable_differences(
             name = _pdo_name(carrier)
             yield Difference(settings.where, name, f"[{carrier.layout}]", f"[{found}]", plan.sheet.kind)
     for setting, value in _kept(sdo, given):
-        if value != setting.value and not _as_told(plan, setting, value):
+        if value != setting.value and not _as_ordered(plan, setting, value):
             yield Difference(settings.where, str(setting), str(setting.value), str(value), setting.source)
 
 
@@ -89,7 +89,7 @@ def remarks(
         if found != carrier.layout and (carrier.mapped_here or found == carrier.described):
             yield f"{_pdo_name(carrier)} has [{found}], a run gives it [{carrier.layout}]"
     for setting, value in _kept(sdo, given):
-        if value != setting.value and _as_told(plan, setting, value):
+        if value != setting.value and _as_ordered(plan, setting, value):
             yield f"{setting} is {value}, a run gives it {setting.value} ({setting.source})"
     for index, function in OPTION_CODES.items():
         described = plan.sheet.value(index)
@@ -102,7 +102,7 @@ def remarks(
                 )
 
 
-def _as_told(plan: DrivePlan, setting: DriveSetting, value: int) -> bool:
+def _as_ordered(plan: DrivePlan, setting: DriveSetting, value: int) -> bool:
     """Whether the drive has what its data sheet says, or that leaves it open."""
     return plan.sheet.value(setting.index, setting.subindex) in (value, None)
 
@@ -168,10 +168,10 @@ def _speed_unit(sdo: SdoChannel, plan: DrivePlan, settings: InverterSettings) ->
     if settings.speed_unit is None:
         expected = {part.index: plan.sheet.value(part.index, part.subindex) for part in parts}
         for index, value in found.items():
-            told = expected[index]
-            if told is not None and value != told:
+            wanted = expected[index]
+            if wanted is not None and value != wanted:
                 name = "SI unit velocity 0x60A9" if index == SI_UNIT_VELOCITY else f"unit of speed 0x{index:04X}"
-                yield Difference(settings.where, name, f"0x{told:08X}", f"0x{value:08X}", plan.sheet.kind)
+                yield Difference(settings.where, name, f"0x{wanted:08X}", f"0x{value:08X}", plan.sheet.kind)
     elif scale is not None and described_scale(plan, settings.where) is not None:
         stated = settings.speed_unit.scale.rad_s_per_count
         if abs(scale.rad_s_per_count - stated) > 1e-6 * stated:

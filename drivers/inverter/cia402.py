@@ -161,7 +161,7 @@ def state_of(statusword: int) -> PowerState:
     if state is None:
         raise ProtocolViolation(
             f"statusword 0x6041 is 0x{statusword:04X}: expected a CiA 402 state in bits 0-3, 5, 6, "
-            f"came 0x{statusword & _STATE_MASK:02X}. Check that the EDS is the one of this drive."
+            f"got 0x{statusword & _STATE_MASK:02X}. Check that the EDS is the one of this drive."
         )
     return state
 

@@ -1,4 +1,4 @@
-"""What configuring gives a drive beside its PDO layouts: which object, which value, and who asks for it.
+"""What configuring gives a drive next to its PDO layouts: which object, which value, and who asks for it.
 
 A dead host must mean zero torque; `drivers.inverter.protection` lists what of this sees to that.
 

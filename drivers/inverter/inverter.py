@@ -283,9 +283,9 @@ class Inverter:
         """
         self._armed = False
         self._send_command(Command.QUICK_STOP)  # overwrites the RPDO still waiting for SYNC
-        self._power.quick_stop(self._go_on_stopping)
+        self._power.quick_stop(self._continue_stopping)
 
-    def _go_on_stopping(self) -> None:
+    def _continue_stopping(self) -> None:
         """Repeat the command with every SYNC, or the drive would take the host for dead before its ramp is over."""
         self._send_command(Command.QUICK_STOP)
         self._link.sync()

@@ -218,7 +218,7 @@ class PowerControl:
 
     def _fault_of(self, state: PowerState) -> str:
         return (
-            f"power state is {state.value}, {self._cause()}, expected a drive without fault. Mend the cause at the "
+            f"power state is {state.value}, {self._cause()}, expected a drive without fault. Fix the cause at the "
             "drive, reset the fault."
         )
 
@@ -226,10 +226,10 @@ class PowerControl:
         if self._sdo.has(0x603F):
             code = self._sdo.upload(0x603F)
             return f"error code 0x603F is 0x{code:04X} {cause_of(code)}"
-        told = self._last_error()
-        if told is None:
+        emergency = self._last_error()
+        if emergency is None:
             return "cause unknown (no 0x603F in the drive, no EMCY since this program began)"
-        return f"error code of its EMCY is 0x{told:04X} {cause_of(told)}"
+        return f"error code of its EMCY is 0x{emergency:04X} {cause_of(emergency)}"
 
     def _poll(self, read: Callable[[], T], accept: Callable[[T], bool], timeout_s: float) -> T:
         """Read until accepted or out of time; the last value either way."""

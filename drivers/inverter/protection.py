@@ -8,9 +8,9 @@ sync_loss            0x1006: it may watch SYNC; what it makes of that is its mak
 drive_watchdog       the drive's own, as its maker names it
 ==================== ==========================================================================================
 
-The first three are to be there or accepted by name in the rig file; the others are told, for they may be the reason.
-The event timer of an RPDO is its deadline monitoring (CiA 301, 7.5.2.35): it runs from the first RPDO received, and a
-drive that misses the next says EMCY 0x8250.
+The first three are to be there or accepted by name in the rig file; the others are reported, for they may be the
+reason. The event timer of an RPDO is its deadline monitoring (CiA 301, 7.5.2.35): it runs from the first RPDO received,
+and a drive that misses the next says EMCY 0x8250.
 """
 
 from __future__ import annotations

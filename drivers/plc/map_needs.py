@@ -85,11 +85,11 @@ def _faults(register_map: RegisterMap, name: str) -> Iterator[str]:
     types, unit, access = USED[name]
     if register.type not in types:
         expected = " or ".join(sorted(each.value for each in types))
-        yield f"{name}: expected type {expected}, came {register.type.value}"
+        yield f"{name}: expected type {expected}, got {register.type.value}"
     if register.unit not in IN_SI[unit]:
-        yield f"{name}: expected unit {' or '.join(IN_SI[unit])}, came {register.unit}"
+        yield f"{name}: expected unit {' or '.join(IN_SI[unit])}, got {register.unit}"
     if access is Access.READ_WRITE and register.access is not access:
-        yield f"{name}: expected access read_write, came {register.access.value}"
+        yield f"{name}: expected access read_write, got {register.access.value}"
     yield from _enum_faults(name, register)
 
 
@@ -97,4 +97,4 @@ def _enum_faults(name: str, register: Register) -> Iterator[str]:
     if name in ENUMS and register.values is not None:
         known = {member.value for member in ENUMS[name]}
         if unknown := sorted(set(register.values) - known):
-            yield f"{name}: expected names out of {', '.join(sorted(known))}, came {', '.join(unknown)}"
+            yield f"{name}: expected names out of {', '.join(sorted(known))}, got {', '.join(unknown)}"

@@ -1,7 +1,7 @@
 """pymodbus's framer for Modbus TCP, which says what it passed over.
 
 An answer whose transaction or unit identifier is not the request's is skipped by pymodbus with a line in its log, and
-its user is told that none came (3.16.1). Which ones came stands here, so that the wait can end with the right cause.
+its user learns that none came (3.16.1). Which ones came stands here, so that the wait can end with the right cause.
 """
 
 from __future__ import annotations
@@ -34,15 +34,15 @@ class MbapFramer(FramerSocket):
 
     def __init__(self, decoder: DecodePDU) -> None:
         super().__init__(decoder)
-        self.came: list[AnswerIds] = []
+        self.got: list[AnswerIds] = []
 
     def begin(self) -> None:
         """Forget what came: another request is sent."""
-        self.came.clear()
+        self.got.clear()
 
     def decode(self, data: bytes) -> tuple[int, int, int, bytes]:
         """Take a frame apart: length, unit, transaction, PDU; length 0 where it is none, or not all of one."""
         length, unit, transaction, pdu = super().decode(data)
         if length:
-            self.came.append(AnswerIds(transaction, unit))
+            self.got.append(AnswerIds(transaction, unit))
         return length, unit, transaction, pdu

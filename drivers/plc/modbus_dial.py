@@ -1,8 +1,8 @@
 """Connect pymodbus's client ourselves: with TLS where that is asked for, and with a reason where it fails.
 
 pymodbus 3.16.1 turns every failure to connect into one False, has no name of the server to check, and lets a
-request wait for its whole time-out when the connection is lost meanwhile. All three are mended here, through the
-two hooks of its transport: what makes the connection, and what is told of its end.
+request wait for its whole time-out when the connection is lost meanwhile. All three are fixed here, through the
+two hooks of its transport: what makes the connection, and what is reported of its end.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 What is done about pymodbus 3.16.1 here:
 
-- a failed connection and a lost answer come back as values or as one catch-all exception: they are told apart
+- a failed connection and a lost answer come back as values or as one catch-all exception: they are distinguished
   here, into `BusDown`, `DeviceTimeout` and `ProtocolViolation`;
 - it does not count the registers of an answer: they are counted here;
 - an answer it can't decode raises in the event loop, where nobody can catch it: `_Decoder` turns it into a
@@ -156,11 +156,11 @@ class ModbusLink:
         what = f"reading {count} {kind.value}(s) from address {address}"
         request = partial(requests[kind], address, count=count, device_id=self._device_id)
         answer = await self._answer(dial, what, request, READ_CODE[kind])
-        came = answer.bits if kind.is_bit else answer.registers
+        got = answer.bits if kind.is_bit else answer.registers
         expected = (count + 7) // 8 * 8 if kind.is_bit else count  # bits travel in whole bytes
-        if len(came) != expected:
-            raise self._wrong_answer(what, f"{expected} values", f"{len(came)}")
-        return tuple(int(value) for value in came[:count])
+        if len(got) != expected:
+            raise self._wrong_answer(what, f"{expected} values", f"{len(got)}")
+        return tuple(int(value) for value in got[:count])
 
     async def write(self, kind: RegisterKind, address: int, words: Sequence[int]) -> None:
         """Write words, or bits as 0 and 1, from ``address`` on.
@@ -181,8 +181,8 @@ class ModbusLink:
             raise self._wrong_answer(what, "a kind that Modbus can write", kind.value)
         answer = await self._answer(dial, what, request, WRITE_CODE[kind])
         if (answer.address, answer.count) != (address, len(words)):
-            came = f"address {answer.address}, count {answer.count}"
-            raise self._wrong_answer(what, f"address {address}, count {len(words)} confirmed", came)
+            got = f"address {answer.address}, count {answer.count}"
+            raise self._wrong_answer(what, f"address {address}, count {len(words)} confirmed", got)
 
     def _connected(self) -> Dial:
         if self._dial is None or not self._dial.client.connected:
@@ -211,7 +211,7 @@ class ModbusLink:
             raise self._foreign_answer(dial, what) or self._no_answer(dial, what) from cause
         dial.answered = True
         if answer.transaction_id != dial.client.ctx.request_transaction_id:  # pymodbus lets a 0 pass
-            raise self._wrong_answer(what, str(self._expected(dial)), str(framer.came[-1]))
+            raise self._wrong_answer(what, str(self._expected(dial)), str(framer.got[-1]))
         if isinstance(answer, _Undecodable):
             raise self._wrong_answer(what, "a Modbus answer", f"bytes {answer.frame.hex(' ')}")
         if isinstance(answer, ExceptionResponse):
@@ -226,20 +226,20 @@ class ModbusLink:
     def _foreign_answer(self, dial: Dial, what: str) -> ProtocolViolation | None:
         """Tell of answers that were none to this request; late ones, to requests before it, are no fault of theirs."""
         expected = self._expected(dial)
-        foreign = [each for each in _framer(dial).came if not self._is_late(each, expected)]
+        foreign = [each for each in _framer(dial).got if not self._is_late(each, expected)]
         return self._wrong_answer(what, f"an answer with {expected}", str(foreign[0])) if foreign else None
 
-    def _is_late(self, came: AnswerIds, expected: AnswerIds) -> bool:
-        return came.unit == expected.unit and 0 < came.transaction < expected.transaction
+    def _is_late(self, got: AnswerIds, expected: AnswerIds) -> bool:
+        return got.unit == expected.unit and 0 < got.transaction < expected.transaction
 
     def _no_answer(self, dial: Dial, what: str) -> DriverError:
         if dial.client.connected:
             part = dial.client.ctx.recv_buffer
-            came = "one to an earlier request came, too late" if _framer(dial).came else "none came"
+            got = "one to an earlier request came, too late" if _framer(dial).got else "none came"
             if part:
-                came = f"only {len(part)} bytes came that are no whole one ({part[:8].hex(' ')} ...)"
+                got = f"only {len(part)} bytes came that are no whole one ({part[:8].hex(' ')} ...)"
             return DeviceTimeout(
-                f"{self.place}: {what}: expected an answer within {self._timeout_s:g} s, {came}. "
+                f"{self.place}: {what}: expected an answer within {self._timeout_s:g} s, {got}. "
                 "Check that the PLC's program runs and that device_id in the register map is its own."
             )
         return dial.loss() or BusDown(
@@ -256,12 +256,12 @@ class ModbusLink:
             text += f", or not from a client certificate {'without a role' if role is None else f'of role {role!r}'}"
             cure = "Use a certificate with the role it takes, or compare the register map with"
         return family(
-            f"{self.place}: {what}: expected it to be done, came exception {code} ({text}). {cure} the PLC's program."
+            f"{self.place}: {what}: expected it to be done, got exception {code} ({text}). {cure} the PLC's program."
         )
 
-    def _wrong_answer(self, what: str, expected: str, came: str) -> ProtocolViolation:
+    def _wrong_answer(self, what: str, expected: str, got: str) -> ProtocolViolation:
         return ProtocolViolation(
-            f"{self.place}: {what}: expected {expected}, came {came}. "
+            f"{self.place}: {what}: expected {expected}, got {got}. "
             "Check that a PLC with this register map is at this address."
         )
 
@@ -269,5 +269,5 @@ class ModbusLink:
 def _framer(dial: Dial) -> MbapFramer:
     framer = dial.client.ctx.framer
     if not isinstance(framer, MbapFramer):
-        raise TypeError(f"expected the framer this module gave the client, came {framer!r}")
+        raise TypeError(f"expected the framer this module gave the client, got {framer!r}")
     return framer

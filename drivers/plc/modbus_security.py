@@ -147,7 +147,7 @@ def tls_failure(place: str, cause: Exception | None) -> ConfigMismatch:
         What OpenSSL said, a lost connection, or None where nothing came at all.
     """
     return ConfigMismatch(
-        f"{place}: expected a TLS connection with certificates that both sides accept, came: {_said(cause)}. "
+        f"{place}: expected a TLS connection with certificates that both sides accept, got: {_said(cause)}. "
         "Look at [plc.security] of the rig file and at the PLC's own settings."
     )
 
@@ -184,11 +184,11 @@ def _load(what: str, files: object, load: Callable[[], None]) -> None:
     except OSError as cause:  # ssl.SSLError is one
         reason = getattr(cause, "reason", None) or cause.strerror or str(cause)
         raise ConfigMismatch(
-            f"{what} ({files}): expected PEM files that belong together, came: {reason}. "
+            f"{what} ({files}): expected PEM files that belong together, got: {reason}. "
             "Look at the paths in the rig file, and make the files again."
         ) from cause
 
 
 def _no_password() -> str:
     """Stand in for OpenSSL's question at the terminal, which nobody would answer."""
-    raise ConfigMismatch("key: expected a private key without a password, came an encrypted one. Decrypt it first.")
+    raise ConfigMismatch("key: expected a private key without a password, got an encrypted one. Decrypt it first.")

@@ -91,7 +91,7 @@ class NamedRegisters:
             if held != sent:
                 raise ProtocolViolation(
                     f"{self._link.place}: {', '.join(block.names)} ({block.kind.value} {block.address}): "
-                    f"expected to read back {list(sent)} as written, came {list(held)}. Look for a limit in "
+                    f"expected to read back {list(sent)} as written, got {list(held)}. Look for a limit in "
                     "the PLC's program, or for another host that writes there."
                 )
 

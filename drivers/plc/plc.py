@@ -192,8 +192,8 @@ class Plc:
                 return status
             await asyncio.sleep(POLL_S)
 
-    async def keep_beating(self, goes_on: Callable[[], bool]) -> None:
-        """Beat every `BEAT_EVERY_S` as long as ``goes_on`` says so, once at least; no beat is broken off.
+    async def keep_beating(self, continues: Callable[[], bool]) -> None:
+        """Beat every `BEAT_EVERY_S` as long as ``continues`` says so, once at least; no beat is broken off.
 
         Raises
         ------
@@ -201,7 +201,7 @@ class Plc:
             If a beat can't be written, or is not seen.
         """
         await self.beat()
-        while goes_on():
+        while continues():
             await asyncio.sleep(BEAT_EVERY_S)
             await self.beat()
 

@@ -49,8 +49,7 @@ class Backoff:
     def __post_init__(self) -> None:
         if self.attempts < 1 or not 0.0 < self.first_s <= self.longest_s:
             raise ConfigMismatch(
-                f"back-off: expected at least one attempt and 0 < first_s <= longest_s, came {self}. "
-                "Correct the caller."
+                f"back-off: expected at least one attempt and 0 < first_s <= longest_s, got {self}. Correct the caller."
             )
 
     def pauses_s(self) -> Iterator[float]:

@@ -77,7 +77,7 @@ class Reading:
         if self.problem is not None or self.value is None:
             raise ProtocolViolation(
                 f"register {self.name} ({self.register.kind.value} {self.register.address}): expected {self.expected}, "
-                f"came {self.problem}"
+                f"got {self.problem}"
             )
         return to_si(self.name, self.register, self.value)
 

@@ -161,7 +161,7 @@ class Register(MapTable):
         """
         if len(words) != self.size:
             raise ProtocolViolation(
-                f"{self._place}: expected {self.size} word(s), came {len(words)}. Compare the register map "
+                f"{self._place}: expected {self.size} word(s), got {len(words)}. Compare the register map "
                 "with the PLC's program."
             )
         if self.type is ValueType.BOOL:
@@ -215,12 +215,12 @@ class Register(MapTable):
 
     def _unfit(self, value: Value, expected: str) -> ConfigMismatch:
         return ConfigMismatch(
-            f"{self._place}: expected {expected}, came {value!r}. Compare the rig file with the register map."
+            f"{self._place}: expected {expected}, got {value!r}. Compare the rig file with the register map."
         )
 
     def _meaningless(self, expected: str, raw: int | float) -> ProtocolViolation:
         return ProtocolViolation(
-            f"{self._place}: expected {expected}, came {raw!r}. Compare the register map, word order "
+            f"{self._place}: expected {expected}, got {raw!r}. Compare the register map, word order "
             "included, with the PLC's program."
         )
 
@@ -232,11 +232,11 @@ class Register(MapTable):
 
     def _faults(self) -> Iterator[str]:
         if self.kind.is_bit != (self.type is ValueType.BOOL):
-            yield f"type bool for coils and discrete inputs and only there, came type {self.type.value}"
+            yield f"type bool for coils and discrete inputs and only there, got type {self.type.value}"
             return
-        given = f"came type {self.type.value}"
+        given = f"got type {self.type.value}"
         if self.end > ADDRESSES:
-            yield f"all of it below address {ADDRESSES}, came address {self.address} for {self.size} words"
+            yield f"all of it below address {ADDRESSES}, got address {self.address} for {self.size} words"
         if (self.word_order is not None) != (self.size == 2):
             yield f"word_order for 32-bit types and only there, {given}"
         if self.scale is not None and self.type not in _INTEGERS:
@@ -244,6 +244,6 @@ class Register(MapTable):
         if bool(self.values) != (self.type is ValueType.ENUM):
             yield f"values for type enum and only there, {given}"
         if len(set((self.values or {}).values())) != len(self.values or {}):
-            yield f"another number for each name of values, came {self.values}"
+            yield f"another number for each name of values, got {self.values}"
         if self.access is Access.READ_WRITE and not self.kind.is_writable:
-            yield f"access read, since Modbus can't write a {self.kind.value}, came read_write"
+            yield f"access read, since Modbus can't write a {self.kind.value}, got read_write"

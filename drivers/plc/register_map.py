@@ -33,7 +33,7 @@ class RegisterMapError(ConfigMismatch):
     path : Path
         The file.
     problems : tuple of str
-        One line each: ``key | expected ... | came ...``.
+        One line each: ``key | expected ... | got ...``.
     """
 
     def __init__(self, path: Path, *problems: str) -> None:
@@ -134,9 +134,9 @@ def load_register_map(path: Path) -> RegisterMap:
     try:
         data = tomllib.loads(path.read_text("utf-8"))
     except OSError as cause:
-        raise RegisterMapError(path, f"the file | expected a readable file | came: {cause.strerror}") from cause
+        raise RegisterMapError(path, f"the file | expected a readable file | got: {cause.strerror}") from cause
     except (ValueError, RecursionError) as cause:  # tomllib's own error, and text that is not UTF-8
-        raise RegisterMapError(path, f"the file | expected TOML in UTF-8 | came: {cause}") from cause
+        raise RegisterMapError(path, f"the file | expected TOML in UTF-8 | got: {cause}") from cause
     try:
         map_ = RegisterMap.model_validate(data)
     except ValidationError as cause:
@@ -150,13 +150,13 @@ def _problems(cause: ValidationError) -> Iterator[str]:
     for detail in cause.errors():
         key = ".".join(map(str, detail["loc"])) or "the file"
         if detail["type"] == "missing":
-            yield f"{key} | expected this key | came nothing: add it"
+            yield f"{key} | expected this key | got nothing: add it"
         elif detail["type"] == "extra_forbidden":
-            yield f"{key} | expected no such key | came this unknown key: mend or remove it"
+            yield f"{key} | expected no such key | got this unknown key: fix or remove it"
         else:
             expected = detail["msg"].removeprefix("Input should be ")
-            came = "a table" if isinstance(detail["input"], Mapping) else repr(detail["input"])
-            yield f"{key} | expected {expected} | came {came}"
+            got = "a table" if isinstance(detail["input"], Mapping) else repr(detail["input"])
+            yield f"{key} | expected {expected} | got {got}"
 
 
 def _overlaps(registers: Mapping[str, Register]) -> Iterator[str]:
@@ -168,17 +168,16 @@ def _overlaps(registers: Mapping[str, Register]) -> Iterator[str]:
         for (before, first), (name, register) in pairwise(of_kind):
             if register.address < first.end:
                 yield (
-                    f"registers.{name}.address | expected {first.end} or more, behind {before} | "
-                    f"came {register.address}"
+                    f"registers.{name}.address | expected {first.end} or more, behind {before} | got {register.address}"
                 )
 
 
 def _identity_faults(map_: RegisterMap) -> Iterator[str]:
     if not map_.identity:
-        yield "identity | expected at least one register and what it must hold | came none"
+        yield "identity | expected at least one register and what it must hold | got none"
     for name, value in map_.identity.items():
         if name not in map_.registers:
-            yield f"identity.{name} | expected the name of a register of this map | came {name!r}"
+            yield f"identity.{name} | expected the name of a register of this map | got {name!r}"
         else:
             yield from _value_faults(f"identity.{name}", map_[name], value)
 
@@ -187,4 +186,4 @@ def _value_faults(key: str, register: Register, value: int) -> Iterator[str]:
     try:
         register.encode(value)
     except ConfigMismatch:
-        yield f"{key} | expected a value that {register.type.value} holds | came {value}"
+        yield f"{key} | expected a value that {register.type.value} holds | got {value}"

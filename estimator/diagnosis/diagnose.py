@@ -12,6 +12,7 @@ from estimator.diagnosis.inference.answer import answer
 from estimator.diagnosis.preconditions import prepare
 from estimator.diagnosis.result import Diagnosis
 from estimator.physics.model import DrivelineModel
+from estimator.physics.simulate import MASSES
 from estimator.signals.record import Record
 
 BUDGET_S = 30.0
@@ -58,10 +59,11 @@ def diagnose(
     Implausible
         Where torque, output or time is off by a factor or in sign.
     """
-    if is_first_use():
+    masses = len(MASSES.get(model.structure, ()))  # of a joint on a bench there is nothing to compile
+    if masses and is_first_use(masses):
         progress = _telling(progress)
         progress("preparing", 0.0)
-        compile_kernels()
+        compile_kernels(masses)
     with threadpool_limits(1, user_api="blas"):  # on tall, thin matrices more threads only wait for each other
         progress("checking the recordings", 0.0)
         ready = prepare(records, model, holdout)

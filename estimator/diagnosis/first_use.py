@@ -1,4 +1,6 @@
-"""The first use on a machine: the simulation has yet to be compiled there, which takes minutes, once.
+"""The first use on a machine: the simulation has yet to be compiled there, which takes a minute, once.
+
+It is compiled for one, two or three masses when a model of so many is first diagnosed.
 
 A compiler works on one core, so two processes share the kernels. What calls a kernel takes its code in from where it is
 kept on disk: first each process compiles a kernel that calls no other, then each a caller. What is quickly compiled
@@ -26,69 +28,77 @@ from estimator.physics.kernel.integration import integrate
 from estimator.physics.kernel.many import integrate_each
 from estimator.physics.kernel.side_by_side import integrate_side_by_side
 
-COMPILING = "compiling, once on this machine: some minutes"
+COMPILING = "compiling, once on this machine: about a minute"
 
 _ROW, _ROWS, _STACK, _INDICES = float64[::1], float64[:, ::1], float64[:, :, ::1], int64[::1]
-_GRID = (int64, float64, int64, float64)
 _fields: Any = types.NamedTuple
-_SETTING = _fields((*_GRID, _ROW, int64, boolean, _ROW, _ROWS), Setting)
+_TUPLE: Any = types.UniTuple
 _NUDGES = _fields((_INDICES, _ROW, float64), Nudges)
 _EACH = (_ROWS, _ROWS, _INDICES, _INDICES, _ROW, _ROWS, _ROWS, int64, boolean, _ROWS)
 _CHAIN = _fields((_STACK, _ROWS, _ROWS, _ROW, float64, float64), Chain)
 _FILTERED = _fields((_ROWS, _STACK, _ROWS, _ROW, _ROW), Filtered)
 
-SIGNATURES: dict[Any, tuple[Any, ...]] = {
-    integrate: (*_GRID, int64, float64, _ROW, _ROW, _ROW, _ROW, _ROW, int64, boolean, _ROW, _ROWS),
-    integrate_side_by_side: (*_GRID, int64, float64, _INDICES, *_EACH),
-    integrate_each: (*_GRID, float64, *_EACH, _STACK, _INDICES),
-    linearise: (_SETTING, _NUDGES, _ROW, _ROW, _ROW, _ROW, _ROW, int64, int64),
-    least: (_ROWS, _ROW, _ROW, _ROW, int64, int64),
-    run_filter: (_CHAIN, _ROW, _ROW, float64, _ROWS, _FILTERED),
-    run_smoother: (_CHAIN, _FILTERED, _ROWS, _ROW),
-}
-"""The types that a diagnosis calls the largest kernels with."""
+
+def signatures(masses: int) -> dict[Any, tuple[Any, ...]]:
+    """Return the types that a diagnosis calls the largest kernels with."""
+    grid = (_TUPLE(int64, masses), float64, int64, float64)
+    setting = _fields((*grid, _ROW, int64, boolean, _ROW, _ROWS), Setting)
+    return {
+        integrate: (*grid, int64, float64, _ROW, _ROW, _ROW, _ROW, _ROW, int64, boolean, _ROW, _ROWS),
+        integrate_side_by_side: (*grid, int64, float64, _INDICES, *_EACH),
+        integrate_each: (*grid, float64, *_EACH, _STACK, _INDICES),
+        linearise: (setting, _NUDGES, _ROW, _ROW, _ROW, _ROW, _ROW, int64, int64),
+        least: (_ROWS, _ROW, _ROW, _ROW, int64, int64),
+        run_filter: (_CHAIN, _ROW, _ROW, float64, _ROWS, _FILTERED),
+        run_smoother: (_CHAIN, _FILTERED, _ROWS, _ROW),
+    }
+
 
 SIDE_BY_SIDE: tuple[tuple[tuple[Any, ...], tuple[Any, ...]], ...] = (
-    ((integrate,), (integrate_side_by_side,)),
-    ((integrate_each,), (linearise, least, run_filter, run_smoother)),
+    ((integrate,), (integrate_side_by_side, least)),
+    ((integrate_each,), (linearise, run_filter, run_smoother)),
 )
 """What one process compiles while the other does, callers last."""
 
 
-def is_first_use() -> bool:
-    """Tell whether no compiled simulation has been kept on disk yet for this version in this place.
+def is_first_use(masses: int) -> bool:
+    """Tell whether no simulation of so many masses has been kept on disk yet for this version in this place.
 
     The same version installed in another place keeps its own.
     """
-    if not IS_COMPILED:
-        return False
+    return IS_COMPILED and not _marker(masses).exists()
+
+
+def _marker(masses: int) -> Path:
     dispatcher: Any = integrate_each
-    kept = Path(dispatcher.stats.cache_path).glob(f"many.{integrate_each.__name__}-*.nbi")
-    return not any(kept)
+    return Path(dispatcher.stats.cache_path) / f"compiled_for_{masses}"
 
 
-def compile_kernels() -> None:
+def compile_kernels(masses: int) -> None:
     """Compile the largest kernels in two processes and keep them on disk; what fails there is compiled when called.
 
     Not in this one: a compiler that is interrupted ends in an error of its own.
     """
     for some, others in SIDE_BY_SIDE if sys.executable else ():
-        with _compiling(some), _compiling(others):
+        with _compiling(masses, some), _compiling(masses, others):
             pass
+    _marker(masses).parent.mkdir(parents=True, exist_ok=True)
+    _marker(masses).touch()
 
 
-def compile_named(*names: str) -> None:
+def compile_named(masses: int, *names: str) -> None:
     """Compile the kernels of these names, in their order, and keep them on disk."""
-    named = {kernel.__name__: kernel for kernel in SIGNATURES}
+    named = {kernel.__name__: (kernel, signature) for kernel, signature in signatures(masses).items()}
     for name in names:
-        named[name].compile(SIGNATURES[named[name]])
+        kernel, signature = named[name]
+        kernel.compile(signature)
 
 
 @contextmanager
-def _compiling(kernels: Sequence[Any]) -> Iterator[None]:
+def _compiling(masses: int, kernels: Sequence[Any]) -> Iterator[None]:
     """Compile kernels in a process of their own meanwhile, and wait for it; whoever is interrupted ends it."""
     names = [kernel.__name__ for kernel in kernels]
-    program = f"from estimator.diagnosis.first_use import compile_named; compile_named(*{names!r})"
+    program = f"from estimator.diagnosis.first_use import compile_named; compile_named({masses}, *{names!r})"
     with (
         tempfile.TemporaryDirectory(prefix="hil-compiling-") as folder,
         # -P: else Python would look for modules in the working folder, which may hold anybody's

@@ -181,7 +181,7 @@ def _needed_pair(fit: LinearFit, band_hz: tuple[float, float], rigid: LinearFit)
     cancelled = [_frequency_hz(one, fit) for one in pole_zero_map(fit.model, fit.covariance).cancellations]
     needed = [each for each in pairs if not np.isclose(each.frequency_hz.value, cancelled, rtol=1e-6).any()]
     if not needed:
-        return None, f"the pole pair at {pairs[0].frequency_hz.value:.3g} Hz and a pair of zeros can't be told apart"
+        return None, f"the pole pair at {pairs[0].frequency_hz.value:.3g} Hz and a pair of zeros can't be distinguished"
     sure = [each for each in needed if _half_width(each) <= MOST_UNCERTAIN * each.frequency_hz.value]
     if not sure:
         return None, f"a pole pair {within} is there, its frequency not known to better than a half"

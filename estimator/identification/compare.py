@@ -7,13 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimator.identification.excitation import SAMPLES_PER_PARAMETER
-from estimator.identification.identify import Identification, Settings
+from estimator.identification.identify import Identification
 from estimator.identification.modes.modes import Mode, resonance
 from estimator.identification.offline.free_run import free_run
 from estimator.identification.offline.noise_model import white
 from estimator.identification.online.recursive import Status
 from estimator.identification.online.registry import Entry, Feed, Setup
 from estimator.identification.online.two_mass import TwoMass
+from estimator.identification.settings import Settings
 from estimator.signals.decimate import decimate
 from estimator.signals.record import Record
 

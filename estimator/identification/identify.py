@@ -16,116 +16,19 @@ is :attr:`FilterPart.ALL`. In 24 simulated cruises each, the worst error of the 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from enum import Enum
+from dataclasses import dataclass
 
 import numpy as np
 
-from estimator.errors import BadSetting, NotExciting
-from estimator.identification.excitation import SAMPLES_PER_PARAMETER
-from estimator.identification.linear_model import LinearModel, Orders
+from estimator.errors import NotExciting
+from estimator.identification.linear_model import LinearModel
 from estimator.identification.modes.modes import Mode, continuous, resonance
-from estimator.identification.offline.blocks import first_part
 from estimator.identification.offline.output_error import OutputErrorFit, fit_output_error
-from estimator.identification.online.adaptation import Adaptation, DecreasingThenConstantTrace
-from estimator.identification.online.oefo import Oefo
 from estimator.identification.online.recursive import Estimate, Trajectory
+from estimator.identification.settings import FilterPart, Settings
 from estimator.identification.spectral.welch import SpectralEstimate, spectral_estimate
-from estimator.signals.decimate import HIGH_PASS_HZ, decimate, high_passed
+from estimator.signals.decimate import decimate
 from estimator.signals.record import FloatArray, Record
-from estimator.signals.settings import Requirement, is_positive, require
-
-
-class FilterPart(Enum):
-    """What of the batch model's A makes the observation filter L."""
-
-    OSCILLATING = "oscillating"
-    ALL = "all"
-
-
-@dataclass(frozen=True, slots=True)
-class Settings:
-    """How to identify; the defaults are the paper's where it gives them.
-
-    Attributes
-    ----------
-    orders : Orders
-        na = nb = 4, nk = 1.
-    sample_time_s : float
-        Sampling period of the on-line model [s].
-    offline_sample_time_s : float or None
-        That of the off-line models [s]; None for the recording's own.
-    high_pass_hz : float
-        Corner of the high-pass [Hz].
-    samples : int or None
-        Good samples the recursive estimate is run through; None for all.
-    adaptation : Adaptation
-        Adaptation-gain profile of the recursive estimate.
-    filter_part : FilterPart
-        What of the batch model's A makes L.
-    band_hz : tuple of float
-        Where the resonance is looked for [Hz].
-    segment_s : float
-        Segment of the spectral estimate [s].
-    """
-
-    orders: Orders = field(default_factory=Orders)
-    sample_time_s: float = 0.02
-    offline_sample_time_s: float | None = None
-    high_pass_hz: float = HIGH_PASS_HZ
-    samples: int | None = 1024
-    adaptation: Adaptation = field(default_factory=DecreasingThenConstantTrace)
-    filter_part: FilterPart = FilterPart.OSCILLATING
-    band_hz: tuple[float, float] = (2.0, 25.0)
-    segment_s: float = 5.12
-
-    def __post_init__(self) -> None:
-        low, high = self.band_hz
-        period, samples = self.sample_time_s, self.samples
-        require(
-            "identification",
-            (
-                Requirement("sample_time_s", period, is_positive(period), "a period above 0 s"),
-                Requirement("samples", samples or 0, samples is None or samples > 0, "1 or more, or none"),
-                Requirement("band_hz", low, 0 <= low < high, f"a lower end from 0 up to its upper end {high}"),
-            ),
-        )
-
-    def factor(self, record: Record) -> int:
-        """Return the decimation factor from a recording's period to the models'.
-
-        Raises
-        ------
-        BadSetting
-            If the recording's period does not divide that of the models.
-        """
-        ratio = self.sample_time_s / record.sample_time_s
-        factor = round(ratio)
-        if factor < 1 or abs(ratio - factor) > 1e-3 * ratio:
-            raise BadSetting(
-                f"recording {record.name}: sampled every {record.sample_time_s:g} s, expected a whole "
-                f"fraction of the models' period {self.sample_time_s:g} s. Choose another for the models."
-            )
-        return factor
-
-    def offline(self, record: Record) -> Record:
-        """Return a recording as the off-line models take it: high-passed, at their period, a long one's first part.
-
-        Raises
-        ------
-        BadSetting
-            As :meth:`factor`.
-        """
-        record = first_part(record)
-        if self.offline_sample_time_s is None:
-            return high_passed(record, self.high_pass_hz)
-        factor = replace(self, sample_time_s=self.offline_sample_time_s).factor(record)
-        return decimate(record, factor, self.high_pass_hz)
-
-    def estimator(self, L: FloatArray) -> Oefo:
-        """Return the recursive estimator of these settings with an observation filter, ready for samples."""
-        start_up = SAMPLES_PER_PARAMETER * self.orders.n_parameters
-        return Oefo(L, self.orders, self.adaptation, start_up_samples=start_up)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -20,7 +20,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from estimator.errors import BadModel, BadShape
 from estimator.signals.record import FloatArray
@@ -174,6 +173,8 @@ class LinearModel:
         ndarray, shape (N,)
             Output.
         """
+        from scipy.signal import lfilter  # a second to import, and on line there is no simulation
+
         output = np.asarray(lfilter(self.B, self.A, u), dtype=np.float64)
         if state is None:
             return output
@@ -182,6 +183,8 @@ class LinearModel:
 
 def free_response(A: FloatArray, state: FloatArray, n_samples: int) -> FloatArray:
     """Return the first ``n_samples`` of C(q^-1) / A(q^-1), the response to what was before, shape (N,)."""
+    from scipy.signal import lfilter  # see above
+
     impulse = np.zeros(max(n_samples, state.shape[0]))
     impulse[: state.shape[0]] = state
     return np.asarray(lfilter([1.0], A, impulse), dtype=np.float64)[:n_samples]

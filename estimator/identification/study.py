@@ -12,14 +12,15 @@ from dataclasses import dataclass
 
 from estimator.errors import BadModel
 from estimator.identification.best import BestEstimate, best_estimate
-from estimator.identification.identify import Identification, Settings
+from estimator.identification.chain import OnlineChain
+from estimator.identification.identify import Identification
 from estimator.identification.modes.physical import PhysicalEstimate, physical_parameters
 from estimator.identification.modes.reduced import Reduced, third_order
 from estimator.identification.modes.uncertainty import PoleZeroMap, UncertainMode, pole_zero_map
 from estimator.identification.offline.feedback import Feedback
 from estimator.identification.offline.validation import Validation, validate
-from estimator.identification.online.chain import OnlineChain
-from estimator.identification.online.online_estimate import OnlineTrajectory
+from estimator.identification.online_estimate import OnlineTrajectory
+from estimator.identification.settings import Settings
 from estimator.signals.record import Record
 
 

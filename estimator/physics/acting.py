@@ -14,7 +14,7 @@ from typing import Any
 class Place(Enum):
     """Where a law acts, and so what it is given before its parameters, and what it returns.
 
-    Those of a speed or an angle are compiled: for one simulation and for several side by side (``estimator.abreast``).
+    Those of a speed or an angle are compiled: for one simulation and for several side by side (``estimator.lanes``).
 
     Attributes
     ----------

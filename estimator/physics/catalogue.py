@@ -152,12 +152,12 @@ def effect_problems(name: str, values: Mapping[str, EffectValue], model: Driveli
     problems += [f"effects.{name}.{key}: missing, expected {listed}" for key in required if key not in values]
     problems += [f"effects.{name}.{key}: unknown parameter, expected {listed}" for key in values if key not in expected]
     problems += [
-        f"effects.{name}.{key}.value: expected a finite number, came {entry_value.value}"
+        f"effects.{name}.{key}.value: expected a finite number, got {entry_value.value}"
         for key, entry_value in values.items()
         if not math.isfinite(entry_value.value)
     ]
     problems += [
-        f"effects.{name}.{key}.tolerance: expected a relative tolerance from 0 up to 1, came {entry_value.tolerance}"
+        f"effects.{name}.{key}.tolerance: expected a relative tolerance from 0 up to 1, got {entry_value.tolerance}"
         for key, entry_value in values.items()
         if not 0 <= entry_value.tolerance < 1
     ]
@@ -173,5 +173,5 @@ def _limit_problems(entry: Effect, values: Mapping[str, EffectValue]) -> list[st
         allowed = least if math.isinf(parameter.most) else f"{least}, up to {parameter.most:g}"
         too_small = value < 0 <= parameter.low or (value == 0 and least == "greater than 0")
         if too_small or value > parameter.most:
-            problems.append(f"effects.{entry.name}.{parameter.name}.value: expected a number {allowed}, came {value}")
+            problems.append(f"effects.{entry.name}.{parameter.name}.value: expected a number {allowed}, got {value}")
     return problems

@@ -1,4 +1,4 @@
-"""Derivatives of an output by differences: simulations with one unknown moved each, beside the one with none."""
+"""Derivatives of an output by differences: simulations with one unknown moved each, next to the one with none."""
 
 from __future__ import annotations
 

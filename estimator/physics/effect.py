@@ -100,7 +100,7 @@ class Within:
 class Untestable:
     """Why a set of recordings can't tell whether an effect is there, and which test would.
 
-    ``needs`` is what must be given beside any test; without it no recording can tell.
+    ``needs`` is what must be given next to any test; without it no recording can tell.
     """
 
     reason: str
@@ -144,7 +144,7 @@ MOMENTS = (
 
 
 def long_enough(key: str) -> Callable[[DrivelineModel, Sequence[Record], Mapping[str, float]], str]:
-    """Return a check that a time is at least a tenth of the sampling period: shorter ones can't be told."""
+    """Return a check that a time is at least a tenth of the sampling period: shorter ones can't be reported."""
 
     def check(_model: DrivelineModel, records: Sequence[Record], values: Mapping[str, float]) -> str:
         least = 0.1 * min(record.sample_time_s for record in records)
@@ -173,7 +173,7 @@ class Step:
     lasting: bool = False
 
     def turned(self, nominal: float, size: float) -> tuple[float, float]:
-        """Return value and size of the same step told the other way round: changed is what was not."""
+        """Return value and size of the same step expressed the other way round: changed is what was not."""
         after = nominal * (1.0 + size) if self.relative else nominal + size
         return after, nominal / after - 1.0 if self.relative else -size
 
@@ -200,7 +200,7 @@ class Effect:
     resembles : tuple[str, ...]
         Rivals that look alike in part: names of effects. In the catalogue it holds both ways.
     equivalent : tuple[str, ...]
-        Effects that are the same linear system seen from torque and speed: no recording tells them apart.
+        Effects that are the same linear system seen from torque and speed: no recording distinguishes them.
     contains : tuple[str, ...]
         Effects that are special cases of this one.
     acting : Acting or None

@@ -54,8 +54,8 @@ class FreeRun:
 def free_run(model: DrivelineModel, record: Record, known: Own = NOTHING_KNOWN) -> FreeRun:
     """Simulate one recording with a model from its measured torques.
 
-    Beside load torque and initial state, what the model's effects leave to every recording is estimated from it: phases
-    of angles, moments of events, the load profile of a road.
+    Besides load torque and initial state, what the model's effects leave to every recording is estimated from it:
+    phases of angles, moments of events, the load profile of a road.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ def simulate_foreign(
     use : ndarray of bool, shape (N,)
         Samples from which what is the recording's own is estimated.
     effects : iterable of str
-        Effects that were fitted beside the model's: what they leave to every recording is estimated too.
+        Effects that were fitted next to the model's: what they leave to every recording is estimated too.
 
     Returns
     -------

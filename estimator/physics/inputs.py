@@ -26,7 +26,7 @@ class Case:
     p : ndarray, shape (layout.SIZE,)
         Parameters of the superset model, the recording's own among them.
     extra_load_nm : ndarray, shape (N,), optional
-        Load torque over time, beside the constant one.
+        Load torque over time, next to the constant one.
     """
 
     p: FloatArray
@@ -58,7 +58,7 @@ class Inputs(NamedTuple):
 
 
 def inputs_of(records: Sequence[Record], of: Sequence[int], cases: Sequence[Case]) -> Inputs:
-    """Return what drives cases of some recordings; the shorter ones go on under what they ended with."""
+    """Return what drives cases of some recordings; the shorter ones continue under what they ended with."""
     size = max(record.time_s.size for record in records)
     torques, loads = _Rows[tuple[int, bytes]](size), _Rows[tuple[int, float, int]](size)
     for i, case in zip(of, cases, strict=True):
@@ -100,7 +100,7 @@ class _Rows(Generic[Key]):
         self._chosen.append(place)
 
     def found(self) -> tuple[FloatArray, IntArray]:
-        """Return the rows, each as long as ``size`` and going on as it ended, and which was added when."""
+        """Return the rows, each as long as ``size`` and continuing as it ended, and which was added when."""
         rows = np.empty((len(self._rows), self._size))
         for row, values in zip(rows, self._rows, strict=True):
             row[: values.size], row[values.size :] = values, values[-1]

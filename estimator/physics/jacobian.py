@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimator.abreast import LANES
+from estimator.lanes import LANES
 from estimator.physics.differences import fill_differences
 from estimator.physics.inputs import Case
 from estimator.physics.parallel import concurrently

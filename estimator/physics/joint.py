@@ -32,7 +32,7 @@ from estimator.physics.motion import measured_speed
 from estimator.signals.record import FloatArray, Record
 
 TORQUE = -1
-"""The output that a joint has beside the kernel's states: the torque it carries."""
+"""The output that a joint has next to the kernel's states: the torque it carries."""
 
 PART_OF_TORQUE, MOST_SECANTS = 1e-12, 100
 """How near the balance inside an open gap is found, as part of the torques at its ends, and by how many secants."""
@@ -54,7 +54,7 @@ class Imposed(NamedTuple):
 def imposed_in(record: Record) -> Imposed:
     """Return the imposed motion of a recording, which is the same in every simulation of it."""
     if record.imposed is None:
-        raise ValueError(f"recording {record.name}: a joint is simulated from an imposed motion, came none")
+        raise ValueError(f"recording {record.name}: a joint is simulated from an imposed motion, got none")
     return Imposed(record.imposed - record.imposed[0], _rate(record))
 
 
@@ -76,7 +76,7 @@ def simulate(
     p : ndarray, shape (layout.SIZE,)
         Parameters of the superset model.
     load_torque_nm : ndarray, shape (N,)
-        Constant torque T_0, and what there is beside it [Nm].
+        Constant torque T_0, and what there is next to it [Nm].
     twist_rad : float
         Twist at the first sample [rad].
     preload_nm : float

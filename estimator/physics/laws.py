@@ -1,17 +1,17 @@
-"""Small pieces that several laws share, compiled: of one simulation, or of many abreast."""
+"""Small pieces that several laws share, compiled: of one simulation, or of many in lanes."""
 
 from __future__ import annotations
 
 import math
 
-from estimator.abreast import choose, every
 from estimator.compiled import compiled
+from estimator.lanes import choose, every
 
 BEYOND = 20.0
 """From here on the hyperbolic tangent is 1 to the last bit; most speeds are beyond, and need no tangent."""
 
 NOTHING_LEFT = 40.0
-"""From here on the exponential of the negative is lost beside 1."""
+"""From here on the exponential of the negative is lost next to 1."""
 
 LEAST = 1e-300
 """A size that is next to nothing and has a logarithm."""

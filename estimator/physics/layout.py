@@ -22,7 +22,7 @@ for _entry in BUILT_IN.values():
         _SLOTS[_entry.name, _parameter.name] = len(_SLOTS)
 
 LOAD = "load"
-"""Name of the constant load torque that is not a recording's own, beside the nominal parameters; last of all, since no
+"""Name of the constant load torque that is not a recording's own, next to the nominal parameters; last of all, since no
 kernel reads it (``inputs``)."""
 
 _SLOTS["", LOAD] = len(_SLOTS)

@@ -26,8 +26,8 @@ CONVERGED = 0.1
 MOST_AS_ONE = 30.0
 """Correlated errors of which one counts in n, at most.
 
-What a wrong law leaves keeps its sign for long. Along a valley that leads nowhere its fit would go on for a part of the
-error that chance alone moves further. But where all of the error is such, a plateau on the way looks like the end.
+What a wrong law leaves keeps its sign for long. Along a valley that leads nowhere its fit would continue for a part of
+the error that chance alone moves further. But where all of the error is such, a plateau on the way looks like the end.
 """
 
 RELIABLE = 0.75
@@ -45,7 +45,7 @@ LEAST_DAMPING, MOST_DAMPING = 1e-10, 1e9
 class Solution:
     """Where a fit ended: unknowns (U,), errors (R,), Jacobian there, or one last small step before (R, U).
 
-    No Jacobian where the iterations were used up: whoever goes on finds it, and few do.
+    No Jacobian where the iterations were used up: whoever continues finds it, and few do.
     ``stuck`` where a step was refused and shorter ones promised nothing any more, or were refused as well: the error
     has a kink there, or ``x`` is its least to the last digits.
     """

@@ -196,7 +196,7 @@ class DrivelineModel:
         object.__setattr__(self, "effects", {self.own(name): values for name, values in self.effects.items()})
         problems = [*self._parameter_problems(), *self._effect_problems()]
         if not isinstance(self.load, Load) and not math.isfinite(self.load):
-            problems.append(f"load.constant: expected 'own', 'shared' or a finite number, came {self.load}")
+            problems.append(f"load.constant: expected 'own', 'shared' or a finite number, got {self.load}")
         if problems:
             raise BadModel("\n".join(problems))
 
@@ -255,9 +255,9 @@ def _value_problems(name: str, parameter: Parameter) -> list[str]:
     low = "greater than 0" if name in STRICTLY_POSITIVE else "0 or greater"
     fits = parameter.value > 0 if name in STRICTLY_POSITIVE else parameter.value >= 0
     if not (math.isfinite(parameter.value) and fits):
-        problems.append(f"parameters.{name}.value: expected a finite number {low}, came {parameter.value}")
+        problems.append(f"parameters.{name}.value: expected a finite number {low}, got {parameter.value}")
     if not 0 <= parameter.tolerance < 1:
         problems.append(
-            f"parameters.{name}.tolerance: expected a relative tolerance from 0 up to 1, came {parameter.tolerance}"
+            f"parameters.{name}.tolerance: expected a relative tolerance from 0 up to 1, got {parameter.tolerance}"
         )
     return problems

@@ -76,7 +76,7 @@ def reverses(record: Record) -> bool:
 
 
 def turns(model: DrivelineModel, records: Sequence[Record]) -> bool:
-    """Tell whether the speed's sign can be told from a constant load torque.
+    """Tell whether the speed's sign can be distinguished from a constant load torque.
 
     In a recording with both signs; in several of one sign each, where they share the load; in any, where it is known.
     """
@@ -99,7 +99,7 @@ def largest_torque(records: Sequence[Record]) -> float:
 
 
 SHARES_DIFFER = 0.03
-"""Least spread of the first input's share of the torque between recordings that tells the inputs apart."""
+"""Least spread of the first input's share of the torque between recordings that distinguishes the inputs."""
 
 
 def shares_differ(records: Sequence[Record]) -> bool:
@@ -173,7 +173,8 @@ PLACES, FEWEST_PASSES = 50, 4.0
 def speed_by_place(record: Record) -> float:
     """Return the share of the speed's variance that goes with where the motor is: 1 where a motion only repeats.
 
-    What depends on the speed is not separable from what depends on the angle then. 0 for a motion that goes on and on.
+    What depends on the speed is not separable from what depends on the angle then. 0 for a motion that continues and
+    on.
     """
     angle, speed = motor_angle(record), np.abs(measured_speed(record))
     seen = np.isfinite(speed)

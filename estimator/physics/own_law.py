@@ -84,7 +84,7 @@ class OwnLaw:
         shape: time since the recording began [s], speeds [rad/s], twist [rad] and torque reading [Nm] to a torque [Nm]
         or, at the sensor, an error of the reading. At the null of its first parameter it returns 0.
     element : Element
-        Motor or load: the torque acts against positive motion. Shaft: it is carried beside spring and damper. Speed
+        Motor or load: the torque acts against positive motion. Shaft: it is carried next to spring and damper. Speed
         sensor: it is added to the reading.
     parameters : tuple of OwnParameter
         The first one decides: its interval must exclude its null for the law to be believed.
@@ -115,18 +115,18 @@ class OwnLaw:
         problems = []
         if self.element not in STRUCTURES:
             places = ", ".join(element.value for element in STRUCTURES)
-            problems.append(f"element: expected one of {places}, came {self.element.value}")
+            problems.append(f"element: expected one of {places}, got {self.element.value}")
         if not self.parameters:
-            problems.append("parameters: expected at least one, came none")
+            problems.append("parameters: expected at least one, got none")
         for p in self.parameters:
             if not all(map(math.isfinite, (p.null, p.low, p.high, p.start))):
                 problems.append(f"parameters.{p.name}: expected finite numbers for null, low, high and start")
             elif not (p.low < p.high and p.low <= p.start <= p.high):
-                problems.append(f"parameters.{p.name}: expected low <= start <= high and low < high, came {p}")
+                problems.append(f"parameters.{p.name}: expected low <= start <= high and low < high, got {p}")
         first = self.parameters[0] if self.parameters else None
         if first is not None and (first.start == first.null or not first.low <= first.null <= first.high):
             problems.append(
-                f"parameters.{first.name}: expected a null inside its bounds and a start other than it, came {first}"
+                f"parameters.{first.name}: expected a null inside its bounds and a start other than it, got {first}"
             )
         return problems
 
@@ -138,7 +138,7 @@ class OwnLaw:
         except TypeError as error:
             expected = f"({', '.join([*ARGUMENTS, *starts])})"
             raise BadModel(
-                f"{self._where}: expected a function of {expected}, came one that does not fit: {error}"
+                f"{self._where}: expected a function of {expected}, got one that does not fit: {error}"
             ) from error
         self(TRIAL, starts)
         object.__setattr__(self, "takes_arrays", self._same_of_arrays(starts))
@@ -147,9 +147,9 @@ class OwnLaw:
         first = self.parameters[0]
         idle = self(TRIAL, starts | {first.name: first.null})
         if np.any(idle != 0.0):
-            came = idle[idle != 0.0][0]
+            got = idle[idle != 0.0][0]
             raise BadModel(
-                f"{self._where}: expected 0 where {first.name} is {first.null:g} (its null), came {came:g}. "
+                f"{self._where}: expected 0 where {first.name} is {first.null:g} (its null), got {got:g}. "
                 "Put first the parameter that switches the law off, and give its null."
             )
 
@@ -170,13 +170,13 @@ class OwnLaw:
         try:
             with np.errstate(all="ignore"):
                 found = self._called(arguments, values)
-        except Exception as error:  # whatever a user's function may raise is told as its own
+        except Exception as error:  # whatever a user's function may raise is reported as its own
             raise BadModel(f"{self._where}: failed with {type(error).__name__}: {error}") from error
         bad = ~np.isfinite(found) & np.isfinite(arguments).all(axis=0)
         if bad.any():
             at = dict(zip(ARGUMENTS, arguments[:, bad][:, 0].tolist(), strict=True)) | dict(values)
             listed = ", ".join(f"{name} = {value:g}" for name, value in at.items())
-            raise BadModel(f"{self._where}: expected a finite number, came {found[bad][0]:g} at {listed}")
+            raise BadModel(f"{self._where}: expected a finite number, got {found[bad][0]:g} at {listed}")
         return found
 
     def _same_of_arrays(self, values: Mapping[str, float]) -> bool:

@@ -18,6 +18,7 @@ import numpy as np
 from estimator.compiled import compiled
 from estimator.physics.effect import Element
 from estimator.physics.kernel import integration, state_vector
+from estimator.physics.kernel.makes import Masses
 from estimator.physics.law_name import LawName
 from estimator.signals.record import FloatArray, Record
 
@@ -57,7 +58,7 @@ class Run:
         Parameter vector.
     """
 
-    masses: int
+    masses: Masses
     sign_width: float
     step_s: float
     time_s: FloatArray
@@ -70,7 +71,7 @@ class Run:
     @classmethod
     def of(
         cls,
-        masses: int,
+        masses: Masses,
         substeps: int,
         sign_width: float,
         record: Record,
@@ -196,7 +197,7 @@ class Run:
 
 @compiled
 def trajectory(
-    masses: int,
+    masses: Masses,
     step_s: float,
     substeps: int,
     sign_width: float,
@@ -217,11 +218,11 @@ def trajectory(
     """
     out, slopes = np.empty(torque.shape[0]), np.zeros((2, 0))
     given, driven = (step_s, substeps, sign_width, first, start_s), (torque, load, angle, p, state)
-    for row in range(1 if masses == 1 else 3):
+    for row in range(1 if len(masses) == 1 else 3):
         output = state_vector.SPEED if row == 0 else (state_vector.LOAD_SPEED if row == 1 else state_vector.TWIST)
         state[:] = begin
         integration.integrate(masses, *given, *driven, output, sensor, out, slopes)
         motion[row, :-1] = out[first:]
         motion[row, -1] = state[output]
-    if masses == 1:
+    if len(masses) == 1:
         motion[1] = motion[0]

@@ -170,7 +170,7 @@ def scan(answers: FloatArray, error: FloatArray, lasting: bool = False) -> Scan:
 def scanned(gram: FloatArray, match: FloatArray, lasting: bool = False) -> Scan:
     """Prepare the same search from the products of the answers with each other, (M, M), and with the error, (M,).
 
-    An event that is ``lasting`` ends with its recording; told the other way round, it begins with it.
+    An event that is ``lasting`` ends with its recording; expressed the other way round, it begins with it.
     """
     along = match[None, :] - match[:, None]
     power = np.maximum(np.diag(gram)[:, None] - 2.0 * gram + np.diag(gram)[None, :], 0.0)

@@ -53,7 +53,7 @@ def workers() -> int:
 
 
 def work_on(cores: int) -> None:
-    """Work on so many cores from the next call on; what is under way goes on as it began.
+    """Work on so many cores from the next call on; what is under way continues as it began.
 
     Raises
     ------
@@ -62,7 +62,7 @@ def work_on(cores: int) -> None:
     """
     global _cores
     if cores < 1:
-        raise ValueError(f"cores: expected 1 or more, came {cores}")
+        raise ValueError(f"cores: expected 1 or more, got {cores}")
     _cores = _Cores(cores)
 
 

@@ -74,7 +74,7 @@ def make_problem(
     """Set up a fit of ``shared`` and every recording's own unknowns, from a model's values and effects.
 
     ``own`` holds the own parameters of effects for each recording; by default those of the model's effects. A constant
-    load torque that all recordings share is an unknown beside ``shared``; of one recording it is its own.
+    load torque that all recordings share is an unknown next to ``shared``; of one recording it is its own.
     """
     if own is None:
         own = [own_unknowns(model.effects, record) for record in records]

@@ -8,12 +8,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from estimator.abreast import LANES
 from estimator.errors import BadModel
+from estimator.lanes import LANES
 from estimator.physics import catalogue, joint, own_law_run
 from estimator.physics.grid import Grid
 from estimator.physics.inputs import Case, inputs_of, load_of
 from estimator.physics.kernel import integration, many, side_by_side, state_vector
+from estimator.physics.kernel.makes import Masses
 from estimator.physics.layout import slot
 from estimator.physics.model import Structure
 from estimator.physics.motion import motor_angle
@@ -21,7 +22,11 @@ from estimator.physics.parallel import PARTS, concurrently
 from estimator.physics.start import Start
 from estimator.signals.record import FloatArray, IntArray, Location, OutputKind, Record
 
-MASSES = {Structure.ONE_MASS: 1, Structure.TWO_MASS: 2, Structure.THREE_MASS: 3}
+MASSES: dict[Structure, Masses] = {
+    Structure.ONE_MASS: (1,),
+    Structure.TWO_MASS: (1, 2),
+    Structure.THREE_MASS: (1, 2, 3),
+}
 """How many inertias the kernel has for a structure."""
 
 _OUTPUT_STATE = {
@@ -40,7 +45,7 @@ _SENSED = (state_vector.SPEED, state_vector.LOAD_SPEED)
 """What the effects of a speed sensor act on."""
 
 LENGTHS_DIFFER = 1.1
-"""Length of the longest recording over the mean of all from which they go each by itself: the others would go on to
+"""Length of the longest recording over the mean of all from which they go each by itself: the others would continue to
 its end."""
 
 
@@ -53,9 +58,9 @@ def output_state(record: Record, structure: Structure) -> int:
         Where the structure has no such output.
     """
     if (record.imposed is not None) != (structure is Structure.JOINT):
-        came = "an imposed motion" if record.imposed is not None else f"{record.kind.value} as the output"
+        got = "an imposed motion" if record.imposed is not None else f"{record.kind.value} as the output"
         raise BadModel(
-            f"recording {record.name}: came {came}, expected the torque under an imposed motion for a joint, and a "
+            f"recording {record.name}: got {got}, expected the torque under an imposed motion for a joint, and a "
             f"measured motion for every other structure; the model is a {structure.value}. Correct the structure."
         )
     if structure is Structure.JOINT:
@@ -228,7 +233,7 @@ def simulate_together(grid: Grid, records: Sequence[Record], of: Sequence[int], 
     Returns
     -------
     ndarray, shape (len(cases), N)
-        As long as the longest recording; shorter ones go on under the torques they ended with.
+        As long as the longest recording; shorter ones continue under the torques they ended with.
     """
     wanted, given = output_state(records[0], grid.structure), inputs_of(records, of, cases)
     out = np.empty((len(cases), given.torque.shape[1]))

@@ -13,10 +13,10 @@ from estimator.physics.problem import Problem, start_vector
 from estimator.signals.record import FloatArray, IntArray
 
 HEAT = 3
-"""Jacobians that each of several starts gets before only the best ones go on."""
+"""Jacobians that each of several starts gets before only the best ones continue."""
 
 CLOSE = 1.1
-"""Squared error, over the best start's, up to which a start goes on."""
+"""Squared error, over the best start's, up to which a start continues."""
 
 Name = tuple[object, ...]
 
@@ -24,7 +24,7 @@ Name = tuple[object, ...]
 def best_fit(problems: Sequence[Problem], warm: FitResult | None = None, iterations: int = ITERATIONS) -> FitResult:
     """Fit from several starts and return the best; what a fit ``warm`` has in common starts where that one ended.
 
-    Every start gets a few steps; those that are then close to the best go on.
+    Every start gets a few steps; those that are then close to the best continue.
     """
     if len(problems) == 1:
         return _begun(problems[0], warm, iterations)
@@ -46,7 +46,7 @@ def close(heat: Sequence[FitResult]) -> list[int]:
 
 
 def converge(result: FitResult, iterations: int = ITERATIONS) -> FitResult:
-    """Go on with a fit that its iteration limit ended."""
+    """Continue with a fit that its iteration limit ended."""
     return result if result.converged or iterations <= HEAT else fit(result.problem, result.x, iterations)
 
 

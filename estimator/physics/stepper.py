@@ -43,7 +43,7 @@ class Stepper:
         self._p = flat(model)
         if laws := [law for law in model.laws if law.is_active(self._p)]:
             raise BadModel(
-                f"effects.{laws[0]}: expected effects of the catalogue, came a law of your own, which a simulated "
+                f"effects.{laws[0]}: expected effects of the catalogue, got a law of your own, which a simulated "
                 "rig can't have. Take it out of the model file."
             )
         self._period_s = period_s

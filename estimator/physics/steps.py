@@ -1,6 +1,6 @@
-"""A step told from its moment on: what changed is what comes after, where the other way round explains as much.
+"""A step expressed from its moment on: what changed is what comes after, where the other way round explains as much.
 
-A payload that grows at 12 s, and one that was smaller until 12 s beside a larger nominal inertia, are one and the same
+A payload that grows at 12 s, and one that was smaller until 12 s next to a larger nominal inertia, are one and the same
 motion. A fit ends in either; people expect the first.
 """
 
@@ -22,7 +22,7 @@ EDGE_S = 0.5
 """An event's moment nearer to a recording's end is none: any start-up error looks like one."""
 
 SAME = 1.001
-"""Squared error told the other way round, over the one before, up to which it is the same explanation."""
+"""Squared error expressed the other way round, over the one before, up to which it is the same explanation."""
 
 Moments = tuple[float, float]
 
@@ -72,14 +72,14 @@ def _turned(result: FitResult, model: DrivelineModel, name: str, step: Step) -> 
             return result
     came_and_went = any(_comes_and_goes(record, moments) for record, moments in found)
     tries = [
-        _told(result, name, found, x, from_the_start)
+        _expressed(result, name, found, x, from_the_start)
         for from_the_start in ((False, True) if came_and_went else (False,))
     ]
-    best = min(tries, key=lambda told: told.squares)
+    best = min(tries, key=lambda expressed: expressed.squares)
     return best if best.squares <= SAME * result.squares else result
 
 
-def _told(
+def _expressed(
     result: FitResult, name: str, found: Sequence[tuple[Record, Moments]], x: FloatArray, from_the_start: bool
 ) -> FitResult:
     """Fit from an event where it did not act before, and from the shared unknowns ``x`` for it."""
@@ -131,7 +131,7 @@ recording is dry friction, which others that do not reverse hide; half a second 
 def has_edge(name: str, result: FitResult) -> bool:
     """Tell whether an event begins or ends inside a recording.
 
-    Where it would be another effect if it acted all along, not a glimpse of it counts, beside whole recordings.
+    Where it would be another effect if it acted all along, not a glimpse of it counts, next to whole recordings.
     """
     acting = [
         (to_s - from_s, inside(record, from_s) or inside(record, to_s))

@@ -100,7 +100,7 @@ class TwistFilter:
         self.use(shaft)
 
     def use(self, shaft: Shaft) -> None:
-        """Go on with other numbers, from the present state."""
+        """Continue with other numbers, from the present state."""
         self.shaft = shaft
         self._F, self._g = _discrete(shaft, self._period_s)
         u = self._uncertainty
@@ -120,7 +120,7 @@ class TwistFilter:
         torque_nm, speed_rad_s
             Total torque and motor speed [Nm, rad/s].
         okay
-            False where they are not to be trusted: the model alone goes on, with the last good torque.
+            False where they are not to be trusted: the model alone continues, with the last good torque.
 
         Returns
         -------

@@ -19,8 +19,8 @@ MOST_BYTES = 2**20
 def once(function: Callable[[Object], Result]) -> Callable[[Object], Result]:
     """Remember what a function returns for each object, as long as that lives; arrays of more than ``MOST_BYTES`` not.
 
-    Only for objects that are told apart by what they are and not by what they hold, and never change. What is returned
-    is shared: nobody may write to it.
+    Only for objects that are distinguished by what they are and not by what they hold, and never change. What is
+    returned is shared: nobody may write to it.
     """
     known: WeakKeyDictionary[Object, Result] = WeakKeyDictionary()
 

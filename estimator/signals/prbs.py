@@ -106,7 +106,7 @@ class Prbs:
         return ((1 << self._cells) - 1) * self._clock_divider
 
     def next(self) -> float:
-        """Return the level of this cycle [Nm] and go on to the next cycle."""
+        """Return the level of this cycle [Nm] and continue to the next cycle."""
         level_nm = self._level_nm if self._state >> (self._cells - 1) else -self._level_nm
         self._held += 1
         if self._held == self._clock_divider:

@@ -75,7 +75,7 @@ class Record:
     output : ndarray, shape (N,)
         Measured output [rad/s, rad, Nm; translation m/s, m, N].
     okay : ndarray of bool, shape (N,)
-        False where the sample must not be used; time goes on there.
+        False where the sample must not be used; time advances there.
     kind, location
         What the output is, and where it is measured.
     began_s : float, optional
@@ -86,7 +86,7 @@ class Record:
         Torque that was asked for, of all inputs together [Nm]; NaN where not known. None: not recorded.
     load_nm : ndarray, shape (N,), optional
         Measured torque of a load machine, held over each period as ``torque_nm``; a positive one is against it [Nm;
-        translation N]. It acts at the load, beside the constant load torque. None: not measured.
+        translation N]. It acts at the load, in addition to the constant load torque. None: not measured.
     imposed : ndarray, shape (N,), optional
         Motion that a bench imposes on a joint [rad; translation m]; the output is then the torque it takes, which
         ``torque_nm`` holds too. None: the torque acts and the motion is measured.

@@ -1,4 +1,7 @@
-"""For Python and notebooks: what the commands do, as functions, with results that show and save themselves."""
+"""For Python and notebooks: what the commands do, as functions, with results that show and save themselves.
+
+What may come in: everything but the command line.
+"""
 
 from hil.api.comparison import ComparisonResult, compare
 from hil.api.diagnosis import DiagnosisResult, diagnose

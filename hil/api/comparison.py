@@ -68,8 +68,8 @@ class ComparisonResult:
 
     def __repr__(self) -> str:
         by_model = zip(*self.comparisons, strict=True)
-        told = ", ".join(f"{of[0].model} off by {shown(together(of), of[0].unit)}" for of in by_model)
-        return f"<Comparison with {len(self.comparisons)} recordings: {told}>"
+        errors = ", ".join(f"{of[0].model} off by {shown(together(of), of[0].unit)}" for of in by_model)
+        return f"<Comparison with {len(self.comparisons)} recordings: {errors}>"
 
     def _repr_html_(self) -> str:
         rows = [

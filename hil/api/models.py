@@ -9,8 +9,8 @@ from typing import Any
 from pydantic import ValidationError
 
 from hil.config.model_file import ModelFile, read_model_for_recordings
-from hil.config.problems import problem_lines
 from hil.errors import UsageError
+from hil.problems import problem_lines
 from hil.recording.signals_config import SignalsConfig
 
 Model = Path | str | ModelFile

@@ -15,7 +15,7 @@ from hil.errors import InputError, UsageError
 if TYPE_CHECKING:
     from rich.table import Table as RichTable
 
-    from drivers.datasheet.check import EdsReport
+    from drivers.eds_check import EdsReport
     from drivers.plc.reading import Reading
     from hil.config.rig_file import Rig
     from hil.rig.check import ChannelReading, Finding
@@ -53,15 +53,15 @@ def check(
     With --eds, check such a file line by line against CiA 306 and against what this program needs of a drive:
     exit status 2 if it can't be used. Without RIG no device is looked for.
     """
-    from drivers.datasheet.check import check_eds
+    from drivers.eds_check import check_eds
     from hil.config.rig_file import read_rig
     from hil.rig.addresses import with_addresses
     from hil.rig.check import check_rig
 
     if rig is None and not eds:
-        raise UsageError("expected a rig file, an EDS with --eds, or both, came neither. See: hil check --help")
+        raise UsageError("expected a rig file, an EDS with --eds, or both, got neither. See: hil check --help")
     if rig is None and (bus or modbus or prove_stop):
-        raise UsageError("--bus, --modbus and --prove-stop concern the rig's devices: expected a rig file beside them")
+        raise UsageError("--bus, --modbus and --prove-stop concern the rig's devices: expected a rig file next to them")
     if proof is not None:
         _require_proof(proof, prove_stop)
     rig_file = None if rig is None else with_addresses(read_rig(rig), bus, modbus)
@@ -105,13 +105,13 @@ def _refuse(reports: tuple[EdsReport, ...], rig: Rig | None, findings: tuple[Fin
     if unusable := [each for each in reports if not each.usable]:
         raise InputError(
             f"{'; '.join(f'EDS {each.path} is {verdict(each)}' for each in unusable)}: see above. "
-            "Mend a copy of the file, or take the one of the drive's firmware version."
+            "Fix a copy of the file, or take the one of the drive's firmware version."
         )
     bad = [finding.device for finding in findings if finding.verdict is not Verdict.AGREES]
     if rig is not None and bad:
         raise ConfigMismatch(
             f"rig {rig.name!r}: {', '.join(bad)}: expected all there and as described, see above. "
-            "Correct the rig file, or mend or connect the device it describes."
+            "Correct the rig file, or fix or connect the device it describes."
         )
 
 

@@ -36,9 +36,9 @@ def compare(
     """
     from rich.console import Console
 
-    from hil.plants.compare import compared
     from hil.plants.trust import Trust
     from hil.provenance import provenance
+    from hil.report.compared import compared
     from hil.report.comparison import comparison_text
     from hil.report.comparison_html import comparison_page
     from hil.report.comparison_text import comparison_summary

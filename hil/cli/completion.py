@@ -1,13 +1,21 @@
-"""``hil completion``: what a shell needs to complete the commands."""
+"""``hil completion``: what a shell needs to complete the commands, by typer: each TAB asks hil itself."""
 
 from __future__ import annotations
 
+import importlib
 from enum import Enum
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from typer.completion import get_completion_script  # type: ignore[attr-defined]
+from typer.core import TyperCommand, TyperGroup
+
+from hil.support.command_log import Level
 
 app = typer.Typer(add_completion=False)
+
+VARIABLE = "_HIL_COMPLETE"
+"""By this variable a shell asks what can stand where the cursor is; the command line is not carried out."""
 
 
 class Shell(Enum):
@@ -20,12 +28,47 @@ class Shell(Enum):
 
 @app.command(epilog="Example: hil completion bash > ~/.local/share/bash-completion/completions/hil")
 def completion(shell: Annotated[Shell, typer.Argument(metavar="SHELL", help="bash, zsh or fish.")]) -> None:
-    """Print the completion script of a shell: commands, options, experiments of a rig file, effects, files.
+    """Print the completion script of a shell: commands, options, experiments of a rig file, effects, files."""
+    typer.echo(get_completion_script(prog_name="hil", complete_var=VARIABLE, shell=shell.value))
 
-    The first lines of the script say where to put it. Print it anew after an update of hil.
-    """
-    from estimator.physics.catalogue import EFFECTS
-    from hil.cli.main import COMMANDS
-    from hil.support.completion import script
 
-    typer.echo(script(shell.value, COMMANDS, EFFECTS), nl=False)
+class Commands(TyperGroup):
+    """All commands with their lines of help; only the one on the line is imported."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Return their names."""
+        from hil.cli.main import COMMANDS
+
+        return list(COMMANDS)
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """Return what is shown of a command in a list."""
+        from hil.cli.main import COMMANDS
+
+        return TyperCommand(cmd_name, help=COMMANDS[cmd_name])
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Return the command on the line, with the options that all have."""
+        name, *rest = args
+        if name not in self.list_commands(ctx):
+            return None, None, []
+        command = typer.main.get_command(importlib.import_module(f"hil.cli.{name}").app)
+        command.params += [option for option in self.params if option.name in ("quiet", "log_level")]
+        return name, command, rest
+
+
+root = typer.Typer(cls=Commands, add_completion=True)
+
+
+@root.callback()
+def everywhere(
+    quiet: Annotated[bool, typer.Option("--quiet", help="Print errors only.")] = False,
+    log_level: Annotated[Level | None, typer.Option(help="What the log keeps.")] = None,
+    version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
+) -> None:
+    """Stand for ``hil`` where a shell asks."""
+
+
+def complete() -> None:
+    """Answer the shell that asks by `VARIABLE`, and end."""
+    root(prog_name="hil")

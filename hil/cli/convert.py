@@ -65,11 +65,11 @@ def convert(
 
 
 def _require_room(target: Path, force: bool) -> None:
-    """Refuse before anything is read; whatever else can be wrong with the name is told by what writes."""
+    """Refuse before anything is read; whatever else can be wrong with the name is reported by what writes."""
     from hil.errors import UsageError
 
     if target.is_file() and not force:
-        raise UsageError(f"{target}: expected a new name, came one that exists. Replace it with --force.")
+        raise UsageError(f"{target}: expected a new name, got one that exists. Replace it with --force.")
 
 
 def _is_trace(source: Path) -> bool:
@@ -83,7 +83,7 @@ def _refuse_for_recording(source: Path, rig: Path | None, every: bool, channel: 
 
     if rig is not None or every or channel is not None:
         raise UsageError(
-            f"{source}: expected a bus trace with --rig, --all or --channel, came a recording. Leave them out."
+            f"{source}: expected a bus trace with --rig, --all or --channel, got a recording. Leave them out."
         )
 
 
@@ -92,7 +92,7 @@ def _refuse_for_trace(source: Path, dbc: Path | None) -> None:
 
     if dbc is not None:
         raise UsageError(
-            f"{source}: expected --dbc with a recording of a logged bus (MDF), came a bus trace, whose frames the EDS "
+            f"{source}: expected --dbc with a recording of a logged bus (MDF), got a bus trace, whose frames the EDS "
             "files of --rig explain. Leave it out."
         )
 
@@ -110,7 +110,7 @@ def _recording(source: Path, encoding: str, delimiter: str, dbc: Path | None) ->
     except ValidationError as error:
         first = error.errors()[0]
         reason = str(first["msg"]).removeprefix("Value error, ")
-        raise UsageError(f"--{first['loc'][0]}: expected {reason}, came {first['input']!r}") from error
+        raise UsageError(f"--{first['loc'][0]}: expected {reason}, got {first['input']!r}") from error
     return read_table(source, Request(hints, dbc=dbc))
 
 
@@ -123,8 +123,8 @@ def _trace(source: Path, rig: Path | None, every: bool, channel: str | None) -> 
 
     if rig is None:
         raise UsageError(
-            f"{source}: expected --rig RIG beside a bus trace: its EDS files say which bits are torque and speed, "
-            "came none."
+            f"{source}: expected --rig RIG besides a bus trace: its EDS files say which bits are torque and speed, "
+            "got none."
         )
     described = read_rig(rig)
     samples = list(replay(source, described, whole=every, channel=channel))

@@ -149,7 +149,7 @@ class _Demo:
             return diagnose(read_records(recordings), model, (), progress)
 
     def _publish(self, diagnosis: Diagnosis, recordings: list[Path]) -> dict[str, Any]:
-        """Write and print the verdict; a seal from an earlier run is not left beside it."""
+        """Write and print the verdict; a seal from an earlier run is not left next to it."""
         from hil.config.model_file import write_model
         from hil.provenance import provenance
         from hil.report.diagnosis_html import diagnosis_page

@@ -6,12 +6,17 @@ from typing import Annotated
 
 import typer
 
+from hil.cli.completers import effect_names
+
 app = typer.Typer(add_completion=False)
 
 
 @app.command(epilog="Example: hil effects backlash")
 def effects(
-    name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="One effect; all of them without it.")] = None,
+    name: Annotated[
+        str | None,
+        typer.Argument(metavar="[NAME]", help="One effect; all of them without it.", autocompletion=effect_names),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
 ) -> None:
     """List the catalogue, or one entry: law, parameters, what excites it, what it is confused with."""

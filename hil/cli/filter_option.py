@@ -14,7 +14,7 @@ import typer
 from hil.errors import UsageError
 
 if TYPE_CHECKING:
-    from estimator.identification.identify import Settings
+    from estimator.identification.settings import Settings
     from hil.rig.live import OnlineSetup
 
 FilterOf = Annotated[
@@ -44,7 +44,7 @@ def with_filter(settings: Settings, path: Path | None, run: str | None) -> Onlin
 
     if path is None:
         if run is not None:
-            raise UsageError(f"--filter-run {run}: expected --filter FILE with it, came none")
+            raise UsageError(f"--filter-run {run}: expected --filter FILE with it, got none")
         return OnlineSetup(settings)
     from hil.report.identification.read_back import identified
 

@@ -15,8 +15,8 @@ from hil.cli.trust_option import TrustLaws
 
 if TYPE_CHECKING:
     from estimator.identification.compare import Compared
-    from estimator.identification.identify import Settings
     from estimator.identification.offline.orders import OrderChoice
+    from estimator.identification.settings import Settings
     from estimator.identification.study import Study
     from estimator.physics.model import DrivelineModel
     from estimator.signals.record import Record
@@ -62,12 +62,8 @@ def identify(
     recording, and DIR/report.html.
     """
     from estimator.identification.compare import compare
-    from estimator.identification.identify import Settings
-    from hil.config.model_file import read_model_for_recordings
-    from hil.errors import ModelFileError
-    from hil.plants.scales import tell_scales
+    from estimator.identification.settings import Settings
     from hil.provenance import provenance
-    from hil.recording import read_records
     from hil.recording.timing_check import require_even_cycles
     from hil.report.identification.choices import chosen_estimators, chosen_orders, start_values
     from hil.report.outputs import require_folder
@@ -80,16 +76,8 @@ def identify(
     if sample_time is not None:
         settings = replace(settings, sample_time_s=sample_time, offline_sample_time_s=sample_time)
     entries = chosen_estimators(estimator)
-    file = None if model is None else read_model_for_recordings(model, trust_laws)
-    if model is not None and file is not None and file.on_bench:
-        raise ModelFileError(
-            model, "structure | expected a driveline, which torque moves | came 'joint': diagnose or simulate it"
-        )
-    records = read_records(recordings, None if file is None else file.signals, dbc=dbc, tell=tell)
-    if file is not None:
-        tell_scales(records, recordings, file.model, file.signals, dbc, tell)
+    records, expected = _read(recordings, model, dbc, trust_laws)
     settings, choice = chosen_orders(settings, order, delay, records)
-    expected = None if file is None else file.model
     start = start_values(estimator, expected)
     studies = _identified(records, settings)
     compared = [
@@ -101,6 +89,27 @@ def identify(
     _publish(out, records, settings, studies, expected, choice, compared, made, as_json=as_json)
     for complaint in attach_to_runs(recordings, {IDENTIFICATION: out / "identification.json"}):
         typer.echo(complaint, err=True)
+
+
+def _read(
+    recordings: Sequence[Path], model: Path | None, dbc: Path | None, trust_laws: bool
+) -> tuple[Sequence[Record], DrivelineModel | None]:
+    """Read the recordings, as a model file says where there is one, and that."""
+    from hil.config.model_file import read_model_for_recordings
+    from hil.errors import ModelFileError
+    from hil.plants.scales import tell_scales
+    from hil.recording import read_records
+
+    if model is None:
+        return read_records(recordings, None, dbc=dbc, tell=tell), None
+    file = read_model_for_recordings(model, trust_laws)
+    if file.on_bench:
+        raise ModelFileError(
+            model, "structure | expected a driveline, which torque moves | got 'joint': diagnose or simulate it"
+        )
+    records = read_records(recordings, file.signals, dbc=dbc, tell=tell)
+    tell_scales(records, recordings, file.model, file.signals, dbc, tell)
+    return records, file.model
 
 
 def _identified(records: Sequence[Record], settings: Settings) -> list[Study]:

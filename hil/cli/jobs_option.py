@@ -35,7 +35,7 @@ def use_cores_of_environment() -> None:
     if not text:
         return
     if not text.isdecimal() or int(text) < 1:
-        raise UsageError(f"{VARIABLE}: expected a whole number from 1 on, came {text!r}. Correct or unset it.")
+        raise UsageError(f"{VARIABLE}: expected a whole number from 1 on, got {text!r}. Correct or unset it.")
     use_cores(int(text))
 
 

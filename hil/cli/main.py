@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import importlib
+import os
 import sys
 from collections.abc import Sequence
 from enum import IntEnum
@@ -150,7 +151,7 @@ def _see_help(error: BaseException) -> str:
 
 
 def _complain(text: str) -> None:
-    """Say what went wrong; where the terminal is gone nobody can be told, and the exit status says it alone."""
+    """Say what went wrong; where the terminal is gone nobody can be informed, and the exit status says it alone."""
     with contextlib.suppress(OSError):
         print(text, file=sys.stderr, flush=True)  # noqa: T201 - the one place that speaks of errors
 
@@ -158,4 +159,8 @@ def _complain(text: str) -> None:
 def main() -> None:
     """Entry point of the console script ``hil``."""
     interrupt_on_signals()
+    if "_HIL_COMPLETE" in os.environ:  # a shell asks what can stand where the cursor is
+        from hil.cli.completion import complete
+
+        complete()
     sys.exit(run(sys.argv[1:], keep_log=True))

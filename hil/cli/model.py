@@ -83,7 +83,7 @@ def new(
     signals = () if recording is None else look(recording, dbc).signals
     complete = set(shape.parameter_names) <= {*values, *known}
     if not (yes or complete or may_ask):
-        raise UsageError("expected someone at a terminal to ask, or --yes with every --value, came neither")
+        raise UsageError("expected someone at a terminal to ask, or --yes with every --value, got neither")
     if ask is None and may_ask and not complete:
         ask = _asker()
     found = parameters(shape, kind, values, assignments("--tolerance", own, shape), usual, known, ask)
@@ -145,7 +145,7 @@ def _asker() -> Ask:
         try:
             return input(f"{what}{f' [{default}]' if default else ''}: ")
         except EOFError as end:
-            raise UsageError(f"{what}: expected an answer, came the end of the input") from end
+            raise UsageError(f"{what}: expected an answer, got the end of the input") from end
 
     return ask
 

@@ -95,10 +95,10 @@ def _open(
     setup = with_filter(tracking_settings(), filter_of, filter_run)
     if replay is not None:
         if simulate:
-            raise UsageError("hil monitor: expected --replay or --simulate, came both")
+            raise UsageError("hil monitor: expected --replay or --simulate, got both")
         opening = open_recording(replay, rig_file, speed, model, trust_laws, channel, setup)
     elif rig is None or rig_file is None:
-        raise UsageError("hil monitor: expected RIG, a rig file to watch, or --replay REC; came neither")
+        raise UsageError("hil monitor: expected RIG, a rig file to watch, or --replay REC; got neither")
     else:
         opening = open_rig(rig, rig_file, out, simulate, model, trust_laws, setup)
     return opening
@@ -113,7 +113,7 @@ def _view(opening: Opening, out: Path, page: str, picture: tuple[Path, float] | 
 def _close(opening: Opening, view: MonitorApp) -> None:
     """Say how every run went, then end as the view ended.
 
-    Where the terminal has gone, which is told as an interruption, nobody can be told.
+    Where the terminal has gone, which is reported as an interruption, nobody can be informed.
     """
     from hil.monitor.outcome import outcome
 
@@ -126,7 +126,7 @@ def _close(opening: Opening, view: MonitorApp) -> None:
     if opening.state.ended is not None and opening.state.ended.error is not None:
         raise RunAborted(opening.state.ended.error)
     if view.return_code:
-        raise RuntimeError("the view ended by a defect of its own, told above; the rig was ended as by q")
+        raise RuntimeError("the view ended by a defect of its own, reported above; the rig was ended as by q")
     if view.interrupted:
         raise KeyboardInterrupt
 
@@ -152,7 +152,7 @@ def _require_terminal() -> None:
 
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         raise UsageError(
-            "hil monitor: expected a terminal on standard input and output, came a pipe or a file. Over ssh ask for "
+            "hil monitor: expected a terminal on standard input and output, got a pipe or a file. Over ssh ask for "
             "one with ssh -t; for a picture without one use --snapshot FILE; for scripts use hil run --json."
         )
     from hil.monitor.layout import LEAST_COLUMNS, LEAST_ROWS
@@ -160,6 +160,6 @@ def _require_terminal() -> None:
     columns, rows = os.get_terminal_size(sys.stdout.fileno())
     if columns < LEAST_COLUMNS or rows < LEAST_ROWS:
         raise UsageError(
-            f"hil monitor: expected a terminal of at least {LEAST_COLUMNS} x {LEAST_ROWS}, came {columns} x {rows}. "
+            f"hil monitor: expected a terminal of at least {LEAST_COLUMNS} x {LEAST_ROWS}, got {columns} x {rows}. "
             "Make it larger, or its type smaller."
         )

@@ -45,7 +45,7 @@ def pacer_for(rig: Rig, pace: Pace) -> Pacer:
 
 
 def scheduling(pace: Pace) -> AbstractContextManager[RealTimeGrants]:
-    """Ask the operating system for real time as long as a run goes on, where it keeps to the wall clock."""
+    """Ask the operating system for real time as long as a run lasts, where it keeps to the wall clock."""
     from hil.rig.realtime import NOT_ASKED, real_time
 
     return real_time() if pace is Pace.REAL else nullcontext(NOT_ASKED)

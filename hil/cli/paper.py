@@ -13,7 +13,7 @@ import typer
 from hil.cli.trust_option import TrustLaws
 
 if TYPE_CHECKING:
-    from estimator.identification.identify import Settings
+    from estimator.identification.settings import Settings
     from hil.figures.local_model import LocalModel
     from hil.figures.numbers import Row
     from hil.figures.road.drive import Driven
@@ -68,8 +68,8 @@ def paper(
     CANopen and Modbus; all of it takes half a minute. The same seed makes the same files. Writes DIR/fig2, fig4 and
     fig5 as .svg and .pdf, DIR/report.html, DIR/paper.json, and the recordings with their rig file.
     """
-    from estimator.identification.identify import Settings
     from estimator.identification.linear_model import Orders
+    from estimator.identification.settings import Settings
     from hil.figures.drawn.style import require_matplotlib
     from hil.provenance import provenance
     from hil.report.outputs import require_folder
@@ -84,7 +84,7 @@ def paper(
     if model is not None:
         from hil.errors import UsageError
 
-        raise UsageError("hil paper: expected recordings with --model, came none: the simulated rig has its own model.")
+        raise UsageError("hil paper: expected recordings with --model, got none: the simulated rig has its own model.")
     with tempfile.TemporaryDirectory(prefix="hil-paper-") as workshop:
         driven = _drive(Path(workshop), seed, duration)
         from hil.figures.experiments import driven_models
@@ -110,7 +110,7 @@ def _drive(workshop: Path, seed: int, duration_s: float) -> list[Driven]:
     from hil.rig.stop import StopRequest, stop_on_signals
 
     if not 0.0 < duration_s < float("inf"):
-        raise UsageError(f"--duration: expected a number of seconds above 0, came {duration_s:g}")
+        raise UsageError(f"--duration: expected a number of seconds above 0, got {duration_s:g}")
     stop = StopRequest()
     with stop_on_signals(stop), _bar(EXPERIMENTS, duration_s) as progress:
         return drive_all(workshop, seed, EXPERIMENTS, duration_s, stop, progress)

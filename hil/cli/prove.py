@@ -23,7 +23,9 @@ SHORT = 12
 Folder = Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a set of cases.")]
 Jobs = Annotated[int, typer.Option(min=1, help="Cases at a time.")]
 Cases = Annotated[int, typer.Option(min=1, max=999, help="How many cases.")]
-Seed = Annotated[int | None, typer.Option(min=0, help="What everything is drawn from; else at random, and not told.")]
+Seed = Annotated[
+    int | None, typer.Option(min=0, help="What everything is drawn from; else at random, and not reported.")
+]
 KeyFile = Annotated[Path | None, typer.Option("--key-file", metavar="FILE", help="File of the key, outside DIR.")]
 Data = Annotated[
     Path | None, typer.Option(metavar="DATA", help="Folder of the real recordings; without it they are left out.")
@@ -46,7 +48,7 @@ def prove(
 ) -> None:
     """Prove the claim: sealed cases, sealed rigs and, where they are at hand, real recordings; one scoreboard.
 
-    Called again it goes on where it was interrupted. The key is kept beside DIR, in DIR.key. To check the claim
+    Called again it continues where it was interrupted. The key is kept next to DIR, in DIR.key. To check the claim
     yourself, make the set on one machine, answer it on another, and open it with the key.
     """
     if context.invoked_subcommand is not None:
@@ -183,7 +185,7 @@ def _real_cases(folder: Path) -> list[dict[str, Any]]:
     try:
         cases: list[dict[str, Any]] = read_json(path)["cases"]
     except (ValueError, KeyError, TypeError) as error:
-        raise UsageError(f"{path}: expected what hil prove real has written, came: {error}. Remove it.") from error
+        raise UsageError(f"{path}: expected what hil prove real has written, got: {error}. Remove it.") from error
     return cases
 
 

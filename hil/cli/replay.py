@@ -14,10 +14,10 @@ from hil.cli.trust_option import TrustLaws
 from hil.errors import UsageError
 
 if TYPE_CHECKING:
-    from estimator.identification.identify import Settings
+    from estimator.identification.settings import Settings
     from estimator.signals.record import FloatArray
     from hil.rig.live_course import Course
-    from hil.rig.live_replay import Pace, Told
+    from hil.rig.live_replay import OnCourse, Pace
 
 SCHEMA = "hil.replay/1"
 
@@ -72,7 +72,7 @@ def replay(
     from hil.store.alarms import statements
 
     if speed is not None and not speed > 0:
-        raise UsageError(f"--speed: expected a multiple of real time above 0, came {speed:g}")
+        raise UsageError(f"--speed: expected a multiple of real time above 0, got {speed:g}")
     settings, pace = tracking_settings(sample_time), Pace(speed)
     settings, filter_l = with_filter(settings, filter_of, filter_run)
     begun_s = time.perf_counter()
@@ -103,11 +103,11 @@ def replay(
 def _require(path: Path, what: str, needed: dict[str, object], senseless: dict[str, object]) -> None:
     for option, value in needed.items():
         if value is None:
-            raise UsageError(f"{path}: expected {option} with {what}, came none")
+            raise UsageError(f"{path}: expected {option} with {what}, got none")
     for option, value in senseless.items():
         if value is not None:
             hint = " To rewrite a recording: hil convert." if option == "--out" else ""
-            raise UsageError(f"{path}: expected no {option} with {what}, came one.{hint}")
+            raise UsageError(f"{path}: expected no {option} with {what}, got one.{hint}")
 
 
 def _play_recording(
@@ -152,7 +152,7 @@ def _play_trace(
     return course, {"recording": None if out is None else str(out), "recorded": len(samples), "flagged": flagged}
 
 
-def _show(pace: Pace) -> Told:
+def _show(pace: Pace) -> OnCourse:
     """Return what shows the estimate as it goes: on a terminal, where the eye can follow."""
     from rich.console import Console
 

@@ -57,7 +57,7 @@ def new(
     """Ask what is connected, and write a rig file with a comment on every key; never over one that is there.
 
     Asks for what is not given as an option, and again where an answer does not fit. On a vehicle nothing that limits
-    torque has a default. Guard, PRBS and experiments follow from the torque limit. rig.schema.json is written beside
+    torque has a default. Guard, PRBS and experiments follow from the torque limit. rig.schema.json is written next to
     it, for editors.
 
     With --eds identity, mode, and from a DCF node id and bit rate, are the data sheet's; what it does not say and the
@@ -88,11 +88,11 @@ def new(
         "speed_rad_s": speed_rad_s,
     }
     if not yes and not sys.stdin.isatty():
-        raise UsageError("expected someone at a terminal to ask, or --yes, came neither. See: hil rig new --help")
+        raise UsageError("expected someone at a terminal to ask, or --yes, got neither. See: hil rig new --help")
     drive = None if eds is None else new_drive(eds, file, simulated)
     ask = None if yes else _asker(simulated)
-    told = {key: text for key, text in given.items() if text is not None}
-    found = answers(told, simulated, ask, None if drive is None else drive.defaults)
+    given_texts = {key: text for key, text in given.items() if text is not None}
+    found = answers(given_texts, simulated, ask, None if drive is None else drive.defaults)
     write_new(file, rig_text(found, file, simulated, () if drive is None else drive.lines))
     typer.echo(f"{file}: written. Go through it, then: hil check {file}")
     schema = file.with_name(FileKind.RIG.value)
@@ -132,6 +132,6 @@ def _asker(simulated: bool) -> Ask:
         try:
             return input(f"{question.asks}{f' [{default}]' if default else ''}: ")
         except EOFError as end:
-            raise UsageError(f"{question.asks}: expected an answer, came the end of the input") from end
+            raise UsageError(f"{question.asks}: expected an answer, got the end of the input") from end
 
     return ask

@@ -13,7 +13,7 @@ from hil.rig.live_course import statement
 from hil.rig.plan import Plan
 
 if TYPE_CHECKING:
-    from estimator.identification.online.online_estimate import OnlineEstimate
+    from estimator.identification.online_estimate import OnlineEstimate
 
 SHOW_EVERY_S = 0.1
 """Time between two changes of the bar [s of the run]; the cycle has better things to do."""
@@ -58,5 +58,5 @@ class RunProgress:
             return
         self._shown = (phase, time_s)
         measured_s = time_s if phase is Phase.MEASURE else None
-        told = "" if estimate is None else statement(estimate)
-        self._bar.update(self._task, description=f"{self._name}: {phase.value}", completed=measured_s, estimate=told)
+        shown = "" if estimate is None else statement(estimate)
+        self._bar.update(self._task, description=f"{self._name}: {phase.value}", completed=measured_s, estimate=shown)

@@ -1,4 +1,4 @@
-"""``hil sim``: serve the simulated slaves until told to stop."""
+"""``hil sim``: serve the simulated slaves until stopped."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.markup import escape
 
+from hil.cli.completers import effect_names
 from hil.cli.trust_option import TrustLaws
 from hil.rig.stop import StopRequest, stop_on_signals
 from hil.simulator.fault_spec import known_faults
@@ -42,13 +43,17 @@ def sim(
     ] = None,
     effect: Annotated[
         list[str] | None,
-        typer.Option(metavar="NAME[:k=v,...]", help="Put an effect into the driveline; may be repeated."),
+        typer.Option(
+            metavar="NAME[:k=v,...]",
+            help="Put an effect into the driveline; may be repeated.",
+            autocompletion=effect_names,
+        ),
     ] = None,
     fault: Annotated[
         list[str] | None,
         typer.Option(
             metavar="SPEC",
-            help=f"Let a device fail, where told after S seconds of simulated time: {escape(known_faults())}. "
+            help=f"Let a device fail, where given after S seconds of simulated time: {escape(known_faults())}. "
             "May be repeated.",
         ),
     ] = None,

@@ -40,7 +40,7 @@ def simulate(
     from hil.report.wording import output_unit, simulated_column
 
     if out.suffix.lower() != ".csv":
-        raise UsageError(f"--out {out}: expected a name that ends in .csv, came {out.suffix!r}")
+        raise UsageError(f"--out {out}: expected a name that ends in .csv, got {out.suffix!r}")
     if out.exists() and recording.exists() and out.samefile(recording):
         raise UsageError(f"--out {out}: expected another file than the recording itself. Choose another name.")
     require_folder(out.parent)

@@ -32,7 +32,7 @@ class WithinBand:
     low_rad_s, high_rad_s
         Ends of the band [rad/s].
     margin_rad_s
-        What the speed at the beginning is given beside it.
+        What the speed at the beginning is given next to it.
     period_s
         Time between two cycles [s].
     """

@@ -42,7 +42,7 @@ class Commissioning:
     asked
         What the command line asks of single steps.
     show
-        Told the findings of each step.
+        Called with the findings of each step.
     """
 
     job: Job
@@ -134,7 +134,7 @@ class Commissioning:
         self.job.say(f"{step.title}: skipped, because: {because}")
 
     def _do(self, step: Step, keep_runs: bool) -> Answer:
-        """Do a step once, and return how to go on."""
+        """Do a step once, and return how to continue."""
         plan = plan_of(self.job, step)
         for line in announcement(self.job, step, plan):
             self.job.say(line)
@@ -154,10 +154,10 @@ class Commissioning:
         try:
             outcome = step.do(self.job)
         except BaseException as error:
-            record.end(Status.INTERRUPTED, _told(error))
+            record.end(Status.INTERRUPTED, _in_words(error))
             try:
                 self.job.state.save()
-            except UsageError as trouble:  # what ended the step is what has to be told first
+            except UsageError as trouble:  # what ended the step is what has to be reported first
                 if str(trouble) != str(error):
                     error.add_note(str(trouble))
             raise
@@ -178,8 +178,8 @@ class Commissioning:
         if stops and answer.what is What.GO:
             first = stops[0]
             raise RunAborted(
-                f"step {step.name}: {first.what}: expected {first.expected}, came {first.measured}. {first.advice}. "
-                f"Then call again; it goes on from here. To go on without: --skip {step.name} --because TEXT."
+                f"step {step.name}: {first.what}: expected {first.expected}, got {first.measured}. {first.advice}. "
+                f"Then call again; it continues from here. To continue without: --skip {step.name} --because TEXT."
             )
         return answer
 
@@ -189,7 +189,7 @@ def _quit_if_asked(answer: Answer) -> None:
         raise KeyboardInterrupt
 
 
-def _told(error: BaseException) -> str:
+def _in_words(error: BaseException) -> str:
     if isinstance(error, KeyboardInterrupt):
         return "interrupted by Ctrl-C or a signal"
     return f"{type(error).__name__}: {error}"

@@ -23,7 +23,7 @@ class Finding:
     advice
         What to do where it is not within; empty where nothing need be done.
     blocking
-        Whether going on would be unsafe, or without meaning.
+        Whether continuing would be unsafe, or without meaning.
     """
 
     what: str

@@ -38,7 +38,7 @@ def sole_use(folder: Path) -> Iterator[None]:
             file.seek(0)
             holder = file.read().strip() or "?"
             raise UsageError(
-                f"{folder}: expected no other call at work on this commissioning, came process {holder}. "
+                f"{folder}: expected no other call at work on this commissioning, got process {holder}. "
                 "Wait for its end or end it by Ctrl-C, or choose another folder by --out."
             )
         _sign(file)
@@ -63,7 +63,7 @@ def _sign(file: IO[str]) -> None:
 
 def _unwritable(path: Path, error: OSError) -> UsageError:
     return UsageError(
-        f"{path}: expected a place to write to, came: {error.strerror or error}. Make room there, or choose another "
+        f"{path}: expected a place to write to, got: {error.strerror or error}. Make room there, or choose another "
         "folder by --out."
     )
 

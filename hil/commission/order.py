@@ -14,9 +14,9 @@ from typing import Any
 import tomlkit
 
 from hil.config.experiment_tables import AnyExperiment
-from hil.config.problems import validate
 from hil.config.rig_file import Rig
 from hil.errors import RigFileError
+from hil.problems import validate
 from hil.rig.addresses import with_addresses
 
 

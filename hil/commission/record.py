@@ -28,7 +28,7 @@ class Status(Enum):
 
 @dataclass(slots=True)
 class RunRecord:
-    """One run of a step: its recording beside the state file, and what was predicted and measured [Nm, rad/s].
+    """One run of a step: its recording next to the state file, and what was predicted and measured [Nm, rad/s].
 
     ``whole`` is False where the run was ended early; its recording then holds what there was.
     """

@@ -28,10 +28,10 @@ from hil.rig.metadata import run_metadata
 from hil.rig.pacing import Pacer, disk_patience_s, heartbeat_patience_ms
 from hil.rig.plan import Plan, plan_run
 from hil.rig.realtime import RealTimeGrants
-from hil.rig.sample import Sample
 from hil.rig.session import run_plan
 from hil.rig.stop import StopRequest, stop_on_signals
 from hil.rig.timing import RunTiming
+from hil.sample import Sample
 from hil.store import register_run
 
 RUNS = "runs"
@@ -39,7 +39,7 @@ RUNS = "runs"
 
 
 class Shows(Protocol):
-    """Shows how a run goes on."""
+    """Shows how a run continues."""
 
     def show(self, phase: Phase, time_s: float) -> None:
         """Take note of one cycle: its phase and the time since the phase began [s]."""
@@ -149,7 +149,7 @@ class Runner:
         speed_rad_s
             Speed the vehicle was last seen at.
         note
-            Told of the run, also of one that was ended early.
+            Called with the summary of a run, also of one that was ended early.
 
         Raises
         ------
@@ -230,7 +230,7 @@ def _banded(plan: Plan, prediction: Prediction, least_margin_rad_s: float) -> Pl
 
 
 def _enter_ended(path: Path, error: BaseException) -> None:
-    """Enter what there is of a run that was ended early; what ended it is told first."""
+    """Enter what there is of a run that was ended early; what ended it is reported first."""
     if not path.exists():
         return
     try:

@@ -1,6 +1,6 @@
 """The state file of a commissioning: ``commission.json`` (schema ``hil.commission/1``), whole after every change.
 
-It is written beside itself and moved over the old one, so that neither an interruption nor a full disk nor the end of
+It is written next to itself and moved over the old one, so that neither an interruption nor a full disk nor the end of
 power leaves half of it.
 """
 
@@ -30,7 +30,7 @@ class State:
     Attributes
     ----------
     folder
-        Where the file and everything beside it is.
+        Where the file and everything next to it is.
     rig_name, rig_path, rig_text
         The rig file as of the last call.
     steps
@@ -88,7 +88,7 @@ class State:
             part.replace(self.path)
         except OSError as error:
             raise UsageError(
-                f"{self.path}: expected room for the state, came: {error.strerror or error}. The one before it is "
+                f"{self.path}: expected room for the state, got: {error.strerror or error}. The one before it is "
                 "kept; make room and call again."
             ) from error
         finally:
@@ -133,7 +133,7 @@ def load_state(folder: Path, names: Iterable[str]) -> State | None:
         )
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise UsageError(
-            f"{path}: expected the state of a commissioning ({SCHEMA}), came a file that can't be read as one: "
+            f"{path}: expected the state of a commissioning ({SCHEMA}), got a file that can't be read as one: "
             f"{error}. Move it away to begin anew in this folder (its recordings stay), or choose another by --out."
         ) from error
 

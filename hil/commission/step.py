@@ -48,9 +48,9 @@ class Job:
     travel_is_given
         Whether the user said so; else it is assumed.
     say
-        Told what goes on.
+        Called with what happens.
     progress
-        Told of long computations: what, and the share done.
+        Called during long computations: what, and the share done.
     """
 
     source: RigSource

@@ -38,7 +38,7 @@ class Talk(Protocol):
         ...
 
     def after(self, step: str, outside: int, blocked: bool) -> Answer:
-        """Ask how to go on after a step with findings outside their limits."""
+        """Ask how to continue after a step with findings outside their limits."""
         ...
 
     def keep_results(self, changes: Sequence[str]) -> Answer:
@@ -71,13 +71,13 @@ class Script:
         """
         if not self.yes:
             raise UsageError(
-                f"step {step} commands torque: expected someone at a terminal to ask, or --yes, came neither. What was "
+                f"step {step} commands torque: expected someone at a terminal to ask, or --yes, got neither. What was "
                 "done up to here is kept; read the plan by --dry-run, then call again with --yes."
             )
         return GO
 
     def after(self, step: str, outside: int, blocked: bool) -> Answer:
-        """Go on; what blocks ends the commissioning all the same."""
+        """Continue; what blocks ends the commissioning all the same."""
         return GO
 
     def keep_results(self, changes: Sequence[str]) -> Answer:
@@ -125,7 +125,7 @@ class Person:
         if not outside or (self.yes and not blocked):
             return GO
         if blocked:
-            question = "  This has to be mended first. [r]epeat, [s]kip with a reason, [q]uit: "
+            question = "  This has to be fixed first. [r]epeat, [s]kip with a reason, [q]uit: "
             return self._answer(question, {"r": What.REPEAT, "s": What.SKIP, "q": What.QUIT, "": What.QUIT})
         question = "  Go [o]n, [r]epeat, [q]uit: "
         return self._answer(question, {"o": What.GO, "": What.GO, "r": What.REPEAT, "q": What.QUIT})
@@ -142,7 +142,7 @@ class Person:
         """Ask until one of the words comes; `SKIP` asks for a reason until there is one."""
         expected = " or ".join(word for word in words if word)
         while (word := self.ask(question).strip().lower()) not in words:
-            question = f"  expected {expected}, came {word or 'nothing'}\n{question.splitlines()[-1]}"
+            question = f"  expected {expected}, got {word or 'nothing'}\n{question.splitlines()[-1]}"
         if words[word] is not What.SKIP:
             return Answer(words[word])
         question = "  Because: "

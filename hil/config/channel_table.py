@@ -17,8 +17,8 @@ from drivers.plc.map_needs import NUMBER
 from drivers.plc.register_map import RegisterMap
 from drivers.plc.units import IN_SI
 from estimator.signals.record import Location, OutputKind
-from hil.config.problems import Fault, refuse
 from hil.config.table import Table, Text
+from hil.problems import Fault, refuse
 from hil.recording import columns
 
 UNITS: Final = MappingProxyType(
@@ -89,14 +89,14 @@ class ChannelTable(Table):
         register = register_map.registers.get(self.register_name or "")
         if register is None:
             listed = ", ".join(sorted(register_map.registers))
-            return f"expected one of the registers of map {register_map.name!r}: {listed} | came {self.register_name!r}"
+            return f"expected one of the registers of map {register_map.name!r}: {listed} | got {self.register_name!r}"
         if register.type not in NUMBER:
             return (
-                f"expected a register that holds a number | came {self.register_name!r}, of type {register.type.value}"
+                f"expected a register that holds a number | got {self.register_name!r}, of type {register.type.value}"
             )
         if register.unit not in IN_SI[self.unit]:
             units = " or ".join(IN_SI[self.unit])
-            return f"expected a register in {units}, since kind is {self.kind.value!r} | came one in {register.unit}"
+            return f"expected a register in {units}, since kind is {self.kind.value!r} | got one in {register.unit}"
         return ""
 
     @model_validator(mode="after")
@@ -119,12 +119,12 @@ class ChannelTable(Table):
 
     def _source_faults(self) -> Iterator[Fault]:
         if (self.object is None) == (self.register_name is None):
-            came = "neither" if self.object is None else "both"
-            yield Fault("", "either object, with inverter and scale, or register", came)
+            got = "neither" if self.object is None else "both"
+            yield Fault("", "either object, with inverter and scale, or register", got)
         elif self.object is None:
             given = {"inverter": self.inverter, "subindex": self.subindex or None}
             for key in (key for key, value in given.items() if value is not None):
-                yield Fault(key, "no such key beside register", given[key])
+                yield Fault(key, "no such key next to register", given[key])
         else:
             for key in (key for key in ("inverter", "scale") if getattr(self, key) is None):
-                yield Fault(key, "this key beside object", None)
+                yield Fault(key, "this key next to object", None)

@@ -9,8 +9,8 @@ from pydantic import Field, model_validator
 
 from drivers.capability.speed_unit import SpeedUnit, SpeedUnitName
 from drivers.inverter.acceptance import Acceptance
-from hil.config.problems import Fault, refuse
 from hil.config.table import Positive, Table, Text
+from hil.problems import Fault, refuse
 
 
 class SpeedUnitTable(Table):

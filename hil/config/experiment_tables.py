@@ -1,4 +1,4 @@
-"""The tables ``[experiments.NAME]``: one class per kind, told apart by ``kind``.
+"""The tables ``[experiments.NAME]``: one class per kind, distinguished by ``kind``.
 
 Torques are of both inverters together. What every kind has:
 
@@ -18,8 +18,8 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from hil.config.problems import Fault, refuse
 from hil.config.table import NotNegative, Positive, Table
+from hil.problems import Fault, refuse
 
 APPROACH_TIMEOUT_S = 60.0
 """Time to reach the start speed where the file gives none [s]; it limits patience, not torque."""

@@ -22,7 +22,7 @@ LEAST_RESPONSE_S: Final = 0.01
 
 
 class GuardTable(Table):
-    """Limits of the torque guard beside the torque limit of each inverter; see `drivers.torque_guard`.
+    """Limits of the torque guard besides the torque limit of each inverter; see `drivers.torque_guard`.
 
     ``torque_error_nm`` is that of one inverter, by default 5 % of its rated torque; ``torque_error_sum_nm`` that of
     both together, by default the root of the sum of both squares. ``torque_response_s`` is the time in which a drive

@@ -11,8 +11,8 @@ from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 from drivers.inverter.cia402 import TorqueMode
 from drivers.inverter.drive_settings import ABORT_CONNECTION
 from hil.config.drive_tables import AcceptedTable, RatedTorqueUnit, SpeedUnitTable
-from hil.config.problems import Fault, refuse
 from hil.config.table import ExistingFile, Positive, Table, Unsigned32
+from hil.problems import Fault, refuse
 
 
 def _mode_by_name(value: object) -> TorqueMode:

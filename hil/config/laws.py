@@ -89,7 +89,7 @@ def moved(tables: Mapping[str, LawTable], path: Path) -> dict[str, LawTable]:
 def _would_run(path: Path, name: str, table: LawTable) -> str:
     folder = (path.parent / table.folder).resolve()
     return (
-        f"laws.{name} | expected --trust-laws, for this law is Python code that runs with your rights | came none: it "
+        f"laws.{name} | expected --trust-laws, for this law is Python code that runs with your rights | got none: it "
         f"would run {table.function} of {folder}, or of an installed package. Read it before you trust it"
     )
 
@@ -103,20 +103,20 @@ def _law(path: Path, name: str, table: LawTable) -> OwnLaw:
 def _function(name: str, text: str, folder: Path) -> Callable[..., object]:
     module_name, _, function_name = text.partition(":")
     if not os.path.isdir(folder):  # Python would look into an archive too; pathlib raises for a name that can't be
-        raise BadModel(f"laws.{name}.folder | expected an existing folder | came {folder}")
+        raise BadModel(f"laws.{name}.folder | expected an existing folder | got {folder}")
     try:
         with _searched_first(folder):
             module = importlib.import_module(module_name)
-    except Exception as error:  # a user's module may fail in any way: it is told as its own
+    except Exception as error:  # a user's module may fail in any way: it is reported as its own
         raise BadModel(
             f"laws.{name}.function | expected module {module_name!r} in {folder} or installed | "
-            f"came {type(error).__name__}: {error}"
+            f"got {type(error).__name__}: {error}"
         ) from error
     function = getattr(module, function_name, None)
     if not callable(function):
         raise BadModel(
             f"laws.{name}.function | expected a function {function_name!r} in {module.__file__} | "
-            f"came {'nothing' if function is None else type(function).__name__}"
+            f"got {'nothing' if function is None else type(function).__name__}"
         )
     return function  # type: ignore[no-any-return]
 
@@ -136,10 +136,10 @@ def _offered() -> Iterable[OwnLaw]:
     for point in entry_points(group=GROUP):
         try:
             law = point.load()
-        except Exception as error:  # another package's code may fail in any way: it is told as its own
+        except Exception as error:  # another package's code may fail in any way: it is reported as its own
             raise BadModel(
-                f"laws.{point.name} | expected entry point {point.value} to load | came {type(error).__name__}: {error}"
+                f"laws.{point.name} | expected entry point {point.value} to load | got {type(error).__name__}: {error}"
             ) from error
         if not isinstance(law, OwnLaw):
-            raise BadModel(f"laws.{point.name} | expected entry point {point.value} to be an OwnLaw | came {law!r}")
+            raise BadModel(f"laws.{point.name} | expected entry point {point.value} to be an OwnLaw | got {law!r}")
         yield law

@@ -1,7 +1,7 @@
 """The model file, ``hil.model/1``: a driveline as a person writes it down, and as a diagnosis hands it back.
 
 What a file may hold is in the contract; what makes a model is in ``estimator.physics.model``. Faults of both
-kinds are reported together, so that a file is mended in one go: a value of the wrong type is replaced by a
+kinds are reported together, so that a file is fixed in one go: a value of the wrong type is replaced by a
 neutral one while the rest of the model is checked.
 """
 
@@ -25,8 +25,8 @@ from estimator.physics.law_name import LawName
 from estimator.physics.model import DrivelineModel, EffectValue, Load, Motion, Parameter, Structure, parameter_unit
 from hil.config.file_schema import FileKind, schema_line
 from hil.config.laws import LawTable, laws_of, moved
-from hil.config.problems import Fault, problem_lines, read_toml, refuse
 from hil.errors import ModelFileError
+from hil.problems import Fault, problem_lines, read_toml, refuse
 from hil.recording import columns
 from hil.recording.signals_config import SignalsConfig
 
@@ -101,7 +101,7 @@ class Prepared(_Strict):
 
     Attributes
     ----------
-    mended : bool
+    fixed : bool
         Whether wrapped positions are put together, and what was cut off, held or interpolated does not count.
     one_in : int
         To one in how many samples recordings are thinned.
@@ -225,7 +225,7 @@ def read_model_for_recordings(path: Path | str, trust_laws: bool = False) -> Mod
             raise ModelFileError(
                 path,
                 "signals | expected position (the imposed motion) and torque or force (what it takes) for a joint | "
-                "came neither or one of them: name both columns in [signals]",
+                "got neither or one of them: name both columns in [signals]",
             )
         return file
     names_output = file.signals is not None and file.signals.names_output
@@ -233,7 +233,7 @@ def read_model_for_recordings(path: Path | str, trust_laws: bool = False) -> Mod
         raise ModelFileError(
             path,
             f"motion | expected 'rotation', since recordings are read by their {columns.SPEED} where [signals] names "
-            "no speed, position or force | came 'translation': correct it, or name the column in [signals]",
+            "no speed, position or force | got 'translation': correct it, or name the column in [signals]",
         )
     return file
 

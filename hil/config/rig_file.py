@@ -1,7 +1,7 @@
 """The rig file: one TOML file that says what is connected, and what it may be asked to do.
 
 Strict and frozen: a number is no text, an unknown key is a fault, and nothing that limits torque has a
-default. Rules that hold across keys stand beside the keys they concern; `hil.config.problems` reports all
+default. Rules that hold across keys stand next to the keys they concern; `hil.problems` reports all
 faults at once. Those across tables are looked at once every table is right by itself.
 
 The base torque of an experiment is that of both inverters together and is split evenly between them, unless its
@@ -35,9 +35,9 @@ from hil.config.inverter_table import InvertersTable, NodeId
 from hil.config.inverter_table import InverterTable as InverterTable
 from hil.config.plc_tables import PlcTable as PlcTable
 from hil.config.plc_tables import SimulatedPlcSecurityTable
-from hil.config.problems import Fault, read_toml, refuse, validate
 from hil.config.table import ExistingFile, NotNegative, Positive, Table, Text
 from hil.errors import RigFileError
+from hil.problems import Fault, read_toml, refuse, validate
 
 
 class PrbsTarget(Enum):
@@ -203,10 +203,10 @@ class Rig(Table):
             torque_limit_m1_nm=self.inverters.m1.torque_limit_nm - parts_nm["m1"],
             torque_limit_m2_nm=self.inverters.m2.torque_limit_nm - parts_nm["m2"],
             sum_limit_nm=self.guard.sum_limit_nm - self.prbs.amplitude_nm,
-            error=self._error_beside_prbs(parts_nm["m1"], parts_nm["m2"]),
+            error=self._error_next_to_prbs(parts_nm["m1"], parts_nm["m2"]),
         )
 
-    def _error_beside_prbs(self, part_m1_nm: float, part_m2_nm: float) -> ErrorLimits:
+    def _error_next_to_prbs(self, part_m1_nm: float, part_m2_nm: float) -> ErrorLimits:
         """Let the torques be off by what the PLC adds without the host knowing when."""
         error = self.torque_limits.error
         return replace(
@@ -302,7 +302,7 @@ class Rig(Table):
             key = f"experiments.{name}"
             for rest_nm, of in self._torque_rests(experiment.share_m1):
                 if experiment.torque_nm > rest_nm:
-                    expected = f"at most {rest_nm:g}, what {of} leaves beside the PRBS"
+                    expected = f"at most {rest_nm:g}, what {of} leaves besides the PRBS"
                     yield Fault(f"{key}.torque_nm", expected, experiment.torque_nm)
             fastest = self.guard.rate_limit_nm_per_s / max(experiment.share_m1, 1.0 - experiment.share_m1)
             if experiment.slew_nm_per_s > fastest:
@@ -310,7 +310,7 @@ class Rig(Table):
                 yield Fault(f"{key}.slew_nm_per_s", expected, experiment.slew_nm_per_s)
 
     def _torque_rests(self, share_m1: float) -> Iterator[tuple[float, str]]:
-        """Largest base torque of both inverters that each limit leaves beside the PRBS [Nm], and its key.
+        """Largest base torque of both inverters that each limit leaves besides the PRBS [Nm], and its key.
 
         ``share_m1`` is the part of the base torque that inverter m1 gives, 0 to 1.
         """
@@ -337,7 +337,7 @@ def read_rig(path: Path | str) -> Rig:
     Raises
     ------
     RigFileError
-        Naming every fault of the file, or of EDS and register map it names: line or key, expected, came.
+        Naming every fault of the file, or of EDS and register map it names: line or key, expected, got.
     """
     file = Path(path)
     rig = validate(Rig, read_toml(file, RigFileError), file, RigFileError)
@@ -372,7 +372,7 @@ def _require_eds(file: Path, key: str, eds: Path, node_id: int) -> None:
     try:
         EdsFile(eds, node_id)
     except ConfigMismatch as cause:
-        raise RigFileError(file, f"{key} | expected an EDS | came: {cause}") from cause
+        raise RigFileError(file, f"{key} | expected an EDS | got: {cause}") from cause
 
 
 def _require_map(path: Path) -> None:

@@ -15,7 +15,7 @@ class Table(BaseModel):
     model_config = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
 
 
-def _beside_the_file(value: object, info: ValidationInfo) -> Path:
+def _next_to_the_file(value: object, info: ValidationInfo) -> Path:
     """Resolve a path against the folder of the file it stands in, and see that it is there.
 
     It may lie anywhere: who starts drives by a rig file is its author, and nothing is written to what it names.
@@ -34,5 +34,5 @@ NotNegative = Annotated[float, Field(ge=0)]
 Text = Annotated[str, Field(min_length=1)]
 TcpPort = Annotated[int, Field(ge=1, le=65535)]
 Unsigned32 = Annotated[int, Field(ge=0, le=0xFFFF_FFFF)]
-ExistingFile = Annotated[Path, BeforeValidator(_beside_the_file)]
+ExistingFile = Annotated[Path, BeforeValidator(_next_to_the_file)]
 """A file, relative to the folder of the file that names it; read as an absolute path."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from estimator.identification.identify import Settings
+from estimator.identification.settings import Settings
 from hil.errors import UsageError
 from hil.export.identification_file import plc_estimator
 from hil.export.plc_estimator import PlcEstimator
@@ -25,10 +25,10 @@ def written_estimator(
     if identification is not None:
         return plc_estimator(identification, run, cycle_s, adaptation, adaptive)
     if run is not None:
-        raise UsageError(f"--run {run}: expected the identification.json that holds it, came no file")
+        raise UsageError(f"--run {run}: expected the identification.json that holds it, got no file")
     if not adaptive:
         raise UsageError(
-            "expected identification.json, whose model gives the observation filter, came no file. Make it by: hil "
+            "expected identification.json, whose model gives the observation filter, got no file. Make it by: hil "
             "identify; or let the filter follow the estimate: --adaptive"
         )
     return PlcEstimator(Settings(adaptation=adaptation), cycle_s, None, "the defaults, filter adapted on line")

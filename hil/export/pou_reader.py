@@ -78,7 +78,7 @@ def _variable(found: re.Match[str]) -> Variable:
 def _array(text: str) -> Array:
     found = _ARRAY.fullmatch(text)
     if found is None:
-        raise ValueError(f"expected ARRAY[low..high] OF name, came {text!r}")
+        raise ValueError(f"expected ARRAY[low..high] OF name, got {text!r}")
     bounds = (tuple(map(int, part.split(".."))) for part in found["bounds"].split(","))
     return Array(tuple((low, high) for low, high in bounds), found["element"])
 

@@ -37,11 +37,11 @@ def profile(text: str) -> Adaptation:
     for part in rest.split(",") if rest else ():
         key, _, number = (piece.strip() for piece in part.partition("="))
         if key not in known or key in values:
-            raise UsageError(f"profile {text!r}: expected each of {', '.join(known)} at most once, came {part!r}")
+            raise UsageError(f"profile {text!r}: expected each of {', '.join(known)} at most once, got {part!r}")
         try:
             values[key] = float(number)
         except ValueError as error:
-            raise UsageError(f"profile {text!r}: expected {key}=number, came {part!r}") from error
+            raise UsageError(f"profile {text!r}: expected {key}=number, got {part!r}") from error
     made: Adaptation = kind(**values)
     made.law  # noqa: B018 - checks the numbers
     return made

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from estimator.identification.identify import Settings, identify
+from estimator.identification.identify import identify
+from estimator.identification.settings import Settings
 from estimator.physics.model import DrivelineModel
 from estimator.signals.record import Record
 from hil.figures.local_model import TRUTH, LocalModel, Reference
@@ -35,7 +36,7 @@ def drive_all(
     stop
         Ends the run under way, and all, when requested.
     progress
-        Gives what is told of every cycle of an experiment, by its number from 0.
+        Gives the callback for every cycle of an experiment, by its number from 0.
 
     Raises
     ------
@@ -61,5 +62,5 @@ def driven_models(driven: Sequence[Driven], settings: Settings) -> list[LocalMod
 def recorded_models(
     records: Sequence[Record], settings: Settings, expected: DrivelineModel | None = None
 ) -> list[LocalModel]:
-    """Identify from recordings; beside them what a two-mass model file expects."""
+    """Identify from recordings; next to them what a two-mass model file expects."""
     return [LocalModel.with_expected(record, identify(record, settings), expected) for record in records]

@@ -43,7 +43,7 @@ class LocalModel:
     found
         On-line, off-line and spectral estimate of it.
     reference
-        What to draw beside them.
+        What to draw next to them.
     """
 
     record: Record

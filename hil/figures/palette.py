@@ -1,7 +1,7 @@
-"""Colours of pages and figures, told apart by people with any common colour blindness.
+"""Colours of pages and figures, distinguished by people with any common colour blindness.
 
 The set of M. Okabe and K. Ito (Color Universal Design, 2008) without its yellow, which can't be seen on white, and the
-wine red and indigo of P. Tol's "muted" set. Lines and points are told by their dash, mark or number, too: nothing
+wine red and indigo of P. Tol's "muted" set. Lines and points differ in dash, mark or number, too: nothing
 is said by colour alone. `tests/figures/test_palette.py` holds the differences in simulated colour blindness.
 """
 

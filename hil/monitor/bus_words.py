@@ -1,4 +1,4 @@
-"""The state of the bus in words: what is wrong, by device; nothing is told by its look alone."""
+"""The state of the bus in words: what is wrong, by device; nothing is shown by colour alone."""
 
 from __future__ import annotations
 

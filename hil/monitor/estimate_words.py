@@ -1,4 +1,4 @@
-"""The on-line estimate in words: values with how sure they are, whether it goes on, the alarms."""
+"""The on-line estimate in words: values with how sure they are, whether it continues, the alarms."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ FREQUENCY = "resonance_hz"
 
 LIVE = "live"
 NOT_EXCITED = "NOT EXCITED"
-GOES_ON = (LIVE, NOT_EXCITED)
+CONTINUES = (LIVE, NOT_EXCITED)
 """What the title says while samples come in: that they are learnt from, or that they say nothing."""
 
-TOLD_SHARE = 0.01
-"""Share of samples the estimate has to do without from which on it is told: a frame lost now and then is no news."""
+REPORTED_SHARE = 0.01
+"""From this share of missing samples on they are reported: a frame lost now and then is no news."""
 
 
 def course(snapshot: Snapshot) -> str:
-    """Tell in a word or two whether the estimate goes on."""
+    """Tell in a word or two whether the estimate continues."""
     estimation = snapshot.estimation
     if not estimation.live:
         return "of the last run" if estimation.model else ""
@@ -40,7 +40,7 @@ def condition(snapshot: Snapshot) -> str:
     estimation, quality = snapshot.estimation, snapshot.quality
     if estimation.live and quality.stands_still:
         return quality.why
-    if course(snapshot) in GOES_ON and quality.bad_share >= TOLD_SHARE:
+    if course(snapshot) in CONTINUES and quality.bad_share >= REPORTED_SHARE:
         return f"{estimation.status}, {100.0 * quality.bad_share:.0f} % masked"
     return estimation.status
 

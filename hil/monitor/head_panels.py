@@ -1,4 +1,4 @@
-"""The lines above and below: what is going on, the last message."""
+"""The lines above and below: what is happening, the last message."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def headline(snapshot: Snapshot, width: int, height: int) -> list[str]:
 
 
 def doing(head: Headline) -> str:
-    """Tell in words what is going on."""
+    """Tell in words what is happening."""
     if head.activity in (Activity.RUNNING, Activity.STOPPING, Activity.STARTING, Activity.REPLAYING):
         time_s = "" if math.isnan(head.phase_s) else f" {head.phase_s:.1f} s"
         of = f" of {head.duration_s:g} s" if head.phase in ("measure", "") and math.isfinite(head.duration_s) else ""

@@ -34,7 +34,7 @@ class NodeWatch:
     inverter
         Whose life signs they are.
     tell
-        Told of every EMCY.
+        Called with every EMCY.
     """
 
     def __init__(self, link: CanLink, inverter: Inverter, tell: Tell) -> None:
@@ -103,7 +103,7 @@ def plc_health(status: PlcStatus | None, trouble: str | None) -> PlcHealth:
 
 
 def timing_health(timing: RunTiming) -> TimingHealth:
-    """Take the figures of a timing record that goes on."""
+    """Take the figures of a timing record that continues."""
     lateness, reply = timing.lateness, timing.reply_age
     return TimingHealth(
         period_s=timing.period_ns / NS_PER_S,

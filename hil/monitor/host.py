@@ -1,4 +1,4 @@
-"""The rig's process: listens to the rig, runs experiments when told to, ends at zero torque whatever happens.
+"""The rig's process: listens to the rig, runs experiments on request, ends at zero torque whatever happens.
 
 ::
 
@@ -39,7 +39,7 @@ from hil.rig.stop import StopRequest, stop_on_signals
 from hil.rig.timing import RunTiming
 
 HEALTH_EVERY_NS = 200_000_000
-"""How often the view is told of the bus's health [ns]."""
+"""How often the view is informed of the bus's health [ns]."""
 
 TRY_AGAIN_S = 1.0
 """Pause before a bus that was lost is opened again [s]."""
@@ -190,12 +190,12 @@ class _Host:
 
     def _listen(self, devices: Devices, listening: Listening, health: HealthWatch) -> Start | Reset | None:
         """Cycle with the drives disarmed until something is to be done; None at the end of the session."""
-        told_ns = 0
+        sent_ns = 0
         while not self._stop.requested:
             sample = listening.step()
             self._outbox.sample(sample, None)
-            if sample.t_ns - told_ns >= HEALTH_EVERY_NS:
-                told_ns = sample.t_ns
+            if sample.t_ns - sent_ns >= HEALTH_EVERY_NS:
+                sent_ns = sample.t_ns
                 plc = plc_health(devices.plc.latest, listening.plc.trouble)
                 self._outbox.health(health.look(plc, listening.timing, listening.troubles))
             try:
@@ -206,12 +206,12 @@ class _Host:
 
     def _run_experiment(self, rig: Rig, devices: Devices, health: HealthWatch, name: str) -> None:
         timing = RunTiming(period_ns(rig.period_s))
-        told_ns = 0
+        sent_ns = 0
 
         def watch(t_ns: int) -> None:
-            nonlocal told_ns
-            if t_ns - told_ns >= HEALTH_EVERY_NS:
-                told_ns = t_ns
+            nonlocal sent_ns
+            if t_ns - sent_ns >= HEALTH_EVERY_NS:
+                sent_ns = t_ns
                 self._outbox.health(health.look(plc_health(devices.plc.latest, None), timing))
 
         with self._stop.of_run() as stop:

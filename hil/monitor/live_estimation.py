@@ -10,13 +10,13 @@ import numpy as np
 
 from estimator.errors import EstimatorError
 from estimator.identification.modes.modes import Mode
-from estimator.identification.online.online_estimate import OnlineEstimate
 from estimator.identification.online.recursive import Status
+from estimator.identification.online_estimate import OnlineEstimate
 from estimator.identification.tracking.alarm import Alarm
 from hil.monitor.ring import Ring
 from hil.monitor.snapshot import ComplexArray, Estimation, History, Model
 from hil.rig.live import USUAL, LiveEstimate, OnlineSetup, tracking_chain
-from hil.rig.sample import Sample
+from hil.sample import Sample
 
 HISTORY_EVERY_NS = 250_000_000
 """Time between two points of the history [ns]."""
@@ -37,7 +37,7 @@ NS_PER_S = 1_000_000_000
 
 
 class LiveEstimation:
-    """Estimates a run while it goes on, and keeps what was before.
+    """Estimates a run while it lasts, and keeps what was before.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ class LiveEstimation:
         return None if self._latest is None else self._latest.resonance
 
     def begin(self) -> None:
-        """Begin anew with the next sample: a run is about to be measured. The history goes on."""
+        """Begin anew with the next sample: a run is about to be measured. The history continues."""
         self._live_estimate, self._refused = None, None
         self._waiting = []
         self._trail.clear()

@@ -13,7 +13,7 @@ from enum import Enum
 
 from drivers.plc.types import PlcStatus
 from hil.rig.experiments.base import Phase
-from hil.rig.sample import Sample
+from hil.sample import Sample
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,7 +158,7 @@ class Over:
 
 @dataclass(frozen=True, slots=True)
 class Lost:
-    """The bus is gone; the rig's process goes on trying."""
+    """The bus is gone; the rig's process keeps trying."""
 
     reason: str
 
@@ -172,7 +172,7 @@ class Ready:
 class Ended:
     """Nothing follows: the source has ended, by itself or since it was asked to.
 
-    ``error`` says why it could not go on.
+    ``error`` says why it could not continue.
     """
 
     error: str | None = None

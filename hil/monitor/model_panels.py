@@ -9,7 +9,7 @@ import numpy as np
 
 from hil.monitor.braille import Canvas
 from hil.monitor.estimate_words import (
-    GOES_ON,
+    CONTINUES,
     WIDEST_BAND,
     alarm_line,
     condition,
@@ -28,7 +28,7 @@ LARGEST_REACH = 2.0
 RESPONSE = "response w/T [dB]"
 
 ROOM_OF_TITLE = 6
-"""Characters of a title beside its text and its value, a short rule included."""
+"""Characters of a title besides its text and its value, a short rule included."""
 
 HISTORY_S = 120.0
 """What the histories reach back [s]."""
@@ -114,9 +114,9 @@ def figures(snapshot: Snapshot, width: int, height: int) -> list[str]:
 
 
 def standing(snapshot: Snapshot, width: int, height: int) -> list[str]:
-    """Say whether the estimate goes on, and why not, for the pages that have only plots."""
+    """Say whether the estimate continues, and why not, for the pages that have only plots."""
     why = snapshot.quality.reasons
-    parts = (course(snapshot), condition(snapshot) + (f" ({why})" if course(snapshot) in GOES_ON and why else ""))
+    parts = (course(snapshot), condition(snapshot) + (f" ({why})" if course(snapshot) in CONTINUES and why else ""))
     return textwrap.wrap(f"estimate: {', '.join(part for part in parts if part)}", max(width, 8))[:height]
 
 

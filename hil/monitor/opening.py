@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from drivers.errors import DriverError
-from estimator.identification.online.chain import decimation_factor
+from estimator.identification.chain import decimation_factor
 from estimator.identification.online.regression import checked_filter
 from estimator.physics.twist import Shaft
 from hil.config.model_file import read_model
@@ -24,8 +24,8 @@ from hil.report.outputs import require_folder
 from hil.rig.dry_run import dry_run
 from hil.rig.live import USUAL, OnlineSetup
 from hil.rig.replay import replay
-from hil.rig.sample import Sample
 from hil.rig.trace import is_trace
+from hil.sample import Sample
 from hil.simulator.rig_server import required_simulation
 from hil.simulator.simulation_model import simulation_model
 
@@ -93,14 +93,14 @@ def open_recording(
     """
     if is_trace(path):
         if rig is None:
-            raise UsageError(f"{path}: expected its rig file as well: hil monitor RIG --replay {path.name}; came none")
+            raise UsageError(f"{path}: expected its rig file as well: hil monitor RIG --replay {path.name}; got none")
         samples = list(replay(path, rig, whole=True, channel=channel))
         measured = _has_prbs
     else:
         samples = recorded_samples(path)
         measured = _always
     if len(samples) < 2:
-        raise RecordingError(path, f"expected samples to play, came {len(samples)}. Record again.")
+        raise RecordingError(path, f"expected samples to play, got {len(samples)}. Record again.")
     period_s = float(np.median(np.diff([sample.time_s for sample in samples])))
     _require_chain(period_s, setup)
     warm, shaft = WarmUp(period_s, setup), _shaft(model, rig, trust_laws)
@@ -130,9 +130,7 @@ def _shaft(model: Path | None, rig: Rig | None, trust_laws: bool) -> Shaft | Non
     if model is not None:
         shaft = Shaft.of_model(read_model(model, trust_laws).model, model.name)
         if shaft is None:
-            raise UsageError(
-                f"{model}: expected structure 'two_mass' and motion 'rotation' for the twist, came another"
-            )
+            raise UsageError(f"{model}: expected structure 'two_mass' and motion 'rotation' for the twist, got another")
         return shaft
     if rig is None or rig.simulation is None:
         return None

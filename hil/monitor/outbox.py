@@ -10,7 +10,7 @@ from typing import Self
 
 from hil.monitor.messages import Health, Report, Samples
 from hil.rig.experiments.base import Phase
-from hil.rig.sample import Sample
+from hil.sample import Sample
 
 SEND_EVERY_S = 0.05
 """Twice as often as the view draws."""

@@ -15,7 +15,7 @@ from hil.monitor.braille import Canvas, envelope
 FloatArray = NDArray[np.float64]
 
 AXIS = 8
-"""Characters for the numbers on the left and the line beside them."""
+"""Characters for the numbers on the left and the line next to them."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hil.monitor.ring import Ring
-from hil.rig.sample import REMARKS, Sample, SampleFlag
+from hil.sample import REMARKS, Sample, SampleFlag
 
 WINDOW_S = 10.0
 """What the counts reach back [s]: short enough that what is over goes away, a thousand cycles at 10 ms."""
@@ -17,7 +17,7 @@ STANDS_STILL_S = 0.3
 """Without a good sample for so long [s] the estimate is said to stand still; a lost frame or two are no news."""
 
 NO_VALUE = 1 << 8
-"""Beside the bits of `SampleFlag`: no flag, and yet no number, as a recording of another program may have it."""
+"""Besides the bits of `SampleFlag`: no flag, and yet no number, as a recording of another program may have it."""
 
 _WORDS = {
     SampleFlag.LATE: "cycle late",
@@ -37,7 +37,7 @@ class Quality:
     ----------
     samples, good
         How many, since the first good one of this stretch (listening, or one run); before it there is no counting:
-        a drive that has never answered is told by its own life signs.
+        a drive that has never answered is judged by its own life signs.
     against
         What is against those that are not good, what is remarked on others, and how often; the most frequent first.
     standing_s
@@ -64,7 +64,7 @@ class Quality:
 
     @property
     def stands_still(self) -> bool:
-        """Whether good samples have been missing for long enough to be told."""
+        """Whether good samples have been missing for long enough to be reported."""
         return self.standing_s >= STANDS_STILL_S
 
 

@@ -23,10 +23,10 @@ from hil.rig.live_course import course_path
 from hil.rig.metadata import run_metadata
 from hil.rig.pacing import NS_PER_S, RealTimePacer, period_ns
 from hil.rig.plan import Plan, plan_run
-from hil.rig.sample import Sample
 from hil.rig.session import run_plan
 from hil.rig.stop import StopRequest
 from hil.rig.timing import RunTiming
+from hil.sample import Sample
 from hil.store import register_run
 from hil.store.alarms import found_changes
 from hil.store.entry import COMPLETE, ONLINE
@@ -52,7 +52,7 @@ class RecordedRun:
     name
         Which experiment.
     outbox
-        Told of every sample and of beginning and end.
+        Called with every sample and of beginning and end.
     setup
         What estimates.
     """
@@ -86,7 +86,7 @@ class RecordedRun:
         watch: Callable[[int], None],
         metadata: Mapping[str, str],
     ) -> None:
-        """Run it to its end, and tell how it went; what ends it early is told, not raised.
+        """Run it to its end, and tell how it went; what ends it early is reported, not raised.
 
         Parameters
         ----------
@@ -141,7 +141,7 @@ class RecordedRun:
         run_plan(devices, plan, pacer, recorder, stop, lambda phase, time_s: None, timing, observers)
 
     def _estimate(self) -> LiveEstimate | None:
-        """Make the estimate that is kept beside the recording, as `hil run` does; None where there can be none."""
+        """Make the estimate that is kept next to the recording, as `hil run` does; None where there can be none."""
         try:
             return LiveEstimate(tracking_chain(self._rig.period_s, *self._setup))
         except EstimatorError:  # the view, which has the same chain, says why there is no estimate
@@ -174,7 +174,7 @@ class RecordedRun:
             return None
 
     def _kept_course(self) -> Path | None:
-        """Write resonance and alarms beside the recording; None where there are none or the disk does not take them."""
+        """Write resonance and alarms next to the recording; None where there are none or they can't be written."""
         if self._live is None:
             return None
         path = course_path(self._path)

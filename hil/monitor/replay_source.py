@@ -16,7 +16,7 @@ from hil.monitor.messages import Began, Order, Over, Report, Samples
 from hil.recording import columns
 from hil.recording.formats import read_table
 from hil.rig.experiments.base import Phase
-from hil.rig.sample import Sample, SampleFlag
+from hil.sample import Sample, SampleFlag
 
 NS_PER_S = 1_000_000_000
 
@@ -114,7 +114,7 @@ def recorded_samples(path: Path) -> list[Sample]:
     n = table.n_rows
     given = table.numeric(name for name in OPTIONAL if name in table.columns)
     if not np.all(np.diff(needed[columns.TIME]) > 0.0):
-        raise RecordingError(path, f"column {columns.TIME}: expected values that rise, came some that do not")
+        raise RecordingError(path, f"column {columns.TIME}: expected values that rise, got some that do not")
     zero = np.zeros(n)
     rows = zip(
         needed[columns.TIME].tolist(),

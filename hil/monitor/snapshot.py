@@ -22,7 +22,7 @@ SILENT_AFTER_S = 2.0
 
 
 class Activity(Enum):
-    """What is going on; the value is the word on the screen."""
+    """What is happening; the value is the word on the screen."""
 
     CONNECTING = "CONNECTING"
     LISTENING = "LISTENING, drives disarmed"
@@ -37,14 +37,14 @@ class Activity(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Headline:
-    """What is going on.
+    """What is happening.
 
     Attributes
     ----------
     rig
         Its name, or that of the recording that is played.
     activity
-        What is going on.
+        What is happening.
     experiment, phase, phase_s, duration_s, recording
         Of the run under way; empty, NaN while there is none. ``duration_s`` is that of the measured part.
     message
@@ -160,7 +160,7 @@ class Estimation:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Snapshot:
-    """Everything at one moment; ``health`` is None until the rig has told it, and stays so for a recording."""
+    """Everything at one moment; ``health`` is None until the rig has sent it, and stays so for a recording."""
 
     headline: Headline
     signals: Signals

@@ -94,7 +94,7 @@ class RigSource:
         return reports
 
     def send(self, order: Order) -> None:
-        """Give an order; one that the process can't take any more is told by `poll`."""
+        """Give an order; one that the process can't take any more is reported by `poll`."""
         if self._ended:
             return
         try:

@@ -18,7 +18,7 @@ from hil.monitor.ring import Ring
 from hil.monitor.snapshot import Activity, Headline, Signals, Snapshot
 from hil.rig.experiments.base import Phase
 from hil.rig.live import USUAL, OnlineSetup
-from hil.rig.sample import Sample
+from hil.sample import Sample
 
 WINDOWS_S = (1.0, 2.0, 5.0, 10.0, 20.0, 60.0)
 """What the plots of the signals may reach back [s]: from single levels of the PRBS to a whole tip-in."""
@@ -81,7 +81,7 @@ class LiveState:
 
     @property
     def activity(self) -> Activity:
-        """What is going on."""
+        """What is happening."""
         return self._headline.activity
 
     @property
@@ -98,7 +98,7 @@ class LiveState:
         self._headline = replace(self._headline, message=text)
 
     def stopping(self, text: str) -> None:
-        """Note that the run has been told to stop."""
+        """Note that the run has been ordered to stop."""
         if self.is_driving:
             self._headline = replace(self._headline, activity=Activity.STOPPING, message=text)
 

@@ -76,7 +76,7 @@ class FmuPlant:
             self._described = self._fmpy.read_model_description(str(path))
             self._fmpy.extract(str(path), unzipdir=self._folder)
         except Exception as error:
-            raise UsageError(f"{path}: expected an FMU of FMI 1.0, 2.0 or 3.0, came: {error}") from error
+            raise UsageError(f"{path}: expected an FMU of FMI 1.0, 2.0 or 3.0, got: {error}") from error
         variables = {each.name: each for each in self._described.modelVariables}
         self._mapped, self._known = tuple(mapped), tuple(variables)
         names(mapped, variables)
@@ -125,7 +125,7 @@ class FmuPlant:
             if named.load not in self._inputs:
                 raise UsageError(
                     f"{self.name}: recording {record.name} has a measured load torque: expected an FMU with an input "
-                    f"for it, came none named {named.load!r}. Name it: --map load=NAME, or take load out of [signals]."
+                    f"for it, got none named {named.load!r}. Name it: --map load=NAME, or take load out of [signals]."
                 )
             values[named.load] = values.get(named.load, 0.0) + record.load_nm
         return self.simulated(record, named, record.torque_nm, values)
@@ -165,7 +165,7 @@ class FmuPlant:
                     output=[named.output],
                 )
         except Exception as error:
-            raise UsageError(f"{self.name}: expected an FMU that simulates {record.name}, came: {error}") from error
+            raise UsageError(f"{self.name}: expected an FMU that simulates {record.name}, got: {error}") from error
         return np.asarray(np.interp(since_s, result["time"], result[named.output]), dtype=np.float64)
 
     def _given(
@@ -219,6 +219,6 @@ def _fmpy() -> Any:
         import fmpy
     except ModuleNotFoundError as error:
         raise UsageError(
-            "expected FMPy, which simulates FMUs, came none. Install it: pip install 'hil-driveline[fmu]'"
+            "expected FMPy, which simulates FMUs, got none. Install it: pip install 'hil-driveline[fmu]'"
         ) from error
     return fmpy

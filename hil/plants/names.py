@@ -73,7 +73,7 @@ def names(given: Sequence[str], known: Collection[str], kind: OutputKind = Outpu
         for name in each:
             if name not in known:
                 raise UsageError(
-                    f"--map {key}=...: expected a variable of the FMU, came {name or 'none'!r}. It has: {_some(known)}"
+                    f"--map {key}=...: expected a variable of the FMU, got {name or 'none'!r}. It has: {_some(known)}"
                 )
     if found.load and found.load not in known:
         raise UsageError(f"--map load={found.load}: expected a variable of the FMU. It has: {_some(known)}")

@@ -1,4 +1,4 @@
-"""Scales that do not fit a model, or that a recording shows by itself, told with the line that cures them."""
+"""Scales that do not fit a model, or that a recording shows by itself, named with the line that cures them."""
 
 from __future__ import annotations
 

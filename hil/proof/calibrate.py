@@ -46,7 +46,7 @@ OTHER_FORMS = {"most_predictable": 0.03, "most_dependent": 0.015}
 to the model than any real one. Set by hand, from the real recordings in docs/real-recordings.md."""
 
 BELIEVED = 0.9
-"""Probability below which nothing is told as found, however well it went in simulated worlds."""
+"""Probability below which nothing is reported as found, however well it went in simulated worlds."""
 
 USUAL_DIVISOR, DIVISOR_SPREAD, MOST_DIVISOR = 4.0, 0.5, 100.0
 """Prior of the divisor of scores, log-normal, and its bound: a few hundred worlds of one simulator with hardly a false
@@ -77,7 +77,7 @@ class World:
     cpu_s: float
 
     def is_there(self, claim: Claim) -> bool:
-        """Tell whether an effect, or one it can't be told from, is in the world or known to the model file."""
+        """Tell whether an effect, or one it can't be distinguished from, is in the world or known to the model file."""
         return bool({*claim.names} & {*self.there})
 
     @property

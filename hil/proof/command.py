@@ -24,7 +24,7 @@ def run_hil(arguments: Sequence[str], folder: Path, limit_s: float) -> None:
     Raises
     ------
     CommandFailed
-        With the last line it wrote, or that it took too long. All it wrote is beside the folder.
+        With the last line it wrote, or that it took too long. All it wrote is next to the folder.
     """
     try:
         done = subprocess.run(

@@ -39,7 +39,7 @@ class Outcome(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """One true size beside the estimated one; ``inside`` says whether the 95 % interval holds the truth."""
+    """One true size next to the estimated one; ``inside`` says whether the 95 % interval holds the truth."""
 
     what: str
     unit: str

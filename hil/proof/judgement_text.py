@@ -1,4 +1,4 @@
-"""A judgement for people: the opened seal beside the verdict."""
+"""A judgement for people: the opened seal next to the verdict."""
 
 from __future__ import annotations
 

@@ -68,7 +68,7 @@ def _share(text: str) -> float:
     """Read an option that is a share no larger than the nominal model's tolerance allows."""
     share = float(text)
     if not 0.0 <= share <= NOMINAL_ERROR:
-        raise argparse.ArgumentTypeError(f"expected 0 to {NOMINAL_ERROR}, came {text}")
+        raise argparse.ArgumentTypeError(f"expected 0 to {NOMINAL_ERROR}, got {text}")
     return share
 
 

@@ -1,4 +1,4 @@
-"""The nominal model of a specimen as a model file: all a tool is told of the bus."""
+"""The nominal model of a specimen as a model file: all a tool knows of the bus."""
 
 from __future__ import annotations
 

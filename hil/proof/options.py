@@ -18,5 +18,5 @@ def parse_work(parser: ArgumentParser, arguments: Sequence[str] | None) -> Names
     """Parse a command line, and refuse less than one job."""
     options = parser.parse_args(arguments)
     if options.jobs < 1:
-        parser.error(f"--jobs: expected 1 or more, came {options.jobs}")
+        parser.error(f"--jobs: expected 1 or more, got {options.jobs}")
     return options

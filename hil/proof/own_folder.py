@@ -25,7 +25,7 @@ def replace_own(folder: Path, built: Path) -> None:
     if folder.is_symlink() or folder.exists():
         if folder.is_symlink() or not (folder / MARK).is_file():
             raise UsageError(
-                f"{folder}: expected no such folder, or one of earlier results ({MARK} in it), came something else. "
+                f"{folder}: expected no such folder, or one of earlier results ({MARK} in it), got something else. "
                 "It is left as it is: move it away."
             )
         shutil.rmtree(folder)

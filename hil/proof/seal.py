@@ -102,10 +102,10 @@ def verify(commitment: str, opened: object) -> dict[str, object]:
         Naming the entries that were changed, or that the seal is another one altogether.
     """
     nonce, digests, truth = _fields(opened)
-    came = _sha256(canonical_json(digests))
-    if came != commitment:
+    got = _sha256(canonical_json(digests))
+    if got != commitment:
         raise SealBroken(
-            f"seal: expected commitment {commitment}, came {came}: this is another seal than the one "
+            f"seal: expected commitment {commitment}, got {got}: this is another seal than the one "
             "committed to. Do not believe its truth."
         )
     actual = _digests(nonce, truth)
@@ -128,7 +128,7 @@ def _fields(opened: object) -> tuple[str, dict[str, str], dict[str, object]]:
         raise SealBroken(f"seal: expected an object with {', '.join(sorted(_FIELDS))} of schema {SCHEMA}")
     nonce, digests, truth = opened["nonce"], opened["digests"], opened["truth"]
     if not (isinstance(nonce, str) and len(nonce) == 2 * NONCE_BYTES and set(nonce) <= set("0123456789abcdef")):
-        raise SealBroken(f"seal: nonce: expected {2 * NONCE_BYTES} hexadecimal digits, came {nonce!r}")
+        raise SealBroken(f"seal: nonce: expected {2 * NONCE_BYTES} hexadecimal digits, got {nonce!r}")
     if not (isinstance(digests, dict) and isinstance(truth, dict)):
         raise SealBroken("seal: digests and truth: expected an object each")
     return nonce, digests, truth

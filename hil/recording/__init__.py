@@ -2,6 +2,7 @@
 
 Read: file -> ``Table`` (columns, units, metadata) -> ``estimator.signals.record.Record`` by ``[signals]``.
 Write: one ``Sample`` per cycle through ``RecordingWriter``, or a whole table by ``write_table``.
+What may come in: files, `hil.sample`, `hil.problems`; no rig, no model.
 """
 
 from hil.recording.formats import read_table

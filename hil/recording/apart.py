@@ -173,11 +173,11 @@ def _why(status: int, file_bytes: int) -> str:
     """Say what an ended process says of its file."""
     if status in (-getattr(signal, "SIGXCPU", 0), -getattr(signal, "SIGKILL", 0)):
         return (
-            f"expected a recording that is read in {processor_s(file_bytes):.0f} s, came one that is not: it is "
+            f"expected a recording that is read in {processor_s(file_bytes):.0f} s, got one that is not: it is "
             "damaged, or made to keep a program busy. Take a copy that is whole."
         )
     return (
-        f"expected a whole recording that is read in {memory_bytes(file_bytes) >> 20} MiB, came one that ends its "
+        f"expected a whole recording that is read in {memory_bytes(file_bytes) >> 20} MiB, got one that ends its "
         f"reader (status {status}): it is damaged. Take a copy that is whole."
     )
 

@@ -48,13 +48,13 @@ def _answer(answers: IO[bytes], request: dict[str, Any]) -> None:
     except MemoryError:
         send(
             answers,
-            {"problems": [f"expected a recording that is read in {memory_bytes(size) >> 20} MiB, came a larger"]},
+            {"problems": [f"expected a recording that is read in {memory_bytes(size) >> 20} MiB, got a larger"]},
         )
     except Exception as error:  # noqa: BLE001 - the libraries raise anything on a damaged file
-        came = f"{type(error).__name__}: {error}"
+        got = f"{type(error).__name__}: {error}"
         send(
             answers,
-            {"problems": [f"expected a whole recording, came a damaged one ({came}). Take a copy that is whole."]},
+            {"problems": [f"expected a whole recording, got a damaged one ({got}). Take a copy that is whole."]},
         )
 
 

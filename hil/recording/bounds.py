@@ -53,7 +53,7 @@ def require_cells(path: Path, cells: int) -> None:
     if cells > most:
         raise RecordingError(
             path,
-            f"expected at most {most} cells in a file of {path.stat().st_size} bytes, came {cells}. It is damaged, or "
+            f"expected at most {most} cells in a file of {path.stat().st_size} bytes, got {cells}. It is damaged, or "
             "made to fill the memory; cut a recording that is so large into several.",
         )
 
@@ -67,4 +67,4 @@ def require_columns(path: Path, columns: int) -> None:
         With how many there may be.
     """
     if columns > COLUMNS:
-        raise RecordingError(path, f"expected at most {COLUMNS} columns, came {columns}. Leave out what is not needed.")
+        raise RecordingError(path, f"expected at most {COLUMNS} columns, got {columns}. Leave out what is not needed.")

@@ -35,12 +35,12 @@ def decoded(path: Path, mdf: MDF, dbc: Path) -> MDF:
         If the file holds no frames, the DBC can't be read, or none of the frames is in it.
     """
     if not any(int(getattr(group.channel_group, "flags", 0)) & BUS_EVENT for group in mdf.groups):
-        raise RecordingError(path, "expected the frames of a bus for --dbc, came signals. Leave --dbc out.")
+        raise RecordingError(path, "expected the frames of a bus for --dbc, got signals. Leave --dbc out.")
     signals = mdf.extract_bus_logging({"CAN": [(_database(path, dbc), ANY_BUS)]})
     if not any(group.channel_group.cycles_nr for group in signals.groups):
         raise RecordingError(
             path,
-            f"--dbc {dbc}: expected a description of the frames in this file, came none of them. Is it of another bus?",
+            f"--dbc {dbc}: expected a description of the frames in this file, got none of them. Is it of another bus?",
         )
     return signals
 
@@ -56,14 +56,12 @@ def _database(path: Path, dbc: Path) -> Path:
     from asammdf.blocks.utils import load_can_database
 
     if dbc.suffix.lower() != ".dbc":
-        raise RecordingError(path, f"--dbc {dbc}: expected a DBC file, named .dbc, came {dbc.suffix!r}")
+        raise RecordingError(path, f"--dbc {dbc}: expected a DBC file, named .dbc, got {dbc.suffix!r}")
     try:
         size = dbc.stat().st_size
         database = load_can_database(dbc) if size <= LARGEST_DBC_BYTES else None
     except Exception as error:
-        raise RecordingError(
-            path, f"--dbc {dbc}: expected a DBC file, came: {type(error).__name__}: {error}"
-        ) from error
+        raise RecordingError(path, f"--dbc {dbc}: expected a DBC file, got: {type(error).__name__}: {error}") from error
     if database is None or not database.frames:
-        raise RecordingError(path, f"--dbc {dbc}: expected a DBC file that describes messages, came one without any")
+        raise RecordingError(path, f"--dbc {dbc}: expected a DBC file that describes messages, got one without any")
     return dbc

@@ -1,4 +1,4 @@
-"""A checksum of what a recording holds, the same in every format, by which damage is told.
+"""A checksum of what a recording holds, the same in every format, by which damage is recognised.
 
 SHA-256 over the columns in the order of their names. Of each: its name, the word for its kind (`hil.recording.kinds`)
 and its cells; a float as IEEE 754 binary64 and an integer as 64 bit two's complement, both little-endian, a truth
@@ -125,23 +125,23 @@ def require_unchanged(path: Path, said: Mapping[str, str], units: Mapping[str, s
         As `require_whole`.
     """
     problems = []
-    if CHECKSUM in said and (came := data()) != said[CHECKSUM]:
+    if CHECKSUM in said and (got := data()) != said[CHECKSUM]:
         problems.append(
-            f"expected the data it was written with, SHA-256 {said[CHECKSUM][:_SHOWN]}…, came {came[:_SHOWN]}…: "
+            f"expected the data it was written with, SHA-256 {said[CHECKSUM][:_SHOWN]}…, got {got[:_SHOWN]}…: "
             f"it is damaged, or was changed since. Take a copy that is whole; if you changed it yourself, remove "
             f"{CHECKSUM} from what it says of itself (of a CSV: move {path.name}.json away)."
         )
-    if SAID in said and (came := said_sha256(units, said)) != said[SAID]:
+    if SAID in said and (got := said_sha256(units, said)) != said[SAID]:
         problems.append(
-            f"expected the units and metadata it was written with, SHA-256 {said[SAID][:_SHOWN]}…, came "
-            f"{came[:_SHOWN]}…: what it says of itself is damaged, or was changed since. Take a copy that is whole; if "
+            f"expected the units and metadata it was written with, SHA-256 {said[SAID][:_SHOWN]}…, got "
+            f"{got[:_SHOWN]}…: what it says of itself is damaged, or was changed since. Take a copy that is whole; if "
             f"you changed it yourself, remove {SAID} from it."
         )
     rig = said.get(RIG_TEXT, "")
-    if RIG_CHECKSUM in said and (came := text_sha256(rig)) != said[RIG_CHECKSUM]:
+    if RIG_CHECKSUM in said and (got := text_sha256(rig)) != said[RIG_CHECKSUM]:
         problems.append(
-            f"expected the rig file it was recorded with, SHA-256 {said[RIG_CHECKSUM][:_SHOWN]}…, came "
-            f"{came[:_SHOWN]}…: what it says of itself is damaged. Take a copy that is whole."
+            f"expected the rig file it was recorded with, SHA-256 {said[RIG_CHECKSUM][:_SHOWN]}…, got "
+            f"{got[:_SHOWN]}…: what it says of itself is damaged. Take a copy that is whole."
         )
     if problems:
         raise RecordingError(path, *problems)

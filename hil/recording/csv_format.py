@@ -3,11 +3,11 @@
 - What form a file has is recognised (`hil.recording.text.recognise`) or set by hand; pyarrow parses it.
 
 - Floats are written as the shortest decimal that reads back to the same bits, integers without a point; that
-  difference is how a reader tells them apart, so that CSV to Parquet and back loses nothing. Units, metadata and the
-  kind of columns whose cells do not tell it stand in a file beside (`hil.recording.sidecar`); without that file text
+  difference is how a reader distinguishes them, so that CSV to Parquet and back loses nothing. Units, metadata and the
+  kind of columns whose cells do not tell it stand in a file next to (`hil.recording.sidecar`); without that file text
   that looks like a number becomes one, and an empty cell among numbers is NaN.
 - A last line without line end is taken (RFC 4180 allows it): a file cut inside its very last number can't be
-  told from a whole one. A cut anywhere else leaves a row with cells missing, and is refused.
+  distinguished from a whole one. A cut anywhere else leaves a row with cells missing, and is refused.
 - A quoted cell must end on its line, so that a row is a line and every fault has its number.
 """
 
@@ -107,7 +107,7 @@ def form_of(text: str, hints: FormatHints) -> TextForm:
 
 
 def write(table: Table, path: Path) -> None:
-    """Write a table as CSV, and what it says of itself beside it.
+    """Write a table as CSV, and what it says of itself next to it.
 
     Raises
     ------
@@ -131,7 +131,7 @@ def _is_recognised(path: Path, table: Table) -> bool:
 
 
 def description_of(table: Table) -> Sidecar:
-    """Return what has to stand beside a table that is written as CSV."""
+    """Return what has to stand next to a table that is written as CSV."""
     types = {name: Kind.of(column) for name, column in table.columns.items() if not _tells_its_kind(column)}
     return Sidecar(as_metadata(table.metadata), table.units, types)
 
@@ -171,7 +171,7 @@ def _rows(path: Path, text: str, form: TextForm) -> tuple[bytes, tuple[int, ...]
         line += sum(number <= line for number in skipped)
         raise RecordingError(
             path,
-            f"line {line}: expected a row, came an empty line. Remove it; a missing sample is nan.",
+            f"line {line}: expected a row, got an empty line. Remove it; a missing sample is nan.",
         )
     if form.delimiter == BLANKS:
         body = re.sub(r"[ \t]+", " ", re.sub(r"(?m)^[ \t]+|[ \t]+$", "", body))
@@ -203,14 +203,14 @@ def _broken_line(rows: bytes, form: TextForm, skipped: tuple[int, ...]) -> str:
     for row, line in enumerate(lines):
         number = line_of(row, form.first_row_line, skipped)
         if line.count('"') % 2:
-            return f"line {number}: expected every quoted cell to end on its line, came one that does not"
+            return f"line {number}: expected every quoted cell to end on its line, got one that does not"
         count = len(split(line, form.delimiter) or [""])
         if count != form.width:
             cut = row + 1 == len(lines) and count < form.width
-            cure = "the file is truncated: remove its last line or record again" if cut else "mend that line"
+            cure = "the file is truncated: remove its last line or record again" if cut else "fix that line"
             where = "as in the header" if form.header_line else "as in most lines"
-            return f"line {number}: expected {form.width} cells {where}, came {count}; {cure}"
-    return f"expected lines shorter than {BLOCK_BYTES} bytes, came a longer one"
+            return f"line {number}: expected {form.width} cells {where}, got {count}; {cure}"
+    return f"expected lines shorter than {BLOCK_BYTES} bytes, got a longer one"
 
 
 def _tells_its_kind(column: Column) -> bool:
@@ -232,7 +232,7 @@ def _cells(table: Table, path: Path, name: str) -> Iterable[str]:
     if broken is not None:
         raise RecordingError(
             path,
-            f"column {name}, row {broken + 1}: expected a text of one line, came one with a line break. "
+            f"column {name}, row {broken + 1}: expected a text of one line, got one with a line break. "
             "CSV can't hold it: write Parquet.",
         )
     return map(_quoted, texts)

@@ -9,8 +9,8 @@ from hil.errors import RecordingError
 
 def damaged(path: Path, expected: str, error: Exception) -> RecordingError:
     """Return what is raised for a file of which a library says that it is not whole."""
-    came = str(error) or type(error).__name__
+    got = str(error) or type(error).__name__
     return RecordingError(
         path,
-        f"expected {expected}, came a damaged or truncated one ({came.rstrip('.')}). Take a copy that is whole.",
+        f"expected {expected}, got a damaged or truncated one ({got.rstrip('.')}). Take a copy that is whole.",
     )

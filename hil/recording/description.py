@@ -60,7 +60,7 @@ def described_table(path: Path, text: str, column: Callable[[str, Kind], Column]
         metadata = {str(key): str(value) for key, value in document["metadata"].items()}
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise RecordingError(
-            path, f"expected a description {SCHEMA} inside, came a damaged one ({error!r}). Take a copy that is whole."
+            path, f"expected a description {SCHEMA} inside, got a damaged one ({error!r}). Take a copy that is whole."
         ) from error
     columns, units = {}, {}
     for name, stored_as, unit, kind in entries:
@@ -68,7 +68,7 @@ def described_table(path: Path, text: str, column: Callable[[str, Kind], Column]
             columns[name] = column(stored_as, kind)
         except KeyError as error:
             raise RecordingError(
-                path, f"column {name}: expected it under the name {stored_as}, came none: it is damaged or was changed."
+                path, f"column {name}: expected it under the name {stored_as}, got none: it is damaged or was changed."
             ) from error
         if unit is not None:
             units[name] = str(unit)
@@ -87,5 +87,5 @@ def metadata_of(path: Path, text: str) -> dict[str, str]:
         return {str(key): str(value) for key, value in parse_json(text)["metadata"].items()}
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise RecordingError(
-            path, f"expected a description {SCHEMA} inside, came a damaged one ({error!r}). Take a copy that is whole."
+            path, f"expected a description {SCHEMA} inside, got a damaged one ({error!r}). Take a copy that is whole."
         ) from error

@@ -33,7 +33,7 @@ def _columns(before: Table, after: Table) -> list[str]:
 
 def _cells(before: Column, after: Column) -> str:
     if before.shape != after.shape:
-        return f"expected {before.size} cells, came {after.size}"
+        return f"expected {before.size} cells, got {after.size}"
     kinds = Kind.of(before), Kind.of(after)
     changed = np.flatnonzero(~_same(before, after))
     if kinds[0] is not kinds[1]:

@@ -1,4 +1,4 @@
-"""What a reader must be told of a file where the file does not tell it: ``[signals] format``."""
+"""What a reader must know of a file where the file does not tell it: ``[signals] format``."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ class Format:
     """How one kind of file is read and written.
 
     ``write`` is None for a format that is only read, ``metadata`` for one whose metadata come with the table alone.
-    ``beside`` names the file that belongs to a recording in a format that has no place for all there is to say.
+    ``companion`` names the file that belongs to a recording in a format that has no place for all there is to say.
     ``tables`` reads a table for each time of a format that may have several.
     ``apart`` is True where a compiled library parses it: in a process of its own (`hil.recording.apart`).
     """
@@ -32,7 +32,7 @@ class Format:
     read: Callable[[Path, Request], Table]
     write: Callable[[Table, Path], None] | None
     metadata: Callable[[Path], Mapping[str, str]] | None = None
-    beside: Callable[[Path], Path] | None = None
+    companion: Callable[[Path], Path] | None = None
     apart: bool = True
     tables: Callable[[Path, Request], list[Table]] | None = None
 
@@ -98,13 +98,13 @@ def writer_for(path: Path, replace: bool = False) -> Callable[[Table, Path], Non
     known = FORMATS.get(path.suffix.lower())
     if known is None or known.write is None:
         writable = ", ".join(suffix for suffix, form in FORMATS.items() if form.write)
-        raise RecordingError(path, f"expected a name that ends in one of {writable}, came {path.suffix!r}")
+        raise RecordingError(path, f"expected a name that ends in one of {writable}, got {path.suffix!r}")
     if not replace:
         _require_new(path, known)
     elif path.is_dir():
-        raise RecordingError(path, "expected the name of a recording, came a folder. Choose another name.")
+        raise RecordingError(path, "expected the name of a recording, got a folder. Choose another name.")
     if not path.parent.is_dir():
-        raise RecordingError(path, f"expected an existing folder, came {path.parent}. Make it first.")
+        raise RecordingError(path, f"expected an existing folder, got {path.parent}. Make it first.")
     return known.write
 
 
@@ -118,7 +118,7 @@ def format_of(path: Path) -> Format:
     """
     known = FORMATS.get(path.suffix.lower())
     if known is None:
-        raise RecordingError(path, f"expected a recording ({', '.join(FORMATS)}), came {path.suffix!r}")
+        raise RecordingError(path, f"expected a recording ({', '.join(FORMATS)}), got {path.suffix!r}")
     _require_readable(path, known)
     return known
 
@@ -126,22 +126,22 @@ def format_of(path: Path) -> Format:
 def _require_readable(path: Path, known: Format) -> None:
     try:
         if known.apart and path.exists() and not path.is_file():  # these are read from their end, and a pipe has none
-            raise RecordingError(path, "expected a file, came a folder, a pipe or a device. Name a recording.")
+            raise RecordingError(path, "expected a file, got a folder, a pipe or a device. Name a recording.")
         with path.open("rb"):
             pass
     except OSError as error:
-        raise RecordingError(path, f"expected a readable file, came: {error.strerror}") from error
+        raise RecordingError(path, f"expected a readable file, got: {error.strerror}") from error
 
 
 def _require_new(path: Path, known: Format) -> None:
     try:
         if path.exists():
             raise RecordingError(
-                path, "expected a new name, came one that exists: a recording is never overwritten. Move it away."
+                path, "expected a new name, got one that exists: a recording is never overwritten. Move it away."
             )
-        if known.beside is not None and (beside := known.beside(path)).exists():
+        if known.companion is not None and (companion := known.companion(path)).exists():
             raise RecordingError(
-                beside, "expected a new name, came one that exists: it describes another recording. Move it away."
+                companion, "expected a new name, got one that exists: it describes another recording. Move it away."
             )
     except OSError as error:
-        raise RecordingError(path, f"expected a place to write, came: {error.strerror or error}") from error
+        raise RecordingError(path, f"expected a place to write, got: {error.strerror or error}") from error

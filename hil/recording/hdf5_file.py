@@ -78,7 +78,7 @@ def _require_self_contained(path: Path, file: Any) -> None:
     outside = file.id.links.visit(look, info=True)
     if outside is not None:
         raise RecordingError(
-            path, f"{text_of(outside)}: expected data in this file, came a reference to another file. Copy it in."
+            path, f"{text_of(outside)}: expected data in this file, got a reference to another file. Copy it in."
         )
     require_cells(path, cells)
 
@@ -89,7 +89,7 @@ def text_of(name: bytes | str) -> str:
 
 
 def write_whole(path: Path, fill: Callable[[Any], None], header: bytes = b"") -> None:
-    """Write a file; it is made in memory, so that a full disk is told by Python, in words, and not by HDF5.
+    """Write a file; it is made in memory, so that a full disk is reported by Python, in words, and not by HDF5.
 
     Parameters
     ----------

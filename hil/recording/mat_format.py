@@ -22,7 +22,7 @@ from hil.recording.shared_length import columns_of_shared_length
 from hil.recording.table import Table
 
 DAMAGED = (ValueError, TypeError, IndexError, KeyError, OSError, NotImplementedError, zlib.error)
-"""What scipy raises, beside its own, on a file that is cut or no .mat file."""
+"""What scipy raises, besides its own, on a file that is cut or no .mat file."""
 
 
 def read(path: Path, request: Request) -> Table:

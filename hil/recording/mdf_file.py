@@ -31,7 +31,7 @@ DAMAGED = (
     struct.error,
     zlib.error,
 )
-"""What asammdf raises, beside its own, on a file that is cut or damaged."""
+"""What asammdf raises, besides its own, on a file that is cut or damaged."""
 
 FINISHED, UNFINISHED = b"MDF     ", b"UnFinMF "
 """Identification of a file whose writer came to its end, and of one whose did not (ASAM MDF 4.1, 5.5)."""
@@ -51,7 +51,7 @@ def require_mdf(path: Path, content: bytes) -> None:
     if len(content) < IDENTIFICATION_BYTES or start not in (FINISHED, UNFINISHED):
         raise RecordingError(
             path,
-            f"expected a whole MDF file, one that begins with {FINISHED.decode()!r}, came one that begins "
+            f"expected a whole MDF file, one that begins with {FINISHED.decode()!r}, got one that begins "
             f"with {start!r}",
         )
 

@@ -113,7 +113,7 @@ def readable(path: Path, mdf: MDF, request: Request) -> MDF:
     if is_bus_log(mdf):
         raise RecordingError(
             path,
-            "expected signals, came the frames of a bus as they were logged. Say what they mean: --dbc FILE",
+            "expected signals, got the frames of a bus as they were logged. Say what they mean: --dbc FILE",
         )
     return mdf
 
@@ -202,7 +202,7 @@ def _brought_together(
         signal = _signal(mdf, place)
         column = _valid(as_column(signal.samples), signal.invalidation_bits) if signal.samples.ndim == 1 else None
         if column is None or Kind.of(column) is Kind.TEXT:
-            raise RecordingError(path, f"column {name}: expected a channel of numbers for resample_s, came another")
+            raise RecordingError(path, f"column {name}: expected a channel of numbers for resample_s, got another")
         series[name] = Series(raster.times.astype(np.float64), column.astype(np.float64), name in request.held)
         units[name] = str(signal.unit or "")
     time, columns, remarks = resampled(path, series, period_s)

@@ -108,7 +108,7 @@ def data_sha256_at(path: Path, n_rows: int) -> str:
 
 
 def own_sidecar(path: Path, metadata: Mapping[str, str], units: Mapping[str, str]) -> Sidecar:
-    """Return what has to stand beside a recording of this rig: metadata, units and checksums.
+    """Return what has to stand next to a recording of this rig: metadata, units and checksums.
 
     Raises
     ------

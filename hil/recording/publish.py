@@ -1,8 +1,8 @@
 """Recordings written whole or not at all, and read back before they get their name.
 
-The recording is written beside its place, read again, and compared with what was to be written, bit for bit: a format
-that can't hold something is found by what it did, not by what is known of it. Whoever converts may go on all the same,
-and is told each loss; what is kept then carries the checksum of what was kept.
+The recording is written next to its place, read again, and compared with what was to be written, bit for bit: a format
+that can't hold something is found by what it did, not by what is known of it. Whoever converts may continue all the
+same, and is informed of each loss; what is kept then carries the checksum of what was kept.
 """
 
 from __future__ import annotations
@@ -39,7 +39,8 @@ def write_table(
     replace : bool
         Whether a recording of that name may be replaced.
     on_loss : callable, optional
-        Told what the format can't hold, one line each; the rest is written then. Without it such a table is refused.
+        Called with what the format can't hold, one line each; the rest is written then. Without it such a table is
+        refused.
 
     Raises
     ------
@@ -65,7 +66,7 @@ def write_table(
     except OSError as error:
         raise no_room(path, "the recording", error) from error
     finally:
-        for file in (part, *([] if form.beside is None else [form.beside(part)])):
+        for file in (part, *([] if form.companion is None else [form.companion(part)])):
             if file.is_file():  # on a disk that can't be written even removing nothing is refused
                 file.unlink()
 
@@ -85,16 +86,16 @@ def _write(
     on_loss(lost)
     plain = changed(kept, metadata={key: value for key, value in kept.metadata.items() if key not in CHECKSUMS})
     if still := losses(plain, written(plain)):
-        raise RecordingError(path, *(f"expected it to stay as it was written, came: {what}" for what in still))
+        raise RecordingError(path, *(f"expected it to stay as it was written, got: {what}" for what in still))
 
 
 def _publish(part: Path, path: Path, form: Format) -> None:
     """Give the files their names; a kill in between leaves a recording that says nothing of itself, never a wrong one.
 
-    What stood beside a replaced recording goes first, for it describes that one.
+    What stood next to a replaced recording goes first, for it describes that one.
     """
-    if form.beside is not None:
-        form.beside(path).unlink(missing_ok=True)
+    if form.companion is not None:
+        form.companion(path).unlink(missing_ok=True)
     part.replace(path)
-    if form.beside is not None and form.beside(part).exists():
-        form.beside(part).replace(form.beside(path))
+    if form.companion is not None and form.companion(part).exists():
+        form.companion(part).replace(form.companion(path))

@@ -23,7 +23,7 @@ def read_records(
     Raises
     ------
     UsageError
-        If two have the same name: results are told by it; or the same samples: they would count twice as
+        If two have the same name: results are reported by it; or the same samples: they would count twice as
         evidence, and held out they would prove nothing.
     RecordingError
         If one can't be read, or has another sampling period than the first.
@@ -52,7 +52,7 @@ def _require_own_names(paths: Sequence[Path]) -> None:
     for path in paths:
         if path.stem in names:
             raise UsageError(
-                f"{path}: expected recordings of different names, came {path.stem!r} twice "
+                f"{path}: expected recordings of different names, got {path.stem!r} twice "
                 f"(also {names[path.stem]}). Rename one, or give it once."
             )
         names[path.stem] = path
@@ -64,7 +64,7 @@ def _require_one_period(paths: Sequence[Path], records: Sequence[Record]) -> Non
             raise RecordingError(
                 path,
                 f"expected the sampling period of {paths[0]}, {records[0].sample_time_s:g} s, "
-                f"came {record.sample_time_s:g} s. Give recordings of one period.",
+                f"got {record.sample_time_s:g} s. Give recordings of one period.",
             )
 
 
@@ -74,7 +74,7 @@ def _require_own_samples(paths: Sequence[Path], records: Sequence[Record]) -> No
         samples = (record.torque_nm.tobytes(), record.output.tobytes())
         if samples in known:
             raise UsageError(
-                f"{path}: expected samples of its own, came those of {known[samples]}, every one the same. "
+                f"{path}: expected samples of its own, got those of {known[samples]}, every one the same. "
                 "Give each recording once; hold out one that was not used."
             )
         known[samples] = path

@@ -84,7 +84,7 @@ def resampled(
     if count < 2:
         raise RecordingError(
             path,
-            f"expected channels with {period_s:g} s in common for resample_s, came the last start at {start:.6g} s "
+            f"expected channels with {period_s:g} s in common for resample_s, got the last start at {start:.6g} s "
             f"and the first end at {end:.6g} s",
         )
     require_cells(path, count * (len(usable) + 1))
@@ -101,12 +101,12 @@ def _in_order(path: Path, name: str, one: Series) -> Series:
     present = np.isfinite(one.values) & np.isfinite(one.time_s)
     time, values = one.time_s[present], one.values[present]
     if time.size < 2:
-        raise RecordingError(path, f"column {name}: expected two samples or more, came {time.size}")
+        raise RecordingError(path, f"column {name}: expected two samples or more, got {time.size}")
     steps = np.diff(time)
     if (steps < 0).any():
         row = int(np.flatnonzero(steps < 0)[0])
         raise RecordingError(
-            path, f"column {name}: expected times that run forward, came {time[row + 1]:.9g} s after {time[row]:.9g} s"
+            path, f"column {name}: expected times that run forward, got {time[row + 1]:.9g} s after {time[row]:.9g} s"
         )
     last = np.append(steps > 0, True)
     return Series(time[last], values[last], one.held)
@@ -121,7 +121,7 @@ def _brought(path: Path, name: str, one: Series, time: FloatArray, period_s: flo
         return _linear(one, time, one.period_s), "straight lines between its samples"
     if ratio > MOST_RATIO:
         raise RecordingError(
-            path, f"column {name}: expected resample_s of at most {MOST_RATIO} of its periods, came {ratio:.0f}"
+            path, f"column {name}: expected resample_s of at most {MOST_RATIO} of its periods, got {ratio:.0f}"
         )
     require_cells(path, time.size * math.ceil(ratio))
     return _thinned(one, time, period_s, math.ceil(ratio)), f"low-pass at {0.5 * EDGE / period_s:.4g} Hz and thinned"

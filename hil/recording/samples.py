@@ -9,7 +9,7 @@ import numpy as np
 
 from hil.recording import columns
 from hil.recording.table import Table
-from hil.rig.sample import Sample
+from hil.sample import Sample
 
 
 def cells_of(sample: Sample) -> tuple[float | int, ...]:

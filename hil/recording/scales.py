@@ -66,12 +66,12 @@ def scale_of(table: Table, column: str, role: Role, given: float | None) -> floa
 def _not_of_the_role(column: str, text: str, unit: Unit, role: Role) -> str:
     if unit.quantity is Quantity.SHARE:
         return (
-            f"column {column}: expected a {role.value} in a unit of its own, came one in {text} of a rated value that "
+            f"column {column}: expected a {role.value} in a unit of its own, got one in {text} of a rated value that "
             f"the file does not say. Give the scale: {role.value} = {{ column = {column!r}, scale = RATED * "
             f"{unit.factor:g} }} with RATED in SI units, worked out."
         )
     return (
-        f"column {column}: expected a {role.value}, came a {unit.quantity.value} in {text}. Are two columns swapped in "
+        f"column {column}: expected a {role.value}, got a {unit.quantity.value} in {text}. Are two columns swapped in "
         "[signals]? Where it is right as it is, give its scale."
     )
 

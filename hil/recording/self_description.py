@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from hil.recording.checksum import CHECKSUM, RIG_CHECKSUM, RIG_TEXT, SAID
 
 _SHOWN = 16
-"""Digits of a checksum that are shown: enough to tell any two apart that a person will ever compare."""
+"""Digits of a checksum that are shown: enough to distinguish any two that a person will ever compare."""
 
 _SINGLE_LINE = 100
 

@@ -1,4 +1,4 @@
-"""What a CSV recording says of itself, in a JSON file beside it: ``run.csv`` has ``run.csv.json``.
+"""What a CSV recording says of itself, in a JSON file next to it: ``run.csv`` has ``run.csv.json``.
 
 CSV has no place for units, types and metadata, and a comment line would keep other programs from reading the recording.
 Where the file is not there, or is some other program's, the recording is read as one that says nothing.
@@ -21,7 +21,7 @@ from hil.recording.kinds import Kind
 from hil.recording.no_room import no_room
 
 SCHEMA_KEY, SCHEMA = "schema", "hil.recording/1"
-"""By which a file of ours is told from any other of that name."""
+"""By which a file of ours is distinguished from any other of that name."""
 
 UNITS_KEY, TYPES_KEY = "units", "types"
 
@@ -42,12 +42,12 @@ class Sidecar:
 
 
 def as_metadata(metadata: Mapping[str, str]) -> dict[str, str]:
-    """Leave out what has a meaning of its own in the file beside, and so can't be metadata."""
+    """Leave out what has a meaning of its own in the file next to, and so can't be metadata."""
     return {key: value for key, value in metadata.items() if key not in {SCHEMA_KEY, UNITS_KEY, TYPES_KEY}}
 
 
 def sidecar_of(recording: Path) -> Path:
-    """Name the file beside a recording."""
+    """Name the file next to a recording."""
     return recording.with_name(f"{recording.name}.json")
 
 
@@ -84,7 +84,7 @@ def is_sidecar(path: Path) -> bool:
 
 
 def read_sidecar(recording: Path) -> Sidecar:
-    """Read what a recording says of itself; empty where no file of ours is beside it.
+    """Read what a recording says of itself; empty where no file of ours is next to it.
 
     Raises
     ------
@@ -101,7 +101,7 @@ def read_sidecar(recording: Path) -> Sidecar:
         types = {name: Kind(kind) for name, kind in _texts(content.get(TYPES_KEY)).items()}
     except (OSError, ValueError) as error:
         raise RecordingError(
-            path, f"expected the description of {recording.name}, came: {error}. Mend it, or move it away."
+            path, f"expected the description of {recording.name}, got: {error}. Fix it, or move it away."
         ) from error
     return Sidecar(_texts(content), _texts(content.get(UNITS_KEY)), types, found=True)
 

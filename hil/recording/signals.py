@@ -1,7 +1,7 @@
 """From a table to the estimator's ``Record``, by the contract's columns or by ``[signals]`` of a model file.
 
 A row is a missing sample (``okay`` False) where torque or output is NaN, where the rig flagged it, or where a
-mask says so. Time goes on there, so the simulation needs a torque: the last good value is held where the
+mask says so. Time advances there, so the simulation needs a torque: the last good value is held where the
 reading is not to be trusted (NaN, flagged, outside a mask on that very column). A mask on another column says
 that the model does not hold there, not that the torque was misread; the torque stays as recorded.
 
@@ -46,11 +46,11 @@ SAME_PERIOD = 1e-6
 """Share by which the steps of a recording may differ from a period it is said to have."""
 
 FEWEST_SAMPLES = 10
-"""A recording with fewer usable samples can't carry a constant load, an initial state and anything beside."""
+"""A recording with fewer usable samples can't carry a constant load, an initial state and anything next to."""
 
 
 Tell = Callable[[str], None]
-"""Takes one line of what was recognised, left out or mended."""
+"""Takes one line of what was recognised, left out or fixed."""
 
 
 def read_record(
@@ -73,7 +73,7 @@ def read_record(
     dbc : Path, optional
         What the frames of a logged CAN bus mean.
     tell : callable, optional
-        Told what was recognised in the file, and what was done to it.
+        Called with what was recognised in the file, and what was done to it.
 
     Returns
     -------
@@ -150,7 +150,7 @@ def _load(
     measured = numbers[signal.column] * scale_of(table, signal.column, Role.TORQUE, signal.given_scale)
     read = np.isfinite(measured)
     if not read.any():
-        raise RecordingError(table.path, f"column {signal.column}: expected a load torque, came no number at all.")
+        raise RecordingError(table.path, f"column {signal.column}: expected a load torque, got no number at all.")
     _require_sizes(table, [(signal.column, measured)])
     return _held(measured[:, np.newaxis], read[:, np.newaxis])[:, 0], read
 
@@ -175,7 +175,7 @@ def _signed(table: Table, signal: TorqueSignal | LoadSignal | OutputSignal, valu
     if end is not None:
         raise RecordingError(
             table.path,
-            f"column {signal.column}: expected a reading with a sign, came one that jumps between 0 and {end:g}: it "
+            f"column {signal.column}: expected a reading with a sign, got one that jumps between 0 and {end:g}: it "
             f"was stored with a sign and read without. Write {{ column = {signal.column!r}, wraps_at = {end:g} }}.",
         )
     return values
@@ -282,7 +282,7 @@ def _require_sizes(table: Table, signals: Iterable[tuple[str, FloatArray]]) -> N
         if largest != 0.0 and not SMALLEST <= largest <= GREATEST:
             problems.append(
                 f"column {name}: expected a signal in SI units, the largest value between {SMALLEST:g} and "
-                f"{GREATEST:g}, came {largest:g}. Check its unit, and its scale in [signals]"
+                f"{GREATEST:g}, got {largest:g}. Check its unit, and its scale in [signals]"
             )
     if problems:
         raise RecordingError(table.path, *problems)
@@ -292,7 +292,7 @@ def _require_period(table: Table, period_s: float) -> None:
     if not SHORTEST_S <= period_s <= LONGEST_S:
         raise RecordingError(
             table.path,
-            f"expected a sampling period between {SHORTEST_S:g} and {LONGEST_S:g} s, came {period_s:g} s. Check the "
+            f"expected a sampling period between {SHORTEST_S:g} and {LONGEST_S:g} s, got {period_s:g} s. Check the "
             "unit of its time, and its scale in [signals]",
         )
 
@@ -302,6 +302,6 @@ def _require_samples(table: Table, okay: NDArray[np.bool_]) -> None:
     if usable < FEWEST_SAMPLES:
         raise RecordingError(
             table.path,
-            f"expected {FEWEST_SAMPLES} usable samples or more, came {usable} of {okay.size} rows "
-            "(the others are nan, flagged or masked). Record longer or mend the mask.",
+            f"expected {FEWEST_SAMPLES} usable samples or more, got {usable} of {okay.size} rows "
+            "(the others are nan, flagged or masked). Record longer or fix the mask.",
         )

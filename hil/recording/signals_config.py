@@ -11,7 +11,7 @@ from typing import Annotated, Self
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from estimator.signals.record import Location, OutputKind
-from hil.config.problems import Fault, refuse
+from hil.problems import Fault, refuse
 from hil.recording import columns
 from hil.recording.format_hints import FormatHints
 from hil.recording.request import Request
@@ -67,8 +67,8 @@ class TimeSignal(_Strict):
     @model_validator(mode="after")
     def _is_one_of_two(self) -> Self:
         if (self.column is None) == (self.sample_time_s is None):
-            came = "neither" if self.column is None else "both"
-            refuse([Fault("", "either column or sample_time_s", came)])
+            got = "neither" if self.column is None else "both"
+            refuse([Fault("", "either column or sample_time_s", got)])
         return self
 
 
@@ -157,7 +157,7 @@ class SignalsConfig(_Strict):
             expected = "one of speed, position, force (position and force together: an imposed motion)"
             refuse([Fault("", expected, " and ".join(given))])
         if self.load is not None and self.names_bench:
-            refuse([Fault("load", "no such key beside an imposed motion, which needs no load", self.load.column)])
+            refuse([Fault("load", "no such key next to an imposed motion, which needs no load", self.load.column)])
         if self.outputs and not given and not self.is_own_recording and self._first_of_outputs is None:
             expected = "a speed or a position among them, or speed = { ... } for one"
             refuse([Fault("outputs", expected, ", ".join(output.kind.value for output in self.outputs))])

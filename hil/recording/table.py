@@ -46,7 +46,7 @@ class Table:
     first_line : int or None
         Line of the first row in a text file; None where rows have no lines.
     remarks : tuple of str
-        What its reader recognised, had to leave out or mend, one line each.
+        What its reader recognised, had to leave out or fix, one line each.
     skipped : tuple of int
         Lines after the first row that are no rows, ascending.
     master : str or None
@@ -75,11 +75,11 @@ class Table:
         if not lengths or min(lengths.values()) == 0:
             raise RecordingError(
                 self.path,
-                "expected columns with at least one row, came none: the file is empty or truncated. Record again.",
+                "expected columns with at least one row, got none: the file is empty or truncated. Record again.",
             )
         if len(set(lengths.values())) > 1:
             listed = ", ".join(f"{name} {length}" for name, length in lengths.items())
-            raise RecordingError(self.path, f"expected columns of one length, came {listed} rows")
+            raise RecordingError(self.path, f"expected columns of one length, got {listed} rows")
 
     @property
     def n_rows(self) -> int:
@@ -130,7 +130,7 @@ class Table:
             return None
         cell = str(column[row])
         shown = repr(cell[:LONGEST_CELL])
-        return f"{self.place(row)}, column {name}: expected a finite number or nan, came {shown}{_hint(cell)}"
+        return f"{self.place(row)}, column {name}: expected a finite number or nan, got {shown}{_hint(cell)}"
 
 
 def line_of(row: int, first_line: int, skipped: tuple[int, ...]) -> int:
@@ -168,7 +168,7 @@ def _is_measurement(cell: str) -> bool:
 
 
 def _hint(cell: str) -> str:
-    """Say what to do about a bad cell whose cause can be told."""
+    """Say what to do about a bad cell whose cause is known."""
     if _is_measurement(cell.replace(",", ".", 1)):
         return ". Write decimals with a point"
     try:

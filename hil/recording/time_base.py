@@ -56,7 +56,7 @@ def time_base(table: Table, signal: TimeSignal) -> tuple[FloatArray, float, tupl
         If there are fewer than two rows, or time is missing, runs backwards, or is not uniform.
     """
     if table.n_rows < 2:
-        raise RecordingError(table.path, f"expected two rows or more, came {table.n_rows}. Record longer.")
+        raise RecordingError(table.path, f"expected two rows or more, got {table.n_rows}. Record longer.")
     if signal.sample_time_s is not None:
         return np.arange(table.n_rows, dtype=np.float64) * signal.sample_time_s, signal.sample_time_s, ()
     column = str(signal.column)
@@ -129,6 +129,6 @@ def _refuse(table: Table, column: str, time: FloatArray, span: int, wrong: NDArr
         before = "the row before" if span == 1 else f"{span} rows before"
         raise RecordingError(
             table.path,
-            f"{table.place(row)}, column {column}: {expected}, came {time[row]:.9g} s "
+            f"{table.place(row)}, column {column}: {expected}, got {time[row]:.9g} s "
             f"after {time[row - span]:.9g} s in {before}",
         )

@@ -40,13 +40,13 @@ def _require_even(path: Path, text: str) -> None:
         late, unanswered = int(timing["late"]), int(timing["unanswered"])
     except (ValueError, TypeError, KeyError) as error:
         raise RecordingError(
-            path, f"metadata timing: expected a record hil.timing/1, came one that can't be read ({error!r})"
+            path, f"metadata timing: expected a record hil.timing/1, got one that can't be read ({error!r})"
         ) from error
     bad, due = missed + late + unanswered, cycles + missed
     if bad > WORST_SHARE * due:
         raise RecordingError(
             path,
-            f"expected at most {WORST_SHARE:.0%} of the cycles late or incomplete, came {bad / due:.0%} of {due}: "
+            f"expected at most {WORST_SHARE:.0%} of the cycles late or incomplete, got {bad / due:.0%} of {due}: "
             f"{missed} missed, {late} late by more than half a period, {unanswered} answers missing. Record again "
             "on a machine that is less busy or grants real-time scheduling, or at a longer period.",
         )

@@ -1,6 +1,6 @@
 """A recording as it is made: every sample leaves the program at once, the file gets its name when whole.
 
-While the run goes on, rows stand in ``<stem>.part.csv`` beside the target, one line each, handed to the
+While the run continues, rows stand in ``<stem>.part.csv`` next to the target, one line each, handed to the
 operating system as they come by a thread of its own: whoever appends waits for no disk. What the disk has not taken
 yet waits in memory, `CAPACITY` samples at most. When the run ends, in any way Python can still act on (end, error,
 Ctrl-C), the rows become the recording, in its own format. What a harder end leaves:
@@ -32,7 +32,7 @@ from hil.recording.samples import cells_of
 from hil.recording.sidecar import write_sidecar
 from hil.recording.table import Table
 from hil.recording.writing_thread import WritingThread
-from hil.rig.sample import Sample
+from hil.sample import Sample
 
 CSV = ".csv"
 
@@ -70,7 +70,7 @@ class RecordingWriter:
         The recording to make; its suffix chooses the format.
     metadata : mapping of str to str
         What the recording shall say of itself; more can be said until it is closed, by `describe`. CSV has no
-        place for it: there it is in a file beside the recording (`hil.recording.sidecar`).
+        place for it: there it is in a file next to the recording (`hil.recording.sidecar`).
     channel_units : mapping of str to str
         Column and unit of each channel of its samples.
     patience_s : float
@@ -104,13 +104,13 @@ class RecordingWriter:
         except FileExistsError as error:
             raise RecordingError(
                 self.part_path,
-                "expected no such file, came one left by a run that was killed, or that goes on. "
+                "expected no such file, got one left by a run that was killed, or that continues. "
                 "It is a recording up to that moment: rename it to keep it, or remove it.",
             ) from error
         except OSError as error:
             raise RecordingError(
                 self.path,
-                f"expected a place to write, came: {error.strerror}. Choose another folder, or mend this one.",
+                f"expected a place to write, got: {error.strerror}. Choose another folder, or fix this one.",
             ) from error
         try:
             self._begin(self._file)
@@ -125,7 +125,7 @@ class RecordingWriter:
     def _opened(self) -> FileIO:
         """Open the part file, a new one or one that a run has left which was killed before its first sample.
 
-        Unbuffered: what the thread writes reaches the operating system at once. It is held while the run goes on.
+        Unbuffered: what the thread writes reaches the operating system at once. It is held while the run lasts.
 
         Raises
         ------
@@ -177,12 +177,12 @@ class RecordingWriter:
             If the writer is not open, or the disk has not taken a sample before this one, or too many wait for it.
         """
         if self._file is None or self._writing is None:
-            raise RecordingError(self.path, "expected an open writer, came one that is closed. Use it by 'with'.")
+            raise RecordingError(self.path, "expected an open writer, got one that is closed. Use it by 'with'.")
         self._raise_if_failed(self._writing)
         if not self._writing.put(self._row(sample), self._patience_s):
             raise RecordingError(
                 self.path,
-                f"expected a disk that takes samples as they come, came one for which {CAPACITY} wait. They are kept "
+                f"expected a disk that takes samples as they come, got one for which {CAPACITY} wait. They are kept "
                 "if it takes them now; choose another disk.",
             )
 
@@ -230,7 +230,7 @@ class RecordingWriter:
         if not drained:
             raise RecordingError(
                 self.path,
-                f"expected a disk that takes the last {writing.n_waiting} samples within {DRAIN_S:g} s, came one that "
+                f"expected a disk that takes the last {writing.n_waiting} samples within {DRAIN_S:g} s, got one that "
                 "does not: they are lost. Choose another disk.",
             )
         file.close()
@@ -271,7 +271,7 @@ class RecordingWriter:
         if len(cells) != len(self._units):
             raise RecordingError(
                 self.path,
-                f"expected samples with {len(self._units)} cells, one for each of {', '.join(self._units)}, came one "
+                f"expected samples with {len(self._units)} cells, one for each of {', '.join(self._units)}, got one "
                 f"with {len(cells)}. Give the channels of the rig file that the samples are of.",
             )
         return ",".join(map(repr, cells)) + "\n"

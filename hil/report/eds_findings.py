@@ -9,8 +9,8 @@ import typer
 
 from drivers.capability.ability import Ability
 from drivers.capability.carrier import RPDO, TPDO
-from drivers.datasheet.check import EdsReport
 from drivers.datasheet.finding import EdsFinding, Severity
+from drivers.eds_check import EdsReport
 
 _COLOURS = {Severity.ERROR: "red", Severity.WARNING: "yellow", Severity.NOTE: "cyan"}
 

@@ -19,7 +19,7 @@ def require_folder(folder: Path) -> None:
     """
     existing = next(parent for parent in (folder, *folder.absolute().parents) if parent.exists())
     if not existing.is_dir():
-        raise UsageError(f"{folder}: expected a folder to write into, came {existing}, which is a file")
+        raise UsageError(f"{folder}: expected a folder to write into, got {existing}, which is a file")
     try:
         with tempfile.TemporaryFile(dir=existing):
             pass  # permissions alone don't tell: the disk may be full, or mounted read-only
@@ -44,7 +44,7 @@ def publish(folder: Path, files: Mapping[str, Callable[[Path], object]]) -> None
     """
     for path in (folder / name for name in files):
         if path.is_dir():
-            raise UsageError(f"{path}: expected the name of a file to write, came a folder. Name a file in it.")
+            raise UsageError(f"{path}: expected the name of a file to write, got a folder. Name a file in it.")
     require_folder(folder)
     try:
         _publish(folder, files)
@@ -69,6 +69,6 @@ def _publish(folder: Path, files: Mapping[str, Callable[[Path], object]]) -> Non
 
 def _unwritable(folder: Path, error: OSError) -> UsageError:
     return UsageError(
-        f"{folder}: expected a folder to write into, came: {error.strerror or error}. Make room there, or choose "
+        f"{folder}: expected a folder to write into, got: {error.strerror or error}. Make room there, or choose "
         "another with --out."
     )

@@ -50,7 +50,7 @@ class BoundedBlfReader(BLFReader):
         while header := self.file.read(HEADER_BYTES):
             signature, _, _, size, kind = OBJ_HEADER_BASE_STRUCT.unpack(header)
             if signature != b"LOBJ" or size < HEADER_BYTES:
-                raise BLFParseError(f"expected an object, came {signature!r} of {size} bytes")
+                raise BLFParseError(f"expected an object, got {signature!r} of {size} bytes")
             content = self.file.read(size - HEADER_BYTES)
             self.file.read(size % 4)
             if kind == LOG_CONTAINER:
@@ -66,17 +66,17 @@ class BoundedBlfReader(BLFReader):
             unpacking = zlib.decompressobj()
             data = unpacking.decompress(packed, CONTAINER_BYTES)
             if unpacking.unconsumed_tail:
-                raise BLFParseError(f"expected containers of at most {CONTAINER_BYTES} bytes, came a larger one")
+                raise BLFParseError(f"expected containers of at most {CONTAINER_BYTES} bytes, got a larger one")
         else:
-            raise BLFParseError(f"expected a container packed by zlib or not at all, came method {method}")
+            raise BLFParseError(f"expected a container packed by zlib or not at all, got method {method}")
         self._left -= len(data)
         if self._left < 0:
-            raise BLFParseError("expected a log, came a file that unpacks to far more than one of its size")
+            raise BLFParseError("expected a log, got a file that unpacks to far more than one of its size")
         return data
 
     def _parse_container(self, data: bytes) -> Iterator[can.Message]:
         if len(self._tail) > CONTAINER_BYTES:
-            raise BLFParseError("expected objects that end, came one that is longer than any")
+            raise BLFParseError("expected objects that end, got one that is longer than any")
         _require_lengths(self._tail + data)
         yield from super()._parse_container(data)
 
@@ -87,5 +87,5 @@ def _require_lengths(data: bytes) -> None:
     while 0 <= at <= len(data) - HEADER_BYTES:
         size = OBJ_HEADER_BASE_STRUCT.unpack_from(data, at)[3]
         if size < HEADER_BYTES:
-            raise BLFParseError(f"expected an object of {HEADER_BYTES} bytes or more, came one of {size}")
+            raise BLFParseError(f"expected an object of {HEADER_BYTES} bytes or more, got one of {size}")
         at = data.find(b"LOBJ", at + size, at + size + 8)

@@ -45,7 +45,7 @@ def open_devices(rig: Rig, least_host_timeout_ms: int = 0) -> Iterator[Devices]:
     Parameters
     ----------
     least_host_timeout_ms
-        The drives, when they are configured, are told to wait for the host's heartbeat at least so long [ms]; see
+        The drives, when they are configured, are ordered to wait for the host's heartbeat at least so long [ms]; see
         `hil.rig.pacing.heartbeat_patience_ms`.
 
     Raises
@@ -81,7 +81,7 @@ def _require_acceptances(rig: Rig) -> None:
             if not acceptance.is_by_a_person:
                 raise UsageError(
                     f"rig {rig.name!r}, inverters.{name}.accepted.{key}: expected the name of who accepts it, and in "
-                    f"words why, came {acceptance.by!r}, {acceptance.why!r}. Nobody has filled it in."
+                    f"words why, got {acceptance.by!r}, {acceptance.why!r}. Nobody has filled it in."
                 )
 
 

@@ -1,6 +1,6 @@
-"""The base torque after cycles that did not take place: it goes on from what the drives hold.
+"""The base torque after cycles that did not take place: it continues from what the drives hold.
 
-A plan gives the torque of a moment. Where the machine was late and cycles are missing, the plan has gone on and the
+A plan gives the torque of a moment. Where the machine was late and cycles are missing, the plan has continued and the
 drives have not: the step between the two is spread over as many cycles as the rate limit of the guard needs. Nothing
 else is changed: a plan that is too fast by itself is for the guard to refuse.
 """

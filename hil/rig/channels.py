@@ -20,7 +20,7 @@ from hil.rig.plc_loop import PlcLoop
 
 
 class Channels:
-    """What is read beside torque and speed.
+    """What is read in addition to torque and speed.
 
     Parameters
     ----------

@@ -10,9 +10,9 @@ from pathlib import Path
 from urllib.parse import parse_qsl, urlsplit
 
 from drivers.canopen.can_link import CanLink
-from drivers.datasheet.check import check_eds
 from drivers.datasheet.file import EdsFile
 from drivers.datasheet.finding import Severity
+from drivers.eds_check import check_eds
 from drivers.errors import DeviceFault, DriverError, ProtocolViolation
 from drivers.inverter.check import Difference
 from drivers.inverter.commissioned import CommissionedValue
@@ -184,13 +184,13 @@ def _eds_note(path: Path | None) -> tuple[str, ...]:
 
 def _rate(table: InverterTable, can_url: str) -> Iterator[CommissionedValue]:
     """Compare the bit rate of a DCF with that of the bus URL, where both say one [kbit/s]."""
-    told = dict(parse_qsl(urlsplit(can_url).query)).get("bitrate", "")
-    if table.eds is None or not told.isdecimal():
+    bitrate = dict(parse_qsl(urlsplit(can_url).query)).get("bitrate", "")
+    if table.eds is None or not bitrate.isdecimal():
         return
     commissioning = EdsFile(table.eds, table.node_id).sheet.commissioning
     rate = None if commissioning is None else commissioning.bit_rate_kbit_s
-    if rate is not None and rate * 1000 != int(told):
-        yield CommissionedValue("bit rate", f"{rate} kbit/s", "", f"{int(told) / 1000:g} kbit/s")
+    if rate is not None and rate * 1000 != int(bitrate):
+        yield CommissionedValue("bit rate", f"{rate} kbit/s", "", f"{int(bitrate) / 1000:g} kbit/s")
 
 
 def _node(table: InverterTable) -> str:

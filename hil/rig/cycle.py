@@ -18,8 +18,8 @@ from drivers.torque_guard import Evidence, Measured, TorqueGuard, TorqueRequest
 from hil.errors import RunAborted
 from hil.rig.channels import Channels
 from hil.rig.pacing import NS_PER_S, Tick
-from hil.rig.sample import Sample, SampleFlag
 from hil.rig.timing import RunTiming
+from hil.sample import Sample, SampleFlag
 
 
 @dataclass(slots=True)

@@ -15,9 +15,9 @@ from hil.rig.pacing import NS_PER_S, Pacer, Tick
 from hil.rig.plan import Plan
 from hil.rig.plc_prbs import PlcPrbs
 from hil.rig.plc_watch import PlcWatch
-from hil.rig.sample import Sample, SampleFlag
 from hil.rig.stop import StopRequest
 from hil.rig.timing import RunTiming
+from hil.sample import Sample, SampleFlag
 
 SLEPT_THROUGH = SampleFlag.LATE | SampleFlag.M1_STALE | SampleFlag.M2_STALE
 """Flags of a cycle this machine was too late for: there was no SYNC, and the torque stood."""
@@ -95,7 +95,7 @@ class Drive:
     stop
         Ends the run at the next cycle when requested.
     progress
-        Told of every cycle.
+        Called with every cycle.
     observers
         Given every sample.
     """

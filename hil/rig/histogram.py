@@ -1,7 +1,7 @@
 """How often each length of time came, in bounded memory, however long a run is.
 
 Bins are exact below 256 ns and then 128 to every doubling, so that no bin is wider than 1/128 of what is in it: a
-quantile is told at most 0.8 % too high, and never too low. The longest time is kept exactly. 64-bit nanoseconds
+quantile is reported at most 0.8 % too high, and never too low. The longest time is kept exactly. 64-bit nanoseconds
 fill fewer than 7500 bins.
 """
 

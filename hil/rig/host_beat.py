@@ -47,7 +47,7 @@ class HostBeat:
             If a beat has failed.
         """
         if error := self._end():
-            raise RunAborted(f"PLC: expected it to see the host's beats, came: {error}") from error
+            raise RunAborted(f"PLC: expected it to see the host's beats, got: {error}") from error
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None

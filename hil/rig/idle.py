@@ -1,7 +1,7 @@
 """Listening: SYNC at the rig's period with both drives disarmed, so that a rig at rest can be watched.
 
 The inverters are configured as for a run (PDO layout, heartbeat, option codes; NMT OPERATIONAL) and never armed:
-their power stages stay off, no torque is commanded, no RPDO is sent. What does not answer is told, not raised: a
+their power stages stay off, no torque is commanded, no RPDO is sent. What does not answer is reported, not raised: a
 drive may be switched on later. Only the loss of the bus itself ends it.
 """
 
@@ -20,8 +20,8 @@ from hil.rig.build import Devices
 from hil.rig.pacing import NS_PER_S, Pacer
 from hil.rig.plc_loop import PlcLoop
 from hil.rig.plc_watch import POLL_EVERY_NS
-from hil.rig.sample import Sample, SampleFlag
 from hil.rig.timing import RunTiming
+from hil.sample import Sample, SampleFlag
 
 PLC_BACKOFF = Backoff(first_s=0.2, longest_s=2.0, attempts=8)
 """Pauses between attempts to reach a PLC that was lost; the longest one is kept to."""

@@ -1,4 +1,4 @@
-"""The estimate of a run while it goes on: what `hil run` works out beside the cycle, and `hil replay` once more.
+"""The estimate of a run while it lasts: what `hil run` works out next to the cycle, and `hil replay` once more.
 
 The cycle comes first: a sample gets here when its frames are out, its answers in and its row recorded
 (`hil.rig.drive.Observer`).
@@ -13,15 +13,15 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from estimator.identification.identify import Settings
+from estimator.identification.chain import OnlineChain
 from estimator.identification.online.adaptation import ConstantForgetting
-from estimator.identification.online.chain import OnlineChain
-from estimator.identification.online.online_estimate import OnlineEstimate
+from estimator.identification.online_estimate import OnlineEstimate
+from estimator.identification.settings import Settings
 from estimator.signals.record import FloatArray
 from hil.rig.experiments.base import Phase
 from hil.rig.live_course import Course
 from hil.rig.pacing import NS_PER_S, period_ns
-from hil.rig.sample import Sample
+from hil.sample import Sample
 
 FORGETTING = 0.995
 """lambda_1: a sample 200 kept ones old, 4 s at 20 ms, weighs a third. A stiffness that drops is followed in seconds."""
@@ -30,7 +30,7 @@ FORGETTING = 0.995
 def tracking_settings(sample_time_s: float = Settings().sample_time_s) -> Settings:
     """Return how a resonance is followed: the paper's settings, but with a constant forgetting.
 
-    The paper's profile goes on learning until tr F has fallen to 0.01, for minutes, and is then slow to change.
+    The paper's profile keeps learning until tr F has fallen to 0.01, for minutes, and is then slow to change.
     """
     return Settings(sample_time_s=sample_time_s, adaptation=ConstantForgetting(FORGETTING))
 

@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any
 from estimator.identification.tracking.state import TrackingState
 
 if TYPE_CHECKING:  # the estimator takes half a second to import, and a run without an estimate has no use for it
-    from estimator.identification.online.chain import OnlineChain
-    from estimator.identification.online.online_estimate import OnlineEstimate, OnlineTrajectory
+    from estimator.identification.chain import OnlineChain
+    from estimator.identification.online_estimate import OnlineEstimate, OnlineTrajectory
     from estimator.identification.tracking.alarm import Alarm
 
 SCHEMA = "hil.online/1"
@@ -30,7 +30,7 @@ MOST = 1 << 17
 
 
 def course_path(recording: Path) -> Path:
-    """Return where the course of a run stands: beside its recording."""
+    """Return where the course of a run stands: next to its recording."""
     return recording.with_suffix(".online.json")
 
 

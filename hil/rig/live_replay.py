@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimator.identification.identify import Settings
+from estimator.identification.settings import Settings
 from estimator.signals.record import FloatArray, Record
 from hil.rig.live import LiveEstimate, tracking_chain
 from hil.rig.live_course import Course
-from hil.rig.sample import Sample
+from hil.sample import Sample
 
 BLOCK_SAMPLES = 10_000
 """Samples of a block when nothing has to be waited for."""
@@ -23,7 +23,7 @@ BLOCK_SAMPLES = 10_000
 BLOCK_S = 0.1
 """Length of a block on the wall clock at a given speed [s]."""
 
-Told = Callable[[Course, float], None]
+OnCourse = Callable[[Course, float], None]
 """Called after each block with the course so far and the time in the recording [s]."""
 
 
@@ -60,7 +60,9 @@ class Pace:
         return wait
 
 
-def play_record(record: Record, settings: Settings, pace: Pace, told: Told, L: FloatArray | None = None) -> Course:
+def play_record(
+    record: Record, settings: Settings, pace: Pace, on_course: OnCourse, L: FloatArray | None = None
+) -> Course:
     """Play a recording in blocks; return what the chain said.
 
     Raises
@@ -77,12 +79,17 @@ def play_record(record: Record, settings: Settings, pace: Pace, told: Told, L: F
         course.extend(block)
         course.samples += record.time_s[part].shape[0]
         wait(float(record.time_s[part][-1] - record.time_s[0]))
-        told(course, float(record.time_s[part][-1]))
+        on_course(course, float(record.time_s[part][-1]))
     return course
 
 
 def play_samples(
-    samples: Iterable[Sample], period_s: float, settings: Settings, pace: Pace, told: Told, L: FloatArray | None = None
+    samples: Iterable[Sample],
+    period_s: float,
+    settings: Settings,
+    pace: Pace,
+    on_course: OnCourse,
+    L: FloatArray | None = None,
 ) -> Course:
     """Play samples as they come, such as those of a bus trace; return what the chain said.
 
@@ -96,5 +103,5 @@ def play_samples(
         live(sample)
         if live.course.samples % every == 0:
             wait(sample.time_s)
-            told(live.course, sample.time_s)
+            on_course(live.course, sample.time_s)
     return live.course

@@ -43,7 +43,7 @@ class Plan:
         The PRBS as the host makes it; where the PLC does, one of the same amplitude to predict with; none where the
         experiment has none.
     plc_prbs
-        What the PLC's own generator is told; None where the host makes the PRBS.
+        What the PLC's own generator is sent; None where the host makes the PRBS.
     split
         Shares of the two inverters.
     needs

@@ -4,7 +4,7 @@
 
     planned      the amplitude passes the torque guard's rules before anything is connected
     a run begins the generator is off, confirmed
-    MEASURE      settings written, read back, enabled: by the PLC's loop, while the torque cycle goes on
+    MEASURE      settings written, read back, enabled: by the PLC's loop, while the torque cycle continues
     after it     off, in the same way
     every exit   off once more, confirmed, when the drives are at zero torque and disarmed
 
@@ -33,7 +33,7 @@ from hil.rig.plc_loop import PlcLoop
 
 @dataclass(frozen=True, slots=True)
 class PlcPrbsOrder:
-    """What the PLC's generator is told: torques as the guard let them through, PLC cycles per level, first state."""
+    """What the PLC's generator is sent: torques as the guard let them through, PLC cycles per level, first state."""
 
     m1: GuardedTorque
     m2: GuardedTorque
@@ -120,7 +120,7 @@ class PlcPrbs:
         except DriverError as failure:
             cause = "" if error is None else f" What ended the run: {error or type(error).__name__}"
             raise RunAborted(
-                f"PLC: expected its own PRBS generator confirmed off, came: {failure} Switch it off at the PLC before "
+                f"PLC: expected its own PRBS generator confirmed off, got: {failure} Switch it off at the PLC before "
                 f"the drives are armed again.{cause}"
             ) from error
 
@@ -139,12 +139,12 @@ class PlcPrbs:
         Raises
         ------
         RunAborted
-            If the PLC does not do as told, or its generator is set to something else.
+            If the PLC does not do as ordered, or its generator is set to something else.
         """
         order = self._order if phase is Phase.MEASURE else None
         if self._change is None and (order is not None) is not self._wanted:
             self._wanted = order is not None
-            self._change = self._loop.start(_told(self._plc, order))
+            self._change = self._loop.start(_ordered(self._plc, order))
         self._take_change(tick)
         if self._change is None and (self._since_ns is None or status.t_ns > self._since_ns):
             self._judge(status)
@@ -159,7 +159,7 @@ class PlcPrbs:
         try:
             self._holds = self._change.result(self._patience_s)
         except DriverError as error:
-            raise RunAborted(f"PLC: expected its PRBS generator to do as told, came: {error}") from error
+            raise RunAborted(f"PLC: expected its PRBS generator to do as ordered, got: {error}") from error
         except TimeoutError:
             return  # under way; the PLC's silence is the watch's to see
         self._change, self._since_ns = None, tick.now_ns
@@ -169,8 +169,8 @@ class PlcPrbs:
             raise RunAborted(wrong)
 
     def _wrong_setting(self, status: PlcStatus) -> str | None:
-        as_told = status.prbs == self._holds if self._holds.enabled else not status.prbs.enabled
-        if as_told:
+        as_ordered = status.prbs == self._holds if self._holds.enabled else not status.prbs.enabled
+        if as_ordered:
             return None
         return (
             f"PLC: its own PRBS generator is set to {_shown(status.prbs)}, expected {_shown(self._holds)}. The run "
@@ -178,7 +178,7 @@ class PlcPrbs:
         )
 
 
-async def _told(plc: Plc, order: PlcPrbsOrder | None) -> PrbsSettings:
+async def _ordered(plc: Plc, order: PlcPrbsOrder | None) -> PrbsSettings:
     if order is None:
         return await plc.stop_prbs()
     return await plc.start_prbs(order.m1, order.m2, order.clock_divider, order.seed)

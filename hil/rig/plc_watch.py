@@ -18,7 +18,7 @@ from hil.errors import RunAborted
 from hil.rig.fitness import Needs, changes
 from hil.rig.pacing import NS_PER_S, Tick
 from hil.rig.plc_loop import PlcLoop
-from hil.rig.sample import SampleFlag
+from hil.sample import SampleFlag
 
 POLL_EVERY_NS = NS_PER_S // 10
 """Time between two polls [ns]: a clutch takes longer than this to close."""
@@ -111,7 +111,7 @@ class PlcWatch:
         try:
             status = self._poll.result(self._patience_s)
         except DriverError as error:
-            raise RunAborted(f"PLC: expected its status, came: {error}") from error
+            raise RunAborted(f"PLC: expected its status, got: {error}") from error
         except TimeoutError:
             return None  # under way; its age speaks when it takes too long
         self._poll = None
@@ -123,4 +123,4 @@ class PlcWatch:
             read = " and ".join(f"{speed_rad_s:.1f}" for speed_rad_s in speeds_rad_s)  # one may read a speed long past
             reasons.append(f"speed is {read} rad/s, expected at most {self._latest.speed_limit_rad_s:g} rad/s")
         if reasons:
-            raise RunAborted(f"PLC: {'; '.join(reasons)}. The run was ended at zero torque; mend the cause, run again.")
+            raise RunAborted(f"PLC: {'; '.join(reasons)}. The run was ended at zero torque; fix the cause, run again.")

@@ -28,8 +28,8 @@ from hil.errors import RecordingError
 from hil.rig.build import inverter_settings
 from hil.rig.drive import SLEPT_THROUGH, unread
 from hil.rig.pacing import NS_PER_S, answer_timeout_ns, period_ns, periods_used_up
-from hil.rig.sample import Sample, SampleFlag
 from hil.rig.trace_file import read_frames
+from hil.sample import Sample, SampleFlag
 
 Frame = tuple[int, bytes, int]
 """Identifier, data and time [ns]."""
@@ -63,7 +63,7 @@ class _Station:
 
     @property
     def has_offset(self) -> bool:
-        """Whether base torque and PRBS can be told apart."""
+        """Whether base torque and PRBS can be distinguished."""
         return self._pdos.has_offset
 
     def _take_command(self, cob_id: int, data: bytes) -> None:
@@ -217,7 +217,7 @@ def replay(path: Path, rig: Rig, whole: bool = False, channel: str | None = None
     if not whole and not (m1.has_offset and m2.has_offset):
         raise RecordingError(
             path,
-            "expected the PRBS in an object of its own (0x60B2), by which the measured part is known, came drives that "
+            "expected the PRBS in an object of its own (0x60B2), by which the measured part is known, got drives that "
             "get base torque and PRBS as one sum (0x6071). For every cycle: --all.",
         )
     every = _Reader(clock, m1, m2, rig.channels).samples(read_frames(path, channel))
@@ -233,7 +233,7 @@ def _is_paced(path: Path, period: int, channel: str | None) -> bool:
     every = (t_ns for cob_id, _, t_ns in read_frames(path, channel) if cob_id == SYNC_COB_ID)
     times = list(itertools.islice(every, LOOKED_AT + 1))
     if len(times) < 2:
-        raise RecordingError(path, f"expected SYNC (0x{SYNC_COB_ID:03X}), came {len(times)}. Trace a run of cycles.")
+        raise RecordingError(path, f"expected SYNC (0x{SYNC_COB_ID:03X}), got {len(times)}. Trace a run of cycles.")
     return 2 * median(after - before for before, after in itertools.pairwise(times)) >= period
 
 
@@ -243,12 +243,12 @@ def _measured(path: Path, samples: Iterable[Sample]) -> Iterator[Sample]:
     for has_prbs, stretch in itertools.groupby(samples, key=lambda sample: sample.prbs_nm != 0.0):
         stretches += has_prbs
         if stretches > 1:
-            raise RecordingError(path, "expected one measured part (PRBS, 0x60B2), came a second. Cut the trace.")
+            raise RecordingError(path, "expected one measured part (PRBS, 0x60B2), got a second. Cut the trace.")
         if has_prbs:
             yield from stretch
     if not stretches:
         raise RecordingError(
-            path, "expected a measured part (PRBS, 0x60B2, not zero), came none. For every cycle: --all."
+            path, "expected a measured part (PRBS, 0x60B2, not zero), got none. For every cycle: --all."
         )
 
 
@@ -264,7 +264,7 @@ def _evenly(path: Path, samples: Iterable[Sample], period: int) -> Iterator[Samp
             if missed > MOST_MISSED:
                 raise RecordingError(
                     path,
-                    f"expected one run, came one without SYNC for {missed * period / NS_PER_S:.0f} s in all. Cut the "
+                    f"expected one run, got one without SYNC for {missed * period / NS_PER_S:.0f} s in all. Cut the "
                     "trace, or give the rig file whose period it has.",
                 )
             for missing in range(last.cycle + 1, sample.cycle):

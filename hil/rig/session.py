@@ -3,7 +3,7 @@
 ::
 
     fit          beat, so that the PLC knows its host; set its generator off, see that the vehicle is fit
-    configure    both inverters; the host goes on beating
+    configure    both inverters; the host keeps beating
     arm          both drives, each step confirmed
     wake up      zero torque until both have answered a SYNC; then the guard is enabled
     drive        the experiment, cycle by cycle; its measured part goes to the recording
@@ -55,7 +55,7 @@ def run_plan(
     stop
         Ends the run at the next cycle when requested.
     progress
-        Told of every cycle.
+        Called with every cycle.
     timing
         Where the run's timing is kept, for a caller who wants it however the run ends.
     observers

@@ -1,4 +1,4 @@
-"""Every frame of a run's bus, recorded beside its samples by python-can's own writers.
+"""Every frame of a run's bus, recorded next to its samples by python-can's own writers.
 
 The cycle only puts a frame into a queue; a thread of its own writes, twenty times a second. The times are those of
 the samples: the host's monotonic clock, stamped once, shifted to the time of day at which the trace began.
@@ -58,11 +58,11 @@ class BusTrace:
     def __enter__(self) -> Self:
         require_trace_name(self.path)
         if self.path.exists():
-            raise RecordingError(self.path, "expected a new name, came one that exists: a trace is never overwritten.")
+            raise RecordingError(self.path, "expected a new name, got one that exists: a trace is never overwritten.")
         try:
             self._writer = can.Logger(self.path)
         except OSError as error:
-            raise RecordingError(self.path, f"expected a place to write, came: {error.strerror or error}") from error
+            raise RecordingError(self.path, f"expected a place to write, got: {error.strerror or error}") from error
         self._thread.start()
         return self
 
@@ -128,4 +128,4 @@ def require_trace_name(path: Path) -> None:
         Unless it ends in one of `SUFFIXES`.
     """
     if path.suffix.lower() not in SUFFIXES:
-        raise RecordingError(path, f"expected a name that ends in one of {', '.join(SUFFIXES)}, came {path.suffix!r}")
+        raise RecordingError(path, f"expected a name that ends in one of {', '.join(SUFFIXES)}, got {path.suffix!r}")

@@ -71,17 +71,17 @@ def read_frames(path: Path, channel: str | None = None) -> Iterator[tuple[int, b
 
 def _which(path: Path, expected: str) -> RecordingError:
     counts = Counter(name for name, _ in _frames(path))
-    came = ", ".join(f"{name} ({count} frames)" for name, count in sorted(counts.items()))
+    got = ", ".join(f"{name} ({count} frames)" for name, count in sorted(counts.items()))
     return RecordingError(
         path,
-        f"{expected}, came channels {came or 'without a frame'}. Say which: --channel {next(iter(counts), 'NAME')}",
+        f"{expected}, got channels {got or 'without a frame'}. Say which: --channel {next(iter(counts), 'NAME')}",
     )
 
 
 def _frames(path: Path) -> Iterator[tuple[str, can.Message]]:
     """Give channel and frame; those of other protocols on the same wire are left out."""
     if not is_trace(path):
-        raise RecordingError(path, f"expected a name that ends in one of {', '.join(READABLE)}, came {path.suffix!r}")
+        raise RecordingError(path, f"expected a name that ends in one of {', '.join(READABLE)}, got {path.suffix!r}")
     if not path.is_file():
         raise RecordingError(path, "expected a bus trace to read, there is no such file")
     suffix = path.suffix.lower()
@@ -93,13 +93,13 @@ def _frames(path: Path) -> Iterator[tuple[str, can.Message]]:
                         raise ValueError(f"a frame of {message.dlc} bytes that has {len(message.data)}")
                     yield _channel(message, suffix), message
     except NotImplementedError as error:
-        raise RecordingError(path, f"expected a version of {suffix} that python-can reads, came: {error}") from error
+        raise RecordingError(path, f"expected a version of {suffix} that python-can reads, got: {error}") from error
     except RecordingError:
         raise
     except Exception as error:  # python-can's readers raise anything on a file that is damaged
         raise RecordingError(
             path,
-            f"expected a bus trace in the format of its suffix, came: {error or type(error).__name__}. It is damaged, "
+            f"expected a bus trace in the format of its suffix, got: {error or type(error).__name__}. It is damaged, "
             "cut off, or of another format.",
         ) from error
 
@@ -111,7 +111,7 @@ def _channel(message: can.Message, suffix: str) -> str:
 
 def _time_ns(path: Path, timestamp_s: float) -> int:
     if not abs(timestamp_s) < LATEST_S:
-        raise RecordingError(path, f"expected frames with the time of a clock, came {timestamp_s:g} s. It is damaged.")
+        raise RecordingError(path, f"expected frames with the time of a clock, got {timestamp_s:g} s. It is damaged.")
     return round(timestamp_s * NS_PER_S)
 
 

@@ -242,7 +242,7 @@ class CanBridge:
     def __enter__(self) -> Self:
         try:
             keep_token(self.port, self._server.token)
-        except OSError as error:  # whoever is told the whole URL needs no file
+        except OSError as error:  # whoever has the whole URL needs no file
             LOGGER.warning("the token of port %d can't be kept: %s", self.port, error)
         self._thread.start()
         return self

@@ -85,7 +85,7 @@ def _sensed(rig: Rig, plant: Plant) -> SensedPlant:
     if not isinstance(plant, SensedPlant):
         listed = ", ".join(rig.channel_units)
         raise UsageError(
-            f"rig {rig.name!r}, channels: expected a driveline that can be measured there, came one with a motor speed "
+            f"rig {rig.name!r}, channels: expected a driveline that can be measured there, got one with a motor speed "
             f"alone ({listed}). Take [[channels]] out of this rig file."
         )
     return plant

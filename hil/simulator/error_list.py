@@ -9,7 +9,7 @@ from drivers.canopen.emcy import Emergency
 
 GENERIC: Final = 0x01
 _CLASSES: Final = {0x2000: 0x02, 0x3000: 0x04, 0x4000: 0x08, 0x8100: 0x10, 0x8200: 0x10, 0x5000: 0x20, 0x6000: 0x20}
-"""Bits of the error register beside the generic one, by class of error code (CiA 301, 7.5.2.2): current, voltage,
+"""Bits of the error register besides the generic one, by class of error code (CiA 301, 7.5.2.2): current, voltage,
 temperature, communication, device profile."""
 
 _HISTORY: Final = 4
@@ -37,14 +37,14 @@ class ErrorList:
         return bits
 
     def set(self, code: int) -> None:
-        """Take an error; one that is there already is not told again."""
+        """Take an error; one that is there already is not reported again."""
         if code not in self._active:
             self._active.add(code)
             self._history.appendleft(code)
             self._due.append(Emergency(code, self.register, _NO_DATA))
 
     def clear(self, *codes: int) -> None:
-        """Take errors for gone, all of them if none is named; the last one's end is told."""
+        """Take errors for gone, all of them if none is named; the last one's end is reported."""
         before = bool(self._active)
         self._active = self._active.difference(codes) if codes else set()
         if before and not self._active:

@@ -57,7 +57,7 @@ def rig_faults(texts: Iterable[str], period_s: float) -> RigFaults:
         moment = asked.moment(period_s)
         once = (asked.device, asked.name, moment.size if asked.kind.adds_up else None)
         if once in known:
-            raise UsageError(f"fault {text!r}: expected {asked.device}.{asked.name} once, came twice. Leave one out.")
+            raise UsageError(f"fault {text!r}: expected {asked.device}.{asked.name} once, got twice. Leave one out.")
         known.add(once)
         faults = replace(faults, **{asked.device: asked.kind.put_into(getattr(faults, asked.device), moment)})
     return faults
@@ -90,35 +90,33 @@ class _Asked:
         if self.at_s is None:
             if self.kind.timed and not self.kind.since_start:
                 raise UsageError(
-                    f"fault {self.text!r}: expected a moment in seconds, came none. Write {self.device}.{self.name}@5.0"
+                    f"fault {self.text!r}: expected a moment in seconds, got none. Write {self.device}.{self.name}@5.0"
                 )
             return 0.0
         if not self.kind.timed:
-            raise UsageError(
-                f"fault {self.text!r}: expected no moment, came {self.at_s!r}: it is there from the start."
-            )
+            raise UsageError(f"fault {self.text!r}: expected no moment, got {self.at_s!r}: it is there from the start.")
         try:
             at_s = float(self.at_s)
         except ValueError:
             at_s = math.nan
         if not 0.0 <= at_s < math.inf:
-            raise UsageError(f"fault {self.text!r}: expected seconds of simulated time, 0 or more, came {self.at_s!r}.")
+            raise UsageError(f"fault {self.text!r}: expected seconds of simulated time, 0 or more, got {self.at_s!r}.")
         return at_s
 
     def _size(self) -> Any:
         size = self.kind.size
         if size is None:
             if self.size is not None:
-                raise UsageError(f"fault {self.text!r}: expected nothing after its name, came '={self.size}'.")
+                raise UsageError(f"fault {self.text!r}: expected nothing after its name, got '={self.size}'.")
             return None
         if self.size is None:
             if size.default is None:
                 raise UsageError(
-                    f"fault {self.text!r}: expected {size.expected}, came none. "
+                    f"fault {self.text!r}: expected {size.expected}, got none. "
                     f"Write {self.device}.{self.kind.written(self.name)}"
                 )
             return size.default
         try:
             return size.read(self.size)
         except ValueError as error:
-            raise UsageError(f"fault {self.text!r}: expected {size.expected}, came {self.size!r}.") from error
+            raise UsageError(f"fault {self.text!r}: expected {size.expected}, got {self.size!r}.") from error

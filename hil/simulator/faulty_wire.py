@@ -166,7 +166,7 @@ class FaultyWire:
     def __init__(self, host_channel: str, device_channel: str, faults: BusFaults, seed: int) -> None:
         self._faults = faults
         self._syncs = 0
-        self._off_told = False
+        self._off_reported = False
         self._postman = Postman() if faults.delay is not None or faults.jitter is not None else None
         self._host, self._device = InlineBus(host_channel), InlineBus(device_channel)
         self._to_devices = Lane(faults, seed, self._step, self._device.send, self._postman)
@@ -199,12 +199,12 @@ class FaultyWire:
             self._to_host.carry(message)
 
     def _off(self) -> bool:
-        """Whether the host's controller has left the bus; the first time the host is told, as an adapter does."""
+        """Whether the host's controller has left the bus; the first time the host is informed, as an adapter does."""
         off_at = self._faults.off_at_step
         if off_at is None or self._syncs < off_at:
             return False
-        if not self._off_told:
-            self._off_told = True
+        if not self._off_reported:
+            self._off_reported = True
             self._host.send(can.Message(arbitration_id=BUS_OFF_ERROR, is_error_frame=True, data=bytes(8)))
         return True
 

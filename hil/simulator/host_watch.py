@@ -45,7 +45,7 @@ class HostWatch:
         self._deadlines = {cob_id: RpdoDeadline(deadline_ms) for cob_id, deadline_ms in deadlines_ms.items()}
 
     def take_sync(self, period_s: float) -> None:
-        """Let simulated time go on to this SYNC; the next one comes after ``period_s`` [s]."""
+        """Let simulated time advance to this SYNC; the next one comes after ``period_s`` [s]."""
         self._sync_ns = self._next_sync_ns
         self._next_sync_ns += round(period_s * 1e9)
 
@@ -54,11 +54,11 @@ class HostWatch:
         self._deadlines[cob_id].received(wall_ns if self._real_time else self._next_sync_ns)
 
     def heartbeat_lost(self, wall_ns: int) -> bool:
-        """Whether the host's heartbeat has ended; told once."""
+        """Whether the host's heartbeat has ended; reported once."""
         return self.heartbeat.lost(wall_ns)
 
     def rpdo_missed(self, wall_ns: int) -> bool:
-        """Whether an RPDO is overdue; told once for each."""
+        """Whether an RPDO is overdue; reported once for each."""
         now_ns = wall_ns if self._real_time else self._sync_ns
         missed = [deadline.missed(now_ns) for deadline in self._deadlines.values()]  # every one is asked
         return any(missed)

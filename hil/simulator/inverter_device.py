@@ -245,7 +245,7 @@ class InverterDevice:
             self.fail(faults.fault.emcy_code)
 
     def _begin(self, stop: Stop) -> None:
-        """Stop as told; without torque or without a ramp that is over at once."""
+        """Stop as ordered; without torque or without a ramp that is over at once."""
         if stop.ramp is Ramp.AT_ONCE or self._torque == 0.0:
             self._enter(stop.final)
         else:

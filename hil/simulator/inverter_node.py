@@ -2,9 +2,9 @@
 
 NMT is done here, for the library's slave sends no boot-up message after a reset and its heartbeat timer outlives
 the bus. PDOs follow the configured mapping, identifiers and transmission types, from those of the EDS on. An event is a
-changed value; values change at SYNC, for that is when simulated time goes on.
+changed value; values change at SYNC, for that is when simulated time advances.
 
-It looks for its host (`hil.simulator.host_watch`) at every frame it takes and, once it is told to watch the host's
+It looks for its host (`hil.simulator.host_watch`) at every frame it takes and, once it is ordered to watch the host's
 heartbeat, by a clock of its own, so that it also notices when nothing comes any more.
 """
 
@@ -93,7 +93,7 @@ class InverterNode:
         self._pending: dict[int, bytes] = {}
         self._sources: dict[int, tuple[Callable[[], int], ...]] = {}
         self._last_sent: dict[int, bytes] = {}
-        self._told: set[int] = set()
+        self._reported: set[int] = set()
         self._heard: set[int] = set()
         self._syncs = 0
         self._off_bus = False
@@ -282,15 +282,15 @@ class InverterNode:
             self._recover(RPDO_TIMEOUT)
 
     def _lose_host(self, error_code: int) -> None:
-        self._told.add(error_code)
+        self._reported.add(error_code)
         self._device.tell(error_code)
         self._device.lose_connection(error_code)
         self._pending.clear()
         self._send_emergencies()
 
     def _recover(self, error_code: int) -> None:
-        if error_code in self._told:
-            self._told.remove(error_code)
+        if error_code in self._reported:
+            self._reported.remove(error_code)
             self._device.recover(error_code)
             self._send_emergencies()
 

@@ -41,12 +41,12 @@ def plant_for(rig: Rig, effects: Sequence[EffectSpec] = (), trust_laws: bool = F
     model = simulation_model(required_simulation(rig), trust_laws)
     if model.motion is not Motion.ROTATION:
         raise UsageError(
-            f"rig {rig.name!r}, simulation.model: expected motion = 'rotation', came {model.motion.value!r}: "
+            f"rig {rig.name!r}, simulation.model: expected motion = 'rotation', got {model.motion.value!r}: "
             "its inverters turn a shaft. Name another model."
         )
     names = [effect.name for effect in effects]
     if twice := sorted({name for name in names if names.count(name) > 1}):
-        raise UsageError(f"effect {twice[0]!r}: expected once, came twice. Give all its parameters in one --effect.")
+        raise UsageError(f"effect {twice[0]!r}: expected once, got twice. Give all its parameters in one --effect.")
     for effect in effects:
         _require_parameters(effect)
     changed = replace(model, effects={**model.effects, **{effect.name: _values(effect) for effect in effects}})
@@ -69,7 +69,7 @@ def _require_parameters(effect: EffectSpec) -> None:
         return
     known = ", ".join(parameter.name for parameter in entry.parameters)
     raise UsageError(
-        f"effect {effect.name!r}: expected at least one of its parameters ({known}), came none, which does "
+        f"effect {effect.name!r}: expected at least one of its parameters ({known}), got none, which does "
         f"nothing. Write {effect.name}:{entry.parameters[0].name}=..."
     )
 
@@ -87,11 +87,11 @@ def _refuse_absent(model: DrivelineModel) -> None:
 def _reason_absent(entry: Effect, values: Mapping[str, EffectValue]) -> str:
     if entry.profile:
         return (
-            "expected an effect with a constant law, came one that is a profile over each recording's own time "
+            "expected an effect with a constant law, got one that is a profile over each recording's own time "
             f"({entry.law}): the simulated rig would drive without it"
         )
     if entry.element is Element.ACQUISITION:
-        return "expected an effect of the driveline or its sensor, came one of the acquisition (see --fault)"
+        return "expected an effect of the driveline or its sensor, got one of the acquisition (see --fault)"
     if entry.event and not {"from_s", "to_s"} <= set(values):
-        return "expected from_s and to_s too, the moments between which it acts, came none"
+        return "expected from_s and to_s too, the moments between which it acts, got none"
     return ""

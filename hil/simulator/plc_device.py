@@ -256,7 +256,7 @@ class PlcDevice:
         for name, value in values.items():
             expected, accepts = _ACCEPTED.get(name, ("no write: this register is read only", _nothing))
             if not accepts(value):
-                raise ValueRefusedError(f"PLC register {name}: expected {expected}, came {value!r}.")
+                raise ValueRefusedError(f"PLC register {name}: expected {expected}, got {value!r}.")
         with self._lock:
             self._held.update(values)
             self._react(values)

@@ -48,7 +48,7 @@ class PlcRegisters(SimCore):
         super().__init__(SimDevice(0, SimData(0, values=0, datatype=DataType.REGISTERS)))
         if unknown := sorted(set(register_map.registers) - set(device.values())):
             raise ConfigMismatch(
-                f"register map {register_map.name!r}: expected registers the simulated PLC knows, came "
+                f"register map {register_map.name!r}: expected registers the simulated PLC knows, got "
                 f"{', '.join(unknown)}. Use the shipped plc.toml with the simulated PLC."
             )
         self._device = device
@@ -87,7 +87,7 @@ class PlcRegisters(SimCore):
 
     def _require_device(self, device_id: int) -> None:
         if device_id != self._map.device_id:
-            raise NoSuchIdException(f"expected device id {self._map.device_id}, came {device_id}")
+            raise NoSuchIdException(f"expected device id {self._map.device_id}, got {device_id}")
 
     def _image(self, kind: RegisterKind) -> dict[int, int]:
         """Put every register of a kind into words, by address."""

@@ -1,4 +1,4 @@
-"""The simulated PLC on Modbus TCP: pymodbus's asyncio server, told by the register map where each value is.
+"""The simulated PLC on Modbus TCP: pymodbus's asyncio server; the register map says where each value is.
 
 Every request is answered from the device as it is at that moment; the server holds no values of its own. A
 write is decoded and put to the device, and refused with an exception code where the device refuses it.
@@ -111,7 +111,7 @@ async def serve_plc(
 async def _close(server: PlcTcpServer, sockets: Sequence[TransportSocket]) -> None:
     """Stop listening and drop every connection, also one that is being accepted just now.
 
-    Such a connection would stay open for ever: until asyncio has told pymodbus of it, closing the server does
+    Such a connection would stay open for ever: until asyncio has informed pymodbus of it, closing the server does
     not reach it. So accepting ends first, and what is under way comes to its end before the server closes.
     """
     for listening in sockets:

@@ -95,7 +95,7 @@ class RigServer:
         self._bridged = None if bus_url.startswith((IN_PROCESS, SOCKETCAN)) else bus_address(bus_url)
         if bus_url.startswith(SOCKETCAN) and self._faults.bus != BusFaults():
             raise UsageError(
-                f"bus {bus_url!r}: expected faults of the devices alone, came faults of the bus: frames of the "
+                f"bus {bus_url!r}: expected faults of the devices alone, got faults of the bus: frames of the "
                 "kernel's own bus are out of reach. Serve it at ws://127.0.0.1:0/ for them."
             )
         self._bus_url = bus_url

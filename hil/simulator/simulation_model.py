@@ -46,12 +46,12 @@ class EffectSpec:
         """
         name, _, rest = text.partition(":")
         if not name.strip():
-            raise UsageError(f"effect {text!r}: expected NAME:key=number, came no name. List them by: hil effects")
+            raise UsageError(f"effect {text!r}: expected NAME:key=number, got no name. List them by: hil effects")
         parameters: dict[str, float] = {}
         for part in rest.split(",") if rest else ():
             key, value = _parameter(text, part)
             if key in parameters:
-                raise UsageError(f"effect {text!r}: expected {key!r} once, came twice. Leave one out.")
+                raise UsageError(f"effect {text!r}: expected {key!r} once, got twice. Leave one out.")
             parameters[key] = value
         return cls(name.strip(), parameters)
 
@@ -62,7 +62,7 @@ def simulation_model(table: SimulationTable, trust_laws: bool = False) -> Drivel
         return DEFAULT_BUS
     file = read_model(table.model, trust_laws)
     if file.on_bench:
-        raise ModelFileError(table.model, "structure | expected a driveline for a rig to drive | came 'joint'")
+        raise ModelFileError(table.model, "structure | expected a driveline for a rig to drive | got 'joint'")
     return file.model
 
 
@@ -72,5 +72,5 @@ def _parameter(text: str, part: str) -> tuple[str, float]:
         return key.strip(), float(value)
     except ValueError as error:
         raise UsageError(
-            f"effect {text!r}: expected key=number, came {part!r}. Write NAME:key=number,key=number."
+            f"effect {text!r}: expected key=number, got {part!r}. Write NAME:key=number,key=number."
         ) from error

@@ -21,7 +21,7 @@ _WARM = 0.9
 
 @dataclass(frozen=True, slots=True)
 class DriveLimits:
-    """Limits a drive sets itself, beside max torque 0x6072; by default none that acts.
+    """Limits a drive sets itself, besides max torque 0x6072; by default none that acts.
 
     Attributes
     ----------

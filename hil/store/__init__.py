@@ -1,6 +1,7 @@
-"""The store of runs: what was run with what and what came of it, in ``runs.sqlite`` beside the recordings.
+"""The store of runs: what was run with what and what came of it, in ``runs.sqlite`` next to the recordings.
 
-The recordings stay the source: each explains itself, and the store can be made again from them.
+The recordings stay the source: each explains itself, and the store can be made again from them. What may come in:
+recordings' metadata (`hil.recording`), results as JSON.
 """
 
 from hil.store.entry import Attachment, Note, Run, RunEntry

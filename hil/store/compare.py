@@ -28,14 +28,14 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """Two runs beside each other; `rig_changes` are the lines of a unified diff of the rig files."""
+    """Two runs alongside each other; `rig_changes` are the lines of a unified diff of the rig files."""
 
     rows: tuple[Row, ...]
     rig_changes: tuple[str, ...]
 
 
 def compare_runs(a: Run, b: Run) -> Comparison:
-    """Set two runs beside each other."""
+    """Set two runs alongside each other."""
     left, right = _flat(a), _flat(b)
     rows = tuple(Row(what, left.get(what), right.get(what)) for what in dict.fromkeys([*left, *right]))
     names = (f"run {a.run_id}", f"run {b.run_id}")

@@ -48,7 +48,7 @@ def open_database(path: Path) -> sqlite3.Connection:
     StoreError
         If it can't be opened, is another program's, or was made by a newer version of this one.
     """
-    with told(path):
+    with in_words(path):
         connection = sqlite3.connect(path, timeout=BUSY_S, isolation_level=None)
         try:
             connection.row_factory = sqlite3.Row
@@ -83,7 +83,7 @@ def transaction(path: Path, connection: sqlite3.Connection) -> Iterator[None]:
     StoreError
         If the database does not take it; then nothing of it is there.
     """
-    with told(path):
+    with in_words(path):
         connection.execute("BEGIN IMMEDIATE")
         try:
             yield
@@ -94,7 +94,7 @@ def transaction(path: Path, connection: sqlite3.Connection) -> Iterator[None]:
 
 
 @contextmanager
-def told(path: Path) -> Iterator[None]:
+def in_words(path: Path) -> Iterator[None]:
     """Say what SQLite's errors in the block mean, and what to do.
 
     Raises
@@ -107,12 +107,12 @@ def told(path: Path) -> Iterator[None]:
     except UnknownVersion as error:
         raise StoreError(
             path,
-            f"expected a store of version {len(MIGRATIONS)} or older, came version {error}: a newer program made it, "
+            f"expected a store of version {len(MIGRATIONS)} or older, got version {error}: a newer program made it, "
             "or it is damaged. Use that program, or a copy that is whole.",
         ) from error
     except ForeignDatabase as error:
         raise StoreError(
-            path, "expected a store of runs, came another program's database. Move it away, or choose another folder."
+            path, "expected a store of runs, got another program's database. Move it away, or choose another folder."
         ) from error
     except sqlite3.Error as error:
         raise _in_words(path, error) from error
@@ -125,24 +125,24 @@ def _in_words(path: Path, error: sqlite3.Error) -> StoreError:
     code = sqlite3.SQLITE_CORRUPT if extended == sqlite3.SQLITE_IOERR_SHORT_READ else extended & _PRIMARY
     if code in _FULL:
         return StoreError(
-            path, f"expected room for the entry, came: {error}. Nothing of it was entered; make room and try again."
+            path, f"expected room for the entry, got: {error}. Nothing of it was entered; make room and try again."
         )
     if code in _UNWRITABLE:
         return StoreError(
             path,
-            f"expected a folder and a file that can be written, came: {error}. Mend their permissions, or copy the "
+            f"expected a folder and a file that can be written, got: {error}. Fix their permissions, or copy the "
             "folder to where they can.",
         )
     if code in _BUSY:
-        return StoreError(path, f"expected the store within {BUSY_S:g} s, came: {error}. Another program holds it.")
+        return StoreError(path, f"expected the store within {BUSY_S:g} s, got: {error}. Another program holds it.")
     if code in _DAMAGED:
         return _damaged(path, error)
     raise error  # a constraint or a wrong call: a defect of this program
 
 
-def _damaged(path: Path, came: object) -> DamagedStore:
+def _damaged(path: Path, got: object) -> DamagedStore:
     return DamagedStore(
         path,
-        f"expected a whole store of runs, came a damaged one ({came}). The recordings are not touched: "
+        f"expected a whole store of runs, got a damaged one ({got}). The recordings are not touched: "
         f"'hil runs rebuild --store {path.parent}' makes it again from them and keeps what can still be read.",
     )

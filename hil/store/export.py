@@ -44,17 +44,16 @@ def export_runs(runs: Sequence[Run], path: Path) -> None:
     """
     write = _WRITERS.get(path.suffix.lower())
     if write is None:
-        raise UsageError(f"{path}: expected a name that ends in one of {', '.join(_WRITERS)}, came {path.suffix!r}")
+        raise UsageError(f"{path}: expected a name that ends in one of {', '.join(_WRITERS)}, got {path.suffix!r}")
     if path.exists():
-        raise UsageError(f"{path}: expected a new name, came one that exists. Move it away.")
+        raise UsageError(f"{path}: expected a new name, got one that exists. Move it away.")
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         write(runs, part)
         part.rename(path)
     except OSError as error:
         raise UsageError(
-            f"{path}: expected room for the export, came: {error.strerror or error}. Make room, or choose another "
-            "place."
+            f"{path}: expected room for the export, got: {error.strerror or error}. Make room, or choose another place."
         ) from error
     finally:
         part.unlink(missing_ok=True)
@@ -95,8 +94,8 @@ def _plain(name: str) -> str:
 def _recording_files(run: Run) -> list[Path]:
     recording = run.entry.recording
     known = FORMATS.get(recording.suffix.lower())
-    beside = [] if known is None or known.beside is None else [known.beside(recording)]
-    return [file for file in (recording, *beside) if file.is_file()]
+    companion = [] if known is None or known.companion is None else [known.companion(recording)]
+    return [file for file in (recording, *companion) if file.is_file()]
 
 
 _WRITERS: Mapping[str, Callable[[Sequence[Run], Path], None]] = MappingProxyType(

@@ -57,7 +57,7 @@ def rebuild(folder: Path, show: Callable[[Path], None] = lambda _: None) -> Rebu
     folder : Path
         It and the folders in it are looked through.
     show : callable
-        Told every recording before it is read.
+        Called with every recording before it is read.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Take a recording away, with what stands beside it."""
+"""Take a recording away, with what stands next to it."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def require_own(entry: RunEntry) -> None:
         raise UsageError(f"{error}\nNothing was deleted; delete the file yourself.") from error
     if not is_run(said) or said.get(CHECKSUM, "") != entry.data_sha256:
         raise UsageError(
-            f"{path}: expected the recording of this run, came another file. Nothing was deleted; delete it yourself, "
+            f"{path}: expected the recording of this run, got another file. Nothing was deleted; delete it yourself, "
             "or leave --with-recording out."
         )
 
@@ -52,17 +52,17 @@ def remove_files(entry: RunEntry) -> list[Path]:
     require_own(entry)
     recording = entry.recording
     known = FORMATS.get(recording.suffix.lower())
-    beside = [] if known is None or known.beside is None else [known.beside(recording)]
+    companion = [] if known is None or known.companion is None else [known.companion(recording)]
     course = recording.with_name(f"{recording.stem}{ONLINE_SUFFIX}")
     removed = []
-    for path in (*filter(is_sidecar, beside), *([course] if _is_course(course) else []), recording):
+    for path in (*filter(is_sidecar, companion), *([course] if _is_course(course) else []), recording):
         try:
             path.unlink()
         except FileNotFoundError:
             continue
         except OSError as error:
             raise UsageError(
-                f"{path}: expected a file that can be deleted, came: {error.strerror or error}. The run is out of the "
+                f"{path}: expected a file that can be deleted, got: {error.strerror or error}. The run is out of the "
                 "store; delete the file yourself."
             ) from error
         removed.append(path)

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from hil.errors import RecordingError
 from hil.inside import is_inside
-from hil.store.connection import DamagedStore, open_database, told, transaction
+from hil.store.connection import DamagedStore, in_words, open_database, transaction
 from hil.store.entry import RunEntry
 from hil.store.register import entry_at
 from hil.store.row_faults import faults_of, mended
@@ -22,7 +22,7 @@ from hil.store.salvage import TABLES, Row, Salvaged, salvage
 from hil.store.schema import columns_of
 
 PARTS = ("", "-wal", "-shm")
-"""What SQLite keeps beside a database in WAL mode."""
+"""What SQLite keeps next to a database in WAL mode."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +47,7 @@ def replace_if_damaged(folder: Path) -> Replaced | None:
     try:
         database = open_database(path)
         try:
-            with told(path):
+            with in_words(path):
                 rows = [dict(row) for row in database.execute("SELECT * FROM runs")]
         finally:
             database.close()

@@ -11,7 +11,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from hil.errors import StoreError, UsageError
-from hil.store.connection import open_database, told, transaction
+from hil.store.connection import in_words, open_database, transaction
 from hil.store.entry import Run, RunEntry
 from hil.store.filters import RunFilter
 from hil.store.rows import insert_run, read_runs
@@ -48,7 +48,7 @@ class RunStore:
 
     def __enter__(self) -> Self:
         if not self.folder.is_dir():
-            raise StoreError(self.path, f"expected an existing folder, came {self.folder}. Make it first.")
+            raise StoreError(self.path, f"expected an existing folder, got {self.folder}. Make it first.")
         self._open = open_database(self.path)
         return self
 
@@ -62,7 +62,7 @@ class RunStore:
     @property
     def _database(self) -> sqlite3.Connection:
         if self._open is None:
-            raise StoreError(self.path, "expected an open store, came one that is closed. Use it by 'with'.")
+            raise StoreError(self.path, "expected an open store, got one that is closed. Use it by 'with'.")
         return self._open
 
     def add_run(self, entry: RunEntry) -> int:
@@ -115,7 +115,7 @@ class RunStore:
             If there is no such run, or the note is empty.
         """
         if not text.strip():
-            raise UsageError("expected a note, came an empty one")
+            raise UsageError("expected a note, got an empty one")
         with transaction(self.path, self._database):
             self._require(run_id)
             self._database.execute(
@@ -137,7 +137,7 @@ class RunStore:
     def find(self, wanted: RunFilter | None = None) -> list[Run]:
         """Return the runs that are asked for, all without a filter, oldest first; attachments without documents."""
         condition, values = (wanted or RunFilter()).where()
-        with told(self.path):
+        with in_words(self.path):
             return read_runs(self._database, self.folder, condition, values, with_documents=False)
 
     def get(self, run_id: int) -> Run:
@@ -148,7 +148,7 @@ class RunStore:
         UsageError
             If there is no such run.
         """
-        with told(self.path):
+        with in_words(self.path):
             found = read_runs(self._database, self.folder, "runs.id = ?", [run_id])
         if not found:
             raise self._no_such(run_id)
@@ -180,14 +180,14 @@ class RunStore:
             raise self._no_such(run_id)
 
     def _no_such(self, run_id: int) -> UsageError:
-        return UsageError(f"{self.path}: expected the number of a run, came {run_id}, which is none. See: hil runs")
+        return UsageError(f"{self.path}: expected the number of a run, got {run_id}, which is none. See: hil runs")
 
     def _inside(self, recording: Path) -> str:
         """Name a recording relative to the folder, so that both can be moved together."""
         resolved = recording.resolve()
         if not resolved.is_relative_to(self.folder.resolve()):
             raise StoreError(
-                self.path, f"expected a recording inside {self.folder}, came {recording}. Use the store of its folder."
+                self.path, f"expected a recording inside {self.folder}, got {recording}. Use the store of its folder."
             )
         return resolved.relative_to(self.folder.resolve()).as_posix()
 
@@ -204,7 +204,7 @@ def _document(content: Path | str | Mapping[str, Any]) -> str:
     try:
         raw = content.read_bytes()
     except OSError as error:
-        raise UsageError(f"{content}: expected a file to attach, came: {error.strerror or error}") from error
+        raise UsageError(f"{content}: expected a file to attach, got: {error.strerror or error}") from error
     try:
         return raw.decode("utf-8") if len(raw) <= LONGEST_DOCUMENT_BYTES else ""
     except UnicodeDecodeError:

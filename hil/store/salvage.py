@@ -21,7 +21,7 @@ TABLES = {
     "notes": "id",
     "attachments": "id",
 }
-"""In the order in which they refer to each other, each with what its rows are told by."""
+"""In the order in which they refer to each other, each with what identifies its rows."""
 
 _NAMES = "sqlite_autoindex_runs_1"
 """The index of UNIQUE (recording, data_sha256), as SQLite names it."""

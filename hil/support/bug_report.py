@@ -100,7 +100,7 @@ def _rig(path: Path, redaction: Redaction) -> Part:
         text = path.read_text(encoding="utf-8", errors="replace")
         return Part(f"rig/{path.name}", redaction.toml(text).encode())
     except OSError as error:
-        raise UsageError(f"--rig {path}: expected a readable file, came: {error.strerror}") from error
+        raise UsageError(f"--rig {path}: expected a readable file, got: {error.strerror}") from error
 
 
 def _redacted(path: Path, redaction: Redaction) -> bytes:
@@ -118,11 +118,11 @@ def _last_run(folder: Path) -> dict[str, Any]:
     from hil.store import STORE_NAME, RunStore
 
     if not (folder / STORE_NAME).is_file():
-        raise UsageError(f"{folder}: expected a run store ({STORE_NAME}), came none; name its folder by --runs")
+        raise UsageError(f"{folder}: expected a run store ({STORE_NAME}), got none; name its folder by --runs")
     with RunStore(folder) as store:
         found = store.find()
     if not found:
-        raise UsageError(f"{folder / STORE_NAME}: expected a run, came none")
+        raise UsageError(f"{folder / STORE_NAME}: expected a run, got none")
     last = found[-1]
     entry = {key: str(value) if isinstance(value, Path) else value for key, value in asdict(last.entry).items()}
     return {"run": last.run_id, "verdict": last.verdict, **entry}

@@ -14,6 +14,7 @@ import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from enum import StrEnum
 from io import TextIOWrapper
 from logging.handlers import RotatingFileHandler
 from pathlib import Path
@@ -24,8 +25,16 @@ from hil.errors import UsageError
 from hil.support.folders import log_file
 from hil.support.redact import Redaction
 
-LEVELS: Final = ("debug", "info", "warning", "error", "off")
-"""From everything, each frame on the bus included, to nothing."""
+
+class Level(StrEnum):
+    """What the log keeps: from everything, each frame on the bus included, to nothing."""
+
+    DEBUG = "debug"
+    INFO = "info"
+    WARNING = "warning"
+    ERROR = "error"
+    OFF = "off"
+
 
 DEFAULT: Final = "info"
 VARIABLE: Final = "HIL_LOG"
@@ -34,7 +43,7 @@ BYTES: Final = 1_000_000
 """A log is rotated here; an ordinary command writes about 300 bytes."""
 
 KEPT: Final = 4
-"""Older logs beside the newest."""
+"""Older logs next to the newest."""
 
 LOGGER: Final = logging.getLogger("hil")
 
@@ -53,14 +62,14 @@ def level_of(given: str | None) -> str:
         If it is none of the levels.
     """
     source, level = ("--log-level", given) if given is not None else (VARIABLE, os.environ.get(VARIABLE) or DEFAULT)
-    if level.lower() not in LEVELS:
-        raise UsageError(f"{source}: expected one of {', '.join(LEVELS)}, came {level!r}")
+    if level.lower() not in tuple(Level):
+        raise UsageError(f"{source}: expected one of {', '.join(Level)}, got {level!r}")
     return level.lower()
 
 
 @contextmanager
 def logged(command: str, arguments: Sequence[str], level: str) -> Iterator[None]:
-    """Keep the log while a command runs; whatever it raises is logged and goes on its way."""
+    """Keep the log while a command runs; whatever it raises is logged and continues its way."""
     handler = None if level == "off" else _opened(level)
     if handler is None:
         yield

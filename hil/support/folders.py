@@ -18,5 +18,5 @@ def state_folder() -> Path:
 
 
 def log_file() -> Path:
-    """Return the newest log; older ones stand beside it as ``hil.log.1`` and so on."""
+    """Return the newest log; older ones stand next to it as ``hil.log.1`` and so on."""
     return state_folder() / "hil.log"

@@ -16,7 +16,7 @@ def refuse_existing(path: Path) -> None:
         If it is.
     """
     if path.exists():
-        raise UsageError(f"{path}: expected a new file, came one that is there. Give another name, or move it away.")
+        raise UsageError(f"{path}: expected a new file, got one that is there. Give another name, or move it away.")
 
 
 def write_new(path: Path, content: str | bytes) -> None:
@@ -36,6 +36,6 @@ def write_new(path: Path, content: str | bytes) -> None:
                 path.unlink()
                 raise
     except FileExistsError as cause:
-        raise UsageError(f"{path}: expected a new file, came one that is there") from cause
+        raise UsageError(f"{path}: expected a new file, got one that is there") from cause
     except OSError as cause:
-        raise UsageError(f"{path}: expected a place to write to, came: {cause.strerror}. Give another.") from cause
+        raise UsageError(f"{path}: expected a place to write to, got: {cause.strerror}. Give another.") from cause

@@ -78,7 +78,7 @@ class Redaction:
         return self._sub("tokens in URLs", BUS_TOKEN, lambda match: f"{match['server']}{REMOVED}", text)
 
     def toml(self, text: str) -> str:
-        """Return a TOML file's text the same way as `text`, and without what people wrote beside its keys."""
+        """Return a TOML file's text the same way as `text`, and without what people wrote next to its keys."""
         return self.text(self._sub("comments", TOML_TEXT_OR_COMMENT, _without_comment, text))
 
     def document(self, value: Any, name: str = "") -> Any:

@@ -1,4 +1,5 @@
-"""Recordings that can be read but not believed: refused, or told and left out; never a crash, never a verdict on them.
+"""Recordings that can be read but not believed: refused, or reported and left out; never a crash, never a verdict on
+them.
 
 The drive is one mass of 2 kg m^2 whose speed is known in closed form (`tests.cli.bench`).
 """
@@ -94,8 +95,8 @@ def test_a_model_in_another_unit_is_refused_like_a_recording(refused: Refused, d
 
 NON_PHYSICAL = {
     "nan": ("parameters.J_M.value", "nan"),
-    "0.0": ("parameters.J_M.value: expected a finite number greater than 0, came 0.0", "0.0"),
-    "-2.0": ("parameters.J_M.value: expected a finite number greater than 0, came -2.0", "-2.0"),
+    "0.0": ("parameters.J_M.value: expected a finite number greater than 0, got 0.0", "0.0"),
+    "-2.0": ("parameters.J_M.value: expected a finite number greater than 0, got -2.0", "-2.0"),
     "inf": ("parameters.J_M.value", "inf"),
 }
 
@@ -121,7 +122,7 @@ def diagnosed(drive: Path) -> tuple[dict[str, Any], str]:
     return json.loads((out / "diagnosis.json").read_text()), (out / "report.html").read_text()
 
 
-def test_a_speed_that_is_cut_off_is_told_and_left_out(drive: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_speed_that_is_cut_off_is_reported_and_left_out(drive: Path, capsys: pytest.CaptureFixture[str]) -> None:
     def cut_off(signals: Signals) -> None:
         signals[SPEED] = np.minimum(signals[SPEED], np.quantile(signals[SPEED], 0.9))
 
@@ -136,7 +137,7 @@ def test_a_speed_that_is_cut_off_is_told_and_left_out(drive: Path, capsys: pytes
     assert found["parameters"]["J_M"]["value"] == pytest.approx(bench.J, rel=0.01)
 
 
-def test_a_long_gap_is_bridged_by_a_new_start_and_told(drive: Path) -> None:
+def test_a_long_gap_is_bridged_by_a_new_start_and_reported(drive: Path) -> None:
     """For 3 s nothing was read, and the drive was stopped and started again meanwhile."""
 
     def interrupted(signals: Signals) -> None:

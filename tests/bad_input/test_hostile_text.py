@@ -14,15 +14,15 @@ import numpy as np
 import pytest
 
 from drivers.canopen.pdo_map import MAX_MAPPED, read_layout
-from drivers.datasheet.check.check import check_eds
 from drivers.datasheet.number import octal_matters, read_formula, read_number
+from drivers.eds_check.check import check_eds
 from drivers.errors import ConfigMismatch
 from drivers.plc.register_map import RegisterMapError, load_register_map
 from drivers.resources import data_file
 from hil.cli.main import run
-from hil.config.problems import read_toml
 from hil.errors import InputError, RecordingError, RigFileError
 from hil.parse_json import LARGEST_BYTES, parse_json, read_json
+from hil.problems import read_toml
 from hil.recording import Table, read_table, write_table
 from hil.recording.sidecar import sidecar_of
 from hil.rig import replay as replaying
@@ -51,7 +51,7 @@ def test_toml_that_no_person_wrote_is_refused_by_every_reader(
 ) -> None:
     path = tmp_path / "file.toml"
     path.write_text(text)
-    with pytest.raises(RigFileError, match=r"file\.toml: .* \| expected .* \| came"):
+    with pytest.raises(RigFileError, match=r"file\.toml: .* \| expected .* \| got"):
         read_toml(path, RigFileError)
     for line in (
         f"check {path}",
@@ -138,7 +138,7 @@ def test_a_trace_with_a_time_of_no_clock_is_refused(tmp_path: Path, time: str) -
 
 def test_a_trace_with_a_gap_of_years_is_not_filled_with_rows(tmp_path: Path) -> None:
     path = log(tmp_path / "made.log", "1.0", "1.01", "1.02", "1e9", f"{1e9 + 0.01}")
-    with pytest.raises(RecordingError, match="expected one run, came one without SYNC for"):
+    with pytest.raises(RecordingError, match="expected one run, got one without SYNC for"):
         list(replay(path, small_rig(), whole=True))
     assert replaying.MOST_MISSED * 0.01 >= 600  # ten minutes of a sleeping host are
 

@@ -18,10 +18,10 @@ EFFECTS = "\n[effects.gremlins]\nx = { value = 1 }\n[effects.coulomb_friction_mo
     ("changes", "said"),
     [
         ([("[parameters]", "[parameters")], ["line 5, column 12 | expected TOML"]),
-        ([("hil.model/1", "hil.model/9")], ["schema | expected 'hil.model/1' | came 'hil.model/9'"]),
+        ([("hil.model/1", "hil.model/9")], ["schema | expected 'hil.model/1' | got 'hil.model/9'"]),
         (
             [("one_mass", "four_mass")],
-            ["structure | expected 'one_mass', 'two_mass', 'three_mass' or 'joint' | came 'four_mass'"],
+            ["structure | expected 'one_mass', 'two_mass', 'three_mass' or 'joint' | got 'four_mass'"],
         ),
         ([("b_M", "# b_M")], ["parameters.b_M: missing, one_mass needs J_M, b_M"]),
         ([("value = 2.0", "value = -2.0")], ["parameters.J_M.value: expected a finite number greater than 0"]),
@@ -39,7 +39,7 @@ EFFECTS = "\n[effects.gremlins]\nx = { value = 1 }\n[effects.coulomb_friction_mo
         ),
         (
             [("\n[parameters]", "\neffects.backlash = 3\n[parameters]")],
-            ["effects.backlash | expected a table | came 3"],
+            ["effects.backlash | expected a table | got 3"],
         ),
     ],
 )
@@ -88,4 +88,4 @@ def test_a_translation_turns_no_shaft_of_a_simulated_rig(refused: Refused, tmp_p
     (tmp_path / "slide.toml").write_text(bench.MODEL.replace("rotation", "translation"), encoding="utf-8")
     rig = tmp_path / "rig.toml"
     rig.write_text(with_changes(rig_text, [('# model = "model.toml"', 'model = "slide.toml"')]), encoding="utf-8")
-    assert "simulation.model: expected motion = 'rotation', came 'translation'" in refused("sim", rig)
+    assert "simulation.model: expected motion = 'rotation', got 'translation'" in refused("sim", rig)

@@ -44,13 +44,13 @@ def test_a_file_is_no_folder(refused: Refused, drive: Path, command: str, place:
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_place_where_nothing_can_be_made(refused: Refused, drive: Path, command: str) -> None:
-    assert "/proc/result: expected a folder to write into, came: " in refused(*words(command, drive), "/proc/result")
+    assert "/proc/result: expected a folder to write into, got: " in refused(*words(command, drive), "/proc/result")
 
 
 def test_a_simulation_has_no_place_either(refused: Refused, drive: Path) -> None:
     model, recording = drive / "drive.toml", drive / "run_1.csv"
     complaint = refused("simulate", "--model", model, "--input", recording, "--out", "/proc/simulated.csv")
-    assert "/proc: expected a folder to write into, came: " in complaint
+    assert "/proc: expected a folder to write into, got: " in complaint
 
 
 @pytest.mark.parametrize(

@@ -39,17 +39,17 @@ BROKEN: dict[str, tuple[Callable[[Lines], Lines], str]] = {
         lambda lines: [lines[0].replace("m2", "m1"), *lines[1:]],
         "line 1: column torque_m1_nm comes twice",
     ),
-    "text": (once(1, "abc"), "line 51, column torque_m1_nm: expected a finite number or nan, came 'abc'"),
+    "text": (once(1, "abc"), "line 51, column torque_m1_nm: expected a finite number or nan, got 'abc'"),
     "no time": (once(0, ""), "line 51, column time_s: expected a time greater than in the row before"),
-    "infinite": (once(3, "inf"), "line 51, column speed_rad_s: expected a finite number or nan, came 'inf'"),
-    "decimal comma": (once(3, '"1,5"'), "came '1,5'. Write decimals with a point"),
-    "no measurement": (once(3, "1e200"), "came '1e+200'. Beyond 1e+30 nothing is a measurement"),
-    "a cell too many": (once(3, "1.0,2.0"), "line 51: expected 4 cells as in the header, came 5"),
-    "truncated": (lambda lines: [*lines[:50], lines[50][:6]], "line 51: expected 4 cells as in the header, came 2"),
+    "infinite": (once(3, "inf"), "line 51, column speed_rad_s: expected a finite number or nan, got 'inf'"),
+    "decimal comma": (once(3, '"1,5"'), "got '1,5'. Write decimals with a point"),
+    "no measurement": (once(3, "1e200"), "got '1e+200'. Beyond 1e+30 nothing is a measurement"),
+    "a cell too many": (once(3, "1.0,2.0"), "line 51: expected 4 cells as in the header, got 5"),
+    "truncated": (lambda lines: [*lines[:50], lines[50][:6]], "line 51: expected 4 cells as in the header, got 2"),
     "time back": (once(0, "0.2"), "line 51, column time_s: expected a time greater than in the row before"),
     "rows left out": (lambda lines: lines[:50] + lines[60:], "line 51, column time_s: expected a uniform step"),
-    "all nan": (everywhere(3, "nan"), "expected 10 usable samples or more, came 0 of 1500"),
-    "too short": (lambda lines: lines[:6], "expected 10 usable samples or more, came 5 of 5"),
+    "all nan": (everywhere(3, "nan"), "expected 10 usable samples or more, got 0 of 1500"),
+    "too short": (lambda lines: lines[:6], "expected 10 usable samples or more, got 5 of 5"),
 }
 
 
@@ -68,7 +68,7 @@ def test_refused_by_line_and_nothing_is_written(refused: Refused, drive: Path, f
     ("name", "content", "said"),
     [
         ("run.csv", b"\xff\xfet\0i\0", "the file is empty or truncated"),
-        ("run.csv", "time_s,caf\u00e9\n".encode("latin-1"), "line 1: expected utf-8 text, came byte 0xe9"),
+        ("run.csv", "time_s,caf\u00e9\n".encode("latin-1"), "line 1: expected utf-8 text, got byte 0xe9"),
         ("run.csv", bytes(100), "the file is empty or truncated"),
         ("run.parquet", b"time_s,speed_rad_s\n", "a damaged or truncated one"),
         ("run.parquet", b"", "a damaged or truncated one"),
@@ -76,9 +76,9 @@ def test_refused_by_line_and_nothing_is_written(refused: Refused, drive: Path, f
         (
             "run.xlsx",
             b"PK",
-            "expected a recording (.csv, .txt, .tsv, .parquet, .mf4, .mdf, .dat, .h5, .hdf5, .mat), came '.xlsx'",
+            "expected a recording (.csv, .txt, .tsv, .parquet, .mf4, .mdf, .dat, .h5, .hdf5, .mat), got '.xlsx'",
         ),
-        ("run", b"", "expected a recording (.csv, .txt, .tsv, .parquet, .mf4, .mdf, .dat, .h5, .hdf5, .mat), came ''"),
+        ("run", b"", "expected a recording (.csv, .txt, .tsv, .parquet, .mf4, .mdf, .dat, .h5, .hdf5, .mat), got ''"),
     ],
 )
 def test_what_is_no_recording_is_refused(
@@ -125,8 +125,8 @@ def test_a_hold_out_that_was_used_is_refused(refused: Refused, drive: Path) -> N
     used, copy = drive / "run_1.csv", drive / "copy.csv"
     copy.write_bytes(used.read_bytes())
     rest = ("--model", drive / "drive.toml", "--out", drive / "out")
-    assert "came 'run_1' twice" in refused("diagnose", used, "--holdout", used, *rest)
-    assert f"{copy}: expected samples of its own, came those of {used}" in refused(
+    assert "got 'run_1' twice" in refused("diagnose", used, "--holdout", used, *rest)
+    assert f"{copy}: expected samples of its own, got those of {used}" in refused(
         "diagnose", used, "--holdout", copy, *rest
     )
     assert not (drive / "out").exists()

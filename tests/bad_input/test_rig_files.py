@@ -13,17 +13,17 @@ from tests.bad_input.conftest import Refused, with_changes
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ([("period_s = 0.01 ", 'period_s = "10ms" ')], ["period_s | expected a valid number | came '10ms'"]),
+        ([("period_s = 0.01 ", 'period_s = "10ms" ')], ["period_s | expected a valid number | got '10ms'"]),
         (
             [("node_id = 1 ", "node_id = 200 ")],
             ["inverters.m1.node_id | expected less than or equal to 127"],
         ),
-        ([("port = 5020", "")], ["plc.port | expected this key | came nothing: add it"]),
+        ([("port = 5020", "")], ["plc.port | expected this key | got nothing: add it"]),
         ([("cells = 10", "cellz = 10")], ["prbs.cellz | expected one of the known keys (amplitude_nm, cells"]),
         ([("[guard] ", "[guard ")], ["line {guard}, column", "expected TOML"]),
-        ([("hil.rig/1", "hil.rig/2")], ["schema | expected 'hil.rig/1' | came 'hil.rig/2'"]),
+        ([("hil.rig/1", "hil.rig/2")], ["schema | expected 'hil.rig/1' | got 'hil.rig/2'"]),
         ([('kind = "tip"', 'kind = "jump"')], ["experiments.tip.kind | expected one of 'cruise', 'reversal', 'tip'"]),
-        ([("ws://127.0.0.1:54701/", "")], ["can.url | expected a text that is not empty | came ''"]),
+        ([("ws://127.0.0.1:54701/", "")], ["can.url | expected a text that is not empty | got ''"]),
         ([("[vehicle]\ninertia_kg_m2 = 100.0", "[guard]")], ["line", "Cannot declare"]),
         (
             [("period_s = 0.01 ", 'period_s = "10ms" '), ("node_id = 1 ", "node_id = 200 "), ("cells", "cellz")],
@@ -45,10 +45,10 @@ def test_each_fault_is_named_and_several_at_once(
 @pytest.mark.parametrize(
     ("content", "said"),
     [
-        (b"", "schema | expected this key | came nothing"),
+        (b"", "schema | expected this key | got nothing"),
         (b"\0" * 64, "line 1, column 1 | expected TOML"),
-        ("name = 'simuliert, \u00e4lter'\n".encode("latin-1"), "line 1 | expected UTF-8 text | came byte 0xe4"),
-        ("name = 'x'\n".encode("utf-16"), "line 1 | expected UTF-8 text | came byte 0xff"),
+        ("name = 'simuliert, \u00e4lter'\n".encode("latin-1"), "line 1 | expected UTF-8 text | got byte 0xe4"),
+        ("name = 'x'\n".encode("utf-16"), "line 1 | expected UTF-8 text | got byte 0xff"),
     ],
 )
 def test_what_is_no_rig_file_is_refused(refused: Refused, tmp_path: Path, content: bytes, said: str) -> None:
@@ -80,7 +80,7 @@ def test_a_byte_order_mark_is_no_fault(tmp_path: Path, rig_text: str, capsys: py
 @pytest.mark.parametrize(
     ("key", "content", "said"),
     [
-        ("eds", "[DeviceInfo]\nfoo", ["rig.toml: inverters.m1.eds | expected an EDS | came: EDS", "lists no object"]),
+        ("eds", "[DeviceInfo]\nfoo", ["rig.toml: inverters.m1.eds | expected an EDS | got: EDS", "lists no object"]),
         ("eds", "", ["rig.toml: inverters.m1.eds | expected an EDS", "no section [DeviceInfo]"]),
         (
             "map",

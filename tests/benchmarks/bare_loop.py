@@ -17,7 +17,7 @@ def compiled() -> Iterator[Path]:
     """Compile the loop, for the time of the block; needs a C compiler."""
     compiler = shutil.which("gcc") or shutil.which("cc")
     if compiler is None:
-        raise FileNotFoundError("expected gcc or cc for the loop to compare with, came neither: install a C compiler")
+        raise FileNotFoundError("expected gcc or cc for the loop to compare with, got neither: install a C compiler")
     with TemporaryDirectory(prefix="hil-bare-loop-") as folder:
         program = Path(folder) / "bare_loop"
         subprocess.run([compiler, "-O2", "-Wall", "-Werror", "-o", str(program), str(SOURCE)], check=True)

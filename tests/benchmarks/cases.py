@@ -54,7 +54,7 @@ def make(effect: str, seed: int, duration_s: float = DURATION_S, reads_per_perio
 
 
 def nominal_model(specimen: Specimen) -> DrivelineModel:
-    """Return all that a tool is told of a bus."""
+    """Return all that a tool knows of a bus."""
     parameters = {name: Parameter(value, NOMINAL_TOLERANCE) for name, value in specimen.nominal.items()}
     return DrivelineModel(Structure.TWO_MASS, parameters, gear_ratio=specimen.bus.gear_ratio)
 

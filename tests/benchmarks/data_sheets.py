@@ -15,8 +15,8 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
-from drivers.datasheet.check import check_eds
 from drivers.datasheet.finding import Severity
+from drivers.eds_check import check_eds
 from tests.drivers.maker_rig import SAMPLES, drive
 from tests.drivers.mutants import mutants
 

@@ -1,8 +1,8 @@
-"""``python -m tests.benchmarks.diagnosis``: what a whole diagnosis takes: time beside scipy's fit, growth, memory.
+"""``python -m tests.benchmarks.diagnosis``: what a whole diagnosis takes: time next to scipy's fit, growth, memory.
 
-Time is told as a share of what scipy takes for the fit of the nominal parameters alone (``tests.benchmarks.fit``), in
-turn. Growth is that of processor time, both cores together, because it does not count what else the machine does: the
-exponent between two lengths, 1 for a time in proportion. Memory is the peak of a process of its own.
+Time is reported as a share of what scipy takes for the fit of the nominal parameters alone (``tests.benchmarks.fit``),
+in turn. Growth is that of processor time, both cores together, because it does not count what else the machine does:
+the exponent between two lengths, 1 for a time in proportion. Memory is the peak of a process of its own.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ HOUR_S, READS_PER_PERIOD = 3600.0, 10
 """Of all recordings together; readings in 10 ms: 1 kHz."""
 
 
-def told(diagnosis: Diagnosis) -> str:
+def verdict_of(diagnosis: Diagnosis) -> str:
     """Return a verdict in a few words."""
     return ", ".join(effect.name for effect in diagnosis.effects) or diagnosis.verdict.value
 
@@ -52,7 +52,7 @@ def times(pairs: int) -> str:
         problem = problem_of(case)
         diagnose(case.records, case.model)  # compiles, or reads what was compiled
         both = compare(lambda c=case: diagnose(c.records, c.model), lambda p=problem: fit_by_scipy(p), pairs)
-        rows.append((*both.row(f"diagnosis, {effect} hidden"), told(both.our_result)))
+        rows.append((*both.row(f"diagnosis, {effect} hidden"), verdict_of(both.our_result)))
     return table((*COLUMNS, "verdict"), rows)
 
 
@@ -72,7 +72,7 @@ def growth(lengths_s: Sequence[float]) -> str:
         steps = ["", *(f"{exponent:.2f}" for exponent in exponents)]
         for length_s, (each, result), step in zip(lengths_s, done, steps, strict=True):
             times = f"{each.processor_s:.3g} s", f"{each.clock_s:.3g} s"
-            rows.append((effect, f"3 × {length_s:g} s", *times, step, told(result)))
+            rows.append((effect, f"3 × {length_s:g} s", *times, step, verdict_of(result)))
         rows.append((effect, "all, fitted", "", "", f"{overall:.2f}", ""))
     return table(("hidden", "recordings", "processor time", "time", "exponent", "verdict"), rows)
 
@@ -115,7 +115,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     unknown = [name for name in options.parts if name not in parts]
     if unknown:
-        parser.error(f"expected {', '.join(parts)}, came {', '.join(unknown)}")
+        parser.error(f"expected {', '.join(parts)}, got {', '.join(unknown)}")
     sys.stdout.write(machine())
     for name in options.parts or parts:
         sys.stdout.write(f"\n### {name.capitalize()}\n\n{parts[name](options)}")

@@ -1,12 +1,12 @@
 """``python -m tests.benchmarks.fieldbus``: the cycle on the bus: lateness, processor share, throughput.
 
-``lateness``    how late cycles begin, beside a bare C loop of the same period and priority, in turn
+``lateness``    how late cycles begin, next to a bare C loop of the same period and priority, in turn
 ``share``       processor time of the host in a 10 ms cycle with two inverters and PLC, of one core; the simulated
                 devices run in another process
-``throughput``  exchanges through guard, drivers and simulated drives in one process, every frame on the bus, beside
+``throughput``  exchanges through guard, drivers and simulated drives in one process, every frame on the bus, next to
                 python-can sending and receiving the same frames, in turn
 
-What is compared is told as ratios of one run; a time depends on the machine and on what else runs on it.
+What is compared is reported as ratios of one run; a time depends on the machine and on what else runs on it.
 """
 
 from __future__ import annotations
@@ -146,7 +146,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     unknown = [name for name in options.parts if name not in parts]
     if unknown:
-        parser.error(f"expected {', '.join(parts)}, came {', '.join(unknown)}")
+        parser.error(f"expected {', '.join(parts)}, got {', '.join(unknown)}")
     sys.stdout.write(f"{time.strftime('%Y-%m-%d')}, {machine()}")
     for name in options.parts or parts:
         sys.stdout.write(f"\n### {name.capitalize()}\n\n{parts[name](options.pairs)}")

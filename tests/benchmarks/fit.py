@@ -1,4 +1,4 @@
-"""``python -m tests.benchmarks.fit``: the fit of three 30 s recordings, and its simulation, beside scipy's.
+"""``python -m tests.benchmarks.fit``: the fit of three 30 s recordings, and its simulation, next to scipy's.
 
 Both fits have the same unknowns (six parameters, load torque and initial state of each recording), the same bounds, the
 same start and the same end; they must reach the same minimum.

@@ -20,8 +20,8 @@ from hil.rig.excitation import NO_TORQUE
 from hil.rig.fitness import Needs
 from hil.rig.pacing import Pacer
 from hil.rig.plc_watch import PlcWatch
-from hil.rig.sample import SampleFlag
 from hil.rig.stop import StopRequest
+from hil.sample import SampleFlag
 from hil.simulator.loopback import Address
 from hil.simulator.plant import RigidPlant
 from hil.simulator.rig_server import RigServer
@@ -88,7 +88,7 @@ def served_here(rig: Rig) -> Iterator[Rig]:
 def served_elsewhere(rig: Rig) -> Iterator[Rig]:
     """Serve a rig from a process of its own (``hil sim``), over loopback; yields it at its addresses."""
     if rig.period_s != read_rig(EXAMPLE).period_s:
-        raise ValueError(f"expected the example's period, came {rig.period_s:g} s: hil sim reads the example's file")
+        raise ValueError(f"expected the example's period, got {rig.period_s:g} s: hil sim reads the example's file")
     command = [
         sys.executable,
         "-m",
@@ -110,5 +110,5 @@ def served_elsewhere(rig: Rig) -> Iterator[Rig]:
 def _addresses(line: Callable[[], str]) -> tuple[str, str]:
     word, bus, modbus = line().split()
     if word != "ready":
-        raise RuntimeError(f"hil sim: expected its line 'ready', came {word!r}")
+        raise RuntimeError(f"hil sim: expected its line 'ready', got {word!r}")
     return bus.removeprefix("bus="), modbus.removeprefix("modbus=")

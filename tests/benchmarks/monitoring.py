@@ -19,8 +19,8 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from estimator.identification.online.chain import OnlineChain
-from estimator.identification.online.online_estimate import OnlineTrajectory
+from estimator.identification.chain import OnlineChain
+from estimator.identification.online_estimate import OnlineTrajectory
 from estimator.identification.tracking.state import TrackingState
 from estimator.identification.tracking.watch_settings import WatchSettings
 from estimator.signals.record import Record

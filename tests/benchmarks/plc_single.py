@@ -48,7 +48,7 @@ def difference(seed: int, duration_s: float, adapted: bool, folder: Path) -> Dif
     ]
     modes = [resonance(model, BAND_HZ) for model in models]
     if modes[0] is None or modes[1] is None:
-        raise ValueError(f"seed {seed}: expected a resonance in {BAND_HZ} Hz, came none")
+        raise ValueError(f"seed {seed}: expected a resonance in {BAND_HZ} Hz, got none")
     gains = [np.abs(model.response(np.linspace(*BAND_HZ, 200))) for model in models]
     return Difference(
         theta=float(np.abs(single - double).max()),

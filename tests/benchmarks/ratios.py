@@ -1,8 +1,8 @@
-"""Times compared in one run, and the table they are told in.
+"""Times compared in one run, and the table they are reported in.
 
 A time depends on the machine and on what else runs on it; a ratio of two times taken in turn depends on much less. So
-every comparison alternates between its two sides, and what is told is the ratio of the two medians: of the time taken,
-and of processor time, which other programs do not stretch and in which two cores at work count twice.
+every comparison alternates between its two sides, and what is reported is the ratio of the two medians: of the time
+taken, and of processor time, which other programs do not stretch and in which two cores at work count twice.
 """
 
 from __future__ import annotations

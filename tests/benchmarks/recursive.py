@@ -1,4 +1,4 @@
-"""Speed of the recursive estimators: beside the same algorithm in C, beside padasip, sample by sample, in replay.
+"""Speed of the recursive estimators: next to the same algorithm in C, next to padasip, sample by sample, in replay.
 
 ``python -m tests.benchmarks.recursive [update] [padasip] [single] [replay] [memory] [--pairs N] [--padasip PYTHON]``
 
@@ -26,13 +26,13 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from estimator.identification.identify import Settings
 from estimator.identification.online.adaptation import DecreasingGain, DecreasingThenConstantTrace
 from estimator.identification.online.oefo import Oefo
 from estimator.identification.online.recursive import RecursiveEstimator, Trajectory
 from estimator.identification.online.registry import ESTIMATORS, Setup
 from estimator.identification.online.rls import Rls
 from estimator.identification.online.two_mass import TwoMass
+from estimator.identification.settings import Settings
 from estimator.signals.record import FloatArray, Record
 from hil.rig.live import tracking_settings
 from hil.rig.live_replay import Pace, play_record
@@ -48,7 +48,7 @@ BLOCKS = 100
 PEER_SAMPLES = 100_000
 
 HINT = "python -m venv /tmp/peers && /tmp/peers/bin/pip install padasip==1.2.2, then --padasip /tmp/peers/bin/python"
-COLUMNS = ("one update", "beside", "here", "there", "ratio", "pair by pair", "limit")
+COLUMNS = ("one update", "next to", "here", "there", "ratio", "pair by pair", "limit")
 C_FLAGS: tuple[tuple[str, ...], ...] = ((), ("-march=native",))
 
 
@@ -68,7 +68,7 @@ def again_and_again(estimator: RecursiveEstimator, samples: Data, times: int) ->
     return run
 
 
-def beside_c(pairs: int, samples: Data, times: int, flags: Sequence[str] = ()) -> Comparison:
+def against_c(pairs: int, samples: Data, times: int, flags: Sequence[str] = ()) -> Comparison:
     """Compare OEFO on a block with the same algorithm in C, in turn."""
     ours = again_and_again(oefo(), samples, times)
     law = DecreasingThenConstantTrace().law
@@ -100,7 +100,7 @@ def padasip_took(python: str, folder: Path, samples: Data) -> Taken:
     return Taken(*json.loads(done.stdout)["taken_s"])
 
 
-def beside_padasip(pairs: int, python: str, estimator: RecursiveEstimator) -> Comparison:
+def against_padasip(pairs: int, python: str, estimator: RecursiveEstimator) -> Comparison:
     """Compare an estimator on blocks with padasip's recursive least squares, in turn."""
     ours = again_and_again(estimator, data(BLOCK), PEER_SAMPLES // BLOCK)
     samples = data(PEER_SAMPLES)
@@ -110,34 +110,36 @@ def beside_padasip(pairs: int, python: str, estimator: RecursiveEstimator) -> Co
     return Comparison(tuple(mine for mine, _ in both), tuple(other for _, other in both), None, None)
 
 
-def per_sample(comparison: Comparison, n: int, what: str, beside: str, limit: str, *, inverse: bool) -> tuple[str, ...]:
+def per_sample(
+    comparison: Comparison, n: int, what: str, companion: str, limit: str, *, inverse: bool
+) -> tuple[str, ...]:
     """Return a line of the table: processor time per sample, and the ratio as the limit counts it."""
     here, there = (median(each.processor_s for each in side) / n * 1e6 for side in (comparison.ours, comparison.theirs))
     ratio, (low, high) = comparison.processor_ratio, comparison.spread
     if inverse:
         ratio, low, high = 1 / ratio, 1 / high, 1 / low
-    return (what, beside, f"{here:.3g} us", f"{there:.3g} us", f"{ratio:.3g}", f"{low:.3g} to {high:.3g}", limit)
+    return (what, companion, f"{here:.3g} us", f"{there:.3g} us", f"{ratio:.3g}", f"{low:.3g} to {high:.3g}", limit)
 
 
 def update(pairs: int) -> list[tuple[str, ...]]:
-    """Return the lines of OEFO beside C."""
+    """Return the lines of OEFO next to C."""
     lines = []
     for flags in C_FLAGS:
-        beside = " ".join(["C, gcc -O3", *flags])
-        comparison = beside_c(pairs, data(BLOCK), BLOCKS, flags)
-        lines.append(per_sample(comparison, BLOCK * BLOCKS, "OEFO, in blocks", beside, "at most 2", inverse=True))
+        companion = " ".join(["C, gcc -O3", *flags])
+        comparison = against_c(pairs, data(BLOCK), BLOCKS, flags)
+        lines.append(per_sample(comparison, BLOCK * BLOCKS, "OEFO, in blocks", companion, "at most 2", inverse=True))
     return lines
 
 
 def padasip(pairs: int, given: str | None) -> list[tuple[str, ...]]:
-    """Return the lines of RLS and OEFO beside padasip's RLS; none, and a hint, where there is no padasip."""
+    """Return the lines of RLS and OEFO next to padasip's RLS; none, and a hint, where there is no padasip."""
     python = python_with_padasip(given)
     if python is None:
-        sys.stderr.write(f"padasip: expected it in this Python or in another, came neither. {HINT}\n")
+        sys.stderr.write(f"padasip: expected it in this Python or in another, got neither. {HINT}\n")
         return []
     lines = []
     for estimator in (Rls(MODEL.orders, DecreasingGain()), oefo()):
-        comparison = beside_padasip(pairs, python, estimator)
+        comparison = against_padasip(pairs, python, estimator)
         what = f"{estimator.name.upper()}, in blocks"
         lines.append(per_sample(comparison, PEER_SAMPLES, what, "padasip's RLS", "at least 100", inverse=False))
     return lines

@@ -27,7 +27,7 @@ def compiled(*options: str) -> Iterator[Run]:
     """Compile it with ``-O3`` and more options, for the time of the block; needs a C compiler."""
     compiler = shutil.which("gcc") or shutil.which("cc")
     if compiler is None:
-        raise FileNotFoundError("expected gcc or cc for the C to compare with, came neither: install a C compiler")
+        raise FileNotFoundError("expected gcc or cc for the C to compare with, got neither: install a C compiler")
     with TemporaryDirectory(prefix="hil-recursive-") as folder:
         library = Path(folder) / "recursive_oefo.so"
         flags = ["-O3", *options, "-Wall", "-Werror", "-shared", "-fPIC"]

@@ -47,7 +47,7 @@ def test_fits_of_other_recordings_do_not_agree(theirs: ScipyFit) -> None:
     assert apart.sigmas > 1.0
 
 
-def test_a_ratio_is_of_medians_and_told_pair_by_pair() -> None:
+def test_a_ratio_is_of_medians_and_reported_pair_by_pair() -> None:
     ours, theirs = (tuple(Taken(2.0 * s, s) for s in side) for side in ((1.0, 2.0, 4.0), (10.0, 40.0, 20.0)))
     seen = Comparison(ours, theirs, None, None)
     assert (seen.ratio, seen.processor_ratio) == (10.0, 10.0)

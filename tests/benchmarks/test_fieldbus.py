@@ -60,4 +60,4 @@ def test_quantile_is_the_nearest_rank() -> None:
 def test_unknown_part_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         main(["speed"])
-    assert "expected lateness, share, throughput, came speed" in capsys.readouterr().err
+    assert "expected lateness, share, throughput, got speed" in capsys.readouterr().err

@@ -83,10 +83,10 @@ def test_the_reference_is_one_of_the_peers() -> None:
     assert REFERENCE in {peer.name for peer in PEERS}
 
 
-def test_every_method_is_asked_about_a_bus_and_told_in_the_tables(judged: Judged) -> None:
-    told = tables([judged])
+def test_every_method_is_asked_about_a_bus_and_reported_in_the_tables(judged: Judged) -> None:
+    text = tables([judged])
     assert judged.seed == 3
-    assert all(name in told for name in judged.answers)
+    assert all(name in text for name in judged.answers)
     assert all(answer.cpu_s > 0.0 for answer in judged.answers.values())
     best = judged.answers["this project: Box-Jenkins, 10 ms"]
     assert best.frequency_hz == pytest.approx(judged.truth["frequency"], rel=0.005)
@@ -156,7 +156,7 @@ def test_coverage_of_the_tests_driveline() -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["speed"], "expected buses, clean, healthy, accuracy, coverage, truth, paper, came speed"),
+        (["speed"], "expected buses, clean, healthy, accuracy, coverage, truth, paper, got speed"),
         (["--buses", "0"], "expected 1 or more"),
         (["--jobs", "0"], "expected 1 or more"),
     ],

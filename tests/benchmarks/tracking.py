@@ -19,8 +19,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from scipy.stats import poisson
 
-from estimator.identification.identify import Settings
-from estimator.identification.online.chain import OnlineChain
+from estimator.identification.chain import OnlineChain
+from estimator.identification.settings import Settings
 from estimator.identification.tracking.watch_settings import WatchSettings
 from estimator.signals.record import Record
 from hil.rig.live import tracking_settings
@@ -116,10 +116,10 @@ def lines(runs: int, number: int) -> Iterator[str]:
         count, as_shipped = false_alarms((counted, shipped), number, road_nm=road_nm)
         low, high = (bound / number for bound in poisson.interval(0.95, max(count, 1)))
         yield (
-            f"false alarms, road {road_nm:g} Nm: stated at most {COUNTED_PER_HOUR:g} an hour, came "
+            f"false alarms, road {road_nm:g} Nm: stated at most {COUNTED_PER_HOUR:g} an hour, got "
             f"{count / number:.2f} ({low:.2f} to {high:.2f}) in {number} h"
         )
-        yield f"  as shipped: stated at most {shipped.false_alarms_per_hour} an hour, came {as_shipped} in all"
+        yield f"  as shipped: stated at most {shipped.false_alarms_per_hour} an hour, got {as_shipped} in all"
     for drop in (0.05, 0.1, 0.2):
         found, early, held = delays(drop, runs)
         yield (

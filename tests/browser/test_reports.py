@@ -10,8 +10,9 @@ from typing import Any
 import pytest
 
 from estimator.identification.compare import compare
-from estimator.identification.identify import Settings, identify
+from estimator.identification.identify import identify
 from estimator.identification.online.registry import ESTIMATORS
+from estimator.identification.settings import Settings
 from estimator.identification.study import study
 from hil.figures.line import TwoMassLine
 from hil.figures.local_model import LocalModel, Reference

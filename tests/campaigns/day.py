@@ -23,7 +23,7 @@ from hil.rig.live import LiveEstimate, tracking_chain
 from hil.rig.metadata import run_metadata
 from hil.rig.pacing import FreePacer, period_ns
 from hil.rig.realtime import NOT_ASKED
-from hil.rig.sample import Sample
+from hil.sample import Sample
 from tests.rig.serving import EXAMPLE, changed, served, small_rig
 
 GROWTH_MIB = 8.0

@@ -33,7 +33,7 @@ SECRETS = {
     "hil x --password=hunter2": "hunter2",
     "hil run '/data/the customer/rig.toml' cruise": "customer",
     "hil run /data/customer/rig.toml cruise": "customer",
-    "came: /home/anna/customer/cruise.csv: line 3": "customer",
+    "got: /home/anna/customer/cruise.csv: line 3": "customer",
     r"C:\Users\anna\customer\rig.toml": "customer",
     r'"C:\Users\the customer\rig.toml"': "customer",
     "user anna on annas-laptop": "anna",
@@ -43,7 +43,7 @@ SECRETS = {
     'auth = ["bert", "hunter2"]': "hunter2",
     'basic_auth: "hunter2"': "hunter2",
     "Authorization: Bearer abc123.def": "abc123",
-    "came Bearer abc123def": "abc123",
+    "got Bearer abc123def": "abc123",
     "Authorization: Basic YmVydDpodW50ZXIy": "YmVyd",
     'user = "bert"': "bert",
     "hil x --user bert": "bert",
@@ -158,7 +158,7 @@ def test_everything_is_in_it_and_listed(state: Path, tmp_path: Path, capsys: pyt
     assert {"canopen", "numpy", "pymodbus"} <= set(versions["packages"])
 
 
-def test_the_last_run_is_told_without_notes_and_secrets(state: Path, tmp_path: Path) -> None:
+def test_the_last_run_is_reported_without_notes_and_secrets(state: Path, tmp_path: Path) -> None:
     for number, name in enumerate(("first", "last")):
         recording = tmp_path / f"{name}.csv"
         recording.write_text("time_s\n0.0\n", encoding="utf-8")

@@ -50,7 +50,7 @@ def test_quiet_prints_nothing_but_what_json_prints(capsys: pytest.CaptureFixture
     assert Call("diagnose", (), quiet=True).silent is True
 
 
-def test_errors_are_told_all_the_same(capsys: pytest.CaptureFixture[str]) -> None:
+def test_errors_are_reported_all_the_same(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["--quiet", "identify", "nowhere.csv", "--out", "out"]) == 2
     printed = capsys.readouterr()
     assert printed.out == ""

@@ -77,7 +77,7 @@ def test_drive_in_fault_is_noted(short_rig: Path, options: tuple[str, ...], caps
     notes = json.loads(printed)["devices"][1]["notes"] if options else [" ".join(printed.split())]
     assert len(notes) == 1
     assert "power state is fault, error code 0x603F is 0x2310 continuous over-current, motor side" in notes[0]
-    assert "Mend the cause at the drive, reset the fault." in notes[0]
+    assert "Fix the cause at the drive, reset the fault." in notes[0]
 
 
 def test_missing_inverter(short_rig: Path, capsys: pytest.CaptureFixture[str]) -> None:

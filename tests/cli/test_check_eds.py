@@ -32,7 +32,7 @@ def test_shipped_eds_has_nothing_to_remark(capsys: pytest.CaptureFixture[str]) -
     assert f"{'torque offset':32} 0x60B2:00" in table
 
 
-def test_warnings_are_told_and_borne(capsys: pytest.CaptureFixture[str]) -> None:
+def test_warnings_are_reported_and_borne(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["check", "--eds", OTHER]) == 0
     printed = capsys.readouterr()
     *lines, verdict = printed.out.splitlines()
@@ -45,7 +45,7 @@ def test_warnings_are_told_and_borne(capsys: pytest.CaptureFixture[str]) -> None
     assert printed.err == ""
 
 
-def test_error_is_told_with_its_line(faulty: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_error_is_reported_with_its_line(faulty: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["check", "--eds", str(faulty)]) == 2
     printed = capsys.readouterr()
     line = faulty.read_text().split("\n").index("DefaultValue=fast") + 1
@@ -110,8 +110,8 @@ def test_rig_is_not_looked_for_with_an_eds_of_no_use(
     ("arguments", "said"),
     [
         ([], "expected a rig file, an EDS with --eds, or both"),
-        (["--eds", SHIPPED, "--bus", "virtual:x"], "expected a rig file beside them"),
-        (["--eds", SHIPPED, "--prove-stop"], "expected a rig file beside them"),
+        (["--eds", SHIPPED, "--bus", "virtual:x"], "expected a rig file next to them"),
+        (["--eds", SHIPPED, "--prove-stop"], "expected a rig file next to them"),
     ],
 )
 def test_arguments_that_make_no_sense(arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:

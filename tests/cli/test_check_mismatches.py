@@ -148,7 +148,7 @@ def test_difference_of_an_inverter_is_named(
 ) -> None:
     with planted(tmp_path, each, monkeypatch) as command:
         assert run([*command, "--json"]) == 3
-        document, told = capsys.readouterr()
+        document, reported = capsys.readouterr()
         assert run(command) == 3
         table = capsys.readouterr().out
     devices = {device["name"]: device for device in json.loads(document)["devices"]}
@@ -157,7 +157,7 @@ def test_difference_of_an_inverter_is_named(
     assert each.expected in differences[each.name]["expected"]
     assert each.found in differences[each.name]["found"]
     assert [name for name, device in devices.items() if device["result"] != "agrees"] == ["m1"]
-    assert ": m1: expected all there and as described" in told
+    assert ": m1: expected all there and as described" in reported
     (row,) = (line for line in table.splitlines() if each.name in line)
     assert each.expected in row
     assert each.found in row

@@ -45,21 +45,21 @@ def test_plan_keeps_the_vehicle_for_less_than_forty_minutes(tmp_path: Path, caps
 
 
 @pytest.mark.parametrize(
-    ("options", "told"),
+    ("options", "reported"),
     [
         (["--skip", "noise"], "expected a reason"),
         (["--skip", "noise", "--because", " "], "expected a reason"),
         (["--because", "so"], "expected a reason"),
         (["--skip", "coffee", "--because", "tired"], "expected one of devices, limits"),
         (["--repeat", "coffee"], "expected one of devices, limits"),
-        (["--skip", "noise", "--because", "so", "--repeat", "noise"], "came both"),
+        (["--skip", "noise", "--because", "so", "--repeat", "noise"], "got both"),
     ],
 )
 def test_wrong_use_is_refused_and_nothing_written(
-    options: list[str], told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    options: list[str], reported: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert run(["commission", str(EXAMPLE), "--out", str(tmp_path / "out"), *options, *NOWHERE]) == 2
-    assert told in capsys.readouterr().err
+    assert reported in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
 
 
@@ -103,7 +103,7 @@ def test_finding_that_blocks_is_a_device_problem(tmp_path: Path, capsys: pytest.
         assert_disarmed(rig.server.bus_url, 1, 2)
     printed = capsys.readouterr()
     assert "m2: sign" in printed.err
-    assert "not complete: it goes on with signs" in printed.out
+    assert "not complete: it continues with signs" in printed.out
 
 
 @pytest.mark.timeout(300)  # a process of its own, at its own pace; a busy machine starts it late

@@ -72,7 +72,7 @@ position = { column = "position_rad" }
     [
         ([], "runs only where you trust it: --trust-fmu"),
         (["--trust-fmu", "--map", "speed=w"], "KEY one of torque, output, load, start"),
-        (["--trust-fmu", "--map", "output=w"], "expected a variable of the FMU, came 'w'. It has: "),
+        (["--trust-fmu", "--map", "output=w"], "expected a variable of the FMU, got 'w'. It has: "),
     ],
 )
 def test_what_is_not_trusted_or_named_is_refused(

@@ -77,8 +77,8 @@ def test_an_existing_file_is_replaced_only_by_force(source: Path, tmp_path: Path
         (["run.csv", "nowhere/out.h5"], "expected an existing folder"),
         (["run.csv", "out.h5", "--encoding", "klingon"], "--encoding: expected a text encoding such as"),
         (["run.csv", "out.h5", "--delimiter", "1"], "--delimiter: expected a character that can't be part"),
-        (["run.csv", "out.h5", "--all"], "expected a bus trace with --rig, --all or --channel, came a recording"),
-        (["run.blf", "out.h5"], "expected --rig RIG beside a bus trace"),
+        (["run.csv", "out.h5", "--all"], "expected a bus trace with --rig, --all or --channel, got a recording"),
+        (["run.blf", "out.h5"], "expected --rig RIG besides a bus trace"),
     ],
 )
 def test_wrong_use_leaves_nothing(
@@ -91,7 +91,7 @@ def test_wrong_use_leaves_nothing(
     assert sorted(tmp_path.iterdir()) == before
 
 
-def test_a_foreign_text_file_is_read_as_it_is_told(tmp_path: Path, capsys: Capture) -> None:
+def test_a_foreign_text_file_is_read_as_it_is_reported(tmp_path: Path, capsys: Capture) -> None:
     path = tmp_path / "trip.csv"
     path.write_bytes("Zeit;Temperatur °C\n0,5;1\n".encode("latin-1"))
     assert hil(["convert", str(path), str(tmp_path / "a.h5")]) == 2

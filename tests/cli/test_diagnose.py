@@ -84,9 +84,9 @@ def test_a_full_disk_takes_the_files_but_not_the_verdict(
     out = tmp_path / "result"
     arguments = [str(bench_folder / "run_1.csv"), "--model", str(bench_folder / "drive.toml"), "--json"]
     assert run(["diagnose", *arguments, "--out", str(out)]) == 2
-    told = capsys.readouterr()
-    assert json.loads(told.out)["effects"][0]["name"] == "coulomb_friction_motor"
-    assert "No space left on device. Make room there" in told.err
+    reported = capsys.readouterr()
+    assert json.loads(reported.out)["effects"][0]["name"] == "coulomb_friction_motor"
+    assert "No space left on device. Make room there" in reported.err
     assert not out.exists()
 
 
@@ -123,8 +123,8 @@ def test_progress_is_shown_on_a_terminal(capsys: pytest.CaptureFixture[str], mon
         ("nowhere.csv --model drive.toml --out OUT", "nowhere.csv: expected a readable file"),
         ("run_1.csv --model nowhere.toml --out OUT", "nowhere.toml"),
         ("run_1.csv --model run_1.csv --out OUT", "expected TOML"),
-        ("run_1.csv run_1.csv --model drive.toml --out OUT", "came 'run_1' twice"),
-        ("run_1.csv --model drive.toml --out OUT --holdout run_1.csv", "came 'run_1' twice"),
+        ("run_1.csv run_1.csv --model drive.toml --out OUT", "got 'run_1' twice"),
+        ("run_1.csv --model drive.toml --out OUT --holdout run_1.csv", "got 'run_1' twice"),
         ("run_1.csv --model drive.toml --out drive.toml", "which is a file"),
         ("run_1.csv --model drive.toml", "--out"),
         ("--model drive.toml --out OUT", "REC"),

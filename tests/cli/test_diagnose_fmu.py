@@ -59,7 +59,7 @@ def test_what_acts_at_an_input_is_named(fmu: str, tmp_path: Path, capsys: pytest
     ("more", "said"),
     [
         ([], "runs only where you trust it: --trust-fmu"),
-        (["--trust-fmu", "--map", "output=w"], "expected a variable of the FMU, came 'w'. It has: "),
+        (["--trust-fmu", "--map", "output=w"], "expected a variable of the FMU, got 'w'. It has: "),
         (["--trust-fmu", "--signals", "none.toml"], "none.toml"),
     ],
 )

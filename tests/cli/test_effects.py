@@ -24,17 +24,17 @@ def test_every_effect_is_listed_for_scripts(capsys: pytest.CaptureFixture[str]) 
 
 
 @pytest.mark.parametrize("name", EFFECTS)
-def test_one_effect_is_told_in_full(
+def test_one_effect_is_reported_in_full(
     name: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("COLUMNS", "400")
     assert run(["effects", name]) == 0
     out = capsys.readouterr().out
     entry = EFFECTS[name]
-    told = [name, entry.title, entry.law, entry.excited_by, entry.source, *entry.resembles, *entry.equivalent]
+    reported = [name, entry.title, entry.law, entry.excited_by, entry.source, *entry.resembles, *entry.equivalent]
     for parameter in entry.parameters:
-        told += [parameter.name, parameter.meaning]
-    assert [text for text in told if text not in out] == []
+        reported += [parameter.name, parameter.meaning]
+    assert [text for text in reported if text not in out] == []
 
 
 @pytest.mark.parametrize(
@@ -55,7 +55,7 @@ def test_one_effect_is_told_in_full(
         ("stale_samples", [["share", "–", "0", "read off the data", "share of stale rows"]]),
     ],
 )
-def test_a_parameter_is_told_with_unit_null_bounds_and_meaning(
+def test_a_parameter_is_reported_with_unit_null_bounds_and_meaning(
     name: str, rows: list[list[str]], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("COLUMNS", "400")

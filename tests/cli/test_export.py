@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from estimator.identification.identify import Settings
+from estimator.identification.settings import Settings
 from estimator.signals.record import Record
 from hil.cli.main import run
 from hil.export.filling import Precision, project
@@ -101,9 +101,9 @@ def test_the_example_is_what_the_command_writes_today(tmp_path: Path) -> None:
         (["FILE", "--run", "run_1", "--cycle", "1e-9"], "low-pass has 320000001 elements, expected fewer than 32767"),
         (["FILE", "--run", "run_1", "--single", "--profile", "constant_gain:initial_gain=1e60"], "REAL has no number"),
         (["FILE", "--run", "run_1", "--single", "--profile", "constant_gain:initial_gain=1e-60"], "REAL has no number"),
-        (["missing.json"], "missing.json: the file | expected identification.json | came: No such file"),
+        (["missing.json"], "missing.json: the file | expected identification.json | got: No such file"),
         ([], "--adaptive"),
-        (["--adaptive", "--run", "run_1"], "came no file"),
+        (["--adaptive", "--run", "run_1"], "got no file"),
     ],
 )
 def test_wrong_use_is_refused(
@@ -202,4 +202,4 @@ def test_other_orders_for_a_and_b_are_exported(what: str, identified: Path, tmp_
 @BOTH
 def test_a_folder_is_no_file_to_write(what: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["export", what, "--adaptive", "--out", str(tmp_path)]) == 2
-    assert f"{tmp_path}: expected the name of a file to write, came a folder" in capsys.readouterr().err
+    assert f"{tmp_path}: expected the name of a file to write, got a folder" in capsys.readouterr().err

@@ -61,7 +61,7 @@ def test_without_a_compiler_it_says_what_to_do(
     assert not any(name.startswith("binaries") for name in names)
 
 
-def test_what_is_of_the_recorder_is_left_out_and_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_is_of_the_recorder_is_left_out_and_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     drift = "\n[effects.clock_drift]\nrate = { value = 1e-4 }\n"
     exported(tmp_path, "--sources-only", text=bench.MODEL + drift)
     assert "clock_drift is of what records, not of the line" in capsys.readouterr().out
@@ -72,7 +72,7 @@ def test_what_is_of_the_recorder_is_left_out_and_told(tmp_path: Path, capsys: py
     [
         (bench.MODEL, "drive.zip", "a name that ends in .fmu"),
         ('schema = "hil.model/1"\nstructure = "joint"\n[parameters]\nk = { value = 1.0, tolerance = 0.1 }\n'
-         "c = { value = 1.0, tolerance = 0.1 }\n", "drive.fmu", "came a joint"),
+         "c = { value = 1.0, tolerance = 0.1 }\n", "drive.fmu", "got a joint"),
         (bench.MODEL + '\n[laws.drag]\nfunction = "mine:drag"\nelement = "motor"\nparameters = { size = { low = 0.0, '
          "high = 5.0, start = 1.0 } }\n[effects.drag]\nsize = { value = 1.0 }\n", "drive.fmu", "a law of your own"),
     ],

@@ -200,7 +200,7 @@ def test_the_terminal_says_why_a_compared_estimate_is_invalid(capsys: pytest.Cap
     assert "run_1, riv:" not in printed
 
 
-def test_a_torque_that_moves_the_speed_next_to_nothing_is_told(
+def test_a_torque_that_moves_the_speed_next_to_nothing_is_reported(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     weak = write(tmp_path / "weak.csv", 1, prbs_nm=2.0)
@@ -237,8 +237,8 @@ def test_help_has_an_example(capsys: pytest.CaptureFixture[str]) -> None:
         (("--sample-time", "0.015"), "sampled every 0.01 s, expected a whole fraction"),
         (("--samples", "-3"), "samples is -3, expected 1 or more"),
         (("--model", "nowhere.toml"), "nowhere.toml"),
-        (("--order", "0"), "--order: expected a whole number from 1 on, or auto, came '0'"),
-        (("--delay", "late"), "--delay: expected a whole number from 0 on, or auto, came 'late'"),
+        (("--order", "0"), "--order: expected a whole number from 1 on, or auto, got '0'"),
+        (("--delay", "late"), "--delay: expected a whole number from 0 on, or auto, got 'late'"),
         (("--estimator", "magic"), "--estimator: expected one of oefo, rls"),
         (("--estimator", "ekf"), "Give a two-mass model file by --model"),
     ],

@@ -117,9 +117,9 @@ def test_it_is_rejected_where_it_is_not(model: Path, tmp_path: Path) -> None:
     [
         (LAW % "no_such_module:drag", "laws.retarder.function | expected module 'no_such_module'"),
         (LAW % "my_own_laws:nothing", "laws.retarder.function | expected a function 'nothing'"),
-        (LAW % "my_own_laws:number", "came int"),
+        (LAW % "my_own_laws:number", "got int"),
         (LAW % "my_own_laws:narrow", "laws.retarder.function my_own_laws:narrow: expected a function of (time_s,"),
-        (LAW % "my_own_laws:undefined", "expected a finite number, came nan"),
+        (LAW % "my_own_laws:undefined", "expected a finite number, got nan"),
         (LAW % "my_own_laws", "laws.retarder.function"),
         ((LAW % "my_own_laws:drag").replace('"motor"', '"wheel"'), "laws.retarder.element"),
         ((LAW % "my_own_laws:drag").replace("low = 0.0,", ""), "laws.retarder.parameters.peak_nm.low"),

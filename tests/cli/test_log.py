@@ -41,10 +41,10 @@ def test_it_tells_the_error_with_its_place_in_the_program() -> None:
     assert "Traceback" in log()
 
 
-@pytest.mark.parametrize(("level", "told"), [("error", False), ("warning", False), ("info", True), ("debug", True)])
-def test_the_level_is_that_of_the_option(level: str, told: bool) -> None:
+@pytest.mark.parametrize(("level", "reported"), [("error", False), ("warning", False), ("info", True), ("debug", True)])
+def test_the_level_is_that_of_the_option(level: str, reported: bool) -> None:
     assert run(["--log-level", level, "effects"], keep_log=True) == 0
-    assert ("hil effects" in log()) is told
+    assert ("hil effects" in log()) is reported
 
 
 def test_the_option_goes_before_the_variable(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -67,7 +67,7 @@ def test_an_unknown_level_is_refused(
     options = ["--log-level", "loud"] if where == "option" else []
     assert run([*options, "effects"], keep_log=True) == 2
     error = capsys.readouterr().err
-    assert "expected one of debug, info, warning, error, off, came 'loud'" in error
+    assert "expected one of debug, info, warning, error, off, got 'loud'" in error
     assert ("--log-level" if where == "option" else "HIL_LOG") in error
 
 
@@ -93,7 +93,7 @@ def test_it_rotates_and_keeps_a_few(monkeypatch: pytest.MonkeyPatch) -> None:
     assert all(path.stat().st_size <= 500 for path in kept)
 
 
-def test_without_a_place_for_it_the_command_goes_on(state: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_without_a_place_for_it_the_command_continues(state: Path, capsys: pytest.CaptureFixture[str]) -> None:
     state.write_text("a file where the folder should be", encoding="utf-8")
     assert run(["effects", "backlash"], keep_log=True) == 0
     assert "note: no log is kept" in capsys.readouterr().err

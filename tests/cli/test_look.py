@@ -94,7 +94,7 @@ def uneven(path: Path) -> None:
         (uneven, "resample_s = 0.01   # rows are uneven"),
     ],
 )
-def test_what_can_t_be_told_is_left_to_a_person(
+def test_what_can_t_be_reported_is_left_to_a_person(
     make: Callable[[Path], None], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     make(tmp_path / "run.csv")

@@ -62,7 +62,7 @@ def looked(tmp_path: Path, columns: Columns, capsys: pytest.CaptureFixture[str])
         (per_mille, "per mille of the rated torque", 'torque = [ { column = "T_1", scale = 0.001 }, '),
     ],
 )
-def test_what_is_wrong_is_told_with_the_line_that_cures_it(
+def test_what_is_wrong_is_named_with_the_line_that_cures_it(
     spoilt: Callable[[Columns], Columns], what: str, line: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     _, _, err = looked(tmp_path, spoilt(recorded(tmp_path / "run.csv")), capsys)
@@ -70,13 +70,13 @@ def test_what_is_wrong_is_told_with_the_line_that_cures_it(
     assert line in err
 
 
-def test_swapped_columns_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_swapped_columns_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     _, _, err = looked(tmp_path, swapped(recorded(tmp_path / "run.csv")), capsys)
     assert "Are their columns swapped?" in err
     assert 'speed = { column = "T_1", at = "motor" }' in err
 
 
-def test_the_lines_read_a_sound_file_and_nothing_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_lines_read_a_sound_file_and_nothing_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     columns = recorded(tmp_path / "run.csv")
     path, out, err = looked(tmp_path, columns, capsys)
     assert err == ""

@@ -28,7 +28,7 @@ def test_a_set_is_made_answered_opened_and_scored(tmp_path: Path, capsys: pytest
     assert "Scoreboard" in (out / "scoreboard.html").read_text()
     assert key.stat().st_mode & 0o077 == 0  # nobody else can read it
     assert not list(out.rglob("*.key"))
-    assert run(["prove", "--out", str(out), "--no-rigs"]) == 0  # goes on: nothing is left to do
+    assert run(["prove", "--out", str(out), "--no-rigs"]) == 0  # continues: nothing is left to do
     assert json.loads((out / "scoreboard.json").read_text()) == data
 
 

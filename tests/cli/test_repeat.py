@@ -36,18 +36,18 @@ def test_compare_and_simulate_give_the_error_of_the_diagnosis(
     flagged(recording)
     command = ["diagnose", str(recording), "--model", str(model), "--out", str(out), "--budget-s", "300"]
     assert run(command) == 0
-    told = json.loads((out / "diagnosis.json").read_text())["fit"]["augmented"]
+    reported = json.loads((out / "diagnosis.json").read_text())["fit"]["augmented"]
     augmented = str(out / "augmented.toml")
     used = tomllib.loads(Path(augmented).read_text())["prepared"]["recordings"][0]
     capsys.readouterr()
     assert run(["compare", augmented, str(recording), "--json"]) == 0
     compared = json.loads(capsys.readouterr().out)["recordings"]["run_1"]
-    assert compared["rms"] == pytest.approx(told, rel=0.005)
+    assert compared["rms"] == pytest.approx(reported, rel=0.005)
     assert compared["samples_used"] == used["samples_used"] == 1500 - 12 - 60
     assert (
         run(["simulate", "--model", augmented, "--input", str(recording), "--out", str(out / "s.csv"), "--json"]) == 0
     )
-    assert json.loads(capsys.readouterr().out)["rms"]["value"] == pytest.approx(told, rel=0.005)
+    assert json.loads(capsys.readouterr().out)["rms"]["value"] == pytest.approx(reported, rel=0.005)
 
 
 def test_every_result_says_what_made_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,4 +1,4 @@
-"""``hil run --trace`` and ``hil replay``: the trace beside the recording, and the recording back from the trace."""
+"""``hil run --trace`` and ``hil replay``: the trace next to the recording, and the recording back from the trace."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from estimator.identification.chain import OnlineChain
 from estimator.identification.online.adaptation import ConstantForgetting
-from estimator.identification.online.chain import OnlineChain
 from hil.cli.main import run
 from hil.config.rig_file import read_rig
 from hil.recording import read_record

@@ -141,7 +141,7 @@ def test_help_has_an_example(capsys: pytest.CaptureFixture[str]) -> None:
     assert "hil run examples/rig.toml cruise" in capsys.readouterr().out
 
 
-def test_estimates_beside_the_recording(short_rig: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_estimates_next_to_the_recording(short_rig: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with served(read_rig(short_rig)) as (server, _):
         addresses = ("--bus", server.bus_url, "--modbus", str(server.modbus))
         options = ("--out", str(tmp_path / "r.csv"), "--pace", "fast", *addresses)

@@ -90,13 +90,13 @@ def test_filters(folder: Path, capsys: Capture, options: list[str], ids: list[in
 
 def test_the_list_says_what_ended_a_run_and_show_what_to_do_then(folder: Path, capsys: Capture) -> None:
     write_table(Table(folder / "d.csv", {"time_s": np.arange(5) * 0.1, "speed_rad_s": np.ones(5)}), folder / "d.csv")
-    register_run(folder / "d.csv", "PLC: clutch is closed. Mend the cause, run again.")
+    register_run(folder / "d.csv", "PLC: clutch is closed. Fix the cause, run again.")
     assert hil(["runs"]) == 0
     said = capsys.readouterr().out
     assert "PLC: clutch is closed" in said
     assert "Mend" not in said
     assert hil(["runs", "show", "4"]) == 0
-    assert "PLC: clutch is closed. Mend the cause, run again." in capsys.readouterr().out
+    assert "PLC: clutch is closed. Fix the cause, run again." in capsys.readouterr().out
 
 
 def test_an_empty_answer_is_an_answer(folder: Path, capsys: Capture) -> None:
@@ -198,7 +198,7 @@ def test_runs_are_exported_as_a_table_and_as_an_archive(folder: Path, capsys: Ca
         assert hil(["runs", "export", "--out", out]) == 2
 
 
-def test_a_damaged_store_is_told_and_rebuilt(folder: Path, capsys: Capture) -> None:
+def test_a_damaged_store_is_reported_and_rebuilt(folder: Path, capsys: Capture) -> None:
     store_of(folder).write_bytes(b"\0" * 10000)
     assert hil(["runs"]) == 2
     assert "hil runs rebuild --store ." in capsys.readouterr().err
@@ -214,8 +214,8 @@ def test_a_damaged_store_is_told_and_rebuilt(folder: Path, capsys: Capture) -> N
     [
         ([], "expected a store of runs, there is none"),
         (["show", "1"], "expected a store of runs, there is none"),
-        (["rebuild", "--store", "nowhere"], "expected an existing folder, came nowhere"),
-        (["--since", "yesterday"], "--since: expected a date such as 2026-11-21, came 'yesterday'"),
+        (["rebuild", "--store", "nowhere"], "expected an existing folder, got nowhere"),
+        (["--since", "yesterday"], "--since: expected a date such as 2026-11-21, got 'yesterday'"),
     ],
 )
 def test_a_look_makes_no_store(

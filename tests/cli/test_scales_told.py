@@ -1,4 +1,4 @@
-"""A wrong scale is told with the line that cures it wherever a recording meets a model, not only in a diagnosis."""
+"""A wrong scale is reported with the line that cures it wherever a recording meets a model, not only in a diagnosis."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def in_millinewton(tmp_path: Path) -> tuple[str, str]:
 
 
 @pytest.mark.parametrize("command", ["compare", "identify", "look"])
-def test_it_is_told_with_the_line_that_cures_it(
+def test_it_is_reported_with_the_line_that_cures_it(
     command: str, in_millinewton: tuple[str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     model, recording = in_millinewton

@@ -122,18 +122,18 @@ def test_delay_of_whole_samples_is_found(extra: int) -> None:
 
 
 def test_spread_of_the_resonance_is_that_of_repeats() -> None:
-    """The foretold standard deviation against the scatter of ten tests that differ in noise alone."""
+    """The predicted standard deviation against the scatter of ten tests that differ in noise alone."""
     base = simulated(12.5 + prbs_nm(2000, 60.0, clock_divider=2), noise=0.0)
-    foretold, found = [], []
+    predicted, found = [], []
     for seed in range(10):
         noise = 0.05 * np.random.default_rng(seed).normal(size=base.output.size)
         record = Record("run", PERIOD_S, base.time_s, base.torque_nm, base.output + noise, base.okay)
         spread = resonance_spread(fit_output_error(decimate(record, 1, 0.3)), (2.0, 25.0))
         assert spread is not None
-        foretold.append(spread.frequency_std)
+        predicted.append(spread.frequency_std)
         found.append(spread.mode.frequency_hz)
     scatter = np.std(found, ddof=1) / np.mean(found)
-    assert 0.4 < np.mean(foretold) / scatter < 2.5  # ten tests: a scatter of 24 %; a decade off would fail
+    assert 0.4 < np.mean(predicted) / scatter < 2.5  # ten tests: a scatter of 24 %; a decade off would fail
 
 
 def test_two_masses_are_found_from_rough_values() -> None:

@@ -75,7 +75,7 @@ def test_every_step_once_and_then_none(world: World) -> None:
     assert world.call() == []
 
 
-def test_goes_on_at_the_step_that_was_interrupted(world: World) -> None:
+def test_continues_at_the_step_that_was_interrupted(world: World) -> None:
     world.fails["second"] = KeyboardInterrupt()
     with pytest.raises(KeyboardInterrupt):
         world.call()
@@ -118,7 +118,7 @@ def test_repeating_what_another_with_torque_builds_on_says_so(world: World, monk
 
 def test_blocking_finding_ends_it_and_is_done_again(world: World) -> None:
     world.findings["first"] = [Finding("sign", "forward", "backward", False, "Swap two phases", blocking=True)]
-    with pytest.raises(RunAborted, match=r"step first: sign: expected forward, came backward\. Swap two phases"):
+    with pytest.raises(RunAborted, match=r"step first: sign: expected forward, got backward\. Swap two phases"):
         world.call()
     assert world.state().steps["first"].status is Status.BLOCKED
     assert world.call() == list(NAMES)
@@ -130,7 +130,7 @@ def test_without_yes_and_terminal_no_torque(world: World) -> None:
     assert world.done == ["first"]
 
 
-def test_person_goes_on_skips_or_quits(world: World) -> None:
+def test_person_continues_skips_or_quits(world: World) -> None:
     assert world.call(person("what?", "s", "", "no torque today")) == ["first", "third"]
     assert world.state().steps["second"].because == "no torque today"
     with pytest.raises(KeyboardInterrupt):
@@ -191,7 +191,7 @@ def test_state_is_whole_or_as_it_was(world: World, monkeypatch: pytest.MonkeyPat
     assert [path.name for path in world.folder.iterdir()] == ["commission.json"]
 
 
-def test_what_ended_a_step_is_told_where_the_state_can_not_be_kept(
+def test_what_ended_a_step_is_reported_where_the_state_can_not_be_kept(
     world: World, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     save = State.save
@@ -212,7 +212,7 @@ def _full_disk(descriptor: int) -> None:
     raise OSError(28, "No space left on device")
 
 
-def test_answer_that_is_none_is_told_what_would_be() -> None:
+def test_answer_that_is_none_is_reported_what_would_be() -> None:
     asked: list[str] = []
     answers = iter(["what?", "", "s", "", "no torque today"])
 
@@ -223,7 +223,7 @@ def test_answer_that_is_none_is_told_what_would_be() -> None:
     assert Person(ask).may_command("any", True) == Answer(What.SKIP, "no torque today")
     go = "  Go? [y]es, [s]kip, [q]uit: "
     assert asked[0].endswith(go)
-    assert asked[1:3] == [f"  expected y or yes or s or q, came {came}\n{go}" for came in ("what?", "nothing")]
+    assert asked[1:3] == [f"  expected y or yes or s or q, got {got}\n{go}" for got in ("what?", "nothing")]
     assert asked[3:] == ["  Because: ", "  A reason is needed, it is recorded. Because: "]
 
 

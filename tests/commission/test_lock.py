@@ -40,7 +40,7 @@ def test_second_call_is_refused_by_name_of_the_first_and_leaves_everything(
     try:
         nowhere = ("--bus", "ws://127.0.0.1:9/", "--modbus", "127.0.0.1:9")
         assert run(["commission", str(EXAMPLE), "--out", str(tmp_path), "--yes", *nowhere]) == 2
-        assert f"came process {first.pid}." in capsys.readouterr().err
+        assert f"got process {first.pid}." in capsys.readouterr().err
         assert [path.name for path in tmp_path.iterdir()] == [LOCK]
     finally:
         first.communicate("")
@@ -58,7 +58,7 @@ def test_folder_is_free_once_its_holder_has_ended_however_it_did(killed: bool, t
         assert (tmp_path / LOCK).exists()
 
 
-def test_folder_that_takes_no_file_is_told_by_name(tmp_path: Path) -> None:
+def test_folder_that_takes_no_file_is_reported_by_name(tmp_path: Path) -> None:
     (tmp_path / LOCK).mkdir()
-    with pytest.raises(UsageError, match=f"{LOCK}: expected a place to write to, came: "), sole_use(tmp_path):
+    with pytest.raises(UsageError, match=f"{LOCK}: expected a place to write to, got: "), sole_use(tmp_path):
         pass

@@ -14,8 +14,8 @@ from hil.commission.finding import Finding, stated
 from hil.commission.record import RunRecord, Status, StepRecord
 from hil.commission.registry import STEPS
 from hil.commission.state import State
+from hil.commission.text import findings_table, result_document, result_lines
 from hil.report.commission_html import commission_page
-from hil.report.commission_text import findings_table, result_document, result_lines
 
 TITLES = {step.name: step.title for step in STEPS}
 OUTSIDE = Finding("gain <m2>", "equal within ±2 %", "3.1 ± 0.4 %", False, "Calibrate one")
@@ -71,10 +71,10 @@ def test_step_to_do_has_no_section(state: dict[str, Any]) -> None:
     assert "<h2>Friction and reversal</h2>" not in page
 
 
-def test_result_tells_where_it_goes_on(state: dict[str, Any], tmp_path: Path) -> None:
+def test_result_tells_where_it_continues(state: dict[str, Any], tmp_path: Path) -> None:
     result = result_document(state, str(tmp_path), "commissioning.html")
     assert (result["complete"], result["outside"], result["driven_s"], result["model"]) == (False, 1, 3.5, None)
-    assert "not complete: it goes on with limits at the next call, 8 steps to go" in list(result_lines(result))
+    assert "not complete: it continues with limits at the next call, 8 steps to go" in list(result_lines(result))
     assert "skipped: devices" in list(result_lines(result))
     assert f"report: {tmp_path / 'commissioning.html'}" in list(result_lines(result))
 
@@ -85,7 +85,7 @@ def test_a_report_that_is_not_written_is_not_named(state: dict[str, Any], tmp_pa
     assert "report: not written" in list(result_lines(result))
 
 
-def test_findings_on_a_terminal_are_told_in_words() -> None:
+def test_findings_on_a_terminal_are_reported_in_words() -> None:
     console = Console(width=100, record=True, file=io.StringIO())
     console.print(findings_table("Signs", [OUTSIDE, OPEN, stated("torque", "20 Nm")]))
     text = console.export_text()

@@ -16,7 +16,7 @@ def saved(folder: Path, recording: str) -> None:
     State(folder, "bench", "rig.toml", "", {"noise": StepRecord(Status.DONE, runs=[run])}).save()
 
 
-def test_a_recording_beside_the_state_is_taken(tmp_path: Path) -> None:
+def test_a_recording_next_to_the_state_is_taken(tmp_path: Path) -> None:
     saved(tmp_path, "recordings/cruise.csv")
     assert load_state(tmp_path, ["noise"]) is not None
 

@@ -1,4 +1,4 @@
-"""Each device is lost in each step that drives: told by its name, noted, and the next call goes on there."""
+"""Each device is lost in each step that drives: reported by its name, noted, and the next call continues there."""
 
 from __future__ import annotations
 

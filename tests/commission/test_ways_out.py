@@ -1,4 +1,4 @@
-"""Whatever ends a step: drives disarmed, the record says why, the next call goes on there."""
+"""Whatever ends a step: drives disarmed, the record says why, the next call continues there."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ def test_after_an_interruption_whole_runs_are_kept_and_the_rest_is_driven(
 
 
 @pytest.mark.parametrize(
-    ("fault", "error", "told"),
+    ("fault", "error", "reported"),
     [
         ("plc.permissive_withdrawn@3.0", RunAborted, "permissive is withdrawn"),
         ("plc.clutch_closes@3.0", RunAborted, "clutch is closed"),
@@ -123,16 +123,16 @@ def test_after_an_interruption_whole_runs_are_kept_and_the_rest_is_driven(
     ],
 )
 def test_lost_permission_or_device_ends_it_at_zero_torque(
-    fault: str, error: type[Exception], told: str, tmp_path: Path
+    fault: str, error: type[Exception], reported: str, tmp_path: Path
 ) -> None:
     with bench(tmp_path, faults=[fault]) as rig:
-        with pytest.raises(error, match=told):
+        with pytest.raises(error, match=reported):
             rig.call("signs")
         record = rig.job().state.steps["signs"]
         torque = rig.server.torque_nm
     assert record.status is Status.INTERRUPTED
-    assert told in record.because
-    assert torque == (0.0, 0.0) or "cut the power" in record.because  # a drive that hangs can't be told anything
+    assert reported in record.because
+    assert torque == (0.0, 0.0) or "cut the power" in record.because  # a drive that hangs can't be ordered anything
 
 
 def test_speed_outside_its_band_ends_the_run(tmp_path: Path) -> None:

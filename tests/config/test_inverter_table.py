@@ -70,7 +70,7 @@ def test_what_can_not_be_is_refused_by_its_key(
 def test_node_guarding_is_refused_with_the_reason(key: str, tmp_path: Path) -> None:
     [line] = problems_of(with_keys(tmp_path, f"{key} = 100"))
     assert line.startswith(f"inverters.m1.{key} | expected no such key: node guarding needs remote frames")
-    assert line.endswith("heartbeat_ms sets its period | came 100")
+    assert line.endswith("heartbeat_ms sets its period | got 100")
 
 
 def test_a_period_too_long_for_the_deadline_is_named_where_it_is_given(tmp_path: Path) -> None:

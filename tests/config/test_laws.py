@@ -53,10 +53,10 @@ def test_an_installed_law_takes_part_in_every_model(package: None, monkeypatch: 
     [
         (
             "a_package_of_laws:thing",
-            "laws.offered | expected entry point a_package_of_laws:thing to be an OwnLaw | came 3",
+            "laws.offered | expected entry point a_package_of_laws:thing to be an OwnLaw | got 3",
         ),
-        ("a_package_of_laws:missing", "to load | came AttributeError"),
-        ("no_such_package:law", "to load | came ModuleNotFoundError"),
+        ("a_package_of_laws:missing", "to load | got AttributeError"),
+        ("no_such_package:law", "to load | got ModuleNotFoundError"),
     ],
 )
 def test_an_offer_that_is_no_law_is_refused(

@@ -130,26 +130,26 @@ def test_the_example_of_the_linear_drive_is_a_nominal_model() -> None:
 @pytest.mark.parametrize(
     ("line", "said"),
     [
-        ('schema = "hil.model/2"', "schema | expected 'hil.model/1' | came 'hil.model/2'"),
+        ('schema = "hil.model/2"', "schema | expected 'hil.model/1' | got 'hil.model/2'"),
         (
             'structure = "four_mass"',
-            "structure | expected 'one_mass', 'two_mass', 'three_mass' or 'joint' | came 'four_mass'",
+            "structure | expected 'one_mass', 'two_mass', 'three_mass' or 'joint' | got 'four_mass'",
         ),
-        ("structure = [1]", "structure | expected 'one_mass', 'two_mass', 'three_mass' or 'joint' | came [1]"),
-        ('motion = "sideways"', "motion | expected 'rotation' or 'translation' | came 'sideways'"),
+        ("structure = [1]", "structure | expected 'one_mass', 'two_mass', 'three_mass' or 'joint' | got [1]"),
+        ('motion = "sideways"', "motion | expected 'rotation' or 'translation' | got 'sideways'"),
         (
             "J_M = { value = '1', tolerance = 0.2 }",
-            "parameters.J_M.value | expected a valid number | came '1'",
+            "parameters.J_M.value | expected a valid number | got '1'",
         ),
         (
             "J_M = { value = true, tolerance = 0.2 }",
-            "parameters.J_M.value | expected a valid number | came True",
+            "parameters.J_M.value | expected a valid number | got True",
         ),
         (
             "J_M = { value = nan, tolerance = 0.2 }",
-            "parameters.J_M.value | expected a finite number | came nan",
+            "parameters.J_M.value | expected a finite number | got nan",
         ),
-        ("J_M = { value = 1 }", "parameters.J_M.tolerance | expected this key | came nothing"),
+        ("J_M = { value = 1 }", "parameters.J_M.tolerance | expected this key | got nothing"),
         (
             "J_M = { value = 1, tolerance = 0.2, x = 1 }",
             "parameters.J_M.x | expected one of the known keys (value, tol",
@@ -157,7 +157,7 @@ def test_the_example_of_the_linear_drive_is_a_nominal_model() -> None:
         ("J_M = 1.6", "parameters.J_M | expected a table of value, tolerance"),
         (
             "J_M = { value = 0, tolerance = 0.2 }",
-            "parameters.J_M.value: expected a finite number greater than 0, came 0",
+            "parameters.J_M.value: expected a finite number greater than 0, got 0",
         ),
         (
             "J_M = { value = 1, tolerance = 1 }",
@@ -178,7 +178,7 @@ def test_a_wrong_line_is_refused_by_its_key(tmp_path: Path, line: str, said: str
     ("added", "said"),
     [
         ("k = { value = 1, tolerance = 0 }", "parameters.k: unknown, one_mass has J_M, b_M"),
-        ("[geometry]\ngear_ratio = 0", "geometry.gear_ratio | expected greater than 0 | came 0"),
+        ("[geometry]\ngear_ratio = 0", "geometry.gear_ratio | expected greater than 0 | got 0"),
         ("[geometry]\nratio = 5", "geometry.gear_ratio | expected this key"),
         ('[load]\nconstant = "everyone\'s"', "load.constant | expected"),
         ("[load]\nconstant = nan", "load.constant | expected"),
@@ -200,7 +200,7 @@ def test_a_wrong_line_is_refused_by_its_key(tmp_path: Path, line: str, said: str
         ),
         (
             "[signals]\nspeed = { column = 'v', at = 'roof' }",
-            "signals.speed.at | expected 'motor', 'load' or 'shaft' | came 'roof'",
+            "signals.speed.at | expected 'motor', 'load' or 'shaft' | got 'roof'",
         ),
         (
             "[signals]\nspeed = { column = 'v', scale = 0 }",
@@ -210,19 +210,19 @@ def test_a_wrong_line_is_refused_by_its_key(tmp_path: Path, line: str, said: str
             "[signals]\nspeed = { column = 'v' }\nforce = { column = 'f' }",
             "signals | expected one of speed, position, force",
         ),
-        ("[signals]\ntime = { }", "signals.time | expected either column or sample_time_s | came 'neither'"),
+        ("[signals]\ntime = { }", "signals.time | expected either column or sample_time_s | got 'neither'"),
         (
             "[signals]\ntime = { column = 't', sample_time_s = 1 }",
             "signals.time | expected either column or sample_time_s",
         ),
         (
             "[signals]\ntime = { sample_time_s = 0 }",
-            "signals.time.sample_time_s | expected greater than 0 | came 0",
+            "signals.time.sample_time_s | expected greater than 0 | got 0",
         ),
         ("[signals]\ntorque = [ { colum = 'a' } ]", "signals.torque.0.column | expected this key"),
         (
             "[signals]\nmask = [ { column = 'a' } ]",
-            "signals.mask.0 | expected min, max or both | came 'neither'",
+            "signals.mask.0 | expected min, max or both | got 'neither'",
         ),
         (
             "[signals]\nmask = [ { column = 'a', min = 2, max = 1 } ]",
@@ -248,7 +248,7 @@ def test_a_wrong_addition_is_refused_by_its_key(tmp_path: Path, added: str, said
     assert any(line.startswith(said) for line in lines), lines
 
 
-def test_every_fault_is_told_at_once(tmp_path: Path) -> None:
+def test_every_fault_is_reported_at_once(tmp_path: Path) -> None:
     text = ONE_MASS.replace("1.6", "'x'").replace("b_M", "bM").replace('"rotation"', "3")
     assert [line.split(" |")[0].split(":")[0] for line in refusal(tmp_path, f"{text}[effects.gremlins]")] == [
         "motion",
@@ -331,7 +331,7 @@ def test_what_is_written_reads_back_the_same(
     assert file.signals == signals
 
 
-def test_a_second_writing_replaces_the_first_and_leaves_nothing_beside(tmp_path: Path) -> None:
+def test_a_second_writing_replaces_the_first_and_leaves_nothing_next_to(tmp_path: Path) -> None:
     model = read_model(write(tmp_path, ONE_MASS)).model
     write_model(tmp_path / "model.toml", replace(model, motion=Motion.TRANSLATION))
     assert read_model(tmp_path / "model.toml").model.motion is Motion.TRANSLATION

@@ -51,21 +51,21 @@ def test_neither() -> None:
     assert rig.simulation.plc_security is None
 
 
-@pytest.mark.parametrize(("more", "came"), [(HOST, "None"), (PLC + ROLES, "a table")])
-def test_one_side_alone_is_refused(more: str, came: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("more", "got"), [(HOST, "None"), (PLC + ROLES, "a table")])
+def test_one_side_alone_is_refused(more: str, got: str, tmp_path: Path) -> None:
     (problem,) = problems_of(rig_file(tmp_path, more))
     assert problem.startswith("simulation.plc_security | expected this table if and only if there is [plc.security]")
-    assert problem.endswith(f"| came {came}")
+    assert problem.endswith(f"| got {got}")
 
 
 @pytest.mark.parametrize(
     ("wrong", "problem"),
     [
         (HOST.replace("host.pem", "gone.pem"), "plc.security.certificate | expected an existing file, looked for "),
-        (HOST.replace('key = "host.key"\n', ""), "plc.security.key | expected this key | came nothing: add it"),
+        (HOST.replace('key = "host.key"\n', ""), "plc.security.key | expected this key | got nothing: add it"),
         (HOST + 'server_name = ""\n', "plc.security.server_name | expected"),
         (HOST + 'password = "x"\n', "plc.security.password | expected one of the known keys (ca, certificate, key, se"),
-        (PLC, "simulation.plc_security.roles | expected this key | came nothing: add it"),
+        (PLC, "simulation.plc_security.roles | expected this key | got nothing: add it"),
         (PLC + "roles = {}\n", "simulation.plc_security.roles | expected"),
         (
             PLC + 'roles = { viewer = "write" }\n',
@@ -90,5 +90,5 @@ def test_a_prbs_of_the_plc_must_leave_the_guard_some_room(amplitude_nm: float, o
     if of is None:
         assert read_rig(path).guard_limits.sum_limit_nm == 700.0 - amplitude_nm
     else:
-        expected = f"prbs.amplitude_nm | expected less than {of} allows, since source is 'plc' | came {amplitude_nm}"
+        expected = f"prbs.amplitude_nm | expected less than {of} allows, since source is 'plc' | got {amplitude_nm}"
         assert expected in problems_of(path)

@@ -8,9 +8,9 @@ from typing import Annotated, Literal, Self
 import pytest
 from pydantic import Field, model_validator
 
-from hil.config.problems import LONGEST_VALUE, Fault, read_toml, refuse, validate
 from hil.config.table import Table
 from hil.errors import FileProblem, ModelFileError, RigFileError
+from hil.problems import LONGEST_VALUE, Fault, read_toml, refuse, validate
 
 
 class Column(Table):
@@ -64,11 +64,11 @@ def lines(data: dict[str, object]) -> list[str]:
 @pytest.mark.parametrize(
     ("content", "problem"),
     [
-        (b'a = 1\nb = \nc = "x"\n', "line 2, column 5 | expected TOML | came: Invalid value"),
-        (b"a = 1\na = 2\n", "line 2, column 6 | expected TOML | came: Cannot overwrite a value"),
-        (b"[a]\n[a]\n", "line 2, column 3 | expected TOML | came: Cannot declare ('a',) twice"),
-        (b'a = "open', "end of document | expected TOML | came: Unterminated string"),
-        (b"a = 1\n# caf\xe9\n", "line 2 | expected UTF-8 text | came byte 0xe9: save as UTF-8"),
+        (b'a = 1\nb = \nc = "x"\n', "line 2, column 5 | expected TOML | got: Invalid value"),
+        (b"a = 1\na = 2\n", "line 2, column 6 | expected TOML | got: Cannot overwrite a value"),
+        (b"[a]\n[a]\n", "line 2, column 3 | expected TOML | got: Cannot declare ('a',) twice"),
+        (b'a = "open', "end of document | expected TOML | got: Unterminated string"),
+        (b"a = 1\n# caf\xe9\n", "line 2 | expected UTF-8 text | got byte 0xe9: save as UTF-8"),
     ],
 )
 def test_what_is_not_toml_is_named_with_its_line(
@@ -83,21 +83,21 @@ def test_what_is_not_toml_is_named_with_its_line(
 
 
 def test_a_file_that_can_t_be_read_is_named(tmp_path: Path) -> None:
-    with pytest.raises(RigFileError, match=r"expected a readable TOML file \| came: No such file"):
+    with pytest.raises(RigFileError, match=r"expected a readable TOML file \| got: No such file"):
         read_toml(tmp_path / "none.toml", RigFileError)
-    with pytest.raises(RigFileError, match="came: Is a directory"):
+    with pytest.raises(RigFileError, match="got: Is a directory"):
         read_toml(tmp_path, RigFileError)
 
 
 @pytest.mark.parametrize(
     ("data", "expected"),
     [
-        ({"schema": 5}, ["schema | expected a valid string | came 5"]),
+        ({"schema": 5}, ["schema | expected a valid string | got 5"]),
         (
             {"schema_id": "x"},
             ["schema_id | expected one of the known keys (schema, time, inputs, pets, limits)"],
         ),
-        ({"inputs": [{"column": "a"}, {}]}, ["inputs.1.column | expected this key | came nothing"]),
+        ({"inputs": [{"column": "a"}, {}]}, ["inputs.1.column | expected this key | got nothing"]),
         (
             {"inputs": [{"column": "a", "x": 1}]},
             ["inputs.0.x | expected one of the known keys (column, scale)"],
@@ -106,11 +106,11 @@ def test_a_file_that_can_t_be_read_is_named(tmp_path: Path) -> None:
             {"pets": {"tom": {"kind": "cat", "legs": 4}}},
             ["pets.tom.lives | ", "pets.tom.legs | expected one of the"],
         ),
-        ({"pets": {"tom": {"kind": "cow"}}}, ["pets.tom.kind | expected one of 'cat', 'dog' | came 'cow'"]),
-        ({"pets": {"tom": {}}}, ["pets.tom.kind | expected one of 'cat', 'dog' | came nothing: add it"]),
+        ({"pets": {"tom": {"kind": "cow"}}}, ["pets.tom.kind | expected one of 'cat', 'dog' | got 'cow'"]),
+        ({"pets": {"tom": {}}}, ["pets.tom.kind | expected one of 'cat', 'dog' | got nothing: add it"]),
         (
             {"pets": {"tom": {"kind": "dog", "legs": {}}}},
-            ["pets.tom.legs | expected a valid integer | came a table"],
+            ["pets.tom.legs | expected a valid integer | got a table"],
         ),
         ({"limits": 5}, ["limits | expected "]),
         (
@@ -119,7 +119,7 @@ def test_a_file_that_can_t_be_read_is_named(tmp_path: Path) -> None:
         ),
         (
             {"limits": {"low": 2.0, "high": 1.0}},
-            ["limits.low | expected less than high | came 2.0", "limits.high | "],
+            ["limits.low | expected less than high | got 2.0", "limits.high | "],
         ),
     ],
 )
@@ -137,7 +137,7 @@ def test_a_union_s_members_do_not_show_as_keys() -> None:
 
 def test_a_long_value_is_cut() -> None:
     (line,) = lines({"schema": ["x" * 500]})
-    assert len(line.split("came ")[1]) == LONGEST_VALUE
+    assert len(line.split("got ")[1]) == LONGEST_VALUE
     assert line.endswith("...")
 
 

@@ -84,18 +84,18 @@ class TestTheExample:
 
 WRONG = [
     (("", "name", '""'), "name | expected"),
-    (("", "period_s", "0.0"), "period_s | expected greater than or equal to 0.001 | came 0.0"),
-    (("", "period_s", "0.0009"), "period_s | expected greater than or equal to 0.001 | came 0.0009"),
-    (("", "period_s", '"10ms"'), "period_s | expected a valid number | came '10ms'"),
+    (("", "period_s", "0.0"), "period_s | expected greater than or equal to 0.001 | got 0.0"),
+    (("", "period_s", "0.0009"), "period_s | expected greater than or equal to 0.001 | got 0.0009"),
+    (("", "period_s", '"10ms"'), "period_s | expected a valid number | got '10ms'"),
     (("", "period_s", "nan"), "period_s | expected"),
-    (("", "schema", '"hil.rig/2"'), "schema | expected 'hil.rig/1' | came 'hil.rig/2'"),
+    (("", "schema", '"hil.rig/2"'), "schema | expected 'hil.rig/1' | got 'hil.rig/2'"),
     (("can", "url", '""'), "can.url | expected"),
     (
         ("inverters.m1", "node_id", "128"),
-        "inverters.m1.node_id | expected less than or equal to 127 | came 128",
+        "inverters.m1.node_id | expected less than or equal to 127 | got 128",
     ),
-    (("inverters.m2", "node_id", "1"), "inverters.m2.node_id | expected another node id than m1 | came 1"),
-    (("inverters.m2", "node_id", "2.0"), "inverters.m2.node_id | expected a valid integer | came 2.0"),
+    (("inverters.m2", "node_id", "1"), "inverters.m2.node_id | expected another node id than m1 | got 1"),
+    (("inverters.m2", "node_id", "2.0"), "inverters.m2.node_id | expected a valid integer | got 2.0"),
     (("inverters.m1", "vendor_id", "0x100000000"), "inverters.m1.vendor_id | expected less than"),
     (("inverters.m1", "product_code", "-1"), "inverters.m1.product_code | expected greater than"),
     (("inverters.m1", "rated_torque_nm", "inf"), "inverters.m1.rated_torque_nm | expected a finite number"),
@@ -105,15 +105,15 @@ WRONG = [
     ),
     (
         ("inverters.m1", "mode", '"speed"'),
-        "inverters.m1.mode | expected 'cyclic_synchronous_torque' or 'profile_torque' | came 'speed'",
+        "inverters.m1.mode | expected 'cyclic_synchronous_torque' or 'profile_torque' | got 'speed'",
     ),
     (("inverters.m1", "mode", "10"), "inverters.m1.mode | expected 'cyclic_synchronous_torque' or"),
     (
         ("inverters.m1", "heartbeat_ms", "1"),
         "inverters.m1.heartbeat_ms | expected greater than or equal to 10",
     ),
-    (("plc", "port", "0"), "plc.port | expected greater than or equal to 1 | came 0"),
-    (("plc", "host", "127"), "plc.host | expected a valid string | came 127"),
+    (("plc", "port", "0"), "plc.port | expected greater than or equal to 1 | got 0"),
+    (("plc", "host", "127"), "plc.host | expected a valid string | got 127"),
     (("guard", "rate_limit_nm_per_s", "0.0"), "guard.rate_limit_nm_per_s | expected greater than 0"),
     (("guard", "prbs_limit_nm", "-5.0"), "guard.prbs_limit_nm | expected greater than 0"),
     (
@@ -122,17 +122,17 @@ WRONG = [
     ),
     (
         ("guard", "sum_limit_nm", "801.0"),
-        "guard.sum_limit_nm | expected at most the torque limits of m1 and m2 together (800) | came 801.0",
+        "guard.sum_limit_nm | expected at most the torque limits of m1 and m2 together (800) | got 801.0",
     ),
     (
         ("guard", "feedback_timeout_s", "0.005"),
         "guard.feedback_timeout_s | expected at least one period (0.01)",
     ),
-    (("prbs", "amplitude_nm", "true"), "prbs.amplitude_nm | expected a valid number | came True"),
+    (("prbs", "amplitude_nm", "true"), "prbs.amplitude_nm | expected a valid number | got True"),
     (("prbs", "clock_divider", "0"), "prbs.clock_divider | expected greater than or equal to 1"),
     (("prbs", "seed", "0"), "prbs.seed | expected greater than or equal to 1"),
-    (("prbs", "seed", "1024"), "prbs.seed | expected at most 1023, what 10 cells hold | came 1024"),
-    (("prbs", "source", '"moon"'), "prbs.source | expected 'plc' or 'host' | came 'moon'"),
+    (("prbs", "seed", "1024"), "prbs.seed | expected at most 1023, what 10 cells hold | got 1024"),
+    (("prbs", "source", '"moon"'), "prbs.source | expected 'plc' or 'host' | got 'moon'"),
     (("prbs", "target", '"shared"'), "prbs.share_m1 | expected the part of inverter m1"),
     (("prbs", "target", '"m1"\nshare_m1 = 0.5'), "prbs.share_m1 | expected no such key while target is 'm1'"),
     (("vehicle", "inertia_kg_m2", "-1.0"), "vehicle.inertia_kg_m2 | expected greater than 0"),
@@ -142,7 +142,7 @@ WRONG = [
     ),
     (
         ("experiments.cruise", "torque_nm", "581.0"),
-        "experiments.cruise.torque_nm | expected at most 580, what guard.sum_limit_nm leaves beside the PRBS",
+        "experiments.cruise.torque_nm | expected at most 580, what guard.sum_limit_nm leaves besides the PRBS",
     ),
     (
         ("experiments.cruise", "slew_nm_per_s", "4001.0"),
@@ -150,7 +150,7 @@ WRONG = [
     ),
     (
         ("experiments.reversal", "share_m1", "0.69"),
-        "experiments.reversal.torque_nm | expected at most 492.754, what inverters.m1.torque_limit_nm leaves beside",
+        "experiments.reversal.torque_nm | expected at most 492.754, what inverters.m1.torque_limit_nm leaves besides",
     ),
     (
         ("experiments.tip", "share_m1", "0.0"),
@@ -158,11 +158,11 @@ WRONG = [
     ),
     (
         ("experiments.reversal", "swing_nm", "500.5"),
-        "experiments.reversal.swing_nm | expected at most torque_nm of the same table (500) | came 500.5",
+        "experiments.reversal.swing_nm | expected at most torque_nm of the same table (500) | got 500.5",
     ),
     (
         ("experiments.tip", "step_nm", "500.5"),
-        "experiments.tip.step_nm | expected at most torque_nm of the same table (500) | came 500.5",
+        "experiments.tip.step_nm | expected at most torque_nm of the same table (500) | got 500.5",
     ),
     (("simulation", "seed", "-1"), "simulation.seed | expected greater than or equal to 0"),
     (
@@ -206,7 +206,7 @@ TABLES = {
 def test_a_missing_key_is_named(table: str, key: str, tmp_path: Path) -> None:
     where = without(table, key) if table else (rf"^{key} = [^\n]*\n", "")
     dotted = f"{table}.{key}" if table else key
-    assert problems_of(changed(tmp_path, where)) == [f"{dotted} | expected this key | came nothing: add it"]
+    assert problems_of(changed(tmp_path, where)) == [f"{dotted} | expected this key | got nothing: add it"]
 
 
 @pytest.mark.parametrize("table", [table for table in TABLES if table])
@@ -274,7 +274,7 @@ def test_simulation_and_experiments_may_be_left_out(tmp_path: Path) -> None:
 
 
 class TestFilesItNames:
-    def test_they_are_looked_for_beside_it(self, tmp_path: Path) -> None:
+    def test_they_are_looked_for_next_to_it(self, tmp_path: Path) -> None:
         (tmp_path / "drive.eds").write_text(data_file("inverter.eds").read_text("utf-8"), "utf-8")
         (tmp_path / "map.toml").write_text(data_file("plc.toml").read_text("utf-8"), "utf-8")
         path = changed(tmp_path, (r'^# eds = "inverter.eds"', 'eds = "drive.eds"'), (r"^# map = .plc", 'map = "map'))
@@ -295,13 +295,11 @@ class TestFilesItNames:
         self, change: tuple[str, str], key: str, tmp_path: Path
     ) -> None:
         (problem,) = problems_of(changed(tmp_path, change))
-        assert re.match(
-            rf"{key} \| expected an existing file, looked for {tmp_path}/none9*\.\w+ \| came 'none", problem
-        )
+        assert re.match(rf"{key} \| expected an existing file, looked for {tmp_path}/none9*\.\w+ \| got 'none", problem)
 
     def test_a_path_that_is_no_text_is_named(self, tmp_path: Path) -> None:
         (problem,) = problems_of(changed(tmp_path, (r'^# eds = "inverter.eds"', "eds = 5")))
-        assert problem == "inverters.m1.eds | expected the path of a file, as text | came 5"
+        assert problem == "inverters.m1.eds | expected the path of a file, as text | got 5"
 
     @pytest.mark.parametrize(
         ("content", "problem"),

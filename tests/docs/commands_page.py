@@ -95,13 +95,13 @@ def _section(name: str) -> Iterator[str]:
     own = command(name)
     inner = getattr(own, "commands", {})
     yield from (f"## hil {name}", "")
-    yield from _told(f"hil {name}", own, bool(inner))
+    yield from _in_words(f"hil {name}", own, bool(inner))
     for each, part in inner.items():
         yield from (f"### hil {name} {each}", "")
-        yield from _told(f"hil {name} {each}", part, False)
+        yield from _in_words(f"hil {name} {each}", part, False)
 
 
-def _told(name: str, given: Any, group: bool) -> Iterator[str]:
+def _in_words(name: str, given: Any, group: bool) -> Iterator[str]:
     """Yield usage, text, arguments, options and examples of one command."""
     arguments = [each for each in given.params if each.param_type_name == "argument"]
     options = [each for each in given.params if each.param_type_name == "option"]

@@ -22,10 +22,10 @@ from hil.rig.experiments.base import Phase
 from hil.rig.pacing import FreePacer, period_ns
 from hil.rig.plan import plan_run
 from hil.rig.realtime import real_time
-from hil.rig.sample import Sample
 from hil.rig.session import run_plan
 from hil.rig.stop import StopRequest
 from hil.rig.timing import RunTiming
+from hil.sample import Sample
 from hil.simulator.loopback import Address
 from hil.simulator.plant_factory import plant_for
 from hil.simulator.rig_server import RigServer
@@ -45,7 +45,7 @@ SHOWN_S = 24.0
 
 
 class Played(FakeSource):
-    """Says the bus's health again and again, as a rig does that goes on; ends when it is told to."""
+    """Says the bus's health again and again, as a rig does that continues; ends when it is ordered to."""
 
     _last: Sequence[Report] = ()
 

@@ -23,7 +23,7 @@ from hil.proof.seal import seal
 from hil.proof.wire.challenge import CONCEALED
 from hil.recording.columns import UNITS
 from hil.recording.formats import FORMATS
-from hil.rig.sample import SampleFlag
+from hil.sample import SampleFlag
 from tests.cli import bench
 from tests.docs.pages import DOCS, ROOT, blocks, pages
 
@@ -119,7 +119,7 @@ MODELS = [
 def test_a_shown_model_file_is_one(page: Path, model: str, tmp_path: Path) -> None:
     path = tmp_path / "model.toml"
     for block in blocks(page):
-        if block.language == "python" and block.title and "/" not in block.title:  # a module beside the model file
+        if block.language == "python" and block.title and "/" not in block.title:  # a module next to the model file
             (tmp_path / block.title).write_text(block.text, encoding="utf-8")
     path.write_text(model, encoding="utf-8")
     assert read_model(path, trust_laws=True).model.parameters

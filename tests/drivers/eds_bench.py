@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from drivers.datasheet.check import EdsReport, check_eds
 from drivers.datasheet.finding import Severity
+from drivers.eds_check import EdsReport, check_eds
 from drivers.resources import data_file
 
 E, W, N = Severity.ERROR, Severity.WARNING, Severity.NOTE

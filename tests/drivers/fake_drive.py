@@ -40,7 +40,7 @@ class FakeDrive:
     state, nmt
         What it is in.
     status_bits
-        Bits of the statusword beside the state.
+        Bits of the statusword next to the state.
     """
 
     def __init__(self, link: CanLink, eds_path: Path | None = None, node_id: int = M1.node_id) -> None:

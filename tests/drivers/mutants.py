@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from drivers.datasheet.check import check_eds
+from drivers.eds_check import check_eds
 
 KINDS = ("dropped", "blanked", "doubled", "another type")
 OTHER_VALUES = ("fast", "-1", "0xFFFFFFFFF", "3.5", "0x9", "ro", "$NODEID", "1")

@@ -147,7 +147,7 @@ def test_server_of_another_kind_is_refused(answer: bytes, reason: str) -> None:
 def server_without_bus() -> Iterator[str]:
     """A CAN server whose own bus is not there."""
     with RemoteServer("127.0.0.1", 0, interface="nosuchinterface", channel="x") as server:
-        server.handle_error = lambda request, client_address: None  # it prints what the client is told anyway
+        server.handle_error = lambda request, client_address: None  # it prints what the client receives anyway
         server.daemon_threads = False
         thread = threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True)
         thread.start()
@@ -231,7 +231,7 @@ def test_closed_link_is_bus_down(channel: str) -> None:
 
 
 @pytest.mark.parametrize("raised", [ProtocolViolation("frame of 3 bytes"), None])
-def test_frame_that_can_not_be_read_is_raised_once_and_receiving_goes_on(
+def test_frame_that_can_not_be_read_is_raised_once_and_receiving_continues(
     channel: str, raised: ProtocolViolation | None
 ) -> None:
     """A subscriber's own complaint, and what canopen's decoder makes of an NMT frame without data."""

@@ -127,7 +127,7 @@ def test_modes_name_themselves_and_their_support_bit() -> None:
     assert (TorqueMode.PROFILE_TORQUE.support_bit, TorqueMode(10).support_bit) == (1 << 3, 1 << 9)
 
 
-def test_bits_of_the_statusword_beside_the_state_are_those_of_the_standard() -> None:
+def test_bits_of_the_statusword_next_to_the_state_are_those_of_the_standard() -> None:
     """CiA 402-2, object 6041h; bit 12 as in cyclic synchronous torque mode."""
     assert {bit.name: bit.value for bit in StatusBit} == {
         "VOLTAGE_ENABLED": 0x0010,
@@ -154,6 +154,6 @@ def test_a_controlword_without_one_before_it_may_be_a_reset() -> None:
     assert command_of(0x0080) is Command.FAULT_RESET
 
 
-def test_a_code_of_no_state_is_told_by_its_own_bits() -> None:
-    with pytest.raises(ProtocolViolation, match=r"0x6041 is 0xFF10: .* came 0x00\.|0x6041 is 0xFF2A: .* came 0x2A\."):
+def test_a_code_of_no_state_is_reported_by_its_own_bits() -> None:
+    with pytest.raises(ProtocolViolation, match=r"0x6041 is 0xFF10: .* got 0x00\.|0x6041 is 0xFF2A: .* got 0x2A\."):
         state_of(0xFF2A)

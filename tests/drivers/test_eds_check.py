@@ -1,4 +1,4 @@
-"""What the EDS checker says of a whole file, where one fault has consequences or is told once for many places."""
+"""What the EDS checker says of a whole file, where one fault has consequences or is reported once for many places."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import pytest
 
 from drivers.capability.function import Function, Without
 from drivers.capability.table import TABLE
-from drivers.datasheet.check import EdsReport
 from drivers.datasheet.finding import EdsFinding, Severity
+from drivers.eds_check import EdsReport
 from tests.docs.pages import DOCS
 from tests.drivers.eds_bench import SHIPPED, E, N, W, checked, edited, line_of, without
 
@@ -135,7 +135,7 @@ COMPACT = "\n[2000]\nParameterName=x\nObjectType=8\nDataType=6\nAccessType=rw\nD
     [
         ("CompactSubObj=3", []),
         ("CompactSubObj=3\nSubNumber=0", []),
-        ("CompactSubObj=3\nSubNumber=4", ["0 beside CompactSubObj"]),
+        ("CompactSubObj=3\nSubNumber=4", ["0 next to CompactSubObj"]),
         ("CompactSubObj=255", ["a number from 0 to 254"]),
         ("CompactSubObj=few", ["sub-indices, or CompactSubObj"]),
         ("CompactSubObj=3\n[2000Name]\nNrOfEntries=2\n1=one\n2=two", []),
@@ -161,7 +161,7 @@ def test_missing_object_type_is_no_fault(tmp_path: Path) -> None:
     assert checked(tmp_path, edited("6071", "ObjectType=0x7\n", "")).findings == ()
 
 
-def test_spelling_is_told_once(tmp_path: Path) -> None:
+def test_spelling_is_reported_once(tmp_path: Path) -> None:
     text = re.sub(r"(?m)^\[(\w+)\]$", lambda match: f"[{match[1].upper()}]", SHIPPED)
     (finding,) = checked(tmp_path, text).findings
     assert (finding.severity, finding.line) == (N, 1)
@@ -189,7 +189,7 @@ def test_no_baud_rate_at_all(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("gone", "left"), [("1800", "1A00"), ("1A00", "1800"), ("1400", "1600"), ("1600", "1400")])
 def test_pdo_parameter_without_the_other(tmp_path: Path, gone: str, left: str) -> None:
     report = checked(tmp_path, without(gone))
-    assert any(each.place == f"[{left}]" and f"0x{gone} beside it" in each.expected for each in report.findings)
+    assert any(each.place == f"[{left}]" and f"0x{gone} next to it" in each.expected for each in report.findings)
     assert not report.usable
 
 
@@ -224,7 +224,7 @@ def test_filler_in_a_mapping(tmp_path: Path, mapping: str, allowed: str, wanted:
     assert all(any(want in each for each in said) for want in wanted)
 
 
-def test_node_guarding_is_told_and_switched_off(tmp_path: Path) -> None:
+def test_node_guarding_is_reported_and_switched_off(tmp_path: Path) -> None:
     """It excludes the heartbeat; where it can't be switched off that is an error."""
     described = "\n[{}]\nParameterName=x\nDataType={}\nAccessType=rw\nDefaultValue={}\n"
     listed = edited("OptionalObjects", "SupportedObjects=35", "SupportedObjects=37\n36=0x100C\n37=0x100D")

@@ -14,8 +14,8 @@ from drivers import resources
 from drivers.capability.carrier import TPDO
 from drivers.capability.carrier_search import find_carriers
 from drivers.capability.plan import plan_drive
-from drivers.datasheet.check import check_eds
 from drivers.datasheet.file import EdsFile
+from drivers.eds_check import check_eds
 from drivers.errors import ConfigMismatch
 from drivers.resources import data_file
 from drivers.scaling import IntegerType
@@ -204,5 +204,5 @@ def test_data_file_that_is_not_shipped_is_refused() -> None:
 
 
 def test_wheel_comes_before_checkout() -> None:
-    """An installed package must not read a folder beside it."""
+    """An installed package must not read a folder next to it."""
     assert resources._FOLDERS[0].parts[-2:] == ("drivers", "eds")

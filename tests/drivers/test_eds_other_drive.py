@@ -18,9 +18,9 @@ from drivers.capability.function import Function, Without
 from drivers.capability.plan import plan_drive
 from drivers.capability.speed_unit import SpeedUnit, SpeedUnitName
 from drivers.capability.table import TABLE
-from drivers.datasheet.check import check_eds
 from drivers.datasheet.file import EdsFile
 from drivers.datasheet.finding import Severity
+from drivers.eds_check import check_eds
 from drivers.errors import ConfigMismatch
 from drivers.inverter.acceptance import Acceptance
 from drivers.inverter.cia402 import PowerState

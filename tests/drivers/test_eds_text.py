@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.datasheet.check import check_eds
 from drivers.datasheet.file import EdsFile
 from drivers.datasheet.finding import Severity
 from drivers.datasheet.text import MAX_BYTES, EdsText, EdsUnreadable, read_eds_text
+from drivers.eds_check import check_eds
 from drivers.errors import ConfigMismatch
 
 
@@ -23,7 +23,7 @@ def read(folder: Path, content: str | bytes) -> EdsText:
     return read_eds_text(path)
 
 
-def told(text: EdsText) -> list[tuple[str, int | None, str]]:
+def reported(text: EdsText) -> list[tuple[str, int | None, str]]:
     return [(each.severity.value, each.line, each.found) for each in text.findings]
 
 
@@ -66,10 +66,10 @@ def test_sections_and_keys_have_the_lines_they_stand_in(tmp_path: Path, end: str
         (b"\xef\xbb\xbf[A]\nx=1\n", [("warning", 1, "a UTF-8 byte order mark")]),
     ],
 )
-def test_what_is_odd_is_told_with_its_line(
+def test_what_is_odd_is_reported_with_its_line(
     tmp_path: Path, content: str | bytes, findings: list[tuple[str, int, str]]
 ) -> None:
-    assert told(read(tmp_path, content)) == findings
+    assert reported(read(tmp_path, content)) == findings
 
 
 def test_first_of_two_keys_counts(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""What a data sheet has wrong that would be read as other numbers, and what of a drive a run has to be told."""
+"""What a data sheet has wrong that would be read as other numbers, and what of a drive a run has to know."""
 
 from __future__ import annotations
 
@@ -75,12 +75,12 @@ def test_max_torque_as_a_signed_number_means_the_same(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("value", ["0x00000065", "$NODEID", "$NODEID+0x40"])
-def test_drive_without_a_torque_mode_is_told(tmp_path: Path, value: str) -> None:
+def test_drive_without_a_torque_mode_is_reported(tmp_path: Path, value: str) -> None:
     """Also one that has a mode by chance, at some node ids."""
     text = edited("6502", "DefaultValue=0x00000208", f"DefaultValue={value}")
-    told = [each for each in checked(tmp_path, text).findings if each.place == "[6502] DefaultValue"]
-    assert [each.severity for each in told] == [W]
-    assert "4 (profile torque) or 10 (cyclic synchronous torque)" in told[0].expected
+    reported = [each for each in checked(tmp_path, text).findings if each.place == "[6502] DefaultValue"]
+    assert [each.severity for each in reported] == [W]
+    assert "4 (profile torque) or 10 (cyclic synchronous torque)" in reported[0].expected
 
 
 def with_counter(access: str = "rw") -> str:
@@ -92,9 +92,11 @@ def with_counter(access: str = "rw") -> str:
 
 
 @pytest.mark.parametrize(("access", "severity"), [("rw", W), ("const", E)])
-def test_sync_counter_is_told(access: str, severity: Severity, tmp_path: Path) -> None:
-    told = [each for each in checked(tmp_path, with_counter(access)).findings if each.place == "[1019] DefaultValue"]
-    assert [each.severity for each in told] == [severity]
+def test_sync_counter_is_reported(access: str, severity: Severity, tmp_path: Path) -> None:
+    reported = [
+        each for each in checked(tmp_path, with_counter(access)).findings if each.place == "[1019] DefaultValue"
+    ]
+    assert [each.severity for each in reported] == [severity]
 
 
 class CountsSync(FakeDrive):
@@ -107,7 +109,7 @@ class CountsSync(FakeDrive):
             super().take_sync(data)
 
 
-def test_drive_that_counts_syncs_is_told_and_set_to_take_ours(tmp_path: Path) -> None:
+def test_drive_that_counts_syncs_is_reported_and_set_to_take_ours(tmp_path: Path) -> None:
     path = tmp_path / "drive.eds"
     path.write_text(with_counter(), encoding="utf-8")
     with on_bus(CountsSync, eds_path=path) as (drive, inverter, link):

@@ -1,4 +1,4 @@
-"""Feedback that does not change: told from a quiet machine and from a slow one."""
+"""Feedback that does not change: distinguished from a quiet machine and from a slow one."""
 
 from __future__ import annotations
 

@@ -55,7 +55,7 @@ def test_device_that_is_another_is_found_and_refused(
             rig.m1.configure()
 
 
-def test_fault_is_told_without_anything_being_written() -> None:
+def test_fault_is_reported_without_anything_being_written() -> None:
     with bench(InverterFaults(fault=FaultAtStep(0, OVER_CURRENT))) as rig:
         assert str(rig.m1.fault()).startswith("power state is fault, error code 0x603F is 0x2310 continuous over-curr")
         assert rig.m1.fault() is not None  # reading it is no reset
@@ -107,7 +107,7 @@ def test_mapping_that_is_right_is_left_alone(index: int) -> None:
         rig.m1.configure()
 
 
-def test_option_code_of_the_drive_s_own_is_kept_and_told() -> None:
+def test_option_code_of_the_drive_s_own_is_kept_and_reported() -> None:
     with bench() as rig:
         rig.m1._sdo.download(0x605A, 0, 2)
         assert rig.m1.check() == ()
@@ -183,7 +183,7 @@ def test_drive_that_hangs_gives_no_feedback_then_loses_its_heartbeat() -> None:
             rig.until_raised()
 
 
-def test_drive_that_hangs_can_not_be_disarmed_and_every_step_is_told() -> None:
+def test_drive_that_hangs_can_not_be_disarmed_and_every_step_is_reported() -> None:
     with bench(InverterFaults(hang_at_step=1)) as rig:
         start(rig)
         rig.m1.await_feedback(rig.link.sync(), timeout_s=0.02)

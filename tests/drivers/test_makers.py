@@ -11,8 +11,8 @@ from drivers.canopen.can_link import CanLink
 from drivers.canopen.pdo_map import COB_ID_INVALID
 from drivers.capability.carrier import RPDO
 from drivers.capability.plan import plan_drive
-from drivers.datasheet.check import check_eds
 from drivers.datasheet.file import EdsFile
+from drivers.eds_check import check_eds
 from drivers.errors import ConfigMismatch
 from drivers.inverter.inverter import Inverter
 from hil.cli.main import run as command
@@ -55,7 +55,7 @@ def test_driven_without_a_flag_and_with_its_prbs_apart(maker: Maker, tmp_path: P
     torque = sum(np.array(driven.samples.column(f"torque_{name}_nm")) for name in ("m1", "m2"))
     assert set(np.abs(prbs)) == {prbs.max()} != {0.0}
     assert np.abs(torque - reference).max() < 8.0  # rounding of two drives, and 0.5 per mille of noise
-    assert np.abs(reference).max() > prbs.max()  # the base torque is beside it
+    assert np.abs(reference).max() > prbs.max()  # the base torque is next to it
 
 
 def test_mutants_run_or_are_refused_by_line(maker: Maker, tmp_path: Path) -> None:

@@ -10,8 +10,8 @@ from drivers.message_rate import CYCLES, MessageRate
 
 def run(per_cycle: list[int]) -> None:
     rate, count = MessageRate("inverter m1 (node 1)"), 0
-    for came in per_cycle:
-        count += came
+    for got in per_cycle:
+        count += got
         rate.take(count)
 
 

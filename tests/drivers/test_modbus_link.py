@@ -67,11 +67,11 @@ def test_an_exception_code_modbus_does_not_define() -> None:
 @pytest.mark.parametrize(
     ("pdu", "expected"),
     [
-        (b"\x03\x02\x12\x34", "expected 2 values, came 1"),
-        (b"\x03\x06\x00\x01\x00\x02\x00\x03", "expected 2 values, came 3"),
-        (b"\x04\x04\x12\x34\xab\xcd", "expected function 3, came function 4"),
-        (b"\x03\x09\x12\x34", "expected a Modbus answer, came bytes 03 09 12 34"),
-        (b"\x55\x01", "expected a Modbus answer, came bytes 55 01"),
+        (b"\x03\x02\x12\x34", "expected 2 values, got 1"),
+        (b"\x03\x06\x00\x01\x00\x02\x00\x03", "expected 2 values, got 3"),
+        (b"\x04\x04\x12\x34\xab\xcd", "expected function 3, got function 4"),
+        (b"\x03\x09\x12\x34", "expected a Modbus answer, got bytes 03 09 12 34"),
+        (b"\x55\x01", "expected a Modbus answer, got bytes 55 01"),
     ],
 )
 def test_a_wrong_answer_is_refused(pdu: bytes, expected: str) -> None:
@@ -88,7 +88,7 @@ WELL = b"\x03\x04\x12\x34\xab\xcd"
 
 
 @pytest.mark.parametrize(
-    ("answer", "came"),
+    ("answer", "got"),
     [
         (lambda request: frame(request, WELL, unit=9), "transaction id 1, unit id 9"),
         (lambda request: frame(request, WELL, transaction=4711), "transaction id 4711, unit id 1"),
@@ -97,8 +97,8 @@ WELL = b"\x03\x04\x12\x34\xab\xcd"
         (lambda request: 2 * frame(request, WELL, transaction=4711), "transaction id 4711, unit id 1"),
     ],
 )
-def test_an_answer_with_other_identifiers_is_told_as_such(answer: Answer, came: str) -> None:
-    with pytest.raises(ProtocolViolation, match=rf"transaction id 1, unit id 1, came {came}"):
+def test_an_answer_with_other_identifiers_is_reported_as_such(answer: Answer, got: str) -> None:
+    with pytest.raises(ProtocolViolation, match=rf"transaction id 1, unit id 1, got {got}"):
         read_from(answer)
 
 
@@ -131,15 +131,15 @@ def test_a_late_answer_is_not_taken_for_that_of_the_next_request_and_is_no_wrong
 
 
 @pytest.mark.parametrize(
-    ("answer", "came"),
+    ("answer", "got"),
     [
         (lambda request: b"HTTP/1.1 400 Bad Request\r\n\r\n", "only 28 bytes came that are no whole one (48 54 54 50"),
         (lambda request: frame(request, b"\x03\x04\x12\x34\xab\xcd")[:6], "only 6 bytes came that are no whole one"),
     ],
     ids=["not Modbus", "half an answer"],
 )
-def test_what_is_no_whole_answer_is_shown(answer: Answer, came: str) -> None:
-    with pytest.raises(DeviceTimeout, match=re.escape(f"expected an answer within 0.1 s, {came}")):
+def test_what_is_no_whole_answer_is_shown(answer: Answer, got: str) -> None:
+    with pytest.raises(DeviceTimeout, match=re.escape(f"expected an answer within 0.1 s, {got}")):
         read_from(answer)
 
 
@@ -164,7 +164,7 @@ def test_a_confirmed_write_passes() -> None:
 
 @pytest.mark.parametrize("confirmed", [b"\x10\x00\x06\x00\x02", b"\x10\x00\x05\x00\x01"])
 def test_a_write_confirmed_for_something_else_is_refused(confirmed: bytes) -> None:
-    with pytest.raises(ProtocolViolation, match="expected address 5, count 2 confirmed, came address"):
+    with pytest.raises(ProtocolViolation, match="expected address 5, count 2 confirmed, got address"):
         write_to(lambda request: frame(request, confirmed))
 
 

@@ -44,7 +44,7 @@ def test_both_sides_want_a_certificate_and_tls_1_2(context: type, tmp_path: Path
 @pytest.mark.parametrize("missing", ["ca", "certificate", "key"])
 def test_a_file_that_is_not_there_is_named(missing: str, tmp_path: Path) -> None:
     credentials = replace(Authority(tmp_path).issue("client"), **{missing: tmp_path / "gone.pem"})
-    with pytest.raises(ConfigMismatch, match=r"gone\.pem.*expected PEM files .*, came: No such file"):
+    with pytest.raises(ConfigMismatch, match=r"gone\.pem.*expected PEM files .*, got: No such file"):
         client_context(credentials)
 
 
@@ -77,7 +77,7 @@ def test_a_key_with_a_password_is_refused_and_nobody_is_asked(tmp_path: Path) ->
         (ssl.SSLError(1, "what OpenSSL has no reason for"), "the handshake failed .*no reason for"),
     ],
 )
-def test_a_failure_without_a_known_reason_is_told_as_it_came(cause: Exception | None, said: str) -> None:
+def test_a_failure_without_a_known_reason_is_reported_as_it_came(cause: Exception | None, said: str) -> None:
     failure = tls_failure("PLC at 127.0.0.1:802", cause)
-    with pytest.raises(ConfigMismatch, match=f"^PLC at 127.0.0.1:802: expected a TLS connection .*came: .*{said}"):
+    with pytest.raises(ConfigMismatch, match=f"^PLC at 127.0.0.1:802: expected a TLS connection .*got: .*{said}"):
         raise failure

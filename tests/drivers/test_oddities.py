@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from drivers.datasheet.check import check_eds
 from drivers.datasheet.finding import Severity
 from drivers.datasheet.sheet import Commissioning, read_commissioning
 from drivers.datasheet.text import read_eds_text
+from drivers.eds_check import check_eds
 from tests.drivers.maker_files import COMPLETE, EPOS_DCF, FIXED, I8, I16, U8, U16, U32, Entry, Maker, fixed, pdo, pdos
 from tests.drivers.maker_rig import drive
 
@@ -122,13 +122,13 @@ def test_count_of_mapped_objects_above_64(count: int, tmp_path: Path) -> None:
         ("", "250 kbit", Commissioning(None, None, "front")),
     ],
 )
-def test_commissioning_that_can_not_be_is_left_out_and_told(
+def test_commissioning_that_can_not_be_is_left_out_and_reported(
     node: str, rate: str, read: Commissioning, tmp_path: Path
 ) -> None:
     text = EPOS_DCF.text().replace("NodeID=1", f"NodeID={node}").replace("Baudrate=250", f"Baudrate={rate}")
     path = tmp_path / "drive.dcf"
     path.write_text(text)
     assert read_commissioning(read_eds_text(path)) == read
-    told = [each.place for each in check_eds(path).findings if each.place.startswith("[DeviceComissioning]")]
+    reported = [each.place for each in check_eds(path).findings if each.place.startswith("[DeviceComissioning]")]
     wrong = [("NodeID", node and read.node_id is None), ("Baudrate", read.bit_rate_kbit_s is None)]
-    assert told == [f"[DeviceComissioning] {key}" for key, is_wrong in wrong if is_wrong]
+    assert reported == [f"[DeviceComissioning] {key}" for key, is_wrong in wrong if is_wrong]

@@ -170,7 +170,7 @@ def test_who_switches_it_off_comes_behind_who_still_switches_it_on() -> None:
 def test_a_setting_that_does_not_fit_its_register_changes_nothing() -> None:
     async def conversation(plc: Plc, _: ServedPlc) -> None:
         await start(plc)
-        with pytest.raises(ConfigMismatch, match="expected a number that fits uint16, came 70000"):
+        with pytest.raises(ConfigMismatch, match="expected a number that fits uint16, got 70000"):
             await start(plc, replace(SETTINGS, clock_divider=70000))
         assert (await plc.read_status()).prbs == SETTINGS
 
@@ -199,7 +199,7 @@ class LimitingPlc(PlcDevice):
 
 def test_a_setting_the_plc_quietly_changes_is_raised() -> None:
     async def conversation(plc: Plc, _: ServedPlc) -> None:
-        with pytest.raises(ProtocolViolation, match=r"prbs_amplitude.*expected to read back .* as written, came"):
+        with pytest.raises(ProtocolViolation, match=r"prbs_amplitude.*expected to read back .* as written, got"):
             await start(plc)
         assert not (await plc.read_status()).prbs.enabled
 
@@ -330,7 +330,7 @@ def test_words_that_mean_nothing_are_refused(tmp_path: Path) -> None:
     path.write_text(re.sub(r"series = 1, parallel = 2, electric = 3", "series = 4", MAP_TEXT, count=1), "utf-8")
 
     async def conversation(plc: Plc, _: ServedPlc) -> None:
-        with pytest.raises(ProtocolViolation, match=r"expected one of \{'series': 4\}, came 1"):
+        with pytest.raises(ProtocolViolation, match=r"expected one of \{'series': 4\}, got 1"):
             await plc.read_status()
 
     talk(PlcDevice(), conversation, map_=load_register_map(path))
@@ -351,7 +351,7 @@ MAP_TEXT = data_file("plc.toml").read_text("utf-8")
 )
 def test_a_unit_the_driver_can_t_work_with_is_refused(name: str, unit: str, expected: str) -> None:
     registers = {**MAP.registers, name: MAP[name].model_copy(update={"unit": unit})}
-    with pytest.raises(ConfigMismatch, match=rf"register map .*: {name}: expected unit {expected}, came {unit}\."):
+    with pytest.raises(ConfigMismatch, match=rf"register map .*: {name}: expected unit {expected}, got {unit}\."):
         Plc("127.0.0.1", 1, MAP.model_copy(update={"registers": registers}))
 
 

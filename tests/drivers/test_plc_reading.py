@@ -75,7 +75,7 @@ def test_zero_is_plausible_everywhere(name: str) -> None:
     assert reading(name, there, (0, 0)).problem is None
 
 
-def test_what_is_no_value_at_all_is_told() -> None:
+def test_what_is_no_value_at_all_is_reported() -> None:
     there = register("float32", "Nm", HIGH)
     nothing = reading("torque_limit", there, (0x7FC0, 0))
     assert (nothing.value, nothing.shown) == (None, "–")

@@ -49,7 +49,7 @@ def test_command_still_waiting_for_sync_does_not_survive_it() -> None:
         assert rig.rig.torque_nm[0] == 0.0
 
 
-def test_drive_that_does_not_leave_operation_is_told() -> None:
+def test_drive_that_does_not_leave_operation_is_reported() -> None:
     with bench() as rig:
         running(rig)
         rig.rig._m1._server.ignored_writes = frozenset({0x6040})
@@ -57,7 +57,7 @@ def test_drive_that_does_not_leave_operation_is_told() -> None:
             rig.m1.quick_stop()
 
 
-def test_ramp_that_does_not_end_in_time_is_told_with_the_torque_that_is_left() -> None:
+def test_ramp_that_does_not_end_in_time_is_reported_with_the_torque_that_is_left() -> None:
     settings = replace(M1, option_codes={0x605A: 1}, torque_slope_nm_per_s=0.6, state_timeout_s=0.05)
     with bench(InverterFaults(), settings=settings) as rig:
         running(rig)

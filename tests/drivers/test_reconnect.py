@@ -6,9 +6,9 @@ import can
 import pytest
 
 from drivers.canopen.can_link import BUS_OFF, CanLink
-from drivers.canopen.reconnect import reconnect
 from drivers.errors import BusDown, CommandRefused, DeviceTimeout
 from drivers.inverter.cia402 import PowerState
+from drivers.inverter.reconnect import reconnect
 from tests.drivers.can_bench import HASTY_M1, M1, M2, bench, guarded, new_channel, virtual_bus
 
 
@@ -76,7 +76,7 @@ def test_drive_that_does_not_answer_keeps_the_bus_from_being_used() -> None:
 
 
 def test_bus_that_is_not_there_is_tried_for_so_long_and_no_longer(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("drivers.canopen.reconnect.RETRY_S", 0.001)
+    monkeypatch.setattr("drivers.inverter.reconnect.RETRY_S", 0.001)
     tries: list[str] = []
 
     def refuse(url: str) -> CanLink:
@@ -90,7 +90,7 @@ def test_bus_that_is_not_there_is_tried_for_so_long_and_no_longer(monkeypatch: p
 
 
 def test_bus_that_comes_back_is_used(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("drivers.canopen.reconnect.RETRY_S", 0.001)
+    monkeypatch.setattr("drivers.inverter.reconnect.RETRY_S", 0.001)
     channel, tries = new_channel(), []
     opened = CanLink.open
 

@@ -85,7 +85,7 @@ def test_known_words(entry: Register, value: Value, words: tuple[int, ...]) -> N
     ],
 )
 def test_what_does_not_fit_is_refused(entry: Register, value: Value, expected: str) -> None:
-    with pytest.raises(ConfigMismatch, match=f"10 \\(Under test\\): expected {expected}.*came"):
+    with pytest.raises(ConfigMismatch, match=f"10 \\(Under test\\): expected {expected}.*got"):
         entry.encode(value)
 
 
@@ -93,10 +93,10 @@ def test_what_does_not_fit_is_refused(entry: Register, value: Value, expected: s
     ("entry", "words", "expected"),
     [
         (ENUM, (1,), "one of"),
-        (FLOAT, (0x0000, 0x7FC0), "a finite number, came nan"),
-        (FLOAT, (0x0000, 0x7F80), "a finite number, came inf"),
-        (FLOAT, (0x0000,), r"2 word\(s\), came 1"),
-        (COIL, (), r"1 word\(s\), came 0"),
+        (FLOAT, (0x0000, 0x7FC0), "a finite number, got nan"),
+        (FLOAT, (0x0000, 0x7F80), "a finite number, got inf"),
+        (FLOAT, (0x0000,), r"2 word\(s\), got 1"),
+        (COIL, (), r"1 word\(s\), got 0"),
     ],
 )
 def test_words_that_mean_nothing_are_refused(entry: Register, words: tuple[int, ...], expected: str) -> None:
@@ -141,13 +141,13 @@ GOOD = {
 @pytest.mark.parametrize(
     ("change", "expected"),
     [
-        ({"kind": "coil"}, "type bool for coils and discrete inputs and only there, came type uint16"),
+        ({"kind": "coil"}, "type bool for coils and discrete inputs and only there, got type uint16"),
         ({"type": "bool"}, "type bool for coils"),
-        ({"type": "uint32"}, "word_order for 32-bit types and only there, came type uint32"),
-        ({"word_order": "high_word_first"}, "word_order for 32-bit types and only there, came type uint16"),
+        ({"type": "uint32"}, "word_order for 32-bit types and only there, got type uint32"),
+        ({"word_order": "high_word_first"}, "word_order for 32-bit types and only there, got type uint16"),
         ({"type": "float32", "word_order": "low_word_first", "scale": 0.1}, "scale for integer types only"),
-        ({"type": "enum"}, "values for type enum and only there, came type enum"),
-        ({"values": {"a": 1}}, "values for type enum and only there, came type uint16"),
+        ({"type": "enum"}, "values for type enum and only there, got type enum"),
+        ({"values": {"a": 1}}, "values for type enum and only there, got type uint16"),
         ({"type": "enum", "values": {"a": 1, "b": 1}}, "another number for each name"),
         ({"access": "read_write"}, "Modbus can't write a input_register"),
         ({"address": 65535, "type": "int32", "word_order": "low_word_first"}, "below address 65536"),

@@ -144,8 +144,8 @@ def test_a_map_the_driver_can_t_use_is_refused_with_all_reasons(tmp_path: Path) 
         require_usable(load_register_map(path))
     for reason in (
         "expected a register plc_count, there is none",
-        "clutch: expected names out of closed, open, came ajar",
-        "prbs_seed: expected access read_write, came read",
-        "host_count: expected type uint16 or uint32, came int16",
+        "clutch: expected names out of closed, open, got ajar",
+        "prbs_seed: expected access read_write, got read",
+        "host_count: expected type uint16 or uint32, got int16",
     ):
         assert reason in str(refusal.value)

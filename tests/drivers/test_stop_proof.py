@@ -105,7 +105,7 @@ def test_what_the_drive_lacks_is_refused_until_somebody_accepts_it_by_name(
     assert protections[other].proof.startswith("proven after 0.")
 
 
-def test_drive_that_stops_by_itself_without_a_deadline_is_told(tmp_path: Path) -> None:
+def test_drive_that_stops_by_itself_without_a_deadline_is_reported(tmp_path: Path) -> None:
     """It has none of CiA 301, but a watchdog of its maker's."""
     eds = tmp_path / "own.eds"
     eds.write_text(without("1400sub5"))

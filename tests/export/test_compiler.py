@@ -12,8 +12,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.identification.identify import Settings
 from estimator.identification.linear_model import Orders
+from estimator.identification.settings import Settings
 from hil.export.filling import Precision, project
 from hil.export.plc_estimator import PlcEstimator
 from tests.export.pyplcopen_dialect import in_dialect

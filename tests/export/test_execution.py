@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from estimator.identification.identify import Settings
+from estimator.identification.chain import OnlineChain
 from estimator.identification.linear_model import Orders
 from estimator.identification.online.adaptation import Adaptation
-from estimator.identification.online.chain import OnlineChain
 from estimator.identification.online.recursive import Status
+from estimator.identification.settings import Settings
 from estimator.signals.record import FloatArray
 from hil.export.filling import Precision
 from hil.export.plc_estimator import PlcEstimator
@@ -138,5 +138,5 @@ def test_in_single_precision_no_number_is_lost_and_the_model_is_the_same(L: Floa
         type(model).from_theta(theta.astype(float), model.orders, 0.02).response(frequency_hz)
         for theta in (plc.theta[-1], host.theta[-1])
     )
-    # A hundredth of the 1 dB the two estimates of one drive may differ by: rounding must not count beside noise.
+    # A hundredth of the 1 dB the two estimates of one drive may differ by: rounding must not count next to noise.
     assert np.abs(20.0 * np.log10(np.abs(single / double))).max() < 0.01 * 1.0

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from estimator.identification.identify import Settings
 from estimator.identification.online.recursive import Trajectory
+from estimator.identification.settings import Settings
 from hil.export.plc_estimator import PlcEstimator
 from hil.export.profiles import profile
 from tests.export.drives import bad_drive

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from lxml import etree
 
-from estimator.identification.identify import Settings
 from estimator.identification.linear_model import Orders
+from estimator.identification.settings import Settings
 from hil.export.filling import Precision, project
 from hil.export.plc_estimator import PlcEstimator
 from hil.export.plcopen import Tc6, plcopen_xml

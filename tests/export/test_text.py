@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from estimator.errors import BadModel, BadSetting
-from estimator.identification.identify import Settings
 from estimator.identification.linear_model import Orders
 from estimator.identification.online import regression_kernel
+from estimator.identification.settings import Settings
 from estimator.signals import decimate_kernel
 from estimator.signals.record import FloatArray
 from hil.export.filling import POUS, Precision, project

@@ -1,4 +1,4 @@
-"""Colours of lines that are told from one another stay apart for the colour-blind, and can be seen on white."""
+"""Colours of lines differ for the colour-blind as well, and can be seen on white."""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ def test_at_standstill_nothing_rolls() -> None:
         ({"roughness_nm": 8.0}, 8.0),
     ],
 )
-def test_road_and_surface_spread_as_they_are_told(changed: dict[str, float], spread_nm: float) -> None:
+def test_road_and_surface_spread_as_they_are_reported(changed: dict[str, float], spread_nm: float) -> None:
     conditions = Conditions(**{**{name: getattr(CALM, name) for name in CALM.__slots__}, **changed})
     assert loads(conditions).std() == pytest.approx(spread_nm, rel=0.15)
 

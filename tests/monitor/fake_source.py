@@ -1,4 +1,4 @@
-"""A source that says what a test has it say, and remembers what it was told."""
+"""A source that says what a test has it say, and remembers what it was sent."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from hil.monitor.messages import (
     Report,
     TimingHealth,
 )
-from hil.rig.sample import Sample, SampleFlag
+from hil.sample import Sample, SampleFlag
 
 PERIOD_S = 0.01
 

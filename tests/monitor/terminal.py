@@ -71,7 +71,7 @@ class Terminal:
         return termios.tcgetattr(self._slave)
 
     def resize(self, columns: int, rows: int) -> None:
-        """Give the terminal another size, as a window manager does; its program is told by SIGWINCH."""
+        """Give the terminal another size, as a window manager does; its program is informed by SIGWINCH."""
         self._screen.resize(rows, columns)
         fcntl.ioctl(self._master, termios.TIOCSWINSZ, struct.pack("HHHH", rows, columns, 0, 0))
 
@@ -102,7 +102,7 @@ class Terminal:
                 while self._read():
                     pass
                 return os.waitstatus_to_exitcode(status)
-            assert time.monotonic() < until, f"the program goes on:\n{self.text}"
+            assert time.monotonic() < until, f"the program continues:\n{self.text}"
 
     def _read(self) -> bool:
         """Take what came within a moment; False where the program has closed its end, or said nothing at its end."""

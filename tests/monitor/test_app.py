@@ -1,4 +1,4 @@
-"""Keys of the view against a source that remembers what it was told."""
+"""Keys of the view against a source that remembers what it was sent."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ from estimator.identification.tracking.state import TrackingState
 from estimator.physics.twist import Shaft
 from hil.monitor.live_estimation import LiveEstimation
 from hil.rig.live import LiveEstimate, OnlineSetup, tracking_chain, tracking_settings
-from hil.rig.sample import Sample, SampleFlag
+from hil.sample import Sample, SampleFlag
 from hil.simulator.simulation_model import DEFAULT_BUS
 from tests.estimator.identification.tracking import roads
 from tests.estimator.identification.tracking.drives import drives
@@ -95,7 +95,7 @@ def test_the_history_outlives_a_run_and_the_trail_does_not(rows: list[Sample]) -
     assert seen.status == "waits for samples"
 
 
-def test_a_period_the_models_have_no_multiple_of_is_told() -> None:
+def test_a_period_the_models_have_no_multiple_of_is_reported() -> None:
     live = LiveEstimation(0.003)
     live.begin()
     live.take([sample(0)])

@@ -17,7 +17,7 @@ from hil.monitor.panel import LEAST_WIDTH, Draw, drawn
 from hil.monitor.snapshot import Activity, History, Model, Snapshot
 from hil.monitor.state import LiveState
 from hil.rig.experiments.base import Phase
-from hil.rig.sample import SampleFlag
+from hil.sample import SampleFlag
 from tests.monitor.fake_source import PERIOD_S, health, node, sample
 
 DRAWN: tuple[Draw, ...] = (
@@ -264,14 +264,14 @@ def test_while_the_drives_are_armed_nothing_old_is_shown() -> None:
         assert "answers" not in text
 
 
-@pytest.mark.parametrize(("silent_s", "told"), [(0.5, False), (3.2, True)])
-def test_a_source_that_says_nothing_is_told(silent_s: float, told: bool) -> None:
+@pytest.mark.parametrize(("silent_s", "reported"), [(0.5, False), (3.2, True)])
+def test_a_source_that_says_nothing_is_reported(silent_s: float, reported: bool) -> None:
     live = LiveState("bus", PERIOD_S, None, can_drive=True)
     live.take(Ready())
     live.take(health())
     shown = live.snapshot(silent_s)
-    assert ("NO NEWS for 3 s" in head_panels.headline(shown, 80, 1)[0]) == told
-    assert bus_panels.full(shown, 80, 22)[0].endswith("NO NEWS 3 s" if told else "OK")
+    assert ("NO NEWS for 3 s" in head_panels.headline(shown, 80, 1)[0]) == reported
+    assert bus_panels.full(shown, 80, 22)[0].endswith("NO NEWS 3 s" if reported else "OK")
 
 
 def test_a_long_message_says_where_the_rest_is() -> None:

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from hil.monitor.quality import NO_VALUE, STANDS_STILL_S, WINDOW_S, Quality, QualityWatch, words
-from hil.rig.sample import SampleFlag
+from hil.sample import SampleFlag
 from tests.monitor.fake_source import PERIOD_S, sample
 
 GOOD, M1, M2, LATE = SampleFlag.GOOD, SampleFlag.M1_STALE, SampleFlag.M2_STALE, SampleFlag.LATE

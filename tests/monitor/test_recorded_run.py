@@ -25,9 +25,9 @@ from hil.rig.drive import Observer, Recorder
 from hil.rig.experiments.base import Phase
 from hil.rig.live import USUAL, OnlineSetup, tracking_settings
 from hil.rig.live_replay import Pace, play_record
-from hil.rig.sample import Sample
 from hil.rig.stop import StopRequest
 from hil.rig.timing import RunTiming
+from hil.sample import Sample
 from hil.simulator.simulation_model import DEFAULT_BUS
 from hil.store import RunStore
 from hil.store.entry import ONLINE
@@ -51,7 +51,7 @@ def rows() -> list[Sample]:
     return found
 
 
-class Told(Outbox):
+class Kept(Outbox):
     """An outbox whose reports stay here."""
 
     def __init__(self) -> None:
@@ -82,16 +82,16 @@ def drive(rig_path: Path, monkeypatch: pytest.MonkeyPatch) -> Drive:
             raise DeviceTimeout("inverter m2: no TPDO")
 
         monkeypatch.setattr(recorded_run, "run_plan", cycles)
-        told = Told()
-        run = RecordedRun(rig_path, read_rig(rig_path), out, "cruise", told, setup)
+        reported = Kept()
+        run = RecordedRun(rig_path, read_rig(rig_path), out, "cruise", reported, setup)
         run.drive(cast(Devices, None), StopRequest(), RunTiming(10_000_000), lambda t_ns: None, {})
-        assert not any(isinstance(report, Notice) for report in told.reports), told.reports
-        return next(report for report in told.reports if isinstance(report, Over))
+        assert not any(isinstance(report, Notice) for report in reported.reports), reported.reports
+        return next(report for report in reported.reports if isinstance(report, Over))
 
     return run
 
 
-def test_a_change_is_kept_beside_the_recording_and_in_the_store(
+def test_a_change_is_kept_next_to_the_recording_and_in_the_store(
     rows: list[Sample], drive: Drive, tmp_path: Path
 ) -> None:
     over = drive(rows, tmp_path)

@@ -15,8 +15,8 @@ from hil.monitor.replay_source import ReplaySource, recorded_samples
 from hil.recording.writer import RecordingWriter
 from hil.rig.build import open_devices
 from hil.rig.experiments.base import Phase
-from hil.rig.sample import Sample, SampleFlag
 from hil.rig.trace import BusTrace
+from hil.sample import Sample, SampleFlag
 from tests.monitor.fake_source import sample
 from tests.rig.serving import Samples as Recorded
 from tests.rig.serving import run, served
@@ -77,7 +77,7 @@ def test_a_recording_of_the_four_columns_will_do(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("rows", "said"),
-    [("0,1,2,3\n0,1,2,3\n", "rise"), ("0,1,2,3\n", "came 1"), ("0,1,2,x\n", "column speed_rad_s")],
+    [("0,1,2,3\n0,1,2,3\n", "rise"), ("0,1,2,3\n", "got 1"), ("0,1,2,x\n", "column speed_rad_s")],
 )
 def test_a_recording_that_can_not_be_played_is_refused(tmp_path: Path, rows: str, said: str) -> None:
     path = tmp_path / "r.csv"

@@ -1,4 +1,4 @@
-"""What the view knows after what it was told."""
+"""What the view knows after what it was sent."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hil.monitor.outcome import outcome
 from hil.monitor.snapshot import Activity
 from hil.monitor.state import WINDOWS_S, LiveState
 from hil.rig.experiments.base import Phase
-from hil.rig.sample import SampleFlag
+from hil.sample import SampleFlag
 from hil.simulator.simulation_model import DEFAULT_BUS
 from tests.monitor.fake_source import PERIOD_S, sample
 
@@ -73,7 +73,7 @@ def test_the_window_holds_what_it_says_at_every_zoom() -> None:
     np.testing.assert_allclose(spans, WINDOWS_S, atol=1.01 * PERIOD_S)
 
 
-def test_a_lost_bus_is_told_once_and_its_return_too() -> None:
+def test_a_lost_bus_is_reported_once_and_its_return_too() -> None:
     live = state()
     for report in (Ready(), Lost("no bus"), Lost("no bus"), Ready()):
         live.take(report)
@@ -89,7 +89,7 @@ def test_the_end_stays_known() -> None:
     assert live.snapshot().headline.message == "gone"
 
 
-def test_samples_that_were_not_sent_are_told() -> None:
+def test_samples_that_were_not_sent_are_reported() -> None:
     live = state()
     live.take(Samples(((sample(0), None),), lost=12))
     assert "12 samples not shown" in live.snapshot().log[-1].text

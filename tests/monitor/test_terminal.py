@@ -133,7 +133,7 @@ def test_a_terminal_that_goes_away_leaves_nothing_armed(rig_path: Path, tmp_path
 
 
 @LONGER
-def test_a_killed_rig_process_is_told(rig_path: Path, tmp_path: Path) -> None:
+def test_a_killed_rig_process_is_reported(rig_path: Path, tmp_path: Path) -> None:
     with watched(rig_path, tmp_path / "runs") as (terminal, _):
         for child in children(terminal.pid):
             os.kill(child, signal.SIGKILL)

@@ -31,7 +31,7 @@ def test_without_a_terminal(rig_path: Path) -> None:
 def test_a_terminal_that_is_too_small(rig_path: Path, columns: int, rows: int) -> None:
     with Terminal("monitor", str(rig_path), columns=columns, rows=rows) as terminal:
         assert terminal.await_end() == 2
-        assert f"at least 80 x 24, came {columns} x {rows}" in " ".join(terminal.text.split())
+        assert f"at least 80 x 24, got {columns} x {rows}" in " ".join(terminal.text.split())
         assert LEAVE_SCREEN not in terminal.output  # it was never taken
 
 
@@ -57,7 +57,7 @@ def identification(period_s: float, filter_l: list[float]) -> dict[str, object]:
         ((), "rig file to watch, or --replay"),
         (("RIG", "--page", "poles"), "overview, model, resonance, bus, log"),
         (("RIG", "--size", "80"), "COLSxROWS"),
-        (("RIG", "--replay", "r.csv", "--simulate"), "came both"),
+        (("RIG", "--replay", "r.csv", "--simulate"), "got both"),
         (("RIG", "--replay", "r.csv"), "r.csv"),
         (("RIG", "--model", "one_mass.toml"), "two_mass"),
         (("RIG", "--out", "rig.toml"), "is a file"),

@@ -95,7 +95,7 @@ def test_the_real_command_is_run_and_its_failure_is_quoted(tmp_path):
         run_hil(["--help"], tmp_path, 0.01)
 
 
-def test_a_campaign_goes_on_where_it_ended_and_repeats_what_failed(tool, tmp_path, capsys):
+def test_a_campaign_continues_where_it_ended_and_repeats_what_failed(tool, tmp_path, capsys):
     arguments = ["--kinds", "backlash,off", "--out", str(tmp_path)]
     assert campaign.main(["--seeds", "1", *arguments]) == 0
     lines = (tmp_path / "results.jsonl").read_text().splitlines()

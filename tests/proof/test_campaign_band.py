@@ -1,4 +1,4 @@
-"""The score of a told frequency band: in a case's row, in the summary, on the scoreboard."""
+"""The score of a reported frequency band: in a case's row, in the summary, on the scoreboard."""
 
 import json
 import re
@@ -25,7 +25,7 @@ def _truth(name, seed=SEED):
     return json.loads(json.dumps(draw_specimen(name, seed).truth()))
 
 
-def _told(band_hz):
+def _with_band(band_hz):
     return {"mismatch": {"band_hz": band_hz}}
 
 
@@ -38,7 +38,7 @@ def rest_of_a_gap():
 def of_a_gap(monkeypatch, rest_of_a_gap):
     """The score of a band from 0 to 50 Hz, which tells the true one too; the bus is driven once for all tests."""
     monkeypatch.setattr(campaign_band, "true_rest_rad_s", lambda specimen: rest_of_a_gap)
-    return score_band(GAP, SEED, _truth("backlash"), _told([0.0, 50.0]))
+    return score_band(GAP, SEED, _truth("backlash"), _with_band([0.0, 50.0]))
 
 
 def test_a_band_of_everything_has_all_the_power_and_is_not_right(of_a_gap):
@@ -53,7 +53,7 @@ def test_the_band_of_the_truth_is_right_and_a_gap_shakes_the_shaft(of_a_gap):
     low, high = of_a_gap["true_hz"]
     assert low < 10.0
     assert high > 6.0
-    score = score_band(GAP, SEED, _truth("backlash"), _told(of_a_gap["true_hz"]))
+    score = score_band(GAP, SEED, _truth("backlash"), _with_band(of_a_gap["true_hz"]))
     assert score["right"]
     assert score["power_share"] >= CENTRAL
     assert score["width_ratio"] == 1.0
@@ -61,16 +61,21 @@ def test_the_band_of_the_truth_is_right_and_a_gap_shakes_the_shaft(of_a_gap):
 
 @pytest.mark.parametrize(
     ("planted", "diagnosis"),
-    [("none", _told([1.0, 2.0])), ("off", _told([1.0, 2.0])), ("backlash", _told(None)), ("backlash", None)],
+    [
+        ("none", _with_band([1.0, 2.0])),
+        ("off", _with_band([1.0, 2.0])),
+        ("backlash", _with_band(None)),
+        ("backlash", None),
+    ],
 )
 def test_without_a_mismatch_or_a_band_there_is_no_score(planted, diagnosis):
     assert score_band(kind(planted), SEED, _truth(kind(planted).effect), diagnosis) is None
 
 
-def test_a_truth_that_can_no_longer_be_drawn_is_told_and_not_scored():
+def test_a_truth_that_can_no_longer_be_drawn_is_reported_and_not_scored():
     truth = _truth("backlash")
     truth["hidden"]["backlash"]["gap_rad"] *= 1.01
-    score = score_band(GAP, SEED, truth, _told([1.0, 2.0]))
+    score = score_band(GAP, SEED, truth, _with_band([1.0, 2.0]))
     assert "no longer draws" in score["fault"]
     assert "right" not in score
 
@@ -84,7 +89,7 @@ def test_the_bus_is_drawn_with_the_nominal_error_of_its_kind(monkeypatch):
 
     monkeypatch.setattr(campaign_band, "draw_specimen", drawing)
     monkeypatch.setattr(campaign_band, "true_rest_rad_s", lambda specimen: [np.linspace(-1.0, 1.0, SAMPLES)])
-    score_band(GAP, SEED, _truth("backlash"), _told([1.0, 2.0]))
+    score_band(GAP, SEED, _truth("backlash"), _with_band([1.0, 2.0]))
     assert drawn == [NOMINAL_ERROR]
 
 
@@ -135,7 +140,7 @@ def _cells(line):
     return [cell.strip() for cell in line.strip("|").split("|")]
 
 
-def test_the_scoreboard_has_told_and_true_band_and_a_tile():
+def test_the_scoreboard_has_reported_and_true_band_and_a_tile():
     page = re.sub("<[^>]*>", "", scoreboard_page(Board(ROWS)))
     assert "✓ 6.0–9.0 (6.5–8.5)" in page
     assert "✗ 6.0–9.0 (6.5–8.5)" in page

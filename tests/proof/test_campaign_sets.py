@@ -47,8 +47,8 @@ def test_the_cases_of_all_sets_are_counted_together(tmp_path, capsys):
     )
     assert sets.main([str(first), str(second), "--out", str(tmp_path / "out")]) == 0
     assert capsys.readouterr().out.strip() == str(tmp_path / "out" / "summary.md")
-    told = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
-    assert told["cases"] == 3
+    reported = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
+    assert reported["cases"] == 3
     assert "| `backlash` | 2 | 50 % |" in (tmp_path / "out" / "summary.md").read_text(encoding="utf-8")
     assert (tmp_path / "out" / "confusion.svg").read_text(encoding="utf-8").startswith("<svg")
 

@@ -37,5 +37,5 @@ def test_the_driveline_stands_still_before_it_is_driven():
 
 
 def test_a_negative_seed_is_refused():
-    with pytest.raises(UsageError, match="seed: expected 0 or greater, came -1"):
+    with pytest.raises(UsageError, match="seed: expected 0 or greater, got -1"):
         draw_specimen("none", -1)

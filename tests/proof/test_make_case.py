@@ -80,9 +80,9 @@ def test_a_spoilt_recording_can_still_be_read(tmp_path, effect):
         assert read_record(path).time_s.size == 300
 
 
-def test_told_stamps_are_written_to_the_microsecond(tmp_path):
-    told = (draw_specimen("sample_jitter", seed) for seed in range(50))
-    seed = next(s.seed for s in told if s.sizes["sample_jitter"]["stamps_told"])
+def test_reported_stamps_are_written_to_the_microsecond(tmp_path):
+    reported = (draw_specimen("sample_jitter", seed) for seed in range(50))
+    seed = next(s.seed for s in reported if s.sizes["sample_jitter"]["stamps_told"])
     main(["--effect", "sample_jitter", "--seed", str(seed), "--out", str(tmp_path)])
     record = read_record(tmp_path / "case" / "run_1.csv")
     deviation = record.time_s - 0.01 * np.arange(3000)

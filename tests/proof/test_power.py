@@ -51,7 +51,7 @@ def _rows(path):
     return [json.loads(line) for line in path.read_text().splitlines()]
 
 
-def test_a_study_goes_on_where_it_ended_and_says_what_it_adds_up_to(tool, tmp_path, capsys):
+def test_a_study_continues_where_it_ended_and_says_what_it_adds_up_to(tool, tmp_path, capsys):
     arguments = [*SHORT, "--out", str(tmp_path), "--seeds", "1"]
     assert power.main([*arguments, "--multiples", "1,2"]) == 0
     assert power.main([*arguments, "--multiples", "1,2,3"]) == 0
@@ -72,7 +72,7 @@ def test_a_study_goes_on_where_it_ended_and_says_what_it_adds_up_to(tool, tmp_pa
     assert float(circles[1].get("cy")) > float(circles[0].get("cy"))  # what was not found is lower
 
 
-def test_a_command_that_fails_is_told_and_run_again(monkeypatch, tmp_path, tool):
+def test_a_command_that_fails_is_reported_and_run_again(monkeypatch, tmp_path, tool):
     def broken(arguments, folder, limit_s):
         raise CommandFailed("hil diagnose: ended with status 3: no bus")
 

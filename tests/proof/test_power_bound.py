@@ -44,9 +44,9 @@ def test_a_size_is_found_from_far_below_and_above_and_of_a_bent_difference():
         assert size_at(9.0, lambda size: size**2, start) == pytest.approx(3.0, rel=2e-3)
 
 
-@pytest.mark.parametrize(("distance", "came"), [(lambda size: 0.0, "came 0 at"), (lambda size: 7.0, "came 7 at")])
-def test_a_distance_that_never_or_always_suffices_is_refused(distance, came):
-    with pytest.raises(ValueError, match=came):
+@pytest.mark.parametrize(("distance", "got"), [(lambda size: 0.0, "got 0 at"), (lambda size: 7.0, "got 7 at")])
+def test_a_distance_that_never_or_always_suffices_is_refused(distance, got):
+    with pytest.raises(ValueError, match=got):
         size_at(4.0, distance, 1.0)
 
 

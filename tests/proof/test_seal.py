@@ -81,8 +81,8 @@ def _with(key, value):
     [
         (_without("nonce"), "expected an object with digests, nonce, schema, truth"),
         (_with("schema", "hil.seal/9"), "of schema hil.seal/1"),
-        (_with("nonce", "xyz"), "nonce: expected 64 hexadecimal digits, came 'xyz'"),
-        (_with("nonce", None), "nonce: expected 64 hexadecimal digits, came None"),
+        (_with("nonce", "xyz"), "nonce: expected 64 hexadecimal digits, got 'xyz'"),
+        (_with("nonce", None), "nonce: expected 64 hexadecimal digits, got None"),
         (_with("truth", []), "digests and truth: expected an object each"),
         (_with("digests", "abc"), "digests and truth: expected an object each"),
     ],

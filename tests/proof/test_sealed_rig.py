@@ -84,7 +84,7 @@ def test_a_rig_that_has_gone_is_named():
             ("--seed", "5", "--effect", "rust"),
             "status 2; it said: error: effect 'rust': expected one of none",
         ),
-        (("--seed", "-5"), "status 2; it said: error: seed: expected 0 or greater, came -5"),
+        (("--seed", "-5"), "status 2; it said: error: seed: expected 0 or greater, got -5"),
         (("--seed", "5", "--rig", "nowhere.toml"), "status 2; it said: error: nowhere.toml"),
         (
             ("--seed", "5", "--bus", "ws://192.0.2.1:0/"),
@@ -99,7 +99,7 @@ def test_a_rig_that_does_not_come_up_says_why(arguments, said):
 
 def test_something_else_than_a_ready_line_is_refused():
     with (
-        pytest.raises(RunAborted, match=r"expected 'ready bus=\.\.\..*', came 'usage: "),
+        pytest.raises(RunAborted, match=r"expected 'ready bus=\.\.\..*', got 'usage: "),
         sealed_process("--help"),
     ):
         pass
@@ -121,5 +121,5 @@ def test_it_ends_cleanly_by_signal_and_by_the_end_of_its_input(end):
     assert process.returncode == 0
     assert err == ""
     if end is None:
-        assert "expected the line 'open' or the end of input, came 'close'" in out
+        assert "expected the line 'open' or the end of input, got 'close'" in out
     assert "truth" not in out

@@ -25,7 +25,7 @@ def silent(what: str, done: int, total: int) -> None:
 
 
 class Tool:
-    """Stands for the command line: finds what it is told to find."""
+    """Stands for the command line: finds what it is ordered to find."""
 
     def __init__(self, named: str = "", refuses: bool = False) -> None:
         self.named, self.refuses = named, refuses

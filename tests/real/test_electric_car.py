@@ -46,7 +46,7 @@ def verdict(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
 
 
 @pytest.mark.timeout(600)
-def test_a_mismatch_is_found_and_told_of_the_trip(verdict: dict[str, Any]) -> None:
+def test_a_mismatch_is_found_and_reported_for_the_trip(verdict: dict[str, Any]) -> None:
     """Grade and drag are left out of the model: that something is missing must be seen, whatever it is called."""
     assert verdict["mismatch"]["detected"] is True
     assert list(verdict["mismatch"]["time_s"]) == list(verdict["load_torque"]) == ["TripA01"]

@@ -74,7 +74,7 @@ def test_fit_improves_in_free_run_and_on_unseen_data(verdict: dict[str, Any]) ->
 
 
 def test_augmented_model_simulates_the_recording(out: Path, emps: Path, tmp_path: Path) -> None:
-    """The file written beside the verdict carries the finding: another command reproduces the error from it."""
+    """The file written next to the verdict carries the finding: another command reproduces the error from it."""
     predicted = tmp_path / "pred.csv"
     model = str(out / "augmented.toml")
     assert run(["simulate", "--model", model, "--input", str(emps), "--out", str(predicted)]) == 0

@@ -74,7 +74,7 @@ def test_the_gap_is_of_the_right_size(verdict: dict[str, Any]) -> None:
 
 
 @pytest.mark.parametrize("name", UNSEEN)
-def test_a_test_not_used_for_the_fit_is_foretold(out: Path, name: str) -> None:
+def test_a_test_not_used_for_the_fit_is_predicted(out: Path, name: str) -> None:
     before, after = nrmse(read_model(MODEL), name), nrmse(read_model(out / "augmented.toml"), name)
     assert after < UNSEEN[name]
     assert after < 0.6 * before

@@ -123,10 +123,9 @@ def test_a_compressed_mat_file_is_unpacked_no_further_than_allowed(tmp_path: Pat
     head = flags + shape + name + (9).to_bytes(4, "little") + (n_bytes & 0xFFFFFFFF).to_bytes(4, "little")
     packing = zlib.compressobj(9)
     element = (14).to_bytes(4, "little") + ((len(head) + n_bytes) & 0xFFFFFFFF).to_bytes(4, "little") + head
-    packed = packing.compress(element)
-    for _ in range(n_bytes >> 24):
-        packed += packing.compress(bytes(1 << 24))
-    packed += packing.flush()
+    packed = packing.compress(element) + packing.flush(zlib.Z_FULL_FLUSH)
+    zeros = packing.compress(bytes(1 << 24)) + packing.flush(zlib.Z_FULL_FLUSH)  # stands alone, so it can be repeated
+    packed += zeros * (n_bytes >> 24) + packing.flush()
     with path.open("wb") as file:
         file.write(b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM")
         file.write((15).to_bytes(4, "little") + len(packed).to_bytes(4, "little") + packed)
@@ -157,7 +156,7 @@ def test_content_in_another_file_is_refused(tmp_path: Path, kind: str) -> None:
             layout[:] = h5py.VirtualSource("other.h5", "x", (10,))
             group.create_virtual_dataset("x", layout)
     with pytest.raises(
-        RecordingError, match=r"run\.h5: deep/x: expected data in this file, came a reference to another"
+        RecordingError, match=r"run\.h5: deep/x: expected data in this file, got a reference to another"
     ):
         read_table(tmp_path / "run.h5")
 
@@ -167,7 +166,7 @@ def test_content_in_another_file_is_refused(tmp_path: Path, kind: str) -> None:
 def test_a_pipe_is_refused_and_not_waited_for(tmp_path: Path, suffix: str, read: Callable[[Path], object]) -> None:
     path = tmp_path / f"pipe{suffix}"
     os.mkfifo(path)
-    with pytest.raises(RecordingError, match="expected a file, came a folder, a pipe or a device"):
+    with pytest.raises(RecordingError, match="expected a file, got a folder, a pipe or a device"):
         read(path)
 
 
@@ -204,10 +203,10 @@ for line in sys.stdin:
 @pytest.mark.parametrize(
     ("act", "said"),
     [
-        ("time.sleep(100)", "came one that is not: it is damaged, or made to keep a program busy"),
-        ("os.abort()", r"came one that ends its reader \(status -6\)"),
-        ("sys.exit(3)", r"came one that ends its reader \(status 3\)"),
-        ("sys.stdout.write('no answer' * 9); sys.stdout.flush(); os._exit(0)", "came one that ends its reader"),
+        ("time.sleep(100)", "got one that is not: it is damaged, or made to keep a program busy"),
+        ("os.abort()", r"got one that ends its reader \(status -6\)"),
+        ("sys.exit(3)", r"got one that ends its reader \(status 3\)"),
+        ("sys.stdout.write('no answer' * 9); sys.stdout.flush(); os._exit(0)", "got one that ends its reader"),
     ],
 )
 def test_a_reader_that_does_not_answer_is_ended_and_the_next_file_is_read(

@@ -19,7 +19,7 @@ def read(tmp_path: Path, content: str | bytes, hints: FormatHints | None = None)
     return csv_format.read(path, Request(hints or FormatHints()))
 
 
-def test_integers_floats_and_text_are_told_apart_by_their_cells(tmp_path: Path) -> None:
+def test_integers_floats_and_text_are_reported_apart_by_their_cells(tmp_path: Path) -> None:
     table = read(tmp_path, "a,b,c\n1,1.0,x\n-2,nan,\n")
     assert table.columns["a"].dtype == np.int64
     assert table.columns["a"].tolist() == [1, -2]
@@ -69,14 +69,14 @@ def test_spaces_around_names_and_cells_do_not_count(tmp_path: Path) -> None:
         ("a,,c\n1,2,3\n", "line 1: cell 2 of the header is empty"),
         ("a,b\n", "the file is empty or truncated"),
         ("a,b", "the file is empty or truncated"),
-        ("a,b\n1,2\n3,4,5\n6,7\n", "line 3: expected 2 cells as in the header, came 3; mend that line"),
-        ("a,b\n1,2\n3,4\n5", "line 4: expected 2 cells as in the header, came 1; the file is truncated"),
+        ("a,b\n1,2\n3,4,5\n6,7\n", "line 3: expected 2 cells as in the header, got 3; fix that line"),
+        ("a,b\n1,2\n3,4\n5", "line 4: expected 2 cells as in the header, got 1; the file is truncated"),
         ('a,b\n1,2\n3,"4\n5,6\n', "line 3: expected every quoted cell to end on its line"),
         ('a,b\n1,"2\n3"\n5,6\n', "line 2: expected every quoted cell to end on its line"),
-        (b"a,b\n1,2\n3,\xe94\n", "line 3: expected utf-8 text, came byte 0xe9"),
+        (b"a,b\n1,2\n3,\xe94\n", "line 3: expected utf-8 text, got byte 0xe9"),
         (b"\xff\xfea\x00b", "expected utf-16 text"),
-        ("a,b\n1," + "2" * 9_000_000 + "\n", "line 2: expected 2 cells as in the header, came 1"),
-        ("a,b\n1,2\n\n3,4\n", "line 3: expected a row, came an empty line"),
+        ("a,b\n1," + "2" * 9_000_000 + "\n", "line 2: expected 2 cells as in the header, got 1"),
+        ("a,b\n1,2\n\n3,4\n", "line 3: expected a row, got an empty line"),
     ],
     ids=range(13),
 )
@@ -97,7 +97,7 @@ def test_a_cell_that_is_no_number_is_refused_by_line_and_column(tmp_path: Path, 
     table = read(tmp_path, f"a;b\n1;2.0\n3;{cell}\n5;6\n")
     with pytest.raises(RecordingError) as refusal:
         table.numeric(["a", "b"])
-    assert "line 3, column b: expected a finite number or nan, came" in str(refusal.value)
+    assert "line 3, column b: expected a finite number or nan, got" in str(refusal.value)
     assert cell in str(refusal.value) or "inf" in str(refusal.value)
 
 

@@ -29,7 +29,7 @@ TRIALS = {".mf4": 12}
 
 
 @pytest.fixture
-def told(own_table: Table) -> Table:
+def reported(own_table: Table) -> Table:
     """A recording that says something of itself, with a text column: where MDF's own parser can be led astray."""
     columns = {**own_table.columns, "gear": as_text([f"gear {k % 5}" for k in range(own_table.n_rows)])}
     rig = 'name = "bench"\n' * 20
@@ -51,9 +51,9 @@ def damaged(whole: bytes, dice: random.Random) -> bytes:
 
 
 @pytest.mark.parametrize("suffix", WRITABLE)
-def test_a_damaged_recording_is_refused_or_read_as_it_was(tmp_path: Path, told: Table, suffix: str) -> None:
+def test_a_damaged_recording_is_refused_or_read_as_it_was(tmp_path: Path, reported: Table, suffix: str) -> None:
     path, dice = tmp_path / f"run{suffix}", random.Random(4)
-    write_table(told, path)
+    write_table(reported, path)
     whole = path.read_bytes()
     trials = TRIALS.get(suffix, 60)
     read = []
@@ -65,10 +65,12 @@ def test_a_damaged_recording_is_refused_or_read_as_it_was(tmp_path: Path, told: 
     assert len(refusals) > trials / 2
     for table in read:
         if not isinstance(table, str):
-            assert [loss for loss in losses(told, table) if loss.startswith("column")] == []
-            assert {key: value for key, value in table.metadata.items() if key in told.metadata} == told.metadata
+            assert [loss for loss in losses(reported, table) if loss.startswith("column")] == []
+            assert {
+                key: value for key, value in table.metadata.items() if key in reported.metadata
+            } == reported.metadata
             assert {name: unit for name, unit in table.units.items() if unit} == {
-                n: u for n, u in told.units.items() if u
+                n: u for n, u in reported.units.items() if u
             }
 
 
@@ -79,30 +81,30 @@ def read_or_refusal(path: Path) -> Table | str:
         return str(refusal)
 
 
-def test_a_csv_changed_by_hand_is_refused_with_both_checksums(tmp_path: Path, told: Table) -> None:
+def test_a_csv_changed_by_hand_is_refused_with_both_checksums(tmp_path: Path, reported: Table) -> None:
     path = tmp_path / "run.csv"
-    write_table(told, path)
+    write_table(reported, path)
     expected = read_metadata(path)[CHECKSUM]
     table = read_table(path)
     path.write_text(path.read_text(encoding="utf-8").replace("gear 3", "gear 9", 1), encoding="utf-8")
-    came = data_sha256({**table.columns, "gear": as_text([*table.columns["gear"].tolist()[:3], "gear 9"])})
-    with pytest.raises(RecordingError, match=rf"SHA-256 {expected[:12]}…, came (?!{came[:12]})\w+….*run\.csv\.json"):
+    got = data_sha256({**table.columns, "gear": as_text([*table.columns["gear"].tolist()[:3], "gear 9"])})
+    with pytest.raises(RecordingError, match=rf"SHA-256 {expected[:12]}…, got (?!{got[:12]})\w+….*run\.csv\.json"):
         read_table(path)
     sidecar_of(path).unlink()  # the cure the message gives
     assert read_table(path).columns["gear"][3] == "gear 9"
 
 
-def test_a_rig_file_that_was_changed_in_the_description_is_refused(tmp_path: Path, told: Table) -> None:
+def test_a_rig_file_that_was_changed_in_the_description_is_refused(tmp_path: Path, reported: Table) -> None:
     path = tmp_path / "run.csv"
-    write_table(told, path)
-    beside = sidecar_of(path)
-    beside.write_text(beside.read_text(encoding="utf-8").replace("bench", "bus 17", 1), encoding="utf-8")
+    write_table(reported, path)
+    companion = sidecar_of(path)
+    companion.write_text(companion.read_text(encoding="utf-8").replace("bench", "bus 17", 1), encoding="utf-8")
     with pytest.raises(RecordingError, match="expected the rig file it was recorded with, SHA-256"):
         read_table(path)
 
 
-def test_the_checksum_knows_cells_names_and_kinds_and_nothing_else(told: Table) -> None:
-    columns = dict(told.columns)
+def test_the_checksum_knows_cells_names_and_kinds_and_nothing_else(reported: Table) -> None:
+    columns = dict(reported.columns)
     checksum = data_sha256(columns)
     assert data_sha256(dict(reversed(columns.items()))) == checksum
     time_s = columns["time_s"]
@@ -143,15 +145,15 @@ def largest_file(n_bytes: int) -> Iterator[None]:
 
 @pytest.mark.parametrize("suffix", WRITABLE)
 @pytest.mark.parametrize("existing", [False, True])
-def test_a_full_disk_leaves_what_was_there(tmp_path: Path, told: Table, suffix: str, existing: bool) -> None:
+def test_a_full_disk_leaves_what_was_there(tmp_path: Path, reported: Table, suffix: str, existing: bool) -> None:
     path = tmp_path / f"run{suffix}"
-    old = replace(told, metadata={"experiment": "old"})
+    old = replace(reported, metadata={"experiment": "old"})
     if existing:
         write_table(old, path)
     before = {file.name: file.read_bytes() for file in tmp_path.iterdir()}
-    refusal = pytest.raises(RecordingError, match=rf"run{suffix}.*: expected room for the .*, came: .*File too large")
+    refusal = pytest.raises(RecordingError, match=rf"run{suffix}.*: expected room for the .*, got: .*File too large")
     with refusal, largest_file(1000):
-        write_table(told, path, replace=True)
+        write_table(reported, path, replace=True)
     assert {file.name: file.read_bytes() for file in tmp_path.iterdir()} == before
 
 
@@ -170,16 +172,16 @@ def test_a_full_disk_at_the_end_of_a_run_costs_the_description_and_no_sample(tmp
 
 
 @pytest.mark.parametrize("suffix", WRITABLE)
-def test_a_place_that_takes_no_file_is_told(told: Table, suffix: str) -> None:
+def test_a_place_that_takes_no_file_is_reported(reported: Table, suffix: str) -> None:
     path = Path(f"/proc/run{suffix}")
-    with pytest.raises(RecordingError, match=rf"/proc/run{suffix}: expected room for the recording, came: "):
-        write_table(told, path)
+    with pytest.raises(RecordingError, match=rf"/proc/run{suffix}: expected room for the recording, got: "):
+        write_table(reported, path)
 
 
-def test_a_folder_that_can_not_be_written_is_told(tmp_path: Path, told: Table) -> None:
+def test_a_folder_that_can_not_be_written_is_reported(tmp_path: Path, reported: Table) -> None:
     (tmp_path / "taken.h5").mkdir()
-    with pytest.raises(RecordingError, match="came a folder"):
-        write_table(told, tmp_path / "taken.h5", replace=True)
+    with pytest.raises(RecordingError, match="got a folder"):
+        write_table(reported, tmp_path / "taken.h5", replace=True)
     shutil.rmtree(tmp_path / "taken.h5")
     assert list(tmp_path.iterdir()) == []
 

@@ -144,7 +144,7 @@ def test_a_description_that_is_damaged_is_refused(tmp_path: Path, mixed: Table, 
     with h5py.File(path, "r+") as file:
         name = "columns/time_s" if suffix == ".h5" else "time_s"
         file.move(name, f"{name}_gone")
-    with pytest.raises(RecordingError, match=r"column time_s: expected it under the name time_s, came none"):
+    with pytest.raises(RecordingError, match=r"column time_s: expected it under the name time_s, got none"):
         read_table(path)
     with h5py.File(path, "r+") as file:
         if suffix == ".h5":
@@ -152,5 +152,5 @@ def test_a_description_that_is_damaged_is_refused(tmp_path: Path, mixed: Table, 
         else:
             file["recording_json"][0, 0] = ord("[")
     for read in (read_table, read_metadata):
-        with pytest.raises(RecordingError, match=r"expected a description hil\.recording/1 inside, came a damaged one"):
+        with pytest.raises(RecordingError, match=r"expected a description hil\.recording/1 inside, got a damaged one"):
             read(path)

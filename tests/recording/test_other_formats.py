@@ -101,7 +101,7 @@ def test_a_mat_file_without_vectors_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("suffix", FORMATS)
 def test_a_file_that_is_not_there_is_refused(tmp_path: Path, suffix: str) -> None:
-    with pytest.raises(RecordingError, match="expected a readable file, came: No such file"):
+    with pytest.raises(RecordingError, match="expected a readable file, got: No such file"):
         read_table(tmp_path / f"run{suffix}")
 
 
@@ -112,7 +112,7 @@ def test_a_folder_is_no_recording(tmp_path: Path) -> None:
 
 
 def test_an_unknown_suffix_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(RecordingError, match=r"\.csv, \.txt, \.tsv, \.parquet, \.mf4.*came '\.xlsx'"):
+    with pytest.raises(RecordingError, match=r"\.csv, \.txt, \.tsv, \.parquet, \.mf4.*got '\.xlsx'"):
         read_table(tmp_path / "run.xlsx")
 
 
@@ -146,5 +146,5 @@ def test_a_recording_that_fails_half_way_leaves_nothing(tmp_path: Path) -> None:
 
 
 def test_columns_of_different_lengths_are_no_table() -> None:
-    with pytest.raises(RecordingError, match="expected columns of one length, came a 2, b 3 rows"):
+    with pytest.raises(RecordingError, match="expected columns of one length, got a 2, b 3 rows"):
         Table(Path("run.csv"), {"a": np.arange(2), "b": np.arange(3)})

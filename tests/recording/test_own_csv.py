@@ -51,7 +51,7 @@ def test_the_facts_are_those_of_the_table(recorded: Path) -> None:
     [
         ("\n0.05,", "\n0.06,", "expected the data it was written with"),
         ("\n0.05,", "\nx,", "expected the data it was written with"),
-        ("\n0.05,", "\n0.05,1.0,", "line 7: expected 10 cells as in the header, came 11"),
+        ("\n0.05,", "\n0.05,1.0,", "line 7: expected 10 cells as in the header, got 11"),
     ],
 )
 def test_a_changed_recording_is_refused_as_the_table_is(recorded: Path, before: str, after: str, said: str) -> None:
@@ -62,8 +62,8 @@ def test_a_changed_recording_is_refused_as_the_table_is(recorded: Path, before: 
 
 
 def test_a_changed_description_is_refused(recorded: Path) -> None:
-    beside = sidecar_of(recorded)
-    beside.write_text(beside.read_text("utf-8").replace("cruise", "bruise"), "utf-8")
+    companion = sidecar_of(recorded)
+    companion.write_text(companion.read_text("utf-8").replace("cruise", "bruise"), "utf-8")
     with pytest.raises(RecordingError, match="expected the units and metadata it was written with"):
         read_facts(recorded)
 

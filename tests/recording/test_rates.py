@@ -134,8 +134,8 @@ def test_a_gap_is_missing_samples(somewhere: Path, period_s: float) -> None:
     ("one", "two", "period_s", "said"),
     [
         ([0.0, 1.0, 2.0], [5.0, 6.0, 7.0], 0.1, "s in common for resample_s"),
-        ([0.0, 2.0, 1.0], [0.0, 1.0, 2.0], 0.1, "expected times that run forward, came 1 s after 2 s"),
-        ([0.0, np.nan, np.nan], [0.0, 1.0, 2.0], 0.1, "expected two samples or more, came 1"),
+        ([0.0, 2.0, 1.0], [0.0, 1.0, 2.0], 0.1, "expected times that run forward, got 1 s after 2 s"),
+        ([0.0, np.nan, np.nan], [0.0, 1.0, 2.0], 0.1, "expected two samples or more, got 1"),
         ([0.0, 1.0, 2.0], [0.0, 1.0, 2.0], 1e-9, "expected at most 16777216 cells"),
     ],
 )
@@ -200,7 +200,7 @@ def bus_log(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[Path, Path]
 
 def test_without_a_dbc_a_logged_bus_says_what_is_needed(bus_log: tuple[Path, Path]) -> None:
     path, _ = bus_log
-    with pytest.raises(RecordingError, match=r"came the frames of a bus as they were logged.*--dbc FILE"):
+    with pytest.raises(RecordingError, match=r"got the frames of a bus as they were logged.*--dbc FILE"):
         read_record(path, signals())
 
 
@@ -225,10 +225,10 @@ def test_a_logged_bus_is_converted_by_its_dbc(bus_log: tuple[Path, Path], tmp_pa
     ("name", "content", "said"),
     [
         ("bus.txt", DBC, "expected a DBC file, named .dbc"),
-        ("other.dbc", DBC.replace("BO_ 385", "BO_ 900"), "came none of them"),
+        ("other.dbc", DBC.replace("BO_ 385", "BO_ 900"), "got none of them"),
         ("empty.dbc", 'VERSION ""\n', "one without any"),
         ("broken.dbc", "BO_ what\n SG_ :::\n", "DBC file"),
-        ("gone.dbc", None, "expected a DBC file, came"),
+        ("gone.dbc", None, "expected a DBC file, got"),
     ],
 )
 def test_a_dbc_that_does_not_fit_is_refused(tmp_path: Path, name: str, content: str | None, said: str) -> None:

@@ -1,4 +1,4 @@
-"""From any format to any other and back: not one bit of a number, no text, unit or metadata is lost, or it is told."""
+"""From any format to any other and back: no number, text, unit or metadata is lost, or the loss is reported."""
 
 from __future__ import annotations
 
@@ -109,12 +109,12 @@ def refusal_of(table: Table, path: Path) -> str:
     return ""
 
 
-def test_what_is_lost_is_told_and_the_rest_is_kept_with_a_checksum_of_its_own(tmp_path: Path) -> None:
+def test_what_is_lost_is_reported_and_the_rest_is_kept_with_a_checksum_of_its_own(tmp_path: Path) -> None:
     """A NUL ends a text in MDF."""
     table = Table(Path("a"), {"x": np.arange(2.0), "word": as_text(["a\0b", "c"])}, {"x": "m"}, {"note": "kept"})
-    told: list[str] = []
-    write_table(table, tmp_path / "a.mf4", on_loss=told.extend)
-    assert told == ["column word: 1 of 2 cells change, the first in row 1: 'a\\x00b' becomes 'a'"]
+    said: list[str] = []
+    write_table(table, tmp_path / "a.mf4", on_loss=said.extend)
+    assert said == ["column word: 1 of 2 cells change, the first in row 1: 'a\\x00b' becomes 'a'"]
     read = read_table(tmp_path / "a.mf4")
     assert read.columns["word"].tolist() == ["a", "c"]
     assert (read.units["x"], read.metadata["note"]) == ("m", "kept")
@@ -125,7 +125,7 @@ def test_a_plain_csv_stays_one_file(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["a.csv"]
 
 
-def test_metadata_that_mean_something_beside_a_csv_are_refused_there(tmp_path: Path) -> None:
+def test_metadata_that_mean_something_next_to_a_csv_are_refused_there(tmp_path: Path) -> None:
     table = Table(Path("a"), {"x": np.arange(3.0)}, {}, {"units": "metric"})
     with pytest.raises(RecordingError, match=r"metadata units: lost: \.csv can't hold it"):
         write_table(table, tmp_path / "a.csv")

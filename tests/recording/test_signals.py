@@ -12,12 +12,12 @@ import scipy.io
 from pydantic import ValidationError
 
 from estimator.signals.record import Location, OutputKind
-from hil.config.problems import problem_lines
 from hil.errors import InputError, RecordingError, UsageError
+from hil.problems import problem_lines
 from hil.recording import SignalsConfig, Table, read_record, read_records, write_table
 from hil.recording.columns import COUNTING_FLAGS
 from hil.recording.signals import to_record
-from hil.rig.sample import REMARKS
+from hil.sample import REMARKS
 
 Changed = Callable[..., Table]
 
@@ -92,7 +92,7 @@ def test_rows_in_which_a_limit_of_the_drive_acts_count(changed: Changed) -> None
 def test_flags_of_a_foreign_recording_mean_nothing(changed: Changed) -> None:
     table = changed(flags=np.ones(40, dtype=np.int64))
     assert to_record(table, signals(torque=[{"column": "torque_m1_nm"}])).okay.all()
-    with pytest.raises(RecordingError, match="came 0 of 40 rows"):
+    with pytest.raises(RecordingError, match="got 0 of 40 rows"):
         to_record(table, SignalsConfig())
 
 
@@ -129,7 +129,7 @@ def test_missing_columns_are_named_together(changed: Changed) -> None:
 def test_too_few_usable_samples_are_refused(changed: Changed) -> None:
     speed = np.full(40, np.nan)
     speed[:9] = 1.0
-    with pytest.raises(RecordingError, match="expected 10 usable samples or more, came 9 of 40 rows"):
+    with pytest.raises(RecordingError, match="expected 10 usable samples or more, got 9 of 40 rows"):
         to_record(changed(speed_rad_s=speed), SignalsConfig())
 
 
@@ -145,13 +145,13 @@ def with_time(changed: Changed, time_s: np.ndarray) -> Table:
         (
             5,
             0.0,
-            "line 7, column time_s: expected a time greater than in the row before, came 0 s after 0.04 s",
+            "line 7, column time_s: expected a time greater than in the row before, got 0 s after 0.04 s",
         ),
-        (5, np.nan, "line 7, column time_s: expected a time greater than in the row before, came nan s"),
+        (5, np.nan, "line 7, column time_s: expected a time greater than in the row before, got nan s"),
         (39, 0.41, "line 41, column time_s: expected a uniform step of 0.01 s within 50%"),
     ],
 )
-def test_a_time_that_does_not_go_on_evenly_is_refused_by_line(
+def test_a_time_that_does_not_continue_evenly_is_refused_by_line(
     changed: Changed, row: int, value: float, said: str
 ) -> None:
     time_s = np.arange(40) * 0.01
@@ -188,7 +188,7 @@ def test_jitter_of_time_stamps_is_no_fault(changed: Changed) -> None:
 
 def test_one_row_has_no_period(own_table: Table) -> None:
     table = Table(own_table.path, {name: column[:1] for name, column in own_table.columns.items()})
-    with pytest.raises(RecordingError, match="expected two rows or more, came 1"):
+    with pytest.raises(RecordingError, match="expected two rows or more, got 1"):
         to_record(table, SignalsConfig())
 
 
@@ -245,7 +245,7 @@ def test_recordings_are_read_in_order(three_runs: list[Path]) -> None:
 
 def test_the_same_samples_under_two_names_are_refused(three_runs: list[Path]) -> None:
     three_runs[2].write_bytes(three_runs[0].read_bytes())
-    with pytest.raises(UsageError, match=r"run_2\.csv: expected samples of its own, came those of .*run_0\.csv"):
+    with pytest.raises(UsageError, match=r"run_2\.csv: expected samples of its own, got those of .*run_0\.csv"):
         read_records(three_runs)
 
 
@@ -263,7 +263,7 @@ def test_all_faulty_recordings_are_named(three_runs: list[Path]) -> None:
 
 
 def test_two_recordings_of_one_name_are_refused(three_runs: list[Path]) -> None:
-    with pytest.raises(UsageError, match="came 'run_1' twice"):
+    with pytest.raises(UsageError, match="got 'run_1' twice"):
         read_records([*three_runs, three_runs[1]])
 
 
@@ -354,7 +354,7 @@ def test_the_first_speed_is_the_output_and_the_others_are_further_ones(changed: 
 @pytest.mark.parametrize(
     ("keys", "first", "further"),
     [
-        ({"outputs": BOTH[1:]}, "speed_rad_s", ["torque_ref_nm"]),  # beside the contract's motor speed
+        ({"outputs": BOTH[1:]}, "speed_rad_s", ["torque_ref_nm"]),  # next to the contract's motor speed
         ({"outputs": [*BOTH, BOTH[1]]}, "speed_rad_s", ["torque_ref_nm"]),
         ({"outputs": BOTH, "position": {"column": "age_s"}}, "age_s", ["speed_rad_s", "torque_ref_nm"]),
         ({"outputs": BOTH, "torque": [{"column": "torque_ref_nm"}]}, "speed_rad_s", []),  # an input is no output
@@ -410,7 +410,7 @@ def test_a_load_torque_is_no_output_too(changed: Changed) -> None:
 
 
 def test_a_load_torque_without_a_number_is_refused(changed: Changed) -> None:
-    with pytest.raises(RecordingError, match="torque_ref_nm: expected a load torque, came no number"):
+    with pytest.raises(RecordingError, match="torque_ref_nm: expected a load torque, got no number"):
         to_record(changed(torque_ref_nm=np.full(40, np.nan)), signals(**LOAD))
 
 
@@ -418,4 +418,4 @@ def test_a_joint_has_no_load() -> None:
     with pytest.raises(ValidationError) as caught:
         signals(position={"column": "x"}, force={"column": "F"}, **LOAD)
     (line,) = problem_lines(SignalsConfig, caught.value)
-    assert "no such key beside an imposed motion" in line
+    assert "no such key next to an imposed motion" in line

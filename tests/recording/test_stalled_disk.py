@@ -16,10 +16,10 @@ from tests.recording.test_writer import sample
 
 
 class Disk:
-    """A disk that stalls until it goes on."""
+    """A disk that stalls until it continues."""
 
     def __init__(self) -> None:
-        self.goes_on = threading.Event()
+        self.continues = threading.Event()
         self.began = threading.Event()
         self.closed = threading.Event()
 
@@ -33,7 +33,7 @@ class StalledFile:
 
     def write(self, data: bytes) -> int:
         self._disk.began.set()
-        assert self._disk.goes_on.wait(60.0)
+        assert self._disk.continues.wait(60.0)
         return self._file.write(data)
 
     def close(self) -> None:
@@ -56,7 +56,7 @@ def test_who_appends_does_not_wait_and_nothing_is_lost(tmp_path: Path, disk: Dis
             recorder.append(sample(k))  # the disk takes none of them: waiting for it would never end
         assert disk.began.wait(60.0)
         assert recorder.n_samples == 0
-        disk.goes_on.set()
+        disk.continues.set()
     assert recorder.n_samples == 500
     assert read_table(tmp_path / "run.csv").n_rows == 500
 
@@ -76,7 +76,7 @@ def test_when_too_many_wait_the_run_ends_and_keeps_them(
                     appended += 1
                     assert disk.began.wait(60.0)
             finally:
-                disk.goes_on.set()
+                disk.continues.set()
 
     with pytest.raises(RecordingError, match="one for which 20 wait"):
         run()
@@ -90,7 +90,7 @@ def test_a_run_without_a_clock_waits_for_room(tmp_path: Path, disk: Disk, monkey
         recorder.append(sample(0))
         assert disk.began.wait(60.0)
         recorder.append(sample(1))
-        threading.Timer(0.01, disk.goes_on.set).start()
+        threading.Timer(0.01, disk.continues.set).start()
         recorder.append(sample(2))
     assert read_table(tmp_path / "run.csv").n_rows == 3
 
@@ -99,10 +99,10 @@ def test_a_disk_that_hangs_for_good_does_not_hang_the_program(
     tmp_path: Path, disk: Disk, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(writer, "DRAIN_S", 0.01)
-    with pytest.raises(RecordingError, match=r"the last \d+ samples within 0.01 s, came one that does not"):
+    with pytest.raises(RecordingError, match=r"the last \d+ samples within 0.01 s, got one that does not"):
         with RecordingWriter(tmp_path / "run.csv") as recorder:
             recorder.append(sample(0))
-    disk.goes_on.set()
+    disk.continues.set()
     assert disk.closed.wait(60.0)
 
 
@@ -137,7 +137,7 @@ def test_a_disk_that_takes_part_of_what_waits_keeps_the_rows_that_are_whole(
             for k in range(9):
                 recorder.append(sample(k))
 
-    with pytest.raises(RecordingError, match=f"expected room for sample {rows + 1}, came: No space left"):
+    with pytest.raises(RecordingError, match=f"expected room for sample {rows + 1}, got: No space left"):
         run()
     assert recorder.n_samples == rows
     assert (tmp_path / "run.csv").exists() == (rows > 0)

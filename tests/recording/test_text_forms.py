@@ -60,7 +60,7 @@ FORMS: dict[str, tuple[str, str]] = {
     "a delimiter at the end of all lines": (text("t,T,n,", end=","), "a delimiter ends every row"),
     "a delimiter at the end of the rows": (text("t,T,n", end=","), "a delimiter ends every row"),
     "a delimiter at the end of the header": (text("t,T,n,"), ""),
-    "nothing beside": (text("t,T,n"), ""),
+    "nothing next to": (text("t,T,n"), ""),
 }
 
 
@@ -98,7 +98,7 @@ def test_unicode_is_recognised_under_every_suffix(tmp_path: Path, suffix: str, e
 
 def test_another_encoding_is_set_by_hand(tmp_path: Path) -> None:
     path = written(tmp_path, text("t,T,n [°/s]"), encoding="latin-1")
-    with pytest.raises(RecordingError, match=r"line 1: expected utf-8 text, came byte 0xb0.*latin-1"):
+    with pytest.raises(RecordingError, match=r"line 1: expected utf-8 text, got byte 0xb0.*latin-1"):
         read_table(path)
 
 
@@ -163,7 +163,7 @@ def test_a_time_since_the_epoch_is_a_time(tmp_path: Path, scale: float, unit: st
 def test_what_was_set_by_hand_counts(tmp_path: Path) -> None:
     content = "\n".join(["a;b;c", "x;y;z", "made on;1;2", *lines(";", ","), "!end"])
     hints = FormatHints(delimiter=";", decimal=",", header_line=2, units_line=0, comment="!")
-    with pytest.raises(RecordingError, match="line 3, column x: expected a finite number or nan, came 'made on'"):
+    with pytest.raises(RecordingError, match="line 3, column x: expected a finite number or nan, got 'made on'"):
         read_table(written(tmp_path, content), Request(hints)).numeric(["x"])
     hints = FormatHints(delimiter=";", header_line=0, skip_lines=3, comment="!")
     table = read_table(written(tmp_path, content), Request(hints))
@@ -215,13 +215,13 @@ def test_a_share_of_a_rated_value_needs_a_scale_and_the_message_says_which(
         read_record(path, SIGNALS)
 
 
-def test_swapped_columns_are_told_by_their_units(tmp_path: Path) -> None:
+def test_swapped_columns_are_reported_by_their_units(tmp_path: Path) -> None:
     path = written(tmp_path, text("t,T,n", "s,rad/s,Nm"))
-    with pytest.raises(RecordingError, match=r"column T: expected a torque, came a speed in rad/s. Are two columns sw"):
+    with pytest.raises(RecordingError, match=r"column T: expected a torque, got a speed in rad/s. Are two columns sw"):
         read_record(path, SIGNALS)
 
 
-def test_a_reading_stored_with_sign_and_read_without_is_told_with_the_line_that_cures_it(tmp_path: Path) -> None:
+def test_a_reading_stored_with_sign_and_read_without_is_reported_with_the_line_that_cures_it(tmp_path: Path) -> None:
     raw = np.round(TORQUE * 10.0).astype(np.int16).astype(np.uint16) * 0.1
     rows = [f"{t:.2f},{a:.1f},{b:.3f}" for t, a, b in zip(TIME, raw, SPEED, strict=True)]
     path = written(tmp_path, "\n".join(["t,T,n", *rows]))

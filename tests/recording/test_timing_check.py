@@ -66,7 +66,7 @@ def test_identify_refuses_and_writes_nothing(
     assert not (tmp_path / "out").exists()
 
 
-def test_file_beside_that_is_not_ours_is_left_alone(tmp_path: Path, own_table: Table) -> None:
+def test_file_next_to_that_is_not_ours_is_left_alone(tmp_path: Path, own_table: Table) -> None:
     path = tmp_path / "run.csv"
     write_table(replace(own_table, units={}, metadata={}), path)
     sidecar_of(path).write_text('{"schema": "another", "timing": "x"}', encoding="utf-8")
@@ -77,7 +77,7 @@ def test_file_beside_that_is_not_ours_is_left_alone(tmp_path: Path, own_table: T
     assert list(tmp_path.iterdir()) == [sidecar_of(path)]
 
 
-def test_damaged_file_beside_is_refused_by_name(tmp_path: Path, own_table: Table) -> None:
+def test_damaged_file_next_to_is_refused_by_name(tmp_path: Path, own_table: Table) -> None:
     path = tmp_path / "run.csv"
     write_table(own_table, path)
     sidecar_of(path).write_text("{", encoding="utf-8")

@@ -14,7 +14,7 @@ from hil.recording import RecordingWriter, columns, read_record, read_table
 from hil.recording.checksum import CHECKSUM, SAID, data_sha256, said_sha256
 from hil.recording.formats import FORMATS
 from hil.recording.own_csv import HEADER
-from hil.rig.sample import Sample, SampleFlag
+from hil.sample import Sample, SampleFlag
 
 WRITABLE = [suffix for suffix, form in FORMATS.items() if form.write]
 
@@ -54,8 +54,8 @@ def test_a_run_is_recorded_to_the_bit(tmp_path: Path, suffix: str) -> None:
         for k in range(30):
             writer.append(sample(k))
     check(path, 30)
-    beside = {f"{path.name}.json"} if suffix == ".csv" else set()
-    assert {file.name for file in tmp_path.iterdir()} == {path.name} | beside
+    companion = {f"{path.name}.json"} if suffix == ".csv" else set()
+    assert {file.name for file in tmp_path.iterdir()} == {path.name} | companion
     record = read_record(path)
     assert record.okay.tolist() == [k not in (0, 3) for k in range(30)]
 
@@ -150,7 +150,7 @@ def test_a_recording_that_cannot_be_made_is_refused_before_the_run(tmp_path: Pat
 
 def test_a_place_that_cannot_be_written_is_refused_before_the_run(tmp_path: Path) -> None:
     with (
-        pytest.raises(RecordingError, match="expected a place to write, came: File name too long"),
+        pytest.raises(RecordingError, match="expected a place to write, got: File name too long"),
         RecordingWriter(tmp_path / f"{'x' * 249}.csv"),
     ):
         pass
@@ -169,7 +169,7 @@ def test_a_recording_there_is_no_room_for_stays_in_the_part_file(tmp_path: Path)
     path = tmp_path / "run.parquet"
     (tmp_path / f".run.parquet.{os.getpid()}.part").mkdir()
     writer = RecordingWriter(path)
-    with pytest.raises(RecordingError, match=r"run\.parquet: expected room for the recording, came: .*run\.part\.csv"):
+    with pytest.raises(RecordingError, match=r"run\.parquet: expected room for the recording, got: .*run\.part\.csv"):
         with writer:
             writer.append(sample(1))
     assert writer.kept == tmp_path / "run.part.csv"
@@ -205,16 +205,16 @@ def test_one_with_anything_else_in_it_does(tmp_path: Path, left: str) -> None:
 
 def test_nor_is_one_taken_from_a_run_that_has_just_begun(tmp_path: Path) -> None:
     with RecordingWriter(tmp_path / "run.csv") as first:
-        with pytest.raises(RecordingError, match="that goes on"), RecordingWriter(tmp_path / "run.csv"):
+        with pytest.raises(RecordingError, match="that continues"), RecordingWriter(tmp_path / "run.csv"):
             pass
         first.append(sample(0))
     check(tmp_path / "run.csv", 1)
 
 
-def test_a_disk_that_is_full_from_the_start_is_told_with_the_name_and_leaves_nothing(tmp_path: Path) -> None:
+def test_a_disk_that_is_full_from_the_start_is_reported_with_the_name_and_leaves_nothing(tmp_path: Path) -> None:
     from tests.recording.test_damage import largest_file
 
-    refusal = pytest.raises(RecordingError, match=r"run\.csv: expected room for the recording, came: .*too large")
+    refusal = pytest.raises(RecordingError, match=r"run\.csv: expected room for the recording, got: .*too large")
     with refusal, largest_file(10), RecordingWriter(tmp_path / "run.csv"):
         pass
     assert list(tmp_path.iterdir()) == []

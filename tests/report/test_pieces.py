@@ -154,7 +154,7 @@ def test_a_result_that_fails_leaves_the_older_ones(tmp_path: Path) -> None:
         path.write_text("half")
         raise OSError("disk full")
 
-    with pytest.raises(UsageError, match="expected a folder to write into, came: disk full"):
+    with pytest.raises(UsageError, match="expected a folder to write into, got: disk full"):
         publish(tmp_path, {"a.txt": lambda path: path.write_text("new"), "b.txt": fail})
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"a.txt": "old"}
 
@@ -173,7 +173,7 @@ def test_a_file_is_no_folder_for_results(tmp_path: Path, name: str) -> None:
 
 
 def test_a_read_only_folder_is_refused() -> None:
-    with pytest.raises(UsageError, match="expected a folder to write into, came: "):
+    with pytest.raises(UsageError, match="expected a folder to write into, got: "):
         require_folder(Path("/proc/1/result"))
 
 

@@ -15,9 +15,9 @@ from hil.rig.build import Devices, open_devices
 from hil.rig.drive import Progress, RunSummary
 from hil.rig.pacing import FreePacer, Pacer, period_ns
 from hil.rig.plan import plan_run
-from hil.rig.sample import Sample
 from hil.rig.session import run_plan
 from hil.rig.stop import StopRequest
+from hil.sample import Sample
 from hil.simulator.loopback import Address
 from hil.simulator.plant import RigidPlant
 from hil.simulator.plc_device import PlcDevice

@@ -185,7 +185,7 @@ def test_a_host_of_the_same_user_finds_the_token_of_the_port(bridge: CanBridge, 
         assert slave.recv(5.0) is not None
 
 
-def test_another_user_is_told_to_give_the_whole_url(
+def test_another_user_is_reported_to_give_the_whole_url(
     bridge: CanBridge, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "another"))

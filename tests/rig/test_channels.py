@@ -16,9 +16,9 @@ from hil.recording.signals_config import SignalsConfig
 from hil.rig.build import open_devices
 from hil.rig.check import Verdict, check_rig
 from hil.rig.plan import plan_run
-from hil.rig.sample import SampleFlag
 from hil.rig.session import run_plan
 from hil.rig.stop import StopRequest
+from hil.sample import SampleFlag
 from hil.simulator.fault_spec import rig_faults
 from hil.simulator.plant import RigidPlant
 from hil.simulator.rig_server import RigServer, required_simulation
@@ -119,7 +119,7 @@ def test_a_driveline_without_such_places_is_refused(tmp_path: Path) -> None:
         ('"acceleration"\n\n', '"accel"\n\n', r"channels\.1\.register \| expected one of the registers.*came 'accel'"),
         ('"acceleration"\n\n', '"speed_limit"\n\n', r"channels\.1\.register \| .*in rad/s\^2.*came one in rad/s$"),
         ('"acceleration"\n\n', '"permissive"\n\n', r"channels\.1\.register \| .*holds a number.*of type bool"),
-        ("subindex = 1\nscale = 0.001", "subindex = 1", r"channels\.0\.scale \| expected this key beside object"),
+        ("subindex = 1\nscale = 0.001", "subindex = 1", r"channels\.0\.scale \| expected this key next to object"),
         ('inverter = "m2"\nobject = 0x2100', 'register = "acceleration"\nobject = 0x2100', r"channels\.2 \| .*either"),
         ('"torque_shaft_nm"', '"torque_shaft"', r"channels\.2\.column \| expected a name that ends in _nm"),
         ('"torque_shaft_nm"', '"torque_m1_nm"', r"channels\.2\.column \| .*every recording has"),

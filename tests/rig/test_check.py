@@ -80,11 +80,11 @@ def test_floats_in_the_other_word_order_are_refused_with_what_they_would_be() ->
 
 
 @pytest.mark.parametrize("fault", ["wrong_unit", "wrong_transaction"])
-def test_plc_that_answers_with_other_identifiers_is_told_as_such(fault: str) -> None:
+def test_plc_that_answers_with_other_identifiers_is_reported_as_such(fault: str) -> None:
     with served(faults=rig_faults([f"plc.{fault}@0"], 0.01)) as (_, rig):
         plc = check_rig(rig)[-1]
     assert plc.verdict is Verdict.FAILED
-    assert "expected an answer with transaction id 1, unit id 1, came transaction id" in plc.notes[0]
+    assert "expected an answer with transaction id 1, unit id 1, got transaction id" in plc.notes[0]
 
 
 def test_drive_in_fault_is_a_note_not_a_difference() -> None:
@@ -96,7 +96,7 @@ def test_drive_in_fault_is_a_note_not_a_difference() -> None:
     assert findings["m2"].verdict is Verdict.AGREES
     assert findings["m2"].notes == (
         "power state is fault, error code 0x603F is 0x4310 excess temperature of the drive, expected a drive without "
-        "fault. Mend the cause at the drive, reset the fault.",
+        "fault. Fix the cause at the drive, reset the fault.",
     )
     assert findings["m1"].notes == ()
     assert state is PowerState.FAULT

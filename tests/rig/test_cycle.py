@@ -19,8 +19,8 @@ from hil.rig.build import Devices, open_devices
 from hil.rig.cycle import Cycle
 from hil.rig.excitation import NO_TORQUE
 from hil.rig.pacing import FreePacer, Tick
-from hil.rig.sample import SampleFlag
 from hil.rig.stop import StopRequest
+from hil.sample import SampleFlag
 from tests.rig.serving import served
 
 MS = 1_000_000

@@ -36,7 +36,7 @@ LAWS = {
 
 
 @pytest.mark.parametrize("kind", LAWS)
-def test_measures_as_long_as_told_and_ends_at_zero_torque(kind: str) -> None:
+def test_measures_as_long_as_ordered_and_ends_at_zero_torque(kind: str) -> None:
     course = drive(staged(LAWS[kind]()), RigidVehicle())
     assert len(course.measured(course.torque_nm)) == 2000
     assert course.torque_nm[-1] == 0.0

@@ -13,7 +13,7 @@ import pytest
 from drivers.errors import BusDown, ConfigMismatch, DeviceFault, DeviceTimeout, DriverError, ProtocolViolation
 from hil.errors import RunAborted
 from hil.rig.drive import RunSummary
-from hil.rig.sample import SampleFlag
+from hil.sample import SampleFlag
 from hil.simulator.fault_spec import rig_faults
 from hil.simulator.rig_server import RigServer
 from tests.rig.observer import assert_disarmed
@@ -112,7 +112,7 @@ def test_host_that_is_off_the_bus_disarms_nobody_but_the_drives_miss_it(within_s
     assert isinstance(caught.value.__cause__, BusDown)
 
 
-def test_lost_answers_are_flagged_and_the_run_goes_on() -> None:
+def test_lost_answers_are_flagged_and_the_run_continues() -> None:
     summary, samples = run_with("bus.lose=0.1:0x181")
     stale = [row for row in samples.rows if row.flags is SampleFlag.M1_STALE]
     assert summary.recorded == 100

@@ -24,10 +24,10 @@ def filled(times_ns: list[int]) -> Histogram:
 @given(st.lists(st.integers(0, 10**12), min_size=1, max_size=200), st.sampled_from((0.01, 0.5, 0.99, 0.999, 1.0)))
 def test_quantile_is_the_nearest_rank_or_slightly_more(times_ns: list[int], share: float) -> None:
     exact = sorted(times_ns)[max(1, math.ceil(share * len(times_ns))) - 1]
-    told = filled(times_ns).quantile_ns(share)
-    assert told is not None
-    assert exact <= told <= exact * (1.0 + WIDEST) + 1e-9
-    assert told <= max(times_ns)
+    reported = filled(times_ns).quantile_ns(share)
+    assert reported is not None
+    assert exact <= reported <= exact * (1.0 + WIDEST) + 1e-9
+    assert reported <= max(times_ns)
 
 
 def test_the_longest_time_is_exact_and_nothing_is_lost() -> None:

@@ -9,8 +9,8 @@ import pytest
 from drivers.errors import BusDown
 from hil.rig.build import open_devices
 from hil.rig.idle import Listening
-from hil.rig.sample import SampleFlag
 from hil.rig.timing import RunTiming
+from hil.sample import SampleFlag
 from hil.simulator.inverter_settings import FaultAtStep, InverterFaults
 from hil.simulator.rig_server import RigFaults
 from tests.rig.observer import assert_disarmed
@@ -34,7 +34,7 @@ def test_both_answer_and_stay_disarmed() -> None:
     assert listening.timing.unanswered == 0
 
 
-def test_a_missing_drive_is_told_and_the_other_is_heard() -> None:
+def test_a_missing_drive_is_reported_and_the_other_is_heard() -> None:
     faults = RigFaults(m2=InverterFaults(absent=True))
     with served(faults=faults) as (_, rig), open_devices(rig) as devices:
         listening = Listening(devices, fast(rig, answer_timeout_s=0.05), RunTiming(10_000_000))

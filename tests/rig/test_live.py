@@ -19,17 +19,17 @@ from hil.rig.experiments.base import Phase
 from hil.rig.live import LiveEstimate, tracking_chain, tracking_settings
 from hil.rig.live_replay import Pace, play_record, play_samples
 from hil.rig.plan import plan_run
-from hil.rig.sample import Sample, SampleFlag
 from hil.rig.session import run_plan
 from hil.rig.stop import StopRequest
 from hil.rig.trace import is_trace
+from hil.sample import Sample, SampleFlag
 from tests.estimator.identification.tracking.drives import drives
 from tests.rig.observer import assert_disarmed
 from tests.rig.serving import Samples, fast, served
 
 
 def driven(flagged: tuple[int, ...] = (), record: Record | None = None) -> list[Sample]:
-    """A drive as samples of a run; some flagged, their values beside the truth, as stand-ins have them."""
+    """A drive as samples of a run; some flagged, their values next to the truth, as stand-ins have them."""
     record = record or drives(21, 1, 16.0)[0]
     samples = []
     for k, (t, (m1, m2), speed) in enumerate(
@@ -172,12 +172,14 @@ def test_speed_is_that_of_the_clock(speed: float) -> None:
     def sleep(seconds: float) -> None:
         now[0] += seconds
 
-    told: list[tuple[float, float]] = []
+    reported: list[tuple[float, float]] = []
     pace = Pace(speed, clock=lambda: now[0], sleep=sleep)
-    play_record(drives(22, 1, 8.0)[0], tracking_settings(), pace, lambda course, time_s: told.append((time_s, now[0])))
-    times = np.array(told)
+    play_record(
+        drives(22, 1, 8.0)[0], tracking_settings(), pace, lambda course, time_s: reported.append((time_s, now[0]))
+    )
+    times = np.array(reported)
     assert times[:, 1] == pytest.approx(times[:, 0] / speed)
-    assert len(told) > 8.0 / speed * 9
+    assert len(reported) > 8.0 / speed * 9
 
 
 def test_samples_of_a_trace_may_be_played_at_a_speed_too() -> None:
@@ -201,7 +203,7 @@ def test_period_that_does_not_fit_is_refused() -> None:
         tracking_chain(0.003)
 
 
-def test_traces_are_told_by_their_suffix() -> None:
+def test_traces_are_reported_by_their_suffix() -> None:
     assert is_trace(Path("a.BLF"))
     assert is_trace(Path("a.trc"))
     assert not is_trace(Path("a.csv"))

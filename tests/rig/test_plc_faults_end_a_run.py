@@ -26,11 +26,11 @@ def in_the_middle() -> str:
 @pytest.mark.parametrize(
     ("fault", "named"),
     [
-        ("exception", r"came exception 4 \(server device failure: the PLC could not do it\)"),
+        ("exception", r"got exception 4 \(server device failure: the PLC could not do it\)"),
         ("slow", r"expected an answer within 1 s, none came|no answer for 1\.\d\d s"),
         ("half_answer", r"expected an answer within 1 s, only \d+ bytes came that are no whole one"),
         ("reset", r"expected an answer, the connection was lost"),
-        ("wrong_width", r"reading \d+ \w+\(s\) from address \d+: expected \d+ values, came \d+"),
+        ("wrong_width", r"reading \d+ \w+\(s\) from address \d+: expected \d+ values, got \d+"),
         ("hang", r"expected an answer within 1 s, none came|no answer for 1\.\d\d s"),
         ("permissive_withdrawn", "permissive is withdrawn, expected present"),
         ("clutch_closes", "clutch is closed, expected open"),
@@ -57,7 +57,7 @@ def test_from_the_start_on_nothing_is_armed(fault: str) -> None:
 
 
 def test_a_host_whose_beats_stop_loses_the_permissive(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The cycle goes on and reads the PLC, but its watchdog stands still, from the measured part on."""
+    """The cycle continues and reads the PLC, but its watchdog stands still, from the measured part on."""
     stopped: list[bool] = []
     beat = Plc.beat
 

@@ -133,12 +133,12 @@ class TestEveryWayOut:
 
     def test_a_plc_that_falls_silent(self) -> None:
         with served(plc_rig()) as (server, rig):
-            with pytest.raises(RunAborted, match=r"generator confirmed off, came: .*What ended the run: PLC: ") as told:
+            with pytest.raises(RunAborted, match=r"generator confirmed off, got: .*What ended the run: PLC: ") as said:
                 run_once(rig, Samples(), progress=half_way(server.plc_server.pause))
             assert_disarmed(server.bus_url, 1, 2)
             assert server.plc.values()["prbs_enable"] is True
-        assert "Switch it off at the PLC before the drives are armed again" in str(told.value)
-        assert isinstance(told.value.__cause__, RunAborted)
+        assert "Switch it off at the PLC before the drives are armed again" in str(said.value)
+        assert isinstance(said.value.__cause__, RunAborted)
 
     def test_a_lost_connection_is_made_again_to_switch_it_off(self) -> None:
         async def drop(devices: Devices) -> None:
@@ -146,7 +146,7 @@ class TestEveryWayOut:
 
         with served(plc_rig()) as (server, rig), open_devices(rig) as devices:
             lose = half_way(lambda: devices.plc_loop.call(drop(devices)))
-            with pytest.raises(RunAborted, match=r"PLC: expected its status, came: .*expected an open connection"):
+            with pytest.raises(RunAborted, match=r"PLC: expected its status, got: .*expected an open connection"):
                 run(rig, devices, Samples(), progress=lose)
             assert_disarmed(server.bus_url, 1, 2)
             assert generator_of(server) == OFF

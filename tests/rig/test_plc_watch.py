@@ -1,4 +1,4 @@
-"""The PLC as the cycle sees it: polled beside it, aged in its time, judged in every cycle."""
+"""The PLC as the cycle sees it: polled next to it, aged in its time, judged in every cycle."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from hil.rig.build import open_devices
 from hil.rig.fitness import Needs
 from hil.rig.pacing import Tick
 from hil.rig.plc_watch import PlcWatch
-from hil.rig.sample import SampleFlag
+from hil.sample import SampleFlag
 from hil.simulator.rig_server import RigServer
 from tests.rig.serving import served
 
@@ -56,12 +56,12 @@ def test_status_is_as_old_as_its_poll_in_the_time_of_the_cycle() -> None:
 
 def test_news_is_there_in_the_cycle_it_came_in_and_in_no_other() -> None:
     with watch(patience_s=5.0) as (_, plc_watch):
-        came = []
+        got = []
         for time_ms in range(0, 210, 10):
             plc_watch.look(at(time_ms), 0.0)
-            came.append(plc_watch.news is not None)
+            got.append(plc_watch.news is not None)
             assert plc_watch.news in (None, plc_watch.status)
-    assert [10 * k for k, news in enumerate(came) if news] == [0, 100, 200]
+    assert [10 * k for k, news in enumerate(got) if news] == [0, 100, 200]
 
 
 def test_silent_plc_is_first_stale_then_the_end() -> None:
@@ -78,7 +78,7 @@ def test_silent_plc_is_first_stale_then_the_end() -> None:
 def test_poll_that_fails_ends_the_run_with_its_reason() -> None:
     with watch(patience_s=5.0) as (server, plc_watch):
         server.plc_server.pause()
-        with pytest.raises(RunAborted, match="PLC: expected its status, came: PLC at 127"):
+        with pytest.raises(RunAborted, match="PLC: expected its status, got: PLC at 127"):
             plc_watch.look(at(0), 0.0)
 
 

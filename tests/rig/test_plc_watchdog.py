@@ -25,7 +25,7 @@ async def beat_once(at: Address) -> None:
 
 
 def lose_a_host(server: RigServer) -> None:
-    """A host beats once and goes; simulated time goes on until the PLC has withdrawn the permissive."""
+    """A host beats once and goes; simulated time advances until the PLC has withdrawn the permissive."""
     asyncio.run(beat_once(server.modbus))
     with CanLink.open(server.bus_url) as link:
         for _ in range(round(1.5 * HOST_TIMEOUT_S / 0.01)):
@@ -68,6 +68,6 @@ def test_a_beat_that_fails_meanwhile_ends_the_run_before_a_torque() -> None:
         devices.plc.close()
         with (
             HostBeat(devices.plc_loop, devices.plc) as beat,
-            pytest.raises(RunAborted, match="host's beats, came: PLC"),
+            pytest.raises(RunAborted, match="host's beats, got: PLC"),
         ):
             beat.hand_over()

@@ -71,7 +71,7 @@ def test_memory_is_not_locked_within_a_limit(monkeypatch: pytest.MonkeyPatch, ma
 
 
 @linux
-def test_refused_lock_is_told_in_the_systems_words(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_refused_lock_is_reported_in_the_systems_words(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(realtime, "_may_lock_all", lambda: True)
     monkeypatch.setattr(realtime, "_call", lambda function, *arguments: "Cannot allocate memory")
     with real_time() as grants:

@@ -41,7 +41,7 @@ def test_run_over_tcp_and_nothing_left_behind() -> None:
     assert threading.active_count() == before
 
 
-def test_free_ports_are_told() -> None:
+def test_free_ports_are_reported() -> None:
     with server() as served:
         assert served.modbus.port > 0
         assert served.bus_url.startswith("ws://127.0.0.1:")
@@ -102,7 +102,7 @@ def test_effect_text_is_read() -> None:
 
 @pytest.mark.parametrize("text", ["backlash:gap_rad", "backlash:gap_rad=", "backlash:gap_rad=wide"])
 def test_effect_parameter_that_is_no_number_is_refused(text: str) -> None:
-    with pytest.raises(UsageError, match="expected key=number, came 'gap_rad"):
+    with pytest.raises(UsageError, match="expected key=number, got 'gap_rad"):
         EffectSpec.parse(text)
 
 

@@ -13,7 +13,7 @@ from hil.config.rig_file import PrbsTarget
 from hil.rig.build import open_devices
 from hil.rig.experiments.base import Phase
 from hil.rig.pacing import RealTimePacer, period_ns
-from hil.rig.sample import SampleFlag
+from hil.sample import SampleFlag
 from tests.rig.observer import assert_disarmed
 from tests.rig.serving import (
     DRAG_NM_S,

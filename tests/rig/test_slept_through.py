@@ -1,4 +1,4 @@
-"""Cycles the host was too late for: their rows are there, flagged, and time goes on evenly."""
+"""Cycles the host was too late for: their rows are there, flagged, and time advances evenly."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 from hil.errors import RunAborted
 from hil.rig.drive import SLEPT_THROUGH
 from hil.rig.pacing import FreePacer, Tick
-from hil.rig.sample import SampleFlag
+from hil.sample import SampleFlag
 from tests.rig.observer import assert_disarmed
 from tests.rig.serving import Samples, fast, run_once, served
 
@@ -58,10 +58,10 @@ def test_a_stall_of_this_machine_is_this_machines_fault() -> None:
 
 
 @pytest.mark.parametrize("gap_after", range(210, 290, 10))
-def test_after_missing_cycles_the_torque_goes_on_from_what_the_drives_hold(
+def test_after_missing_cycles_the_torque_continues_from_what_the_drives_hold(
     gap_after: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The plan has gone on for 15 cycles at up to 2000 Nm/s, 0.65 of it on m1; the torque has not."""
+    """The plan has continued for 15 cycles at up to 2000 Nm/s, 0.65 of it on m1; the torque has not."""
     monkeypatch.setattr("tests.rig.test_slept_through.GAP_AFTER", gap_after)
     samples = Samples()
     with served() as (_, rig):

@@ -1,4 +1,4 @@
-"""A run's bus trace beside its samples, and the samples rebuilt from it: torque and speed the same to the bit."""
+"""A run's bus trace next to its samples, and the samples rebuilt from it: torque and speed the same to the bit."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import pytest
 
 from hil.errors import RecordingError
 from hil.rig.replay import replay
-from hil.rig.sample import Sample, SampleFlag
 from hil.rig.trace import SUFFIXES, BusTrace
+from hil.sample import Sample, SampleFlag
 from hil.simulator.fault_spec import rig_faults
 from hil.simulator.inverter_settings import InverterFaults
 from hil.simulator.rig_server import RigFaults
@@ -136,8 +136,8 @@ def test_trace_of_a_run_without_a_clock_has_one_period_per_sync(written: Callabl
     ("rows", "reason"),
     [
         ([], "expected SYNC"),
-        ([*cycle(0, 1, prbs=0), *cycle(10, 1, prbs=0)], "measured part .* came none"),
-        ([*cycle(0, 1), *cycle(10, 1, prbs=0), *cycle(20, 1), *cycle(30, 1)], "came a second"),
+        ([*cycle(0, 1, prbs=0), *cycle(10, 1, prbs=0)], "measured part .* got none"),
+        ([*cycle(0, 1), *cycle(10, 1, prbs=0), *cycle(20, 1), *cycle(30, 1)], "got a second"),
         ([*cycle(0, 1), (3, TPDO_M1, b"\x00"), *cycle(10, 1)], "frame of 1 bytes.*rig file is not the one"),
     ],
 )
@@ -227,13 +227,13 @@ def test_log_of_several_channels_asks_which_and_never_merges_them(
 ) -> None:
     path = two_buses(tmp_path / f"two{suffix}")
     one, two = NAMES[suffix]
-    with pytest.raises(RecordingError, match=rf"came channels {one} \(40 frames\), {two} \(40 frames\)\. Say which"):
+    with pytest.raises(RecordingError, match=rf"got channels {one} \(40 frames\), {two} \(40 frames\)\. Say which"):
         list(replay(path, small_rig()))
     wanted = list(replay(written(*CYCLES), small_rig()))
     for name in MEASURED:
         assert column(list(replay(path, small_rig(), channel=one)), name) == column(wanted, name)
     assert set(column(list(replay(path, small_rig(), channel=two)), "torque_m1_nm")) == {77 * RATED_NM / 1000.0}
-    with pytest.raises(RecordingError, match=rf"expected channel 'can7', came channels {one} \(40 frames\)"):
+    with pytest.raises(RecordingError, match=rf"expected channel 'can7', got channels {one} \(40 frames\)"):
         list(replay(path, small_rig(), channel="can7"))
 
 
@@ -315,7 +315,7 @@ class _FullDisk:
         pass
 
 
-def test_disk_that_fills_up_is_told_and_the_cycle_goes_on(tmp_path: Path) -> None:
+def test_disk_that_fills_up_is_reported_and_the_cycle_continues(tmp_path: Path) -> None:
     trace = BusTrace(tmp_path / "a.log")
     trace.__enter__()
     trace._writer.stop()

@@ -1,11 +1,11 @@
-"""Drives that give another torque than they are asked for, from the moment on or from the start: told, and ended."""
+"""Drives that give another torque than they are asked for, from some moment on or from the start: reported, ended."""
 
 from __future__ import annotations
 
 import pytest
 
 from drivers.errors import CommandRefused, WrongTorque
-from hil.rig.sample import SampleFlag
+from hil.sample import SampleFlag
 from hil.simulator.fault_spec import rig_faults
 from tests.rig.observer import assert_disarmed
 from tests.rig.serving import Samples, changed, run_once, served, small_rig

@@ -19,7 +19,7 @@ def test_the_register_tells_the_class(code: int, register: int) -> None:
     assert (emergency.code, emergency.register) == (code, register)
 
 
-def test_an_error_is_told_once_and_its_end_when_all_are_gone() -> None:
+def test_an_error_is_reported_once_and_its_end_when_all_are_gone() -> None:
     errors = ErrorList()
     for code in (0x8130, 0x8130, 0x4310):
         errors.set(code)

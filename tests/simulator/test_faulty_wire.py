@@ -133,12 +133,12 @@ def test_delayed_frames_come_later_and_in_their_order(faults: BusFaults) -> None
         assert [message.data[0] for message in ends.at_host] == list(range(20))
 
 
-def test_a_controller_off_the_bus_is_told_once_and_nothing_passes_any_more() -> None:
+def test_a_controller_off_the_bus_is_reported_once_and_nothing_passes_any_more() -> None:
     with cable(BusFaults(off_at_step=1)) as ends:
         assert ends.from_device(1) == [0]
         for _ in range(3):
             ends.host.send(frame(SYNC, b""))
         assert ends.at_device == []
         assert ends.from_device(2) == [0]
-        [told] = [message for message in ends.at_host if message.is_error_frame]
-        assert told.arbitration_id == BUS_OFF_ERROR
+        [reported] = [message for message in ends.at_host if message.is_error_frame]
+        assert reported.arbitration_id == BUS_OFF_ERROR

@@ -162,7 +162,7 @@ def test_tpdo_that_is_switched_off_is_not_sent(armed: Bench) -> None:
     assert answers(armed, syncs=1) == 0
 
 
-def test_rpdo_of_another_length_is_not_processed_and_told(armed: Bench) -> None:
+def test_rpdo_of_another_length_is_not_processed_and_reported(armed: Bench) -> None:
     with armed.intruder() as bus:
         bus.send(frame(0x205, bytes(5)))
         armed.cycle()
@@ -170,7 +170,7 @@ def test_rpdo_of_another_length_is_not_processed_and_told(armed: Bench) -> None:
     assert armed.rig.torque_nm[0] == pytest.approx(120.0)
 
 
-def test_fault_from_power_on_is_told_after_the_boot_up() -> None:
+def test_fault_from_power_on_is_reported_after_the_boot_up() -> None:
     with bench(InverterFaults(fault=FaultAtStep(0, 0x3220))) as rig, rig.intruder() as bus:
         nmt(rig, NmtCommand.RESET_NODE)
         assert received(bus, 0x700 + M1.node_id) == b"\x00"

@@ -67,7 +67,7 @@ def test_a_refused_mode_is_requested_and_not_taken() -> None:
     assert device.clutch is ClutchState.OPEN
 
 
-def test_the_clutch_closes_when_told_and_stays() -> None:
+def test_the_clutch_closes_when_ordered_and_stays() -> None:
     device = PlcDevice(faults=PlcFaults(clutch_closes_at_s=1.0))
     device.step(0.99)
     assert device.clutch is ClutchState.OPEN
@@ -78,7 +78,7 @@ def test_the_clutch_closes_when_told_and_stays() -> None:
     assert device.clutch is ClutchState.CLOSED
 
 
-def test_the_permissive_goes_when_told_and_stays_away() -> None:
+def test_the_permissive_goes_when_ordered_and_stays_away() -> None:
     device = PlcDevice(faults=PlcFaults(permissive_withdrawn_at_s=0.5))
     device.step(0.49)
     assert device.values()["permissive"] is True
@@ -222,6 +222,6 @@ def test_of_two_faults_the_later_one_tells_how_it_answers() -> None:
 def test_what_the_program_does_not_accept_changes_nothing(name: str, value: Value) -> None:
     device = PlcDevice()
     before = device.values()
-    with pytest.raises(ValueRefusedError, match=f"PLC register {name}: expected .*, came {value!r}"):
+    with pytest.raises(ValueRefusedError, match=f"PLC register {name}: expected .*, got {value!r}"):
         device.write({"prbs_divider": 9, "drive_mode_request": "parallel", name: value})
     assert device.values() == before

@@ -182,7 +182,7 @@ def test_a_port_in_use_is_refused_in_both_ways_to_serve() -> None:
 
 def test_a_map_with_a_register_the_plc_does_not_know_is_refused() -> None:
     more = {**MAP.registers, "oil_level": MAP["plc_count"]}
-    with pytest.raises(ConfigMismatch, match="registers the simulated PLC knows, came oil_level"):
+    with pytest.raises(ConfigMismatch, match="registers the simulated PLC knows, got oil_level"):
         PlcServer(PlcDevice(), MAP.model_copy(update={"registers": more})).start()
 
 

@@ -65,7 +65,7 @@ def test_speed_is_sampled_before_the_torque_of_the_same_step_acts() -> None:
     assert plant.steps == [((pytest.approx(60.0 * k), pytest.approx(6.0)), 0.01) for k in range(3)]
 
 
-def test_time_counts_steps_and_is_told_to_callbacks() -> None:
+def test_time_counts_steps_and_is_reported_to_callbacks() -> None:
     times_s: list[float] = []
     with bench() as rig:
         armed(rig)

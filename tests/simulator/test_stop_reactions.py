@@ -1,4 +1,4 @@
-"""Option codes of the simulated drive: each does what its number says, told by torque and state, SYNC by SYNC."""
+"""Option codes of the simulated drive: each does what its number says, reported by torque and state, SYNC by SYNC."""
 
 from __future__ import annotations
 

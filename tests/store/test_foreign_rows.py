@@ -39,7 +39,7 @@ def change(folder: Path, statement: str, *values: Any) -> None:
 @pytest.mark.parametrize(
     "name", ["{outside}", "../thesis.csv", "x/../../thesis.csv", "link.csv", ".", "", "x\0y", "x" * 400]
 )
-def test_a_row_that_leads_out_of_the_folder_is_told_and_harms_nothing(
+def test_a_row_that_leads_out_of_the_folder_is_reported_and_harms_nothing(
     filled: Path, name: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     outside = filled.parent / "thesis.csv"

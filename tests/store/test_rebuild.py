@@ -49,7 +49,7 @@ def test_a_moved_recording_is_found_again_with_its_notes(tmp_path: Path, record:
     assert recording_state(run.entry) == VERIFIED
 
 
-def test_what_ended_a_run_is_told_by_the_recording_itself(tmp_path: Path) -> None:
+def test_what_ended_a_run_is_reported_by_the_recording_itself(tmp_path: Path) -> None:
     said = {"experiment": "cruise", "rig_file": RIG, "rig_sha256": text_sha256(RIG)}
 
     def run(name: str, samples: int, ended_by: Exception | None = None) -> None:
@@ -87,7 +87,7 @@ def test_results_in_the_folder_are_attached_once_to_the_runs_they_name(tmp_path:
     assert [run.verdict for run in runs] == ["explained", "explained", ""]
 
 
-def test_what_a_recording_became_is_told(tmp_path: Path, record: Record) -> None:
+def test_what_a_recording_became_is_reported(tmp_path: Path, record: Record) -> None:
     number = register_run(record("a.csv"))
     with RunStore(tmp_path) as store:
         entry = store.get(number).entry
@@ -97,8 +97,8 @@ def test_what_a_recording_became_is_told(tmp_path: Path, record: Record) -> None
     path.write_text(whole.replace("0.01,", "0.02,"), encoding="utf-8")
     assert "damaged, or was changed" in recording_state(entry)
     path.write_text(whole, encoding="utf-8")
-    for beside in ("", ".json"):
-        (tmp_path / f"a.csv{beside}").unlink()
+    for companion in ("", ".json"):
+        (tmp_path / f"a.csv{companion}").unlink()
     other = record("b.csv")
     other.rename(path)
     (tmp_path / "b.csv.json").rename(tmp_path / "a.csv.json")

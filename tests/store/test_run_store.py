@@ -144,7 +144,7 @@ def test_a_deleted_run_is_gone_with_all_that_is_its_own(four: Path) -> None:
         for run in runs[:2]:
             assert store.delete(run.run_id).entry == run.entry
         assert [run.run_id for run in store.find()] == [run.run_id for run in runs[2:]]
-        with pytest.raises(UsageError, match=r"runs\.sqlite: expected the number of a run, came 1, which is none"):
+        with pytest.raises(UsageError, match=r"runs\.sqlite: expected the number of a run, got 1, which is none"):
             store.get(runs[0].run_id)
         left = {
             table: store._database.execute(f"SELECT count(*) FROM {table}").fetchone()[0]
@@ -165,16 +165,16 @@ def test_a_number_is_never_given_twice(four: Path, record: Record) -> None:
 def test_a_run_that_is_none_is_refused(tmp_path: Path, record: Record, call: str) -> None:
     register_run(record("a.csv"))
     more = {"note": ("x",), "attach": ("model", "x"), "move": (tmp_path / "b.csv",)}.get(call, ())
-    with RunStore(tmp_path) as store, pytest.raises(UsageError, match="came 99, which is none"):
+    with RunStore(tmp_path) as store, pytest.raises(UsageError, match="got 99, which is none"):
         getattr(store, call)(99, *more)
 
 
 def test_what_can_not_be_entered_is_refused(tmp_path: Path, record: Record) -> None:
     number = register_run(record("a.csv"))
     with RunStore(tmp_path) as store:
-        with pytest.raises(UsageError, match="expected a note, came an empty one"):
+        with pytest.raises(UsageError, match="expected a note, got an empty one"):
             store.note(number, "  ")
-        with pytest.raises(UsageError, match=r"gone\.json: expected a file to attach, came: No such file"):
+        with pytest.raises(UsageError, match=r"gone\.json: expected a file to attach, got: No such file"):
             store.attach(number, "model", tmp_path / "gone.json")
         with pytest.raises(StoreError, match="expected a recording inside"):
             store.add_run(RunEntry(recording=tmp_path.parent / "elsewhere.csv"))
@@ -212,9 +212,9 @@ def test_a_store_moves_with_its_folder(tmp_path: Path, record: Record) -> None:
 
 def test_results_go_with_a_registration(tmp_path: Path, record: Record) -> None:
     path = record("a.csv")
-    beside = tmp_path / "a.online.json"
-    beside.write_text(json.dumps({"final": {}}), encoding="utf-8")
-    number = register_run(path, results={"online": beside})
+    companion = tmp_path / "a.online.json"
+    companion.write_text(json.dumps({"final": {}}), encoding="utf-8")
+    number = register_run(path, results={"online": companion})
     with RunStore(tmp_path) as store:
         assert [attachment.kind for attachment in store.get(number).attachments] == ["online"]
 

@@ -46,7 +46,7 @@ def test_what_is_no_store_at_all(tmp_path: Path, record: Record, content: bytes)
     record("a.csv")
     store_of(tmp_path).write_bytes(content)
     if content:
-        with pytest.raises(StoreError, match=r"expected a whole store of runs, came a damaged one.*hil runs rebuild"):
+        with pytest.raises(StoreError, match=r"expected a whole store of runs, got a damaged one.*hil runs rebuild"):
             RunStore(tmp_path).__enter__()
     result = rebuild(tmp_path)
     assert (result.before, result.found) == (0, 1)
@@ -74,7 +74,7 @@ def test_any_damaged_page_costs_no_run_and_only_notes_of_its_own(filled: Path) -
     assert costly == 2  # the first page, which names all others, and that of the notes
 
 
-def test_a_truncated_store_is_told_and_rebuilt(filled: Path) -> None:
+def test_a_truncated_store_is_reported_and_rebuilt(filled: Path) -> None:
     store = store_of(filled)
     store.write_bytes(store.read_bytes()[: 5 * PAGE_BYTES])
     with pytest.raises(StoreError, match="damaged"):
@@ -90,7 +90,7 @@ def test_a_newer_store_is_refused_and_left_alone(filled: Path, version: int) -> 
     database.close()
     before = store_of(filled).read_bytes()
     for attempt in (lambda: names(filled), lambda: rebuild(filled)):
-        with pytest.raises(StoreError, match=f"version {len(MIGRATIONS)} or older, came version {version}"):
+        with pytest.raises(StoreError, match=f"version {len(MIGRATIONS)} or older, got version {version}"):
             attempt()
     assert store_of(filled).read_bytes() == before
 
@@ -152,14 +152,14 @@ def test_a_full_disk_costs_only_what_was_being_entered(filled: Path) -> None:
 
 
 @pytest.mark.parametrize("pages", [0, 4, 8, 12])
-def test_a_full_disk_leaves_no_room_for_a_new_store_and_is_told(tmp_path: Path, pages: int) -> None:
+def test_a_full_disk_leaves_no_room_for_a_new_store_and_is_reported(tmp_path: Path, pages: int) -> None:
     """From 8 pages on there is room for the index of the WAL, and SQLite rolls back by itself."""
     with largest_file(pages * PAGE_BYTES), pytest.raises(StoreError, match=r"expected room for the entry.*make room"):
         names(tmp_path)
     assert names(tmp_path) == {}
 
 
-def test_a_store_held_by_another_program_is_told(filled: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_store_held_by_another_program_is_reported(filled: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(connection, "BUSY_S", 0.05)
     other = sqlite3.connect(store_of(filled), isolation_level=None)
     other.execute("BEGIN IMMEDIATE")
@@ -202,16 +202,16 @@ def test_a_killed_writer_loses_nothing_it_had_committed(filled: Path) -> None:
     for _ in range(30):
         writer.stdout.readline()
     writer.kill()
-    told = 30 + len(writer.stdout.read().splitlines())
+    said = 30 + len(writer.stdout.read().splitlines())
     writer.wait()
     writer.stdout.close()
     with RunStore(filled) as store:
         kept = [note.text for note in store.get(1).notes[1:]]
-    assert kept[:told] == [f"x {k}" for k in range(told)]
-    assert len(kept) - told in (0, 1)  # one may have been committed and not told any more
+    assert kept[:said] == [f"x {k}" for k in range(said)]
+    assert len(kept) - said in (0, 1)  # one may have been committed and not reported any more
 
 
-def test_a_folder_that_can_not_be_written_is_told(filled: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_folder_that_can_not_be_written_is_reported(filled: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     shutil.rmtree(filled / "gone", ignore_errors=True)
     (filled / "gone").mkdir()
     (filled / "gone" / "runs.sqlite").mkdir()

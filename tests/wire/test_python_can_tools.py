@@ -74,7 +74,7 @@ def interrupt(process: subprocess.Popen[str]) -> None:
     """Press Ctrl-C until the program ends: one may fall where the program, or its closing of a socket, swallows it."""
     deadline = time.monotonic() + PATIENCE_S
     while process.poll() is None:
-        assert time.monotonic() < deadline, f"{process.args} goes on after every Ctrl-C"
+        assert time.monotonic() < deadline, f"{process.args} continues after every Ctrl-C"
         process.send_signal(signal.SIGINT)
         with suppress(subprocess.TimeoutExpired):
             process.wait(5.0)
@@ -179,7 +179,7 @@ def rest_of(terminal: int) -> bytes:
 
 
 def test_socketcan_that_is_not_there_is_refused_by_name() -> None:
-    """The URL reaches python-can's SocketCAN back end, whose complaint is told."""
+    """The URL reaches python-can's SocketCAN back end, whose complaint is reported."""
     with pytest.raises(BusDown, match=r"'socketcan:nosuchcan0\?.*can't be opened"):
         CanLink.open("socketcan:nosuchcan0?bitrate=500000")
 
@@ -206,7 +206,7 @@ def test_a_simulated_rig_on_a_bus_of_the_kernel_says_when_there_is_none() -> Non
     ("url", "faults", "wanted"),
     [
         ("socketcan:can0", RigFaults(), r"expected ws://HOST:PORT/"),  # real drives may be on it
-        (f"socketcan:{INTERFACE}", RigFaults(bus=BusFaults(off_at_step=5)), "came faults of the bus"),
+        (f"socketcan:{INTERFACE}", RigFaults(bus=BusFaults(off_at_step=5)), "got faults of the bus"),
     ],
 )
 def test_a_simulated_rig_is_not_served_where_it_must_not_be(url: str, faults: RigFaults, wanted: str) -> None:

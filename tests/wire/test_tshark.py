@@ -50,11 +50,11 @@ def test_every_frame_is_canopen_and_none_is_malformed(trace: Path) -> None:
     assert [frame for frame in frames if frame["_ws.malformed"] or frame["_ws.expert.severity"]] == []
 
 
-def test_every_kind_of_message_is_told_as_often_as_it_was_sent(trace: Path) -> None:
+def test_every_kind_of_message_is_reported_as_often_as_it_was_sent(trace: Path) -> None:
     with can.LogReader(trace) as reader:
         sent = Counter(kind_of(message.arbitration_id) for message in reader)
-    told = Counter(int(frame["canopen.function_code"], 16) for frame in dissected(trace))
-    assert told == sent
+    reported = Counter(int(frame["canopen.function_code"], 16) for frame in dissected(trace))
+    assert reported == sent
     names = {
         0x0: "NMT",
         SYNC_OR_EMCY: "SYNC",
@@ -64,15 +64,15 @@ def test_every_kind_of_message_is_told_as_often_as_it_was_sent(trace: Path) -> N
         0xC: "SDO rx",
         0xE: "heartbeat",
     }
-    assert set(told) == set(names), "a kind of message is missing on the bus, or one came that nobody sends"
+    assert set(reported) == set(names), "a kind of message is missing on the bus, or one came that nobody sends"
 
 
-def test_emergency_is_told_with_its_error_code(trace: Path) -> None:
+def test_emergency_is_reported_with_its_error_code(trace: Path) -> None:
     codes = [frame["canopen.em.err_code"] for frame in dissected(trace) if frame["canopen.em.err_code"]]
     assert {int(code, 16) for code in codes} == {EXCESS_TEMPERATURE}
 
 
-def test_a_malformed_frame_would_be_told(tmp_path: Path) -> None:
+def test_a_malformed_frame_would_be_reported(tmp_path: Path) -> None:
     """The test above can fail: an SDO request of one byte is no SDO request."""
     path = tmp_path / "short.blf"
     with can.Logger(path) as logger:

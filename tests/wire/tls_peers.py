@@ -55,8 +55,8 @@ def openssl_exchange(port: int, credentials: Credentials, request: bytes, *optio
             assert client.stdout is not None
             client.stdin.write(request)
             client.stdin.flush()
-            came, _, _ = select.select([client.stdout], [], [], TIMEOUT_S)
-            assert came, f"neither an answer nor an end within {TIMEOUT_S} s"
+            got, _, _ = select.select([client.stdout], [], [], TIMEOUT_S)
+            assert got, f"neither an answer nor an end within {TIMEOUT_S} s"
             return os.read(client.stdout.fileno(), 260)
         finally:
             client.kill()

@@ -10,15 +10,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.compiled import compiled, woven
+from estimator.compiled import compiled, ir_inlined
 from estimator.physics.kernel import integration
+from estimator.physics.kernel.makes import Masses
 from estimator.signals.record import FloatArray
 
 
 class Setting(NamedTuple):
     """What the kernel is told alike in every block, and room for its answers; see ``integration.integrate``."""
 
-    masses: int
+    masses: Masses
     sample_time_s: float
     substeps: int
     sign_width: float
@@ -89,7 +90,7 @@ def linearise(
     return phi, gamma, c, d
 
 
-@woven
+@ir_inlined
 def by_states(
     setting: Setting,
     nudges: Nudges,
@@ -111,7 +112,7 @@ def by_states(
             phi[j, i] = (moved[nudges.states[j]] - state[nudges.states[j]]) / nudges.steps[i]
 
 
-@woven
+@ir_inlined
 def by_torques(
     setting: Setting,
     nudges: Nudges,
@@ -134,7 +135,7 @@ def by_torques(
             gamma[j, i] = (moved[nudges.states[j]] - rest[nudges.states[j]]) / nudges.step_nm
 
 
-@woven
+@ir_inlined
 def run_block(setting: Setting, first: int, torques: Torques, p: FloatArray, state: FloatArray) -> float:
     """Simulate a block from ``state``, leave there its last state, and return its mean output."""
     torque, load = torques

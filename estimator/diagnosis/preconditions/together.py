@@ -26,7 +26,7 @@ def require_together(records: Sequence[Record]) -> None:
     first = records[0]
     names = [record.name for record in records]
     if len(set(names)) < len(names):
-        raise BadShape(f"recordings must have different names, came {', '.join(names)}. Rename the files.")
+        raise BadShape(f"recordings must have different names, got {', '.join(names)}. Rename the files.")
     for record in records[1:]:
         if not np.isclose(record.sample_time_s, first.sample_time_s, rtol=SAME_PERIOD):
             raise BadShape(

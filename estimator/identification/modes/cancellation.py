@@ -41,7 +41,7 @@ class Cancellation:
         """What it means, in a sentence."""
         kind = "pair" if self.pole.imag else "pole"
         return (
-            f"The {kind} at {self.pole:.3f} and the zero at {self.zero:.3f} can't be told apart "
+            f"The {kind} at {self.pole:.3f} and the zero at {self.zero:.3f} can't be distinguished "
             f"(p = {self.p_value:.2g}): the data do not need this {kind}."
         )
 

@@ -14,9 +14,9 @@ input, and P the covariance of the estimate theta_hat::
 
 which for many samples is as good as fitting x to the data themselves. The second sum holds what is known beforehand.
 
-Near constant speed friction is told from the load torque by the lowest frequencies alone, and a motor friction b_M
-damps the resonance almost as c does. Then b_M, b_L and c come out with intervals that hold 0, and the statement says
-so; the sum c + b_M is sharp all the same.
+Near constant speed friction is distinguished from the load torque by the lowest frequencies alone, and a motor friction
+b_M damps the resonance almost as c does. Then b_M, b_L and c come out with intervals that hold 0, and the statement
+says so; the sum c + b_M is sharp all the same.
 """
 
 from __future__ import annotations
@@ -184,8 +184,8 @@ def physical_parameters(
 
     def residual(x: FloatArray) -> FloatArray:
         apart = two_mass_model(x * scale, model.sample_time_s).theta - model.theta
-        told = [(x[i] * scale[i] - known_i.value) / known_i.std for i, known_i in prior.items()]
-        return np.concatenate([whitening @ apart, told])
+        pulled_to_prior = [(x[i] * scale[i] - known_i.value) / known_i.std for i, known_i in prior.items()]
+        return np.concatenate([whitening @ apart, pulled_to_prior])
 
     solution = least_squares(residual, start / scale, jac="3-point", method="lm", max_nfev=MOST_EVALUATIONS)
     x, jacobian = solution.x * scale, np.asarray(solution.jac, dtype=np.float64)

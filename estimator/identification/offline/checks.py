@@ -19,7 +19,7 @@ def require_identifiable(record: Record, orders: Orders) -> None:
     Raises
     ------
     BadSetting
-        If the sampling period told is not that of the time stamps: every frequency would be wrong by their ratio.
+        If the sampling period given is not that of the time stamps: every frequency would be wrong by their ratio.
     NotExciting
         If the run is too short, the torque does not excite enough, or the output never changes; with their names.
     """

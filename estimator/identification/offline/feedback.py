@@ -19,10 +19,8 @@ SIGNIFICANCE = 0.01
 
 CONSEQUENCES = MappingProxyType(
     {
-        "arx": "unbiased only if the noise is exactly w / A; with sensor noise it is biased, in closed loop as in open",
         "output_error": "biased towards minus the inverse of the feedback where the noise is stronger than the PRBS",
         "box_jenkins": "unbiased as long as its noise model is right and the loop holds at least one sample of delay",
-        "instrumental_variable": "unbiased if the PRBS alone is the instrument; biased if the torque is",
         "spectral": "a mean of B / A and minus the inverse of the feedback, weighted by PRBS and noise",
         "recursive": "as output_error",
     }
@@ -65,6 +63,6 @@ def judge_feedback(validation: Validation) -> Feedback:
     statement = (
         f"The torque follows the speed (p = {p_value:.2g}): a driver or controller closes the loop. The output-error, "
         "recursive and spectral estimates are biased by what noise it feeds back. Believe the Box-Jenkins model, or "
-        "the instrumental variable with the PRBS as instrument; or record with the torque held but for the PRBS."
+        "record with the torque held but for the PRBS."
     )
     return Feedback(True, p_value, CONSEQUENCES, statement)

@@ -17,7 +17,7 @@ from estimator.signals.record import FloatArray, Record
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FreeRun:
-    """Free-run simulation beside the measurement.
+    """Free-run simulation next to the measurement.
 
     Attributes
     ----------

@@ -22,10 +22,8 @@ from estimator.signals.record import BoolArray, FloatArray
 class Method(Enum):
     """Off-line estimators; the value is the name in reports."""
 
-    ARX = "arx"
     OUTPUT_ERROR = "output_error"
     BOX_JENKINS = "box_jenkins"
-    INSTRUMENTAL_VARIABLE = "instrumental_variable"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

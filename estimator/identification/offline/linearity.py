@@ -1,4 +1,4 @@
-"""Whether a linear model is enough: a score test on what bends a driveline's response.
+"""Whether a linear model is enough: a score test on what makes a driveline's response nonlinear.
 
 With the linear model right, its innovation w(t) is independent of everything that was known at t - 1, so also of any
 nonlinear function of the torque in the shaft or of the speed. Piecewise linear functions of both, whose knots lie at

@@ -1,7 +1,7 @@
 """Whether a model is right: free run first, then whether what it leaves has to do with the input.
 
 An output-error model is judged by its transfer function, so by the independence of residual and past input; whiteness
-of the residual is a matter of the noise model, and its autocorrelation is shown beside without a verdict (L. Ljung,
+of the residual is a matter of the noise model, and its autocorrelation is shown besides without a verdict (L. Ljung,
 System Identification, 2nd ed., section 16.6). Both signals are made white first, the residual by its own
 autoregression D and the input by one of its own (G. E. P. Box, G. M. Jenkins, Time Series Analysis, "prewhitening"),
 so that under independence each correlation is normal with variance 1 / N, whatever the colours, and those at m lags

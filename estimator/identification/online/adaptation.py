@@ -133,7 +133,7 @@ class DecreasingThenConstantTrace:
     """Decreasing gain until tr F has fallen to ``trace``, which is then held: fast start, then tracking.
 
     The paper's profile. While the trace is held, lambda_1(t) and lambda_2(t) follow from it and from their
-    constant ratio alpha. The paper gives "lambda_1 = 0.993" beside "tr F(0) = 0.01"; since lambda_1(t) itself
+    constant ratio alpha. The paper gives "lambda_1 = 0.993" next to "tr F(0) = 0.01"; since lambda_1(t) itself
     is fixed by the trace, its number is taken as the ratio (lambda_1 for lambda_2 = 1).
     """
 

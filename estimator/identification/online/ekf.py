@@ -18,7 +18,7 @@ It wants the torque as it was held and the speed as it was read: raw samples at 
 longer period between the samples let the torque move in between, which the transfer functions of the other estimators
 absorb and physical parameters can't.
 
-Guards: as everywhere a masked sample, or one that is no number, leaves the estimate alone while time goes on. An
+Guards: as everywhere a masked sample, or one that is no number, leaves the estimate alone while time advances. An
 output 100 standard deviations from the prediction is not used; twenty in a row, and the motion starts anew from them.
 A parameter stays within a factor of 100 of its start value.
 """

@@ -37,7 +37,7 @@ START = NOISE + N_STATES  # variance of each state before the first sample
 ORIGIN = START + N_STATES  # value of each state before the first sample
 N_LAW = ORIGIN + N_STATES
 
-# Places in `live` beside those of all estimators, where theirs have the gain.
+# Places in `live` besides those of all estimators, where theirs have the gain.
 STARTED = 0  # 1 once an output has set the speeds
 REJECTED = 1  # outputs in a row that the prediction makes impossible
 
@@ -123,7 +123,7 @@ def spread(m: Parts) -> None:
 
 @inlined
 def observed(y: float, m: Parts) -> bool:
-    """Correct the state by an output; tell whether it was possible beside the prediction."""
+    """Correct the state by an output; tell whether it was possible besides the prediction."""
     x, law, live = m.x, m.law, m.live
     variance = 0.0
     for j in range(N_STATES):

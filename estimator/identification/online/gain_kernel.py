@@ -136,7 +136,7 @@ def adapt(Phi: FloatArray, m: Parts) -> float:
     """Update whatever the profile has; g = F Phi and Phi^T F Phi are of the F before.
 
     ``m.diagonal`` then tells what the samples determine: it is that of F, or, where F does not fall with them, that of
-    the decreasing gain ``known_U``, ``known_D`` that runs beside it for this alone.
+    the decreasing gain ``known_U``, ``known_D`` that runs alongside it for this alone.
     """
     by_itself = informs_by_itself(m.law)
     if not by_itself:

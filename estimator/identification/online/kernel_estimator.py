@@ -48,7 +48,7 @@ class KernelEstimator:
     memory : Memory
         With its start values.
     extra_names : tuple of str
-        What it holds beside theta, in the columns after it.
+        What it holds besides theta, in the columns after it.
     """
 
     def __init__(
@@ -85,7 +85,7 @@ class KernelEstimator:
 
     @property
     def extra_names(self) -> tuple[str, ...]:
-        """Names of what it estimates beside theta; see :attr:`Trajectory.extra`."""
+        """Names of what it estimates besides theta; see :attr:`Trajectory.extra`."""
         return self._extra_names
 
     @property

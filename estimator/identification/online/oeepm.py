@@ -1,7 +1,7 @@
 """Recursive output error with extended prediction model (OEEPM): the noise is modelled, so that no filter is needed.
 
 I. D. Landau and G. Zito, Digital Control Systems (Springer, 2006), section 5.4 (output error with extended
-prediction model). The a-posteriori errors stand in the regressor beside the predicted outputs::
+prediction model). The a-posteriori errors stand in the regressor next to the predicted outputs::
 
     phi(t-1)^T = [-yhat(t-1) .. -yhat(t-na), u(t-nk) .. u(t-nk-nb+1), e(t-1) .. e(t-na)]
     Phi(t-1)   = phi(t-1)

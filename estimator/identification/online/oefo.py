@@ -28,7 +28,7 @@ thrown. In 24 simulated cruises the worst damping error fell from 10 % to 1.5 % 
 80 samples.
 
 Guards, since nothing may raise or run away in the loop: a masked output, or one that is no number or beyond
-1e30, leaves theta and F as they are while time goes on with the prediction; an input of that kind is held,
+1e30, leaves theta and F as they are while time advances with the prediction; an input of that kind is held,
 and its samples are masked; a prediction beyond 1000 times the largest output seen starts again from the
 measured one; without excitation F stops growing at tr F(0).
 """

@@ -117,7 +117,7 @@ class Trajectory:
     reason : ndarray of int, shape (N,)
         Values of :class:`Reason`.
     extra : ndarray, shape (N, m)
-        What the estimator holds beside theta (noise model, masses and stiffness); m is often 0.
+        What the estimator holds besides theta (noise model, masses and stiffness); m is often 0.
     extra_names : tuple of str
         Names of its columns.
     """
@@ -166,7 +166,7 @@ class RecursiveEstimator(Protocol):
 
     @property
     def extra_names(self) -> tuple[str, ...]:
-        """Names of what it holds beside theta; see :attr:`Trajectory.extra`."""
+        """Names of what it holds besides theta; see :attr:`Trajectory.extra`."""
         ...
 
     def update(self, u: float, y: float, okay: bool = True) -> Estimate:

@@ -36,7 +36,7 @@ class RegressionEstimator(KernelEstimator):
     theta : ndarray, shape (na+nb,), optional
         Start values; zero by default. Choose a small initial gain with them.
     extra_names : tuple of str
-        Parameters beside those of the transfer function, estimated along.
+        Parameters besides those of the transfer function, estimated along.
 
     Raises
     ------

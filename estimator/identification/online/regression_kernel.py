@@ -38,7 +38,7 @@ RUNAWAY = 1e3  # times the largest output, beyond which a predicted output is gi
 
 
 def kept(n: int) -> Shapes:
-    """Return the parts that every estimator of n parameters keeps, beside its past values and L."""
+    """Return the parts that every estimator of n parameters keeps, next to its past values and L."""
     vectors = dict.fromkeys(("theta", "D", "known_D", "diagonal"), (n,))
     return {"live": (N_LIVE,), **vectors, "U": (n, n), "known_U": (n, n)}
 

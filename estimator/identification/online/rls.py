@@ -11,7 +11,7 @@ is white. White noise w on the *measured output* alone makes it A w, which corre
 however long the run, and the damping of a light resonance most of all. That bias is why the paper takes another.
 
 A missing output is missing from the next na regressors too: they are left out, exactly as rows of a least-squares
-problem. In time goes on with the prediction.
+problem. In time advances with the prediction.
 """
 
 from __future__ import annotations

@@ -61,9 +61,9 @@ def _numbers(state: Mapping[str, Any], name: str) -> np.ndarray:
         raise BadSetting(f"state of an estimator: {name} holds {part!r}, expected numbers only.") from fault
 
 
-def _require(fits: bool, name: str, came: Any, expected: str) -> None:
+def _require(fits: bool, name: str, got: Any, expected: str) -> None:
     if not fits:
         raise BadSetting(
-            f"state of an estimator: {name} is {came}, expected {expected}. Restore it into an estimator of the same "
+            f"state of an estimator: {name} is {got}, expected {expected}. Restore it into an estimator of the same "
             "kind and settings as the one that was saved."
         )

@@ -8,7 +8,7 @@
 
 The torque is held over the period, so that the motion is linear in (w_M, w_L, s, T_0, u) and its Taylor series is
 summed until nothing is left; the derivatives with respect to the state, T_0, the logarithms of J_M, J_L, k, c, and u
-obey the same equations and are summed beside it.
+obey the same equations and are summed next to it.
 """
 
 from __future__ import annotations

@@ -17,9 +17,6 @@ class SpectralMethod(Enum):
     """Spectral estimators; the value is the name in reports."""
 
     WELCH = "welch"
-    BLACKMAN_TUKEY = "blackman_tukey"
-    PERIODIC = "periodic"
-    LOCAL_POLYNOMIAL = "local_polynomial"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

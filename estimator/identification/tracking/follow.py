@@ -166,7 +166,7 @@ class Follower:
         return {name: values.copy() for name, values in self._live.items()} | {"roots": self._roots.view(float).copy()}
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Go on from a state of a follower with the same settings."""
+        """Continue from a state of a follower with the same settings."""
         for name, values in self._live.items():
             values[:] = state[name]
         self._roots.view(float)[:] = state["roots"]

@@ -19,7 +19,6 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from scipy.optimize import brentq
 from scipy.special import gammaincinv, ndtr, roots_hermitenorm
 
 from estimator.errors import BadSetting
@@ -78,4 +77,6 @@ def threshold_for(false_alarms_per_hour: float, statistics_per_hour: float, n: i
             f"alarm: false_alarms_per_hour is {false_alarms_per_hour}, fewer than a level of {n} blocks and a spread "
             f"with {freedom} degrees of freedom can promise. Take a longer reference."
         )
+    from scipy.optimize import brentq  # half a second to import, and a run has to start first
+
     return float(brentq(lambda h: false_pairs(h, n, freedom) - wanted, 0.0, HIGHEST, xtol=1e-9))

@@ -114,7 +114,7 @@ class Tracker:
         return kept | {"drowned": self._drowned}
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Go on from a state of a tracker with the same settings."""
+        """Continue from a state of a tracker with the same settings."""
         for part, holder in self._parts.items():
             own = {name.removeprefix(f"{part}."): value for name, value in state.items() if name.startswith(f"{part}.")}
             holder.restore(own)

@@ -1,7 +1,7 @@
 """Change detection: has the resonance left where it was, at a stated rate of false alarms.
 
-A reference model, the estimate once it has settled, runs free beside the driveline. If the natural frequency moves by
-delta, its error is to first order ``e = w + psi delta``, with psi the sensitivity of the output to that frequency
+A reference model, the estimate once it has settled, runs free alongside the driveline. If the natural frequency moves
+by delta, its error is to first order ``e = w + psi delta``, with psi the sensitivity of the output to that frequency
 (:mod:`sensitivity_kernel`; e and psi are both taken in steps). Every second the samples come to one deviation::
 
     d = sum psi e / sum psi^2
@@ -63,7 +63,7 @@ class _Memory:
     """What the watch remembers of the blocks before, all numbers."""
 
     state: float = TrackingState.STARTING
-    unsettled: float = 0.0  # 1 from an alarm until the value after is told
+    unsettled: float = 0.0  # 1 from an alarm until the value after is reported
     waited: float = 0.0  # excited blocks since the estimate was left to settle
     number: float = 0.0  # blocks since the reference was taken
     learnt: float = 0.0  # ... that the level was learnt from
@@ -201,10 +201,10 @@ class ChangeWatch:
         self._take_reference(last[np.argsort(last[:, 0])[CANDIDATES // 2], 1:])
         if self._live["mode"][REFERENCE_HZ] == 0.0:
             return None
-        told, memory.unsettled = memory.unsettled, 0.0
+        unsettled, memory.unsettled = memory.unsettled, 0.0
         memory.state, memory.side = TrackingState.LEARNING, 0.0
         memory.number = memory.learnt = memory.error_2 = memory.output_2 = 0.0
-        return self._alarm(frequency, settled=True) if told else None
+        return self._alarm(frequency, settled=True) if unsettled else None
 
     def _take_reference(self, theta: FloatArray) -> None:
         live = self._live
@@ -295,7 +295,7 @@ class ChangeWatch:
         return kept | {"memory": np.array(astuple(self._memory), dtype=np.float64)}
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Go on from a state of a watch with the same settings."""
+        """Continue from a state of a watch with the same settings."""
         for name, values in self._live.items():
             values[:] = state[name]
         self._memory = _Memory(*np.asarray(state["memory"], dtype=np.float64).tolist())

@@ -1,4 +1,4 @@
-"""Compiled: a reference model runs free beside the driveline; the score of its natural frequency over a block."""
+"""Compiled: a reference model runs free alongside the driveline; the score of its natural frequency over a block."""
 
 from __future__ import annotations
 

@@ -60,7 +60,7 @@ class WatchSettings:
         return max(round(self.block_s / sample_time_s), 1)
 
     def threshold(self, blocks: int, sample_time_s: float) -> float:
-        """Return the threshold beside a level learnt from so many blocks.
+        """Return the threshold next to a level learnt from so many blocks.
 
         Raises
         ------

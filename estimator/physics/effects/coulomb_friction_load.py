@@ -10,7 +10,7 @@ from estimator.physics.model import DrivelineModel, Motion, unit
 from estimator.signals.record import Record
 
 STICKING = 0.02
-"""Presliding of a contact that sticks, in the scale of one that bends."""
+"""Presliding of a contact that sticks, in the scale of one that deflects."""
 
 PRESLIDING = EffectParameter(
     "presliding_rad", "angle", 0.0, 0.5 * STICKING, 10.0, "deflection at which it breaks away: x_b", True

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from estimator.abreast import choose, every
 from estimator.compiled import compiled
+from estimator.lanes import choose, every
 from estimator.physics.acting import Acting, Place
 from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start, Untestable
 from estimator.physics.model import DrivelineModel, Motion, unit

@@ -45,7 +45,7 @@ def frequency_within(inertia: float, stiffness: float, line_share: float) -> flo
 
 
 def within(values: Mapping[str, float]) -> float:
-    """Return the inertia within the line [kg m^2], before the shaft or behind it; 0 for one beside it."""
+    """Return the inertia within the line [kg m^2], before the shaft or behind it; 0 for one next to it."""
     return values.get("between_kg_m2", 0.0) + values.get("behind_kg_m2", 0.0)
 
 
@@ -67,7 +67,7 @@ def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...
 def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
     """Return heavy modes far above the first resonance, and light ones below, around and above it, as close as narrow.
 
-    The heavy ones come first: where only what their spring does to the line shows, nothing else tells them apart. An
+    The heavy ones come first: where only what their spring does to the line shows, nothing else distinguishes them. An
     inertia within the line is looked for from where such a branch has been fitted (``retold``).
     """
     none = Held(0.0)
@@ -137,12 +137,12 @@ def sentence(values: Mapping[str, float], motion: Motion) -> str:
 def implausible(model: DrivelineModel, records: Sequence[Record], values: Mapping[str, float]) -> str:
     """Object to a mode damped so much that it has no resonance to speak of, and to one too light or stiff to follow.
 
-    A branch that stands for an inertia within the line is damped by the shaft beside it, too: ``c / (2 J_X w)`` comes
+    A branch that stands for an inertia within the line is damped by the shaft next to it, too: ``c / (2 J_X w)`` comes
     on top of its own.
     """
     if inertia := within(values):
         if inertia <= 1.01 * LIGHTEST * model.parameters["J_M"].value:
-            return f"{inertia:.2g} {unit('inertia', model.motion)} within the line are too little to be told"
+            return f"{inertia:.2g} {unit('inertia', model.motion)} within the line are too little to be reported"
         belongs = "motor" if values.get("between_kg_m2") else "load"
         too_stiff = values["line_share"] >= 0.99 * STIFFEST
         return f"an inertia on so stiff a spring belongs to the {belongs}" if too_stiff else ""
@@ -163,10 +163,10 @@ EFFECT = Effect(
     "T_S = s k twist + s^2 c d twist/dt, s < 1 where the spring is in the line; or between "
     "motor and shaft: J_X dw_X/dt = k_X (phi_M - phi_X) + c_X (w_M - w_X) - T_S, k_X = k s / (1 - s); or between shaft "
     "and load: J_X dw_X/dt = T_S - k_X (phi_X - phi_L) - c_X (w_X - w_L)",
-    source="an inertia on a spring beside the main one: Den Hartog, Mechanical Vibrations, 4th ed., 1956",
+    source="an inertia on a spring next to the main one: Den Hartog, Mechanical Vibrations, 4th ed., 1956",
     excited_by="PRBS that reaches the mode's frequency",
     parameters=(
-        EffectParameter("inertia_kg_m2", "inertia", 0.0, 0.0, MOST, "inertia beside the line: J_X", True),
+        EffectParameter("inertia_kg_m2", "inertia", 0.0, 0.0, MOST, "inertia next to the line: J_X", True),
         EffectParameter("frequency_hz", "Hz", 1.0, 0.05, 8.0, "its frequency with the motor held: f"),
         EffectParameter(
             "line_share", "", 1.0, SOFTEST, 1.0, "share of the twist that the main shaft has: s", True, most=1.0

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from estimator.abreast import choose, every
 from estimator.compiled import compiled
+from estimator.lanes import choose, every
 from estimator.physics.acting import Acting, Place
 from estimator.physics.effect import WITH_SHAFT, Effect, EffectParameter, Element, Start, Untestable
 from estimator.physics.model import DrivelineModel, Motion

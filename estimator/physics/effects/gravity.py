@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from estimator.abreast import every
 from estimator.compiled import compiled
+from estimator.lanes import every
 from estimator.physics.acting import Acting, Place
 from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Held, Start
 from estimator.physics.model import DrivelineModel, Motion, unit

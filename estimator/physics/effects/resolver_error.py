@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from estimator.abreast import some
 from estimator.compiled import compiled
+from estimator.lanes import some
 from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start
 from estimator.physics.model import DrivelineModel, Motion
 from estimator.signals.record import OutputKind, Record

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from estimator.abreast import choose
 from estimator.compiled import compiled
+from estimator.lanes import choose
 from estimator.physics.effect import WITH_SPRING, Effect, EffectParameter, Element, Held, Start
 from estimator.physics.laws import power
 from estimator.physics.model import DrivelineModel, Motion, Structure, unit

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from estimator.abreast import choose, every
 from estimator.compiled import compiled
+from estimator.lanes import choose, every
 from estimator.physics.effect import WITH_SPRING, Effect, EffectParameter, Element, Held, Retelling, Start
 from estimator.physics.laws import beyond_gap, power
 from estimator.physics.model import DrivelineModel, Motion, unit
@@ -31,7 +31,7 @@ def factor(twist: float, hardening: float, shape: float) -> float:
 def loaded_twist(twist: float, hardening: float, shape: float, stage: float, stage_from: float) -> float:
     """Return the twist at which a linear shaft carries the same torque [rad].
 
-    From ``stage_from`` on, either way, a second spring is loaded beside the first: a coupling of two stages.
+    From ``stage_from`` on, either way, a second spring is loaded next to the first: a coupling of two stages.
     """
     same = twist * factor(twist, hardening, shape)
     if every(stage == 0.0):
@@ -81,7 +81,7 @@ EFFECT = Effect(
     excited_by="large and small shaft torques in the same set of tests",
     parameters=(
         EffectParameter("hardening_per_rad2", "per_angle_squared", 0.0, -200.0, 200.0, "relative stiffness change h"),
-        EffectParameter("shape", "", 1.0, 0.1, 3.0, "how the change goes on at large twist: m", True),
+        EffectParameter("shape", "", 1.0, 0.1, 3.0, "how the change continues at large twist: m", True),
         EffectParameter("stage_share", "", 0.0, -1.0, 10.0, "stiffness that a second stage adds, over k: s", True),
         EffectParameter("stage_rad", "angle", 0.0, 0.02, 1.0, "twist from which on it is loaded: e_2", True),
     ),

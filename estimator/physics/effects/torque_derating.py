@@ -20,7 +20,7 @@ def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...
 
 
 def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
-    """Return a decay within the recording and one that goes on beyond it, by time alone."""
+    """Return a decay within the recording and one that continues beyond it, by time alone."""
     return [(0.2, 0.3, Held(0.0)), (0.3, 2.0, Held(0.0))]
 
 
@@ -29,7 +29,7 @@ def retold(
 ) -> list[Retelling]:
     """Return a loss by the torque's own heat, within the recording and beyond it.
 
-    The torque that the loss is told for is a matter of scale, and held.
+    The torque that the loss is reported for is a matter of scale, and held.
     """
     if values["heating_nm"] > 0.0:
         return []

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from estimator.abreast import choose, every
 from estimator.compiled import compiled
+from estimator.lanes import choose, every
 from estimator.physics.effect import WITH_SHAFT, Effect, EffectParameter, Element, Start
 from estimator.physics.laws import hyperbolic_tangent
 from estimator.physics.model import DrivelineModel, Motion, unit

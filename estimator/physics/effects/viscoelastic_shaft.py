@@ -1,4 +1,4 @@
-"""A shaft that relaxes: rubber in a coupling is a spring in series with a damper, beside the shaft's own spring."""
+"""A shaft that relaxes: rubber in a coupling is a spring in series with a damper, next to the shaft's own spring."""
 
 from __future__ import annotations
 

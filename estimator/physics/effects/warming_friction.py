@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from estimator.abreast import every
 from estimator.compiled import compiled
+from estimator.lanes import every
 from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Span, Start
 from estimator.physics.model import DrivelineModel, Motion, unit
 from estimator.physics.motion import longest_s, speed_scale, torque_scale
@@ -27,7 +27,7 @@ def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...
 
 
 def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
-    """Return a decay within the recording and one that goes on beyond it."""
+    """Return a decay within the recording and one that continues beyond it."""
     return [(1.0, 0.3), (2.0, 1.5)]
 
 

@@ -13,8 +13,8 @@ the load ``g`` is constant, but a brake's is there for a while only: bristles ho
 
 from __future__ import annotations
 
-from estimator.abreast import choose, like, some
 from estimator.compiled import inlined
+from estimator.lanes import choose, like, some
 from estimator.physics.kernel import slots
 from estimator.physics.kernel.conditions import with_friction
 from estimator.physics.kernel.line import Line, is_bristled_at_load, is_bristled_at_motor
@@ -39,7 +39,7 @@ def sliding(speed: float, p: FloatArray) -> float:
 
 @inlined
 def slid(speed: float, limit: float) -> float:
-    """Return the torque against a motion that has gone on for long under a friction [Nm]."""
+    """Return the torque against a motion that has continued for long under a friction [Nm]."""
     return choose(speed > 0.0, limit, choose(speed < 0.0, -limit, 0.0))
 
 

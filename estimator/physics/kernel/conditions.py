@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from estimator.abreast import choose, every, like, some
 from estimator.compiled import inlined
+from estimator.lanes import choose, every, like, some
 from estimator.physics.catalogue import BUILT_IN
 from estimator.physics.effects import extra_torsional_mode, warming_friction
 from estimator.physics.kernel import slots
@@ -76,7 +76,7 @@ def line_share(p: FloatArray) -> float:
 
 @inlined
 def branch_inertia(p: FloatArray) -> float:
-    """Return the inertia of the extra mode [kg m^2], beside the line, before the shaft or behind it."""
+    """Return the inertia of the extra mode [kg m^2], next to the line, before the shaft or behind it."""
     return float(p[slots.BRANCH_INERTIA] + p[slots.BETWEEN] + p[slots.BEHIND])
 
 
@@ -211,5 +211,5 @@ def with_torques(now: Conditions, torque: float, load: float) -> Conditions:
 
 @inlined
 def with_torque(now: Conditions, torque: float) -> Conditions:
-    """Return the conditions with a torque [Nm] beside the ripple."""
+    """Return the conditions with a torque [Nm] next to the ripple."""
     return with_torques(now, now.torque + torque * now.torque_factor, now.load)

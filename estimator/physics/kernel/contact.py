@@ -7,8 +7,8 @@ resolver, and the size of the gap found is off by as much as its interval is wid
 
 from __future__ import annotations
 
-from estimator.abreast import choose, every, like, some
 from estimator.compiled import inlined
+from estimator.lanes import choose, every, like, some
 from estimator.physics.kernel import slots
 from estimator.physics.kernel.line import Line
 from estimator.physics.kernel.runge_kutta import runge_kutta

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-from estimator.abreast import like
 from estimator.compiled import assembled
+from estimator.lanes import like
 from estimator.physics.acting import Place
 from estimator.physics.catalogue import BUILT_IN
 from estimator.physics.layout import slot

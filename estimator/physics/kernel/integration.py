@@ -11,8 +11,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from estimator.abreast import lent
 from estimator.compiled import brief, compiled, inlined
+from estimator.lanes import borrowed
 from estimator.physics.kernel import slots
 from estimator.physics.kernel.bristles import bent, rubbed
 from estimator.physics.kernel.conditions import (
@@ -26,7 +26,7 @@ from estimator.physics.kernel.conditions import (
 from estimator.physics.kernel.feed import begun_feed, fed, is_late
 from estimator.physics.kernel.line import Line, is_bristled, is_within
 from estimator.physics.kernel.linear import WORTHWHILE_SAMPLES, Answers, answers, has_dry_friction, is_linear, led_on
-from estimator.physics.kernel.makes import for_its_make
+from estimator.physics.kernel.makes import Masses, for_its_make
 from estimator.physics.kernel.rates import read_out
 from estimator.physics.kernel.sensing import entry, reading, shown, smoothed
 from estimator.physics.kernel.state_vector import (
@@ -171,7 +171,7 @@ def integrate_made(
 
 @compiled
 def integrate(
-    masses: int,
+    masses: Masses,
     sample_time_s: float,
     substeps: int,
     sign_width: float,
@@ -193,8 +193,8 @@ def integrate(
 
     Parameters
     ----------
-    masses : int
-        1, 2 or 3.
+    masses : tuple of int
+        An entry for each of them, 1 to 3.
     sample_time_s : float
         Sampling period [s].
     substeps : int
@@ -223,8 +223,19 @@ def integrate(
         Where it has room: slope of the output just before and just after each sample [unit of the output / s]. That
         before ``first`` is taken from it, and where it is longer that before the next sample is left in it.
     """
-    given = (sample_time_s, substeps, sign_width, first, start_s, lent(torque), lent(load), lent(angle), lent(p))
-    for_its_make(masses, integrate_made, lent(p), *given, lent(state), output, sensor, lent(out), lent(slopes))
+    given = (
+        sample_time_s,
+        substeps,
+        sign_width,
+        first,
+        start_s,
+        borrowed(torque),
+        borrowed(load),
+        borrowed(angle),
+        borrowed(p),
+    )
+    given_back = (borrowed(state), output, sensor, borrowed(out), borrowed(slopes))
+    for_its_make(len(masses), integrate_made, borrowed(p), (*given, *given_back))
 
 
 @brief

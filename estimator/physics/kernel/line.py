@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from estimator.abreast import some
 from estimator.compiled import inlined
+from estimator.lanes import some
 from estimator.physics.kernel import slots
 from estimator.signals.record import FloatArray
 
@@ -18,7 +18,7 @@ class Line(NamedTuple):
     masses : int
         1, 2 or 3.
     elastic : bool
-        Whether the first shaft is a spring and a damper, and no law beside them.
+        Whether the first shaft is a spring and a damper, and no law next to them.
     sliding : bool
         Whether there may be a slider inside that shaft.
     extended : bool
@@ -34,7 +34,7 @@ class Line(NamedTuple):
 
 @inlined
 def is_elastic(p: FloatArray) -> bool:
-    """Tell whether the first shaft is a spring and a damper, and no law beside them."""
+    """Tell whether the first shaft is a spring and a damper, and no law next to them."""
     bent = p[slots.GAP] > 0.0 or p[slots.HARDENING] != 0.0 or p[slots.STAGE] != 0.0
     sliding = p[slots.SLIDER] != 0.0 or p[slots.SLIDER_INSIDE] > 0.0
     jointed = p[slots.CARDAN] != 0.0 or p[slots.CARDAN_ANGLE] != 0.0 or p[slots.CARDAN_SHARE] != 0.0
@@ -43,19 +43,19 @@ def is_elastic(p: FloatArray) -> bool:
 
 @inlined
 def is_bristled(p: FloatArray) -> bool:
-    """Tell whether dry friction, at the motor or at the load, bends before it slides."""
+    """Tell whether dry friction, at the motor or at the load, deflects before it slides."""
     return is_bristled_at_motor(p) or is_bristled_at_load(p)
 
 
 @inlined
 def is_bristled_at_motor(p: FloatArray) -> bool:
-    """Tell whether dry friction at the motor bends before it slides."""
+    """Tell whether dry friction at the motor deflects before it slides."""
     return some(p[slots.COULOMB_PRESLIDING] > 0.0) or some(p[slots.STRIBECK_PRESLIDING] > 0.0)
 
 
 @inlined
 def is_bristled_at_load(p: FloatArray) -> bool:
-    """Tell whether dry friction at the load bends before it slides, that of a brake included."""
+    """Tell whether dry friction at the load deflects before it slides, that of a brake included."""
     return some(p[slots.COULOMB_LOAD_PRESLIDING] > 0.0) or some(p[slots.BRAKE_PRESLIDING] > 0.0)
 
 
@@ -67,5 +67,5 @@ def is_extended(p: FloatArray) -> bool:
 
 @inlined
 def is_within(p: FloatArray) -> bool:
-    """Tell whether the inertia of an extra mode is in the line, before the shaft or behind it, and not beside it."""
+    """Tell whether the inertia of an extra mode is in the line, before the shaft or behind it, and not next to it."""
     return some(p[slots.BETWEEN] > 0.0) or some(p[slots.BEHIND] > 0.0)

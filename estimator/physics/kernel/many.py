@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from estimator.abreast import LANES
 from estimator.compiled import compiled
+from estimator.lanes import LANES
 from estimator.physics.kernel.integration import integrate, with_mode
+from estimator.physics.kernel.makes import Masses
 from estimator.physics.kernel.side_by_side import go_side_by_side, integrate_side_by_side, kin_together, leading_kin
 from estimator.signals.record import FloatArray, IntArray
 
 
 @compiled
 def integrate_each(
-    masses: int,
+    masses: Masses,
     sample_time_s: float,
     substeps: int,
     sign_width: float,

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from estimator.abreast import every, like, some
 from estimator.compiled import inlined
+from estimator.lanes import every, like, some
 from estimator.physics.effects import (
     backlash,
     shaft_hysteresis,

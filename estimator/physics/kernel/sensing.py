@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from estimator.abreast import every
 from estimator.compiled import inlined
+from estimator.lanes import every
 from estimator.physics.effects import resolver_error, speed_filter
 from estimator.physics.kernel import slots
 from estimator.physics.kernel.line import is_within

@@ -1,6 +1,6 @@
 """Up to eight simulations side by side, as a Jacobian takes them: one instruction for all.
 
-The laws are those of one simulation (``rates``), compiled for numbers abreast. What torque comes through a delay or a
+The laws are those of one simulation (``rates``), compiled for numbers in lanes. What torque comes through a delay or a
 lag does not depend on the motion, and is worked out before. A line whose output is differentiated takes its simulations
 one by one, and so does a linear one: it adds up what it knows.
 """
@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from estimator.abreast import LANES, abreast, lent
 from estimator.compiled import IS_COMPILED, compiled, inlined
+from estimator.lanes import LANES, as_lanes, borrowed
 from estimator.physics.catalogue import BUILT_IN
 from estimator.physics.kernel import slots
 from estimator.physics.kernel.bristles import bent, rubbed
@@ -19,7 +19,7 @@ from estimator.physics.kernel.contact import stepped
 from estimator.physics.kernel.feed import begun_feed, fed, is_late
 from estimator.physics.kernel.line import Line, is_bristled, is_elastic
 from estimator.physics.kernel.linear import is_linear
-from estimator.physics.kernel.makes import for_its_make
+from estimator.physics.kernel.makes import Masses, for_its_make
 from estimator.physics.kernel.rates import read_out
 from estimator.physics.kernel.sensing import reading, shown, smoothed
 from estimator.physics.kernel.state_vector import (
@@ -46,12 +46,12 @@ FEEDING = np.array([slots.DELAY, slots.DELAYED_BEFORE, slots.DRIFT, slots.LAG, s
 
 
 @compiled
-def go_side_by_side(masses: int, p: FloatArray, rows: IntArray) -> bool:
+def go_side_by_side(masses: Masses, p: FloatArray, rows: IntArray) -> bool:
     """Tell whether some of the lines, a row of parameters each, are simulated side by side."""
     first = p[rows[0]]
     if rows.size == 1 or not IS_COMPILED:
         return False
-    if is_linear(Line(masses, masses == 1 or is_elastic(first), False, False), first):
+    if is_linear(Line(len(masses), len(masses) == 1 or is_elastic(first), False, False), first):
         return False
     return leading_kin(p, rows) == rows.size
 
@@ -174,8 +174,8 @@ def advance(
     out_lanes: FloatArray,
 ) -> None:
     """Simulate lines of one make; ``one_of_them`` is the parameters of one."""
-    torque, rise, load, p = abreast(torque_lanes), abreast(rise_lanes), abreast(load_lanes), abreast(p_lanes)
-    start, out, filters = abreast(state_lanes), abreast(out_lanes), abreast(low_lanes)
+    torque, rise, load, p = as_lanes(torque_lanes), as_lanes(rise_lanes), as_lanes(load_lanes), as_lanes(p_lanes)
+    start, out, filters = as_lanes(state_lanes), as_lanes(out_lanes), as_lanes(low_lanes)
     h = sample_time_s / substeps
     length = 1.0 / substeps
     waving = is_waving(one_of_them)
@@ -212,7 +212,7 @@ def advance(
 
 @compiled
 def integrate_side_by_side(
-    masses: int,
+    masses: Masses,
     sample_time_s: float,
     substeps: int,
     sign_width: float,
@@ -243,16 +243,16 @@ def integrate_side_by_side(
     p, state, out
         As there, a row each: (K, layout.SIZE), (K, STATES), (K, N).
     """
-    rows, torque, load, angle = lent(rows), lent(torque), lent(load), lent(angle)
-    fed_by, loaded_by = lent(fed_by), lent(loaded_by)
-    p, state, out = lent(p), lent(state), lent(out)
+    rows, torque, load, angle = borrowed(rows), borrowed(torque), borrowed(load), borrowed(angle)
+    fed_by, loaded_by = borrowed(fed_by), borrowed(loaded_by)
+    p, state, out = borrowed(p), borrowed(state), borrowed(out)
     values = np.empty((torque.shape[1], LANES))
     mean, rise = supplied_lanes(sample_time_s, substeps, first, start_s, rows, torque, fed_by, p, state)
     loads = in_lanes(load, loaded_by[rows])
     given = (sample_time_s, substeps, sign_width, first, start_s, mean, rise, loads, angle)
     filtering = sensor and p[rows[0], slots.FILTER] > 0.0
     them = (in_lanes(p, rows), in_lanes(state, rows), low_passes(rows, p, sample_time_s / substeps))
-    for_its_make(masses, advance, p[rows[0]], *given, p[rows[0]], *them, output, filtering, values)
+    for_its_make(len(masses), advance, p[rows[0]], (*given, p[rows[0]], *them, output, filtering, values))
     for lane in range(rows.size):
         own = p[rows[lane]]
         for k in range(first, torque.shape[1]):

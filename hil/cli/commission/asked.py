@@ -27,11 +27,11 @@ def asked_of_steps(skip: Sequence[str], because: Sequence[str], repeat: Sequence
         if name not in NAMES:
             raise UsageError(f"step {name!r}: expected one of {', '.join(NAMES)}. Name one of these.")
     if both := sorted(set(skip) & set(repeat)):
-        raise UsageError(f"step {both[0]!r}: expected --skip or --repeat, came both. Leave one out.")
+        raise UsageError(f"step {both[0]!r}: expected --skip or --repeat, got both. Leave one out.")
     if len(because) not in ({0} if not skip else {1, len(skip)}) or not all(text.strip() for text in because):
         raise UsageError(
             f"expected a reason for each of {len(skip)} skipped steps (--because TEXT, one for each or one for all), "
-            f"came {len(because)}. A skipped step is recorded with its reason."
+            f"got {len(because)}. A skipped step is recorded with its reason."
         )
     reasons = list(because) * (len(skip) if len(because) == 1 else 1)
     return Asked(dict(zip(skip, reasons, strict=True)), frozenset(repeat))

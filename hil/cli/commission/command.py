@@ -88,7 +88,7 @@ def _to_its_report(job: Job, talk: Talk, asked: Asked, console: Console, as_json
         reported = True
         try:
             write_report(job.state)
-        except UsageError as trouble:  # what ended the job is what has to be told first
+        except UsageError as trouble:  # what ended the job is what has to be reported first
             error.add_note(f"Its report is missing: {trouble}")
             reported = False
         print_result(job.state, console, as_json, reported)
@@ -100,7 +100,7 @@ def _to_its_report(job: Job, talk: Talk, asked: Asked, console: Console, as_json
 def _commission(job: Job, talk: Talk, asked: Asked, console: Console) -> None:
     from hil.cli.commission.bar import Bar
     from hil.commission.engine import Commissioning
-    from hil.report.commission_text import findings_table
+    from hil.commission.text import findings_table
 
     pacer = job.runner.conditions.pacer(job.rig)  # refuses a pace this rig must not be driven at, before anything
     job.say(f"{job.rig.name}: commissioning in {job.folder}, one cycle every {pacer.period_ns / 1e6:g} ms")

@@ -12,8 +12,8 @@ from hil.commission.announce import plan_document
 from hil.commission.registry import STEPS
 from hil.commission.state import State
 from hil.commission.step import Job
+from hil.commission.text import plan_lines, result_document, result_lines
 from hil.provenance import provenance
-from hil.report.commission_text import plan_lines, result_document, result_lines
 from hil.report.outputs import publish
 
 if TYPE_CHECKING:

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from hil.cli.completers import experiment_names
 from hil.cli.filter_option import FilterOf, FilterRun
 from hil.cli.pace import Pace, PaceOption
 from hil.cli.trust_option import TrustLaws
@@ -15,7 +16,12 @@ from hil.errors import UsageError
 
 def run(
     rig: Annotated[Path, typer.Argument(metavar="RIG", help="Rig file.")],
-    experiment: Annotated[str, typer.Argument(metavar="EXPERIMENT", help="Name of an experiment of the rig file.")],
+    experiment: Annotated[
+        str,
+        typer.Argument(
+            metavar="EXPERIMENT", help="Name of an experiment of the rig file.", autocompletion=experiment_names
+        ),
+    ],
     out: Annotated[
         Path | None, typer.Option(metavar="REC", help="Recording to write, .csv or .parquet; a new file.")
     ] = None,
@@ -28,11 +34,11 @@ def run(
     trace: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE", help="Bus trace beside it: every frame; .blf, .log (candump) or .asc; a new file."
+            metavar="FILE", help="Bus trace next to it: every frame; .blf, .log (candump) or .asc; a new file."
         ),
     ] = None,
     estimate: Annotated[
-        bool, typer.Option(help="Estimate while driving; its course goes beside the recording: .online.json.")
+        bool, typer.Option(help="Estimate while driving; its course goes next to the recording: .online.json.")
     ] = True,
     filter_of: FilterOf = None,
     filter_run: FilterRun = None,
@@ -54,7 +60,7 @@ def run(
         predict(rig_file, experiment, as_json, trust_laws)
         return
     if out is None:
-        raise UsageError("hil run: expected --out REC, a recording to write, or --dry-run; came neither.")
+        raise UsageError("hil run: expected --out REC, a recording to write, or --dry-run; got neither.")
     from hil.cli.pace import pacer_for, scheduling
     from hil.cli.run.job import Job, record
     from hil.cli.run.live import live_estimate

@@ -94,7 +94,7 @@ def record(job: Job, grants: RealTimeGrants) -> RunSummary:
 
 
 def _register(job: Job, recorder: RecordingWriter, ended_by: str) -> None:
-    """Enter the run into the store beside its recording, which stays whole where that can't be done."""
+    """Enter the run into the store next to its recording, which stays whole where that can't be done."""
     if recorder.kept != job.out:
         return
     results = {ONLINE: course_path(job.out)} if course_path(job.out).exists() else {}

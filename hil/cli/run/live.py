@@ -1,4 +1,4 @@
-"""What estimates a run while it goes on, and its course in a file beside the recording."""
+"""What estimates a run while it lasts, and its course in a file next to the recording."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 def live_estimate(
     rig: Rig, recording: Path, filter_of: Path | None = None, filter_run: str | None = None
 ) -> LiveEstimate:
-    """Make what estimates a run while it goes on.
+    """Make what estimates a run while it lasts.
 
     Raises
     ------
@@ -32,7 +32,7 @@ def live_estimate(
 
     if course_path(recording).exists():
         raise UsageError(
-            f"{course_path(recording)}: expected no such file, came one of an earlier run. Move it away, or choose "
+            f"{course_path(recording)}: expected no such file, got one of an earlier run. Move it away, or choose "
             "another name with --out."
         )
     try:
@@ -42,7 +42,7 @@ def live_estimate(
 
 
 def keep_course(live: LiveEstimate, path: Path) -> None:
-    """Write the course of the estimate; where that can't be done, what ended the run is still told."""
+    """Write the course of the estimate; where that can't be done, what ended the run is still reported."""
     try:
         publish(path.parent, {path.name: live.course.write})
     except UsageError as error:

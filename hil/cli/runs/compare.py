@@ -1,4 +1,4 @@
-"""``hil runs compare``: two runs beside each other."""
+"""``hil runs compare``: two runs alongside each other."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def compare(
     store: Folder = HERE,
     as_json: AsJson = False,
 ) -> None:
-    """Set two runs beside each other: facts, results, and the lines in which their rig files differ."""
+    """Set two runs alongside each other: facts, results, and the lines in which their rig files differ."""
     from hil.store.compare import compare_runs
 
     with opened(store) as runs:
@@ -37,5 +37,5 @@ def compare(
 
 
 def _short(what: str, value: Any) -> str:
-    """Shorten a checksum to what tells any two apart."""
+    """Shorten a checksum to what distinguishes any two."""
     return f"{value[:16]}…" if value and ("sha256" in what or what.startswith("EDS")) else cell(value)

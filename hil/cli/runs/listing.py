@@ -57,7 +57,7 @@ def _require_date(option: str, date: str) -> None:
     try:
         datetime.fromisoformat(date)
     except ValueError as error:
-        raise UsageError(f"{option}: expected a date such as 2026-11-21, came {date!r}") from error
+        raise UsageError(f"{option}: expected a date such as 2026-11-21, got {date!r}") from error
 
 
 def _print_table(runs: Sequence[Run]) -> None:

@@ -25,7 +25,7 @@ def opened(folder: Path) -> RunStore:
 
     if not store_of(folder).exists():
         raise UsageError(
-            f"{store_of(folder)}: expected a store of runs, there is none. 'hil run' makes one beside its recording, "
+            f"{store_of(folder)}: expected a store of runs, there is none. 'hil run' makes one next to its recording, "
             f"'hil runs rebuild --store {folder}' makes one of the recordings there."
         )
     return RunStore(folder)

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def rebuild(store: Folder = HERE, as_json: AsJson = False) -> None:
-    """Bring the store up to what is in the folder: enter recordings, find moved ones, mend a damaged store.
+    """Bring the store up to what is in the folder: enter recordings, find moved ones, fix a damaged store.
 
     What can still be read of a damaged store is kept, notes and results included; the damaged file is put aside.
     """
@@ -23,7 +23,7 @@ def rebuild(store: Folder = HERE, as_json: AsJson = False) -> None:
     from hil.store.run_store import store_of
 
     if not store.is_dir():
-        raise StoreError(store_of(store), f"expected an existing folder, came {store}")
+        raise StoreError(store_of(store), f"expected an existing folder, got {store}")
     result = rebuilt(store)
     for problem in result.unreadable:
         typer.echo(f"not entered: {problem}", err=True)

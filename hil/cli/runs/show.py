@@ -27,8 +27,8 @@ def show(run: RunId, store: Folder = HERE, as_json: AsJson = False) -> None:
         found = runs.get(run)
     state, facts, results = recording_state(found.entry), facts_of(found), results_of(found)
     if as_json:
-        told = {"recording_state": state, "results": results, "alarm_statements": alarms_of(found)}
-        more = {**told, "rig_file": found.entry.rig_text}
+        shown = {"recording_state": state, "results": results, "alarm_statements": alarms_of(found)}
+        more = {**shown, "rig_file": found.entry.rig_text}
         typer.echo(json.dumps({"schema": "hil.run_facts/1", **facts, **more}))
         return
     for what in HEAD:

@@ -2,8 +2,8 @@
 
 Has to: in one run, the resonance's frequency and damping must come out with a standard deviation below `FREQUENCY_STD`
 and `DAMPING_STD`. The spread of an output-error estimate is inverse to the amplitude and to the root of the length of a
-run (L. Ljung, System Identification, 2nd ed., chapter 9), so that one small test foretells it; `MARGIN` is kept for
-what a road adds. May: the torque guard's limits beside the base torque, and the comfort of those on board.
+run (L. Ljung, System Identification, 2nd ed., chapter 9), so that one small test predicts it; `MARGIN` is kept for
+what a road adds. May: the torque guard's limits besides the base torque, and the comfort of those on board.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def needed_nm(spread: ResonanceSpread, amplitude_nm: float) -> float:
 
 
 def torque_caps(rig: Rig) -> Iterable[Cap]:
-    """Name what the torque guard leaves a PRBS beside the base torque of the rig's experiments."""
+    """Name what the torque guard leaves a PRBS besides the base torque of the rig's experiments."""
     part = rig.prbs.part_m1
     limits = {"m1": (part, rig.inverters.m1.torque_limit_nm), "m2": (1.0 - part, rig.inverters.m2.torque_limit_nm)}
     for name, (carried, limit_nm) in limits.items():
@@ -64,9 +64,9 @@ def torque_caps(rig: Rig) -> Iterable[Cap]:
         for key, table in rig.experiments.items():
             share = table.share_m1 if name == "m1" else 1.0 - table.share_m1
             rest_nm = (limit_nm - share * table.torque_nm) / carried
-            yield Cap(rest_nm, f"inverters.{name}.torque_limit_nm beside experiments.{key}.torque_nm")
+            yield Cap(rest_nm, f"inverters.{name}.torque_limit_nm besides experiments.{key}.torque_nm")
     for key, table in rig.experiments.items():
-        yield Cap(rig.guard.sum_limit_nm - table.torque_nm, f"guard.sum_limit_nm beside experiments.{key}.torque_nm")
+        yield Cap(rig.guard.sum_limit_nm - table.torque_nm, f"guard.sum_limit_nm besides experiments.{key}.torque_nm")
 
 
 def choose(wanted_nm: float, needed: float, caps: Iterable[Cap], step_nm: float) -> Choice:

@@ -16,7 +16,7 @@ from hil.rig.build import open_devices
 from hil.rig.check import Finding as Found
 from hil.rig.check import Verdict, check_rig
 
-MENDING = "Correct the rig file, or mend or connect the device it describes; see: hil check RIG"
+MENDING = "Correct the rig file, or fix or connect the device it describes; see: hil check RIG"
 
 
 def _about(job: Job) -> str:

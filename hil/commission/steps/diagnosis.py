@@ -24,7 +24,7 @@ MODEL_FILE = "model.toml"
 NOMINAL_FILE = "nominal.toml"
 
 OTHERS = ("tip", "reversal")
-"""Explained beside the slowest and the fastest PRBS run.
+"""Explained next to the slowest and the fastest PRBS run.
 
 Nothing is held out as a whole: a gain that is wrong shows in some of these only, and a recording that can't show it
 would speak against it. The diagnosis keeps stretches of each back instead.
@@ -61,7 +61,7 @@ def _nominal(job: Job) -> DrivelineModel:
     document = job.evidence("validation").get("model")
     if document is None:
         raise UsageError(
-            f"commissioning in {job.folder}: expected a model from the validation, or one given by --model, came "
+            f"commissioning in {job.folder}: expected a model from the validation, or one given by --model, got "
             "neither. Repeat the validation (--repeat validation), or skip this step."
         )
     return model_from_json(document)
@@ -88,7 +88,7 @@ def _findings(result: Diagnosis) -> list[Finding]:
     fit = result.fit
     advice = {
         Verdict.NO_MISMATCH: "",
-        Verdict.EXPLAINED: f"{MODEL_FILE} has it; see the diagnosis for its evidence, and whether it is to be mended",
+        Verdict.EXPLAINED: f"{MODEL_FILE} has it; see the diagnosis for its evidence, and whether it is to be fixed",
         Verdict.PARTLY_EXPLAINED: f"{MODEL_FILE} has what is established; see the diagnosis for what it leaves",
         Verdict.UNEXPLAINED: "See where it is in the diagnosis, and what to look at there",
     }[result.verdict]

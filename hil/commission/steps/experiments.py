@@ -47,7 +47,7 @@ def orders(job: Job) -> list[Order]:
 
 
 def _others(job: Job) -> list[tuple[str, TipTable | ReversalTable | None]]:
-    """Return what is driven beside the runs at constant speed; None where the rig file has none of its kind."""
+    """Return what is driven next to the runs at constant speed; None where the rig file has none of its kind."""
     return [("tip", first_of(job.rig, TipTable)), ("reversal", first_of(job.rig, ReversalTable))]
 
 

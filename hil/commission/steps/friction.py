@@ -93,7 +93,7 @@ def _missing() -> Finding:
         "an experiment of kind 'reversal' in the rig file",
         "none",
         None,
-        "Add [experiments.reversal]; without it dry friction can't be told from a grade",
+        "Add [experiments.reversal]; without it dry friction can't be distinguished from a grade",
     )
 
 

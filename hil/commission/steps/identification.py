@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 
 from estimator.identification.best import BestEstimate, Verdict, best_estimate
-from estimator.identification.identify import Identification, Settings
+from estimator.identification.identify import Identification
 from estimator.identification.identify import identify as identify_record
 from estimator.identification.modes.modes import Mode
 from estimator.identification.online.recursive import Status as OnlineStatus
+from estimator.identification.settings import Settings
 from hil.commission.analysis.measured import of_repeats
 from hil.commission.finding import Finding
 from hil.commission.readings import record_of, rounded
@@ -44,7 +45,7 @@ def cruises(job: Job) -> list[Any]:
     runs = [run for run in job.runs_of("experiments") if run.name.startswith("cruise")]
     if len(runs) < 2:
         raise UsageError(
-            f"commissioning in {job.folder}: expected PRBS runs to work with, came {len(runs)} (experiments is "
+            f"commissioning in {job.folder}: expected PRBS runs to work with, got {len(runs)} (experiments is "
             f"{job.state.steps['experiments'].status.value}). Drive them: --repeat experiments; or skip this step."
         )
     return runs

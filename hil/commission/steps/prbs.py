@@ -1,6 +1,6 @@
 """PRBS amplitude: large enough for the resonance, small enough for limits, speed band and those on board.
 
-Foretold from the small PRBS of the scales step and from the driveline as far as it is known; then driven once and
+Predicted from the small PRBS of the scales step and from the driveline as far as it is known; then driven once and
 measured. Where the measurement says otherwise the amplitude is changed, twice at most.
 """
 
@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 
 from estimator.errors import NotExciting
-from estimator.identification.identify import Settings
 from estimator.identification.linear_model import Orders
 from estimator.identification.modes.modes import Mode
 from estimator.identification.offline.output_error import fit_output_error
+from estimator.identification.settings import Settings
 from estimator.signals.decimate import decimate
 from estimator.signals.record import FloatArray, Record
 from hil.commission.analysis import amplitude
@@ -103,7 +103,7 @@ def _resolution_nm(job: Job) -> float:
 
 
 def _comfort_cap(job: Job) -> Iterator[Cap]:
-    """Foretell the vibration with the rig file's amplitude; it grows with it."""
+    """Predict the vibration with the rig file's amplitude; it grows with it."""
     if not job.evidence("scales").get("model") and job.nominal is None:
         return
     seen = _predicted(job, job.rig.prbs.amplitude_nm)
@@ -215,7 +215,7 @@ def _findings(job: Job, choice: Choice, predicted: _Seen, seen: _Seen, run: RunR
 
 
 def _spread_findings(predicted: ResonanceSpread | None, seen: ResonanceSpread | None, advice: str) -> Iterator[Finding]:
-    def told(value: float | None) -> str:
+    def written(value: float | None) -> str:
         return "" if value is None else f", predicted {shown(100.0 * value, '%')}"
 
     if seen is None:
@@ -225,7 +225,7 @@ def _spread_findings(predicted: ResonanceSpread | None, seen: ResonanceSpread | 
         "standard deviation of the resonance's frequency, one run",
         f"at most {100.0 * FREQUENCY_STD:g} %",
         f"{shown(100.0 * seen.frequency_std, '%')} of {shown(seen.mode.frequency_hz, 'Hz')}"
-        + told(None if predicted is None else predicted.frequency_std),
+        + written(None if predicted is None else predicted.frequency_std),
         seen.frequency_std <= FREQUENCY_STD,
         advice,
     )
@@ -233,7 +233,7 @@ def _spread_findings(predicted: ResonanceSpread | None, seen: ResonanceSpread | 
         "standard deviation of its damping, one run",
         f"at most {100.0 * DAMPING_STD:g} %",
         f"{shown(100.0 * seen.damping_std, '%')} of {seen.mode.damping:.3f}"
-        + told(None if predicted is None else predicted.damping_std),
+        + written(None if predicted is None else predicted.damping_std),
         seen.damping_std <= DAMPING_STD,
         advice,
     )

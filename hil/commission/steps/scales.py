@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from estimator.errors import NotExciting
-from estimator.identification.identify import Settings
+from estimator.identification.settings import Settings
 from estimator.signals.record import Record
 from hil.commission.analysis.delay_selection import NATURAL_DELAY, DelaySelection, select_delay
 from hil.commission.analysis.physical_fit import fit_two_mass

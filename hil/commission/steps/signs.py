@@ -1,6 +1,6 @@
 """Signs and sizes: small pulses from standstill, one inverter at a time, without a speed controller.
 
-Begins small; where nothing is seen to move, goes on with twice and four times as much.
+Begins small; where nothing is seen to move, continues with twice and four times as much.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ READING_SCALE = (0.98, 1.02)
 """Torque reading over its reference."""
 
 SPARE_SPEED = 5.0
-"""The run ends at so many times the speed expected, beside `SPARE_RAD_S`."""
+"""The run ends at so many times the speed expected, besides `SPARE_RAD_S`."""
 
 SPARE_RAD_S = 0.5
 

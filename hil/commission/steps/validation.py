@@ -62,7 +62,7 @@ def _mode(job: Job) -> Mode:
     if "resonance" in job.evidence("scales"):
         return Mode(*job.evidence("scales")["resonance"])
     raise UsageError(
-        f"commissioning in {job.folder}: expected a resonance from identification or scales, came none. Repeat one of "
+        f"commissioning in {job.folder}: expected a resonance from identification or scales, got none. Repeat one of "
         "them (--repeat identification), or skip this step."
     )
 

@@ -10,9 +10,9 @@ from estimator.physics.model import DrivelineModel, Motion, parameter_unit
 from hil.config.file_schema import FileKind, schema_line
 from hil.config.model_file import SCHEMA, ModelDocument
 from hil.config.new_model.values import MEANINGS, Known
-from hil.config.problems import validate
 from hil.errors import ModelFileError
 from hil.printable import printable
+from hil.problems import validate
 
 COMMENTS_AT = 48
 """Column in which comments begin."""

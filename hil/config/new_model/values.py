@@ -103,7 +103,7 @@ def parameters(
             value = _asked(what, value, ask, name in STRICTLY_POSITIVE)
             tolerance = _asked(f"its relative tolerance, {name}", tolerance, ask, False)
         if value is None:
-            missing.append(f"--value {name}=NUMBER | expected {MEANINGS[name]} | came nothing")
+            missing.append(f"--value {name}=NUMBER | expected {MEANINGS[name]} | got nothing")
             continue
         found[name] = Parameter(value, tolerance)
     if missing:
@@ -123,4 +123,4 @@ def _asked(what: str, default: float | None, ask: Ask, positive: bool) -> float:
             value = math.nan
         if math.isfinite(value) and (value > 0.0 if positive else value >= 0.0):
             return value
-        wrong = f"expected a number {'above 0' if positive else 'of 0 or more'}, came {text!r}"
+        wrong = f"expected a number {'above 0' if positive else 'of 0 or more'}, got {text!r}"

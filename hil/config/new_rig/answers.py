@@ -42,12 +42,12 @@ def answers(
             continue
         text = given.get(question.name, default)
         if not text and question.name not in given:
-            faults.append(f"{question.option} | expected {question.asks}: no default on a vehicle | came nothing")
+            faults.append(f"{question.option} | expected {question.asks}: no default on a vehicle | got nothing")
             continue
         try:
             found[question.name] = question.read(text.strip(), found)
         except NotAnAnswer as fits:
-            faults.append(f"{question.option} | expected {fits} | came {text!r}")
+            faults.append(f"{question.option} | expected {fits} | got {text!r}")
     if faults:
         raise UsageError("\n".join(faults))
     return found
@@ -60,4 +60,4 @@ def _asked(question: Question, default: str, found: Answers, ask: Ask) -> Value:
         try:
             return question.read(text, found)
         except NotAnAnswer as fits:
-            wrong = f"expected {fits}, came {text!r}" if text else f"expected {fits}: there is no default"
+            wrong = f"expected {fits}, got {text!r}" if text else f"expected {fits}: there is no default"

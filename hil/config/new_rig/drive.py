@@ -9,11 +9,11 @@ from pathlib import Path
 
 from drivers.capability.function import Function
 from drivers.capability.plan import DrivePlan
-from drivers.datasheet.check import EdsReport, check_eds
-from drivers.datasheet.check.rig_lines import RigLine, usual_mode
 from drivers.datasheet.finding import Severity
 from drivers.datasheet.number import read_number
 from drivers.datasheet.text import EdsSection, read_eds_text
+from drivers.eds_check import EdsReport, check_eds
+from drivers.eds_check.rig_lines import RigLine, usual_mode
 from hil.config.new_rig.questions import BY_NAME
 from hil.errors import InputError
 

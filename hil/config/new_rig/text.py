@@ -16,9 +16,9 @@ from string import Template
 from typing import Final
 
 from hil.config.new_rig.questions import Answers, Value
-from hil.config.problems import validate
 from hil.config.rig_file import Rig
 from hil.errors import RigFileError
+from hil.problems import validate
 
 PARTS_OF_LIMIT: Final = {
     "rate_limit": 5.0,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from estimator import abreast
+from estimator import lanes
 from estimator.signals.record import FloatArray
 from hil.export.c.types import Type, c_name, fields, is_record
 
@@ -32,7 +32,7 @@ _FUNCTIONS: dict[Any, str] = {
     **dict.fromkeys((min, np.minimum), "lesser"),
     **dict.fromkeys((max, np.maximum), "greater"),
 }
-_TRANSPARENT = (abreast.every, abreast.some, abreast.like, abreast.lent, np.asarray)
+_TRANSPARENT = (lanes.every, lanes.some, lanes.like, lanes.borrowed, np.asarray)
 """Functions that return their first argument where there is one number only."""
 
 
@@ -60,8 +60,8 @@ class Expressions:
 
     def refused(self, node: ast.AST) -> NotTranslatable:
         """Return the error that names what can't be translated."""
-        came = ast.unparse(node).splitlines()[0]
-        return NotTranslatable(f"{self._where}: expected what C can be written for, came {came!r}")
+        got = ast.unparse(node).splitlines()[0]
+        return NotTranslatable(f"{self._where}: expected what C can be written for, got {got!r}")
 
     def text(self, node: ast.expr) -> Text:
         """Return C text and type of an expression."""
@@ -171,7 +171,7 @@ class Expressions:
         function = self._value(node.func)
         if node.keywords or function is None:
             raise self.refused(node)
-        if function in (abreast.choose, np.where):
+        if function in (lanes.choose, np.where):
             return self._choice(*node.args)
         if function in _TRANSPARENT:
             return self.text(node.args[0])

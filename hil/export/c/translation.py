@@ -169,7 +169,7 @@ def _wider(one: Type, other: Type) -> Type:
         return one
     if {one, other} <= {float, int, bool}:
         return float
-    raise NotTranslatable(f"expected one type for a variable, came {c_name(one)} and {c_name(other)}")
+    raise NotTranslatable(f"expected one type for a variable, got {c_name(one)} and {c_name(other)}")
 
 
 def _read(target: ast.expr) -> ast.expr:
@@ -180,5 +180,5 @@ def _read(target: ast.expr) -> ast.expr:
 def _parsed(function: Callable[..., Any]) -> ast.FunctionDef:
     node = ast.parse(textwrap.dedent(inspect.getsource(function))).body[0]
     if not isinstance(node, ast.FunctionDef):
-        raise NotTranslatable(f"expected a function, came {function!r}")
+        raise NotTranslatable(f"expected a function, got {function!r}")
     return node

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from hil.config.model_file import read_model, read_model_for_recordings
-from hil.config.problems import read_toml
 from hil.errors import ModelFileError, UsageError
 from hil.export.fmu import package
 from hil.export.fmu.driveline import begun, driveline
+from hil.problems import read_toml
 from hil.recording import read_record
 from hil.recording.signals_config import SignalsConfig
 from hil.report.outputs import publish
@@ -26,10 +26,10 @@ def written_fmu(
         For what can't be exported, a wrong name, or without a compiler.
     """
     if out.suffix.lower() != ".fmu":
-        raise UsageError(f"--out {out}: expected a name that ends in .fmu, came {out.suffix!r}")
+        raise UsageError(f"--out {out}: expected a name that ends in .fmu, got {out.suffix!r}")
     if read_toml(model, ModelFileError).get("laws"):
         raise UsageError(
-            f"{model}: laws | expected effects of the catalogue, whose laws hil can write as C, came a law of your own "
+            f"{model}: laws | expected effects of the catalogue, whose laws hil can write as C, got a law of your own "
             "in Python. Take it out, and write it in your simulation."
         )
     file = read_model(model) if recording is None else read_model_for_recordings(model)

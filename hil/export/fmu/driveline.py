@@ -63,7 +63,7 @@ class Driveline:
     @property
     def masses(self) -> int:
         """How many inertias it has."""
-        return MASSES[self.structure]
+        return len(MASSES[self.structure])
 
 
 def driveline(name: str, model: DrivelineModel, period_s: float, sensor_at: Location = Location.MOTOR) -> Driveline:
@@ -75,7 +75,7 @@ def driveline(name: str, model: DrivelineModel, period_s: float, sensor_at: Loca
         For a joint.
     """
     if model.structure is Structure.JOINT:
-        raise UsageError("structure = 'joint': expected a driveline of 1 to 3 masses to export, came a joint")
+        raise UsageError("structure = 'joint': expected a driveline of 1 to 3 masses to export, got a joint")
     left = [each for each in model.effects if each in OF_THE_RECORDER]
     kept = replace(model, effects={each: values for each, values in model.effects.items() if each not in left})
     p = flat(kept)

@@ -29,7 +29,8 @@ def c_files(d: Driveline, version: str) -> tuple[dict[str, str], list[str], str]
     number = version[0]
     headers = {name: text for name, text in _headers().items() if name.startswith(f"fmi{number}")}
     functions = f"fmi{number}Functions.h"
-    own = {name: sources.own(name) for name in ("driveline.c", "driveline.h", f"fmi{number}.c")}
+    own = {name: sources.own(name) for name in ("driveline.c", "driveline.h")}
+    own[f"fmi{number}.c"] = sources.interface(number)
     stubs = sources.stubs(headers[f"fmi{number}FunctionTypes.h"], functions, own[f"fmi{number}.c"])
     files = {**headers, **own, "laws.h": sources.laws(), "stubs.c": stubs}
     text = "".join((*files.values(), sources.model_header(d, "")))
@@ -66,7 +67,7 @@ def _headers() -> dict[str, str]:
         import fmpy
     except ModuleNotFoundError as error:
         raise UsageError(
-            "hil export fmu: expected FMPy, which brings the headers of the FMI standard, came none. Install it: "
+            "hil export fmu: expected FMPy, which brings the headers of the FMI standard, got none. Install it: "
             "pip install 'hil-driveline[fmu]'"
         ) from error
     folder = Path(fmpy.__file__).parent / "c-code"
@@ -78,7 +79,7 @@ def _compiler() -> str:
     found = next((path for name in ((named,) if named else ("cc", "gcc", "clang")) if (path := shutil.which(name))), "")
     if not found:
         raise UsageError(
-            f"expected a C compiler to make the FMU's binary ({named or 'cc, gcc or clang'}), came none. Install one, "
+            f"expected a C compiler to make the FMU's binary ({named or 'cc, gcc or clang'}), got none. Install one, "
             "name it in the variable CC, or write the FMU without a binary: --sources-only"
         )
     return found
@@ -92,5 +93,5 @@ def _binary(files: dict[str, str], compiled: list[str]) -> bytes:
         command = [compiler, *OPTIONS, *compiled, "-o", "out.so", "-lm"]
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
         if done.returncode:
-            raise UsageError(f"{compiler}: expected a compiler that takes C99, came: {done.stderr.strip()[:500]}")
+            raise UsageError(f"{compiler}: expected a compiler that takes C99, got: {done.stderr.strip()[:500]}")
         return (Path(folder) / "out.so").read_bytes()

@@ -97,6 +97,20 @@ def own(name: str) -> str:
     return (resources.files("hil.export.fmu") / "c" / name).read_text("ascii")
 
 
+_TYPES = {
+    "2": {"INSTANCE": "fmi2Component", "REAL": "fmi2Real"},
+    "3": {"INSTANCE": "fmi3Instance", "REAL": "fmi3Float64"},
+}
+
+
+def interface(number: str) -> str:
+    """Return the C file with the functions of a version of the standard: what both have, and what it has alone."""
+    text = own("fmi.c").replace("fmiX", f"fmi{number}")
+    for name, of in _TYPES[number].items():
+        text = text.replace(f"TYPE_OF_{name}", of)
+    return text + own(f"fmi{number}.c")
+
+
 def stubs(types: str, functions: str, written: str) -> str:
     """Return a C file with the functions of a standard that a model does not have: they answer with an error.
 

@@ -83,7 +83,7 @@ def drive(
     stop
         Ends it at the next cycle when requested.
     progress
-        Told of every cycle.
+        Called with every cycle.
 
     Raises
     ------
@@ -106,7 +106,7 @@ def drive(
 
 
 def _loaded(rig: Rig, conditions: Conditions) -> tuple[Bus, TwoMassLine]:
-    """Load the rig's bus: what turns at the wheels is small beside the mass, which is taken to be all of J_L."""
+    """Load the rig's bus: what turns at the wheels is small besides the mass, which is taken to be all of J_L."""
     values = simulation_model(required_simulation(rig)).values()
     metres_per_rad = WHEEL_RADIUS_M / GEAR_RATIO
     mass_kg = values["J_L"] / metres_per_rad**2 + conditions.payload_kg
@@ -122,7 +122,7 @@ def _plan(rig: Rig, conditions: Conditions, duration_s: float) -> Plan:
     plan = plan_run(rig.model_copy(update={"prbs": prbs}), EXPERIMENT)
     table = experiment_table(rig, EXPERIMENT)
     if not isinstance(table, CruiseTable):
-        raise UsageError(f"rig {rig.name!r}, experiments.{EXPERIMENT}: expected kind = 'cruise', came {table.kind!r}")
+        raise UsageError(f"rig {rig.name!r}, experiments.{EXPERIMENT}: expected kind = 'cruise', got {table.kind!r}")
     inertia, period_s, speed = rig.vehicle.inertia_kg_m2, rig.period_s, conditions.speed_rad_s
     cruise = Cruise(speed, duration_s, inertia, table.torque_nm, period_s)
     law = PedalCruise(cruise, conditions.pedal_nm, period_s, np.random.default_rng([conditions.seed, 1]))

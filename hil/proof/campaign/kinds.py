@@ -148,7 +148,7 @@ def parse_seeds(text: str) -> range:
     try:
         seeds = range(int(first), int(last if sign else first) + 1)
     except ValueError:
-        raise UsageError(f"seeds: expected A..B or one number, such as 1..20, came {text!r}") from None
+        raise UsageError(f"seeds: expected A..B or one number, such as 1..20, got {text!r}") from None
     if not seeds or seeds[0] < 0:
-        raise UsageError(f"seeds: expected A..B with 0 <= A <= B, came {text!r}")
+        raise UsageError(f"seeds: expected A..B with 0 <= A <= B, got {text!r}")
     return seeds

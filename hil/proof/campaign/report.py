@@ -45,8 +45,8 @@ FRESH_NOTE = (
 )
 
 BAND_NOTE = (
-    "*band*: of the frequency bands told, those right: at least half of the true mismatch's power is inside, and both "
-    "bands share at least half of the wider."
+    "*band*: of the frequency bands reported, those right: at least half of the true mismatch's power is inside, and "
+    "both bands share at least half of the wider."
 )
 
 

@@ -3,7 +3,7 @@
 For every kind and seed a case is made, ``hil diagnose`` and ``hil simulate`` are run on it as any user would, and only
 then its truth is written and held against the verdict. ``DIR/results.jsonl`` has a line per case, ``DIR/summary.md``,
 ``DIR/summary.json`` and ``DIR/confusion.svg`` have what they add up to, ``DIR/cases/KIND/SEED`` the files of each case.
-Called again, it goes on where it was interrupted; cases in which a command failed are run again.
+Called again, it continues where it was interrupted; cases in which a command failed are run again.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def read_results(path: Path) -> dict[tuple[str, int], Row]:
             rows[row["kind"], row["seed"]] = row
         except (ValueError, KeyError, TypeError) as error:
             raise RecordingError(
-                path, f"line {number}: expected one case as JSON with kind and seed, came {line[:40]!r}. Remove it."
+                path, f"line {number}: expected one case as JSON with kind and seed, got {line[:40]!r}. Remove it."
             ) from error
     return rows
 
@@ -101,7 +101,7 @@ def write_summary(rows: Sequence[Row], out: Path) -> None:
     (out / "confusion.svg").write_text(confusion_of(rows), encoding="utf-8")
 
 
-def _told(row: Row, done: int, total: int) -> str:
+def _in_words(row: Row, done: int, total: int) -> str:
     named = row["fault"] or ", ".join(row["named"]) or row["verdict"]
     return f"[{done}/{total}] {row['kind']} {row['seed']}: {row['outcome']} ({named}), {row['diagnose_s']:.1f} s"
 
@@ -137,7 +137,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         for done, row in enumerate(run_campaign(jobs, options.out, options.jobs, options.limit_s), start=1):
             rows[row["kind"], row["seed"]] = row
-            sys.stdout.write(_told(row, done, len(jobs)) + "\n")
+            sys.stdout.write(_in_words(row, done, len(jobs)) + "\n")
             sys.stdout.flush()
     except KeyboardInterrupt:
         return _INTERRUPTED

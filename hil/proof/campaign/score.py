@@ -19,10 +19,10 @@ Json = Mapping[str, Any]
 Intervals = Sequence[Sequence[float]]
 
 ALIKE = "alike"
-"""Outcome beside those of `Outcome`: right, by way of an effect declared to be the same to torque and speed."""
+"""Outcome besides those of `Outcome`: right, by way of an effect declared to be the same to torque and speed."""
 
 FAILED = "failed"
-"""Outcome beside those of `Outcome`: a command gave no result."""
+"""Outcome besides those of `Outcome`: a command gave no result."""
 
 RESOLUTION_S = 0.01
 """Intervals are compared on a grid of one sample."""

@@ -39,7 +39,7 @@ def _rows(path: Path) -> list[Row]:
     try:
         rows: list[Row] = read_json(path)["cases"]
     except (ValueError, KeyError, TypeError) as error:
-        raise RecordingError(path, f"expected a scoreboard with its cases, came another file ({error}).") from error
+        raise RecordingError(path, f"expected a scoreboard with its cases, got another file ({error}).") from error
     return rows
 
 

@@ -68,7 +68,7 @@ def _relaxation_rad(sizes: Json, bus: Json) -> float:
 
 
 def _grip_nm(sizes: Json, bus: Json) -> float:
-    """Grip of the ``G tanh(x / G)`` that bends off as ``D sin(C atan(x / (C D)))`` does: their terms in x^3 agree."""
+    """Grip of the ``G tanh(x / G)`` that levels off as ``D sin(C atan(x / (C D)))`` does: their terms in x^3 agree."""
     return float(sizes["grip_nm"]) / math.sqrt(0.5 + SHAPE**-2)
 
 

@@ -18,7 +18,7 @@ Z95 = 1.959963984540054
 """Two-sided 95 % quantile of the standard normal distribution."""
 
 NO_MISMATCH, ABSTAINED, FAILED = "(no mismatch)", "(no name)", "(failed)"
-"""Columns of the confusion matrix beside the names."""
+"""Columns of the confusion matrix besides the names."""
 
 
 @dataclass(frozen=True, slots=True)

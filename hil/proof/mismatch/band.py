@@ -1,4 +1,4 @@
-"""At which frequencies a mismatch is, and how a band that was told stands to the true one.
+"""At which frequencies a mismatch is, and how a band that was reported stands to the true one.
 
 A band holds the central part of a mismatch's power, as ``mismatch.band_hz`` of ``diagnosis.json`` (CONTRACT): a tenth
 of it is below and a tenth above. The density is Welch's average (IEEE Trans. Audio Electroacoust. 15, 1967) over all
@@ -70,15 +70,15 @@ class Spectrum:
 
 @dataclass(frozen=True, slots=True)
 class BandScore:
-    """How a band that was told stands to the true one.
+    """How a band that was reported stands to the true one.
 
     Attributes
     ----------
     told_hz, true_hz : tuple of float
     power_share : float
-        Share of the true mismatch's power that is in the told band; in the true one it is `CENTRAL`.
+        Share of the true mismatch's power that is in the reported band; in the true one it is `CENTRAL`.
     width_ratio : float
-        Width of the told band over that of the true one.
+        Width of the reported band over that of the true one.
     overlap : float
         Width that both share, over that of the wider.
     """
@@ -91,7 +91,7 @@ class BandScore:
 
     @property
     def right(self) -> bool:
-        """Whether the told band is where the mismatch is, and is not there by being everywhere."""
+        """Whether the reported band is where the mismatch is, and is not there by being everywhere."""
         return self.power_share >= MOST_OF_POWER and self.overlap >= MOST_OF_WIDTH
 
 
@@ -102,14 +102,14 @@ def spectrum_of(rests_rad_s: Sequence[FloatArray]) -> Spectrum:
 
 
 def compare(told_hz: Band, true: Spectrum) -> BandScore:
-    """Compare a band that was told with a true mismatch."""
+    """Compare a band that was reported with a true mismatch."""
     step, true_hz = true.step_hz, true.band_hz()
-    told_width, true_width = (high - low + step for low, high in (told_hz, true_hz))
+    reported_width, true_width = (high - low + step for low, high in (told_hz, true_hz))
     shared = min(told_hz[1], true_hz[1]) - max(told_hz[0], true_hz[0]) + step
     return BandScore(
         told_hz=told_hz,
         true_hz=true_hz,
         power_share=true.share_in(told_hz),
-        width_ratio=told_width / true_width,
-        overlap=max(0.0, shared) / max(told_width, true_width),
+        width_ratio=reported_width / true_width,
+        overlap=max(0.0, shared) / max(reported_width, true_width),
     )

@@ -1,1 +1,1 @@
-"""How small an effect is found, beside the best test there can be."""
+"""How small an effect is found, next to the best test there can be."""

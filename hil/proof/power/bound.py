@@ -124,7 +124,7 @@ def size_at(needed: float, distance: Callable[[float], float], start: float) -> 
     if excess(low) > 0.0 or excess(high) < 0.0:
         raise ValueError(
             f"size: expected one between {math.exp(least):.3g} and {math.exp(most):.3g} at a distance of {needed:.3g}, "
-            f"came {distance(math.exp(low)):.3g} at {math.exp(low):.3g} and {distance(math.exp(high)):.3g} at "
+            f"got {distance(math.exp(low)):.3g} at {math.exp(low):.3g} and {distance(math.exp(high)):.3g} at "
             f"{math.exp(high):.3g}. Does the effect vanish with its size?"
         )
     return math.exp(optimize.brentq(excess, low, high, xtol=CLOSE))

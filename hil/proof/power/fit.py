@@ -72,7 +72,7 @@ def fit_curve(sizes: Sequence[float], found: Sequence[bool]) -> Curve:
         If there are no trials, or not one answer for each.
     """
     if not sizes or len(sizes) != len(found):
-        raise ValueError(f"trials: expected as many answers as sizes and at least one, came {len(sizes)} {len(found)}")
+        raise ValueError(f"trials: expected as many answers as sizes and at least one, got {len(sizes)} {len(found)}")
     x, hit = np.log(np.asarray(sizes)), np.asarray(found, dtype=np.bool_)
     grid = np.linspace(x.min() - math.log(MARGIN), x.max() + math.log(MARGIN), SIZES)
     level = np.array([_penalised(x, hit, grid, float(b)) for b in STEEPNESS])

@@ -1,8 +1,8 @@
 """The noise of a free run: that of the speed's reading, and what the noise of the torque's readings moves.
 
 A model is driven by the torques as they were read. With y = G u + v and u read as u + e, the error y - G (u + e) of the
-true model is v - G e: white noise, and slow and resonant noise beside it. The truth without an effect is linear, so one
-answer to a pulse of torque gives G, and the covariance is sigma^2 I + s^2 G G'. Rounding to a step q adds q^2 / 12.
+true model is v - G e: white noise, and slow and resonant noise next to it. The truth without an effect is linear, so
+one answer to a pulse of torque gives G, and the covariance is sigma^2 I + s^2 G G'. Rounding to a step q adds q^2 / 12.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ from hil.proof.power.report import BASE, KNOWLEDGE
 
 WIDTH_PX, HEIGHT_PX, LEFT_PX, TOP_PX, GAP_PX, BOTTOM_PX = 250, 170, 52, 46, 40, 40
 PER_ROW = 3
-"""Panels beside each other: a page shows them at the size of its text."""
+"""Panels next to each other: a page shows them at the size of its text."""
 
 TOOL = "#1f77b4"
 

@@ -87,7 +87,7 @@ def markdown(rows: Sequence[Row], bounds: Sequence[Row]) -> str:
     data = summary(rows, bounds)
     effects: Mapping[str, Any] = data["effects"]
     names = list(KNOWLEDGE.values())
-    told = " | ".join(names)
+    text = " | ".join(names)
     return "\n".join(
         [
             "# Power",
@@ -96,7 +96,7 @@ def markdown(rows: Sequence[Row], bounds: Sequence[Row]) -> str:
             "buses, or the 95 % interval. Best possible tests (module `hil.proof.power.bound`) by what they know; "
             f"alpha is their level, a {HYPOTHESES}th of 5 % unless it was set.",
             "",
-            f"| effect | unit | alpha | {told} | tool | {' | '.join(f'tool / {name}' for name in names)} | trials |",
+            f"| effect | unit | alpha | {text} | tool | {' | '.join(f'tool / {name}' for name in names)} | trials |",
             f"|{' --- |' * (5 + 2 * len(names))}",
             *(_line(effect, figures) for effect, figures in effects.items()),
             "",
@@ -131,9 +131,9 @@ def _line(effect: str, figures: Mapping[str, Any]) -> str:
 
 def _interval(of: Mapping[str, float | None]) -> str:
     value, low, high = of["value"], of["low"], of["high"]
-    told = "not reached" if value is None else f"{value:.3g}" if value else "below all tried"
+    text = "not reached" if value is None else f"{value:.3g}" if value else "below all tried"
     ends = f"from {low or 0.0:.3g}" if high is None else f"{low or 0.0:.3g} to {high:.3g}"
-    return f"{told} ({ends})"
+    return f"{text} ({ends})"
 
 
 def _point_line(effect: str, point: Mapping[str, Any]) -> str:

@@ -1,9 +1,9 @@
-"""``python -m hil.proof.power --effects A,B --seeds A..B --out DIR``: how small an effect is found, beside the bound.
+"""``python -m hil.proof.power --effects A,B --seeds A..B --out DIR``: how small an effect is found, next to the bound.
 
 For every effect and seed the smallest sizes that the best possible tests find are computed from the noise-free truth;
 then ``hil diagnose`` is run on multiples of one of them, with noise drawn anew each time. ``DIR/bounds.jsonl`` has a
 line per bus, ``DIR/results.jsonl`` one per trial, ``DIR/summary.md``, ``DIR/summary.json`` and ``DIR/power.svg`` what
-they add up to, ``DIR/cases/EFFECT/SEED/MULTIPLE`` the files of each trial. Called again, it goes on where it was
+they add up to, ``DIR/cases/EFFECT/SEED/MULTIPLE`` the files of each trial. Called again, it continues where it was
 interrupted; trials in which the command failed are run again.
 """
 
@@ -83,10 +83,10 @@ def run_study(
     trying = [partial(attempt, study, bounds[bus], multiple, out, options.limit_s) for bus, multiple in missing]
     for done, row in enumerate(appended(trying, out / RESULTS, options.jobs), start=1):
         results[row["kind"], row["seed"]] = row
-        _tell(f"[{done}/{len(missing)}] {row['kind']} {row['seed']}: {_told(row)}, {row['diagnose_s']:.1f} s")
+        _tell(f"[{done}/{len(missing)}] {row['kind']} {row['seed']}: {_in_words(row)}, {row['diagnose_s']:.1f} s")
 
 
-def _told(row: Row) -> str:
+def _in_words(row: Row) -> str:
     named = row["fault"] or ", ".join(row["named"]) or row["verdict"]
     return f"{'found' if row['found'] else 'not found'} ({named})"
 
@@ -122,30 +122,30 @@ def _multiples(text: str) -> tuple[float, ...]:
     try:
         multiples = tuple(float(word) for word in text.split(","))
     except ValueError:
-        raise argparse.ArgumentTypeError(f"expected numbers with commas, came {text!r}") from None
+        raise argparse.ArgumentTypeError(f"expected numbers with commas, got {text!r}") from None
     if min(multiples) < LEAST_MULTIPLE:
-        raise argparse.ArgumentTypeError(f"expected {LEAST_MULTIPLE:g} or more each, came {text!r}")
+        raise argparse.ArgumentTypeError(f"expected {LEAST_MULTIPLE:g} or more each, got {text!r}")
     return multiples
 
 
 def _alpha(text: str) -> float:
     alpha = float(text)
     if not 0.0 < alpha < 1.0:
-        raise argparse.ArgumentTypeError(f"expected a probability between 0 and 1, came {text}")
+        raise argparse.ArgumentTypeError(f"expected a probability between 0 and 1, got {text}")
     return alpha
 
 
 def _samples(text: str) -> int:
     duration_s = float(text)
     if not 1.0 <= duration_s <= DURATION_S:
-        raise argparse.ArgumentTypeError(f"expected 1 to {DURATION_S:g} s, came {text}")
+        raise argparse.ArgumentTypeError(f"expected 1 to {DURATION_S:g} s, got {text}")
     return round(duration_s / PERIOD_S)
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="python -m hil.proof.power",
-        description="Find how small an effect the public command names, beside the best possible tests.",
+        description="Find how small an effect the public command names, next to the best possible tests.",
         epilog="Example: python -m hil.proof.power --effects backlash --seeds 1..10 --out out/power",
     )
     parser.add_argument(
@@ -185,7 +185,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error(str(error))
     if (other := made_otherwise(study, [*bounds.values(), *results.values()])) is not None:
         parser.error(
-            f"--out {options.out}: expected a study of alpha {study.alpha:g} and {study.samples} samples, came one of "
+            f"--out {options.out}: expected a study of alpha {study.alpha:g} and {study.samples} samples, got one of "
             f"{other['alpha']:g} and {other['samples']}. Choose another folder."
         )
     try:

@@ -52,7 +52,7 @@ def judge_set(folder: Path, key: bytes, jobs: int, progress: Progress, verdicts:
     Returns
     -------
     list of dict
-        One row per case, as a campaign's (``hil.proof.campaign.score``), with ``case``, its name, beside.
+        One row per case, as a campaign's (``hil.proof.campaign.score``), with ``case``, its name, next to.
 
     Raises
     ------
@@ -64,14 +64,14 @@ def judge_set(folder: Path, key: bytes, jobs: int, progress: Progress, verdicts:
     cases = read_commitments(folder)
     answered = read_list(folder / VERDICTS_LIST, "hil prove run DIR writes it")
     if verdicts is not None and digest_of(answered) != verdicts:
-        raise SealBroken(f"{folder / VERDICTS_LIST}: expected the verdicts of digest {verdicts}, came others")
+        raise SealBroken(f"{folder / VERDICTS_LIST}: expected the verdicts of digest {verdicts}, got others")
     if missing := sorted(set(cases) - set(answered)):
         raise UsageError(
             f"{folder}: expected a verdict for every case, none for {', '.join(missing)}. hil prove run DIR"
         )
     for name, entry in answered.items():
         if not isinstance(entry.get("diagnose_s"), int | float):
-            raise UsageError(f"{folder / VERDICTS_LIST}: {name}: expected diagnose_s, a number of seconds, came none")
+            raise UsageError(f"{folder / VERDICTS_LIST}: {name}: expected diagnose_s, a number of seconds, got none")
     rows: dict[str, Row] = {}
     for name, row in each(lambda name: _judge_one(folder, key, name, cases[name], answered[name]), list(cases), jobs):
         rows[name] = row
@@ -104,7 +104,7 @@ def _unpacked(path: Path, content: bytes) -> object:
             raise ValueError(f"more than {LARGEST_TRUTH_BYTES} bytes, or a part of them")
         return parse_json(text.decode("utf-8"))
     except (ValueError, zlib.error) as error:
-        raise SealBroken(f"{path}: expected a truth as hil prove make seals it, came {error}") from error
+        raise SealBroken(f"{path}: expected a truth as hil prove make seals it, got {error}") from error
 
 
 def _answer(verdict: Path, fresh: Mapping[str, str], took_s: float) -> Answer:

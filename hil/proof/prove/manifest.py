@@ -78,7 +78,7 @@ def read_commitments(folder: Path) -> dict[str, Shown]:
     listed = read_list(path, advice)
     for name, entry in listed.items():
         if not isinstance(entry.get("commitment"), str):
-            raise UsageError(f"{path}: {name}: expected a commitment, came none; {advice}")
+            raise UsageError(f"{path}: {name}: expected a commitment, got none; {advice}")
     return {name: Shown(entry["commitment"], entry["files"]) for name, entry in listed.items()}
 
 
@@ -95,7 +95,7 @@ def read_list(path: Path, advice: str) -> dict[str, Any]:
     except OSError as error:
         raise UsageError(f"{path}: expected a list of cases, can't be read: {error.strerror}; {advice}") from error
     except ValueError as error:
-        raise UsageError(f"{path}: expected JSON, came: {error}; {advice}") from error
+        raise UsageError(f"{path}: expected JSON, got: {error}; {advice}") from error
     if not isinstance(listed, dict) or listed.get("schema") != SCHEMA or not isinstance(listed.get("cases"), dict):
         raise UsageError(f"{path}: expected an object of schema {SCHEMA} with cases; {advice}")
     cases: dict[str, Any] = listed["cases"]
@@ -115,19 +115,19 @@ def place_in(folder: Path, *names: str) -> Path:
     """
     path = folder.joinpath(*names)
     if not is_inside(folder, path):
-        raise UsageError(f"{path}: expected a place inside {folder}, came a link that leads out of it. Remove it.")
+        raise UsageError(f"{path}: expected a place inside {folder}, got a link that leads out of it. Remove it.")
     return path
 
 
 def _fault(name: str, entry: object) -> str:
     """Say what is wrong with an entry of a list; names in it become paths. Empty where nothing is."""
     if not is_plain(name):
-        return f"expected names of cases, plain ones such as case_001, came {name[:_SHOWN]!r}"
+        return f"expected names of cases, plain ones such as case_001, got {name[:_SHOWN]!r}"
     files = entry.get("files") if isinstance(entry, dict) else None
     if not isinstance(files, dict) or not all(isinstance(digest, str) for digest in files.values()):
-        return f"{name}: expected an object with files, each with its digest, came something else"
+        return f"{name}: expected an object with files, each with its digest, got something else"
     wrong = next((file for file in files if not is_plain(file)), None)
-    return "" if wrong is None else f"{name}: expected names of files, plain ones, came {wrong[:_SHOWN]!r}"
+    return "" if wrong is None else f"{name}: expected names of files, plain ones, got {wrong[:_SHOWN]!r}"
 
 
 def write_list(path: Path, entries: Mapping[str, Any]) -> None:

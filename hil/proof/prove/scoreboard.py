@@ -23,7 +23,7 @@ from hil.report.made import made_section
 SCHEMA = "hil.scoreboard/1"
 PAGE, DATA = "scoreboard.html", "scoreboard.json"
 WIRE, REAL = "wire", "real"
-"""Folders beside the page."""
+"""Folders next to the page."""
 
 FALSE_CLAIMS = ("false_claim", "wrong", "invented")
 """Outcomes in which something was named that is not there."""
@@ -57,7 +57,7 @@ class Board:
 
 
 def scoreboard_files(board: Board) -> dict[str, Callable[[Path], object]]:
-    """Return what writes the scoreboard, by file name; it stands beside the folders verdicts, wire and real."""
+    """Return what writes the scoreboard, by file name; it stands next to the folders verdicts, wire and real."""
     data = json.dumps(scoreboard_json(board), indent=1, allow_nan=False) + "\n"
     text = scoreboard_page(board)
     return {

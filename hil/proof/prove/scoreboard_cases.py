@@ -26,7 +26,7 @@ HEADINGS = (
 
 
 def cases_table(rows: Sequence[Row]) -> str:
-    """Return the table of cases; the page stands beside the folder of verdicts."""
+    """Return the table of cases; the page stands next to the folder of verdicts."""
     return html.html_table(HEADINGS, [_case(row) for row in rows], numbers=(5, 6, 7, 8))
 
 
@@ -55,15 +55,15 @@ def _found(row: Row) -> str:
 
 
 def _band(row: Row) -> str:
-    """Return the band that was told, whether it was right, and the true one; none where there is no mismatch."""
+    """Return the band that was reported, whether it was right, and the true one; none where there is no mismatch."""
     band = row.get("band")
     if band is None:
         return "–"
-    told = _range(band["told_hz"])
+    reported = _range(band["told_hz"])
     if "right" not in band:
-        return _unbroken(f"{told} (?)")
+        return _unbroken(f"{reported} (?)")
     mark, true = "✓" if band["right"] else "✗", _range(band["true_hz"])
-    return _unbroken(f"{mark} {told}") + " " + _unbroken(f"({true})")
+    return _unbroken(f"{mark} {reported}") + " " + _unbroken(f"({true})")
 
 
 def _range(band_hz: Sequence[float]) -> str:

@@ -11,7 +11,7 @@ from hil.report import page as html
 
 Json = Mapping[str, Any]
 
-AGREEMENTS = ("beside what is known", "found", "known", "95 % interval", "asked")
+AGREEMENTS = ("besides what is known", "found", "known", "95 % interval", "asked")
 HEADINGS = ("recording", "found", "held-out error before", "after", "black boxes", "report")
 
 

@@ -15,12 +15,12 @@ def wire_section(rows: Sequence[Row], folder: str) -> str:
     """Return the section; ``folder`` is where the rigs' folders are, seen from the page."""
     right = sum(bool(row["success"]) for row in rows)
     title = f"Over the wire: {right} of {len(rows)}"
-    told = (
+    sentence = (
         "The effect sits in simulated slaves served by a process of its own; the tool has CANopen and Modbus, runs its "
         "own tests, and the seal is opened once its verdict is written."
     )
     table = html.html_table(HEADINGS, [_cells(row, folder) for row in rows], numbers=(4, 5, 6))
-    return html.section(title, html.paragraph(told), table)
+    return html.section(title, html.paragraph(sentence), table)
 
 
 def _cells(row: Row, folder: str) -> list[str]:

@@ -38,7 +38,7 @@ def parse_key(text: str) -> bytes:
         key = b""
     if len(key) != KEY_BYTES:
         raise UsageError(
-            f"key: expected the {2 * KEY_BYTES} hexadecimal digits that hil prove make has printed, came "
+            f"key: expected the {2 * KEY_BYTES} hexadecimal digits that hil prove make has printed, got "
             f"{len(text.strip())} characters. Give it with --key or in a file with --key-file."
         )
     return key
@@ -64,7 +64,7 @@ def unlock(key: bytes, name: str, path: Path) -> bytes:
         raise SealBroken(f"{path}: expected what was sealed with {name}, can't be read: {error.strerror}") from error
     start = len(MAGIC) + NONCE_BYTES
     if not locked.startswith(MAGIC) or len(locked) < start:
-        raise SealBroken(f"{path}: expected a file sealed by hil prove make, came something else")
+        raise SealBroken(f"{path}: expected a file sealed by hil prove make, got something else")
     try:
         return AESGCM(key).decrypt(locked[len(MAGIC) : start], locked[start:], name.encode())
     except InvalidTag:

@@ -9,10 +9,10 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from hil.config.problems import Fault, read_toml, refuse, validate
 from hil.config.table import Positive, Table, Text
 from hil.errors import FileProblem, UsageError
 from hil.inside import PLAIN
+from hil.problems import Fault, read_toml, refuse, validate
 from hil.recording.format_hints import FormatHints
 
 ROOM = Path(__file__).parent

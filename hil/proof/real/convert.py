@@ -41,7 +41,7 @@ def friction_damper(content: bytes) -> bytes:
         ]
     except (ValueError, KeyError, TypeError, IndexError) as error:
         raise NotAsPublished(
-            f'expected JSON with "data", rows of time, displacement, force, velocity, came {content[:40]!r} ({error})'
+            f'expected JSON with "data", rows of time, displacement, force, velocity, got {content[:40]!r} ({error})'
         ) from error
     return ("\n".join([HEADER, *lines]) + "\n").encode("ascii")
 

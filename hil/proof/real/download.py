@@ -1,8 +1,8 @@
 """``python -m hil.proof.real.download --to DIR [NAME...]``: the recordings, from where they are published.
 
 Every file is checked against its SHA-256 before it takes its place; one that is there and right is not fetched again.
-A transfer that broke off goes on from where it stopped. Where a file can't be had, the message says what to download by
-hand and where to put it.
+A transfer that broke off continues from where it stopped. Where a file can't be had, the message says what to download
+by hand and where to put it.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def wanted(names: Sequence[str], room: Path = ROOM) -> dict[str, RecordingEntry]
         for entry in read_case(folder).recordings.values():
             other = found.setdefault(entry.path, entry)
             if (other.sha256, other.origin) != (entry.sha256, entry.origin):
-                raise UsageError(f"{entry.path}: expected one checksum and origin in all cases, came two ({folder})")
+                raise UsageError(f"{entry.path}: expected one checksum and origin in all cases, got two ({folder})")
     return found
 
 
@@ -86,10 +86,10 @@ def _one(entry: RecordingEntry, to: Path) -> str:
         part.unlink()
         raise NotToBeHad(_by_hand(entry, path, str(error))) from error
     part.write_bytes(content)
-    came = sha256_of(part)
-    if came != entry.sha256:
+    got = sha256_of(part)
+    if got != entry.sha256:
         part.unlink()
-        raise NotToBeHad(_by_hand(entry, path, f"expected the SHA-256 {entry.sha256}, came {came}"))
+        raise NotToBeHad(_by_hand(entry, path, f"expected the SHA-256 {entry.sha256}, got {got}"))
     part.replace(path)
     return f"from {entry.origin.url}"
 
@@ -109,10 +109,10 @@ def _unpacked(part: Path, origin: Origin) -> bytes:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             inside = [name for name in archive.namelist() if Path(name).name == origin.member]
             if len(inside) != 1:
-                raise NotAsPublished(f"expected {origin.member} once in the archive, came {archive.namelist()}")
+                raise NotAsPublished(f"expected {origin.member} once in the archive, got {archive.namelist()}")
             return archive.read(inside[0])
     except zipfile.BadZipFile as error:
-        raise NotAsPublished(f"expected a zip archive, came {content[:40]!r}") from error
+        raise NotAsPublished(f"expected a zip archive, got {content[:40]!r}") from error
 
 
 def _by_hand(entry: RecordingEntry, path: Path, why: str) -> str:
@@ -124,8 +124,8 @@ def _by_hand(entry: RecordingEntry, path: Path, why: str) -> str:
         steps.append(f"put it at {path}")
     else:
         steps.append(f"run python -m hil.proof.real.convert {origin.convert.value} FILE {path}")
-    told = [f"{entry.path}: not downloaded: {why}", f"  By hand: {', '.join(steps)}.", f"  SHA-256 {entry.sha256}"]
-    return "\n".join(told)
+    lines = [f"{entry.path}: not downloaded: {why}", f"  By hand: {', '.join(steps)}.", f"  SHA-256 {entry.sha256}"]
+    return "\n".join(lines)
 
 
 def _parser() -> argparse.ArgumentParser:

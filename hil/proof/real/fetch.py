@@ -15,7 +15,7 @@ RANGE_NOT_SATISFIABLE = 416
 
 
 class FetchFailed(Exception):
-    """A file could not be had; what was is kept, and the next try goes on from there."""
+    """A file could not be had; what was is kept, and the next try continues from there."""
 
 
 def fetch(url: str, part: Path) -> None:
@@ -37,16 +37,16 @@ def fetch(url: str, part: Path) -> None:
             return  # nothing is left to fetch; the checksum will tell whether it is the right thing
         raise FetchFailed(f"{url}: expected the file, the server says {error.code} {error.reason}") from error
     except (OSError, http.client.HTTPException, ValueError) as error:
-        raise FetchFailed(f"{url}: expected a connection, came: {error}") from error
+        raise FetchFailed(f"{url}: expected a connection, got: {error}") from error
 
 
 def _write(answer: http.client.HTTPResponse, part: Path, resumed: bool) -> None:
     left = answer.headers.get("Content-Length")
     expected = None if left is None else int(left)
-    came = 0
+    got = 0
     with part.open("ab" if resumed else "wb") as file:
         while chunk := answer.read(CHUNK_BYTES):
             file.write(chunk)
-            came += len(chunk)
-    if expected is not None and came < expected:
-        raise FetchFailed(f"{answer.url}: expected {expected} bytes, the connection broke off after {came}. Try again.")
+            got += len(chunk)
+    if expected is not None and got < expected:
+        raise FetchFailed(f"{answer.url}: expected {expected} bytes, the connection broke off after {got}. Try again.")

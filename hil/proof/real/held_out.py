@@ -1,7 +1,7 @@
 """Blocks of a held-out recording that count while the rest of it tells its own course (a road's grade, a load).
 
 A block must have something measured on both sides, or nothing would tell the course in it. So blocks lie within
-stretches that are long enough, away from their ends, and not beside a gap.
+stretches that are long enough, away from their ends, and not next to a gap.
 """
 
 from __future__ import annotations

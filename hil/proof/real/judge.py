@@ -13,7 +13,7 @@ from hil.proof.real.truth_file import Goal, KnownValue
 
 @dataclass(frozen=True, slots=True)
 class Agreement:
-    """One known thing beside what was found.
+    """One known thing besides what was found.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ def _entry(diagnosis: Mapping[str, Any], place: str) -> Mapping[str, Any] | None
         case ["load_torque"]:
             loads = list(diagnosis["load_torque"].values())
             return _table(loads[0]) if len(loads) == 1 else None
-    raise ValueError(f"expected parameters.NAME, effects.NAME.NAME or load_torque, came {place}")
+    raise ValueError(f"expected parameters.NAME, effects.NAME.NAME or load_torque, got {place}")
 
 
 def _table(value: Any) -> Mapping[str, Any] | None:

@@ -37,13 +37,13 @@ def require_recording(data: Path, entry: RecordingEntry) -> Path:
     if not path.is_file():
         raise RealFileError(
             path,
-            "expected a recording, came nothing. Fetch it with python -m hil.proof.real.download "
+            "expected a recording, got nothing. Fetch it with python -m hil.proof.real.download "
             f"--to {data}, or from {entry.origin.page}",
         )
-    came = sha256_of(path)
-    if came != entry.sha256:
+    got = sha256_of(path)
+    if got != entry.sha256:
         raise RealFileError(
-            path, f"expected the SHA-256 {entry.sha256}, came {came}. Fetch it again, or name the new one"
+            path, f"expected the SHA-256 {entry.sha256}, got {got}. Fetch it again, or name the new one"
         )
     return path
 
@@ -78,7 +78,7 @@ def write_shown(case: CaseFile, name: str, data: Path, place: Path, hide: dict[s
     table = full_table(case, name, data)
     missing = [column for column in case.shown if column not in table.columns]
     if missing:
-        raise RealFileError(table.path, f"expected the channels {missing}, came {', '.join(table.columns)}")
+        raise RealFileError(table.path, f"expected the channels {missing}, got {', '.join(table.columns)}")
     columns: dict[str, Column] = {column: table.columns[column] for column in case.shown}
     for column, rows in (hide or {}).items():
         columns[column] = np.where(rows, np.nan, columns[column].astype(np.float64))

@@ -135,7 +135,7 @@ def read_results(path: Path) -> list[RealResult]:
     """
     content = read_json(path)
     if content.get("schema") != SCHEMA:
-        raise ValueError(f"{path}: expected the schema {SCHEMA}, came {content.get('schema')!r}. Make it again.")
+        raise ValueError(f"{path}: expected the schema {SCHEMA}, got {content.get('schema')!r}. Make it again.")
     return [_result(case) for case in content["cases"]]
 
 

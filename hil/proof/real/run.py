@@ -3,7 +3,7 @@
 Every case's recordings are written where nothing else is, without the channels that would tell what is concealed;
 `hil diagnose` is run there as any user would, and only then the truth is read. ``DIR/real.json`` has a case each, with
 the verdict, the errors before and after on recordings that were not fitted, what agrees with what is known, and what
-black boxes get. ``DIR/NAME/RUN/out`` has the diagnosis and its report. Called again, it goes on where it was
+black boxes get. ``DIR/NAME/RUN/out`` has the diagnosis and its report. Called again, it continues where it was
 interrupted.
 """
 
@@ -113,13 +113,13 @@ def _run_all(
         for finished in as_completed(running):
             name, result = running[finished], finished.result()
             done[name, result.name] = result
-            progress(f"{name} {result.name}: {_told(result)}", len(done) / len(wanted))
+            progress(f"{name} {result.name}: {_in_words(result)}", len(done) / len(wanted))
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
     return done
 
 
-def _told(result: RunResult) -> str:
+def _in_words(result: RunResult) -> str:
     if result.fault is not None:
         return f"failed, {result.fault}"
     return f"{result.verdict} ({', '.join(result.named) or 'nothing named'}), {result.duration_s:.0f} s"
@@ -179,7 +179,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = _parser()
     options = parse_work(parser, arguments)
     if options.data is None:
-        parser.error("--data: expected the folder of the recordings, came neither it nor HIL_DATA")
+        parser.error("--data: expected the folder of the recordings, got neither it nor HIL_DATA")
 
     def tell(message: str, share: float) -> None:
         sys.stdout.write(f"[{share:4.0%}] {message}\n")

@@ -7,8 +7,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from hil.config.problems import read_toml, validate
 from hil.config.table import Positive, Table, Text
+from hil.problems import read_toml, validate
 from hil.proof.real.case_file import TRUTH, RealFileError
 
 
@@ -73,7 +73,7 @@ class Goal(Table):
 
 
 class TruthFile(Table):
-    """What is known of a machine beside its recordings."""
+    """What is known of a machine next to its recordings."""
 
     schema_: Literal["hil.real-truth/1"] = Field(alias="schema")
     source: Text

@@ -50,8 +50,8 @@ class TruthDriveline:
         states: FloatArray = kernel.course(self._state, self._physics, commands_nm, held_s)[ends]
         return states
 
-    def go_on_with(self, physics: Physics) -> None:
-        """Change the physics under way: motion and twist go on, clock and distance start again at zero."""
+    def continue_with(self, physics: Physics) -> None:
+        """Change the physics under way: motion and twist continue, clock and distance start again at zero."""
         self._physics = physics
         self._state[[State.ANGLE_M, State.ANGLE_X]] -= self._state[State.ANGLE_L]
         self._state[[State.TIME_S, State.ANGLE_L]] = 0.0

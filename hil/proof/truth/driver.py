@@ -56,5 +56,5 @@ def bring_to_speed(physics: Physics, speed_rad_s: float, share_m1: float) -> Rol
     torque_nm = holding_torque(physics, speed_rad_s, share_m1)
     driveline = TruthDriveline(before_the_recording(physics), speed_rad_s)
     driveline.advance((share_m1 * torque_nm, (1.0 - share_m1) * torque_nm), _SETTLING_S)
-    driveline.go_on_with(physics)
+    driveline.continue_with(physics)
     return Rolling(driveline, torque_nm)

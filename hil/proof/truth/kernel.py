@@ -131,7 +131,7 @@ def advance(state: FloatArray, p: Physics, command_nm: float, duration_s: float)
     command_nm : float
         Torque that reaches the current loops, both inverters together [Nm].
     duration_s : float
-        Time to go on by [s]; divided into equal steps of at most `MAX_STEP_S`.
+        Time to continue by [s]; divided into equal steps of at most `MAX_STEP_S`.
     """
     steps = math.ceil(duration_s / MAX_STEP_S - 1e-9)
     if steps < 1:

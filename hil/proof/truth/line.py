@@ -1,6 +1,6 @@
 """The line from motor to vehicle: which torque acts on each of its inertias.
 
-Motor, shaft and load; beside them, where there is one, an extra inertia before or behind the shaft, and the vehicle
+Motor, shaft and load; next to them, where there is one, an extra inertia before or behind the shaft, and the vehicle
 behind a tyre that slips (the load is then the wheels).
 """
 

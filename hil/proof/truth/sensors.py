@@ -21,7 +21,7 @@ SPEED_NOISE_RAD_S = 0.05
 class Noise:
     """What a faultless sensor adds to a quantity: standard deviations, and the resolution of the torque.
 
-    Beside the white noise of speed and torque there may be coloured noise of the speed, and a drift of each torque
+    Besides the white noise of speed and torque there may be coloured noise of the speed, and a drift of each torque
     reading: of first order, with these corner frequencies.
     """
 

@@ -41,7 +41,7 @@ def stream(seed: int, purpose: Stream, *key: int) -> np.random.Generator:
         If the seed is negative.
     """
     if seed < 0:
-        raise UsageError(f"seed: expected 0 or greater, came {seed}")
+        raise UsageError(f"seed: expected 0 or greater, got {seed}")
     return np.random.default_rng([seed, purpose, *key])
 
 

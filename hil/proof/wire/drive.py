@@ -39,7 +39,7 @@ def drive(name: str, concealed: Concealed, seed: int, out: Path, limit_s: float)
     Returns
     -------
     dict
-        A row as a campaign's, with ``case`` (the rig's name), ``where`` and ``said`` (a refusal) beside.
+        A row as a campaign's, with ``case`` (the rig's name), ``where`` and ``said`` (a refusal) next to.
     """
     arguments = ["--seed", str(seed), "--effect", concealed.effect]
     for fault in concealed.faults:
@@ -52,10 +52,10 @@ def drive(name: str, concealed: Concealed, seed: int, out: Path, limit_s: float)
             answer = _work(place, limit_s)
             truth = _truth(sealed, concealed)
         replace_own(out / name, place)
-    told = {"case": name, "where": concealed.where, "said": answer.fault or ""}
+    about = {"case": name, "where": concealed.where, "said": answer.fault or ""}
     if concealed.refused:
-        return {**told, **_refusal(concealed, seed, answer)}
-    return {**score(kind(str(truth["effect"])), seed, truth, answer), **told}
+        return {**about, **_refusal(concealed, seed, answer)}
+    return {**score(kind(str(truth["effect"])), seed, truth, answer), **about}
 
 
 def _work(place: Path, limit_s: float) -> Answer:

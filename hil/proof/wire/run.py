@@ -60,7 +60,7 @@ def read_rows(out: Path) -> list[Row]:
         rows: list[Row] = data["rigs"]
     except (ValueError, KeyError, TypeError) as error:
         raise UsageError(
-            f"{path}: expected an object of schema {SCHEMA} with rigs, came: {error}. Remove it."
+            f"{path}: expected an object of schema {SCHEMA} with rigs, got: {error}. Remove it."
         ) from error
     return rows
 

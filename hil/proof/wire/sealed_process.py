@@ -53,7 +53,7 @@ class _Pipes:
 
     process: subprocess.Popen[str]
     asked: IO[str]
-    told: IO[str]
+    answers: IO[str]
     complaints: IO[bytes]
 
     def ask(self, line: str) -> str:
@@ -65,7 +65,7 @@ class _Pipes:
         return self.answer()
 
     def answer(self) -> str:
-        line = self.told.readline()
+        line = self.answers.readline()
         if not line:
             raise self._gone()
         return line
@@ -79,7 +79,7 @@ class _Pipes:
         except subprocess.TimeoutExpired:
             self.process.kill()
             self.process.wait()
-        self.told.close()
+        self.answers.close()
 
     def _gone(self) -> RunAborted:
         status = self.process.wait()
@@ -124,13 +124,13 @@ def _start(arguments: tuple[str, ...], complaints: IO[bytes], folder: str) -> _P
         text=True,
         start_new_session=True,
     )
-    asked, told = cast(IO[str], process.stdin), cast(IO[str], process.stdout)  # both are pipes, see above
-    return _Pipes(process, asked, told, complaints)
+    asked, answers = cast(IO[str], process.stdin), cast(IO[str], process.stdout)  # both are pipes, see above
+    return _Pipes(process, asked, answers, complaints)
 
 
 def _meet(pipes: _Pipes) -> SealedProcess:
     line = pipes.answer()
     ready = _READY.fullmatch(line)
     if ready is None:
-        raise RunAborted(f"sealed rig: expected 'ready bus=... modbus=... commitment=...', came {line!r}")
+        raise RunAborted(f"sealed rig: expected 'ready bus=... modbus=... commitment=...', got {line!r}")
     return SealedProcess(ready["bus"], ready["modbus"], ready["commitment"], pipes)

@@ -52,8 +52,8 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def serve(challenge: Challenge, rig: Rig, bus_url: str, modbus: str, asked: TextIO, told: TextIO) -> None:
-    """Serve a challenge until ``asked`` ends; see the module's text for what is read and told.
+def serve(challenge: Challenge, rig: Rig, bus_url: str, modbus: str, asked: TextIO, answers: TextIO) -> None:
+    """Serve a challenge until ``asked`` ends; see the module's text for what is read and written.
 
     Raises
     ------
@@ -65,20 +65,20 @@ def serve(challenge: Challenge, rig: Rig, bus_url: str, modbus: str, asked: Text
     address, seed = modbus_address(modbus), challenge.specimen.seed
     with RigServer(challenge.plant, rig, bus_url, address, faults, seed) as server:
         commitment = challenge.seal.commitment
-        _tell(told, f"ready bus={server.bus_url} modbus={server.modbus} commitment={commitment}")
+        _tell(answers, f"ready bus={server.bus_url} modbus={server.modbus} commitment={commitment}")
         for line in asked:
-            _tell(told, _answer(line.strip(), challenge))
+            _tell(answers, _answer(line.strip(), challenge))
 
 
 def _answer(asked: str, challenge: Challenge) -> str:
     if asked == OPEN:
         return json.dumps(challenge.seal.opened())
-    return json.dumps({"error": f"expected the line {OPEN!r} or the end of input, came {asked!r}"})
+    return json.dumps({"error": f"expected the line {OPEN!r} or the end of input, got {asked!r}"})
 
 
-def _tell(told: TextIO, line: str) -> None:
-    told.write(f"{line}\n")
-    told.flush()
+def _tell(answers: TextIO, line: str) -> None:
+    answers.write(f"{line}\n")
+    answers.flush()
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -20,8 +20,6 @@ NUMBER: Final = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:i
 DATE_TIME: Final = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(?::\d\d(?:[.,]\d{1,9})?)?(?:Z|[+-]\d\d:?\d\d)?")
 """A date with a time of day (ISO 8601)."""
 
-TRUTH: Final = pa.array(["True", "False"])
-
 NS: Final = 1e-9
 
 
@@ -53,7 +51,7 @@ def as_column(cells: pa.ChunkedArray, kind: Kind | None = None, decimal: str = "
     """
     if kind is Kind.TEXT:
         return as_text(cells.to_pylist())
-    if kind is Kind.BOOLEAN and pa.compute.all(pa.compute.is_in(cells, TRUTH)).as_py():
+    if kind is Kind.BOOLEAN and pa.compute.all(pa.compute.is_in(cells, pa.array(["True", "False"]))).as_py():
         return np.asarray(pa.compute.equal(cells, "True").to_numpy())
     trimmed = pa.compute.utf8_trim_whitespace(cells)
     present = pa.compute.if_else(pa.compute.is_in(trimmed, pa.array(MISSING)), pa.scalar(None, pa.string()), trimmed)

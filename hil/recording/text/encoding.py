@@ -56,7 +56,7 @@ def decoded(path: Path, content: bytes, given: str) -> tuple[str, str]:
         byte = content[start : start + 1].hex()
         raise RecordingError(
             path,
-            f"line {line}: expected {encoding} text, came byte 0x{byte}. Give its encoding in the model file: "
+            f"line {line}: expected {encoding} text, got byte 0x{byte}. Give its encoding in the model file: "
             f'[signals] format = {{ encoding = "{FALLBACK}" }}.',
         ) from error
     lines = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")

@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
-from estimator.identification.identify import Settings
 from estimator.identification.linear_model import Orders
 from estimator.identification.offline.orders import OrderChoice, select_orders
 from estimator.identification.online.registry import ESTIMATORS, Entry
 from estimator.identification.online.two_mass import TwoMass
+from estimator.identification.settings import Settings
 from estimator.physics.model import DrivelineModel, Structure
 from estimator.signals.decimate import decimate
 from estimator.signals.record import Record
@@ -68,7 +68,7 @@ def _numbers(option: str, text: str, least: int, all_of_them: Sequence[int]) -> 
     if text == AUTO:
         return all_of_them
     if not (text.isascii() and text.isdigit()) or int(text) < least:
-        raise UsageError(f"{option}: expected a whole number from {least} on, or {AUTO}, came {text!r}")
+        raise UsageError(f"{option}: expected a whole number from {least} on, or {AUTO}, got {text!r}")
     return (int(text),)
 
 
@@ -82,7 +82,7 @@ def chosen_estimators(names: Sequence[str]) -> Mapping[str, Entry]:
     """
     for name in names:
         if name not in ESTIMATORS:
-            raise UsageError(f"--estimator: expected one of {', '.join(ESTIMATORS)}, came {name!r}")
+            raise UsageError(f"--estimator: expected one of {', '.join(ESTIMATORS)}, got {name!r}")
     return {name: ESTIMATORS[name] for name in names}
 
 
@@ -98,7 +98,7 @@ def start_values(names: Sequence[str], expected: DrivelineModel | None) -> TwoMa
         return TwoMass(**expected.values())
     if PHYSICAL in names:
         raise UsageError(
-            f"--estimator {PHYSICAL}: expected start values for J_M, J_L, k and c, came none. Give a two-mass model "
+            f"--estimator {PHYSICAL}: expected start values for J_M, J_L, k and c, got none. Give a two-mass model "
             "file by --model; a factor of two off is near enough."
         )
     return None

@@ -9,7 +9,7 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from estimator.identification.modes.propagate import QUANTILE
-from estimator.identification.online.online_estimate import OnlineTrajectory
+from estimator.identification.online_estimate import OnlineTrajectory
 from estimator.signals.record import FloatArray, IntArray
 from hil.figures.local_model import LocalModel
 from hil.figures.palette import BLACK, BLUE, VERMILION, faded, series_colour

@@ -12,10 +12,11 @@ from typing import Any, Final
 import numpy as np
 
 from estimator.identification.compare import Compared
-from estimator.identification.identify import Identification, Settings
+from estimator.identification.identify import Identification
 from estimator.identification.linear_model import ComplexArray, LinearModel
 from estimator.identification.modes.modes import Mode
 from estimator.identification.offline.orders import OrderChoice
+from estimator.identification.settings import Settings
 from estimator.identification.spectral.welch import SpectralEstimate
 from estimator.identification.study import Study
 from hil.provenance import Provenance

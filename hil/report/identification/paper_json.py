@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any, Final
 
-from estimator.identification.identify import Settings
+from estimator.identification.settings import Settings
 from hil.figures.numbers import Row
 from hil.figures.road.conditions import Conditions
 from hil.provenance import Provenance

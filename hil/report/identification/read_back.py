@@ -12,13 +12,13 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from estimator.errors import BadSetting
-from estimator.identification.identify import Settings
 from estimator.identification.linear_model import Orders
 from estimator.identification.online.adaptation import Adaptation
+from estimator.identification.settings import Settings
 from estimator.signals.record import FloatArray
-from hil.config.problems import validate
 from hil.errors import FileProblem, UsageError
 from hil.parse_json import read_json
+from hil.problems import validate
 
 
 class _Part(BaseModel):
@@ -103,7 +103,7 @@ def identified(path: Path, run: str | None, adaptation: Adaptation, option: str 
     file = read_identification(path)
     entry = _chosen(path, file.recordings, run, option)
     if entry.output != "speed":
-        raise FileProblem(path, f"recordings.{entry.name}.output | expected 'speed' | came {entry.output!r}")
+        raise FileProblem(path, f"recordings.{entry.name}.output | expected 'speed' | got {entry.output!r}")
     return Identified(entry.name, _settings(path, file.settings, adaptation), np.array(entry.filter_L))
 
 
@@ -133,15 +133,15 @@ def _json(path: Path) -> dict[str, Any]:
     try:
         found = read_json(path)
     except OSError as cause:
-        raise FileProblem(path, f"the file | expected identification.json | came: {cause.strerror}") from cause
+        raise FileProblem(path, f"the file | expected identification.json | got: {cause.strerror}") from cause
     except UnicodeDecodeError as cause:
-        raise FileProblem(path, f"the file | expected UTF-8 text | came: {cause.reason}") from cause
+        raise FileProblem(path, f"the file | expected UTF-8 text | got: {cause.reason}") from cause
     except json.JSONDecodeError as cause:
-        raise FileProblem(path, f"line {cause.lineno} | expected JSON | came: {cause.msg}") from cause
+        raise FileProblem(path, f"line {cause.lineno} | expected JSON | got: {cause.msg}") from cause
     except ValueError as cause:
-        raise FileProblem(path, f"the file | expected JSON | came: {cause}") from cause
+        raise FileProblem(path, f"the file | expected JSON | got: {cause}") from cause
     if not isinstance(found, dict):
-        raise FileProblem(path, f"the file | expected a JSON object | came a {type(found).__name__}")
+        raise FileProblem(path, f"the file | expected a JSON object | got a {type(found).__name__}")
     return found
 
 
@@ -167,7 +167,7 @@ def physical_values(path: Path, run: str | None = None) -> dict[str, PhysicalVal
     read_identification(path)  # says what is wrong with it
     entries = [each for each in _json(path)["recordings"] if run in (None, each["name"])]
     if not entries:
-        raise UsageError(f"{path}: expected a recording {run!r} in it, came a file without. See --run.")
+        raise UsageError(f"{path}: expected a recording {run!r} in it, got a file without. See --run.")
     best: dict[str, PhysicalValue] = {}
     for entry in entries:
         for name, one in ((entry.get("physical") or {}).get("parameters") or {}).items():

@@ -1,4 +1,4 @@
-"""How right the identified models are, over many buses, beside other tools.
+"""How right the identified models are, over many buses, next to other tools.
 
 ``python -m tests.benchmarks.identification [buses] [clean] [healthy] [accuracy] [coverage] [truth] [paper]
 [--buses N] ...``
@@ -30,7 +30,7 @@ BUSES, FIRST_SEED = 200, 0
 
 
 def buses_part(options: argparse.Namespace, world: World, name: str) -> str:
-    """Judge every method; write the JSON beside where it is wanted."""
+    """Judge every method; write the JSON next to where it is wanted."""
     seeds = range(options.seed, options.seed + options.buses)
     judged = judge_all(seeds, world, options.jobs)
     if options.json is not None:
@@ -63,7 +63,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     unknown = [name for name in options.parts if name not in parts]
     if unknown:
-        parser.error(f"expected {', '.join(parts)}, came {', '.join(unknown)}")
+        parser.error(f"expected {', '.join(parts)}, got {', '.join(unknown)}")
     if options.buses < 1 or options.jobs < 1:
         parser.error(f"--buses {options.buses}, --jobs {options.jobs}: expected 1 or more of each")
     for name in options.parts or ("buses",):

@@ -90,7 +90,7 @@ def eigensystem(u: Array, y: Array) -> Array:
 SIPPY, NFOURSID, CONTROL, SCIPY = "sippy_unipi==1.0.1", "nfoursid==1.0.2", "control==0.10.2", "scipy"
 
 REFERENCE = "SIPPY: N4SID"
-"""Processor times are told as ratios to this one's."""
+"""Processor times are reported as ratios to this one's."""
 
 PEERS = (
     Peer(REFERENCE, "sippy_unipi", SIPPY, sippy("N4SID")),

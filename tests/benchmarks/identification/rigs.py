@@ -26,7 +26,6 @@ from estimator.identification.modes.propagate import Uncertain
 from estimator.identification.modes.uncertainty import uncertain_resonance
 from estimator.identification.offline.box_jenkins import fit_box_jenkins
 from estimator.identification.spectral.estimate import SpectralEstimate
-from estimator.identification.spectral.local_polynomial import local_polynomial
 from estimator.signals.decimate import decimate
 from estimator.signals.record import Record
 from hil.figures.road.conditions import draw_conditions
@@ -36,6 +35,7 @@ from hil.proof.truth.case import record as drive
 from hil.proof.truth.specimen import draw_specimen
 from hil.recording.signals import read_record
 from hil.rig.stop import StopRequest
+from tests.benchmarks.identification.local_polynomial import local_polynomial
 from tests.benchmarks.identification.scores import Rate
 from tests.benchmarks.ratios import table
 from tests.estimator.identification import driveline

@@ -24,7 +24,7 @@ class Kind:
     needs_torque
         Whether it shows only while a torque is asked for that is large enough.
     may_pass
-        Whether a run may also go on with it.
+        Whether a run may also continue with it.
     exceeds
         Whether the drive itself gives more than it is asked for.
     silent

@@ -66,7 +66,7 @@ def kill_host(scene: Scene) -> None:
 
 
 def suspend_host(scene: Scene) -> None:
-    """As a debugger does; it goes on later."""
+    """As a debugger does; it continues later."""
     scene.host.send_signal(signal.SIGSTOP)
 
 
@@ -111,7 +111,7 @@ def step_clock(seconds: int) -> Meet:
 class Kind:
     """What is met, what the host has to say, and whether the drives have to stop by themselves.
 
-    A host that goes on must not be disturbed: who asks its drives for anything is a foreign controller.
+    A host that continues must not be disturbed: who asks its drives for anything is a foreign controller.
 
     Attributes
     ----------

@@ -2,7 +2,7 @@
 
 Each is tried in a process of its own. Prints a table, Markdown, of how many inputs there were, what became of them, the
 longest time and the most memory; exits 1 if one ended with a traceback or a warning, took too long or too much. What
-was wrong is kept in ``out/fuzz``: mended, it belongs into ``tests/campaigns/fuzz/kept``.
+was wrong is kept in ``out/fuzz``: fixed, it belongs into ``tests/campaigns/fuzz/kept``.
 """
 
 from __future__ import annotations

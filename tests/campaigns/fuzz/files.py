@@ -13,7 +13,7 @@ from typing import Any
 import can
 import numpy as np
 
-from drivers.datasheet.check.check import check_eds
+from drivers.eds_check.check import check_eds
 from drivers.inverter.pdos import InverterPdos
 from drivers.inverter.settings import InverterSettings
 from drivers.plc.register_map import load_register_map

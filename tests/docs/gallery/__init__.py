@@ -1,1 +1,1 @@
-"""The failures of docs/gallery.md: each provoked on the simulated rig or by a file, told by the tool itself."""
+"""The failures of docs/gallery.md: each provoked on the simulated rig or by a file, reported by the tool itself."""

@@ -21,16 +21,16 @@ def main(arguments: Sequence[str]) -> int:
     check = "--check" in arguments
     stale = 0
     for name in [each for each in arguments if each != "--check"] or list(FAILURES):
-        told = tell(FAILURES[name])
-        shown = shown_of(name, told)
+        outcome = tell(FAILURES[name])
+        shown = shown_of(name, outcome)
         if check:
             same = skeleton(shown) == skeleton(shown_on_page()[name])
             stale += not same
             sys.stdout.write(f"{name}: {'as shown' if same else 'says something else now:'}\n{'' if same else shown}")
             continue
         PAGE.write_text(with_shown(PAGE.read_text(encoding="utf-8"), name, shown), encoding="utf-8")
-        drawn = "" if told.draw is None else f", {picture(name, told.draw)}"
-        sys.stdout.write(f"{name}: status {told.status}{drawn}\n")
+        drawn = "" if outcome.draw is None else f", {picture(name, outcome.draw)}"
+        sys.stdout.write(f"{name}: status {outcome.status}{drawn}\n")
         sys.stdout.flush()
     return 1 if stale else 0
 

@@ -19,7 +19,7 @@ Draw = Callable[[Path], None]
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class Outcome:
     """What stands on the page: the command, what it printed, its exit status, and how to draw the signals."""
 
     command: str
@@ -33,7 +33,7 @@ class Failure:
     """One failure: ``provoke`` is called in an empty folder; ``quick`` ones are tried again by the tests."""
 
     name: str
-    provoke: Callable[[], Told]
+    provoke: Callable[[], Outcome]
     quick: bool = False
 
 
@@ -51,7 +51,7 @@ def skeleton(text: str) -> str:
     return re.sub(r"\s+", " ", _NUMBER.sub("#", text))
 
 
-def tell(failure: Failure) -> Told:
+def tell(failure: Failure) -> Outcome:
     """Provoke a failure in a folder of its own, which is the current one meanwhile."""
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
         return failure.provoke()

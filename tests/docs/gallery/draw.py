@@ -23,19 +23,22 @@ _TOO_FINE = re.compile(r"(?<=[ L])(\d+\.\d)\d+(?=[ \n])")
 
 
 def signals_of(path: Path, other: Path | None = None, until_s: float | None = None) -> Draw:
-    """Return what draws a recording, beside the same one without the fault where there is one; read at once."""
+    """Return what draws a recording, next to the same one without the fault where there is one; read at once."""
     columns = read_table(path).columns
-    beside = None if other is None else read_table(other).columns
+    companion = None if other is None else read_table(other).columns
     time_s = np.asarray(columns["time_s"], dtype=float)
     flags = np.asarray(columns.get("flags", np.zeros(time_s.size))) != 0
 
     def draw(target: Path) -> None:
         figure = Figure(figsize=(7.6, 2.9), layout="constrained")
         torque, speed = figure.subplots(2, 1, sharex=True)
-        if beside is not None:
-            for panel, values in ((torque, _torque(beside)), (speed, np.asarray(beside["speed_rad_s"], dtype=float))):
-                panel.plot(np.asarray(beside["time_s"], dtype=float), values, color=WITHOUT, label="as it should be")
-        if beside is None:
+        if companion is not None:
+            for panel, values in (
+                (torque, _torque(companion)),
+                (speed, np.asarray(companion["speed_rad_s"], dtype=float)),
+            ):
+                panel.plot(np.asarray(companion["time_s"], dtype=float), values, color=WITHOUT, label="as it should be")
+        if companion is None:
             torque.plot(time_s, columns["torque_m1_nm"], color=WITH, label="m1")
             torque.plot(time_s, columns["torque_m2_nm"], color=WITHOUT, ls="--", label="m2")
         else:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from tests.docs.gallery.case import Failure, Told
+from tests.docs.gallery.case import Failure, Outcome
 from tests.docs.gallery.draw import FOLDER
 from tests.docs.gallery.file_failures import FILES
 from tests.docs.gallery.recording_failures import RECORDINGS
@@ -17,13 +17,13 @@ FAILURES: dict[str, Failure] = {failure.name: failure for failure in (*RIG, *REC
 _SHOWN = re.compile(r"<!-- shown: (?P<name>\w+) -->\n(?P<shown>.*?)<!-- end -->", re.S)
 
 
-def shown_of(name: str, told: Told) -> str:
+def shown_of(name: str, outcome: Outcome) -> str:
     """Return what stands on the page of one failure, as Markdown."""
-    typed = "\n".join(f"$ {line}" for line in told.command.splitlines())
+    typed = "\n".join(f"$ {line}" for line in outcome.command.splitlines())
     picture = (
-        "" if told.draw is None else f"\n![Torque and speed: {name.replace('_', ' ')}](images/gallery/{name}.svg)\n"
+        "" if outcome.draw is None else f"\n![Torque and speed: {name.replace('_', ' ')}](images/gallery/{name}.svg)\n"
     )
-    return f"```console\n{typed}\n{told.text}\n```\n\nExit status {told.status}.\n{picture}"
+    return f"```console\n{typed}\n{outcome.text}\n```\n\nExit status {outcome.status}.\n{picture}"
 
 
 def shown_on_page() -> dict[str, str]:

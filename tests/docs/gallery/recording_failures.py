@@ -1,4 +1,4 @@
-"""Failures in recordings: what can be read and yet not be believed, or not told from."""
+"""Failures in recordings: what can be read and yet not be believed, or not distinguished from."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy as np
 
 from estimator.signals.record import FloatArray
 from tests.cli import bench
-from tests.docs.gallery.case import WIDTH, Failure, Told, said
+from tests.docs.gallery.case import WIDTH, Failure, Outcome, said
 from tests.docs.gallery.draw import signals_of
 from tests.docs.gallery.recordings import columns_of, cruise, save
 
@@ -47,7 +47,7 @@ def torque_clipped(columns: Columns) -> None:
         columns[name] = np.minimum(columns[name] + 0.02 * np.sin(40.0 * columns["time_s"]), 6.0)
 
 
-def diagnosed(change: Callable[[Columns], None], only: tuple[str, ...] = ()) -> Told:
+def diagnosed(change: Callable[[Columns], None], only: tuple[str, ...] = ()) -> Outcome:
     """Spoil a recording of the bench's drive, and diagnose it."""
     bench.record(GOOD, 1, noise=0.02)
     bench.model(MODEL)
@@ -55,31 +55,31 @@ def diagnosed(change: Callable[[Columns], None], only: tuple[str, ...] = ()) -> 
     change(columns)
     save(RUN, columns)
     text, status = said(DIAGNOSE, only=only)
-    return Told(DIAGNOSE, text, status, signals_of(RUN, GOOD))
+    return Outcome(DIAGNOSE, text, status, signals_of(RUN, GOOD))
 
 
-def cruise_alone() -> Told:
+def cruise_alone() -> Outcome:
     """Diagnose a drive at a speed that never changes its sign."""
     bench.record(RUN, 1, noise=0.02, reverse=False)
     bench.model(MODEL)
     text, status = said(DIAGNOSE, only=("can't tell: coulomb",))
-    return Told(DIAGNOSE, text, status, signals_of(RUN))
+    return Outcome(DIAGNOSE, text, status, signals_of(RUN))
 
 
-def identified(prbs_nm: float, gain_nm_s: float, finding: str) -> Told:
+def identified(prbs_nm: float, gain_nm_s: float, finding: str) -> Outcome:
     """Identify a cruise of the bus; show a finding of identification.json too."""
     cruise(RUN, prbs_nm, gain_nm_s)
     text, status = said(IDENTIFY)
     findings = json.loads(Path("identified/identification.json").read_text(encoding="utf-8"))["recordings"][0]
     asked = f"jq -r .recordings[0].{finding}.statement identified/identification.json"
     statement = "\n".join(textwrap.wrap(findings[finding]["statement"], WIDTH))
-    return Told(IDENTIFY, f"{text}\n$ {asked}\n{statement}", status, signals_of(RUN, until_s=6.0))
+    return Outcome(IDENTIFY, f"{text}\n$ {asked}\n{statement}", status, signals_of(RUN, until_s=6.0))
 
 
-def too_short() -> Told:
+def too_short() -> Outcome:
     """Identify a second and a half."""
     cruise(RUN, 120.0, duration_s=1.5)
-    return Told(IDENTIFY, *said(IDENTIFY))
+    return Outcome(IDENTIFY, *said(IDENTIFY))
 
 
 RECORDINGS = (

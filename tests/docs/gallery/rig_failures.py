@@ -10,7 +10,7 @@ from hil.simulator.fault_spec import rig_faults
 from hil.simulator.loopback import Address
 from hil.simulator.plant_factory import plant_for
 from hil.simulator.rig_server import RigServer
-from tests.docs.gallery.case import Failure, Told, said
+from tests.docs.gallery.case import Failure, Outcome, said
 from tests.docs.gallery.draw import signals_of
 
 EXAMPLE = Path(__file__).resolve().parents[3] / "examples" / "rig.toml"
@@ -43,14 +43,14 @@ def write_rig(changes: tuple[tuple[str, str], ...] = SHORTER) -> Path:
     return path
 
 
-def on_rig(command: str, fault: str, draws: bool = False) -> Told:
+def on_rig(command: str, fault: str, draws: bool = False) -> Outcome:
     """Carry out a command on the simulated rig of ``rig.toml`` with a fault."""
     rig = read_rig(write_rig())
     faults = rig_faults([fault], rig.period_s)
     with RigServer(plant_for(rig, []), rig, rig.can.url, Address(rig.plc.host, rig.plc.port), faults):
         pace = ("--pace", "fast") if command.startswith("hil run") else ()
         text, status = said(command, *pace, without=BRIDGED)
-    return Told(
+    return Outcome(
         f"hil sim rig.toml --fault {fault}\n{command}", text, status, signals_of(Path("cruise.csv")) if draws else None
     )
 

@@ -11,20 +11,21 @@ from pathlib import Path
 import pytest
 
 from estimator.diagnosis import diagnose, first_use
-from estimator.diagnosis.first_use import COMPILING, SIGNATURES, is_first_use
+from estimator.diagnosis.first_use import COMPILING, is_first_use, signatures
 from tests.estimator.diagnosis.planted import quiet
 from tests.estimator.physics.bench import ONE_MASS, model
 
 COUNT_KEPT = """
 from estimator.diagnosis import diagnose
-from estimator.diagnosis.first_use import SIGNATURES, compile_kernels, is_first_use
+from estimator.diagnosis.first_use import compile_kernels, is_first_use, signatures
 from tests.benchmarks.cases import make
-assert is_first_use()
-compile_kernels()
-assert not is_first_use()
+assert is_first_use(2)
+compile_kernels(2)
+assert not is_first_use(2)
+assert is_first_use(3)
 case = make("backlash", 1)
 diagnose(case.records, case.model)
-for kernel in SIGNATURES:
+for kernel in signatures(2):
     print(kernel.__name__, sum(kernel.stats.cache_misses.values()), len(kernel._cache._cache_file._load_index()))
 """
 
@@ -35,10 +36,10 @@ from estimator.diagnosis.first_use import is_first_use
 from estimator.physics.kernel.many import integrate_each
 here = Path(integrate_each.stats.cache_path)
 for place in (here.with_name("kernel_of_another_installation"), here):
-    print(is_first_use())
+    print(is_first_use(2))
     place.mkdir(parents=True, exist_ok=True)
-    (place / "many.integrate_each-24.py311.nbi").touch()
-print(is_first_use())
+    (place / "compiled_for_2").touch()
+print(is_first_use(2))
 """
 
 
@@ -50,16 +51,16 @@ def test_it_is_the_first_use_where_nothing_has_been_kept_for_this_place(tmp_path
 
 def test_where_nothing_is_compiled_there_is_no_first_use(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(first_use, "IS_COMPILED", False)
-    assert not is_first_use()
+    assert not is_first_use(2)
 
 
 @pytest.mark.parametrize("first", [True, False])
 def test_a_diagnosis_says_at_every_stage_that_it_compiles(first: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    """And compiles before all else. Once it is done there is something on disk."""
+    """And compiles before all else."""
     stages: list[str] = []
     job = import_module("estimator.diagnosis.diagnose")
-    monkeypatch.setattr(job, "is_first_use", lambda: first)
-    monkeypatch.setattr(job, "compile_kernels", lambda: stages.append(f"compiling itself ({COMPILING})"))
+    monkeypatch.setattr(job, "is_first_use", lambda masses: first)
+    monkeypatch.setattr(job, "compile_kernels", lambda masses: stages.append(f"compiling itself ({COMPILING})"))
     diagnose(quiet(values=ONE_MASS, samples=1200), model(ONE_MASS), (), lambda stage, _: stages.append(stage))
     assert list(dict.fromkeys(stage.split(" (")[0] for stage in stages))[:3] == (
         ["preparing", "compiling itself", "checking the recordings"]
@@ -67,16 +68,15 @@ def test_a_diagnosis_says_at_every_stage_that_it_compiles(first: bool, monkeypat
         else ["checking the recordings", "comparing hypotheses", "simulating what was found"]
     )
     assert {COMPILING in stage for stage in stages} == {first}
-    assert not is_first_use()
 
 
 def test_what_is_on_disk_is_what_is_called() -> None:
     """Nothing is compiled anew for the types that are written down."""
     diagnose(quiet(values=ONE_MASS, samples=1200), model(ONE_MASS))
-    had = {kernel: sum(kernel.stats.cache_misses.values()) for kernel in SIGNATURES}
-    for kernel, signature in SIGNATURES.items():
+    had = {kernel: sum(kernel.stats.cache_misses.values()) for kernel in signatures(1)}
+    for kernel, signature in signatures(1).items():
         kernel.compile(signature)
-    assert {kernel: sum(kernel.stats.cache_misses.values()) for kernel in SIGNATURES} == had
+    assert {kernel: sum(kernel.stats.cache_misses.values()) for kernel in signatures(1)} == had
 
 
 @pytest.mark.campaign
@@ -84,7 +84,7 @@ def test_what_is_on_disk_is_what_is_called() -> None:
 def test_two_processes_leave_on_disk_all_that_a_diagnosis_calls(tmp_path: Path) -> None:
     """Of each kernel one is kept, and none was compiled here."""
     done = _in_a_process_of_its_own(COUNT_KEPT, tmp_path)
-    assert done.splitlines() == [f"{kernel.__name__} 0 1" for kernel in SIGNATURES]
+    assert done.splitlines() == [f"{kernel.__name__} 0 1" for kernel in signatures(2)]
 
 
 def _in_a_process_of_its_own(program: str, cache: Path) -> str:

@@ -33,7 +33,7 @@ def test_no_recording_at_all() -> None:
 
 @pytest.mark.parametrize("holdout", [False, True])
 def test_a_name_used_twice(holdout: bool) -> None:
-    message = "recordings must have different names, came run_1, run_1. Rename the files."
+    message = "recordings must have different names, got run_1, run_1. Rename the files."
     with pytest.raises(BadShape, match=message):
         prepare([drive()] if holdout else [drive(), drive()], LINE, [drive()] if holdout else [])
 

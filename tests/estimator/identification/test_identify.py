@@ -8,15 +8,10 @@ import numpy as np
 import pytest
 
 from estimator.errors import BadSetting, NotExciting
-from estimator.identification.identify import (
-    FilterPart,
-    Identification,
-    Settings,
-    identify,
-    observation_filter,
-)
+from estimator.identification.identify import Identification, identify, observation_filter
 from estimator.identification.linear_model import LinearModel, Orders
 from estimator.identification.online.recursive import Status
+from estimator.identification.settings import FilterPart, Settings
 from estimator.signals.decimate import Decimator
 from tests.estimator.identification.driveline import Cruise, cruise
 

@@ -9,10 +9,11 @@ import pytest
 
 from estimator.errors import BadModel
 from estimator.identification.compare import compare
-from estimator.identification.identify import Settings, identify
+from estimator.identification.identify import identify
 from estimator.identification.online.recursive import Status
 from estimator.identification.online.registry import ESTIMATORS
 from estimator.identification.online.two_mass import TwoMass
+from estimator.identification.settings import Settings
 from estimator.identification.study import study
 from estimator.signals.record import Record
 from tests.estimator.identification.driveline import B_L, B_M, J_L, J_M, C, K, cruise, true_resonance
@@ -61,18 +62,18 @@ def test_a_model_is_tried_on_the_others(record: Record) -> None:
     assert asked.validation.unseen[0].fit_percent > 50.0
 
 
-def test_the_papers_estimator_beside_itself_is_the_same(record: Record) -> None:
+def test_the_papers_estimator_next_to_itself_is_the_same(record: Record) -> None:
     found = identify(record, SETTINGS)
-    beside = compare(record, found, SETTINGS, "oefo", ESTIMATORS["oefo"])
-    assert beside.resonance == found.online_resonance
-    assert (beside.recording, beside.estimator, beside.status) == (record.name, "oefo", Status.ESTIMATED)
+    companion = compare(record, found, SETTINGS, "oefo", ESTIMATORS["oefo"])
+    assert companion.resonance == found.online_resonance
+    assert (companion.recording, companion.estimator, companion.status) == (record.name, "oefo", Status.ESTIMATED)
 
 
 def test_an_estimator_of_masses_takes_the_samples_as_they_were_recorded(record: Record) -> None:
     found = identify(record, SETTINGS)
     start = TwoMass(1.3 * J_M, 0.8 * J_L, 0.9 * K, 1.2 * C, B_M, B_L)
-    beside = compare(record, found, SETTINGS, "ekf", ESTIMATORS["ekf"], start)
-    assert beside.resonance is not None
-    assert beside.resonance.frequency_hz == pytest.approx(true_resonance()[0], rel=0.05)
+    companion = compare(record, found, SETTINGS, "ekf", ESTIMATORS["ekf"], start)
+    assert companion.resonance is not None
+    assert companion.resonance.frequency_hz == pytest.approx(true_resonance()[0], rel=0.05)
     with pytest.raises(BadModel, match="start values"):
         compare(record, found, SETTINGS, "ekf", ESTIMATORS["ekf"])

@@ -1,4 +1,4 @@
-"""A shaft that cracks, and a fit of it told the other way round."""
+"""A shaft that cracks, and a fit of it expressed the other way round."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ SOUND = model(TWO_MASS, tolerance=0.5)
 
 
 def cracking(seed: int, from_s: float, to_s: float) -> Record:
-    """A shaft that is softer for a while; simulated by the law that is fitted, what is tested is how it is told."""
+    """A shaft that is softer for a while; simulated by the law that is fitted, what is tested is how it is reported."""
     line = model(TWO_MASS, effects={CRACK: {"change": CHANGE}})
     torque = random_steps(SAMPLES, seed, mean_nm=30.0)
     blank = record(torque, np.ones(SAMPLES), name=f"run_{seed}")

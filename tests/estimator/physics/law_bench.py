@@ -21,7 +21,7 @@ SUBSTEPS = 20
 
 SIGN_WIDTH = 0.05
 TOLERANCE = 1e-4
-"""Of the output's range: events and angles are told to within a fraction of an integration step of 0.5 ms."""
+"""Of the output's range: events and angles are reported to within a fraction of an integration step of 0.5 ms."""
 
 START = Start(load_torque_nm=12.0, angle_rad=0.0, speed_rad_s=1.5, twist_rad=0.004, load_speed_rad_s=1.4)
 TORQUE = random_steps(SAMPLES, seed=1, hold=10)

@@ -79,9 +79,9 @@ class TwoMass:
     load_nm : float
         Constant load torque T_0.
     ripple : callable
-        Time to a torque beside the one applied [Nm].
+        Time to a torque next to the one applied [Nm].
     friction, drag : callable
-        Time and speed to the torque against the motor's and the load's motion, beside the viscous one [Nm].
+        Time and speed to the torque against the motor's and the load's motion, next to the viscous one [Nm].
     shaft : callable or None
         Time, twist and its rate to the torque of the shaft [Nm]; None: linear.
     more_motor, more_load : callable

@@ -306,7 +306,7 @@ def test_what_a_recording_can_not_tell_is_refused_with_the_test_that_would(
     assert test in EXPERIMENTS
 
 
-def test_two_inverters_with_the_same_share_all_along_can_not_be_told_apart(reversal: Record) -> None:
+def test_two_inverters_with_the_same_share_all_along_can_not_be_distinguished(reversal: Record) -> None:
     total = reversal.torque_nm.sum(axis=1)
     entry = EFFECTS["inverter_gain_mismatch"]
     same = replace(reversal, torque_nm=np.column_stack([0.6 * total, 0.4 * total]))

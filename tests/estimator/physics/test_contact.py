@@ -25,7 +25,7 @@ CROSSED = {
     "crosses the gap": (0.0101, -0.0101, True),
     "turns within the gap": (0.003, -0.003, False),
     "stays in the gap": (0.003, 0.0099, False),
-    "goes on into its play": (0.0101, 0.0109, True),
+    "continues into its play": (0.0101, 0.0109, True),
     "rests in its play": (0.0101, 0.0102, False),
     "is wound up": (0.02, 0.022, False),
 }

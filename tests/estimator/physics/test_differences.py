@@ -1,4 +1,4 @@
-"""Derivatives by differences, beside the same written with numpy."""
+"""Derivatives by differences, next to the same written with numpy."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def of_one_recording(
     return found
 
 
-def test_samples_that_count_are_told_per_step(output: np.ndarray) -> None:
+def test_samples_that_count_are_reported_per_step(output: np.ndarray) -> None:
     moved = output + STEPS[:, np.newaxis] * np.random.default_rng(2).standard_normal((2, 50))
     use = np.arange(50) % 3 > 0
     np.testing.assert_array_equal(

@@ -88,7 +88,7 @@ class TestRecovery:
         assert result.value("", "J_M") == pytest.approx(true["J_M"], rel=0.01)
         assert result.value("", "b_M") == pytest.approx(true["b_M"], rel=0.02)
 
-    def test_a_parameter_ends_at_the_edge_of_its_tolerance_and_is_told_pinned(self) -> None:
+    def test_a_parameter_ends_at_the_edge_of_its_tolerance_and_is_reported_pinned(self) -> None:
         true = scaled(TWO_MASS, J_L=1.5)
         result = fit(nominal_problem(recordings(true)))
         names = [shared.name for shared in result.problem.shared]

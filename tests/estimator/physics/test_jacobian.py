@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.abreast import LANES
+from estimator.lanes import LANES
 from estimator.physics import simulate as simulate_module
 from estimator.physics.grid import Grid
 from estimator.physics.jacobian import changes, jacobian_at

@@ -48,7 +48,7 @@ def test_one_mass_follows_the_exact_solution(kind: OutputKind) -> None:
     np.testing.assert_allclose(simulated_output, rec.output, rtol=0, atol=1e-9 * np.ptp(rec.output))
 
 
-def test_a_load_over_time_acts_beside_the_constant_one() -> None:
+def test_a_load_over_time_acts_next_to_the_constant_one() -> None:
     torque, extra = random_steps(300, seed=3), random_steps(300, seed=4, size_nm=30.0, hold=25)
     rec = linear_record(ONE_MASS, torque, START, extra_load_nm=extra)
     line = model(ONE_MASS)

@@ -40,7 +40,7 @@ def test_a_power_of_nothing_is_nothing() -> None:
     assert power(0.0, 0.3) == 0.0
 
 
-def test_what_fades_is_exponential_until_it_is_lost_beside_one() -> None:
+def test_what_fades_is_exponential_until_it_is_lost_next_to_one() -> None:
     assert [fading(x) for x in (0.0, 1.0, 30.0)] == pytest.approx([1.0, math.exp(-1.0), math.exp(-30.0)], rel=1e-15)
     assert fading(NOTHING_LEFT) == 0.0
     assert 1.0 - math.exp(-NOTHING_LEFT) == 1.0

@@ -48,7 +48,7 @@ def test_dry_friction_at_the_load_is_against_the_loads_motion() -> None:
 def against_bristles(held_nm: Callable[[float], float], presliding_rad: float) -> FloatArray:
     """Solve a load held by bristles, one more state: dT/dt = s (w - |w| T / T_c), s = T_c / x_b.
 
-    They are told by their deflection: T = T_c z / x_b, dz/dt = w - |w| z / x_b. A brake begins with straight ones.
+    They are described by their deflection: T = T_c z / x_b, dz/dt = w - |w| z / x_b. A brake begins with straight ones.
     """
 
     def rhs(t: float, x: FloatArray, torque: float) -> FloatArray:
@@ -62,7 +62,7 @@ def against_bristles(held_nm: Callable[[float], float], presliding_rad: float) -
     return reference.solve(rhs, start, torque, TIME_S, BRAKED_S)[:, reference.SPEED]
 
 
-def test_dry_friction_at_the_load_bends_before_it_slides() -> None:
+def test_dry_friction_at_the_load_deflects_before_it_slides() -> None:
     effects = {"coulomb_friction_load": {"friction_nm": 30.0, "presliding_rad": 0.02}}
     expected = against_bristles(lambda t: 30.0, 0.02)
     assert_law(effects, expected, tolerance=3e-4)
@@ -70,14 +70,14 @@ def test_dry_friction_at_the_load_bends_before_it_slides() -> None:
     assert np.max(np.abs(rigid - expected)) > 2e-3 * np.ptp(expected)
 
 
-def test_a_brake_bends_before_it_slides_and_lets_go() -> None:
+def test_a_brake_deflects_before_it_slides_and_lets_go() -> None:
     from_s, to_s = BRAKED_S
     brake = {"brake_nm": 60.0, "presliding_rad": 0.004, "from_s": from_s, "to_s": to_s}
     assert_law({"brake_drag": brake}, against_bristles(lasting(60.0, from_s, to_s), 0.004), tolerance=1e-3)
 
 
 def test_a_load_that_sticks_stands_still() -> None:
-    """A torque below that of breaking away bends the bristles, and no more."""
+    """A torque below that of breaking away deflects the bristles, and no more."""
     line, pushed = model(TWO_MASS), np.full(400, 20.0)
     stuck = flat_values(TWO_MASS, {"coulomb_friction_load": {"friction_nm": 60.0, "presliding_rad": 1e-5}})
     rec, grid = measured(np.ones(400), pushed), grid_for(line, [measured()])
@@ -254,7 +254,7 @@ def test_friction_brakes_the_wheel_and_air_the_vehicle() -> None:
     assert_same(kernel_output(effects, measured()), expected, kernel_output({"tyre_slip": tyre}, measured()))
 
 
-def test_a_road_acts_beside_the_constant_load() -> None:
+def test_a_road_acts_next_to_the_constant_load() -> None:
     profile = 40.0 * np.sin(2.0 * np.pi * TIME_S / 1.5)
     steps = Held.of(profile, SAMPLE_TIME_S)
     line = two_mass(drag=lambda t, w: steps.at(t))

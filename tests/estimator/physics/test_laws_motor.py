@@ -40,7 +40,7 @@ def test_stribeck_friction_falls_with_speed() -> None:
 
 
 @pytest.mark.parametrize("excess_nm", [0.0, 25.0])
-def test_friction_that_bends_before_it_slides_is_one_more_state(excess_nm: float) -> None:
+def test_friction_that_deflects_before_it_slides_is_one_more_state(excess_nm: float) -> None:
     """dT/dt = s (w - |w| T / g(w)): a spring until it breaks away, behind by a distance when the motion turns."""
     coulomb_nm, presliding, range_rad_s = 15.0, 4e-3, 0.8
     stiffness = (coulomb_nm + excess_nm) / presliding

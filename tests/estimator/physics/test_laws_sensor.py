@@ -51,7 +51,7 @@ def test_a_resolver_errs_once_and_twice_per_measured_turn() -> None:
     assert_law({"resolver_error": RESOLVER}, read_by_resolver(true_speed(), TURNED), measured(TURNING))
 
 
-def test_the_read_angle_is_off_by_the_amplitudes_told() -> None:
+def test_the_read_angle_is_off_by_the_amplitudes_reported() -> None:
     """The reading of a constant speed, summed up, is the angle with e_1 once and e_2 twice per turn."""
     speed = 2.0 * np.pi
     angle = np.linspace(0.0, 2.0 * np.pi, 4001)

@@ -71,7 +71,7 @@ def test_a_crack_takes_stiffness_from_a_moment_on(from_s: float, to_s: float) ->
     assert_law(effects, solved(line, (from_s, to_s)), tolerance=3e-4)
 
 
-def test_hysteresis_is_a_slider_beside_the_spring() -> None:
+def test_hysteresis_is_a_slider_next_to_the_spring() -> None:
     friction, give = 25.0, 5e-3
 
     def rhs(t: float, x: FloatArray, torque: float) -> FloatArray:
@@ -170,12 +170,12 @@ def test_an_inertia_within_the_line_is_on_the_spring_that_softens_the_shaft(
         """Return the rates of motor, shaft and load, of the twist of the other spring, and of the inertia."""
         motor, load, inner = x[reference.SPEED], x[reference.LOAD_SPEED], x[5]
         shaft = inner - load if at_motor else motor - inner
-        beside = motor - inner if at_motor else inner - load
-        through_shaft, through_spring = K * x[reference.TWIST] + C * shaft, k_X * x[4] + c_X * beside
+        companion = motor - inner if at_motor else inner - load
+        through_shaft, through_spring = K * x[reference.TWIST] + C * shaft, k_X * x[4] + c_X * companion
         taken, given = (through_spring, through_shaft) if at_motor else (through_shaft, through_spring)
         of_motor = (torque - TWO_MASS["b_M"] * motor - taken) / TWO_MASS["J_M"]
         of_load = (given - TWO_MASS["b_L"] * load - START.load_torque_nm) / TWO_MASS["J_L"]
-        return np.array([motor, of_motor, shaft, of_load, beside, (taken - given) / inertia])
+        return np.array([motor, of_motor, shaft, of_load, companion, (taken - given) / inertia])
 
     carried = K * START.twist_rad / k_X
     start = np.concatenate([start_vector(), [carried, START.speed_rad_s if at_motor else START.load_speed_rad_s]])

@@ -226,7 +226,7 @@ def test_a_step_over_a_cliff_is_shortened(measured: FloatArray) -> None:
     np.testing.assert_allclose(ours.x, [3.0, 1.2, 0.5], atol=0.1)
 
 
-def test_at_a_kink_it_is_told_that_no_step_fell_as_promised() -> None:
+def test_at_a_kink_it_is_reported_that_no_step_fell_as_promised() -> None:
     """The slope to the right of 0 asks for a step to the left, where the error rises, too."""
 
     def residual(x: FloatArray) -> FloatArray:
@@ -242,7 +242,7 @@ def test_at_a_kink_it_is_told_that_no_step_fell_as_promised() -> None:
     assert smooth.x == pytest.approx([0.0, 1.0], abs=0.1)
 
 
-def test_running_out_of_iterations_is_told(measured: FloatArray) -> None:
+def test_running_out_of_iterations_is_reported(measured: FloatArray) -> None:
     ours = minimise(
         lambda x: decay(x) - measured,
         decay_jacobian,

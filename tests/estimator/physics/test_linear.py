@@ -40,7 +40,7 @@ EFFECTS: dict[str, Mapping[str, Mapping[str, float]]] = {
     "lag": {"actuator_lag": {"time_constant_s": 0.02}},
     "filter": {"speed_filter": {"time_constant_s": 0.03}},
     "drift": {"clock_drift": {"rate": 0.01}},
-    "mode beside": {"extra_torsional_mode": {"inertia_kg_m2": 0.3, "frequency_hz": 12.0, "damping_ratio": 0.05}},
+    "mode next to": {"extra_torsional_mode": {"inertia_kg_m2": 0.3, "frequency_hz": 12.0, "damping_ratio": 0.05}},
     "dry friction": {"coulomb_friction_motor": {"friction_nm": 20.0}, "coulomb_friction_load": {"friction_nm": 9.0}},
     "bristles": {"stribeck_friction": BRISTLES, "coulomb_friction_load": {"friction_nm": 9.0}},
     "bristles at the load": {"coulomb_friction_load": {"friction_nm": 9.0, "presliding_rad": 1e-3}},
@@ -53,11 +53,11 @@ EFFECTS: dict[str, Mapping[str, Mapping[str, float]]] = {
     "a ripple": {"torque_ripple": {"amplitude_nm": 2.0, "order": 6.0}},
 }
 WITHOUT_BRISTLES = {("stribeck_friction", "excess_nm"), ("stribeck_friction", "coulomb_nm")}
-"""What bends the line unless friction is told by bristles."""
+"""What makes the line nonlinear unless friction is described by bristles."""
 
 LINES = {"one mass": ONE_MASS, "two masses": TWO_MASS, "three masses": THREE_MASS}
-BESIDE_THE_LINE = ("delay", "lag", "filter", "drift", "an offset")
-OF_ONE_MASS = ("nothing", *BESIDE_THE_LINE, "a spring to the ground", "a brake", "a brake that sticks", "a ripple")
+OUTSIDE_THE_LINE = ("delay", "lag", "filter", "drift", "an offset")
+OF_ONE_MASS = ("nothing", *OUTSIDE_THE_LINE, "a spring to the ground", "a brake", "a brake that sticks", "a ripple")
 
 
 def line_with(values: Mapping[str, float], effects: Mapping[str, Mapping[str, float]]) -> DrivelineModel:
@@ -98,7 +98,7 @@ def test_sums_are_the_sub_steps_of_a_mode_within_the_line(values: str, place: st
         assert_same_to_rounding(*both_ways(line, p, output))
 
 
-def test_what_bends_slips_or_drags_is_not_linear() -> None:
+def test_what_is_nonlinear_slips_or_drags_is_not_linear() -> None:
     elastic = Line(2, True, False, False)
     p = flat(model(TWO_MASS))
     assert linear.is_linear(elastic, p)
@@ -122,7 +122,7 @@ def test_dry_friction_is_constant_on_one_side_of_zero(begun: float, ended: float
     assert linear.is_beyond(begun, ended, 2.0) is beyond
 
 
-def test_whatever_bends_in_the_catalogue_takes_the_sub_steps() -> None:
+def test_whatever_is_nonlinear_in_the_catalogue_takes_the_sub_steps() -> None:
     """A new effect is not taken for linear before its entry says so."""
     nulls = flat(model(TWO_MASS))
     elastic = Line(2, True, False, False)
@@ -130,5 +130,5 @@ def test_whatever_bends_in_the_catalogue_takes_the_sub_steps() -> None:
         for parameter in entry.parameters:
             p = nulls.copy()
             p[slot(name, parameter.name)] += 1.0
-            bends = (name, parameter.name) in WITHOUT_BRISTLES or not entry.linear
-            assert linear.is_linear(elastic, p) is (not bends or not np.isfinite(parameter.null))
+            nonlinear = (name, parameter.name) in WITHOUT_BRISTLES or not entry.linear
+            assert linear.is_linear(elastic, p) is (not nonlinear or not np.isfinite(parameter.null))

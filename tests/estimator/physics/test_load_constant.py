@@ -62,7 +62,7 @@ def test_shared_or_known_it_leaves_dry_friction_to_be_seen(load: Load | float) -
     assert free.free_count - result.free_count == (1 if load is Load.SHARED else 2)
 
 
-def test_dry_friction_is_told_in_one_direction_where_the_load_is_known_or_shared_by_both() -> None:
+def test_dry_friction_is_reported_in_one_direction_where_the_load_is_known_or_shared_by_both() -> None:
     def tells(load: Load | float, *records: Record) -> bool:
         return "coulomb_friction_motor" in open_hypotheses(with_load(load), records)[0]
 
@@ -79,5 +79,5 @@ def test_of_one_recording_alone_a_shared_load_is_its_own_and_a_known_one_is_kept
 
 
 def test_a_load_that_is_no_number_is_refused() -> None:
-    with pytest.raises(BadModel, match=r"load\.constant: expected 'own', 'shared' or a finite number, came nan"):
+    with pytest.raises(BadModel, match=r"load\.constant: expected 'own', 'shared' or a finite number, got nan"):
         with_load(float("nan"))

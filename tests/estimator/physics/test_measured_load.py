@@ -36,7 +36,7 @@ def test_it_acts_at_the_load(location: Location) -> None:
     np.testing.assert_allclose(simulated, record.output, atol=1e-3 * np.ptp(record.output))
 
 
-def test_a_free_run_finds_the_constant_load_beside_it() -> None:
+def test_a_free_run_finds_the_constant_load_besides_it() -> None:
     record = braked(ONE_MASS)
     run = free_run(model(ONE_MASS), record)
     assert run.start.load_torque_nm == pytest.approx(START.load_torque_nm, abs=1e-3)

@@ -34,30 +34,30 @@ def test_an_unknown_parameter_is_named() -> None:
 
 @pytest.mark.parametrize("value", [0.0, -1.0, math.nan, math.inf])
 def test_an_inertia_must_be_positive(value: float) -> None:
-    with pytest.raises(BadModel, match=rf"parameters.J_M.value: expected a finite number greater than 0, came {value}"):
+    with pytest.raises(BadModel, match=rf"parameters.J_M.value: expected a finite number greater than 0, got {value}"):
         one_mass(J_M=Parameter(value, 0.1))
 
 
 @pytest.mark.parametrize("name", ["J_L", "k"])
 def test_so_must_load_inertia_and_stiffness(name: str) -> None:
-    with pytest.raises(BadModel, match=rf"parameters.{name}.value: expected a finite number greater than 0, came 0"):
+    with pytest.raises(BadModel, match=rf"parameters.{name}.value: expected a finite number greater than 0, got 0"):
         model(TWO_MASS | {name: 0.0})
 
 
 @pytest.mark.parametrize("name", ["c", "b_M", "b_L"])
 def test_damping_may_be_zero_but_not_negative(name: str) -> None:
     assert model(TWO_MASS | {name: 0.0}).values()[name] == 0.0
-    with pytest.raises(BadModel, match=rf"parameters.{name}.value: expected a finite number 0 or greater, came -0.1"):
+    with pytest.raises(BadModel, match=rf"parameters.{name}.value: expected a finite number 0 or greater, got -0.1"):
         model(TWO_MASS | {name: -0.1})
 
 
 @pytest.mark.parametrize("tolerance", [-0.1, 1.0, math.nan])
 def test_a_tolerance_is_a_share_below_one(tolerance: float) -> None:
-    with pytest.raises(BadModel, match=rf"parameters.J_M.tolerance: expected .* from 0 up to 1, came {tolerance}"):
+    with pytest.raises(BadModel, match=rf"parameters.J_M.tolerance: expected .* from 0 up to 1, got {tolerance}"):
         one_mass(J_M=Parameter(2.0, tolerance))
 
 
-def test_every_fault_is_told_at_once() -> None:
+def test_every_fault_is_reported_at_once() -> None:
     with pytest.raises(BadModel) as refusal:
         DrivelineModel(
             Structure.ONE_MASS,
@@ -84,20 +84,20 @@ def test_every_fault_is_told_at_once() -> None:
         ),
         (
             {"transport_delay": {"delay_s": math.nan}},
-            "transport_delay.delay_s.value: expected a finite number, came nan",
+            "transport_delay.delay_s.value: expected a finite number, got nan",
         ),
-        ({"transport_delay": {"delay_s": -0.01}}, "delay_s.value: expected a number 0 or greater, came -0.01"),
+        ({"transport_delay": {"delay_s": -0.01}}, "delay_s.value: expected a number 0 or greater, got -0.01"),
         (
             {"backlash": {"gap_rad": -0.02}},
-            "effects.backlash.gap_rad.value: expected a number 0 or greater, came -0.02",
+            "effects.backlash.gap_rad.value: expected a number 0 or greater, got -0.02",
         ),
         (
             {"stiffness_nonlinearity": {"hardening_per_rad2": 80.0, "shape": 0.0}},
-            "effects.stiffness_nonlinearity.shape.value: expected a number greater than 0, came 0.0",
+            "effects.stiffness_nonlinearity.shape.value: expected a number greater than 0, got 0.0",
         ),
         (
             {"backlash": {"gap_rad": 0.02, "pull": 1.5}},
-            "effects.backlash.pull.value: expected a number 0 or greater, up to 1, came 1.5",
+            "effects.backlash.pull.value: expected a number 0 or greater, up to 1, got 1.5",
         ),
     ],
 )

@@ -100,7 +100,7 @@ def test_a_swing_that_repeats_passes_each_place_at_one_speed() -> None:
     assert speed_by_place(record(np.ones(500), swing, kind=OutputKind.POSITION)) > 0.9
 
 
-def test_swings_of_different_speed_and_a_motion_that_goes_on_do_not() -> None:
+def test_swings_of_different_speed_and_a_motion_that_continues_do_not() -> None:
     time_s = np.arange(1000) * 0.01
     phase = np.where(time_s < 5.0, 0.5 * time_s, 2.5 + 2.0 * (time_s - 5.0))
     slow_then_fast = np.abs(np.mod(phase, 1.0) - 0.5)  # to and fro, each time at one speed

@@ -153,19 +153,19 @@ def test_a_name_that_is_taken_is_refused(names: list[str]) -> None:
 @pytest.mark.parametrize(
     ("function", "said"),
     [
-        (lambda motor_speed, size: size, r"expected a function of \(time_s, .*, size\), came one that does not fit"),
+        (lambda motor_speed, size: size, r"expected a function of \(time_s, .*, size\), got one that does not fit"),
         (lambda t, w, load, twist, torque, other: 0.0, "does not fit"),
         (
             lambda t, w, load, twist, torque, size: size * float("nan"),
-            "expected a finite number, came nan at time_s = ",
+            "expected a finite number, got nan at time_s = ",
         ),
         (
             lambda t, w, load, twist, torque, size: size / w,
-            "expected a finite number, came inf|failed with ZeroDivisionError",
+            "expected a finite number, got inf|failed with ZeroDivisionError",
         ),
         (lambda t, w, load, twist, torque, size: size * math.log(w), "failed with ValueError"),
         (lambda t, w, load, twist, torque, size: "much", "failed with ValueError"),
-        (lambda t, w, load, twist, torque, size: 1.0 + size, "expected 0 where size is 0 .* came 1"),
+        (lambda t, w, load, twist, torque, size: 1.0 + size, "expected 0 where size is 0 .* got 1"),
     ],
 )
 def test_a_function_that_can_not_be_used_is_refused(function: Callable[..., object], said: str) -> None:
@@ -180,7 +180,7 @@ def test_a_function_that_can_not_be_used_is_refused(function: Callable[..., obje
         (
             SIZE_OF_IT,
             Element.TORQUE_PATH,
-            "element: expected one of motor, shaft, load, speed_sensor, came torque_path",
+            "element: expected one of motor, shaft, load, speed_sensor, got torque_path",
         ),
         ((OwnParameter("size", "", 0.0, 2.0, 1.0, 1.0),), Element.MOTOR, "expected low <= start <= high"),
         ((OwnParameter("size", "", 0.0, 0.0, math.inf, 1.0),), Element.MOTOR, "expected finite numbers"),
@@ -195,7 +195,7 @@ def test_a_definition_without_sense_is_refused(
         OwnLaw("mine", square, element, parameters)
 
 
-def test_functions_of_arrays_are_told_from_functions_of_numbers() -> None:
+def test_functions_of_arrays_are_reported_from_functions_of_numbers() -> None:
     assert law(square).takes_arrays
     assert not law(square_by_cases).takes_arrays
     for function in (square, square_by_cases):

@@ -119,7 +119,7 @@ def test_so_many_cores_as_were_asked_for_work(count: int) -> None:
 
 def test_a_process_may_use_one_core_at_least() -> None:
     assert available_cores() >= 1
-    with pytest.raises(ValueError, match="expected 1 or more, came 0"):
+    with pytest.raises(ValueError, match="expected 1 or more, got 0"):
         work_on(0)
 
 

@@ -12,8 +12,8 @@ from estimator.physics.effect import Effect
 from estimator.physics.effects.stiffness_nonlinearity import factor
 from estimator.physics.model import Motion
 
-# What each sentence is told, and the numbers that must stand in it; the rest is reported in the table alone.
-TOLD: dict[str, tuple[dict[str, float], list[str]]] = {
+# What each sentence is given, and the numbers that must stand in it; the rest is reported in the table alone.
+SENTENCES: dict[str, tuple[dict[str, float], list[str]]] = {
     "inverter_gain_mismatch": ({"gain_m1": 1.0, "gain_m2": 0.876}, ["m2", "0.876"]),
     "torque_derating": (
         {"depth": 0.123, "time_constant_s": 4.56, "heating_nm": 789.0},
@@ -63,14 +63,16 @@ TOLD: dict[str, tuple[dict[str, float], list[str]]] = {
     "gravity": ({"moment_nm": 4.56, "motor_turns_per_turn": 7.89}, ["4.56 Nm", "7.89 motor turns"]),
     "viscoelastic_shaft": ({"branch_share": 0.456, "relaxation_s": 0.0123}, ["45.6%", "12.3 ms"]),
 }
-TOLD |= {name: (dict(entry.example), []) for name, entry in EFFECTS.items() if entry.example and name not in TOLD}
+SENTENCES |= {
+    name: (dict(entry.example), []) for name, entry in EFFECTS.items() if entry.example and name not in SENTENCES
+}
 
 fitted = pytest.mark.parametrize("entry", [e for e in EFFECTS.values() if not e.recognised], ids=lambda e: e.name)
 
 
 @fitted
 def test_the_sentence_tells_its_numbers_with_their_units(entry: Effect) -> None:
-    values, numbers = TOLD[entry.name]
+    values, numbers = SENTENCES[entry.name]
     said = entry.sentence(values, Motion.ROTATION)
     for number in numbers:
         assert number in said
@@ -90,18 +92,18 @@ def test_the_sentence_tells_its_numbers_with_their_units(entry: Effect) -> None:
         ("cardan_second_order", {"amplitude_nm": 0.0, "angle_rad": 0.0, "share": 0.0456}, "4.56% of its torque"),
     ],
 )
-def test_of_several_causes_the_one_found_is_told(name: str, values: dict[str, float], said: str) -> None:
+def test_of_several_causes_the_one_found_is_reported(name: str, values: dict[str, float], said: str) -> None:
     assert said in EFFECTS[name].sentence(values, Motion.ROTATION)
 
 
 @fitted
 def test_the_sentence_of_a_translation_speaks_of_newtons_and_metres(entry: Effect) -> None:
-    said = entry.sentence(TOLD[entry.name][0], Motion.TRANSLATION)
+    said = entry.sentence(SENTENCES[entry.name][0], Motion.TRANSLATION)
     assert not re.search(r"\b(rad|Nm|rad/s)\b", said)
 
 
 @pytest.mark.parametrize(("share", "word"), [(0.25, "25% stiffer"), (-0.25, "25% softer")])
-def test_a_shaft_of_two_stages_is_told_as_one(share: float, word: str) -> None:
+def test_a_shaft_of_two_stages_is_reported_as_one(share: float, word: str) -> None:
     values = {"hardening_per_rad2": 0.0, "shape": 1.0, "stage_share": share, "stage_rad": 0.0123}
     said = EFFECTS["stiffness_nonlinearity"].sentence(values, Motion.ROTATION)
     assert word in said
@@ -111,7 +113,7 @@ def test_a_shaft_of_two_stages_is_told_as_one(share: float, word: str) -> None:
 @pytest.mark.parametrize(
     ("hardening", "shape", "word"), [(45.6, 1.0, "hardens"), (45.6, 2.5, "hardens"), (-45.6, 0.5, "softens")]
 )
-def test_the_stiffness_has_changed_by_a_tenth_at_the_twist_told(hardening: float, shape: float, word: str) -> None:
+def test_the_stiffness_has_changed_by_a_tenth_at_the_twist_reported(hardening: float, shape: float, word: str) -> None:
     values = {"hardening_per_rad2": hardening, "shape": shape}
     said = EFFECTS["stiffness_nonlinearity"].sentence(values, Motion.ROTATION)
     (number,) = re.findall(r"at ([0-9.]+) rad", said)

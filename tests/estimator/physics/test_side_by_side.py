@@ -34,7 +34,7 @@ Effects = Mapping[str, Mapping[str, float]]
 
 SLIDER = {"shaft_hysteresis": {"friction_nm": 20.0, "yield_rad": 0.004, "sharpness": 0.7, "unloading": 0.6}}
 QUADRATIC = {"quadratic_friction": {"quadratic_nm_s2": 0.01}}
-BESIDE_A_SHAFT: dict[str, Effects] = {
+ON_THE_SHAFT: dict[str, Effects] = {
     "slider": SLIDER,
     "slider inside": {"shaft_hysteresis": {**SLIDER["shaft_hysteresis"], "inside": 0.3}},
     "tyre that creeps": {"tyre_slip": {"slip_per_nm": 1e-4, "wheel_share": 0.1, "creep_rad_s": 5.0}},
@@ -85,10 +85,10 @@ EVERYWHERE: dict[str, Effects] = {
     | {"resolver_error": {"once_rad": 0.02, "twice_rad": 0.01}, "speed_filter": {"time_constant_s": 0.03}},
 }
 LINES = [
-    *((values, effects) for values in (TWO_MASS, THREE_MASS) for effects in (BESIDE_A_SHAFT | EVERYWHERE).values()),
+    *((values, effects) for values in (TWO_MASS, THREE_MASS) for effects in (ON_THE_SHAFT | EVERYWHERE).values()),
     *((ONE_MASS, effects) for effects in EVERYWHERE.values()),
 ]
-IDS = [f"{size}: {name}" for size in ("two", "three") for name in (*BESIDE_A_SHAFT, *EVERYWHERE)]
+IDS = [f"{size}: {name}" for size in ("two", "three") for name in (*ON_THE_SHAFT, *EVERYWHERE)]
 IDS += [f"one: {name}" for name in EVERYWHERE]
 
 
@@ -118,8 +118,8 @@ def test_side_by_side_is_one_by_one(values: Mapping[str, float], effects: Effect
 
 
 def test_lines_of_several_makes_in_any_order_are_each_as_alone() -> None:
-    """Sliders, gaps, waves and linear ones: each is done beside its kin, wherever these stand."""
-    makes = [BESIDE_A_SHAFT["slider"], BESIDE_A_SHAFT["gap"], EVERYWHERE["ripple"], {}]
+    """Sliders, gaps, waves and linear ones: each is done next to its kin, wherever these stand."""
+    makes = [ON_THE_SHAFT["slider"], ON_THE_SHAFT["gap"], EVERYWHERE["ripple"], {}]
     grid, rec = Grid(Structure.TWO_MASS, SUBSTEPS, 0.02), record(random_steps(400, seed=7), np.ones(400))
     cases = [case for effects in makes for case in cases_of(flat(line_with(TWO_MASS, effects)), 400)]
     mixed = [cases[i] for i in np.random.default_rng(6).permutation(len(cases))]
@@ -128,9 +128,9 @@ def test_lines_of_several_makes_in_any_order_are_each_as_alone() -> None:
     assert_same_to_rounding(together, alone)
 
 
-def test_lines_that_are_fed_alike_beside_others() -> None:
+def test_lines_that_are_fed_alike_next_to_others() -> None:
     """As the columns of a Jacobian: most have the lag of the first, one has another, one another torque."""
-    line = line_with(TWO_MASS, BESIDE_A_SHAFT["gap behind a lag"])
+    line = line_with(TWO_MASS, ON_THE_SHAFT["gap behind a lag"])
     grid, rec = Grid(line.structure, SUBSTEPS, 0.02), record(random_steps(400, seed=7), np.ones(400))
     lines = [flat(line) for _ in range(6)]
     for i, p in enumerate(lines):
@@ -151,7 +151,7 @@ def test_kin_follow_each_other() -> None:
 
 
 @pytest.mark.parametrize("place", ["between_kg_m2", "behind_kg_m2"])
-def test_a_mode_within_a_line_that_bends(place: str) -> None:
+def test_a_mode_within_a_nonlinear_line(place: str) -> None:
     line = model(TWO_MASS, effects=SLIDER)
     p = flat(line)
     p[slot("extra_torsional_mode", place)] = 0.3
@@ -163,7 +163,7 @@ def test_a_mode_within_a_line_that_bends(place: str) -> None:
     )
 
 
-def test_what_has_its_beginning_in_common_goes_on_from_there() -> None:
+def test_what_has_its_beginning_in_common_continues_from_there() -> None:
     """Lines that crack at different moments: each is as the first one until shortly before its own."""
     effects = SLIDER | {"stiffness_change": {"change": -0.3, "from_s": 0.0, "to_s": 0.0}}
     line = model(TWO_MASS, effects=effects)
@@ -196,10 +196,10 @@ def test_recordings_of_different_lengths_side_by_side() -> None:
 def test_what_is_linear_or_another_make_goes_alone() -> None:
     rows = np.arange(3)
     bent = np.array([flat(model(TWO_MASS, effects=SLIDER))] * 3)
-    assert go_side_by_side(2, bent, rows)
-    assert not go_side_by_side(2, bent, rows[:1])
-    assert not go_side_by_side(2, np.array([flat(model(TWO_MASS))] * 3), rows)
+    assert go_side_by_side((1, 2), bent, rows)
+    assert not go_side_by_side((1, 2), bent, rows[:1])
+    assert not go_side_by_side((1, 2), np.array([flat(model(TWO_MASS))] * 3), rows)
     other = bent.copy()
     other[2, slot("backlash", "gap_rad")] = 0.01
-    assert not go_side_by_side(2, other, rows)
-    assert go_side_by_side(2, other, rows[:2])
+    assert not go_side_by_side((1, 2), other, rows)
+    assert go_side_by_side((1, 2), other, rows[:2])

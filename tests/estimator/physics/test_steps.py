@@ -1,4 +1,4 @@
-"""A step is told from its moment on, whichever way round a fit found it."""
+"""A step is distinguished from its moment on, whichever way round a fit found it."""
 
 from __future__ import annotations
 
@@ -37,24 +37,24 @@ class TestFromTheirMoment:
     def test_what_was_stiffer_before_is_softer_after(self, records: list[Record]) -> None:
         found = the_other_way_round(SOUND, records, [(0.0, AT_S), (0.0, 0.0)])
         assert found.value(CRACK, "change") == pytest.approx(1.0 / (1.0 + CHANGE) - 1.0, rel=0.02)
-        told = from_their_moment(found, SOUND)
-        assert told.value(CRACK, "change") == pytest.approx(CHANGE, rel=0.02)
-        assert told.value("", "k") == pytest.approx(TWO_MASS["k"], rel=0.01)
-        assert told.rms == pytest.approx(SIGMA, rel=0.05)
-        first, second = moments_of(told, CRACK)
+        reported = from_their_moment(found, SOUND)
+        assert reported.value(CRACK, "change") == pytest.approx(CHANGE, rel=0.02)
+        assert reported.value("", "k") == pytest.approx(TWO_MASS["k"], rel=0.01)
+        assert reported.rms == pytest.approx(SIGMA, rel=0.05)
+        first, second = moments_of(reported, CRACK)
         assert first == pytest.approx((AT_S, LAST_S), abs=0.02)
         assert second == pytest.approx((0.0, LAST_S))
 
-    def test_told_from_its_moment_it_stays(self, records: list[Record]) -> None:
-        told = from_their_moment(the_other_way_round(SOUND, records, [(0.0, AT_S), (0.0, 0.0)]), SOUND)
-        assert from_their_moment(told, SOUND) is told
+    def test_distinguished_from_its_moment_it_stays(self, records: list[Record]) -> None:
+        reported = from_their_moment(the_other_way_round(SOUND, records, [(0.0, AT_S), (0.0, 0.0)]), SOUND)
+        assert from_their_moment(reported, SOUND) is reported
 
     @pytest.mark.parametrize("found_s", [(7.0, 7.3), (0.7, 3.0)], ids=["an instant", "all but its beginning"])
     def test_one_found_to_come_and_go_is_sought_again_from_the_other_side(self, found_s: tuple[float, float]) -> None:
         records = [cracking(1, AT_S, LAST_S), cracking(2, 5.0, LAST_S), cracking(3, 3.0, LAST_S)]
-        told = from_their_moment(the_other_way_round(SOUND, records, [(0.0, AT_S), (0.0, 5.0), found_s]), SOUND)
-        assert told.value(CRACK, "change") < 0.0
-        began_s, ended_s = moments_of(told, CRACK)[2]
+        reported = from_their_moment(the_other_way_round(SOUND, records, [(0.0, AT_S), (0.0, 5.0), found_s]), SOUND)
+        assert reported.value(CRACK, "change") < 0.0
+        began_s, ended_s = moments_of(reported, CRACK)[2]
         assert ended_s == pytest.approx(LAST_S)
         assert ended_s - began_s > found_s[1] - found_s[0]
 

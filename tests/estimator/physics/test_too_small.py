@@ -14,7 +14,7 @@ RECORDS = [record(np.zeros(3001), np.zeros(3001))]  # 30 s at 10 ms
 
 
 @pytest.mark.parametrize(
-    ("name", "key", "told", "not_told"),
+    ("name", "key", "reported", "too_small"),
     [
         ("actuator_lag", "time_constant_s", 1.1e-3, 0.9e-3),
         ("speed_filter", "time_constant_s", 1.1e-3, 0.9e-3),
@@ -22,12 +22,12 @@ RECORDS = [record(np.zeros(3001), np.zeros(3001))]  # 30 s at 10 ms
         ("clock_drift", "rate", -1.1e-3 / 30.0, -0.9e-3 / 30.0),
     ],
 )
-def test_a_tenth_of_the_sampling_period_is_the_least_that_is_told(
-    name: str, key: str, told: float, not_told: float
+def test_a_tenth_of_the_sampling_period_is_the_least_that_is_reported(
+    name: str, key: str, reported: float, too_small: float
 ) -> None:
     unresolved = EFFECTS[name].unresolved
-    assert unresolved(LINE, RECORDS, {key: told}) == ""
-    assert "less than a tenth of the sampling period" in unresolved(LINE, RECORDS, {key: not_told})
+    assert unresolved(LINE, RECORDS, {key: reported}) == ""
+    assert "less than a tenth of the sampling period" in unresolved(LINE, RECORDS, {key: too_small})
 
 
 def test_a_wheel_at_the_edge_of_its_bounds_is_none() -> None:
@@ -49,12 +49,12 @@ def test_a_carcass_that_damps_at_every_speed_is_no_tyre() -> None:
 @pytest.mark.parametrize(
     ("inertia", "frequency_hz", "most"),
     [
-        (10.0, 30.0, 0.152),  # so heavy that the shaft beside it takes next to nothing: 9 / (4 pi 10 30) = 0.002
+        (10.0, 30.0, 0.152),  # so heavy that the shaft next to it takes next to nothing: 9 / (4 pi 10 30) = 0.002
         (0.5, 16.0, 0.2395),  # 9 / (4 pi 0.5 16) = 0.0895 on top of 0.15
         (0.01, 16.0, 0.25),  # what amplifies less than twice is no resonance
     ],
 )
-def test_a_mode_may_be_damped_by_itself_and_by_the_shaft_beside_it(
+def test_a_mode_may_be_damped_by_itself_and_by_the_shaft_next_to_it(
     inertia: float, frequency_hz: float, most: float
 ) -> None:
     assert LINE.parameters["c"].value == 9.0

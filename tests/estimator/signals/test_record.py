@@ -43,7 +43,7 @@ def test_signals_of_the_wrong_shape_or_without_values_are_refused(changed: dict[
         record(**changed)
 
 
-def test_every_torque_is_trusted_unless_told_otherwise() -> None:
+def test_every_torque_is_trusted_unless_given_otherwise() -> None:
     assert record().torque_trusted.tolist() == [[True, True]] * 4
     by_row = np.array([True, False, True, True])
     assert record(torque_okay=by_row).torque_trusted.tolist() == [[okay, okay] for okay in by_row]

@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from estimator.abreast import choose, every
+from estimator.lanes import choose, every
 from estimator.physics import laws, low_pass
 from estimator.physics.effects import stribeck_friction, tyre_slip
 from hil.export.c.expressions import NotTranslatable

@@ -30,7 +30,7 @@ from hil.export.fmu.package import write
 from hil.export.fmu.variables import variables
 from tests.estimator.physics.bench import ONE_MASS, THREE_MASS, TWO_MASS, random_steps, record
 from tests.estimator.physics.test_recovery import PLANTS, effect_of
-from tests.estimator.physics.test_side_by_side import BESIDE_A_SHAFT, EVERYWHERE
+from tests.estimator.physics.test_side_by_side import EVERYWHERE, ON_THE_SHAFT
 
 PERIOD_S, SAMPLES, SIGN_WIDTH = 0.01, 300, 0.05
 START = Start(12.0, 0.0, 5.0, 0.01, 4.0, 0.004, 4.5)
@@ -58,7 +58,7 @@ def planted(case: str) -> Effects:
 
 CASES: dict[str, Effects] = {
     **{case: planted(case) for case in PLANTS if effect_of(case) in IN_THE_LINE},
-    **{case: effects for case, effects in (BESIDE_A_SHAFT | EVERYWHERE).items() if "clock_drift" not in effects},
+    **{case: effects for case, effects in (ON_THE_SHAFT | EVERYWHERE).items() if "clock_drift" not in effects},
     "quantised": {"speed_quantisation": {"step_rad_s": 0.25}},
     "late by parts of a step, heated": {
         "transport_delay": {"delay_s": 0.0237, "before_nm": 20.0},
@@ -155,7 +155,7 @@ def off(actual: FloatArray, expected: FloatArray) -> float:
 @pytest.mark.parametrize(
     ("structure", "case"),
     [(Structure.TWO_MASS, case) for case in CASES] + [(Structure.ONE_MASS, case) for case in ONE_MASS_TOO]
-    + [(Structure.THREE_MASS, case) for case in BESIDE_A_SHAFT],
+    + [(Structure.THREE_MASS, case) for case in ON_THE_SHAFT],
 )  # fmt: skip
 def test_the_steps_are_those_of_hil(structure: Structure, case: str) -> None:
     line, load, expected = begun(structure, CASES[case])

@@ -1,8 +1,8 @@
 """Reads Structured Text into the typed tree; whatever the standard would refuse, or leaves open, is refused.
 
 Checked here and in what it is built on, as a PLC's compiler does: every name is declared, before it is used, once (case
-is not told), and no word of the standard; constants, inputs and loop counters are not written to; types are never mixed
-without a conversion; literals fit their type; calls name inputs that there are.
+does not matter), and no word of the standard; constants, inputs and loop counters are not written to; types are never
+mixed without a conversion; literals fit their type; calls name inputs that there are.
 
 Source: IEC 61131-3, edition 2, annexes B.1.3, B.1.4 and B.1.5.
 """
@@ -38,7 +38,7 @@ class Parser(Statements):
 
     def _pou(self) -> None:
         kind = self._next().text
-        self._require(kind in ("FUNCTION_BLOCK", "PROGRAM"), f"expected TYPE or a POU, came {kind!r}")
+        self._require(kind in ("FUNCTION_BLOCK", "PROGRAM"), f"expected TYPE or a POU, got {kind!r}")
         self._block = Block(self._new_name(), kind == "PROGRAM")
         while self._now.text in SECTIONS:
             self._section()
@@ -112,5 +112,5 @@ class Parser(Statements):
     def _literal(self, kind: str) -> str:
         signed = self._tokens[self._place + (self._now.text == "-")]
         is_literal = signed.kind in ("int", "real") or self._now.text in ("TRUE", "FALSE")
-        self._require(is_literal, f"expected a literal, came {self._now.text}")
+        self._require(is_literal, f"expected a literal, got {self._now.text}")
         return self._typed(self._unary(), kind).c

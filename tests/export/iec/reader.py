@@ -27,7 +27,7 @@ class Reader:
         return token
 
     def _take(self, text: str) -> None:
-        self._require(self._now.text == text, f"expected {text}, came {self._now.text!r}")
+        self._require(self._now.text == text, f"expected {text}, got {self._now.text!r}")
         self._next()
 
     def _took(self, text: str) -> bool:
@@ -37,12 +37,12 @@ class Reader:
         return True
 
     def _name(self) -> str:
-        self._require(self._now.kind == "name", f"expected a name, came {self._now.text!r}")
+        self._require(self._now.kind == "name", f"expected a name, got {self._now.text!r}")
         return self._next().text
 
     def _integer(self) -> int:
         sign = -1 if self._took("-") else 1
-        self._require(self._now.kind == "int", f"expected a whole number, came {self._now.text!r}")
+        self._require(self._now.kind == "int", f"expected a whole number, got {self._now.text!r}")
         return sign * int(self._next().text)
 
     def _variable(self) -> Variable:

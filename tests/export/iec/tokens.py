@@ -1,4 +1,4 @@
-"""Structured Text in tokens: comments gone, keywords and names told apart, every token with its line.
+"""Structured Text in tokens: comments gone, keywords and names distinguished, every token with its line.
 
 Source: IEC 61131-3, edition 2, annex B.1 (letters, digits and identifiers; constants) and annex C (reserved words).
 """

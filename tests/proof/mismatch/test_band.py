@@ -1,4 +1,4 @@
-"""The band of a mismatch, and when a band that was told is right."""
+"""The band of a mismatch, and when a band that was reported is right."""
 
 import numpy as np
 import pytest
@@ -40,24 +40,24 @@ def test_the_true_band_is_right():
 
 
 @pytest.mark.parametrize(
-    ("told", "right"),
+    ("said", "right"),
     [((0.0, 50.0), True), ((5.0, 25.0), False), ((5.0, 30.0), True), ((0.0, 20.0), False), ((30.0, 50.0), False)],
     ids=["everything", "less than half", "more than half", "below", "above"],
 )
-def test_of_an_even_mismatch_most_must_be_told(told, right):
-    assert compare(told, FLAT).right is right
+def test_of_an_even_mismatch_most_must_be_reported(said, right):
+    assert compare(said, FLAT).right is right
 
 
 @pytest.mark.parametrize(
-    ("told", "right"),
+    ("said", "right"),
     [((10.0, 14.0), True), ((7.5, 16.5), False), ((12.0, 16.0), True), ((13.0, 17.0), False), ((0.0, 50.0), False)],
     ids=["true", "more than twice as wide", "moved by half", "moved by more", "everything"],
 )
-def test_of_a_narrow_mismatch_nothing_wide_wins(told, right):
+def test_of_a_narrow_mismatch_nothing_wide_wins(said, right):
     inside = (FLAT.frequency_hz >= 10.0) & (FLAT.frequency_hz <= 14.0)
     narrow = Spectrum(FLAT.frequency_hz, inside.astype(float))
     assert narrow.band_hz() == (10.0, 14.0)
-    assert compare(told, narrow).right is right
+    assert compare(said, narrow).right is right
 
 
 def test_a_single_frequency_has_a_width_and_can_be_met():

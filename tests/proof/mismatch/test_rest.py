@@ -58,7 +58,7 @@ def test_rows_that_are_not_good_do_not_count():
 
 
 def test_of_a_small_effect_what_the_projector_of_the_power_study_leaves_is_left():
-    """Friction of 0.5 Nm: 0.3 % of the torque, so that the second order is small beside the first."""
+    """Friction of 0.5 Nm: 0.3 % of the torque, so that the second order is small next to the first."""
     specimen = imposed(draw_specimen("coulomb_friction_motor", SEED), 0.5)
     there = [drive(specimen, test, SHORT) for test in EVERY_TEST]
     absent = [under_torques_of(each, draw_specimen("none", SEED), test) for test, each in enumerate(there)]
@@ -82,7 +82,7 @@ def test_a_recording_without_noise_has_the_same_faults_in_the_same_samples():
     said = heard(silent)
     flagged = np.zeros(missing.size, dtype=np.bool_) if silent.flags is None else silent.flags != 0
     assert np.array_equal(said.good, ~(missing | flagged))
-    kept = said.good & (np.abs(noisy.speed_rad_s) > 0.0)  # a loss may be told as 0
+    kept = said.good & (np.abs(noisy.speed_rad_s) > 0.0)  # a loss may be reported as 0
     assert silent.speed_rad_s[kept] == pytest.approx(silent.speed_true_rad_s[kept])
     assert np.std((noisy.speed_rad_s - silent.speed_rad_s)[kept]) == pytest.approx(SPEED_NOISE_RAD_S, rel=0.1)
 

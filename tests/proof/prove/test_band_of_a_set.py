@@ -22,7 +22,7 @@ SEED = 5
 """Its first case hides something."""
 
 KEY = parse_key(new_key())
-TOLD_HZ = [5.0, 12.0]
+REPORTED_HZ = [5.0, 12.0]
 
 
 def silent(what: str, done: int, total: int) -> None:
@@ -34,7 +34,7 @@ def tells_a_band(arguments: Sequence[str], folder: Path, limit_s: float) -> None
     if arguments[0] == "diagnose":
         diagnosis = {
             "verdict": "unexplained",
-            "mismatch": {"detected": True, "element": "shaft", "band_hz": TOLD_HZ},
+            "mismatch": {"detected": True, "element": "shaft", "band_hz": REPORTED_HZ},
             "effects": [],
             "parameters": {},
             "fit": {"noise_floor": 0.05},
@@ -55,7 +55,7 @@ def test_the_row_of_a_case_has_its_band(monkeypatch: pytest.MonkeyPatch, tmp_pat
     (row,) = judge_set(tmp_path / "set", KEY, 1, silent)
     (drawn,) = draw(1, SEED)
     assert drawn.kind.effect != NOTHING
-    assert row["band"]["told_hz"] == TOLD_HZ
+    assert row["band"]["told_hz"] == REPORTED_HZ
     assert 0.0 <= row["band"]["power_share"] <= 1.0
     low, high = row["band"]["true_hz"]
     assert 0.0 <= low <= high <= 50.0

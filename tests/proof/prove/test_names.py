@@ -79,10 +79,10 @@ def test_a_folder_that_the_tool_did_not_make_is_not_replaced(tmp_path: Path, vic
     built = tmp_path / "built"
     built.mkdir()
     (built / "diagnosis.json").write_text("{}")
-    with pytest.raises(UsageError, match="came something else"):
+    with pytest.raises(UsageError, match="got something else"):
         replace_own(victim, built)
     (tmp_path / "link").symlink_to(built)
-    with pytest.raises(UsageError, match="came something else"):
+    with pytest.raises(UsageError, match="got something else"):
         replace_own(tmp_path / "link", built)
     assert [path.name for path in victim.iterdir()] == ["thesis.txt"]
 

@@ -159,7 +159,7 @@ def test_answers_are_scored_against_the_truth(proof: Path, tool: Tool, tmp_path:
     assert {each["sha256"] in page for each in data["made"]["recordings"]} == {True}
 
 
-def test_answering_goes_on_where_it_was_interrupted(proof: Path, tool: Tool) -> None:
+def test_answering_continues_where_it_was_interrupted(proof: Path, tool: Tool) -> None:
     def interrupt(what: str, done: int, total: int) -> None:
         raise KeyboardInterrupt
 
@@ -217,12 +217,14 @@ def test_a_case_changed_before_it_is_answered_is_not_answered(proof: Path, tool:
         answer(proof, 1, silent)
 
 
-def test_verdicts_and_their_list_changed_together_are_told_by_the_digest_that_was_kept(proof: Path, tool: Tool) -> None:
+def test_verdicts_and_their_list_changed_together_are_reported_by_the_digest_that_was_kept(
+    proof: Path, tool: Tool
+) -> None:
     digest = answer(proof, 1, silent)
     listed = json.loads((proof / VERDICTS_LIST).read_text())
     listed["cases"]["case_001"]["diagnose_s"] = 99.0
     (proof / VERDICTS_LIST).write_text(json.dumps(listed))
-    with pytest.raises(SealBroken, match="came others"):
+    with pytest.raises(SealBroken, match="got others"):
         judge_set(proof, KEY, 1, silent, digest)
 
 

@@ -1,4 +1,4 @@
-"""Encryption of the sealed: a changed, exchanged or foreign file is told, and so is a wrong key."""
+"""Encryption of the sealed: a changed, exchanged or foreign file is reported, and so is a wrong key."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def test_equal_truths_look_different(key: bytes) -> None:
 
 
 @pytest.mark.parametrize("place", [0, 15, 40, -1], ids=["magic", "nonce", "content", "tag"])
-def test_one_changed_byte_is_told_with_the_file_s_name(tmp_path: Path, key: bytes, place: int) -> None:
+def test_one_changed_byte_is_reported_with_the_file_s_name(tmp_path: Path, key: bytes, place: int) -> None:
     locked = bytearray(lock(key, "case_001", SECRET))
     locked[place] ^= 1
     path = tmp_path / "case_001.sealed"
@@ -39,7 +39,7 @@ def test_one_changed_byte_is_told_with_the_file_s_name(tmp_path: Path, key: byte
         unlock(key, "case_001", path)
 
 
-def test_another_key_another_case_and_no_file_are_told(tmp_path: Path, key: bytes) -> None:
+def test_another_key_another_case_and_no_file_are_reported(tmp_path: Path, key: bytes) -> None:
     path = tmp_path / "case_001.sealed"
     path.write_bytes(lock(key, "case_001", SECRET))
     with pytest.raises(SealBroken, match="another key"):

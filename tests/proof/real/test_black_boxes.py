@@ -50,7 +50,7 @@ def test_a_lower_rate_takes_the_mean_of_the_force_and_the_speed_at_the_row():
     assert part.sample_time_s == pytest.approx(0.5)
 
 
-def test_a_linear_system_with_an_offset_is_found_again_and_foretells_another_recording():
+def test_a_linear_system_with_an_offset_is_found_again_and_predicts_another_recording():
     true = LinearModel((-1.6, 0.9, -0.1, 0.02), (0.02, 0.03, 0.01, 0.005), 1, made_up.PERIOD_S)
 
     def recorded(seed, offset):
@@ -68,7 +68,7 @@ def test_a_linear_system_with_an_offset_is_found_again_and_foretells_another_rec
     assert np.sqrt(np.mean(error[~early] ** 2)) < 1e-4 * np.std(unseen.output)
 
 
-def test_a_position_that_drifts_is_foretold():
+def test_a_position_that_drifts_is_predicted():
     """A mass pushed about: two integrators, of which the linear model must find both."""
     parts = [part for seed in (1, 2) for part in stretches(pushed(seed), EVERYWHERE, made_up.PERIOD_S, 50)]
     model = fit_linear(parts)

@@ -37,9 +37,9 @@ def test_a_shipped_case_is_whole(name):
 @pytest.mark.parametrize("name", CASES)
 def test_nothing_the_tool_is_given_tells_the_truth(name):
     """Of a case's folder the model file alone goes into the neutral place: no known value may be written in it."""
-    told = (CASES[name] / "model.toml").read_text()
+    reported = (CASES[name] / "model.toml").read_text()
     for known in read_truth(CASES[name]).values:
-        assert f"{known.value:g}" not in told or known.found.split(".")[1] not in read_case(CASES[name]).concealed
+        assert f"{known.value:g}" not in reported or known.found.split(".")[1] not in read_case(CASES[name]).concealed
 
 
 def refused(tmp_path, before, after):
@@ -50,7 +50,7 @@ def refused(tmp_path, before, after):
 
 
 @pytest.mark.parametrize(
-    ("before", "after", "told"),
+    ("before", "after", "reported"),
     [
         ('withheld = ["secret"]', 'withheld = ["speed"]', "withheld | expected channels that are not shown"),
         ('fit = ["first"]', 'fit = ["third"]', "runs.0 | expected names of [recordings] (first, second)"),
@@ -61,8 +61,8 @@ def refused(tmp_path, before, after):
         ('sha256 = "{a}"', 'sha256 = "123"', "recordings.first.sha256"),
     ],
 )
-def test_a_wrong_case_file_is_refused_by_key(tmp_path, before, after, told):
-    assert told in refused(tmp_path, before, after)
+def test_a_wrong_case_file_is_refused_by_key(tmp_path, before, after, reported):
+    assert reported in refused(tmp_path, before, after)
 
 
 def test_two_runs_need_two_names(tmp_path):

@@ -22,7 +22,7 @@ CONTENT = b"t,force,speed\n" + b"0.0,1.0,2.0\n" * 1000
 
 
 class Site(ThreadingHTTPServer):
-    """Serves files by path, whole or from a byte on; breaks off after so many bytes where it is told to."""
+    """Serves files by path, whole or from a byte on; breaks off after so many bytes where a test says so."""
 
     def __init__(self):
         super().__init__(("127.0.0.1", 0), Page)
@@ -84,7 +84,7 @@ def test_a_recording_is_fetched_checked_and_not_fetched_again(site, tmp_path):
     assert len(site.asked) == 1
 
 
-def test_a_transfer_that_broke_off_goes_on(site, tmp_path):
+def test_a_transfer_that_broke_off_continues(site, tmp_path):
     site.break_after = 5000
     _, (message,) = had(entry(CONTENT, site.url("/a.csv")), tmp_path)
     assert "the connection broke off after 5000" in message
@@ -95,9 +95,9 @@ def test_a_transfer_that_broke_off_goes_on(site, tmp_path):
     assert site.asked[-1] == ("/a.csv", "bytes=5000-")
 
 
-def test_a_wrong_file_does_not_take_the_place_and_is_not_gone_on_with(site, tmp_path):
+def test_a_wrong_file_does_not_take_the_place_and_is_not_continued_with(site, tmp_path):
     _, (message,) = had(entry(b"something else", site.url("/a.csv")), tmp_path)
-    assert f"came {hashlib.sha256(CONTENT).hexdigest()}" in message
+    assert f"got {hashlib.sha256(CONTENT).hexdigest()}" in message
     assert list((tmp_path / "set").iterdir()) == []
 
 

@@ -45,7 +45,7 @@ def test_a_sample_that_was_not_measured_does_not_count():
     assert inner_blocks(record(okay))[29]
 
 
-def test_beside_a_gap_there_is_none():
+def test_next_to_a_gap_there_is_none():
     okay = np.ones(N, dtype=bool)
     okay[36] = False
     hidden = runs(inner_blocks(record(okay)))

@@ -59,7 +59,7 @@ def test_the_force_error_of_a_load_left_out_is_that_load():
     np.testing.assert_allclose(lacking[inner], load[inner], atol=4.0)
 
 
-def test_the_force_error_is_not_known_beside_missing_speed(driven):
+def test_the_force_error_is_not_known_next_to_missing_speed(driven):
     okay = driven.okay.copy()
     okay[200] = False
     lacking = force_error(record(driven.total_torque_nm, driven.output, okay), driven.output, MODEL)
@@ -88,7 +88,7 @@ def test_the_accelerometer_less_the_rise_of_the_speed_is_the_grade():
     np.testing.assert_allclose(grade[1:-1], 0.3, atol=1e-4)
 
 
-def test_a_low_pass_keeps_a_constant_also_beside_gaps():
+def test_a_low_pass_keeps_a_constant_also_next_to_gaps():
     there = np.ones(made_up.N, dtype=bool)
     there[100:180] = False
     np.testing.assert_allclose(low_passed(np.full(made_up.N, 2.0), there, 0.1, made_up.PERIOD_S)[there], 2.0, rtol=1e-6)

@@ -64,13 +64,13 @@ def test_a_recording_is_cut_to_its_rows(tmp_path, place, data):
 def test_another_recording_than_was_meant_is_refused(case, data, place):
     path = data / "trolley" / "a.csv"
     path.write_text(path.read_text().replace("speed", "Speed"))
-    with pytest.raises(RealFileError, match=r"expected the SHA-256 [0-9a-f]{64}, came"):
+    with pytest.raises(RealFileError, match=r"expected the SHA-256 [0-9a-f]{64}, got"):
         write_shown(case, "first", data, place)
 
 
 def test_a_missing_recording_is_refused_and_says_where_it_is_from(case, data, place):
     (data / "trolley" / "a.csv").unlink()
-    with pytest.raises(RealFileError, match=r"(?s)came nothing.*real\.download.*https://example\.org/trolley"):
+    with pytest.raises(RealFileError, match=r"(?s)got nothing.*real\.download.*https://example\.org/trolley"):
         write_shown(case, "first", data, place)
 
 

@@ -55,7 +55,7 @@ def test_dry_friction_of_the_drive_is_named_and_of_the_published_size(asked):
     assert all(agreement(run, what).inside for what in ("moving mass", "viscous friction", "dry friction"))
 
 
-def test_the_drive_is_foretold_better_with_dry_friction(asked):
+def test_the_drive_is_predicted_better_with_dry_friction(asked):
     """Against black boxes nothing is claimed: a linear one of fourth order does as well on this position (docs)."""
     run = only(asked("emps"))
     (after,) = run.held_out.after.values()

@@ -155,12 +155,12 @@ def test_a_command_that_fails_is_a_result_and_is_tried_again(tool, world, monkey
     def broken(arguments, folder, limit_s):
         raise CommandFailed("hil diagnose: ended with status 3")
 
-    told = []
+    reported = []
     monkeypatch.setattr(ask, "run_hil", broken)
-    (result,) = run(world, progress=lambda message, share: told.append((message, share)))
+    (result,) = run(world, progress=lambda message, share: reported.append((message, share)))
     assert result.runs[0].fault == "hil diagnose: ended with status 3"
     assert not result.named_right
-    assert told == [("trolley only: failed, hil diagnose: ended with status 3", 1.0)]
+    assert reported == [("trolley only: failed, hil diagnose: ended with status 3", 1.0)]
     monkeypatch.setattr(ask, "run_hil", tool)
     assert run(world)[0].runs[0].fault is None
 

@@ -109,12 +109,12 @@ EVENTS = [name for name, effect in EFFECTS.items() if effect.when is not None]
 @pytest.mark.parametrize("name", EVENTS)
 def test_the_truth_has_the_times_of_an_event_in_each_recording(name):
     case = make_case(name, SEED)
-    told = case.truth()["events"][name]
-    assert list(told) == ["run_1", "run_2", "run_3", "fresh_1", "fresh_2", "fresh_3"]
-    for intervals in told.values():
+    reported = case.truth()["events"][name]
+    assert list(reported) == ["run_1", "run_2", "run_3", "fresh_1", "fresh_2", "fresh_3"]
+    for intervals in reported.values():
         assert all(3.0 < begin < end <= 30.0 for begin, end in intervals)
     absent = [test for test in range(3) if not case.specimen.effects[0].happens_in(test, case.specimen.sizes[name])]
-    assert [test for test, intervals in enumerate(list(told.values())[:3]) if not intervals] == absent
+    assert [test for test, intervals in enumerate(list(reported.values())[:3]) if not intervals] == absent
 
 
 @pytest.mark.parametrize("name", EVENTS)

@@ -44,7 +44,7 @@ def test_a_closing_clutch_conserves_the_momentum_and_ends_in_one_speed(alone, tr
     assert motor[-1] == pytest.approx(generator[-1], abs=1e-9)
 
 
-def test_a_clutch_that_is_too_weak_goes_on_slipping(alone, trace):
+def test_a_clutch_that_is_too_weak_continues_slipping(alone, trace):
     states = trace(alone._replace(clutch_nm=20.0), [300.0] * 190)
     slip = states[:, State.SPEED_M] - states[:, State.SPEED_G]
     assert np.all(np.diff(slip[121:]) > 0.0)

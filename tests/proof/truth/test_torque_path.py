@@ -21,7 +21,7 @@ def test_a_torque_derates_exponentially_or_evenly(plain):
     assert true_torque(even, (60.0, 40.0), 2 * TIME_TO_DERATE_S) == pytest.approx(80.0)
 
 
-def test_a_derated_torque_accelerates_less_as_time_goes_on(plain):
+def test_a_derated_torque_accelerates_less_as_time_continues(plain):
     driveline = TruthDriveline(plain._replace(derating=0.5, k=0.0, c=0.0, b_M=0.0, b_L=0.0))
     for _ in range(3000):
         driveline.advance((8.0, 8.0), 0.01)

@@ -91,7 +91,7 @@ def require_pysindy() -> Any:
         return importlib.import_module("pysindy")
     except ModuleNotFoundError as error:
         raise PySindyMissing(
-            f"expected PySINDy for the sparse regression, came: {error}. Install pysindy into the environment."
+            f"expected PySINDy for the sparse regression, got: {error}. Install pysindy into the environment."
         ) from error
 
 

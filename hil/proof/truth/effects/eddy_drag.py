@@ -1,6 +1,6 @@
 """A shorted turn in the motor: eddy-current drag that is greatest at one speed.
 
-Currents keep to the surface at speed, which bends the law (Davies, 1963).
+Currents keep to the surface at speed, which makes the law nonlinear (Davies, 1963).
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The payload changes under way: sand or water runs out, or comes from a vehicle alongside.
 
-What leaves or comes has the bus's speed, so the speed goes on without a step and only the acceleration changes. The
+What leaves or comes has the bus's speed, so the speed continues without a step and only the acceleration changes. The
 constant load torque stays as it is.
 """
 

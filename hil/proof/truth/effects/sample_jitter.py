@@ -10,13 +10,13 @@ from hil.proof.truth.acquisition import Acquisition
 from hil.proof.truth.bus import Bus
 from hil.proof.truth.hidden import HiddenEffect, Place, Sizes, log_uniform
 
-MOST_TOLD_S = 0.0024
+MOST_STAMPED_S = 0.0024
 """A recording whose time steps differ from the period by more than half of it is refused by any reader."""
 
 
 def _draw(rng: np.random.Generator, bus: Bus) -> Sizes:
-    told = bool(rng.random() < 0.25)
-    return {"jitter_s": log_uniform(rng, 0.001, MOST_TOLD_S if told else 0.003), "stamps_told": float(told)}
+    stamped = bool(rng.random() < 0.25)
+    return {"jitter_s": log_uniform(rng, 0.001, MOST_STAMPED_S if stamped else 0.003), "stamps_told": float(stamped)}
 
 
 def _corrupt(acquisition: Acquisition, sizes: Sizes) -> Acquisition:

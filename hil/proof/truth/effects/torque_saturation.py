@@ -1,4 +1,4 @@
-"""Voltage or temperature limits the torque, and the reading, a model inside the inverter, goes on.
+"""Voltage or temperature limits the torque, and the reading, a model inside the inverter, continues.
 
 Of one inverter, of both, or of their sum; in a knee rather than at an edge.
 """

@@ -97,7 +97,7 @@ def test_a_pair_closer_to_its_zeros_than_they_are_certain_is_flagged() -> None:
     flagged = pole_zero_map(near_cancelling(1e-7), P).cancellations
     assert len(flagged) == 1
     assert flagged[0].pole == pytest.approx(0.6 * np.exp(1.9j))
-    assert "can't be told apart" in flagged[0].statement
+    assert "can't be distinguished" in flagged[0].statement
     assert pole_zero_map(near_cancelling(0.05), P).cancellations == ()
 
 

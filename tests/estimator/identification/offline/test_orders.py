@@ -46,7 +46,7 @@ def test_a_longer_delay_is_found() -> None:
     assert select_orders(late, AMONG).chosen.nk == 2
 
 
-def test_unseen_recordings_stand_beside() -> None:
+def test_unseen_recordings_stand_next_to() -> None:
     choice = select_orders(cruise(400, 30.0).record, AMONG[:3], [cruise(401, 30.0).record])
     assert all(80 < candidate.unseen_fit_percent < 100 for candidate in choice.candidates)
     assert choice.candidates[0].criterion == 0.0

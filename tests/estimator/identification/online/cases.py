@@ -35,7 +35,7 @@ class Case:
     setup: Callable[[Adaptation], Setup]
 
     def make(self, adaptation: Adaptation | None = None) -> RecursiveEstimator:
-        """Return a fresh estimator, with the decreasing gain unless told otherwise."""
+        """Return a fresh estimator, with the decreasing gain unless another is given."""
         return ESTIMATORS[self.name](self.setup(adaptation or DecreasingGain()))
 
 

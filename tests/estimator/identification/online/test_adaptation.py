@@ -158,7 +158,7 @@ FAST = {ConstantTrace: ConstantTrace(0.2), ConstantGain: ConstantGain(0.2)}
 
 
 @pytest.mark.parametrize("profile", PROFILES, ids=lambda profile: profile.__name__)
-def test_with_every_profile_the_truth_is_found_and_the_status_told(profile: type[Adaptation]) -> None:
+def test_with_every_profile_the_truth_is_found_and_the_status_reported(profile: type[Adaptation]) -> None:
     u, y, okay = linear_data(8000)
     estimator = Oefo(np.ones(1), LINEAR.orders, FAST.get(profile, profile()))
     block = estimator.run(u, y, okay)

@@ -241,7 +241,7 @@ def through_json(state: dict[str, object]) -> dict[str, object]:
 
 
 @pytest.mark.parametrize("carried", [dict, through_npz, through_json])
-def test_a_restored_state_goes_on_to_the_bit(case: Case, carried: type) -> None:
+def test_a_restored_state_continues_to_the_bit(case: Case, carried: type) -> None:
     u, y, okay = case.data(500, 0.05, 0)
     okay[248:252] = False  # in the middle of a gap, where everything that is remembered counts
     straight, first, second = case.make(), case.make(), case.make()
@@ -299,7 +299,7 @@ def test_the_kalman_filter_asks_for_its_start_values() -> None:
         ESTIMATORS["ekf"](Setup())
 
 
-def test_names_and_titles_are_told() -> None:
+def test_names_and_titles_are_reported() -> None:
     assert next(iter(ESTIMATORS)) == "oefo"  # the paper's first
     for name, entry in ESTIMATORS.items():
         made = CASES[name].make()

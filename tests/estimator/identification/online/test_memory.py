@@ -44,6 +44,6 @@ def test_structures_side_by_side_keep_to_themselves() -> None:
     alone = [Oefo(np.ones(1), of).run(u, y, okay).theta for of in orders]
     estimators = [Oefo(np.ones(1), of) for of in orders]
     for k in range(200):
-        beside = [estimator.update(u[k], y[k]).theta for estimator in estimators]
-    for theta, last in zip(alone, beside, strict=True):
+        companion = [estimator.update(u[k], y[k]).theta for estimator in estimators]
+    for theta, last in zip(alone, companion, strict=True):
         assert np.array_equal(theta[-1], last)

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from estimator.identification.identify import Settings
+from estimator.identification.chain import OnlineChain
 from estimator.identification.online.adaptation import ConstantForgetting
-from estimator.identification.online.chain import OnlineChain
-from estimator.identification.online.online_estimate import OnlineTrajectory
 from estimator.identification.online.recursive import Status
+from estimator.identification.online_estimate import OnlineTrajectory
+from estimator.identification.settings import Settings
 from estimator.identification.tracking.sensitivity_kernel import (
     N_THROUGH,
     output_density,

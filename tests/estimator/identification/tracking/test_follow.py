@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.identification.identify import Settings
+from estimator.identification.chain import OnlineChain
 from estimator.identification.online.adaptation import ConstantForgetting
-from estimator.identification.online.chain import OnlineChain
+from estimator.identification.settings import Settings
 from estimator.identification.tracking.follow import FEWEST
 from tests.estimator.identification.tracking.drives import SAMPLE_TIME_S, Line, drives
 

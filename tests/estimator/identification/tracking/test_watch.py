@@ -1,4 +1,4 @@
-"""Changes of the driveline are found and told; what is no change is none."""
+"""Changes of the driveline are found and reported; what is no change is none."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ import pytest
 from scipy.stats import poisson
 
 from estimator.errors import BadSetting
-from estimator.identification.identify import Settings
+from estimator.identification.chain import OnlineChain
 from estimator.identification.online.adaptation import ConstantForgetting
-from estimator.identification.online.chain import OnlineChain
-from estimator.identification.online.online_estimate import OnlineTrajectory
+from estimator.identification.online_estimate import OnlineTrajectory
+from estimator.identification.settings import Settings
 from estimator.identification.tracking.state import TrackingState
 from estimator.identification.tracking.watch import ChangeWatch
 from estimator.identification.tracking.watch_settings import WatchSettings
@@ -31,7 +31,7 @@ def play(record: Record, watch: WatchSettings | None = None) -> OnlineTrajectory
 
 
 @pytest.mark.parametrize("drop", [0.1, 0.2])
-def test_a_stiffness_drop_is_found_and_told(drop: float) -> None:
+def test_a_stiffness_drop_is_found_and_reported(drop: float) -> None:
     before, after = Line(), Line(CHANGE_S, k=4200.0 * (1.0 - drop))
     for record in drives(4, 4, 80.0, (before, after)):
         first, settled = play(record).alarms
@@ -60,8 +60,8 @@ def test_a_drift_that_continues_is_alarmed_again(share_in_10_s: float) -> None:
         assert found[0].time_s > begin_s
         settled = [alarm.after.value for alarm in alarms if alarm.settled]
         assert (np.sign(np.diff([Line().resonance[0], *settled])) == np.sign(share_in_10_s)).all()
-        told = [begin_s, *(alarm.time_s for alarm in found), end_s]
-        moved = np.diff(np.sqrt([lines[int(t) - 1].k for t in told])) / np.sqrt(4200.0)
+        reported = [begin_s, *(alarm.time_s for alarm in found), end_s]
+        moved = np.diff(np.sqrt([lines[int(t) - 1].k for t in reported])) / np.sqrt(4200.0)
         assert len(found) >= 2
         assert np.abs(moved).max() < 0.04 if abs(share_in_10_s) < 0.02 else np.abs(moved).max() < 0.09
 
@@ -97,8 +97,8 @@ def test_false_alarms_come_no_more_often_than_stated(prbs_nm: Callable[[float], 
     courses = [play(each, watch) for each in drives(8, number, duration_s, prbs_nm=prbs_nm)]
     watched_s = sum(float((course.state == TrackingState.WATCHING).sum()) * 0.02 for course in courses)
     assert watched_s > 0.3 * duration_s * number
-    came = sum(not alarm.settled for course in courses for alarm in course.alarms)
-    assert came <= poisson.ppf(0.999, stated * watched_s / 3600.0)
+    got = sum(not alarm.settled for course in courses for alarm in course.alarms)
+    assert got <= poisson.ppf(0.999, stated * watched_s / 3600.0)
 
 
 def test_a_statistic_is_standard_normal_where_nothing_changes() -> None:

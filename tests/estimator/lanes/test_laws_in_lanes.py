@@ -1,0 +1,67 @@
+"""Every law in every lane is what it is alone, on whichever side of its edges each lane is."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numba
+import numpy as np
+import pytest
+
+from estimator.physics import laws
+from estimator.physics.effects import (
+    backlash,
+    shaft_hysteresis,
+    stiffness_nonlinearity,
+    stribeck_friction,
+    tyre_slip,
+    warming_friction,
+)
+from tests.estimator.lanes.bench import in_both_ways
+
+EITHER_SIDE = (-25.0, -0.7, -0.01, 0.0, 0.3, 0.625, 1.0, 45.0)
+SIZES = (0.0, 1e-3, 0.4, 1.0, 3.0, 50.0)
+
+
+def _slope(vehicle: float, slip: float, creep: float, wheel: float, steepest: float) -> float:
+    return tyre_slip.coupling(vehicle, slip, creep, wheel, steepest)[0]
+
+
+def _share(vehicle: float, slip: float, creep: float, wheel: float, steepest: float) -> float:
+    return tyre_slip.coupling(vehicle, slip, creep, wheel, steepest)[1]
+
+
+LAWS: list[tuple[Callable[..., Any], Sequence[Sequence[float]]]] = [
+    (laws.hyperbolic_tangent, [EITHER_SIDE]),
+    (laws.power, [SIZES, (-2.0, -0.3, 0.2, 1.0, 3.0)]),
+    (laws.fading, [SIZES]),
+    (laws.dry_friction, [EITHER_SIDE, SIZES, (0.01, 1.0)]),
+    (laws.beyond_gap, [EITHER_SIDE, SIZES]),
+    (laws.share_inside, [EITHER_SIDE, (0.1, 2.0), (-1.0, 0.5), (0.6, 4.0)]),
+    (laws.inertia_while, [(1.0, 30.0), (-0.2, 5.0), (0.0, 0.4, 1.0)]),
+    (laws.overtoned_wave, [SIZES, EITHER_SIDE, (0.0, 2.0), (0.0, 0.3), (0.0, -0.2)]),
+    (laws.wave, [SIZES, EITHER_SIDE, (0.0, 2.0)]),
+    (backlash.damping_share, [EITHER_SIDE, SIZES]),
+    (backlash.pressed, [EITHER_SIDE, EITHER_SIDE, (0.0, 0.5, 1.0)]),
+    (shaft_hysteresis.loading_rate, [(-1.2, -0.5, 0.0, 0.9), EITHER_SIDE, (0.3, 2.0), (0.0, 0.8), (5.0, 600.0)]),
+    (stiffness_nonlinearity.factor, [EITHER_SIDE, (-2.0, 0.0, 30.0), (0.5, 1.0, 2.0)]),
+    (stribeck_friction.law, [EITHER_SIDE, (0.0, 4.0), (3.0,), (0.0, 0.5, 2.0), (0.01, 0.5)]),
+    (tyre_slip.carcass, [EITHER_SIDE, EITHER_SIDE, (3.0,), (0.2, 5.0)]),
+    (tyre_slip.gripped, [EITHER_SIDE, (2.0,), (0.0, 0.5)]),
+    (_slope, [EITHER_SIDE, (1e-3, 0.2), (0.1, 4.0), (0.005, 0.3), (5.0, 400.0)]),
+    (_share, [EITHER_SIDE, (1e-3, 0.2), (0.1, 4.0), (0.005, 0.3), (5.0, 400.0)]),
+    (warming_friction.cold_part, [(0.0, 3.0, 600.0), SIZES, (20.0, 300.0)]),
+]
+
+
+@pytest.mark.parametrize(("law", "values"), LAWS, ids=lambda value: getattr(value, "__name__", ""))
+def test_a_law_is_the_same_in_every_lane(law: Callable[..., Any], values: Sequence[Sequence[float]]) -> None:
+    grid = np.array(list(itertools.product(*values)))
+    shuffled = np.random.default_rng(3).permutation(grid)  # so that lanes differ in every argument
+    sorted_too = np.vstack([shuffled, grid, grid[: -2 * len(grid) % 8]])  # and agree in some
+    compiled = law if hasattr(law, "py_func") else numba.njit(error_model="numpy")(law)
+    with np.errstate(invalid="ignore"):
+        together, alone = in_both_ways(compiled, tuple(sorted_too.T))
+    np.testing.assert_allclose(together, alone, rtol=1e-13, atol=1e-15 * np.abs(alone).max())
