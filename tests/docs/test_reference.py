@@ -13,7 +13,7 @@ from drivers.inverter.drive_settings import OPTION_CODES
 from drivers.plc.map_needs import USED
 from estimator.diagnosis import holdout
 from estimator.diagnosis.diagnose import BUDGET_S
-from estimator.diagnosis.inference import calibration, plausible, unnamed
+from estimator.diagnosis.inference import calibration, plausible
 from estimator.diagnosis.where import locate
 from hil.cli.main import ExitStatus
 from hil.config.experiment_tables import AnyExperiment
@@ -99,8 +99,9 @@ def test_the_thresholds_of_a_verdict_are_those_of_the_code() -> None:
         assert said in page
     assert plausible.LEAST_THROUGH == 0.2
     assert "lets through less than a fifth" in page
-    assert unnamed.MOST_OF_IT == 0.5
-    assert "gain less than half of what it gains at their place" in page
+    assert (calibration.MOST_AT_PLACE, calibration.MOST_ELSEWHERE) == (0.75, 0.9)
+    assert "gain nine tenths of what it gains" in page
+    assert "gain three quarters of it by themselves" in page
 
 
 def test_every_concealed_effect_is_listed() -> None:
