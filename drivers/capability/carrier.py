@@ -58,7 +58,7 @@ ObjectId = tuple[int, int]
 
 
 def object_name(index: int, subindex: int) -> str:
-    """Name an object: ``0x6077``, or ``0x60E5:01``."""
+    """Name an object: ``0x6077``, or ``0x1018:01``."""
     return f"0x{index:04X}:{subindex:02X}" if subindex else f"0x{index:04X}"
 
 

@@ -23,7 +23,7 @@ def test_sound_rig_passes_the_first_steps(tmp_path: Path) -> None:
 
 def test_wrong_sign_of_one_inverter_blocks(tmp_path: Path) -> None:
     with bench(tmp_path, miswired=True) as rig:
-        with pytest.raises(RunAborted, match=r"m2: sign.*came backward.*Swap two phases of m2"):
+        with pytest.raises(RunAborted, match=r"m2: sign.*got backward.*Swap two phases of m2"):
             rig.call("signs")
         assert_disarmed(rig.server.bus_url, 1, 2)
         assert rig.job().state.steps["signs"].status is Status.BLOCKED

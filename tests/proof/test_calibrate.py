@@ -20,7 +20,7 @@ LAX = {"most_predictable": 1.0, "most_dependent": 1.0, "most_line": 1e9, "most_c
 def world(seed: int, gain: float = 400.0, is_there: bool = True) -> World:
     name = "backlash" if is_there else "tyre_slip"
     claims = [Claim(name, [name], 0.5)]
-    scores: list[tuple[list[str], float]] = [([], gain), ([name], 0.0)]
+    scores: list[tuple[list[str], float, bool]] = [([], gain, True), ([name], 0.0, True)]
     return World("dirty", seed, "backlash", ["backlash"], claims, scores, TESTS, 9000, 2.0 + seed)
 
 

@@ -128,9 +128,9 @@ class _SmallDisk:
 def test_a_disk_that_takes_part_of_what_waits_keeps_the_rows_that_are_whole(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rows: int
 ) -> None:
-    room = sum(len(writer._row(sample(k))) for k in range(rows)) + 7
-    monkeypatch.setattr(writer, "WritingThread", lambda file, capacity: WritingThread(_SmallDisk(file, room), capacity))
     recorder = RecordingWriter(tmp_path / "run.csv", patience_s=0.0)
+    room = sum(len(recorder._row(sample(k))) for k in range(rows)) + 7
+    monkeypatch.setattr(writer, "WritingThread", lambda file, capacity: WritingThread(_SmallDisk(file, room), capacity))
 
     def run() -> None:
         with recorder:

@@ -116,14 +116,14 @@ def test_a_driveline_without_such_places_is_refused(tmp_path: Path) -> None:
     [
         ("object = 0x2100", "object = 0x2101", r"channels\.2\.object \| .*0x2101.*is not there"),
         ("object = 0x2100", "object = 0x6502", r"channels\.2\.object \| .*0x6502 has PDOMapping=0"),
-        ('"acceleration"\n\n', '"accel"\n\n', r"channels\.1\.register \| expected one of the registers.*came 'accel'"),
-        ('"acceleration"\n\n', '"speed_limit"\n\n', r"channels\.1\.register \| .*in rad/s\^2.*came one in rad/s$"),
+        ('"acceleration"\n\n', '"accel"\n\n', r"channels\.1\.register \| expected one of the registers.*got 'accel'"),
+        ('"acceleration"\n\n', '"speed_limit"\n\n', r"channels\.1\.register \| .*in rad/s\^2.*got one in rad/s$"),
         ('"acceleration"\n\n', '"permissive"\n\n', r"channels\.1\.register \| .*holds a number.*of type bool"),
         ("subindex = 1\nscale = 0.001", "subindex = 1", r"channels\.0\.scale \| expected this key next to object"),
         ('inverter = "m2"\nobject = 0x2100', 'register = "acceleration"\nobject = 0x2100', r"channels\.2 \| .*either"),
         ('"torque_shaft_nm"', '"torque_shaft"', r"channels\.2\.column \| expected a name that ends in _nm"),
         ('"torque_shaft_nm"', '"torque_m1_nm"', r"channels\.2\.column \| .*every recording has"),
-        ('at = "shaft"', 'at = "motor"', r"channels\.2\.kind \| .*came 'torque at the motor'"),
+        ('at = "shaft"', 'at = "motor"', r"channels\.2\.kind \| .*got 'torque at the motor'"),
         ("scale = 0.1", "scale = 0.0", r"channels\.2\.scale \| expected a number other than 0"),
         (
             'register = "acceleration"',

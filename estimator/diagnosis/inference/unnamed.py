@@ -147,7 +147,7 @@ def weighed_against(decision: Decision, law: Law | None, alone: Callable[[Elemen
     it says.
     """
     best, nothing = of_first_outputs(decision.best), of_first_outputs(decision.nothing)
-    if law is None or 1.0 - (law.rms / free_rms(nothing)) ** 2 < LEAST_SHARE:
+    if law is None or law.score >= nothing.score or 1.0 - (law.rms / free_rms(nothing)) ** 2 < LEAST_SHARE:
         return decision
     if gain_of_names(best, nothing, law) >= MOST_ELSEWHERE:
         return decision

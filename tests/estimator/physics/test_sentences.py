@@ -58,7 +58,7 @@ SENTENCES: dict[str, tuple[dict[str, float], list[str]]] = {
         {"curvature_per_nm": 4e-4, "asymmetry_per_nm": 1e-4},
         ["5.00% at 100 Nm", "3.00% at -100 Nm"],
     ),
-    "torque_bias": ({"offset_nm": -4.56, "time_constant_s": 7.89}, ["-4.56 Nm", "7.89 s"]),
+    "torque_bias": ({"offset_nm": -4.56, "time_constant_s": 7.89}, ["4.56 Nm below its reading", "7.89 s"]),
     "grounded_spring": ({"stiffness_nm_per_rad": 45.6}, ["45.6 Nm/rad"]),
     "gravity": ({"moment_nm": 4.56, "motor_turns_per_turn": 7.89}, ["4.56 Nm", "7.89 motor turns"]),
     "viscoelastic_shaft": ({"branch_share": 0.456, "relaxation_s": 0.0123}, ["45.6%", "12.3 ms"]),
