@@ -63,9 +63,11 @@ def _rigid(records: Sequence[Record]) -> tuple[float, float]:
     """Return inertia and viscous friction of a rigid line, by regression on ``J (w - w_0) = S T - b S w - T_0 t``."""
     columns, moved = [], []
     for record in records:
-        speed, period_s = measured_speed(record), record.sample_time_s
-        turned, driven = (np.cumsum(each) * period_s for each in (speed, record.total_torque_nm))
-        columns.append(np.column_stack([driven, -turned, -record.time_s + record.time_s[0]])[:-1])
+        whole, period_s = measured_speed(record), record.sample_time_s
+        known = np.isfinite(whole)  # the slope of an angle is not, at its ends
+        speed, time_s = whole[known], record.time_s[known]
+        turned, driven = (np.cumsum(each) * period_s for each in (speed, record.total_torque_nm[known]))
+        columns.append(np.column_stack([driven, -turned, time_s[0] - time_s])[:-1])
         moved.append(speed[1:] - speed[0])
     found = np.linalg.lstsq(np.concatenate(columns), np.concatenate(moved), rcond=None)[0]
     inertia = 1.0 / max(abs(float(found[0])), np.finfo(float).tiny)

@@ -32,6 +32,10 @@ UNITS: Final = MappingProxyType(
 """Unit of each kind of channel, and what the name of its column ends in."""
 
 
+LEAST_SCALE, MOST_SCALE = 1e-12, 1e12
+"""Sizes of a scale: any unit of an integer has one between them, and a cell beyond 1e30 can't be read back."""
+
+
 class ChannelTable(Table):
     """One channel; its values are in SI units, reflected to the motor shaft.
 
@@ -113,8 +117,8 @@ class ChannelTable(Table):
             yield Fault("column", f"a name that ends in {UNITS[self.kind][1]}, its unit", self.column)
         if self.column in columns.UNITS:
             yield Fault("column", "another name than a column that every recording has", self.column)
-        if self.scale == 0:
-            yield Fault("scale", "a number other than 0", self.scale)
+        if self.scale is not None and not LEAST_SCALE <= abs(self.scale) <= MOST_SCALE:
+            yield Fault("scale", f"a number of {LEAST_SCALE:g} to {MOST_SCALE:g}, or its negative", self.scale)
         yield from self._source_faults()
 
     def _source_faults(self) -> Iterator[Fault]:

@@ -76,7 +76,9 @@ class FmuPlant:
             self._described = self._fmpy.read_model_description(str(path))
             self._fmpy.extract(str(path), unzipdir=self._folder)
         except Exception as error:
-            raise UsageError(f"{path}: expected an FMU of FMI 1.0, 2.0 or 3.0, got: {error}") from error
+            raise UsageError(
+                f"{path}: expected an FMU of FMI 1.0, 2.0 or 3.0, got: {error}. Check the path, or export it again."
+            ) from error
         variables = {each.name: each for each in self._described.modelVariables}
         self._mapped, self._known = tuple(mapped), tuple(variables)
         names(mapped, variables)
@@ -112,8 +114,22 @@ class FmuPlant:
         return FreeRun(output, float(np.sqrt(np.mean(error**2))), Start(load, 0.0, float("nan")))
 
     def named(self, kind: OutputKind) -> Names:
-        """Return which of its variables are what, for a kind of output."""
-        return names(self._mapped, self._known, kind)
+        """Return which of its variables are what, for a kind of output.
+
+        Raises
+        ------
+        UsageError
+            Where a torque is none of its inputs, or its output is one.
+        """
+        found = names(self._mapped, self._known, kind)
+        for name in found.torque:
+            if name not in self._inputs:
+                raise UsageError(
+                    f"--map torque={name}: expected an input of the FMU. It has: {', '.join(self._inputs)}"
+                )
+        if found.output in self._inputs:
+            raise UsageError(f"--map output={found.output}: expected an output of the FMU, got an input")
+        return found
 
     def is_input(self, name: str) -> bool:
         """Tell whether a variable is an input, which may change over time."""
@@ -165,8 +181,18 @@ class FmuPlant:
                     output=[named.output],
                 )
         except Exception as error:
-            raise UsageError(f"{self.name}: expected an FMU that simulates {record.name}, got: {error}") from error
-        return np.asarray(np.interp(since_s, result["time"], result[named.output]), dtype=np.float64)
+            raise UsageError(
+                f"{self.name}: expected an FMU that simulates {record.name}, got: {error}. Simulate it in the program "
+                "that made it, and export it for Linux, 64 bit."
+            ) from error
+        output = np.interp(since_s, result["time"], result[named.output])
+        if not np.isfinite(output).all():
+            given = ", ".join(f"{name} = {float(np.mean(value)):.4g}" for name, value in values.items())
+            raise UsageError(
+                f"{self.name}: expected a finite {named.output} over {record.name}, got NaN or infinity"
+                f"{f' with {given}' if given else ''}. See that what --map names as load and start is what it is."
+            )
+        return np.asarray(output, dtype=np.float64)
 
     def _given(
         self,

@@ -52,13 +52,19 @@ def names(given: Sequence[str], known: Collection[str], kind: OutputKind = Outpu
     Raises
     ------
     UsageError
-        For a key that there is not, or a name that the FMU does not have.
+        For a key that there is not or that is given twice, or a name that the FMU does not have or that is too much.
     """
     entries = [text.partition("=") for text in given]
-    for key, sign, _ in entries:
+    for text, (key, sign, _) in zip(given, entries, strict=True):
         if key not in KEYS or not sign:
-            raise UsageError(f"--map {key}{sign}: expected KEY=NAME, KEY one of {', '.join(KEYS)}")
+            raise UsageError(f"--map {text}: expected KEY=NAME, KEY one of {', '.join(KEYS)}")
+        if [each for each, _, _ in entries].count(key) > 1:
+            raise UsageError(f"--map {text}: expected {key} once, got it twice. Give its names in one: {key}=A,B")
     mapped = {key: tuple(name.strip() for name in value.split(",") if name.strip()) for key, _, value in entries}
+    for key, named in mapped.items():
+        if len({*named}) < len(named) or (key in ("output", "load") and len(named) > 1):
+            most = "one name" if key in ("output", "load") else "each name once"
+            raise UsageError(f"--map {key}={','.join(named)}: expected {most}")
     standard = OF_A_POSITION if kind is OutputKind.POSITION else Names()
     found = replace(
         standard,

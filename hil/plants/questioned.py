@@ -48,8 +48,12 @@ def questioned(
         fmu = FmuPlant(asked.model, asked.mapped, asked.trust.fmu)
         signals = None if asked.signals is None else read_signals(asked.signals)
         records = read_records(recordings, signals, False, dbc, tell)
+        if any(record.channels for record in records):
+            raise UsageError(f"{asked.signals}: expected one output with an FMU. Take outputs out of [signals]")
         return ModelFile(fmu_line(fmu, records), signals), records
     if asked.signals is not None:
         raise UsageError(f"--signals {asked.signals}: expected with an FMU; a model file has its own [signals]")
+    if asked.mapped:
+        raise UsageError(f"--map {asked.mapped[0]}: expected with an FMU; {asked.model} is a model file")
     file = read_model_for_recordings(asked.model, asked.trust.laws)
     return file, read_records(recordings, file.signals, file.on_bench, dbc, tell)

@@ -158,6 +158,9 @@ class SignalsConfig(_Strict):
             refuse([Fault("", expected, " and ".join(given))])
         if self.load is not None and self.names_bench:
             refuse([Fault("load", "no such key next to an imposed motion, which needs no load", self.load.column)])
+        taken = [*(each.column for each in self.torques()), self.output()[1].column]
+        if self.load is not None and self.load.column in taken:
+            refuse([Fault("load.column", "a column of its own", self.load.column)])
         if self.outputs and not given and not self.is_own_recording and self._first_of_outputs is None:
             expected = "a speed or a position among them, or speed = { ... } for one"
             refuse([Fault("outputs", expected, ", ".join(output.kind.value for output in self.outputs))])

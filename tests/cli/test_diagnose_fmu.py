@@ -60,6 +60,12 @@ def test_what_acts_at_an_input_is_named(fmu: str, tmp_path: Path, capsys: pytest
     [
         ([], "runs only where you trust it: --trust-fmu"),
         (["--trust-fmu", "--map", "output=w"], "expected a variable of the FMU, got 'w'. It has: "),
+        (["--trust-fmu", "--map", "output=T_M1"], "expected an output of the FMU, got an input"),
+        (["--trust-fmu", "--map", "torque=speed_motor"], "expected an input of the FMU. It has: "),
+        (["--trust-fmu", "--map", "torque=T_M1,T_M1"], "expected each name once"),
+        (["--trust-fmu", "--map", "output=speed_motor,speed_load"], "expected one name"),
+        (["--trust-fmu", "--map", "torque=T_M1", "--map", "torque=T_M2"], "expected torque once, got it twice"),
+        (["--trust-fmu", "--map", "start=J_M"], "expected a finite speed_measured over run_1, got NaN or infinity"),
         (["--trust-fmu", "--signals", "none.toml"], "none.toml"),
     ],
 )
@@ -70,6 +76,24 @@ def test_what_is_not_trusted_or_named_is_refused(
     assert run(["diagnose", str(tmp_path / "run_1.csv"), "--model", fmu, "--out", str(tmp_path / "out"), *more]) == 2
     assert said in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+def test_a_recorded_angle_is_held_against_the_fmus(fmu: str, tmp_path: Path) -> None:
+    bench.record(tmp_path / "run_1.csv", 1, n=800)
+    time, first, second, speed = np.loadtxt(tmp_path / "run_1.csv", delimiter=",", skiprows=1).T
+    columns = np.column_stack([time, first + second, bench.DT * np.cumsum(speed)])
+    np.savetxt(tmp_path / "turned.csv", columns, delimiter=",", header="t,T,x", comments="")
+    (tmp_path / "signals.toml").write_text(SIGNALS.replace("speed", "position").replace('"w"', '"x"'))
+    given = ["--signals", str(tmp_path / "signals.toml"), "--trust-fmu", "--map", "torque=T_M1", "--budget-s", "5"]
+    assert run(["diagnose", str(tmp_path / "turned.csv"), "--model", fmu, "--out", str(tmp_path / "out"), *given]) == 0
+
+
+def test_a_model_file_takes_no_map(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "drive.toml").write_text(bench.MODEL)
+    bench.record(tmp_path / "run_1.csv", 1, n=300)
+    given = ["--model", str(tmp_path / "drive.toml"), "--map", "torque=T_M1", "--out", str(tmp_path / "out")]
+    assert run(["diagnose", str(tmp_path / "run_1.csv"), *given]) == 2
+    assert "expected with an FMU" in capsys.readouterr().err
 
 
 def test_a_model_file_has_its_own_signals(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -409,6 +409,13 @@ def test_a_load_torque_is_no_output_too(changed: Changed) -> None:
     assert to_record(changed(torque_ref_nm=np.arange(40.0)), signals(outputs=BOTH, **LOAD)).channels == ()
 
 
+@pytest.mark.parametrize("column", ["torque_m1_nm", "speed_rad_s"])
+def test_a_load_torque_is_no_other_signal_too(column: str) -> None:
+    with pytest.raises(ValidationError) as caught:
+        signals(load={"column": column})
+    assert "expected a column of its own" in problem_lines(SignalsConfig, caught.value)[0]
+
+
 def test_a_load_torque_without_a_number_is_refused(changed: Changed) -> None:
     with pytest.raises(RecordingError, match="torque_ref_nm: expected a load torque, got no number"):
         to_record(changed(torque_ref_nm=np.full(40, np.nan)), signals(**LOAD))

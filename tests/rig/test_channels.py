@@ -124,7 +124,8 @@ def test_a_driveline_without_such_places_is_refused(tmp_path: Path) -> None:
         ('"torque_shaft_nm"', '"torque_shaft"', r"channels\.2\.column \| expected a name that ends in _nm"),
         ('"torque_shaft_nm"', '"torque_m1_nm"', r"channels\.2\.column \| .*every recording has"),
         ('at = "shaft"', 'at = "motor"', r"channels\.2\.kind \| .*got 'torque at the motor'"),
-        ("scale = 0.1", "scale = 0.0", r"channels\.2\.scale \| expected a number other than 0"),
+        ("scale = 0.1", "scale = 0.0", r"channels\.2\.scale \| expected a number of 1e-12 to 1e\+12"),
+        ("scale = 0.1", "scale = 1e300", r"channels\.2\.scale \| expected a number of 1e-12 to 1e\+12"),
         (
             'register = "acceleration"',
             'register = "acceleration"\nsubindex = 3',

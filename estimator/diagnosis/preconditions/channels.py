@@ -25,6 +25,9 @@ ALIKE = 0.5
 MOST_RATIO = 2.0
 """Factor by which a speed may be larger or smaller than the motor's: the shaft's twist is no part of its spread."""
 
+CHANCE = 3.0
+"""Standard deviations of the correlation of two signals that have nothing to do with each other."""
+
 SAME = 1e-9
 """Difference over the spread up to which two channels are one signal."""
 
@@ -99,13 +102,16 @@ def _fault(record: Record, channel: Channel, others: Sequence[Channel]) -> str:
     seen = good & np.isfinite(like)
     width = max(1, round(SMOOTH_S / record.sample_time_s))
     mine, its = (_smooth(np.where(seen, each, 0.0), width) for each in (channel.output, like))
-    return _turned(channel, mine[seen], its[seen]) or _off_clock(record, mine, its, seen)
+    return _turned(channel, mine[seen], its[seen], seen.sum() / width) or _off_clock(record, mine, its, seen)
 
 
-def _turned(channel: Channel, mine: FloatArray, its: FloatArray) -> str:
+def _turned(channel: Channel, mine: FloatArray, its: FloatArray, independent: float) -> str:
     mine, its = mine - mine.mean(), its - its.mean()
     both = float(np.linalg.norm(mine) * np.linalg.norm(its))
     alike = float(mine @ its) / both if both else 0.0
+    if channel.kind is not OutputKind.TORQUE or channel.location is not Location.LOAD:
+        if abs(alike) < CHANCE / np.sqrt(independent):
+            return "it does not go with the motor at all: another signal, or a sensor that shows noise alone."
     if alike < -ALIKE:
         return "it goes the other way than the motor: turned round. Give it a negative scale."
     if channel.kind is OutputKind.SPEED and alike > ALIKE:

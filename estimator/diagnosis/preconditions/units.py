@@ -54,6 +54,9 @@ MOST_PER_MILLE = 50.0
 MOST_PER_CENT = 300.0
 """Torque in per cent of a rated one that no drive exceeds."""
 
+MOST_LOAD = 10.0
+"""Factor by which a load machine's torque may exceed all torque of the motor: more would turn the motor over."""
+
 NAMED = 2
 """Known factors that a message names."""
 
@@ -75,6 +78,8 @@ def require_plausible_units(records: Sequence[Record], model: DrivelineModel) ->
         With the factor, and the units that it is close to.
     """
     line = replace(model, effects={})
+    for record in records:
+        _require_plausible_load(record)
     for record in map(_less_its_load, records):
         if record.kind is OutputKind.FORCE:
             continue
@@ -115,6 +120,18 @@ def _refuse_milliseconds(record: Record, line: DrivelineModel) -> None:
             f"{shorter:g} s it fits the nominal inertia. Is time in ms, expected s? Give time its scale in "
             "[signals].",
             Cure(record.name, time=1e-3),
+        )
+
+
+def _require_plausible_load(record: Record) -> None:
+    if record.load_nm is None:
+        return
+    load, torque = (float(np.abs(each).max()) for each in (record.load_nm, record.total_torque_nm))
+    if load > MOST_LOAD * torque:
+        raise Implausible(
+            f"recording {record.name} is implausible: its measured load torque reaches {load:.3g} Nm, its torque "
+            f"{torque:.3g} Nm. Is load in another unit, or not as the motor shaft sees it? Divide its scale in "
+            "[signals] by the gear's ratio."
         )
 
 

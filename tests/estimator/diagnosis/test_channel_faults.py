@@ -56,6 +56,14 @@ def test_a_channel_by_another_clock_is_left_out(ppm: float) -> None:
     assert apart == pytest.approx(abs(ppm), rel=0.2)
 
 
+@pytest.mark.parametrize("seed", range(1, 6))
+@pytest.mark.parametrize("kind", [OutputKind.SPEED, OutputKind.ACCELERATION])
+def test_a_channel_that_shows_noise_alone_is_left_out(kind: OutputKind, seed: int) -> None:
+    mended, (warning,) = with_usable_channels([with_channel(np.full(N, 3.0), kind, seed=seed)])
+    assert mended[0].channels == ()
+    assert "does not go with the motor at all" in warning
+
+
 def test_where_a_channel_is_dead_it_is_not_used() -> None:
     speed = states()[:, LOAD_SPEED]
     whole = with_channel(speed)

@@ -60,6 +60,12 @@ def test_a_load_that_takes_most_of_the_torque_is_no_wrong_unit() -> None:
         require_plausible_units([replace(record, load_nm=None)], model(ONE_MASS))
 
 
+def test_a_load_beyond_all_torque_is_another_unit() -> None:
+    record = braked(ONE_MASS)
+    with pytest.raises(Implausible, match="its measured load torque reaches"):
+        require_plausible_units([replace(record, load_nm=1000.0 * record.total_torque_nm)], model(ONE_MASS))
+
+
 def test_it_has_a_number_in_every_row() -> None:
     with pytest.raises(BadShape, match="load_nm holds NaN"):
         replace(braked(ONE_MASS), load_nm=np.where(np.arange(400) == 7, np.nan, LOAD))
