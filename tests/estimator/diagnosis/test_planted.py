@@ -174,10 +174,18 @@ WITH_EVERY_CHANGE = {
 """One law each of torque path, shaft and sensor, and an event; the others take too long: `make campaign`."""
 
 
+MISSED = {
+    "torque_slew": "a torque whose rate is limited is named a lag, next to a remainder",
+    "torque_dropouts": "no name is given, but it is placed at the acquisition",
+}
+"""What is known not to be answered as it should be."""
+
+
 def by_turns(names: Sequence[str]) -> list[object]:
-    """Mark what is run by `make campaign` only."""
+    """Mark what is run by `make campaign` only, and what is known to be missed."""
     marks = {True: (), False: (pytest.mark.campaign,)}
-    return [pytest.param(name, marks=marks[name in WITH_EVERY_CHANGE]) for name in names]
+    missed = {name: (pytest.mark.xfail(reason=why, strict=True),) for name, why in MISSED.items()}
+    return [pytest.param(name, marks=(*marks[name in WITH_EVERY_CHANGE], *missed.get(name, ()))) for name in names]
 
 
 @pytest.mark.parametrize("name", by_turns(IN_CATALOGUE))
@@ -203,7 +211,12 @@ def own_frequency_hz(sizes: Mapping[str, float]) -> float:
     return float(np.sqrt(sizes["stiffness_nm_per_rad"] / sizes["inertia_kg_m2"])) / (2.0 * np.pi)
 
 
-@pytest.mark.parametrize("at_motor", [pytest.param(True, marks=pytest.mark.campaign), False], ids=["motor", "load"])
+HUNG = pytest.mark.xfail(reason="named, but as an inertia that hangs at the motor by a spring", strict=True)
+
+
+@pytest.mark.parametrize(
+    "at_motor", [pytest.param(True, marks=(pytest.mark.campaign, HUNG)), False], ids=["motor", "load"]
+)
 def test_a_mode_is_named_with_its_frequency_on_either_side_of_the_shaft(at_motor: bool) -> None:
     """The first seed that hides one at the motor that samples of 10 ms show, and the first at the load."""
     name = "extra_torsional_mode"
