@@ -132,7 +132,10 @@ def acts_at(beliefs: Sequence[Belief], element: Element) -> bool:
 
 
 def gain_of_names(alone: Hypothesis, nothing: Hypothesis, law: Law) -> float:
-    """Return what names at the place of a law without a name gain by themselves, over what the law gains."""
+    """Return what a set of names gains over nothing, as a share of what a law without a name gains.
+
+    ``alone`` is that set: the best one, or what of it acts at the law's place.
+    """
     return (nothing.score - alone.score) / (nothing.score - law.score)
 
 
