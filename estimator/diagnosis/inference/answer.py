@@ -30,7 +30,7 @@ from estimator.diagnosis.inference.unnamed import (
     hunts_around,
     weighed_against,
 )
-from estimator.diagnosis.inference.verdict import Decision, decide
+from estimator.diagnosis.inference.verdict import Decision, decide, spread, verdict_of
 from estimator.diagnosis.inference.wording import statement, tests_in_words
 from estimator.diagnosis.phrases import law_in_words
 from estimator.diagnosis.preconditions import Prepared
@@ -153,10 +153,12 @@ def _looked_at(search: Search, decision: Decision, is_over: Callable[[], bool]) 
     line = free_line(search) if decision.failed or decision.named else None
     if line is not None:
         decision = beside_rival(decision, line.score, lambda each: True)
+    believed = decision.nothing
+    if decision.verdict in (Verdict.EXPLAINED, Verdict.PARTLY_EXPLAINED):
+        decision, believed = _without_doubted(search, decision)
     if decision.verdict not in (Verdict.EXPLAINED, Verdict.PARTLY_EXPLAINED):
         strays = line.strays if line is not None and line.leaves_noise else ()
         return _Seen(replace(decision, named=()), decision.nothing, hunts, law, strays)
-    decision, believed = _without_doubted(search, decision)
     is_left = bool(decision.failed) and not is_over()
     first = of_first_outputs(believed)
     left = best_law(first, hunts_around(first)) if is_left else None
@@ -170,8 +172,8 @@ def _without_doubted(search: Search, decision: Decision) -> tuple[Decision, Hypo
         established = search.without(established, name)
     if established is not decision.best:
         failed = tuple(test for test in tests(established) if test.failed)
-        verdict = Verdict.PARTLY_EXPLAINED if failed else Verdict.EXPLAINED
-        decision = replace(decision, verdict=verdict, failed=failed)
+        of_spread = free_rms(established) / spread(established)
+        decision = replace(decision, verdict=verdict_of(of_spread, True, bool(failed)), failed=failed)
     return decision, _steps_from_their_moment(search, established)
 
 

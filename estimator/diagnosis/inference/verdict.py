@@ -122,7 +122,7 @@ def decide(search: Search, ground: Grounds, with_findings: bool = False) -> Deci
     rms = math.sqrt(levels(search.path)[-1] / best.plain.residual.size)
     left = min(max(rms**2 - noise**2, 0.0) / free_rms(nothing) ** 2, 1.0)
     return Decision(
-        _verdict(rms / _spread(best), bool(named) or with_findings, bool(failed)),
+        verdict_of(rms / spread(best), bool(named) or with_findings, bool(failed)),
         best,
         nothing,
         named,
@@ -151,7 +151,8 @@ def _as_simple_as_will_do(search: Search, best: Hypothesis) -> Hypothesis:
     return best
 
 
-def _verdict(of_spread: float, is_named: bool, is_more_than_noise: bool) -> Verdict:
+def verdict_of(of_spread: float, is_named: bool, is_more_than_noise: bool) -> Verdict:
+    """Return the verdict on a set that leaves an error of so much of the signal's spread (CONTRACT)."""
     if of_spread > CLEARLY_BELOW:
         return Verdict.UNEXPLAINED
     if is_named:
@@ -159,7 +160,7 @@ def _verdict(of_spread: float, is_named: bool, is_more_than_noise: bool) -> Verd
     return Verdict.UNEXPLAINED if is_more_than_noise else Verdict.NO_MISMATCH
 
 
-def _spread(best: Hypothesis) -> float:
+def spread(best: Hypothesis) -> float:
     """Return how far the output itself is spread, each recording around its mean."""
     problem = best.plain.problem
     parts = [record.output[use] for record, use in zip(problem.records, problem.use, strict=True)]

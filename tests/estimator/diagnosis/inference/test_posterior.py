@@ -10,7 +10,8 @@ import pytest
 from estimator.diagnosis.inference import remainder
 from estimator.diagnosis.inference.likelihood import Hypothesis
 from estimator.diagnosis.inference.posterior import Score, levels, probability_of, shares, shares_with_grade
-from estimator.diagnosis.inference.verdict import tempered_by
+from estimator.diagnosis.inference.verdict import tempered_by, verdict_of
+from estimator.diagnosis.result import Verdict
 
 
 @dataclass
@@ -88,3 +89,19 @@ def test_differences_of_scores_count_by_what_is_left_beyond_what_explained_world
     assert tempered_by([left_over(0.02, 0.03), left_over(50.0, 25.0, is_share=False)], 1000, 4.0) == 4.0
     assert tempered_by([left_over(0.05, 0.03), left_over(0.13, 0.03)], 1000, 4.0) == pytest.approx(104.0)
     assert tempered_by([left_over(0.0301, 0.03)], 1000, 4.0) == pytest.approx(4.1)
+
+
+@pytest.mark.parametrize(
+    ("of_spread", "is_named", "is_more_than_noise", "expected"),
+    [
+        (0.1, True, False, Verdict.EXPLAINED),
+        (0.1, True, True, Verdict.PARTLY_EXPLAINED),
+        (0.1, False, False, Verdict.NO_MISMATCH),
+        (0.1, False, True, Verdict.UNEXPLAINED),
+        (1.2, True, True, Verdict.UNEXPLAINED),
+    ],
+)
+def test_nothing_is_explained_that_leaves_as_much_as_the_signal_itself(
+    of_spread: float, is_named: bool, is_more_than_noise: bool, expected: Verdict
+) -> None:
+    assert verdict_of(of_spread, is_named, is_more_than_noise) is expected
