@@ -13,6 +13,7 @@ import numpy as np
 from estimator.diagnosis.assemble import augmented_model, load_torques, retuned_parameters
 from estimator.diagnosis.chain import mechanical, read_through
 from estimator.diagnosis.hypotheses import Progress, open_hypotheses
+from estimator.diagnosis.inference.calibration import CLEARLY_BELOW
 from estimator.diagnosis.inference.data_sheet import free_line
 from estimator.diagnosis.inference.disturbances import reading_noise
 from estimator.diagnosis.inference.figures import FreeRuns, courses_of, effects_of, figures_of, free_runs, traces_of
@@ -80,6 +81,9 @@ def answer(ready: Prepared, model: DrivelineModel, progress: Progress, budget_s:
     progress("simulating what was found", 0.9)
     unseen = Unseen(line, read_through(ready.holdout).records)
     runs = free_runs(seen.decision.nothing, seen.believed, not seen.decision.failed, chain, unseen)
+    if seen.believed is not seen.decision.nothing and runs.final.rms > CLEARLY_BELOW * spread(runs.final.problem):
+        seen = _abstained(seen)  # what held on thinned samples does not at the recordings' own rate
+        runs = free_runs(seen.decision.nothing, seen.believed, False, chain, unseen)
     said = _said(seen, runs, search, untestable, model)
     progress("done", 1.0)
     warnings = (_stopped(search, budget_s),) if search.stopped else ()
@@ -165,6 +169,13 @@ def _looked_at(search: Search, decision: Decision, is_over: Callable[[], bool]) 
     return _Seen(decision, believed, hunts, left)
 
 
+def _abstained(seen: _Seen) -> _Seen:
+    """Return what is left to say where what is believed leaves as much as the signal itself."""
+    decision = replace(seen.decision, verdict=Verdict.UNEXPLAINED, named=(), traces=())
+    law = best_law(of_first_outputs(decision.nothing), seen.hunts) if seen.hunts else None
+    return _Seen(decision, decision.nothing, seen.hunts, law)
+
+
 def _without_doubted(search: Search, decision: Decision) -> tuple[Decision, Hypothesis]:
     """Return a decision on the effects that are established, traces among them, and the set of these."""
     established = decision.best
@@ -172,7 +183,7 @@ def _without_doubted(search: Search, decision: Decision) -> tuple[Decision, Hypo
         established = search.without(established, name)
     if established is not decision.best:
         failed = tuple(test for test in tests(established) if test.failed)
-        of_spread = free_rms(established) / spread(established)
+        of_spread = free_rms(established) / spread(established.plain.problem)
         decision = replace(decision, verdict=verdict_of(of_spread, True, bool(failed)), failed=failed)
     return decision, _steps_from_their_moment(search, established)
 

@@ -33,6 +33,7 @@ from estimator.diagnosis.inference.remainder import Test, tests
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.result import Verdict
 from estimator.physics.catalogue import EFFECTS
+from estimator.physics.problem import Problem
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,7 +123,7 @@ def decide(search: Search, ground: Grounds, with_findings: bool = False) -> Deci
     rms = math.sqrt(levels(search.path)[-1] / best.plain.residual.size)
     left = min(max(rms**2 - noise**2, 0.0) / free_rms(nothing) ** 2, 1.0)
     return Decision(
-        verdict_of(rms / spread(best), bool(named) or with_findings, bool(failed)),
+        verdict_of(rms / spread(best.plain.problem), bool(named) or with_findings, bool(failed)),
         best,
         nothing,
         named,
@@ -160,8 +161,7 @@ def verdict_of(of_spread: float, is_named: bool, is_more_than_noise: bool) -> Ve
     return Verdict.UNEXPLAINED if is_more_than_noise else Verdict.NO_MISMATCH
 
 
-def spread(best: Hypothesis) -> float:
+def spread(problem: Problem) -> float:
     """Return how far the output itself is spread, each recording around its mean."""
-    problem = best.plain.problem
     parts = [record.output[use] for record, use in zip(problem.records, problem.use, strict=True)]
     return float(np.std(np.concatenate([part - part.mean() for part in parts])))
