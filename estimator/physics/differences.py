@@ -25,12 +25,12 @@ def fill_differences(
 
     Parameters
     ----------
-    moved : ndarray, shape (K, N)
-        Simulations with one unknown moved each [unit of the output].
-    of : ndarray of int, shape (K,)
-        Which recording each is of.
+    moved : ndarray, shape (K, C, N)
+        Outputs of simulations with one unknown moved each [units of the outputs].
+    of : ndarray of int, shape (K, C)
+        Which of the I each output is.
     outputs, use : ndarray, shape (I, N)
-        Of every recording the simulation without [unit of the output], and which samples count.
+        Of every output the simulation without [unit of the output], and which samples count.
     steps : ndarray, shape (K,)
         By how much it is moved, in scaled unknowns, without unit.
     limits, least : ndarray, shape (I,)
@@ -39,16 +39,16 @@ def fill_differences(
     columns : ndarray of int, shape (K,)
         Which unknown is moved.
     firsts : ndarray of int, shape (I,)
-        Where the samples of each recording begin among all that count.
+        Where the samples of each output begin among all that count.
     found : ndarray, shape (U, R)
         A row per unknown.
     """
-    for k in range(of.size):
-        i = of[k]
+    for k, c in np.ndindex(of.shape):
+        i = of[k, c]
         row, largest = firsts[i], 0.0
         for n in range(outputs.shape[1]):
             if use[i, n]:
-                value = limits[i] if np.isnan(moved[k, n]) else min(max(moved[k, n], -limits[i]), limits[i])
+                value = limits[i] if np.isnan(moved[k, c, n]) else min(max(moved[k, c, n], -limits[i]), limits[i])
                 change = value - outputs[i, n]
                 found[columns[k], row] = change / steps[k]
                 largest = max(largest, abs(change))

@@ -17,7 +17,8 @@ from estimator.physics.differences import fill_differences
 from estimator.physics.inputs import Case
 from estimator.physics.parallel import concurrently
 from estimator.physics.problem import Problem, bounds, case_of, far_away, local_part, own_part, parameters
-from estimator.physics.simulate import are_of_a_length, go_together, lanes_filled, simulate_each, simulate_together
+from estimator.physics.simulate import simulate_outputs
+from estimator.physics.together import are_of_a_length, go_together, lanes_filled, simulate_together
 from estimator.physics.unknowns import Shared
 from estimator.signals.record import BoolArray, FloatArray, IntArray
 
@@ -39,7 +40,7 @@ class _Moved:
     Attributes
     ----------
     of, columns : ndarray of int, shape (K,)
-        Which recording each is of, and which unknown is moved.
+        Which of the drives each is of, and which unknown is moved.
     """
 
     of: IntArray
@@ -59,8 +60,8 @@ def jacobian_at(
     """
     low, high = bounds(problem)
     wanted = (low < high) if among is None else (low < high) & among
-    moving = [np.flatnonzero(_moves(problem, wanted, i)) for i in range(len(problem.records))]
-    around = _Around(problem, x, outputs)
+    moving = [np.flatnonzero(_moves(problem, wanted, drive[0])) for drive in problem.drives]
+    around = _Around(problem, x, outputs, problem.drives)
     parts = _together(problem, moving) if around.is_one else _apart(moving)
     found = np.zeros((x.size, around.firsts[-1]))
     concurrently(lambda part: around.fill(part, found), parts)
@@ -71,9 +72,9 @@ def changes(
     problem: Problem, x: FloatArray, index: int, columns: IntArray, outputs: Sequence[FloatArray]
 ) -> FloatArray:
     """Return the derivative of one recording's errors by some of the scaled unknowns, shape (R_i, columns.size)."""
-    around = _Around(problem, x, outputs)
+    around = _Around(problem, x, outputs, [(index,)])
     found = np.zeros((x.size, around.firsts[-1]))
-    around.fill(_Moved(np.full(columns.size, index), columns), found)
+    around.fill(_Moved(np.zeros(columns.size, dtype=np.int64), columns), found)
     return found[columns, around.firsts[index] : around.firsts[index + 1]].T
 
 
@@ -86,7 +87,7 @@ def _moves(problem: Problem, free: BoolArray, index: int) -> BoolArray:
 
 
 def _apart(moving: Sequence[IntArray]) -> list[_Moved]:
-    """Return parts of one recording each: two at least, none wider than the lanes."""
+    """Return parts of one drive each: two at least, none wider than the lanes."""
     return [
         _Moved(np.full(some.size, i), some)
         for i, mine in enumerate(moving)
@@ -96,11 +97,11 @@ def _apart(moving: Sequence[IntArray]) -> list[_Moved]:
 
 
 def _together(problem: Problem, moving: Sequence[IntArray]) -> list[_Moved]:
-    """Return parts across recordings that fill the lanes; the same unknown of all is next to it."""
+    """Return parts across drives that fill the lanes; the same unknown of all is next to it."""
     of = np.repeat(np.arange(len(moving)), [mine.size for mine in moving])
     columns = np.concatenate(moving)
     own = columns >= len(problem.shared)
-    place = columns - np.where(own, [own_part(problem, i).start for i in of.tolist()], 0)
+    place = columns - np.where(own, [own_part(problem, problem.drives[i][0]).start for i in of.tolist()], 0)
     order = np.lexsort((of, place, own))
     everything = _Moved(of[order], columns[order])
     longest = max(record.time_s.size for record in problem.records)
@@ -108,14 +109,21 @@ def _together(problem: Problem, moving: Sequence[IntArray]) -> list[_Moved]:
 
 
 class _Around:
-    """The free runs around a point: each differs from the one there by one unknown."""
+    """The free runs around a point: each differs from the one there by one unknown.
 
-    def __init__(self, problem: Problem, x: FloatArray, outputs: Sequence[FloatArray]) -> None:
+    ``drives`` holds the places of outputs that one simulation gives.
+    """
+
+    def __init__(
+        self, problem: Problem, x: FloatArray, outputs: Sequence[FloatArray], drives: Sequence[tuple[int, ...]]
+    ) -> None:
         self._problem, self._x = problem, x
         _, high = bounds(problem)
         self._steps = np.where(x + STEP <= high, STEP, -STEP)
         p = parameters(problem, x)
-        self._cases = [case_of(basis, p, local_part(problem, x, i)) for i, basis in enumerate(problem.local)]
+        self._members = drives
+        self._drives = [[problem.records[i] for i in drive] for drive in drives]
+        self._cases = [case_of(problem.local[i], p, local_part(problem, x, i)) for i, *_ in drives]
         shape = (len(outputs), max(output.size for output in outputs))
         self._outputs, self._use = np.zeros(shape), np.zeros(shape, dtype=bool)
         for i, (output, use) in enumerate(zip(outputs, problem.use, strict=True)):
@@ -125,28 +133,31 @@ class _Around:
 
     @property
     def is_one(self) -> bool:
-        """Whether the recordings are simulated as if they were one."""
-        problem, records = self._problem, self._problem.records
-        if len(records) == 1 or not are_of_a_length(records):
+        """Whether the drives are simulated as if they were one."""
+        problem = self._problem
+        if len(self._drives) == 1 or not are_of_a_length(self._drives):
             return False
         moved = {unknown.slot for unknown in (*problem.shared, *(own for basis in problem.local for own in basis.own))}
-        return go_together(problem.grid, records, [case.p for case in self._cases], sorted(moved))
+        return go_together(problem.grid, self._drives, [case.p for case in self._cases], sorted(moved))
 
     def fill(self, moved: _Moved, found: FloatArray) -> None:
         """Fill in derivatives: a row of all samples that count for each unknown, shape (U, R)."""
-        grid, records = self._problem.grid, self._problem.records
+        grid, drives = self._problem.grid, self._drives
         of, columns, steps = moved.of, moved.columns, self._steps[moved.columns]
         cases = [self._case(i, j) for i, j in zip(of.tolist(), columns.tolist(), strict=True)]
         if (of == of[0]).all():
-            out = simulate_each(grid, records[of[0]], cases)
+            out = simulate_outputs(grid, drives[of[0]], cases)
         else:
-            out = simulate_together(grid, records, of.tolist(), cases)
+            out = simulate_together(grid, drives, of.tolist(), cases)
+        members = np.array([self._members[i] for i in of])
         least = ROUNDING * np.abs(self._outputs).max(axis=1)
-        fill_differences(out, of, self._outputs, self._use, steps, self._limits, least, columns, self.firsts, found)
+        known = self._outputs, self._use, steps, self._limits, least, columns, self.firsts
+        fill_differences(out, members, *known, found)
 
-    def _case(self, index: int, column: int) -> Case:
-        """Return the simulation of a recording with one of the scaled unknowns moved by its step."""
-        problem, case, basis = self._problem, self._cases[index], self._problem.local[index]
+    def _case(self, drive: int, column: int) -> Case:
+        """Return the simulation of a drive with one of the scaled unknowns moved by its step."""
+        problem, case, index = self._problem, self._cases[drive], self._members[drive][0]
+        basis = problem.local[index]
         moved = float(self._x[column] + self._steps[column])
         own = column - own_part(problem, index).start
         if column < len(problem.shared):

@@ -216,13 +216,13 @@ def trajectory(
 
     ``substeps`` and ``sensor``, 1 and False, come from outside: for constants the whole kernel would be compiled anew.
     """
-    out, slopes = np.empty(torque.shape[0]), np.zeros((2, 0))
-    given, driven = (step_s, substeps, sign_width, first, start_s), (torque, load, angle, p, state)
-    for row in range(1 if len(masses) == 1 else 3):
-        output = state_vector.SPEED if row == 0 else (state_vector.LOAD_SPEED if row == 1 else state_vector.TWIST)
-        state[:] = begin
-        integration.integrate(masses, *given, *driven, output, sensor, out, slopes)
-        motion[row, :-1] = out[first:]
-        motion[row, -1] = state[output]
+    outputs = np.array([state_vector.SPEED, state_vector.LOAD_SPEED, state_vector.TWIST])
+    out = np.empty((outputs.size, torque.shape[0]))
+    given, driven = (step_s, substeps, sign_width, first, torque.shape[0], start_s), (torque, load, angle, p, state)
+    state[:] = begin
+    integration.integrate(masses, *given, *driven, outputs, sensor, out, np.zeros((2, 0)))
+    motion[:, :-1] = out[:, first:]
+    for row in range(outputs.size):
+        motion[row, -1] = state[outputs[row]]
     if len(masses) == 1:
         motion[1] = motion[0]

@@ -15,8 +15,9 @@ from estimator.physics.grid import Grid, grid_for
 from estimator.physics.inputs import Case
 from estimator.physics.layout import LOAD, flat, slot
 from estimator.physics.model import DrivelineModel, Load
-from estimator.physics.simulate import simulate_each, simulate_records
+from estimator.physics.simulate import simulate_each
 from estimator.physics.start import Start
+from estimator.physics.together import simulate_records
 from estimator.physics.unknowns import LocalBasis, Shared, local_basis, own_unknowns, shared_load
 from estimator.signals.once import once
 from estimator.signals.outputs import leads
@@ -54,6 +55,12 @@ class Problem:
     def __post_init__(self) -> None:
         if not self.leads:
             object.__setattr__(self, "leads", leads(self.records))
+
+    @property
+    def drives(self) -> tuple[tuple[int, ...], ...]:
+        """Places of the outputs of each recording, which one simulation gives; first that of the recording itself."""
+        firsts = sorted(set(self.leads))
+        return tuple(tuple(i for i, lead in enumerate(self.leads) if lead == first) for first in firsts)
 
     @property
     def bases(self) -> tuple[LocalBasis, ...]:
@@ -132,9 +139,11 @@ def start_vector(problem: Problem) -> FloatArray:
 def outputs_at(problem: Problem, x: FloatArray) -> tuple[FloatArray, ...]:
     """Simulate every recording at scaled unknowns ``x``."""
     p = parameters(problem, x)
-    cases = [case_of(basis, p, local_part(problem, x, i)) for i, basis in enumerate(problem.local)]
-    outputs = simulate_records(problem.grid, problem.records, cases)
-    return tuple(_within_reason(out, record) for out, record in zip(outputs, problem.records, strict=True))
+    drives = problem.drives
+    cases = [case_of(problem.local[drive[0]], p, local_part(problem, x, drive[0])) for drive in drives]
+    runs = simulate_records(problem.grid, [[problem.records[i] for i in drive] for drive in drives], cases)
+    found = {i: out for drive, run in zip(drives, runs, strict=True) for i, out in zip(drive, run, strict=True)}
+    return tuple(_within_reason(found[i], record) for i, record in enumerate(problem.records))
 
 
 def start_of(problem: Problem, x: FloatArray, index: int) -> Start:

@@ -54,7 +54,7 @@ class Stepper:
         self._torque = np.zeros(history)
         self._load = np.full(history, load_torque_nm)
         self._angle = np.zeros(history)
-        self._out = np.zeros(history)
+        self._outputs, self._out = np.array([state_vector.SPEED]), np.zeros((1, history))
         self._slopes = np.zeros((2, 0))
         start = Start(load_torque_nm, 0.0, speed_rad_s, load_speed_rad_s=speed_rad_s, middle_speed_rad_s=speed_rad_s)
         self._state = initial_state(start, 0.0, 0.0, self._p)
@@ -86,13 +86,14 @@ class Stepper:
             self._substeps,
             SIGN_WIDTH_RAD_S,
             last,
+            last + 1,
             (self._steps - last) * self._period_s,
             self._torque,
             self._load,
             self._angle,
             self._p,
             self._state,
-            state_vector.SPEED,
+            self._outputs,
             False,
             self._out,
             self._slopes,

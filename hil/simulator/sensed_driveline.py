@@ -41,25 +41,26 @@ class SensedDriveline(Stepper):
         """
         is_slope = kind is OutputKind.ACCELERATION
         size, last = self._torque.size, self._torque.size - 1
-        out, slopes = np.zeros(size), np.zeros((2, size))
+        out, slopes = np.zeros((1, size)), np.zeros((2, size))
         integration.integrate_period(
             MASSES[self._structure],
             self._period_s,
             FINER * self._substeps if is_slope else self._substeps,
             SIGN_WIDTH_RAD_S,
             last,
+            size,
             (self._steps - last) * self._period_s,
             np.append(self._torque[1:], self._torque[-1]),
             self._load,
             self._angle,
             self._p,
             self._state.copy(),
-            output_state(_recording_of(kind, at), self._structure),
+            np.array([output_state(_recording_of(kind, at), self._structure)]),
             False,
             out,
             slopes,
         )
-        return float(slopes[1, last] if is_slope else out[last])
+        return float(slopes[1, last] if is_slope else out[0, last])
 
 
 def _recording_of(kind: OutputKind, at: Location) -> Record:

@@ -24,7 +24,7 @@ class Setting(NamedTuple):
     substeps: int
     sign_width: float
     angle: FloatArray
-    output: int
+    outputs: NDArray[np.int_]
     sensor: bool
     out: FloatArray
     slopes: FloatArray
@@ -145,16 +145,17 @@ def run_block(setting: Setting, first: int, torques: Torques, p: FloatArray, sta
         setting.substeps,
         setting.sign_width,
         first,
+        torque.shape[0],
         0.0,
         torque,
         load,
         setting.angle,
         p,
         state,
-        setting.output,
+        setting.outputs,
         setting.sensor,
         setting.out,
         setting.slopes,
     )
-    mean: float = setting.out[first : torque.shape[0]].mean()
+    mean: float = setting.out[0, first : torque.shape[0]].mean()
     return mean

@@ -89,9 +89,9 @@ def _setting(result: FitResult, record: Record, angle: FloatArray) -> Setting:
         substeps=grid.substeps,
         sign_width=grid.sign_width,
         angle=angle,
-        output=output,
+        outputs=np.array([output]),
         sensor=output != state_vector.ANGLE,
-        out=np.zeros(angle.size),
+        out=np.zeros((1, angle.size)),
         slopes=np.zeros((2, 0)),  # no room: not wanted
     )
 

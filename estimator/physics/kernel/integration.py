@@ -42,7 +42,7 @@ from estimator.physics.kernel.state_vector import (
     unpacked,
 )
 from estimator.physics.low_pass import low_pass
-from estimator.signals.record import FloatArray
+from estimator.signals.record import FloatArray, IntArray
 
 RADIANS_PER_STEP_OF_MODE = 0.6
 """Integration step in radians of the extra mode, which is seen through the motor's inertia only."""
@@ -105,13 +105,14 @@ def integrate_made(
     substeps: int,
     sign_width: float,
     first: int,
+    last: int,
     start_s: float,
     torque: FloatArray,
     load: FloatArray,
     angle: FloatArray,
     p: FloatArray,
     state: FloatArray,
-    output: int,
+    outputs: IntArray,
     sensor: bool,
     out: FloatArray,
     slopes: FloatArray,
@@ -125,7 +126,7 @@ def integrate_made(
     waving, filtering = is_waving(p), p[slots.FILTER] > 0.0
     steep = slopes.shape[1] > 0
     slope = slope_before(first, slopes)
-    n = min(torque.shape[0], out.shape[0])
+    output = outputs[0]
     linear = torque.shape[0] >= WORTHWHILE_SAMPLES and is_linear(line, p)
     whole = not (is_late(p) or filtering or steep or has_dry_friction(p))
     leap = substeps if whole else 1
@@ -135,10 +136,11 @@ def integrate_made(
     bristles = Bristles(state[BRISTLES_MOTOR], state[BRISTLES_LOAD])
     now = conditions(line.masses, start_s + first * sample_time_s, h, 0.0, 0.0, sign_width, p)
     to, read = answers(line, now, p, h, 0), False
-    for k in range(first, n):
+    for k in range(first, last):
         turn = angle[k + 1] - angle[k] if k + 1 < angle.shape[0] else angle[k] - angle[k - 1]
-        value = read_out(line, now, x, output, p)
-        out[k] = shown(reading(value, angle[k], p), filtered, p) if sensor else value
+        for i in range(outputs.shape[0]):
+            value = read_out(line, now, x, outputs[i], p)
+            out[i, k] = shown(reading(value, angle[k], p), filtered, p) if sensor and i == 0 else value
         leave_slope(k, slope, slopes)
         time_s = start_s + k * sample_time_s
         varying = waving or is_changing(time_s - sample_time_s, time_s + sample_time_s, p)
@@ -161,7 +163,7 @@ def integrate_made(
                 filtered, filter_rise = smoothed(before, x, output, turned, turns, filtered, filter_rise, low, p, h)
             if steep and j == 0:
                 slopes[1, k] = slope
-    leave_slope(n, slope, slopes)
+    leave_slope(last, slope, slopes)
     for i, last in enumerate(x):
         state[i] = last
     state[LAGGED], state[LAG_RISE] = lagged, lag_rise
@@ -176,20 +178,21 @@ def integrate(
     substeps: int,
     sign_width: float,
     first: int,
+    last: int,
     start_s: float,
     torque: FloatArray,
     load: FloatArray,
     angle: FloatArray,
     p: FloatArray,
     state: FloatArray,
-    output: int,
+    outputs: IntArray,
     sensor: bool,
     out: FloatArray,
     slopes: FloatArray,
 ) -> None:
-    """Simulate samples ``first`` to the end of ``torque`` or of ``out``, whichever comes first.
+    """Simulate samples ``first`` to ``last``, without this one.
 
-    Row k of ``out`` is the state entry before torque k acts.
+    Column k of ``out`` is the states' entries before torque k acts.
 
     Parameters
     ----------
@@ -201,8 +204,8 @@ def integrate(
         Integration steps per period.
     sign_width : float
         Speed within which dry friction changes sign [rad/s].
-    first : int
-        Sample to start at; earlier torques are only seen through the delay.
+    first, last : int
+        Sample to start at, and the one behind the last; other torques are only seen through a delay or a clock.
     start_s : float
         Time of sample 0, for laws over time [s].
     torque, load : ndarray, shape (N,)
@@ -213,28 +216,29 @@ def integrate(
         Parameters of the superset model.
     state : ndarray, shape (STATES,)
         Start state; the end state afterwards.
-    output : int
-        Which state is the output.
+    outputs : ndarray of int, shape (C,)
+        Which states are the outputs.
     sensor : bool
-        Whether the output is seen through the speed sensor.
-    out : ndarray, shape (N,), or shorter where the simulation ends before
+        Whether the first output is seen through the speed sensor.
+    out : ndarray, shape (C, N)
         Filled from ``first`` on.
     slopes : ndarray, shape (2, N) or (2, 0)
-        Where it has room: slope of the output just before and just after each sample [unit of the output / s]. That
-        before ``first`` is taken from it, and where it is longer that before the next sample is left in it.
+        Where it has room: slope of the first output just before and just after each sample [its unit / s]. That before
+        ``first`` is taken from it, and where it is longer that before the next sample is left in it.
     """
     given = (
         sample_time_s,
         substeps,
         sign_width,
         first,
+        last,
         start_s,
         borrowed(torque),
         borrowed(load),
         borrowed(angle),
         borrowed(p),
     )
-    given_back = (borrowed(state), output, sensor, borrowed(out), borrowed(slopes))
+    given_back = (borrowed(state), borrowed(outputs), sensor, borrowed(out), borrowed(slopes))
     for_its_make(len(masses), integrate_made, borrowed(p), (*given, *given_back))
 
 

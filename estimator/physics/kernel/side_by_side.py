@@ -169,17 +169,20 @@ def advance(
     p_lanes: FloatArray,
     state_lanes: FloatArray,
     low_lanes: FloatArray,
-    output: int,
+    outputs: IntArray,
     filtering: bool,
     out_lanes: FloatArray,
 ) -> None:
-    """Simulate lines of one make; ``one_of_them`` is the parameters of one."""
+    """Simulate lines of one make; ``one_of_them`` is the parameters of one.
+
+    Of ``out_lanes`` each sample has a row per output, shape (N C, LANES).
+    """
     torque, rise, load, p = as_lanes(torque_lanes), as_lanes(rise_lanes), as_lanes(load_lanes), as_lanes(p_lanes)
     start, out, filters = as_lanes(state_lanes), as_lanes(out_lanes), as_lanes(low_lanes)
     h = sample_time_s / substeps
     length = 1.0 / substeps
     waving = is_waving(one_of_them)
-    samples = load_lanes.shape[0]
+    samples, output = load_lanes.shape[0], outputs[0]
     parts = torque_lanes.shape[0] // samples
     x = unpacked(start)
     bristled, bristles = is_bristled(one_of_them), Bristles(start[BRISTLES_MOTOR], start[BRISTLES_LOAD])
@@ -187,7 +190,9 @@ def advance(
     filtered, filter_rise = start[FILTERED], start[FILTER_RISE]
     now = conditions(line.masses, start_s + first * sample_time_s, h, 0.0, load[first], sign_width, p)
     for k in range(first, samples):
-        out[k] = filtered if filtering else read_out(line, now, x, output, p)
+        for i in range(outputs.shape[0]):
+            seen = filtered if filtering and i == 0 else read_out(line, now, x, outputs[i], p)
+            out[k * outputs.shape[0] + i] = seen
         turn = angle[k + 1] - angle[k] if k + 1 < angle.shape[0] else angle[k] - angle[k - 1]
         time_s = start_s + k * sample_time_s
         varying = waving or is_changing(time_s - sample_time_s, time_s + sample_time_s, p)
@@ -226,7 +231,7 @@ def integrate_side_by_side(
     angle: FloatArray,
     p: FloatArray,
     state: FloatArray,
-    output: int,
+    outputs: IntArray,
     sensor: bool,
     out: FloatArray,
 ) -> None:
@@ -241,21 +246,23 @@ def integrate_side_by_side(
     fed_by, loaded_by : ndarray of int, shape (K,)
         Which of these drives each.
     p, state, out
-        As there, a row each: (K, layout.SIZE), (K, STATES), (K, N).
+        As there, a row each: (K, layout.SIZE), (K, STATES), (K, C, N).
     """
     rows, torque, load, angle = borrowed(rows), borrowed(torque), borrowed(load), borrowed(angle)
-    fed_by, loaded_by = borrowed(fed_by), borrowed(loaded_by)
+    fed_by, loaded_by, outputs = borrowed(fed_by), borrowed(loaded_by), borrowed(outputs)
     p, state, out = borrowed(p), borrowed(state), borrowed(out)
-    values = np.empty((torque.shape[1], LANES))
+    count = outputs.shape[0]
+    values = np.empty((torque.shape[1] * count, LANES))
     mean, rise = supplied_lanes(sample_time_s, substeps, first, start_s, rows, torque, fed_by, p, state)
     loads = in_lanes(load, loaded_by[rows])
     given = (sample_time_s, substeps, sign_width, first, start_s, mean, rise, loads, angle)
     filtering = sensor and p[rows[0], slots.FILTER] > 0.0
     them = (in_lanes(p, rows), in_lanes(state, rows), low_passes(rows, p, sample_time_s / substeps))
-    for_its_make(len(masses), advance, p[rows[0]], (*given, p[rows[0]], *them, output, filtering, values))
+    for_its_make(len(masses), advance, p[rows[0]], (*given, p[rows[0]], *them, outputs, filtering, values))
     for lane in range(rows.size):
         own = p[rows[lane]]
         for k in range(first, torque.shape[1]):
-            value = values[k, lane]
-            read = value if filtering else reading(value, angle[k], own)
-            out[rows[lane], k] = shown(read, value, own) if sensor else value
+            for i in range(count):
+                value = values[k * count + i, lane]
+                read = value if filtering else reading(value, angle[k], own)
+                out[rows[lane], i, k] = shown(read, value, own) if sensor and i == 0 else value

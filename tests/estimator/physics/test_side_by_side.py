@@ -13,8 +13,9 @@ from estimator.physics.inputs import Case
 from estimator.physics.kernel.side_by_side import go_side_by_side, kin_together, leading_kin
 from estimator.physics.layout import flat, slot
 from estimator.physics.model import DrivelineModel, EffectValue, Parameter, Structure
-from estimator.physics.simulate import simulate_each, simulate_records
+from estimator.physics.simulate import simulate_each
 from estimator.physics.start import Start
+from estimator.physics.together import simulate_records
 from estimator.signals.record import FloatArray
 from tests.estimator.physics.bench import (
     ONE_MASS,
@@ -187,7 +188,7 @@ def test_recordings_of_different_lengths_side_by_side() -> None:
         Case(flat(line), replace(START, speed_rad_s=5.0 + i), np.full(n, 3.0 * i))
         for i, n in enumerate((400, 150, 377))
     ]
-    together = simulate_records(grid, records, cases)
+    together = [each for (each,) in simulate_records(grid, [[record] for record in records], cases)]
     for rec, case, output in zip(records, cases, together, strict=True):
         assert output.shape == rec.output.shape
         assert_same_to_rounding(output, simulate_each(grid, rec, [case])[0])
