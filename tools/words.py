@@ -1,7 +1,6 @@
 """``python tools/words.py``: find words that only this project would use.
 
-``tools/words.toml`` has each with a better one. A folder that is listed there under ``to_do`` may keep as many as the
-list says; everything else has none.
+``tools/words.toml`` has each with a better one.
 """
 
 from __future__ import annotations
@@ -10,7 +9,6 @@ import re
 import subprocess
 import sys
 import tomllib
-from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -36,17 +34,11 @@ def found(better: dict[str, str], text: str) -> Iterator[tuple[int, str, str]]:
 
 
 def main() -> int:
-    """Write a line for each word where there are too many; return 1 if there are any."""
-    lists = tomllib.loads((HERE / "words.toml").read_text("utf-8"))
-    to_do: dict[str, int] = lists["to_do"]
-    lines: dict[str, list[str]] = defaultdict(list)
-    for path, text in texts():
-        folder = max((folder for folder in to_do if path.startswith(folder)), key=len, default="")
-        lines[folder] += [f"{path}:{line}: {word}: {say}" for line, word, say in found(lists["words"], text)]
-    too_many = {folder: said for folder, said in lines.items() if len(said) > to_do.get(folder, 0)}
-    for folder, said in too_many.items():
-        sys.stdout.write("\n".join(said) + f"\n{folder or 'elsewhere'}: {len(said)}, allowed {to_do.get(folder, 0)}\n")
-    return 1 if too_many else 0
+    """Write a line for each word; return 1 if there are any."""
+    better: dict[str, str] = tomllib.loads((HERE / "words.toml").read_text("utf-8"))["words"]
+    lines = [f"{path}:{line}: {word}: {say}\n" for path, text in texts() for line, word, say in found(better, text)]
+    sys.stdout.writelines(lines)
+    return 1 if lines else 0
 
 
 if __name__ == "__main__":

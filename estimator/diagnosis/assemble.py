@@ -158,7 +158,7 @@ def retuned_parameters(result: FitResult, model: DrivelineModel, whole: bool) ->
     Of a plant simulated elsewhere there are none.
 
     Without the ``whole`` physics in the fit its intervals are what the nominal values are trusted to: how far a
-    parameter bends to follow what is left out, no covariance of the errors tells.
+    parameter shifts to follow what is left out is in no covariance of the errors.
     """
     if model.plant is not None:
         return {}
@@ -198,7 +198,7 @@ def load_torques(result: FitResult, model: DrivelineModel) -> dict[str, Estimate
 
 
 def augmented_model(result: FitResult, model: DrivelineModel, effects: Sequence[FoundEffect]) -> DrivelineModel:
-    """Return the model with re-tuned parameters and the effects found beside those it had."""
+    """Return the model with re-tuned parameters and the effects found in addition to those it had."""
     values = {
         shared.name: float(result.x[i]) * shared.scale
         for i, shared in enumerate(result.problem.shared)

@@ -1,4 +1,4 @@
-"""Hypotheses: sets of effects released beside the nominal model; which there are, and which crowd each other."""
+"""Hypotheses: sets of effects added to the nominal model; which are possible, and which exclude each other."""
 
 from __future__ import annotations
 

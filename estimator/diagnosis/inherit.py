@@ -1,4 +1,4 @@
-"""From where a fit starts that goes on from another one: with an effect more, or less, or the same one anew."""
+"""Where a fit starts that continues another one: with one effect more, one less, or one from a new start."""
 
 from __future__ import annotations
 

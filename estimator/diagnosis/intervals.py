@@ -44,7 +44,7 @@ def covariance(result: FitResult) -> FloatArray:
 def reported_covariance(result: FitResult) -> FloatArray:
     """Return the covariance that intervals are reported from, shape (U, U): of the noise, and of what is no noise.
 
-    The part of the error that its own past foretells is physics written another way, or the torque reading's own
+    The part of the error that its own past predicts is physics written another way, or the torque reading's own
     noise. It pulls the unknowns as an error would that keeps its value for ``COHERENT_S``: its mean square times that
     many samples takes the place of the noise's variance in ``sigma^2 (J'J)^-1``.
     """
@@ -113,7 +113,7 @@ def interval(result: FitResult, cov: FloatArray, index: int) -> tuple[float, flo
 
 
 def interval_that_follows(
-    result: FitResult, cov: FloatArray, told: Callable[[FitResult], float]
+    result: FitResult, cov: FloatArray, value_of: Callable[[FitResult], float]
 ) -> tuple[float, float]:
     """Return the 95 % interval of what follows from the unknowns, to first order; never of the other sign.
 
@@ -121,14 +121,14 @@ def interval_that_follows(
     ----------
     cov : ndarray, shape (n, n)
         Covariance of all unknowns, in their scales.
-    told : callable
+    value_of : callable
         A fit to the value, in the value's own unit, which is the interval's.
     """
-    value, slope = told(result), np.zeros(result.x.size)
+    value, slope = value_of(result), np.zeros(result.x.size)
     for i in np.flatnonzero(np.diag(cov) > 0.0):
         moved = result.x.copy()
         moved[i] -= STEP
-        slope[i] = (value - told(replace(result, x=moved))) / STEP
+        slope[i] = (value - value_of(replace(result, x=moved))) / STEP
     spread = Z95 * float(np.sqrt(max(float(slope @ cov @ slope), 0.0)))
     low, high = value - spread, value + spread
     return (max(low, 0.0), high) if value > 0.0 else (low, min(high, 0.0))
@@ -141,9 +141,9 @@ def trusted(result: FitResult, index: int) -> tuple[float, float]:
 
 
 def interval_both_ways(result: FitResult, cov: FloatArray, index: int) -> tuple[float, float]:
-    """Return the 95 % interval of a shared parameter that holds it where the same motion is told the other way, too.
+    """Return the 95 % interval of a shared parameter that also holds it in the other parametrisation of the motion.
 
-    In the other way it is multiplied by a factor, itself estimated: ``d(x f) = f dx + x df``.
+    There it is multiplied by a factor, itself estimated: ``d(x f) = f dx + x df``.
     """
     low, high = interval(result, cov, index)
     dimension = _dimension_in_line(result.problem.shared[index])

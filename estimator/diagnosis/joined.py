@@ -1,4 +1,4 @@
-"""A diagnosis of segments, told of the recordings they were cut from.
+"""A diagnosis of segments, given for the recordings they were cut from.
 
 Users know their recordings by name, and get everything by it: intervals and courses of all its segments, one after the
 other; simulations over its whole time, NaN where no segment is; as constant load torque the mean of its segments',

@@ -70,7 +70,7 @@ def _one_step_errors(record: Record, usable: BoolArray) -> FloatArray:
 
 
 def unpredictable(errors: Sequence[FloatArray]) -> float:
-    """Return the RMS of what a set of simulation errors' own past does not foretell.
+    """Return the RMS of what a set of simulation errors' own past does not predict.
 
     A second, often sharper view of the floor: once a model explains most of what happens, what its error leaves to a
     linear predictor of itself is the noise of the reading.

@@ -132,7 +132,7 @@ class RejectedEffect:
 
 @dataclass(frozen=True, slots=True)
 class UntestableEffect:
-    """An effect these recordings can't tell, and the test that could; ``needs`` is what must be given beside it."""
+    """An effect these recordings can't tell, and the test that could; ``needs`` is what must be given for it."""
 
     name: str
     reason: str

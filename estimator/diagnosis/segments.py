@@ -1,9 +1,9 @@
 """Recordings with long gaps, cut into segments for the fit; ``joined`` puts the result together again.
 
-Over a short gap the simulation goes on with the torque it has. Over a long one it would run away: the torque there was
+Over a short gap the simulation continues with the torque it has. Over a long one it would diverge: the torque there was
 not read, or the model does not hold there (a mask: another brake, a gear change). So each segment is a recording of its
 own, with its own initial state and, as every recording, its own constant load torque: a road is not as steep behind a
-gap as before it. Time goes on (``Record.began_s``), for laws over time.
+gap as before it. Time continues (``Record.began_s``), for laws over time.
 """
 
 from __future__ import annotations
@@ -103,14 +103,14 @@ def cut(records: Sequence[Record]) -> Cut:
         long = found
         if len(found) > 1:
             long = [part for part in found if _is_long(record, part)]
-            warnings.append(_told(record, found, long))
+            warnings.append(_gaps_warning(record, found, long))
         used = stretches(record, long, share)
         if used == [slice(0, record.okay.size)]:
             kept.append(record)
             origin[record.name] = record.name
             continue
         if used != long:
-            warnings.append(_told_of_stretches(record, long, used))
+            warnings.append(_stretches_warning(record, long, used))
         for i, part in enumerate(used, start=1):
             name = record.name if len(used) == 1 and len(found) == 1 else f"{record.name}#{i}"
             kept.append(sliced(record, part, name))
@@ -123,7 +123,7 @@ def _is_long(record: Record, part: slice) -> bool:
     return good >= max(FEWEST_SAMPLES, round(SHORTEST_S / record.sample_time_s))
 
 
-def _told(record: Record, found: Sequence[slice], long: Sequence[slice]) -> str:
+def _gaps_warning(record: Record, found: Sequence[slice], long: Sequence[slice]) -> str:
     least = max(FEWEST_SAMPLES * record.sample_time_s, SHORTEST_S)
     text = f"recording {record.name}: gaps of more than {LONG_S:g} s cut it into {len(found)} segments"
     if not long:
@@ -134,7 +134,7 @@ def _told(record: Record, found: Sequence[slice], long: Sequence[slice]) -> str:
     return f"{text}, each with its own initial state and constant load{left_out if short else ''}."
 
 
-def _told_of_stretches(record: Record, long: Sequence[slice], used: Sequence[slice]) -> str:
+def _stretches_warning(record: Record, long: Sequence[slice], used: Sequence[slice]) -> str:
     whole, seen = (sum(part.stop - part.start for part in parts) * record.sample_time_s for parts in (long, used))
     return (
         f"recording {record.name}: {seen:.0f} s of its {whole:.0f} s are used, in {len(used)} stretches, each with its "

@@ -110,7 +110,7 @@ def diagnose(
     text = diagnosis_text(diagnosis, made)
     try:
         publish_diagnosis(out, diagnosis, file, records, every, made)
-    finally:  # told even where the disk does not take it
+    finally:  # the verdict is printed even if the disk is full
         if as_json:
             typer.echo(text, nl=False)
         else:
@@ -126,13 +126,13 @@ def _why_minutes() -> Progress:
     """Return what says once that a stage compiles, unless nothing is to be said."""
     from estimator.diagnosis.first_use import COMPILING
 
-    told = is_silent()
+    has_said = is_silent()
 
     def show(stage: str, share: float) -> None:
-        nonlocal told
-        if COMPILING in stage and not told:
+        nonlocal has_said
+        if COMPILING in stage and not has_said:
             typer.echo(stage, err=True)
-            told = True
+            has_said = True
 
     return show
 

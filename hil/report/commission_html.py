@@ -109,11 +109,11 @@ def _overview(steps: Mapping[str, Any], titles: Mapping[str, str]) -> str:
         record = steps[name]
         within = sum(finding["within"] is True for finding in record["findings"])
         outside = sum(finding["within"] is False for finding in record["findings"])
-        told = f"{within} within" + (f", {outside} outside" if outside else "") if record["findings"] else "–"
+        counted = f"{within} within" + (f", {outside} outside" if outside else "") if record["findings"] else "–"
         cells = (
             f"{number} {escape(title)}",
             badge(*STATUSES[record["status"]]),
-            escape(told),
+            escape(counted),
             escape(record["because"] or "–"),
         )
         rows.append(card_row(columns, cells, outside > 0))

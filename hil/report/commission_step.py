@@ -39,7 +39,7 @@ table.findings td:nth-child(4) { white-space: nowrap; }
   table.findings td[data-label]:not(:first-child)::before { content: attr(data-label) ": "; color: var(--soft); }
 }
 </style>"""
-"""What the findings need beside the look of every page: on a narrow screen each becomes a small card."""
+"""Style of the findings, in addition to that of every page: on a narrow screen each becomes a small card."""
 
 COLUMNS = ("what", "expected", "measured", "within?")
 
@@ -104,8 +104,8 @@ def _finding(finding: Mapping[str, Any]) -> str:
     if within is None and finding["expected"] != "–":
         words = "? can't tell"
     do = f'<div class="do">→ {escape(finding["advice"])}</div>' if finding["advice"] and within is not True else ""
-    told = badge(kind, words) if within is not None else escape(words)
-    cells = (escape(finding["what"]), escape(finding["expected"]), escape(finding["measured"]) + do, told)
+    verdict = badge(kind, words) if within is not None else escape(words)
+    cells = (escape(finding["what"]), escape(finding["expected"]), escape(finding["measured"]) + do, verdict)
     return card_row(COLUMNS, cells, within is False)
 
 

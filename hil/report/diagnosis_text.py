@@ -37,8 +37,8 @@ def diagnosis_summary(diagnosis: Diagnosis) -> RenderableType:
     ]
     if diagnosis.effects:
         pieces.append(_effects_table(diagnosis))
-    told = [(effect.name, belief(effect).rstrip()) for effect in diagnosis.effects]
-    pieces += [Text(f"{name}: {said}") for name, said in told if said]
+    beliefs = [(effect.name, belief(effect).rstrip()) for effect in diagnosis.effects]
+    pieces += [Text(f"{name}: {said}") for name, said in beliefs if said]
     pieces.append(_parameter_table(diagnosis))
     pieces += [Text(f"rejected: {rival.name}: {rival.reason}") for rival in diagnosis.rejected[:MOST_RIVALS]]
     if len(diagnosis.rejected) > MOST_RIVALS:

@@ -111,10 +111,10 @@ def frequency(diagnosis: Diagnosis) -> str:
         return ""
     unit = diagnosis.fit.unit
     loud = [band for band in seen.spectrum.bands if band.p_value < SIGNIFICANT_P]
-    told = ", ".join(f"{b.low_hz:.3g} to {b.high_hz:.3g} Hz ({shown_ratio(b.ratio, 1.0)})" for b in loud)
+    bands = ", ".join(f"{b.low_hz:.3g} to {b.high_hz:.3g} Hz ({shown_ratio(b.ratio, 1.0)})" for b in loud)
     pieces = [
         html.paragraph(
-            f"Above the noise floor's power, p < {SIGNIFICANT_P:g} after correction for the number of bands: {told}."
+            f"Above the noise floor's power, p < {SIGNIFICANT_P:g} after correction for the number of bands: {bands}."
             if loud
             else "In no band is the error of the re-tuned model above the noise floor beyond chance.",
         ),

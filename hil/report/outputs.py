@@ -1,4 +1,4 @@
-"""Results of a command in a folder: all files are made beside it first and moved in when each is whole."""
+"""Results of a command in a folder: all files are written next to it first and moved in when each is complete."""
 
 from __future__ import annotations
 

@@ -166,7 +166,7 @@
     const height = screen.height > TALL_PX ? Math.round(PRINT_HEIGHT * screen.height) : screen.height;
     const around = screen.margin.t + screen.margin.b;
     div.style.height = `${height}px`;
-    // The legend's place is told in parts of the height between the margins: as many pixels below as before.
+    // Plotly takes the legend's place as a fraction of the height between the margins: keep its distance in pixels.
     const y = (screen.legend * (screen.height - around)) / (height - around);
     return { width: PRINT_WIDTH_PX, height, "legend.y": y };
   }

@@ -1,6 +1,6 @@
 """The samples behind a figure over time, so that it can be zoomed to each of them.
 
-A figure draws the lowest and the highest sample of every stretch (``decimate``). Beside it stand the samples as 16-bit
+A figure draws the lowest and the highest sample of every stretch (``decimate``). Next to it stand the samples as 16-bit
 numbers, a scale and an offset per line: a step is 1/65000 of the line's range, and five minutes of eight lines at 1 kHz
 take 6.4 MB as text. `page.js` draws from them what is in view.
 """

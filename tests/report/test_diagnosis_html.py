@@ -69,7 +69,7 @@ def test_the_page_says_everything_from_the_verdict_down(diagnosis: Diagnosis) ->
         "Neither found nor excluded",
         "Parameters of the model",
     ]
-    told = (
+    expected = (
         diagnosis.statement,  # holds characters that HTML has to escape
         "✓ explained",
         "Missing in the model: backlash in the shaft line (99.9 % sure) and road grade",
@@ -90,7 +90,7 @@ def test_the_page_says_everything_from_the_verdict_down(diagnosis: Diagnosis) ->
         "kg m^2",
         "-5.0 %",
     )
-    assert [text for text in told if text not in reader.text] == []
+    assert [text for text in expected if text not in reader.text] == []
 
 
 def test_the_page_fetches_nothing_and_holds_plotly_once(diagnosis: Diagnosis) -> None:
@@ -141,7 +141,7 @@ def test_the_other_answers_are_pages_too(diagnosis: Diagnosis, verdict: Verdict,
     assert "Where simulation and recording differ" not in reader.sections
 
 
-def test_effects_that_explain_only_a_part_are_told_as_such(diagnosis: Diagnosis) -> None:
+def test_effects_that_explain_only_a_part_are_named_as_such(diagnosis: Diagnosis) -> None:
     assert "; the rest no effect of the catalogue explains" in diagnosis_page(
         replace(diagnosis, verdict=Verdict.UNEXPLAINED)
     )
@@ -227,6 +227,6 @@ def test_share_and_probability_of_an_effect_are_shown(diagnosis: Diagnosis) -> N
     assert "94% of the squared error goes with it; probability 99.9 %. Evidence:" in page
 
 
-def test_thinned_recordings_are_told(diagnosis: Diagnosis) -> None:
+def test_thinned_recordings_are_reported(diagnosis: Diagnosis) -> None:
     assert "one in 10 samples was used" in diagnosis_page(diagnosis, one_in=10)
     assert "samples was used" not in diagnosis_page(diagnosis)

@@ -97,7 +97,7 @@ def test_the_text_is_strict_json_of_the_contract(diagnosis: Diagnosis) -> None:
     assert content["timing_s"] == {"total": 4.2}
 
 
-def test_what_is_left_and_what_hardly_counts_are_told_where_they_are_known(diagnosis: Diagnosis) -> None:
+def test_remainder_and_traces_are_given_where_they_are_known(diagnosis: Diagnosis) -> None:
     content = diagnosis_json(diagnosis)
     assert content["remainder"] is None
     assert content["traces"] == []
@@ -181,7 +181,7 @@ def test_without_a_discrepancy_the_key_is_null(diagnosis: Diagnosis) -> None:
     assert diagnosis_json(replace(diagnosis, discrepancy=None))["discrepancy"] is None
 
 
-def test_nominal_values_that_are_off_are_told_by_how_much(diagnosis: Diagnosis) -> None:
+def test_nominal_values_that_are_off_are_given_as_a_ratio(diagnosis: Diagnosis) -> None:
     assert diagnosis_json(diagnosis)["strays"] == []
     off = replace(diagnosis, strays=(Stray("J_L", 1.11, 0.04),))
     assert diagnosis_json(off)["strays"] == [{"parameter": "J_L", "ratio": 1.11, "tolerance": 0.04}]

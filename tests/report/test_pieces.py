@@ -109,11 +109,11 @@ def test_a_simulated_column_names_its_unit(kind: OutputKind, motion: Motion, col
 
 def test_the_terminal_tells_the_verdict_and_what_it_rests_on(diagnosis: Diagnosis) -> None:
     text = rendered(diagnosis_summary(diagnosis))
-    told = ("✓ explained", diagnosis.statement, "[rad/s]", "gap_rad", "0.021 rad", "J_M", "1.51 … 1.53")
-    told += ("rejected: stiffness_nonlinearity", "can't tell: coulomb_friction_motor", "note: run_2")
-    told += ("backlash: 94% of the squared error goes with it; probability 99.9 %.",)
+    expected = ("✓ explained", diagnosis.statement, "[rad/s]", "gap_rad", "0.021 rad", "J_M", "1.51 … 1.53")
+    expected += ("rejected: stiffness_nonlinearity", "can't tell: coulomb_friction_motor", "note: run_2")
+    expected += ("backlash: 94% of the squared error goes with it; probability 99.9 %.",)
     assert "road_grade: " not in text  # of which neither is known
-    assert [part for part in told if part not in text] == []
+    assert [part for part in expected if part not in text] == []
 
 
 def test_the_catalogue_lists_every_entry() -> None:
@@ -125,8 +125,8 @@ def test_the_catalogue_lists_every_entry() -> None:
 def test_an_entry_tells_law_parameters_excitation_and_rivals(name: str) -> None:
     entry = EFFECTS[name]
     text = " ".join(rendered(effect_details(select(name)[0]), width=400).split())
-    told = [entry.law, entry.excited_by, *entry.resembles, *(p.name for p in entry.parameters)]
-    assert [part for part in told if part not in text] == []
+    expected = [entry.law, entry.excited_by, *entry.resembles, *(p.name for p in entry.parameters)]
+    assert [part for part in expected if part not in text] == []
     content = json.loads(entries_text([entry]))["effects"][0]
     assert content["name"] == name
     assert content["element"] == entry.element.value

@@ -13,7 +13,7 @@ from estimator.diagnosis.acquisition.readings import all_of
 from estimator.signals.record import BoolArray, FloatArray
 
 PERIODS = 3
-"""The torque of a row is told by its own reference and by those of the rows before, so many in all."""
+"""The torque of a row is predicted from its own reference and from those before it, so many in all."""
 
 FEWEST_ROWS = 100
 """Fewer rows that were read do not show how a drive follows."""
@@ -45,8 +45,8 @@ def followed(torque: FloatArray, trusted: BoolArray, reference: FloatArray) -> t
         Whether that is as good as a reading.
     """
     regressors = _regressors(np.where(~trusted & (reference == 0.0), np.nan, reference))  # lost with the torque
-    told = all_of(np.isfinite(regressors))
-    read = told & trusted
+    predicted = all_of(np.isfinite(regressors))
+    read = predicted & trusted
     both = read[1:] & read[:-1]
     if read.sum() < FEWEST_ROWS or not both.any():
         return torque, np.zeros_like(trusted), False
@@ -58,7 +58,7 @@ def followed(torque: FloatArray, trusted: BoolArray, reference: FloatArray) -> t
     power_left, power = float(left @ left), float(change @ change)
     if power_left > MOST_LEFT * power:
         return torque, np.zeros_like(trusted), False
-    return by_reference, told, power_left <= AS_GOOD * power
+    return by_reference, predicted, power_left <= AS_GOOD * power
 
 
 def _regressors(reference: FloatArray) -> FloatArray:

@@ -8,7 +8,7 @@ A torque that steps at the sample gives the output two slopes there, ``b`` for r
 those that come late. Such a row's error has a mean, ``E|tau| (a - b) / 2``, and its variance about it follows
 ``(a^2 + b^2) / 2 - ((a - b) E|tau| / 2 sigma_t)^2`` in place of slope^2.
 
-Missing mechanics leaves errors that are large where the slope is large, too. But such an error goes on from one row to
+Missing mechanics leaves errors that are large where the slope is large, too. But such an error persists from one row to
 the next and follows the motion, while jitter changes from row to row at random. What the error's own past and the
 slopes around explain is taken off first; of the rest it is asked whether its square follows the squared slope, within
 each recording (their noise may differ), in the many and not in a few rows only, and whether neighbours are independent.
@@ -35,8 +35,8 @@ AROUND = 3
 
 BLOCK = 250
 """Rows within which these explain by coefficients of their own, to tell whether there is jitter at all: a simulated
-angle that drifts off the true one moves what depends on it as a delay does that comes and goes. Its size is told from
-all rows: so many coefficients follow a part of the jitter too."""
+angle that drifts off the true one moves what depends on it as a delay does that comes and goes. Its size is estimated
+from all rows: so many coefficients follow a part of the jitter too."""
 
 LEAST_GAIN = 0.05
 """Share of the error's variance that jitter must account for, on average: less changes no fit."""

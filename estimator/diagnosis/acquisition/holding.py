@@ -93,8 +93,8 @@ def fill(torque: FloatArray, trusted: BoolArray, reference: FloatArray | None = 
     filled, known = _by_clock(torque, trusted)
     if reference is None or trusted.all():
         return filled, known
-    by_reference, told, as_good = followed(torque, trusted, reference)
-    unread = told & ~trusted & (as_good | ~known)
+    by_reference, predicted, as_good = followed(torque, trusted, reference)
+    unread = predicted & ~trusted & (as_good | ~known)
     filled[unread] = by_reference[unread]
     return filled, known | (unread & as_good)
 

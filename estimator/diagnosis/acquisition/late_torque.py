@@ -1,4 +1,4 @@
-"""Stale torques, told by the output: it answers a torque step a row before the torque is recorded to step.
+"""Stale torques, shown by the output: it answers a torque step a row before the torque is recorded to step.
 
 A torque that is held for some samples repeats by right, so its repeats alone say little. But where a repeat is
 followed by a step and the output has already answered that step, the repeated reading was stale. The test compares
@@ -113,7 +113,7 @@ def pooled_p_value(found: Sequence[LateTorque]) -> float:
 
     Elsewhere in the same recording: where the predictor follows one worse than the others, that one has more of both.
     Above its mean a sum of binomials is at most as far out as Poisson's law of that mean (Hoeffding, Ann. Math. Stat.
-    27, 1956), which is what is told.
+    27, 1956); that probability is returned.
     """
     usual = sum(late.repeats * (late.early_others + 1.0) / (late.others + 2.0) for late in found)
     return float(stats.poisson.sf(sum(late.early for late in found) - 1, usual))

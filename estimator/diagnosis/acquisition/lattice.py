@@ -2,7 +2,7 @@
 
 Whatever is written with so many decimals, or counted, lies on a lattice of step q, and two readings in a row are
 then equal now and then without any fault. How often follows from the readings themselves: their differences fall
-on 0, +-q, +-2q, ... with probabilities that vary smoothly, so those near zero foretell the one at zero.
+on 0, +-q, +-2q, ... with probabilities that vary smoothly, so those near zero predict the one at zero.
 """
 
 from __future__ import annotations
@@ -68,13 +68,13 @@ class ChanceRepeats:
 
 
 MODEL_ERROR = 0.1
-"""Relative error that extrapolating the density to zero may have beside its sampling error."""
+"""Relative error of extrapolating the density to zero, in addition to its sampling error."""
 
 
 def chance_repeats(differences: FloatArray, step: float) -> ChanceRepeats:
-    """Foretell from differences other than zero how many are zero.
+    """Predict from differences other than zero how many are zero.
 
-    A Gaussian is drawn through the counts of two bands beside zero, ``0 < |d| <= w`` and ``w < |d| <= 2w``: it has
+    A Gaussian is drawn through the counts of two bands next to zero, ``0 < |d| <= w`` and ``w < |d| <= 2w``: it has
     ``ln p(d)`` linear in d^2, and locally so has every smooth density that is symmetric about zero.
 
     Parameters

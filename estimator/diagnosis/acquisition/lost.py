@@ -23,15 +23,19 @@ LONGEST_BURST = 50
 def lost_samples(records: Sequence[Record]) -> Finding | None:
     """Recognise lost readings; None where they are too few to matter."""
     zeros, p_value = lost_zeros(records)
-    told = [_told(record) for record in records]
-    cells = [missing | zero for missing, zero in zip(told, zeros, strict=True)]
+    missing = [_missing(record) for record in records]
+    cells = [absent | zero for absent, zero in zip(missing, zeros, strict=True)]
     rows = [any_of(lost) for lost in cells]
     count, total = sum(int(lost.sum()) for lost in rows), sum(lost.size for lost in rows)
     if count < SMALLEST_SHARE * total:
         return None
     share = count / total
     silent = any(zero.any() for zero in zeros)
-    how = "recorded as zero without a flag" if silent and not any(lost.any() for lost in told) else "missing or flagged"
+    how = (
+        "recorded as zero without a flag"
+        if silent and not any(lost.any() for lost in missing)
+        else "missing or flagged"
+    )
     return Finding(
         name="lost_samples",
         parameters={"share": Sized(share, share_interval(count, total, mean_run(rows)), "")},
@@ -41,11 +45,11 @@ def lost_samples(records: Sequence[Record]) -> Finding | None:
     )
 
 
-def _told(record: Record) -> BoolArray:
+def _missing(record: Record) -> BoolArray:
     """Return what the recording itself says is missing, gaps left out; shape (N, 1 + M)."""
     lost = ~record.torque_trusted
     whole_row = all_of(lost) & ~record.okay
     lost = np.column_stack([~np.isfinite(record.output) | whole_row, lost])
     short = shorter_runs(any_of(lost), LONGEST_BURST)
-    told: BoolArray = lost & short[:, np.newaxis]
-    return told
+    missing: BoolArray = lost & short[:, np.newaxis]
+    return missing

@@ -29,7 +29,7 @@ NEAR_SHARE = 0.02
 
 MORE_THAN_MEANT = 5.0
 """Where zeros are lost, those between values near zero are so too if there are so many times as many of them as of any
-value beside zero: rounded noise of half a lattice step around zero shows it four times as often as the next value."""
+value next to zero: rounded noise of half a lattice step around zero shows it four times as often as the next value."""
 
 
 def lost_zeros(records: Sequence[Record]) -> tuple[list[BoolArray], float]:
@@ -55,12 +55,12 @@ def _with_their_frames(read: Sequence[FloatArray], lost: Sequence[BoolArray]) ->
     whole = [cells.copy() for cells in lost]
     for column in range(max(cells.shape[1] for cells in lost)):
         having = [k for k, cells in enumerate(lost) if cells.shape[1] > column]
-        beside = [any_of(np.delete(lost[k], column, axis=1)) for k in having]
+        others = [any_of(np.delete(lost[k], column, axis=1)) for k in having]
         zero = [read[k][:, column] == 0.0 for k in having]
-        rows, zeros = np.concatenate(beside), np.concatenate(zero)
+        rows, zeros = np.concatenate(others), np.concatenate(zero)
         usual = float(np.mean(zeros[~rows]))
         if stats.binom.sf(int(zeros[rows].sum()) - 1, int(rows.sum()), usual) <= LEVEL:
-            for k, its_rows, its_zeros in zip(having, beside, zero, strict=True):
+            for k, its_rows, its_zeros in zip(having, others, zero, strict=True):
                 whole[k][:, column] |= its_rows & its_zeros
     return whole
 
@@ -78,16 +78,16 @@ def _zeros_of(series: Sequence[FloatArray]) -> tuple[list[BoolArray], float]:
     count = sum(int(found.sum()) for found in rows)
     if count < sum(int(np.sum((values == 0.0) & ~shorter_runs(values == 0.0, LONGEST_ZERO))) for values in series):
         return none, 1.0  # it rests at zero for longer than it would have been lost
-    beside = float(np.sum((pooled != 0.0) & (np.abs(pooled) <= near)))
-    expected = (beside + 2.0 * np.sqrt(beside + 1.0)) * step / (2.0 * near)
+    other = float(np.sum((pooled != 0.0) & (np.abs(pooled) <= near)))
+    expected = (other + 2.0 * np.sqrt(other + 1.0)) * step / (2.0 * near)
     p_value = float(stats.poisson.sf(count - 1, expected))
     enough = p_value <= LEVEL and count >= SMALLEST_SHARE * pooled.size
     if not enough or _has_levels(series, near, count):
         return none, 1.0
     short = [_out_of_line(values, 0.0) for values in series]
     near_zero = sum(int(found.sum()) for found in short) - count
-    beside_zero = pooled[(pooled != 0.0) & (np.abs(pooled) <= (NEAR_STEPS + 0.5) * step)]
-    usual = max(np.unique(beside_zero, return_counts=True)[1], default=1)
+    next_to_zero = pooled[(pooled != 0.0) & (np.abs(pooled) <= (NEAR_STEPS + 0.5) * step)]
+    usual = max(np.unique(next_to_zero, return_counts=True)[1], default=1)
     found = short if near_zero > MORE_THAN_MEANT * usual else rows
     return [inside | _at_ends(values, near, found) for values, inside in zip(series, found, strict=True)], p_value
 
@@ -115,7 +115,7 @@ def _out_of_line(values: FloatArray, near: float) -> BoolArray:
 def _has_levels(series: Sequence[FloatArray], near: float, count: int) -> bool:
     """Tell whether zero may be one of the signal's own levels: others come alone as often, for short, from afar.
 
-    And as exactly: what a signal jumps to and back is read with its noise, so that values beside it come as well.
+    And as exactly: what a signal jumps to and back is read with its noise, so that values next to it come as well.
     """
     pooled = np.concatenate(series)
     levels, times = np.unique(pooled[np.isfinite(pooled) & (pooled != 0.0)], return_counts=True)

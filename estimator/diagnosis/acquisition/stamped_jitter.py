@@ -44,19 +44,19 @@ def stamp_offsets_s(record: Record) -> FloatArray:
 def stamped_jitter(records: Sequence[Record]) -> Finding | None:
     """Recognise jitter that stamps tell and the output confirms; None otherwise."""
     offsets = {record.name: stamp_offsets_s(record) for record in records}
-    told = [record for record in records if offsets[record.name].any()]
-    confirmed = [found for record in told if (found := _confirmed(record, offsets[record.name])) is not None]
+    stamped = [record for record in records if offsets[record.name].any()]
+    confirmed = [found for record in stamped if (found := _confirmed(record, offsets[record.name])) is not None]
     if not confirmed:
         return None
     agreement, error = _pooled(confirmed)
     p_value = float(stats.norm.sf(agreement / error))
     if p_value > LEVEL or agreement < AGREEMENT:
         return None
-    every = np.concatenate([offsets[record.name] for record in told])
+    every = np.concatenate([offsets[record.name] for record in stamped])
     jitter_s, n = float(np.std(every)), every.size
     low, high = (jitter_s * float(np.sqrt(n / stats.chi2.ppf(q, n))) for q in (0.975, 0.025))
     cells = {record.name: no_cells(record) for record in records}
-    for record in told:
+    for record in stamped:
         cells[record.name][:, OUTPUT] = True
     return Finding(
         name="sample_jitter",

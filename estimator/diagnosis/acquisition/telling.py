@@ -2,7 +2,7 @@
 
 At standstill, on a coarse lattice, or in a torque without noise that is held for some samples, repeats are what a
 healthy recording has. Standstill is left out window by window. A lattice too coarse rules out the whole recording:
-windows chosen for their large changes would have few small ones to foretell chance repeats from.
+windows chosen for their large changes would have few small ones to predict chance repeats from.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ HALF_WINDOW = 25
 
 STEPS_PER_ROW = 1.5
 """The signal moves if all but a quarter of its changes, repeats left out, are larger than so many lattice steps, two
-steps that is: where one step is common, a repeat is the likeliest outcome and can't be foretold from its neighbours.
+steps that is: where one step is common, a repeat is the likeliest outcome and can't be predicted from its neighbours.
 The quarter is taken, not the half, because a torque that jumps every few samples is at rest in between."""
 
 REST_ROWS = 8

@@ -25,8 +25,8 @@ from estimator.diagnosis.inference.remainder import tests
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.inference.unnamed import (
     Law,
+    against_rival,
     at_place,
-    beside_rival,
     best_law,
     hunts_around,
     weighed_against,
@@ -128,7 +128,7 @@ class _Seen:
     believed : Hypothesis
         What the answer is of, and the augmented model holds: the effects that are named, and traces.
     hunts : list of Hunt
-        The search for a law beside no effect at all; empty where it was not made.
+        The search for a law without any effect; empty where it was not made.
     law : Law or None
         What is left beyond noise, as a law without a name.
     strays : tuple of Stray
@@ -156,7 +156,7 @@ def _looked_at(search: Search, decision: Decision, is_over: Callable[[], bool]) 
         decision = weighed_against(decision, law, partial(at_place, search, decision))
     line = free_line(search) if decision.failed or decision.named else None
     if line is not None:
-        decision = beside_rival(decision, line.score, lambda each: True)
+        decision = against_rival(decision, line.score, lambda each: True)
     believed = decision.nothing
     if decision.verdict in (Verdict.EXPLAINED, Verdict.PARTLY_EXPLAINED):
         decision, believed = _without_doubted(search, decision)

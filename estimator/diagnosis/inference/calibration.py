@@ -36,7 +36,7 @@ TEST_LIMITS = {
     "most_line": Limit(THRESHOLDS["most_line"]),
     "most_change": Limit(THRESHOLDS["most_change"]),
 }
-"""What their own past may foretell of the innovations, and what torque, speed and angle may, beyond chance; the power
+"""What their own past may predict of the innovations, and what torque, speed and angle may, beyond chance; the power
 of a line in their spectrum over their mean power; their mean square in a second, in standard deviations from that of
 all."""
 

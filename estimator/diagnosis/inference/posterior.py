@@ -36,9 +36,9 @@ class Belief:
     Attributes
     ----------
     names : frozenset of str
-        The effect, those it can't be told from, and those that hold it or are one of it.
+        The effect, those it can't be distinguished from, and those that hold it or are one of it.
     probability : float
-        Of this effect or one of those it can't be told from.
+        Of this effect or one of those it can't be distinguished from.
     share : float
         Share of the re-tuned model's squared free-run error that goes with it.
     score : float

@@ -84,7 +84,7 @@ class Search:
     stopped: bool = False
     answers: Answers = field(default_factory=Answers)
     _lessened: set[tuple[Effects, str]] = field(default_factory=set)
-    _told: defaultdict[Effects, set[str]] = field(default_factory=lambda: defaultdict(set))
+    _restarted: defaultdict[Effects, set[str]] = field(default_factory=lambda: defaultdict(set))
     _limits: Limits | None = None
 
     @property
@@ -129,19 +129,19 @@ class Search:
         return self._better(finished, current)
 
     def _begun_anew(self, current: Hypothesis) -> list[Hypothesis]:
-        """Fit a hypothesis' effects from other starts a few steps, each beside the same others once.
+        """Fit a hypothesis' effects from other starts a few steps, once for each set of other effects.
 
         Laws are written other ways, events looked for in other stretches of the recordings.
         """
         fits: list[Hypothesis | None] = []
-        for name in sorted(current.effects - {GRADE} - self._told[current.effects]):
-            self._told[current.effects].add(name)
-            fits += self._retold(current, name)
+        for name in sorted(current.effects - {GRADE} - self._restarted[current.effects]):
+            self._restarted[current.effects].add(name)
+            fits += self._rewritten(current, name)
             if EFFECTS[name].event:
                 fits.append(self._elsewhere(current, name))
         return [each for each in fits if each is not None and self.is_plausible(each)]
 
-    def _retold(self, current: Hypothesis, name: str) -> list[Hypothesis]:
+    def _rewritten(self, current: Hypothesis, name: str) -> list[Hypothesis]:
         """Fit a law written other ways."""
         fits, plain = [], current.plain
         for other in EFFECTS[name].retold(self.model, self.records, plain.values_of(name), line_values(plain)):
@@ -162,7 +162,7 @@ class Search:
         return self._added(base, name, promising(screen(base, self.model, self.answers).looks(name)), current)
 
     def _open(self, current: Hypothesis) -> Sequence[str]:
-        """Return the effects that can be told; behind a sensor blind for the sign reversals are the motion's own."""
+        """Return the testable effects; behind a sensor blind for the sign, reversals are those of the motion."""
         if BLIND not in current.effects and BLIND not in self.model.effects:
             return self.names
         plain = current.plain
@@ -172,8 +172,8 @@ class Search:
             replace(record, output=simulate(plain.problem.grid, record, mine, start_of(plain.problem, plain.x, i)))
             for i, (record, mine) in enumerate(zip(self.records, p, strict=True))
         ]
-        told = open_hypotheses(self.model, seeing)[0]
-        return list(dict.fromkeys([*self.names, *told]))
+        testable = open_hypotheses(self.model, seeing)[0]
+        return list(dict.fromkeys([*self.names, *testable]))
 
     def _graded(self, current: Hypothesis) -> Hypothesis | None:
         """Return a hypothesis with a load that walks far, which follows whatever is slow: after all laws."""
@@ -188,7 +188,7 @@ class Search:
     def _looks(self, current: Hypothesis, names: Sequence[str], rival: str = "") -> dict[str, list[Look]]:
         """Return the starts of the effects that are worth a fit, the most promising effect first.
 
-        Beside a ``rival`` those are worth it that promise nearly as much.
+        With a ``rival`` those are worth it that promise nearly as much.
         """
         view = screen(current, self.model, self.answers)
         contained = {special for have in current.effects for special in EFFECTS[have].contains}
@@ -281,7 +281,7 @@ class Search:
         return tuple(Score(effects, each.score, self.is_plausible(each)) for effects, each in possible.items())
 
     def is_resolved(self, hypothesis: Hypothesis, name: str) -> bool:
-        """Tell whether an effect is large enough to be told from another way of sampling."""
+        """Tell whether an effect is large enough to be distinguished from another way of sampling."""
         values = hypothesis.plain.values_of(name)
         return name == GRADE or not EFFECTS[name].unresolved(self.model, self.records, values)
 

@@ -39,7 +39,7 @@ LOOKING_ROUNDS = 6
 
 @dataclass(frozen=True, slots=True)
 class Law:
-    """The law without a name that makes the recordings most probable beside a set of effects.
+    """The law without a name that makes the recordings most probable together with a set of effects.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class Law:
 
 
 def hunts_around(hypothesis: Hypothesis) -> list[Hunt]:
-    """Look for the best law at every element beside a hypothesis; inside a plant simulated elsewhere for none."""
+    """Look for the best law to add to a hypothesis at every element; none inside a plant simulated elsewhere."""
     if hypothesis.plain.problem.grid.plant is not None:
         return []
     noise = float(reading_noise(hypothesis.sizes)[0])
@@ -127,7 +127,7 @@ def at_place(search: Search, decision: Decision, element: Element) -> Hypothesis
 
 
 def acts_at(beliefs: Sequence[Belief], element: Element) -> bool:
-    """Tell whether one of some effects acts at an element, or one that it can't be told from."""
+    """Tell whether one of some effects acts at an element, or one that it can't be distinguished from."""
     return any(element in _elements(each) for each in beliefs)
 
 
@@ -142,7 +142,7 @@ def gain_of_names(alone: Hypothesis, nothing: Hypothesis, law: Law) -> float:
 def weighed_against(decision: Decision, law: Law | None, alone: Callable[[Element], Hypothesis]) -> Decision:
     """Return a decision in which a law without a name has its share of the probability.
 
-    ``law`` is the best beside no effect at all; ``alone`` returns the best set without what acts elsewhere. In as far
+    ``law`` is the best without any effect; ``alone`` returns the best set without what acts elsewhere. In as far
     as the law makes the recordings more probable than the best set of names, what these explain is there, and they are
     not, unless they gain nearly as much. At its own place a law without a name is a name's law in another form, where
     the names there gain most of what it gains. One that leaves the free-run error as it was is a trace, and no other
@@ -156,11 +156,11 @@ def weighed_against(decision: Decision, law: Law | None, alone: Callable[[Elemen
         return decision
     same = acts_at(decision.named, law.element) and gain_of_names(alone(law.element), nothing, law) >= MOST_AT_PLACE
     first = replace(decision, best=best, nothing=nothing)
-    weighed = beside_rival(first, law.score, lambda each: not (same and law.element in _elements(each)))
+    weighed = against_rival(first, law.score, lambda each: not (same and law.element in _elements(each)))
     return replace(weighed, best=decision.best, nothing=decision.nothing)
 
 
-def beside_rival(decision: Decision, score: float, falls: Callable[[Belief], bool]) -> Decision:
+def against_rival(decision: Decision, score: float, falls: Callable[[Belief], bool]) -> Decision:
     """Return a decision in which a hypothesis of a score, without names, has its share of the probability.
 
     ``falls`` tells which names it stands against. Those left with too little are doubted.
@@ -188,5 +188,5 @@ def _share_of_names(decision: Decision, score: float) -> float:
 
 
 def _elements(belief: Belief) -> set[Element]:
-    """Return where an effect acts, or one that it can't be told from."""
+    """Return where an effect acts, or one that it can't be distinguished from."""
     return {EFFECTS[name].element for name in (belief.name, *belief.alike)}

@@ -74,7 +74,7 @@ class Grounds:
     best, nothing : Hypothesis
         The best set of effects, and the re-tuned model.
     beliefs : tuple of Belief
-        Of every effect of the best set that is large enough to be told from another way of sampling.
+        Of every effect of the best set that is large enough to be distinguished from another way of sampling.
     tests : tuple of Test
     scores : tuple of Score
         Of all sets that were fitted to their end and that a machine can be.
@@ -136,7 +136,7 @@ def decide(search: Search, ground: Grounds, with_findings: bool = False) -> Deci
 
 
 def _as_simple_as_will_do(search: Search, best: Hypothesis) -> Hypothesis:
-    """Return the best set with special cases in the place of general laws that hardly move the error beside them.
+    """Return the best set with special cases in the place of general laws that hardly change the error further.
 
     What a general law has beyond its special case would be a trace.
     """

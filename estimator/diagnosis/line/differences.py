@@ -17,7 +17,7 @@ from estimator.signals.record import FloatArray
 
 
 class Setting(NamedTuple):
-    """What the kernel is told alike in every block, and room for its answers; see ``integration.integrate``."""
+    """What the kernel is given in every block alike, and room for its answers; see ``integration.integrate``."""
 
     masses: Masses
     sample_time_s: float

@@ -36,7 +36,7 @@ class Motion:
 
 
 Force = tuple[FloatArray | float, FloatArray | float]
-"""Torque on the motor and torque against the load beside the model's, shape (N,) each [Nm]."""
+"""Torque on the motor and torque against the load, in addition to the model's, shape (N,) each [Nm]."""
 
 NO_FORCE: Force = (0.0, 0.0)
 

@@ -76,8 +76,8 @@ def _at_pace(values: FloatArray, seen: BoolArray, rows: BoolArray) -> bool:
 def without_clipped(records: Sequence[Record]) -> tuple[list[Record], list[str]]:
     """Mask the rows in which the output is cut off; say so, and say where a torque seems to be.
 
-    A torque that stands at its limit may be cut off in the reading or held there by the drive; that can't be told from
-    it, so its rows stay.
+    A torque that stands at its limit may be cut off in the reading or held there by the drive; the reading
+    alone doesn't show which, so its rows stay.
     """
     mended, warnings = [], []
     for record in records:

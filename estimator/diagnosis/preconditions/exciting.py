@@ -89,19 +89,19 @@ def _unexcited_mode(records: Sequence[Record], line: DrivelineModel, grid: Grid,
     first_hz = float(natural_frequencies_rad_s(line.values())[0]) / (2.0 * math.pi)
     if first_hz == 0.0:
         return []
-    untold = "stiffness, damping and effects of the shaft can't be told from these recordings"
+    lacking = "stiffness, damping and effects of the shaft can't be determined from these recordings"
     nyquist_hz = 0.5 / records[0].sample_time_s
     if nyquist_hz < first_hz:
         return [
             f"the model's first mode is at {first_hz:.3g} Hz, beyond the {nyquist_hz:.3g} Hz that a sampling period of "
-            f"{records[0].sample_time_s:g} s can show: {untold}. Sample faster, or use structure = 'one_mass'."
+            f"{records[0].sample_time_s:g} s can show: {lacking}. Sample faster, or use structure = 'one_mass'."
         ]
     answer = _rms([_good(record, driven(record, line, grid, NEAR_MODE * first_hz)) for record in records])
     if answer >= floor:
         return []
     return [
         f"at and above the model's first mode ({first_hz:.3g} Hz) the torque moves the {records[0].kind.value} by "
-        f"{answer:.3g} (rms), less than its noise of {floor:.3g}: {untold}. Superpose a PRBS, or a tip-in."
+        f"{answer:.3g} (rms), less than its noise of {floor:.3g}: {lacking}. Superpose a PRBS, or a tip-in."
     ]
 
 

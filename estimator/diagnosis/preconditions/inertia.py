@@ -1,7 +1,7 @@
 """The inertia a recording fits, over the nominal one, found in two ways that missing physics hardly touches.
 
 **By bands.** Well below its first mode a line moves as one body, well above it only the motor does: there torque and
-speed follow the inertias, whatever the shaft is like. A lag bends the upper band, play and a soft shaft the lower one;
+speed follow the inertias, whatever the shaft does. A lag distorts the upper band, backlash or a soft shaft the lower;
 a factor between units moves both alike, so only where both agree is there a factor. Near the mode itself nothing is
 compared. A road, a brake or a speed control is slower than either band.
 

@@ -1,4 +1,4 @@
-"""Values of a model that are possible and yet hardly meant: told before anything is fitted with them."""
+"""Values of a model that are possible but hardly meant: reported before anything is fitted with them."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ SMOOTH = 1e-9
 """The same as a share of the signal's range, where a file has all digits."""
 
 BENT = 50.0
-"""How far three samples usually are off a straight line, in what rounding makes of one: below, it can't be told. The
+"""How far three samples usually are off a straight line, in what rounding makes of one: below, it can't be decided. The
 line itself must go further than that: a motion that settles without noise is straight in the end."""
 
 SELDOM = 0.05

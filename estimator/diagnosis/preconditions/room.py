@@ -40,7 +40,7 @@ def with_room(segments: Cut, training: Iterable[str]) -> tuple[Cut, list[str]]:
         return segments, []
     left_out = {piece.name for piece in pieces} - {piece.name for piece in used}
     kept = tuple(record for record in segments.records if record.name not in left_out)
-    return replace(segments, records=kept), [_told(used, pieces)]
+    return replace(segments, records=kept), [_warning(used, pieces)]
 
 
 def _size(pieces: Sequence[Record]) -> int:
@@ -53,7 +53,7 @@ def _some(pieces: Sequence[Record], count: int) -> list[Record]:
     return [pieces[i] for i in np.random.default_rng(SEED).integers(edges[:-1], edges[1:])]
 
 
-def _told(used: Sequence[Record], pieces: Sequence[Record]) -> str:
+def _warning(used: Sequence[Record], pieces: Sequence[Record]) -> str:
     return (
         f"{len(used)} of {len(pieces)} recordings are used (each piece between long gaps, or stretch of a long one, "
         f"counts as one), drawn from the whole list: {', '.join(piece.name for piece in used)}. Each has unknowns of "

@@ -1,7 +1,7 @@
 """Positions that wrap: a counter or an angle that begins anew after a turn, which no motion does.
 
-From one sample to the next the reading jumps by more than half of its whole range, always as far, and goes on from
-there as it came. It is put together again; where jumps are of different sizes they are something else and stay.
+From one sample to the next the reading jumps by more than half of its whole range, always as far, and continues from
+there as before. It is put together again; where jumps are of different sizes they are something else and stay.
 """
 
 from __future__ import annotations

@@ -45,7 +45,7 @@ def ground_of(view: Scene) -> Ground:
     """Return what re-tuning a fit further could explain of its error.
 
     The derivative is found anew: that of a fit is of the place before its last step. That is near enough for all but
-    this. Of a drifting position re-tuning explains nearly all that a law does, and the rest is told by the fifth digit.
+    this. Of a drifting position re-tuning explains nearly all that a law does, and the rest is in the fifth digit.
     """
     result = view.result
     jacobian = jacobian_at(result.problem, result.x, result.outputs)

@@ -66,7 +66,7 @@ def _with(function: Callable[[FloatArray, Motion, float], FloatArray], signal: L
 
 
 def _lags(phrase: str, signal: Law, times_s: Sequence[float]) -> dict[str, Law]:
-    """Return how far lags of first order are behind a signal; ``phrase`` goes on with the time."""
+    """Return how far lags of first order are behind a signal; the time is appended to ``phrase``."""
     return {f"{phrase} {time_s:g} s": _with(behind, signal, time_s) for time_s in times_s}
 
 
@@ -209,4 +209,4 @@ MODULATIONS: Mapping[Element, Mapping[str, Law]] = {
     Element.SPEED_SENSOR: {" of w": _speed},
     Element.ACQUISITION: {},
 }
-"""What a wave over the angle is multiplied by, as its name goes on."""
+"""What a wave over the angle is multiplied by, as it ends the name."""

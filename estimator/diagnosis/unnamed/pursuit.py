@@ -23,7 +23,7 @@ MOST_TERMS = 9
 MOST_COEFFICIENTS = 45
 
 ALIKE = 1e-6
-"""A candidate that re-tuning reproduces to this share of its power can't be told from it."""
+"""A candidate that re-tuning reproduces to this share of its power can't be distinguished from it."""
 
 CHUNK = 2048
 """Rows that are worked on at a time."""

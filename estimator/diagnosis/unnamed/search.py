@@ -38,7 +38,7 @@ ROUNDS = 20
 LEAST_ROUNDS = 5
 WORTH_A_ROUND = 0.005
 """Rounds that are made in any case, and the share of the squared error that a further one must have taken away at an
-element for its next: where the line's own parameters are far off, as beside a shaft that relaxes, law and line come to
+element for its next: where the line's own parameters are far off, as next to a shaft that relaxes, law and line come to
 each other in many steps."""
 
 MOST_AT_ONCE = 20_000

@@ -17,7 +17,7 @@ FALSE_ALARM = 0.01
 """Probability that normal noise makes one stray in all recordings."""
 
 WITHIN = 0.9
-"""Share of the values that their spread is told from: few of them are their own neighbours' median, and no stray."""
+"""Share of the values from which their spread is estimated: few of those are their neighbours' median, none a stray."""
 
 
 def strays(errors: Sequence[FloatArray]) -> list[BoolArray]:

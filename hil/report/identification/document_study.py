@@ -121,7 +121,7 @@ def _physical(each: Study) -> dict[str, Any]:
     if each.physical is None:
         return {"parameters": {}, "sums": {}, "reason": each.not_physical}
     groups = {"parameters": each.physical.parameters, "sums": each.physical.sums}
-    told: dict[str, Any] = {
+    content: dict[str, Any] = {
         group: {
             name: _uncertain(one.estimate)
             | {"unit": one.unit, "determined": one.is_determined, "statement": one.statement}
@@ -129,4 +129,4 @@ def _physical(each: Study) -> dict[str, Any]:
         }
         for group, members in groups.items()
     }
-    return told | {"reason": ""}
+    return content | {"reason": ""}

@@ -84,12 +84,12 @@ def _tiles(studies: Sequence[Study]) -> list[tuple[str, str, str]]:
     tiles = []
     if first.resonance is not None:
         mode, online = first.resonance, first.found.online_resonance
-        told = ("none on line", "none on line")
+        on_line = ("none on line", "none on line")
         if online is not None:
-            told = (f"on line {shown(online.frequency_hz, 'Hz')}", f"on line {shown(online.damping)}")
+            on_line = (f"on line {shown(online.frequency_hz, 'Hz')}", f"on line {shown(online.damping)}")
         tiles += [
-            (f"frequency, {first.name}", plus_minus(mode.frequency_hz, "Hz"), told[0]),
-            (f"damping, {first.name}", plus_minus(mode.damping), told[1]),
+            (f"frequency, {first.name}", plus_minus(mode.frequency_hz, "Hz"), on_line[0]),
+            (f"damping, {first.name}", plus_minus(mode.damping), on_line[1]),
         ]
     own = first.validation.own
     tiles.append(("free-run fit", f"{own.fit_percent:.1f} %", f"one step ahead {own.one_step_fit_percent:.1f} %"))

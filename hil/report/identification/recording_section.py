@@ -86,14 +86,18 @@ def _roots(model: LocalModel, study: Study, number: int) -> list[str]:
         PoleSet("output error, third order", third.poles**k, third.zeros**k, GREEN, hidden=True),
         *known_sets([model]),
     ]
-    told = [html.paragraph(each.statement) for each in study.roots.cancellations]
+    cancellations = [html.paragraph(each.statement) for each in study.roots.cancellations]
     bound = shown(study.third_order.largest_error)
     note = (
         f"Crosses are poles, circles zeros, drawn at the on-line model's period, {1e3 * model.online.sample_time_s:g} "
         "ms (exact for poles alone). Outlines: where they are with 95 % confidence, a line for a real one; left "
         f"out where they would cover the map. The third-order equivalent changes the response by {bound} at most."
     )
-    return [html.paragraph(note, "note"), *told, pole_figure(f"poles-{number}", sets, model.online.sample_time_s)]
+    return [
+        html.paragraph(note, "note"),
+        *cancellations,
+        pole_figure(f"poles-{number}", sets, model.online.sample_time_s),
+    ]
 
 
 def _regions(study: Study, k: float) -> tuple[FloatArray, ...]:

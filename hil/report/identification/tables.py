@@ -59,10 +59,10 @@ def _numbers(each: Study) -> tuple[str, ...]:
 
 def physical_tables(studies: Sequence[Study]) -> list[str]:
     """Return the drive's parameters of every recording: one row each, then what is open and why."""
-    rows, told, is_open = [], [], []
+    rows, warnings, is_open = [], [], []
     for each in studies:
         if each.physical is None:
-            told.append(html.paragraph(f"{each.name}: no two-mass drive. {each.not_physical}", "warning"))
+            warnings.append(html.paragraph(f"{each.name}: no two-mass drive. {each.not_physical}", "warning"))
             continue
         both = {**each.physical.parameters, **each.physical.sums}
         rows += [
@@ -81,7 +81,7 @@ def physical_tables(studies: Sequence[Study]) -> list[str]:
         ]
     headings = ("recording", "parameter", "value", "95 % interval", "unit", "")
     table = html.table(headings, rows, numbers=(2, 3)) if rows else ""
-    return [table, *told, html.details("What is open, and what would tell", *is_open) if is_open else ""]
+    return [table, *warnings, html.details("What is open, and what would tell", *is_open) if is_open else ""]
 
 
 def orders_table(choice: OrderChoice) -> str:

@@ -15,7 +15,7 @@ from estimator.identification.study import Study
 from hil.report.identification.wording import plus_minus
 
 NAME_WIDTH = 20
-"""Longest name of a recording in the table; what is longer goes on in a second line."""
+"""Longest name of a recording in the table; a longer one wraps."""
 
 
 def summary(studies: Sequence[Study], nominal: Mode | None) -> Table:
@@ -44,11 +44,11 @@ def compared_summary(compared: Iterable[Compared]) -> Table:
     table = Table(title="Recursive estimators", title_justify="left", box=SIMPLE_HEAD)
     for heading in ("recording", "estimator", "[Hz]", "damping", "fit", "status"):
         table.add_column(heading)
-    told = list(compared)
-    for each in told:
+    shown = list(compared)
+    for each in shown:
         fit = f"{each.fit_percent:.1f} %" if math.isfinite(each.fit_percent) else "–"
         table.add_row(each.recording, each.estimator, *_shown(each.resonance), fit, each.status.value)
-    table.caption = "\n".join(f"{each.recording}, {each.estimator}: {each.reason}" for each in told if each.reason)
+    table.caption = "\n".join(f"{each.recording}, {each.estimator}: {each.reason}" for each in shown if each.reason)
     table.caption_justify = "left"
     return table
 

@@ -83,7 +83,7 @@ def best_statement(each: Study) -> str:
 
 
 LEAST_BAND_HZ = 25.0
-"""Up to here driveline resonances are common; a recording that can't show them is told so."""
+"""Driveline resonances are common up to here; of a recording that can't show them the page says so."""
 
 
 def headline(studies: Sequence[Study]) -> str:
@@ -126,13 +126,13 @@ def statement(models: Sequence[LocalModel], studies: Sequence[Study]) -> str:
 
 def warnings(studies: Sequence[Study]) -> list[str]:
     """Return what a reader must know before believing it."""
-    told = []
+    texts = []
     for each in studies:
         estimate = each.found.estimate
         if estimate.status is not Status.ESTIMATED:
-            told.append(f"{each.name}: the on-line estimate is {estimate.status.value}: {estimate.reason.message}.")
+            texts.append(f"{each.name}: the on-line estimate is {estimate.status.value}: {estimate.reason.message}.")
         if (fit := each.found.batch.fit_percent) < LITTLE_PERCENT:
-            told.append(
+            texts.append(
                 f"{each.name}: the off-line model reproduces {fit:.0f} % of its recording: most of the speed comes "
                 "from elsewhere than from the torque, and a resonance of such a model is none to believe. Raise the "
                 "PRBS or record longer."
@@ -140,16 +140,16 @@ def warnings(studies: Sequence[Study]) -> list[str]:
     for each in studies:
         used_s, whole_s = (x.time_s.shape[0] * x.sample_time_s for x in (each.found.offline, each.found.data))
         if used_s < 0.99 * whole_s:
-            told.append(
+            texts.append(
                 f"{each.name}: off line the first {used_s / 60.0:.0f} of {whole_s / 60.0:.0f} min are used. Cut the "
                 "recording for another part."
             )
     missed = [each.name for each in studies if not _passed(each.validation) and not _passed(each.best.validation)]
     if missed:
-        told.append(
+        texts.append(
             f"In {listed(missed)} the residual still depends on the input: the models miss a part of the response."
         )
-    return told
+    return texts
 
 
 def _passed(validation: Validation) -> bool:

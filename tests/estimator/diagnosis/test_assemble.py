@@ -104,9 +104,9 @@ def test_whichever_inverter_is_wrong_the_intervals_hold_the_line(wrong: str) -> 
         records.append(replace(record, torque_nm=read))
     result = assembled(records, "inverter_gain_mismatch")
     found = effect_of("inverter_gain_mismatch", result)
-    (told,) = found.parameters
-    other_way = 1.0 / found.parameters[told].value
-    assert (found.parameters[told].value if told == wrong else other_way) == pytest.approx(gain, rel=0.01)
+    (named,) = found.parameters
+    other_way = 1.0 / found.parameters[named].value
+    assert (found.parameters[named].value if named == wrong else other_way) == pytest.approx(gain, rel=0.01)
     for name, parameter in retuned_parameters(result, LINE, whole=True).items():
         low, high = parameter.ci95
         assert low <= ONE_MASS[name] <= high
@@ -129,12 +129,13 @@ def test_the_other_way_is_as_uncertain_as_the_factor_between_both() -> None:
     other[inertia], other[gain] = 1.0 / result.x[inertia], -1.0 / result.x[gain]  # of ln(J / g)
     relative = float(np.sqrt(other @ cov @ other))
     scale = result.problem.shared[inertia].scale
-    told = scale * result.x[inertia] / result.x[gain] * np.array([1.0 - Z95 * relative, 1.0 + Z95 * relative])
+    expected = scale * result.x[inertia] / result.x[gain] * np.array([1.0 - Z95 * relative, 1.0 + Z95 * relative])
     low, high = interval_both_ways(result, cov, inertia)
     assert (low, high) == pytest.approx(
-        (min(interval(result, cov, inertia)[0], told[0]), max(interval(result, cov, inertia)[1], told[1])), rel=1e-6
+        (min(interval(result, cov, inertia)[0], expected[0]), max(interval(result, cov, inertia)[1], expected[1])),
+        rel=1e-6,
     )
-    assert np.ptp(told) > 1.2 * np.ptp(interval(result, cov, inertia)) / result.x[gain]
+    assert np.ptp(expected) > 1.2 * np.ptp(interval(result, cov, inertia)) / result.x[gain]
 
 
 def by_another_clock(values: Mapping[str, float], seed: int, rate: float) -> Record:
@@ -281,11 +282,11 @@ class TestParameters:
         self,
     ) -> None:
         retuned = assembled(rubbing(lambda speed: FRICTION_NM))
-        told = {whole: retuned_parameters(retuned, LINE, whole)["J_M"] for whole in (True, False)}
-        assert told[False].value == told[True].value
+        by_whole = {whole: retuned_parameters(retuned, LINE, whole)["J_M"] for whole in (True, False)}
+        assert by_whole[False].value == by_whole[True].value
         tolerance = LINE.parameters["J_M"].tolerance
         edges = (NOMINAL["J_M"] * (1.0 - tolerance), NOMINAL["J_M"] * (1.0 + tolerance))
-        assert told[False].ci95 == pytest.approx(edges)
+        assert by_whole[False].ci95 == pytest.approx(edges)
 
     def test_one_that_is_trusted_exactly_stays(self) -> None:
         records = rubbing(lambda speed: 0.0)
@@ -326,7 +327,7 @@ class TestAugmentedModel:
         assert augmented_model(rubbed, having, []).effects == having.effects
 
 
-def test_a_held_value_is_told_at_its_null_where_a_model_file_needs_it() -> None:
+def test_a_held_value_is_reported_at_its_null_where_a_model_file_needs_it() -> None:
     """A ripple of order 6, the null of the order: without it the augmented model could not be read."""
     result = regression([np.random.default_rng(1).standard_normal((500, 3))], [np.zeros(500)])
     shared = (
@@ -335,8 +336,8 @@ def test_a_held_value_is_told_at_its_null_where_a_model_file_needs_it() -> None:
         Shared("torque_ripple", "order", 1.0, 6.0, 6.0, 6.0),
     )
     fitted = replace(result, problem=replace(result.problem, shared=shared), x=np.array([0.5, 0.0, 6.0]))
-    told = parameters_of("torque_ripple", fitted, np.eye(3), LINE)
-    assert set(told) == {"amplitude_nm", "order"}
-    assert told["order"].ci95 == (6.0, 6.0)
-    values = {name: EffectValue(each.value, each.ci95) for name, each in told.items()}
+    found = parameters_of("torque_ripple", fitted, np.eye(3), LINE)
+    assert set(found) == {"amplitude_nm", "order"}
+    assert found["order"].ci95 == (6.0, 6.0)
+    values = {name: EffectValue(each.value, each.ci95) for name, each in found.items()}
     assert effect_problems("torque_ripple", values, LINE) == []

@@ -1,4 +1,4 @@
-"""Who waits for a compiler is told so, and waits for both cores."""
+"""A run that waits for the compiler says so, and compiles on both cores."""
 
 from __future__ import annotations
 

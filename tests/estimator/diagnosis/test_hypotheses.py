@@ -46,7 +46,7 @@ class TestOpenHypotheses:
         assert {EFFECTS[name].element for name in testable} == set(Element) - {Element.SHAFT}
         assert all(Structure.ONE_MASS in EFFECTS[name].structures for name in {*testable, *untestable})
 
-    def test_what_can_not_be_told_is_given_with_its_reason(self) -> None:
+    def test_what_can_not_be_tested_is_given_with_its_reason(self) -> None:
         testable, untestable = open_hypotheses(model(ONE_MASS), [self.FORWARD])
         assert set(untestable) >= {"coulomb_friction_motor", "stribeck_friction", "speed_sign_blind"}
         assert "never changes sign" in untestable["stribeck_friction"].reason

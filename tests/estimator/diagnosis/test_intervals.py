@@ -139,7 +139,7 @@ def test_recordings_are_not_correlated_across_their_ends() -> None:
 
 
 class TestReported:
-    """White errors of the regression's own, and beside them one that keeps its value for a second."""
+    """White errors of the regression's own, and in addition one that keeps its value for a second."""
 
     SIGMA, SAMPLES = 0.1, 9000
 
@@ -159,7 +159,7 @@ class TestReported:
         assert np.diag(reported_covariance(result)) == pytest.approx(np.diag(covariance(result)), rel=0.2)
 
     def test_what_is_no_noise_counts_for_as_long_as_it_keeps_its_value(self) -> None:
-        """100 times its mean square takes the place of sigma^2; from twenty noisy values some of it is foretold."""
+        """100 times its mean square takes the place of sigma^2; from twenty noisy values some of it is predicted."""
         result = self.result(0.05)
         added = np.diag(reported_covariance(result) - covariance(result))
         j = result.jacobian

@@ -73,7 +73,7 @@ def test_a_recording_with_hardly_two_good_samples_in_a_row_is_refused() -> None:
 
 
 class TestUnpredictable:
-    """What a series' own past does not foretell."""
+    """What a series' own past does not predict."""
 
     @pytest.mark.parametrize("a", [0.0, 0.5, 0.9])
     def test_of_a_first_order_series_it_is_the_innovation(self, a: float) -> None:
@@ -81,7 +81,7 @@ class TestUnpredictable:
         errors = [autoregressive(a, 4000, rng), autoregressive(a, 2000, rng)]
         assert unpredictable(errors) == pytest.approx(np.sqrt(1.0 - a**2), rel=0.05)
 
-    def test_a_slow_swing_is_foretold_and_the_noise_on_it_is_not(self) -> None:
+    def test_a_slow_swing_is_predicted_and_the_noise_on_it_is_not(self) -> None:
         time_s = np.arange(4000) * 0.01
         noise = 0.05 * np.random.default_rng(10).standard_normal(4000)
         assert unpredictable([np.sin(2 * np.pi * 0.3 * time_s) + noise]) == pytest.approx(0.05, rel=0.15)

@@ -225,11 +225,11 @@ def test_a_mode_is_named_with_its_frequency_on_either_side_of_the_shaft(at_motor
     seed, true_hz = next((seed, hz) for seed, hz in hidden if hz < BELOW_HZ or not at_motor)
     case = planted(name, seed)
     assert_named(case, [name])
-    told = case.effect_that_stands_for(name).parameters
-    assert ("between_kg_m2" if at_motor else "behind_kg_m2") in told
-    assert told["frequency_hz"].ci95[0] <= true_hz <= told["frequency_hz"].ci95[1]
-    assert told["frequency_hz"].value == pytest.approx(true_hz, rel=0.05)
-    assert told["frequency_hz"].ci95[1] - told["frequency_hz"].ci95[0] < 0.2 * true_hz
+    sizes = case.effect_that_stands_for(name).parameters
+    assert ("between_kg_m2" if at_motor else "behind_kg_m2") in sizes
+    assert sizes["frequency_hz"].ci95[0] <= true_hz <= sizes["frequency_hz"].ci95[1]
+    assert sizes["frequency_hz"].value == pytest.approx(true_hz, rel=0.05)
+    assert sizes["frequency_hz"].ci95[1] - sizes["frequency_hz"].ci95[0] < 0.2 * true_hz
 
 
 PAIRS = (("backlash", "actuator_lag"), ("speed_quantisation", "backlash"), ("clock_drift", "coulomb_friction_motor"))

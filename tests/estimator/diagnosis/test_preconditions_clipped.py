@@ -1,4 +1,4 @@
-"""Readings that are cut off: found, told with channel, value and share, and left out where they are the output's."""
+"""Readings that are cut off: reported with channel, value and share, and left out where they are the output's."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def test_the_output_is_masked_where_it_is_cut_off() -> None:
     ]
 
 
-def test_a_torque_at_its_limit_is_told_and_stays() -> None:
+def test_a_torque_at_its_limit_is_reported_and_stays() -> None:
     whole = drive()
     cut = replace(whole, torque_nm=np.column_stack([SWING, np.minimum(SWING, 8.0)]))
     (mended,), warnings = without_clipped([cut])

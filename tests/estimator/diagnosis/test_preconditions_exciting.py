@@ -1,4 +1,4 @@
-"""Recordings that excite nothing are refused; what excites only a part of the model is told, and so are odd models."""
+"""Recordings that excite nothing are refused; partial excitation and odd models are reported."""
 
 from __future__ import annotations
 
@@ -63,10 +63,10 @@ def slow_torque() -> np.ndarray:
     return 100.0 * np.sin(0.4 * 0.01 * np.arange(N))
 
 
-def test_a_mode_that_is_not_excited_is_told() -> None:
+def test_a_mode_that_is_not_excited_is_reported() -> None:
     (warning,) = prepare([drive(slow_torque())], LINE).warnings
     assert warning.startswith("at and above the model's first mode (8.32 Hz) the torque moves the speed by")
-    assert "stiffness, damping and effects of the shaft can't be told" in warning
+    assert "stiffness, damping and effects of the shaft can't be determined" in warning
     assert warning.endswith("Superpose a PRBS, or a tip-in.")
 
 
@@ -76,7 +76,7 @@ def test_one_mass_has_no_mode_to_excite() -> None:
     assert prepare([rec], model(ONE_MASS)).warnings == ()
 
 
-def test_a_mode_too_fast_for_the_sampling_is_told() -> None:
+def test_a_mode_too_fast_for_the_sampling_is_reported() -> None:
     stiff = model(scaled(TWO_MASS, k=100.0))
     (warning,) = require_excitation([drive(random_steps(N, 1))], stiff)
     assert "first mode is at 83.2 Hz, beyond the 50 Hz that a sampling period of 0.01 s can show" in warning
@@ -95,7 +95,7 @@ def test_effects_of_the_model_do_not_hide_what_the_torque_does() -> None:
         ({"c": 100.0}, "with c = 900 and k = 4200 the first mode (8.32 Hz) is damped 5.6 times critically"),
     ],
 )
-def test_values_that_are_hardly_meant_are_told(changes: dict[str, float], said: str) -> None:
+def test_values_that_are_hardly_meant_are_reported(changes: dict[str, float], said: str) -> None:
     (warning,) = model_warnings(model(scaled(TWO_MASS, **changes)))
     assert said in warning
     assert warning.endswith("?")

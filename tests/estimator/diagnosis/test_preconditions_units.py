@@ -230,7 +230,7 @@ def test_a_refusal_says_what_to_correct(fault: str) -> None:
 
 @pytest.mark.parametrize("rated_nm", [300.0, 600.0, 1600.0])
 @pytest.mark.parametrize("values", [TWO_MASS, ONE_MASS], ids=["two masses", "one mass"])
-def test_per_mille_of_a_rated_torque_are_told_with_their_scale(rated_nm: float, values: dict[str, float]) -> None:
+def test_per_mille_of_a_rated_torque_are_reported_with_their_scale(rated_nm: float, values: dict[str, float]) -> None:
     with pytest.raises(Implausible, match="per mille of a rated torque") as refusal:
         require_plausible_units([in_per_mille(rated_nm)(drive(values))], model(values))
     assert refusal.value.cure is not None
@@ -248,14 +248,14 @@ def test_per_mille_within_the_tolerance_change_no_verdict() -> None:
     require_plausible_units([in_per_mille(950.0)(drive())], model(TWO_MASS))
 
 
-def test_a_torque_in_per_cent_is_told_with_its_scale() -> None:
+def test_a_torque_in_per_cent_is_reported_with_its_scale() -> None:
     with pytest.raises(Implausible, match="per cent of a rated torque of about") as refusal:
         require_plausible_units([torque(1.0 / 20.0, 1.0 / 20.0)(drive())], model(TWO_MASS))
     assert refusal.value.cure is not None
     assert refusal.value.cure.torque == pytest.approx(20.0, rel=0.2)
 
 
-def test_a_torque_turned_round_is_told_where_the_inertia_is_hardly_off() -> None:
+def test_a_torque_turned_round_is_reported_where_the_inertia_is_hardly_off() -> None:
     rng = np.random.default_rng(4)
     record = drive()
     own = np.cumsum(rng.normal(size=(SAMPLES, 2)), axis=0)

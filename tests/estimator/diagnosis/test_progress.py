@@ -1,4 +1,4 @@
-"""Progress is told in rising shares, and raising from it cancels."""
+"""Progress is reported in rising shares, and raising from it cancels."""
 
 from __future__ import annotations
 
@@ -40,26 +40,26 @@ def misread(records: list[Record]) -> list[Record]:
     ids=["nothing", "one", "two", "unknown"],
 )
 def test_shares_rise_from_none_to_all(records: list[Record]) -> None:
-    told: list[tuple[str, float]] = []
-    diagnose(records, LINE, progress=lambda *what: told.append(what))
-    shares = [share for _, share in told]
+    reported: list[tuple[str, float]] = []
+    diagnose(records, LINE, progress=lambda *what: reported.append(what))
+    shares = [share for _, share in reported]
     assert shares == sorted(shares)
     assert (shares[0], shares[-1]) == (0.0, 1.0)
-    assert [stage for stage, _ in told[:2]] == ["checking the recordings", "comparing hypotheses"]
+    assert [stage for stage, _ in reported[:2]] == ["checking the recordings", "comparing hypotheses"]
 
 
 @pytest.mark.parametrize("after", [0.0, 0.2, 0.9, 1.0])
 def test_an_exception_from_it_cancels(after: float) -> None:
-    told: list[float] = []
+    reported: list[float] = []
 
     def stop(message: str, share: float) -> None:
-        told.append(share)
+        reported.append(share)
         if share >= after:
             raise Cancelled
 
     with pytest.raises(Cancelled):
         diagnose(rubbing(lambda speed: 12.0), LINE, progress=stop)
-    assert [share for share in told if share >= after] == told[-1:]
+    assert [share for share in reported if share >= after] == reported[-1:]
 
 
 def test_without_anybody_listening_the_answer_is_the_same() -> None:

@@ -92,7 +92,7 @@ class TestLinear:
         assert 0.0 <= looks[0].promise < 10.8 * retuned.rms**2
 
 
-def test_a_law_that_bends_is_promised_to_first_order() -> None:
+def test_a_nonlinear_law_is_promised_to_first_order() -> None:
     """Dry friction: the direction holds no further than it goes, but it tells the order of size, and the sign."""
     (look,), retuned, fitted = looked_at(model(ONE_MASS), rubbing(lambda speed: 12.0), "coulomb_friction_motor")
     gained = retuned.squares - fitted.squares
@@ -154,7 +154,7 @@ INERTIA, CLOSED_S = 5.0, ((2.0, 5.0), (6.0, 9.5), None)
 
 
 def with_clutch(seed: int, closed_s: tuple[float, float] | None) -> Record:
-    """One mass with a generator for a while, piece by piece: its speed goes on as it was, on both sides the same."""
+    """One mass with a generator for a while, piece by piece: its speed continues as it was, on both sides the same."""
     torque, pieces, start = drive_torque(seed, SAMPLES), [], Start(5.0, 0.0, 2.0)
     cuts = [0, *(round(100 * moment) for moment in closed_s or ()), SAMPLES]
     for number, (first, last) in enumerate(pairwise(cuts)):

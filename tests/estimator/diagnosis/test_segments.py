@@ -1,4 +1,4 @@
-"""Long gaps cut recordings into segments, and what is found of these is told of the recordings."""
+"""Long gaps cut recordings into segments, and what is found in these is given for the recordings."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ def test_of_a_segment_of_a_part_time_counts_from_the_very_beginning() -> None:
     assert quarter.offset_s.shape == quarter.torque_okay.shape == (200,)
 
 
-def test_a_held_out_recording_in_scraps_is_told_and_not_used() -> None:
+def test_a_held_out_recording_in_scraps_is_reported_and_not_used() -> None:
     ready = prepare([drive()], LINE, [replace(drive(name="unseen"), okay=np.arange(3000) % 300 < 100)])
     assert ready.holdout == ()
     assert "recording unseen: gaps of more than 1 s cut it into 10 segments, none of which" in ready.warnings[0]

@@ -1,4 +1,4 @@
-"""Long recordings are looked at in stretches, spread evenly and told of."""
+"""Long recordings are looked at in stretches, spread evenly and reported."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_many_short_recordings_stay_whole() -> None:
     assert found.warnings == ()
 
 
-def test_it_is_told() -> None:
+def test_it_is_reported() -> None:
     (warning,) = cut([lasting(2 * MOST_SAMPLES)]).warnings
     assert warning == (
         "recording run: 300 s of its 600 s are used, in 5 stretches, each with its own initial state and constant load."

@@ -1,4 +1,4 @@
-"""Jitter of the samples: told by stamps and confirmed by the output, or hidden and seen in the errors alone."""
+"""Jitter of the samples: shown by stamps and confirmed by the output, or hidden and seen in the errors alone."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ def test_a_mistaken_line_is_no_jitter(mistaken: dict[str, float], seed: int) -> 
     assert seen(seed, 0.0, **mistaken) is None
 
 
-def test_jitter_is_seen_beside_a_small_mistake() -> None:
+def test_jitter_is_seen_despite_a_small_mistake() -> None:
     finding = seen(1, 0.002, k=1.005)
     assert finding is not None
     assert finding.parameters["jitter_s"].value == pytest.approx(0.002, rel=0.1)

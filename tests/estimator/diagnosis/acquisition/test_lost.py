@@ -159,7 +159,7 @@ def test_a_torque_that_begins_at_zero_for_longer_is_kept() -> None:
     assert not any(finding.rows(record)[:8].any() for record in records)
 
 
-def test_zeros_that_the_values_beside_them_let_expect_are_kept() -> None:
+def test_zeros_that_the_values_near_zero_let_expect_are_kept() -> None:
     """A reading in coarse steps is at zero now and then while the line stands still."""
     rows = rows_of(5, 0.03)
     records = [replace(r, output=0.1 * np.round(10.0 * r.output)) for r in healthy(5)]

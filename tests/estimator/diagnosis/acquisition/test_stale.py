@@ -1,4 +1,4 @@
-"""Stale samples are recognised in every channel, at random and at regular intervals, and told from innocent repeats."""
+"""Stale samples are recognised in every channel, at random or regular intervals; innocent repeats are not."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def test_a_stale_output_is_found_with_its_share_and_its_rows(
 @pytest.mark.parametrize("channels", [TORQUES, M1])
 @pytest.mark.parametrize("share", [0.02, 0.05, 0.1, 0.2])
 @pytest.mark.parametrize("seed", range(3))
-def test_a_stale_torque_is_told_by_the_speed_that_answered(channels: tuple[int, ...], share: float, seed: int) -> None:
+def test_a_stale_torque_is_shown_by_the_speed_that_answered(channels: tuple[int, ...], share: float, seed: int) -> None:
     rows = random(seed, share)
     records = spoiled(healthy(seed), rows, channels)
     finding = only(records)
@@ -81,7 +81,7 @@ def test_bursts_are_found(burst: float, complete: float) -> None:
     assert np.mean(found[np.concatenate(rows)]) > complete
 
 
-def test_whole_rows_are_told_from_single_channels() -> None:
+def test_whole_rows_are_distinguished_from_single_channels() -> None:
     rows = random(6, 0.05)
     assert "in whole rows" in only(spoiled(healthy(6), rows, ROWS)).statement
     assert "in speed and torque 1" in only(spoiled(healthy(6), rows, M1_AND_SPEED)).statement
@@ -124,12 +124,12 @@ def test_flagged_repeats_are_lost_and_not_stale() -> None:
 
 
 @pytest.mark.parametrize("step", [0.001, 0.01, 0.03])
-def test_chance_repeats_are_foretold_from_the_other_changes(step: float) -> None:
+def test_chance_repeats_are_predicted_from_the_other_changes(step: float) -> None:
     """White noise of 0.05 on a lattice: the estimate against the count, within four standard deviations of it."""
     values = np.round(0.05 * np.random.default_rng(1).standard_normal(200_000) / step) * step
     changes = np.diff(values)
     count = int(np.sum(np.abs(changes) < 0.5 * step))
-    foretold = chance_repeats(changes, lattice_step(values))
+    predicted = chance_repeats(changes, lattice_step(values))
     assert lattice_step(values) == pytest.approx(step, rel=1e-6)
-    assert foretold.expected == pytest.approx(count, rel=0.1)
-    assert foretold.upper > count
+    assert predicted.expected == pytest.approx(count, rel=0.1)
+    assert predicted.upper > count

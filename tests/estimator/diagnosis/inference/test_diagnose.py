@@ -33,13 +33,13 @@ def test_a_named_effect_has_its_share_and_probability_and_the_model_has_it() -> 
     assert content["traces"] == []
     assert content["mismatch"]["element"] == "motor"
     rejected = [rival["name"] for rival in content["rejected"]]
-    told = ["coulomb_friction_motor", *rejected, *(entry["name"] for entry in content["untestable"])]
+    reported = ["coulomb_friction_motor", *rejected, *(entry["name"] for entry in content["untestable"])]
     can_be = [n for n, entry in EFFECTS.items() if bench.model.structure in entry.structures and not entry.recognised]
-    assert sorted(told) == sorted(can_be)
+    assert sorted(reported) == sorted(can_be)
     assert all(rival["delta_bic"] <= 0.0 for rival in content["rejected"])
 
 
-def test_nothing_missing_is_told_with_the_noise() -> None:
+def test_nothing_missing_is_reported_with_the_noise() -> None:
     bench = bench_with("quadratic_friction", {"quadratic_nm_s2": 1e-9})
     content = diagnosis_json(diagnose(bench.records, bench.model))
     assert content["verdict"] == "no_mismatch"

@@ -37,8 +37,8 @@ def test_an_effect_that_takes_anothers_place_has_its_share_too() -> None:
 
 
 def test_a_step_without_a_new_effect_changes_all_in_proportion() -> None:
-    told_another_way = shares(path(("", 100.0), ("lag", 60.0), ("lag brake", 40.0), ("lag brake", 10.0)))
-    assert told_another_way == pytest.approx({"lag": 0.6, "brake": 0.3})
+    written_another_way = shares(path(("", 100.0), ("lag", 60.0), ("lag brake", 40.0), ("lag brake", 10.0)))
+    assert written_another_way == pytest.approx({"lag": 0.6, "brake": 0.3})
     dropped = shares(path(("", 100.0), ("lag", 60.0), ("lag brake", 40.0), ("brake", 41.0)))
     assert dropped == pytest.approx({"brake": 0.59})
 

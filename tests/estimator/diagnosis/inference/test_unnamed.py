@@ -102,7 +102,7 @@ def test_a_name_stands_against_a_law_at_its_own_place_that_gains_somewhat_more(f
 
 def test_what_is_no_better_than_the_nominal_model_takes_nothing(friction: Decision) -> None:
     """However little differences of scores count where much is left: the posterior has counted that already."""
-    doubtful = replace(friction, failed=(remainder.Test("foretold by its own past", 0.5, 0.03, is_share=True),))
+    doubtful = replace(friction, failed=(remainder.Test("predicted by its own past", 0.5, 0.03, is_share=True),))
     for better in (0.0, -5.0):
         rival = Law(Element.SHAFT, (("T", 1.0),), friction.nothing.score - better, 0.1)
         (after,) = weighed(doubtful, rival).named

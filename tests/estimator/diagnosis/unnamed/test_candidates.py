@@ -202,7 +202,7 @@ def test_a_law_that_is_zero_throughout_has_no_answer() -> None:
     assert not pick(pool, Element.TORQUE_PATH, "T |T|").answers.any()
 
 
-def test_a_profile_of_the_fit_goes_on_in_the_answers() -> None:
+def test_a_profile_of_the_fit_continues_in_the_answers() -> None:
     records = quiet()
     line = model(TWO_MASS)
     hill = [

@@ -7,7 +7,7 @@ import numpy as np
 from estimator.diagnosis.unnamed.strays import strays
 
 
-def test_strays_are_told_from_a_swing_and_from_noise() -> None:
+def test_strays_are_distinguished_from_a_swing_and_from_noise() -> None:
     rng = np.random.default_rng(3)
     time_s = np.arange(0.0, 30.0, 0.01)
     error = 0.2 * np.sin(2 * np.pi * 1.0 * time_s) + 0.02 * rng.standard_normal(time_s.size)
