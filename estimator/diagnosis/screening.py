@@ -19,9 +19,8 @@ from estimator.physics.fit import FitResult
 from estimator.physics.inputs import Case
 from estimator.physics.model import DrivelineModel
 from estimator.physics.own_scan import Cells, Simulate, Stretch, Wave, answers_to, cells, scanned, small_waves
-from estimator.physics.problem import start_of
+from estimator.physics.problem import simulated_cases, start_of
 from estimator.physics.projector import Projector
-from estimator.physics.simulate import simulate_each
 from estimator.physics.unknowns import Release, Shared, effect_unknowns
 from estimator.signals.record import FloatArray
 
@@ -112,7 +111,7 @@ class Screen:
         self._result = result
         self._model = model
         self._projector = projector or Projector(result)
-        self._rows = np.cumsum([0, *(int(use.sum()) for use in result.problem.use)])
+        self._rows = result.problem.rows
 
     def looks(self, name: str, kept: str = "") -> list[Look]:
         """Return a look at each start of an effect, the most promising first.
@@ -141,7 +140,7 @@ class Screen:
             tried = [_Steps.of(entry, release) for release in some]
             outputs = self._each([steps.filled for steps in tried])
             for steps, mine in zip(tried, outputs, strict=True):
-                moved = np.hstack([output - self._output(i) for i, output in enumerate(mine)])
+                moved = self._stacked([output - self._output(i) for i, output in enumerate(mine)])
                 looks = [self._along(steps, step, change) for step, change in zip(steps.sizes, moved, strict=True)]
                 found.append(max(looks, key=lambda look: look.promise))
         return found
@@ -161,7 +160,7 @@ class Screen:
             For each function and each recording.
         """
         found = []
-        for i in range(len(self._result.problem.records)):
+        for i in range(len(self._rows)):
             lists = [make(self._result.p_of(i)) for make in tried]
             ends = np.cumsum([len(each) for each in lists])
             found.append(np.split(self._runner(i)([p for each in lists for p in each]), ends[:-1]))
@@ -198,17 +197,17 @@ class Screen:
             for u in release.shared
         )
         own = tuple(
-            tuple(replace(u, start=phases[i].get(u.name, u.start)) for u in unknowns)
-            for i, unknowns in enumerate(release.own)
+            tuple(replace(u, start=mine.get(u.name, u.start)) for u in unknowns)
+            for unknowns, mine in zip(release.own, phases, strict=False)
         )
-        return Look(Release(shared, own), promise)
+        return Look(_with_own(Release(shared, release.own), own), promise)
 
     def _regress(self, found: list[list[Wave]]) -> tuple[dict[str, float], list[dict[str, float]], float]:
         """Return the amplitudes all recordings share, the phases of each, and the promise."""
         parts: dict[str, list[tuple[float, float]]] = {}
         phases: list[dict[str, float]] = []
         for i, mine in enumerate(found):
-            gram, match = self._projector.products(np.concatenate([wave.answers for wave in mine]), self._rows_of(i))
+            gram, match = self._projector.products(np.concatenate([wave.answers for wave in mine]), i)
             coefficients = -np.linalg.lstsq(gram, match, rcond=None)[0].reshape(-1, 2)
             phases.append({})
             for wave, (along, across), power in zip(
@@ -225,7 +224,7 @@ class Screen:
             for wave in mine:
                 angle = angles[wave.phase]
                 turned = np.cos(angle) * wave.answers[0] + np.sin(angle) * wave.answers[1]
-                change[self._rows_of(i)] += amplitudes[wave.amplitude] * turned
+                change[self._rows[i]] += amplitudes[wave.amplitude] * turned
         return amplitudes, phases, self._projector.promise(change, 0.0, 1.0)[1]
 
     def _events(self, entry: Effect, releases: Sequence[Release]) -> list[Look]:
@@ -236,12 +235,9 @@ class Screen:
         size = release.shared[0]
         grids = [
             cells(entry, _filled(self._result.p_of(i), release.shared), own, sizes, self._runner(i))
-            for i, own in enumerate(release.own)
+            for i, own in enumerate(release.own[: len(self._rows)])
         ]
-        scans = [
-            scanned(*self._projector.products(grid.answers, self._rows_of(i)), entry.lasting)
-            for i, grid in enumerate(grids)
-        ]
+        scans = [scanned(*self._projector.products(grid.answers, i), entry.lasting) for i, grid in enumerate(grids)]
         tried = [value for value in SIZES * size.scale * abs(size.start) if self._may_be(size, value)]
         tried += [-value for value in tried if self._may_be(size, -value)]
         best = max(tried, key=lambda value: sum(each.best(value).taken for each in scans))
@@ -255,10 +251,10 @@ class Screen:
             )
         own = tuple(
             _between(unknowns, entry, grid, stretch)
-            for unknowns, grid, stretch in zip(release.own, grids, stretches, strict=True)
+            for unknowns, grid, stretch in zip(release.own, grids, stretches, strict=False)
         )
-        found = Release((replace(size, start=best / size.scale), *release.shared[1:]), own)
-        change = np.hstack(
+        found = _with_own(Release((replace(size, start=best / size.scale), *release.shared[1:]), release.own), own)
+        change = self._stacked(
             [
                 grid.answers[stretch.last] - grid.answers[stretch.first]
                 for grid, stretch in zip(grids, stretches, strict=True)
@@ -272,22 +268,29 @@ class Screen:
 
     def _runner(self, index: int) -> Simulate:
         problem = self._result.problem
-        record, basis = problem.records[index], problem.local[index]
+        basis = problem.local[index]
         start = start_of(problem, self._result.x, index)
         extra = basis.extra_load(self._result.local_of(index))
 
         def run(parameters: Sequence[FloatArray], alike_s: FloatArray | None = None) -> FloatArray:
             cases = [Case(p, start, extra) for p in parameters]
-            return simulate_each(problem.grid, record, cases, alike_s=alike_s)[:, problem.use[index]]
+            return simulated_cases(problem, cases, index, alike_s)
 
         return run
 
     def _output(self, index: int) -> FloatArray:
-        return self._result.outputs[index][self._result.problem.use[index]]
+        """Return the samples that count of a recording, its outputs in turn, as the fit has them."""
+        result = self._result
+        return np.concatenate([result.outputs[i][result.problem.use[i]] for i in result.problem.drives[index]])
 
-    def _rows_of(self, index: int) -> slice:
-        """Return where the samples of one recording that count stand among those of all."""
-        return slice(self._rows[index], self._rows[index + 1])
+    def _stacked(self, parts: Sequence[FloatArray]) -> FloatArray:
+        """Stack what there is of the samples that count of each recording, shapes (..., R_i)."""
+        if len(parts) == 1:
+            return parts[0]
+        whole = np.empty((*parts[0].shape[:-1], self._projector.error.size))
+        for rows, part in zip(self._rows, parts, strict=True):
+            whole[..., rows] = part
+        return whole
 
 
 def _filled(p: FloatArray, shared: tuple[Shared, ...]) -> FloatArray:
@@ -303,6 +306,11 @@ def _waved(entry: Effect, release: Release, p: FloatArray) -> list[FloatArray]:
 
 def _sizes(release: Release) -> Mapping[str, float]:
     return {unknown.name: unknown.scale * unknown.start for unknown in release.shared}
+
+
+def _with_own(release: Release, own: tuple[tuple[Shared, ...], ...]) -> Release:
+    """Return a release with what recordings have of their own; a further output has that of its recording."""
+    return replace(release, own=(*own, *release.own[len(own) :]))
 
 
 def _with_start(release: Release, unknown: Shared, start: float) -> Release:

@@ -72,10 +72,10 @@ def changes(
     problem: Problem, x: FloatArray, index: int, columns: IntArray, outputs: Sequence[FloatArray]
 ) -> FloatArray:
     """Return the derivative of one recording's errors by some of the scaled unknowns, shape (R_i, columns.size)."""
-    around = _Around(problem, x, outputs, [(index,)])
+    around = _Around(problem, x, outputs, problem.drives)
     found = np.zeros((x.size, around.firsts[-1]))
-    around.fill(_Moved(np.zeros(columns.size, dtype=np.int64), columns), found)
-    return found[columns, around.firsts[index] : around.firsts[index + 1]].T
+    around.fill(_Moved(np.full(columns.size, index), columns), found)
+    return found[columns][:, problem.rows[index]].T
 
 
 def _moves(problem: Problem, free: BoolArray, index: int) -> BoolArray:

@@ -15,16 +15,20 @@ from estimator.physics.grid import Grid, grid_for
 from estimator.physics.inputs import Case
 from estimator.physics.layout import LOAD, flat, slot
 from estimator.physics.model import DrivelineModel, Load
-from estimator.physics.simulate import simulate_each
+from estimator.physics.simulate import simulate_outputs
 from estimator.physics.start import Start
 from estimator.physics.together import simulate_records
 from estimator.physics.unknowns import LocalBasis, Shared, local_basis, own_unknowns, shared_load
 from estimator.signals.once import once
 from estimator.signals.outputs import leads
-from estimator.signals.record import BoolArray, FloatArray, Record
+from estimator.signals.record import BoolArray, FloatArray, IntArray, Record
 
 BAD = 1e3
 """A simulation that runs away counts as this many times the largest output."""
+
+
+Rows = slice | IntArray
+"""Places of some samples among all that are stacked."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +65,17 @@ class Problem:
         """Places of the outputs of each recording, which one simulation gives; first that of the recording itself."""
         firsts = sorted(set(self.leads))
         return tuple(tuple(i for i, lead in enumerate(self.leads) if lead == first) for first in firsts)
+
+    @property
+    def rows(self) -> list[Rows]:
+        """Where the samples of each recording that count stand among all, its outputs in turn."""
+        ends = np.cumsum([0, *(int(use.sum()) for use in self.use)])
+        return [
+            slice(ends[first], ends[first + 1])
+            if not further
+            else np.concatenate([np.arange(ends[i], ends[i + 1]) for i in (first, *further)])
+            for first, *further in self.drives
+        ]
 
     @property
     def bases(self) -> tuple[LocalBasis, ...]:
@@ -157,13 +172,26 @@ def simulated_each(
     index: int,
     alike_s: FloatArray | None = None,
 ) -> FloatArray:
-    """Return the outputs of one recording for parameter vectors and the recording's own unknowns, shape (K, N).
+    """Return the samples that count of one recording for parameter vectors and its own unknowns, shape (K, R_i).
 
-    ``alike_s``, shape (K,), tells up to when each is as the first one (``simulate.simulate_each``).
+    Its outputs stand in turn. ``alike_s``, shape (K,), says up to when each is as the first one
+    (``simulate.simulate_each``).
     """
-    record, basis = problem.records[index], problem.local[index]
+    basis = problem.local[index]
     cases = [case_of(basis, p, local) for p, local in points]
-    return _within_reason(simulate_each(problem.grid, record, cases, alike_s=alike_s), record)
+    return simulated_cases(problem, cases, index, alike_s)
+
+
+def simulated_cases(
+    problem: Problem, cases: Sequence[Case], index: int, alike_s: FloatArray | None = None
+) -> FloatArray:
+    """Return the same for cases of a recording."""
+    drive = problem.drives[index]
+    records = [problem.records[i] for i in drive]
+    outputs = simulate_outputs(problem.grid, records, cases, alike_s)
+    return np.hstack(
+        [_within_reason(outputs[:, place], problem.records[i])[:, problem.use[i]] for place, i in enumerate(drive)]
+    )
 
 
 def case_of(basis: LocalBasis, p: FloatArray, local: FloatArray) -> Case:

@@ -27,7 +27,7 @@ class Projector:
         self._all, self._triangle = np.linalg.qr(jacobian[:, movable])
         x = result.x[movable]
         self._room = low[movable] - x, high[movable] - x
-        self._residual = result.residual
+        self._residual, self._rows = result.residual, result.problem.rows
         self.error = self.rest(result.residual)
 
     def rest(self, signals: FloatArray) -> FloatArray:
@@ -35,11 +35,12 @@ class Projector:
         left: FloatArray = signals - (signals @ self._free) @ self._free.T
         return left
 
-    def products(self, answers: FloatArray, rows: slice) -> tuple[FloatArray, FloatArray]:
+    def products(self, answers: FloatArray, index: int) -> tuple[FloatArray, FloatArray]:
         """Return the products of what is left of answers with each other, (K, K), and with ``error``, (K,).
 
-        The answers, shape (K, rows), are 0 in all other rows: one recording's own.
+        The answers, shape (K, R_i), are one recording's own, its outputs in turn: they are 0 in all other rows.
         """
+        rows = self._rows[index]
         seen = answers @ self._free[rows]
         return answers @ answers.T - seen @ seen.T, answers @ self.error[rows]
 

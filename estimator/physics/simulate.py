@@ -195,7 +195,8 @@ def _read(outputs: Sequence[Record], out: FloatArray, slopes: FloatArray) -> Flo
         found: FloatArray = 0.5 * slopes.sum(axis=-2, keepdims=True) / units
         found[..., 0, [0, -1]] = slopes[..., [1, 0], [0, -1]] / units
         return found
-    return _sampled_off_time(out, slopes, outputs[0].offset_s) / units
+    read: FloatArray = _sampled_off_time(out, slopes, outputs[0].offset_s) / units
+    return read
 
 
 def _samples_alike(record: Record, count: int, alike_s: FloatArray | None) -> IntArray:

@@ -19,15 +19,12 @@ from estimator.diagnosis.hypotheses import Effects
 from estimator.diagnosis.inference.descent import Effort, descended, extended, light
 from estimator.diagnosis.inference.disturbances import (
     Limits,
-    Size,
-    Whitener,
     estimated,
     minus_twice_log_prior,
     reading_noise,
-    sizes_of,
-    whitener_of,
 )
 from estimator.diagnosis.inference.moments import moved
+from estimator.diagnosis.inference.whitener import Whitener, of_first, readings, whitener_of
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import MOMENT_NAMES, FitResult, not_fitted
 from estimator.physics.jacobian import jacobian_at
@@ -69,8 +66,8 @@ class Hypothesis:
     effects : frozenset of str
     plain : FitResult
         Unknowns, simulations and errors; no derivative.
-    sizes : ndarray, shape (7,)
-        Logarithms of the disturbances' sizes and times.
+    sizes : ndarray, shape (S,)
+        Logarithms of the disturbances' sizes and times (`whitener.Size`).
     limits : Limits
     minus_twice_log : float
         Minus twice the log-likelihood of the recordings, and of the disturbances' prior.
@@ -88,7 +85,7 @@ class Hypothesis:
     @property
     def outputs(self) -> int:
         """How many measured outputs the recordings have: each may have seen the same."""
-        return self.sizes.size // len(Size)
+        return len(readings(self.sizes))
 
     @property
     def unknowns(self) -> int:
@@ -205,7 +202,7 @@ def of_first_outputs(hypothesis: Hypothesis) -> Hypothesis:
     plain = hypothesis.plain.first_outputs()
     if plain is hypothesis.plain:
         return hypothesis
-    sizes, limits = sizes_of(hypothesis.sizes, 0), hypothesis.limits.of(0)
+    sizes, limits = of_first(hypothesis.sizes), hypothesis.limits.of_first()
     filtered = whitener_of(plain, sizes)
     now = filtered.minus_twice_log(filtered(plain.residual)) + minus_twice_log_prior(sizes, limits)
     return Hypothesis(hypothesis.effects, plain, sizes, limits, now, hypothesis.choices)

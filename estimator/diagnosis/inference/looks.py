@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from estimator.diagnosis.inference.disturbances import Whitener
 from estimator.diagnosis.inference.likelihood import Hypothesis
+from estimator.diagnosis.inference.whitener import Whitener
 from estimator.diagnosis.screening import Look, Screen
 from estimator.physics.fit import FitResult
 from estimator.physics.model import DrivelineModel
@@ -38,7 +38,7 @@ class Answers:
         for other, known in self.around:
             if _difference(fit, other) < SAME_MOTION:
                 return known
-        self.around.append((fit, [{} for _ in fit.outputs]))
+        self.around.append((fit, [{} for _ in fit.problem.drives]))
         return self.around[-1][1]
 
     def is_full(self) -> bool:
@@ -59,12 +59,9 @@ class _Weighted(Projector):
     def __init__(self, hypothesis: Hypothesis) -> None:
         super().__init__(hypothesis.white)
         self._filter: Whitener = hypothesis.filter
-        self._firsts: list[int] = [0]
-        for use in hypothesis.plain.problem.use:
-            self._firsts.append(self._firsts[-1] + int(use.sum()))
 
-    def products(self, answers: FloatArray, rows: slice) -> tuple[FloatArray, FloatArray]:
-        return super().products(self._filter.part(self._firsts.index(rows.start), answers.T).T, rows)
+    def products(self, answers: FloatArray, index: int) -> tuple[FloatArray, FloatArray]:
+        return super().products(self._filter.part(index, answers.T).T, index)
 
     def promise(self, direction: FloatArray, low: float, high: float) -> tuple[float, float]:
         white = self._filter(direction)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimator.diagnosis.inference.disturbances import Whitener
+from estimator.diagnosis.inference.whitener import Whitener
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult
 from estimator.physics.jacobian import changes
@@ -100,8 +100,9 @@ def _squares(
     result: FitResult, filtered: Whitener, index: int, taken_up: FloatArray, tried: list[FloatArray]
 ) -> FloatArray:
     """Return the squared innovations for each of several vectors that differ in moments, shape (K,)."""
-    record, use = result.problem.records[index], result.problem.use[index]
-    outputs = simulated_each(result.problem, [(result.p, x) for x in tried], index)
-    errors = filtered.part(index, (outputs - record.output)[:, use].T).T
+    problem = result.problem
+    measured = np.concatenate([problem.records[i].output[problem.use[i]] for i in problem.drives[index]])
+    outputs = simulated_each(problem, [(result.p, x) for x in tried], index)
+    errors = filtered.part(index, (outputs - measured).T).T
     left: FloatArray = (errors**2).sum(axis=1) - ((errors @ taken_up) ** 2).sum(axis=1)
     return left

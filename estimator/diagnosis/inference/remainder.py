@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimator.diagnosis.inference.calibration import TEST_LIMITS
-from estimator.diagnosis.inference.disturbances import Size
 from estimator.diagnosis.inference.likelihood import Hypothesis, residuals
+from estimator.diagnosis.inference.whitener import Size
 from estimator.diagnosis.noise import PREDICTOR_ORDER, unpredictable
 from estimator.physics.motion import measured_speed, motor_angle
 from estimator.signals.record import FloatArray, Record
@@ -98,8 +98,7 @@ def _bounded(best: Hypothesis) -> list[tuple[Size, str]]:
 
 
 def _is_at_bound(best: Hypothesis, size: Size) -> bool:
-    every_output = slice(size, None, len(Size))
-    return bool((best.sizes[every_output] > best.limits.high[every_output] - EDGE).any())
+    return bool(best.sizes[size] > best.limits.high[size] - EDGE)
 
 
 def _dependent(best: Hypothesis, whole: FloatArray) -> float:

@@ -180,7 +180,7 @@ def _share_of_names(decision: Decision, score: float) -> float:
     is what it has beyond the nominal model, which has had its share of the posterior already.
     """
     best = decision.best
-    tempered = tempered_by(decision.failed, best.plain.residual.size, TEMPERED * best.outputs)
+    tempered = tempered_by(decision.failed, best.plain.residual.size, TEMPERED)
     rival, nominal = (
         math.exp(min(0.5 * (decision.best.score - each) / tempered, 700.0)) for each in (score, decision.nothing.score)
     )

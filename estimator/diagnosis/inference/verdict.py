@@ -104,7 +104,7 @@ def grounds(search: Search) -> Grounds:
     for name in best.effects:
         search.without(best, name)
     examined = tests(best)
-    tempered = tempered_by(examined, best.plain.residual.size, TEMPERED * best.outputs)
+    tempered = tempered_by(examined, best.plain.residual.size, TEMPERED)
     graded = GRADE in best.effects
     share = shares_with_grade(best, search.visited, nothing) if graded else shares(search.path)
     scores = search.scores

@@ -164,8 +164,8 @@ def integrate_made(
             if steep and j == 0:
                 slopes[1, k] = slope
     leave_slope(last, slope, slopes)
-    for i, last in enumerate(x):
-        state[i] = last
+    for i, entry_now in enumerate(x):
+        state[i] = entry_now
     state[LAGGED], state[LAG_RISE] = lagged, lag_rise
     state[FILTERED], state[FILTER_RISE] = filtered, filter_rise
     state[BRISTLES_MOTOR], state[BRISTLES_LOAD] = bristles.motor, bristles.load

@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+from itertools import pairwise
 from operator import itemgetter
 
 import numpy as np
 import pytest
 from scipy.linalg import block_diag, cholesky, solve_triangular
 
-from estimator.diagnosis.inference.disturbances import (
-    Limits,
-    Line,
-    Size,
-    estimate,
-    limits_for,
-    line_of,
-    starts,
-    whitener,
-)
-from estimator.physics.fit import FitResult, fit
-from estimator.physics.problem import make_problem
+from estimator.diagnosis.inference.disturbances import Limits, estimate, limits_for, starts
+from estimator.diagnosis.inference.sampled_line import Line, line_of
+from estimator.diagnosis.inference.whitener import Size, Whitener, readings, whitener, whitener_of
+from estimator.physics.fit import FitResult, fit, not_fitted
+from estimator.physics.problem import make_problem, start_vector
 from estimator.physics.start import Start
-from estimator.signals.record import BoolArray, FloatArray
+from estimator.signals.outputs import outputs_apart
+from estimator.signals.record import BoolArray, Channel, FloatArray, Location, OutputKind
 from tests.estimator.diagnosis.planted import drive_torque
 from tests.estimator.physics.bench import SAMPLE_TIME_S, TWO_MASS, linear_record, model
 
@@ -36,27 +34,44 @@ def result() -> FitResult:
     return fit(make_problem(model(TWO_MASS), [record], ()))
 
 
+def of_one_output(
+    line: Line, uses: Sequence[BoolArray], unread: Sequence[FloatArray] | None = None
+) -> Callable[[FloatArray], Whitener]:
+    """Return the filters of recordings of one output, by their noise model; all torques were read by default."""
+    ends = np.cumsum([0, *(int(use.sum()) for use in uses)])
+    rows = [slice(first, last) for first, last in pairwise(ends)]
+    unread = [np.zeros(use.size) for use in uses] if unread is None else unread
+    return partial(whitener, line, SAMPLE_TIME_S, [use[None] for use in uses], unread, rows)
+
+
 def covariance(line: Line, sizes: FloatArray, count: int, unread: FloatArray | float = 0.0) -> FloatArray:
     """Covariance of the error over so many samples: what each disturbance of each sample does to all later ones.
 
-    ``unread`` is the variance of the torque where it was not read.
+    Of several outputs in turn: shape (C count, C count). ``unread`` is the variance of the torque where it was not
+    read.
     """
-    white, coloured, colour_s, torque, drift, drift_s, walk = np.exp(sizes)
+    torque, drift, drift_s, walk = np.exp(sizes[3:7])
     k = np.arange(count)
     apart = np.abs(k[:, None] - k[None, :]) * SAMPLE_TIME_S
 
     def answer(drive: FloatArray) -> FloatArray:
-        """Response of the output at k to a torque held during sample j: column j."""
-        pulse, x = np.zeros(count), drive
+        """Response of each output at k to a torque held during sample j: column j."""
+        pulse, x = np.zeros((count, line.h.shape[0])), drive
         for i in range(1, count):
             pulse[i], x = line.h @ x, line.f @ x
-        return np.array([[pulse[i - j] if i >= j else 0.0 for j in range(count)] for i in range(count)])
+        late = k[:, None] - k[None, :]
+        return np.vstack([np.where(late >= 0, each[late], 0.0) for each in pulse.T])
 
     at_motor, at_load = answer(line.torque), answer(line.load)
     walked = walk**2 * SAMPLE_TIME_S * np.minimum(k[:, None], k[None, :])
     torques = torque**2 * np.eye(count) + np.diag(np.broadcast_to(unread, count)) + drift**2 * np.exp(-apart / drift_s)
-    readings = white**2 * np.eye(count) + coloured**2 * np.exp(-apart / colour_s)
-    found: FloatArray = at_motor @ torques @ at_motor.T + at_load @ walked @ at_load.T + readings
+    noise = block_diag(
+        *(
+            white**2 * np.eye(count) + coloured**2 * np.exp(-apart / colour_s)
+            for white, coloured, colour_s in np.exp(readings(sizes))
+        )
+    )
+    found: FloatArray = at_motor @ torques @ at_motor.T + at_load @ walked @ at_load.T + noise
     return found
 
 
@@ -68,18 +83,37 @@ def test_innovations_are_those_of_the_covariance_written_out(result: FitResult, 
     line = line_of(result)
     signals = np.random.default_rng(2).standard_normal((int(use.sum()), 3))
     unread = np.where(np.isin(np.arange(count), missing), 900.0, 0.0)
-    filtered = whitener(line, SIZES, SAMPLE_TIME_S, [use], [unread])
+    filtered = of_one_output(line, [use], [unread])(SIZES)
     lower = cholesky(covariance(line, SIZES, count, unread)[np.ix_(use, use)], lower=True)
     np.testing.assert_allclose(filtered(signals), solve_triangular(lower, signals, lower=True), rtol=2e-4, atol=1e-4)
-    spread = np.concatenate([each[rows] for each, rows in zip(filtered.spread, filtered.use, strict=True)])
-    assert np.log(spread).sum() == pytest.approx(np.log(np.diag(lower)).sum(), abs=5e-4)
+    assert filtered.logs.sum() == pytest.approx(np.log(np.diag(lower)).sum(), abs=5e-4)
+
+
+@pytest.mark.parametrize("missing", [(), (3, 4, 17), tuple(range(20, 40))])
+def test_all_outputs_of_a_recording_are_whitened_together(missing: tuple[int, ...]) -> None:
+    count = 60
+    record = linear_record(TWO_MASS, drive_torque(1)[:count], Start(5.0, 0.0, 2.0, 0.0, 2.0))
+    seen: BoolArray = np.ones(count, dtype=bool)
+    seen[list(missing)] = False
+    shaft = Channel(OutputKind.TORQUE, Location.SHAFT, "shaft_nm", np.zeros(count), seen)
+    at_load = Channel(OutputKind.POSITION, Location.LOAD, "load_rad", np.zeros(count), record.okay)
+    records = outputs_apart([replace(record, channels=(shaft, at_load))], lambda _: 1.0)
+    result = not_fitted(problem := make_problem(model(TWO_MASS), records, ()), start_vector(problem))
+    sizes = np.concatenate([SIZES, np.log([20.0, 7.0, 0.1, 0.01, 0.02, 0.03])])
+    filtered = whitener_of(result, sizes)
+    use = np.concatenate(problem.use)
+    lower = cholesky(covariance(line_of(result), sizes, count)[np.ix_(use, use)], lower=True)
+    signals = np.random.default_rng(2).standard_normal((int(use.sum()), 3))
+    dense = solve_triangular(lower, signals, lower=True)
+    np.testing.assert_allclose((filtered(signals) ** 2).sum(axis=0), (dense**2).sum(axis=0), rtol=2e-3)
+    assert filtered.logs.sum() == pytest.approx(np.log(np.diag(lower)).sum(), abs=2e-3)
 
 
 def test_recordings_are_whitened_each_by_itself(result: FitResult) -> None:
     uses = [np.ones(30, dtype=bool), np.ones(50, dtype=bool)]
     stacked = np.random.default_rng(3).standard_normal(80)
     line = line_of(result)
-    whole = whitener(line, SIZES, SAMPLE_TIME_S, uses)(stacked)
+    whole = of_one_output(line, uses)(SIZES)(stacked)
     dense = cholesky(block_diag(*(covariance(line, SIZES, use.size) for use in uses)), lower=True)
     np.testing.assert_allclose(whole, solve_triangular(dense, stacked, lower=True), rtol=2e-4, atol=1e-4)
 
@@ -97,11 +131,12 @@ def test_the_sizes_that_made_an_error_are_found(result: FitResult, seed: int) ->
     limits = limits_for(result.problem.records, 0.05)
     limits = Limits(limits.usual, limits.low, limits.high + np.log(100.0))
     begun = starts(limits.usual, limits)
-    found, value = min((estimate(line, error, each, limits, SAMPLE_TIME_S, uses, 30) for each in begun), key=second)
-    _, from_the_truth = estimate(line, error, true, limits, SAMPLE_TIME_S, uses, rounds=30)
+    whitened = of_one_output(line, uses)
+    found, value = min((estimate(whitened, error, each, limits, 30) for each in begun), key=second)
+    _, from_the_truth = estimate(whitened, error, true, limits, 30)
     assert value < from_the_truth + 2.0
     for size in (Size.WHITE, Size.WALK):
         assert found[size] == pytest.approx(true[size], abs=0.35)
-    innovations = whitener(line, found, SAMPLE_TIME_S, uses)(error)
+    innovations = whitened(found)(error)
     assert np.mean(innovations**2) == pytest.approx(1.0, abs=0.05)
     assert abs(innovations[1:] @ innovations[:-1]) / innovations.size < 0.05

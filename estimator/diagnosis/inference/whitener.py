@@ -1,0 +1,163 @@
+"""Kalman filters that turn a fit's errors into innovations under a noise model, all outputs of a recording together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from functools import partial
+
+import numpy as np
+
+from estimator.diagnosis.inference.sampled_line import Line, line_of
+from estimator.diagnosis.line.whitening import fill_gains, innovate
+from estimator.physics.fit import FitResult
+from estimator.physics.problem import Rows
+from estimator.signals.outputs import by_output
+from estimator.signals.record import BoolArray, FloatArray
+from estimator.signals.stand_in import stand_in_variance
+
+
+class Size(IntEnum):
+    """Places in the vector of a noise model: natural logarithms of sizes and times.
+
+    The noise of each further output's reading follows: its ``WHITE``, ``COLOURED`` and ``COLOUR_S``.
+    """
+
+    WHITE = 0
+    COLOURED = 1
+    COLOUR_S = 2
+    TORQUE = 3
+    DRIFT = 4
+    DRIFT_S = 5
+    WALK = 6
+
+
+READING = 3
+"""How many sizes are of an output's reading."""
+
+
+def of_first(sizes: FloatArray) -> FloatArray:
+    """Return the noise model of the first output alone, shape (7,)."""
+    return sizes[: len(Size)]
+
+
+def readings(sizes: FloatArray) -> FloatArray:
+    """Return the sizes of each output's reading, shape (C, 3), of a noise model of C outputs."""
+    return np.concatenate([sizes[:READING], sizes[len(Size) :]]).reshape(-1, READING)
+
+
+@dataclass(frozen=True, slots=True)
+class Whitener:
+    """Kalman filters for recordings: a linear map of their errors to innovations of variance 1.
+
+    Attributes
+    ----------
+    f, h : ndarray, shapes (m, m) and (C, m)
+    gains, cross, spread : tuple of ndarray, shapes (N_i, C, m), (N_i, C, C) and (C, N_i)
+        Of each recording.
+    use : tuple of ndarray of bool, shape (C, N_i)
+    rows : tuple of Rows
+        Where the samples of each recording that count stand among all, its outputs in turn.
+    """
+
+    f: FloatArray
+    h: FloatArray
+    gains: tuple[FloatArray, ...]
+    cross: tuple[FloatArray, ...]
+    spread: tuple[FloatArray, ...]
+    use: tuple[BoolArray, ...]
+    rows: tuple[Rows, ...]
+
+    def __call__(self, stacked: FloatArray) -> FloatArray:
+        """Return the innovations of stacked errors of the samples that count, shape (R,) or (R, K)."""
+        columns = np.atleast_2d(stacked.T).T
+        found = np.empty(columns.shape)
+        for i, rows in enumerate(self.rows):
+            found[rows] = self.part(i, columns[rows])
+        return found.reshape(stacked.shape)
+
+    def part(self, index: int, columns: FloatArray) -> FloatArray:
+        """Return the same of one recording alone, shape (R_i, K)."""
+        use = self.use[index]
+        whole = np.zeros((use.shape[1], use.shape[0], columns.shape[1]))
+        ends = np.cumsum(use.sum(axis=1))
+        for output, mine in enumerate(np.split(columns, ends[:-1])):
+            whole[use[output], output] = mine
+        innovate(self.f, self.h, self.gains[index], self.cross[index], self.spread[index], whole)
+        return np.concatenate([whole[mask, output] for output, mask in enumerate(use)])
+
+    @property
+    def logs(self) -> FloatArray:
+        """Logarithms of the innovations' standard deviations, stacked, shape (R,)."""
+        found = np.empty(sum(int(use.sum()) for use in self.use))
+        for rows, spread, use in zip(self.rows, self.spread, self.use, strict=True):
+            found[rows] = np.log(spread[use])
+        return found
+
+    def minus_twice_log(self, innovations: FloatArray) -> float:
+        """Return minus twice the log-likelihood of stacked innovations, but for a constant."""
+        return 2.0 * float(self.logs.sum()) + float(innovations @ innovations)
+
+
+def whitener_of(result: FitResult, sizes: FloatArray) -> Whitener:
+    """Return the filters of a fit's errors under a noise model, ``sizes`` as `Size` says."""
+    return whitening_of(result)(sizes)
+
+
+def whitening_of(result: FitResult) -> Callable[[FloatArray], Whitener]:
+    """Return a function from a noise model to the filters of a fit's errors."""
+    problem = result.problem
+    parts, firsts = by_output(problem.records), problem.records[: len(problem.bases)]
+    use = [np.zeros((len(parts), record.time_s.size), dtype=np.bool_) for record in firsts]
+    for output, part in enumerate(parts):
+        for i in range(part.start, part.stop):
+            use[problem.leads[i]][output] = problem.use[i]
+    unread = [stand_in_variance(record) for record in firsts]
+    return partial(whitener, line_of(result), firsts[0].sample_time_s, use, unread, problem.rows)
+
+
+def whitener(
+    line: Line,
+    period_s: float,
+    use: Sequence[BoolArray],
+    unread: Sequence[FloatArray],
+    rows: Sequence[Rows],
+    sizes: FloatArray,
+) -> Whitener:
+    """Return the filters of recordings under a noise model, ``sizes`` as `Size` says.
+
+    Parameters
+    ----------
+    use : sequence of ndarray of bool, shapes (C, N_i)
+    unread : sequence of ndarray, shapes (N_i,)
+        Variance of each recording's torque where it was not read.
+    rows : sequence of Rows
+        See `Whitener`.
+    """
+    torque, drift, drift_s, walk = np.exp(sizes[READING : len(Size)])
+    white, coloured, colour_s = np.exp(readings(sizes)).T
+    count, n = line.h.shape
+    m = n + 2 + count  # drift, walk, coloured of each output
+    colours = n + 2 + np.arange(count)
+    f, q, prior, h = np.zeros((m, m)), np.zeros((m, m)), np.zeros((m, m)), np.zeros((count, m))
+    kept_drift, kept_colour = np.exp(-period_s / drift_s), np.exp(-period_s / colour_s)
+    f[:n, :n], f[:n, n], f[:n, n + 1] = line.f, line.torque, line.load
+    f[n, n], f[n + 1, n + 1], f[colours, colours] = kept_drift, 1.0, kept_colour
+    q[:n, :n] = torque**2 * np.outer(line.torque, line.torque)
+    q[n, n], q[n + 1, n + 1] = drift**2 * (1.0 - kept_drift**2), walk**2 * period_s
+    q[colours, colours] = coloured**2 * (1.0 - kept_colour**2)
+    prior[n, n], prior[colours, colours] = drift**2, coloured**2
+    h[:, :n], h[:, n + 1], h[np.arange(count), colours] = line.h, line.direct, 1.0
+    at_input = np.concatenate([line.torque, np.zeros(m - n)])
+    seen: dict[tuple[bytes, bytes], tuple[FloatArray, FloatArray, FloatArray]] = {}
+    each = []
+    for mask, variance in zip(use, unread, strict=True):
+        key = mask.tobytes(), variance.tobytes()
+        if key not in seen:
+            size = variance.size
+            seen[key] = np.empty((size, count, m)), np.empty((size, count, count)), np.empty((count, size))
+            fill_gains(f, h, q, white**2, prior, mask, at_input, variance, *seen[key])
+        each.append(seen[key])
+    gains, cross, spread = zip(*each, strict=True)
+    return Whitener(f, h, gains, cross, spread, tuple(use), tuple(rows))
