@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 from estimator.diagnosis.inference.sampled_line import Line, line_of
-from estimator.diagnosis.line.whitening import fill_gains, innovate
+from estimator.diagnosis.line.whitening import Gains, Terms, fill_gains, innovate, terms_of
 from estimator.physics.fit import FitResult
 from estimator.physics.problem import Rows
 from estimator.signals.outputs import by_output
@@ -53,19 +53,18 @@ class Whitener:
 
     Attributes
     ----------
-    f, h : ndarray, shapes (m, m) and (C, m)
-    gains, cross, spread : tuple of ndarray, shapes (N_i, C, m), (N_i, C, C) and (C, N_i)
+    f, h : Terms
+        Of the transition, shape (m, m), and of how the outputs show the state, shape (C, m).
+    gains : tuple of Gains
         Of each recording.
-    use : tuple of ndarray of bool, shape (C, N_i)
+    use : tuple of ndarray of bool, shape (N_i, C)
     rows : tuple of Rows
         Where the samples of each recording that count stand among all, its outputs in turn.
     """
 
-    f: FloatArray
-    h: FloatArray
-    gains: tuple[FloatArray, ...]
-    cross: tuple[FloatArray, ...]
-    spread: tuple[FloatArray, ...]
+    f: Terms
+    h: Terms
+    gains: tuple[Gains, ...]
     use: tuple[BoolArray, ...]
     rows: tuple[Rows, ...]
 
@@ -80,19 +79,19 @@ class Whitener:
     def part(self, index: int, columns: FloatArray) -> FloatArray:
         """Return the same of one recording alone, shape (R_i, K)."""
         use = self.use[index]
-        whole = np.zeros((use.shape[1], use.shape[0], columns.shape[1]))
-        ends = np.cumsum(use.sum(axis=1))
+        whole = np.zeros((*use.shape, columns.shape[1]))
+        ends = np.cumsum(use.sum(axis=0))
         for output, mine in enumerate(np.split(columns, ends[:-1])):
-            whole[use[output], output] = mine
-        innovate(self.f, self.h, self.gains[index], self.cross[index], self.spread[index], whole)
-        return np.concatenate([whole[mask, output] for output, mask in enumerate(use)])
+            whole[use[:, output], output] = mine
+        innovate(self.f, self.h, self.gains[index], whole)
+        return np.concatenate([whole[mask, output] for output, mask in enumerate(use.T)])
 
     @property
     def logs(self) -> FloatArray:
         """Logarithms of the innovations' standard deviations, stacked, shape (R,)."""
         found = np.empty(sum(int(use.sum()) for use in self.use))
-        for rows, spread, use in zip(self.rows, self.spread, self.use, strict=True):
-            found[rows] = np.log(spread[use])
+        for rows, gains, use in zip(self.rows, self.gains, self.use, strict=True):
+            found[rows] = np.log(gains.spread.T[use.T])
         return found
 
     def minus_twice_log(self, innovations: FloatArray) -> float:
@@ -109,10 +108,10 @@ def whitening_of(result: FitResult) -> Callable[[FloatArray], Whitener]:
     """Return a function from a noise model to the filters of a fit's errors."""
     problem = result.problem
     parts, firsts = by_output(problem.records), problem.records[: len(problem.bases)]
-    use = [np.zeros((len(parts), record.time_s.size), dtype=np.bool_) for record in firsts]
+    use = [np.zeros((record.time_s.size, len(parts)), dtype=np.bool_) for record in firsts]
     for output, part in enumerate(parts):
         for i in range(part.start, part.stop):
-            use[problem.leads[i]][output] = problem.use[i]
+            use[problem.leads[i]][:, output] = problem.use[i]
     unread = [stand_in_variance(record) for record in firsts]
     return partial(whitener, line_of(result), firsts[0].sample_time_s, use, unread, problem.rows)
 
@@ -129,7 +128,7 @@ def whitener(
 
     Parameters
     ----------
-    use : sequence of ndarray of bool, shapes (C, N_i)
+    use : sequence of ndarray of bool, shapes (N_i, C)
     unread : sequence of ndarray, shapes (N_i,)
         Variance of each recording's torque where it was not read.
     rows : sequence of Rows
@@ -150,14 +149,13 @@ def whitener(
     prior[n, n], prior[colours, colours] = drift**2, coloured**2
     h[:, :n], h[:, n + 1], h[np.arange(count), colours] = line.h, line.direct, 1.0
     at_input = np.concatenate([line.torque, np.zeros(m - n)])
-    seen: dict[tuple[bytes, bytes], tuple[FloatArray, FloatArray, FloatArray]] = {}
+    terms = terms_of(f)
+    seen: dict[tuple[bytes, bytes], Gains] = {}
     each = []
     for mask, variance in zip(use, unread, strict=True):
         key = mask.tobytes(), variance.tobytes()
         if key not in seen:
-            size = variance.size
-            seen[key] = np.empty((size, count, m)), np.empty((size, count, count)), np.empty((count, size))
-            fill_gains(f, h, q, white**2, prior, mask, at_input, variance, *seen[key])
+            seen[key] = Gains(np.empty((*mask.shape, m)), np.empty((*mask.shape, count)), np.empty(mask.shape))
+            fill_gains(terms, h, q, white**2, prior, mask, at_input, variance, seen[key])
         each.append(seen[key])
-    gains, cross, spread = zip(*each, strict=True)
-    return Whitener(f, h, gains, cross, spread, tuple(use), tuple(rows))
+    return Whitener(terms, terms_of(h), tuple(each), tuple(use), tuple(rows))

@@ -1,69 +1,118 @@
 """The Kalman filter that turns a free-run error into its innovations, compiled: gains once, then any signals.
 
 Model: ``x[t+1] = F x[t] + w``, ``y[t] = H x[t] + v`` with ``cov w = Q`` and ``cov v = diag(r)``. What was not observed
-is predicted and not corrected, and the outputs of a sample are taken one after the other (Durbin and Koopman, Time
-Series Analysis by State Space Methods, chapters 4 and 6.4).
+is predicted and not corrected, and the outputs of a sample correct the state one after the other (Durbin and Koopman,
+Time Series Analysis by State Space Methods, chapters 4 and 6.4). F and H are sparse.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from estimator.compiled import compiled
-from estimator.diagnosis.line.kalman import product, symmetric_product
-from estimator.signals.record import BoolArray, FloatArray
+from estimator.compiled import compiled, inlined
+from estimator.lanes import borrowed
+from estimator.signals.record import BoolArray, FloatArray, IntArray
 
 SETTLED = 1e-5
 """Relative change of every state's variance from sample to sample below which the gain no longer changes."""
 
 
-@compiled
-def correct(f: FloatArray, h: FloatArray, r: float, p: FloatArray, ph: FloatArray, gain: FloatArray) -> float:
-    """Correct a covariance by one observation, fill the predictor's gain, and return the innovation's variance."""
-    m = h.shape[0]
-    s = r
-    for i in range(m):
-        total = 0.0
-        for j in range(m):
-            total += p[i, j] * h[j]
-        ph[i] = total
-        s += h[i] * total
-    for i in range(m):
-        total = 0.0
-        for j in range(m):
-            total += f[i, j] * ph[j]
-            p[i, j] -= ph[i] * ph[j] / s
-        gain[i] = total / s
-    return s
+class Terms(NamedTuple):
+    """The entries of a matrix that are not 0."""
+
+    rows: IntArray
+    columns: IntArray
+    values: FloatArray
 
 
-@compiled
-def predict(f: FloatArray, q: FloatArray, p: FloatArray, half: FloatArray, before: FloatArray) -> bool:
+def terms_of(matrix: FloatArray) -> Terms:
+    """Return the entries of a matrix that are not 0, row by row."""
+    rows, columns = np.nonzero(matrix)
+    return Terms(rows, columns, matrix[rows, columns])
+
+
+class Gains(NamedTuple):
+    """What the filter of a recording does with N samples of C outputs.
+
+    Attributes
+    ----------
+    predictor : ndarray, shape (N, C, m)
+        How the innovation of each output moves the next state's prediction.
+    cross : ndarray, shape (N, C, C)
+        How it moves the predictions of the outputs after it.
+    spread : ndarray, shape (N, C)
+        Standard deviation of each innovation; infinite where it was not observed.
+    """
+
+    predictor: FloatArray
+    cross: FloatArray
+    spread: FloatArray
+
+
+@inlined
+def correct(f: Terms, h: FloatArray, i: int, r: float, p: FloatArray, ph: FloatArray, gain: FloatArray) -> float:
+    """Correct a covariance by output i, fill the predictor's gain for it, and return its innovation's variance."""
+    m = h.shape[1]
+    s = float(r)
+    for row in range(m):
+        total = 0.0
+        for k in range(m):
+            total += p[row, k] * h[i, k]
+        ph[i, row] = total
+        gain[i, row] = 0.0
+        s += h[i, row] * total
+    for n in range(f.values.size):
+        gain[i, f.rows[n]] += f.values[n] * ph[i, f.columns[n]] / s
+    for row in range(m):
+        for k in range(m):
+            p[row, k] -= ph[i, row] * ph[i, k] / s
+    return float(s)
+
+
+@inlined
+def shown_by(j: int, i: int, h: FloatArray, ph: FloatArray, s: FloatArray) -> float:
+    """Return how the innovation of output j moves the prediction of output i of the same sample."""
+    total = 0.0
+    for k in range(h.shape[1]):
+        total += h[i, k] * ph[j, k]
+    return float(total / s[j])
+
+
+@inlined
+def predict(f: Terms, q: FloatArray, p: FloatArray, half: FloatArray, before: FloatArray) -> bool:
     """Move a covariance on by one sample; tell whether it no longer changes. ``before`` keeps the last variances."""
-    m = f.shape[0]
-    product(f, p, half)
-    symmetric_product(half, f.T, p)
+    m = q.shape[0]
+    half[:] = 0.0
+    for n in range(f.values.size):
+        for k in range(m):
+            half[f.rows[n], k] += f.values[n] * p[f.columns[n], k]
+    for i in range(m):
+        for k in range(m):
+            p[i, k] = q[i, k]
+    for n in range(f.values.size):
+        for k in range(m):
+            p[f.rows[n], k] += f.values[n] * half[k, f.columns[n]]
     settled = True
     for i in range(m):
-        for j in range(m):
-            p[i, j] += q[i, j]
         settled = settled and abs(p[i, i] - before[i]) <= SETTLED * p[i, i]
         before[i] = p[i, i]
     return settled
 
 
-@compiled
-def shown_to_later(i: int, h: FloatArray, ph: FloatArray, s: FloatArray, shown: FloatArray) -> None:
-    """Fill how the innovations of the outputs before one move its prediction; of those that were observed."""
-    for j in range(i):
-        shown[i, j] = 0.0
-        for k in range(h.shape[1]):
-            shown[i, j] += h[i, k] * ph[j, k] / s[j]
+@inlined
+def is_as_before(observed: BoolArray, t: int) -> bool:
+    """Tell whether the same outputs were observed as a sample before."""
+    same = True
+    for i in range(observed.shape[1]):
+        same = same and observed[t, i] == observed[t - 1, i]
+    return same
 
 
 @compiled
 def fill_gains(
-    f: FloatArray,
+    f: Terms,
     h: FloatArray,
     q: FloatArray,
     r: FloatArray,
@@ -71,93 +120,126 @@ def fill_gains(
     observed: BoolArray,
     at_input: FloatArray,
     unread: FloatArray,
-    gains: FloatArray,
-    cross: FloatArray,
-    spread: FloatArray,
+    gains: Gains,
 ) -> None:
-    """Fill the predictor's gains, shape (N, C, m), and the innovations' standard deviations, shape (C, N).
-
-    The outputs of a sample correct the state in turn: ``cross``, shape (N, C, C), is how the innovation of each moves
-    the prediction of those after it.
+    """Fill the gains of a recording.
 
     Parameters
     ----------
-    f, q, prior : ndarray, shape (m, m)
-        Transition, covariance of what drives it, and covariance of the first state.
+    f : Terms
+        Of the transition, shape (m, m).
     h : ndarray, shape (C, m)
         How each of C outputs shows the state.
+    q, prior : ndarray, shape (m, m)
+        Covariance of what drives the state, and of the first state.
     r : ndarray, shape (C,)
         Variance of each reading.
-    observed : ndarray of bool, shape (C, N)
+    observed : ndarray of bool, shape (N, C)
     at_input : ndarray, shape (m,)
         How an input held for a sample moves the state.
     unread : ndarray, shape (N,)
         Variance of the input where it was not read; 0 elsewhere.
     """
     count, m = h.shape
-    p, half, ph = prior.copy(), np.empty((m, m)), np.empty((count, m))
-    gain, before, s, shown = np.zeros((count, m)), np.zeros(m), np.zeros(count), np.zeros((count, count))
+    room = (np.empty((m, m)), np.empty((count, m)), np.empty((count, m)), np.zeros(m), np.empty(count))
+    fill_gains_in(f, h, q, r, prior.copy(), observed, at_input, unread, gains, room)
+
+
+@compiled
+def fill_gains_in(
+    f: Terms,
+    h: FloatArray,
+    q: FloatArray,
+    r: FloatArray,
+    p: FloatArray,
+    observed: BoolArray,
+    at_input: FloatArray,
+    unread: FloatArray,
+    gains: Gains,
+    room: tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray],
+) -> None:
+    """Do what ``fill_gains`` does, from the covariance of the first state and with room for what it needs."""
+    f = Terms(borrowed(f.rows), borrowed(f.columns), borrowed(f.values))
+    h, q, p, observed = borrowed(h), borrowed(q), borrowed(p), borrowed(observed)
+    predictor, cross, spread = borrowed(gains.predictor), borrowed(gains.cross), borrowed(gains.spread)
+    half, ph, gain, before, s = (
+        borrowed(room[0]),
+        borrowed(room[1]),
+        borrowed(room[2]),
+        borrowed(room[3]),
+        borrowed(room[4]),
+    )
+    count, m = h.shape
     settled = False
-    for t in range(observed.shape[1]):
-        settled = settled and bool(np.all(observed[:, t] == observed[:, t - 1]))
+    for t in range(observed.shape[0]):
+        settled = settled and is_as_before(observed, t)
+        is_any = False
         for i in range(count):
             if not settled:
-                s[i] = np.inf
-                if observed[i, t]:
-                    s[i] = correct(f, h[i], r[i], p, ph[i], gain[i])
-                    shown_to_later(i, h, ph, s, shown)
-            seen = 1.0 if observed[i, t] else 0.0
-            gains[t, i], cross[t, i], spread[i, t] = seen * gain[i], seen * shown[i], np.sqrt(s[i])
+                s[i] = correct(f, h, i, r[i], p, ph, gain) if observed[t, i] else np.inf
+            is_any = is_any or observed[t, i]
+            spread[t, i] = np.sqrt(s[i])
+            for k in range(m):
+                predictor[t, i, k] = gain[i, k] if observed[t, i] else 0.0
+            for j in range(i):
+                cross[t, i, j] = shown_by(j, i, h, ph, s) if observed[t, i] and observed[t, j] else 0.0
         if not settled:
-            settled = predict(f, q, p, half, before) and bool(np.isfinite(s).any())
+            settled = predict(f, q, p, half, before) and is_any
         if unread[t] > 0.0:
             settled = False
             for i in range(m):
-                for j in range(m):
-                    p[i, j] += unread[t] * at_input[i] * at_input[j]
+                for k in range(m):
+                    p[i, k] += unread[t] * at_input[i] * at_input[k]
 
 
-@compiled
-def step(f: FloatArray, gains: FloatArray, e: FloatArray, x: FloatArray, moved: FloatArray) -> None:
-    """Fill the next state's prediction, shape (m, K), from this one's and the innovations (C, K)."""
-    for i in range(f.shape[0]):
+@inlined
+def add_products(terms: Terms, sign: float, x: FloatArray, total: FloatArray) -> None:
+    """Add a matrix times ``x``, shape (n, K), with a sign to a total, shape (m, K)."""
+    for n in range(terms.values.size):
+        row, column, value = terms.rows[n], terms.columns[n], sign * terms.values[n]
+        for k in range(x.shape[1]):
+            total[row, k] += value * x[column, k]
+
+
+@inlined
+def fill_gained(gains: FloatArray, t: int, e: FloatArray, total: FloatArray) -> None:
+    """Fill what the innovations of a sample, shape (C, K), do to the next state, shape (m, K)."""
+    for row in range(total.shape[0]):
+        gain = gains[t, 0, row]
         for k in range(e.shape[1]):
-            moved[i, k] = gains[0, i] * e[0, k]
-        for c in range(1, e.shape[0]):
+            total[row, k] = gain * e[0, k]
+        for i in range(1, e.shape[0]):
+            gain = gains[t, i, row]
             for k in range(e.shape[1]):
-                moved[i, k] += gains[c, i] * e[c, k]
-        for j in range(f.shape[0]):
-            a = f[i, j]
-            if a != 0.0:
-                for k in range(e.shape[1]):
-                    moved[i, k] += a * x[j, k]
+                total[row, k] += gain * e[i, k]
 
 
 @compiled
-def subtract(shares: FloatArray, rows: FloatArray, count: int, left: FloatArray) -> None:
-    """Subtract shares of the first ``count`` rows, shape (count, K), from what is left, shape (K,)."""
-    for i in range(count):
-        if shares[i] != 0.0:
-            for k in range(left.shape[0]):
-                left[k] -= shares[i] * rows[i, k]
-
-
-@compiled
-def innovate(
-    f: FloatArray, h: FloatArray, gains: FloatArray, cross: FloatArray, spread: FloatArray, signals: FloatArray
-) -> None:
+def innovate(f: Terms, h: Terms, gains: Gains, signals: FloatArray) -> None:
     """Replace signals, shape (N, C, K), by their innovations over the standard deviations; 0 where not observed."""
-    outputs, m = h.shape
-    count = signals.shape[2]
-    x, moved, e = np.zeros((m, count)), np.zeros((m, count)), np.zeros((outputs, count))
+    m, count = gains.predictor.shape[2], signals.shape[2]
+    innovate_in(f, h, gains, signals, np.zeros((m, count)), np.zeros((m, count)))
+
+
+@compiled
+def innovate_in(f: Terms, h: Terms, gains: Gains, signals: FloatArray, x: FloatArray, moved: FloatArray) -> None:
+    """Do what ``innovate`` does, from a first state and with room for the next, both of shape (m, K)."""
+    f = Terms(borrowed(f.rows), borrowed(f.columns), borrowed(f.values))
+    h = Terms(borrowed(h.rows), borrowed(h.columns), borrowed(h.values))
+    predictor, cross, spread = borrowed(gains.predictor), borrowed(gains.cross), borrowed(gains.spread)
+    signals, x, moved = borrowed(signals), borrowed(x), borrowed(moved)
+    outputs, count = signals.shape[1:]
     for t in range(signals.shape[0]):
-        for c in range(outputs):
-            for k in range(count):
-                e[c, k] = signals[t, c, k]
-            subtract(h[c], x, m, e[c])
-            subtract(cross[t, c], e, c, e[c])
-        step(f, gains[t], e, x, moved)
+        e = signals[t]
+        add_products(h, -1.0, x, e)
+        for i in range(1, outputs):
+            for j in range(i):
+                for k in range(count):
+                    e[i, k] -= cross[t, i, j] * e[j, k]
+        fill_gained(predictor, t, e, moved)
+        add_products(f, 1.0, x, moved)
         x, moved = moved, x
-        for c in range(outputs):
+        for i in range(outputs):
+            spread_now = spread[t, i]
             for k in range(count):
-                signals[t, c, k] = e[c, k] / spread[c, t]
+                e[i, k] /= spread_now

@@ -41,7 +41,7 @@ def of_one_output(
     ends = np.cumsum([0, *(int(use.sum()) for use in uses)])
     rows = [slice(first, last) for first, last in pairwise(ends)]
     unread = [np.zeros(use.size) for use in uses] if unread is None else unread
-    return partial(whitener, line, SAMPLE_TIME_S, [use[None] for use in uses], unread, rows)
+    return partial(whitener, line, SAMPLE_TIME_S, [use[:, None] for use in uses], unread, rows)
 
 
 def covariance(line: Line, sizes: FloatArray, count: int, unread: FloatArray | float = 0.0) -> FloatArray:
