@@ -78,13 +78,9 @@ class Whitener:
 
     def part(self, index: int, columns: FloatArray) -> FloatArray:
         """Return the same of one recording alone, shape (R_i, K)."""
-        use = self.use[index]
-        whole = np.zeros((*use.shape, columns.shape[1]))
-        ends = np.cumsum(use.sum(axis=0))
-        for output, mine in enumerate(np.split(columns, ends[:-1])):
-            whole[use[:, output], output] = mine
-        innovate(self.f, self.h, self.gains[index], whole)
-        return np.concatenate([whole[mask, output] for output, mask in enumerate(use.T)])
+        found = np.array(columns, order="C")
+        innovate(self.f, self.h, self.gains[index], self.use[index], found)
+        return found
 
     @property
     def logs(self) -> FloatArray:

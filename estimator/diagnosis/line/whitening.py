@@ -215,31 +215,59 @@ def fill_gained(gains: FloatArray, t: int, e: FloatArray, total: FloatArray) -> 
 
 
 @compiled
-def innovate(f: Terms, h: Terms, gains: Gains, signals: FloatArray) -> None:
-    """Replace signals, shape (N, C, K), by their innovations over the standard deviations; 0 where not observed."""
-    m, count = gains.predictor.shape[2], signals.shape[2]
-    innovate_in(f, h, gains, signals, np.zeros((m, count)), np.zeros((m, count)))
+def innovate(f: Terms, h: Terms, gains: Gains, observed: BoolArray, signals: FloatArray) -> None:
+    """Replace signals of the samples that were observed by their innovations over the standard deviations.
+
+    Parameters
+    ----------
+    observed : ndarray of bool, shape (N, C)
+    signals : ndarray, shape (R, K)
+        The outputs in turn.
+    """
+    outputs, m, count = observed.shape[1], gains.predictor.shape[2], signals.shape[1]
+    places = np.zeros(outputs, dtype=np.int64)
+    for i in range(1, outputs):
+        places[i] = places[i - 1] + observed[:, i - 1].sum()
+    room = (np.zeros((m, count)), np.zeros((m, count)), np.zeros((outputs, count)))
+    innovate_in(f, h, gains, observed, signals, places, room)
 
 
 @compiled
-def innovate_in(f: Terms, h: Terms, gains: Gains, signals: FloatArray, x: FloatArray, moved: FloatArray) -> None:
-    """Do what ``innovate`` does, from a first state and with room for the next, both of shape (m, K)."""
+def innovate_in(
+    f: Terms,
+    h: Terms,
+    gains: Gains,
+    observed: BoolArray,
+    signals: FloatArray,
+    places: IntArray,
+    room: tuple[FloatArray, FloatArray, FloatArray],
+) -> None:
+    """Do what ``innovate`` does, from where each output begins, with room for two states and the innovations."""
     f = Terms(borrowed(f.rows), borrowed(f.columns), borrowed(f.values))
     h = Terms(borrowed(h.rows), borrowed(h.columns), borrowed(h.values))
     predictor, cross, spread = borrowed(gains.predictor), borrowed(gains.cross), borrowed(gains.spread)
-    signals, x, moved = borrowed(signals), borrowed(x), borrowed(moved)
-    outputs, count = signals.shape[1:]
-    for t in range(signals.shape[0]):
-        e = signals[t]
+    observed, signals, places = borrowed(observed), borrowed(signals), borrowed(places)
+    x, moved, e = borrowed(room[0]), borrowed(room[1]), borrowed(room[2])
+    for t in range(observed.shape[0]):
+        take(observed, t, signals, places, e)
         add_products(h, -1.0, x, e)
-        for i in range(1, outputs):
+        for i in range(1, e.shape[0]):
             for j in range(i):
-                for k in range(count):
+                for k in range(e.shape[1]):
                     e[i, k] -= cross[t, i, j] * e[j, k]
         fill_gained(predictor, t, e, moved)
         add_products(f, 1.0, x, moved)
         x, moved = moved, x
-        for i in range(outputs):
-            spread_now = spread[t, i]
-            for k in range(count):
-                e[i, k] /= spread_now
+        for i in range(e.shape[0]):
+            if observed[t, i]:
+                for k in range(e.shape[1]):
+                    signals[places[i], k] = e[i, k] / spread[t, i]
+                places[i] += 1
+
+
+@inlined
+def take(observed: BoolArray, t: int, signals: FloatArray, places: IntArray, e: FloatArray) -> None:
+    """Fill the signals of a sample, shape (C, K); 0 where nothing was observed."""
+    for i in range(e.shape[0]):
+        for k in range(e.shape[1]):
+            e[i, k] = signals[places[i], k] if observed[t, i] else 0.0
