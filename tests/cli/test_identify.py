@@ -124,6 +124,25 @@ def test_a_model_file_adds_what_was_expected(
     assert json.loads((tmp_path / "identification.json").read_text())["nominal_resonance"] is None
 
 
+def test_signals_that_no_estimator_takes_are_named(
+    recordings: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    header, *rows = recordings[0].read_text(encoding="utf-8").splitlines()
+    more = [f"{header},wheel,brake", *(f"{row},{row.rpartition(',')[2]},0.0" for row in rows)]
+    (tmp_path / "more.csv").write_text("\n".join(more), encoding="utf-8")
+    model = tmp_path / "model.toml"
+    wheel = '{ kind = "speed", at = "load", column = "wheel" }'
+    model.write_text(f'{MODEL}\n[signals]\noutputs = [{wheel}]\nload = {{ column = "brake" }}\n', encoding="utf-8")
+    assert run(arguments([tmp_path / "more.csv"], tmp_path / "out", "--model", str(model))) == 0
+    told = [line for line in capsys.readouterr().err.splitlines() if "not used" in line]
+    assert told == [
+        "note: identified from motor torque to the first output; not used: the output wheel, the measured load torque. "
+        "See hil diagnose."
+    ]
+    assert run(arguments(recordings[:1], tmp_path / "plain")) == 0
+    assert "not used" not in capsys.readouterr().err
+
+
 def test_samples_and_period_can_be_chosen(recordings: list[Path], tmp_path: Path) -> None:
     assert run(arguments(recordings[:1], tmp_path, "--samples", "300", "--sample-time", "0.01")) == 0
     entry = json.loads((tmp_path / "identification.json").read_text())["recordings"][0]
