@@ -134,8 +134,8 @@ def test_signals_that_no_estimator_takes_are_named(
     wheel = '{ kind = "speed", at = "load", column = "wheel" }'
     model.write_text(f'{MODEL}\n[signals]\noutputs = [{wheel}]\nload = {{ column = "brake" }}\n', encoding="utf-8")
     assert run(arguments([tmp_path / "more.csv"], tmp_path / "out", "--model", str(model))) == 0
-    told = [line for line in capsys.readouterr().err.splitlines() if "not used" in line]
-    assert told == [
+    said = [line for line in capsys.readouterr().err.splitlines() if "not used" in line]
+    assert said == [
         "note: identified from motor torque to the first output; not used: the output wheel, the measured load torque. "
         "See hil diagnose."
     ]
