@@ -1,8 +1,8 @@
 """Signals while other people's code runs that calls back into Python: they are taken when it is done.
 
 An exception that a signal handler raises in such a callback, that of Ctrl-C for one, does not get through: LLVM leaves
-its data half freed, and the process ends with a double free; ctypes prints it, and the program goes on. So the handlers
-of this process are kept away from there in its main thread, and are called behind it.
+its data half freed, and the process ends with a double free; ctypes prints it and continues. So the handlers of this
+process are kept away from there in its main thread, and are called behind it.
 """
 
 from __future__ import annotations

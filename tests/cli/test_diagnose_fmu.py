@@ -101,7 +101,7 @@ def test_a_recorded_angle_is_held_against_the_fmus(fmu: str, tmp_path: Path) -> 
 def test_an_interruption_is_not_lost_in_a_callback_of_the_simulation(
     kind: str, called_back: Callable[..., Any], fmu: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """ctypes prints what is raised in a callback and goes on: Ctrl-C in one of CVode's was of no effect."""
+    """ctypes prints what is raised in a callback and continues: Ctrl-C in one of CVode's was of no effect."""
     bench.record(tmp_path / "run_1.csv", 1, n=300)
     plant = FmuPlant(Path(fmu), [], trusted=True)
     monkeypatch.setattr(plant._described, "coSimulation" if kind == "modelExchange" else "modelExchange", None)
