@@ -19,20 +19,8 @@ from hil.cli.main import run
 from hil.recording import read_record
 from hil.report.identification.terminal import compared_summary
 from tests.benchmarks.buses.line import Line
+from tests.cli.bus_model import MODEL
 from tests.estimator.identification.driveline import cruise, true_resonance
-
-MODEL = """schema = "hil.model/1"
-structure = "two_mass"
-motion = "rotation"
-
-[parameters]
-J_M = { value = 1.6, tolerance = 0.2 }
-J_L = { value = 100.0, tolerance = 0.2 }
-k = { value = 4200, tolerance = 0.2 }
-c = { value = 9.0, tolerance = 0.2 }
-b_M = { value = 0.35, tolerance = 0.2 }
-b_L = { value = 0.9, tolerance = 0.2 }
-"""
 
 ONE_MASS = """schema = "hil.model/1"
 structure = "one_mass"
