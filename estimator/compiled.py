@@ -2,7 +2,7 @@
 
 numba keys its cache by the file of the outermost function alone, so a kernel would keep using the old code of a law
 that lives in another file. Here the cache folder carries the digest of every source file next to which code is
-compiled.
+compiled. Folders of other versions are removed when nobody uses them any more (`estimator.kernel_cache`).
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from typing import Any, TypeVar, cast
 import numba
 from numba.core import config as numba_config
 
+from estimator.kernel_cache import take
 from estimator.undisturbed import compile_undisturbed
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -44,6 +45,9 @@ compile_undisturbed()
 
 IS_COMPILED = not vars(numba_config)["DISABLE_JIT"]
 """Whether code is compiled, and not run by Python, for a debugger, because of ``NUMBA_DISABLE_JIT``."""
+
+if IS_COMPILED:
+    take(_cache_folder())
 
 
 def compiled(function: Function) -> Function:

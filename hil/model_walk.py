@@ -43,6 +43,12 @@ class ModelWalk:
         tags = [tag for member in _members(self.annotation) for tag in _tags(member)]
         return ", ".join(repr(tag) for tag in tags)
 
+    @property
+    def is_of_tables(self) -> bool:
+        """Whether the walk has come to a list of tables."""
+        is_list = typing.get_origin(self.annotation) in (list, tuple)
+        return is_list and any(_fields(each) for each in typing.get_args(self.annotation))
+
     def _step(self, part: Key) -> ModelWalk:
         for member in _members(self.annotation):
             if part in _tags(member) or part == getattr(member, "__name__", None):

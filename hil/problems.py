@@ -44,6 +44,7 @@ LONGEST_VALUE: Final = 80
 
 WORDS: Final[Mapping[str, str]] = {
     "dict_type": "a table",
+    "model_type": "a table",
     "list_type": "a list in [ ]",
     "string_too_short": "a text that is not empty",
 }
@@ -197,6 +198,9 @@ def _lines(model: type[BaseModel], detail: ErrorDetails) -> Iterator[str]:
     elif kind in ("union_tag_invalid", "union_tag_not_found"):
         got = repr(context["tag"]) if "tag" in context else "nothing: add it"
         yield _line((*table.keys, context["discriminator"].strip("'")), f"one of {table.known_tags()}", got)
+    elif kind == "list_type" and isinstance(detail["input"], Mapping) and table.is_of_tables:
+        name = ".".join(map(str, table.keys))
+        yield _line(table.keys, f"a list of tables, [[{name}]] or [ {{ ... }} ]", f"one table, [{name}] or {{ ... }}")
     else:
         yield _line(table.keys, _expected(detail), _shown(detail["input"]))
 

@@ -7,13 +7,16 @@ What lives here: bus, SDO, PDO, heartbeat, EMCY, as bytes and integers. What may
 from __future__ import annotations
 
 import sys
-from importlib import import_module
 
 if "can" not in sys.modules and "asammdf" not in sys.modules:
     # python-can imports asammdf and pandas, a second or two, for bus logs in MF4, of which nothing here makes use; with
-    # this entry it takes them for not installed.
+    # this entry it takes them for not installed. So whoever needs `can` imports it from here.
     sys.modules["asammdf"] = None  # type: ignore[assignment]
     try:
-        import_module("can")
+        import can
     finally:
         del sys.modules["asammdf"]
+else:
+    import can
+
+__all__ = ["can"]

@@ -2,37 +2,24 @@
 
 from __future__ import annotations
 
-import threading
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Sequence
 
 from drivers.canopen.pdo_map import PdoCodec
 from drivers.capability.carrier import ObjectId
-
-
-@dataclass(frozen=True, slots=True)
-class _Received:
-    """The values of one TPDO, and when it arrived on the host's monotonic clock [ns]."""
-
-    values: tuple[int, ...]
-    t_ns: int
-
+from drivers.inverter.tpdos import TpdoReceiver
 
 NEVER_NS = -1
 """Before any clock's beginning."""
 
-NOTHING = _Received((), NEVER_NS)
 
-
-class ChannelReceiver:
-    """Takes the TPDOs that carry further objects where frames are received; hands their counts to the caller's thread.
+class ChannelReceiver(TpdoReceiver):
+    """Hands the counts of further objects to the caller's thread.
 
     Parameters
     ----------
     codecs
-        Unpackers of the TPDOs.
+        Unpackers of the TPDOs that carry them.
     objects
         What is to be read of them.
 
@@ -43,36 +30,8 @@ class ChannelReceiver:
     """
 
     def __init__(self, codecs: Sequence[PdoCodec], objects: Sequence[ObjectId]) -> None:
-        self._codecs = tuple(codecs)
-        self._places = tuple(self._place(each) for each in objects)
-        self._received = [NOTHING] * len(self._codecs)
-        self._arrived = threading.Condition()
-        self._started = False
-
-    @property
-    def subscriptions(self) -> list[tuple[int, Callable[[bytes, int], None]]]:
-        """Identifier of each TPDO, and what takes its frames: data and arrival [ns]."""
-        return [(codec.layout.cob_id, partial(self.on_frame, n)) for n, codec in enumerate(self._codecs)]
-
-    def on_frame(self, part: int, data: bytes, t_ns: int) -> None:
-        """Take the TPDO of that number; before `start_anew` its mapping is unknown, and it is left alone.
-
-        Raises
-        ------
-        ProtocolViolation
-            If it has not the length of its mapping.
-        """
-        if self._started:
-            received = _Received(self._codecs[part].unpack(data), t_ns)
-            with self._arrived:
-                self._received[part] = received
-                self._arrived.notify_all()
-
-    def start_anew(self) -> None:
-        """Take frames from now on, and forget those before: the mapping was another."""
-        with self._arrived:
-            self._started = True
-            self._received = [NOTHING] * len(self._codecs)
+        super().__init__(codecs)
+        self._places = tuple(self._place(*each) for each in objects)
 
     def await_after(self, after_ns: int, timeout_s: float) -> tuple[int | None, ...]:
         """Wait for all TPDOs that arrive after ``after_ns`` [ns], ``timeout_s`` at most [s].
@@ -84,7 +43,7 @@ class ChannelReceiver:
         """
         deadline = time.monotonic() + timeout_s
         with self._arrived:
-            while any(received.t_ns <= after_ns for received in self._received):
+            while any(received is None or received.t_ns <= after_ns for received in self._received):
                 if not self._arrived.wait(deadline - time.monotonic()):
                     break
             return tuple(self._count(place, after_ns) for place in self._places)
@@ -97,12 +56,4 @@ class ChannelReceiver:
     def _count(self, place: tuple[int, int], after_ns: int) -> int | None:
         part, at = place
         received = self._received[part]
-        return received.values[at] if received.t_ns > after_ns else None
-
-    def _place(self, wanted: ObjectId) -> tuple[int, int]:
-        """Find an object: number of the TPDO, and place among its values."""
-        carries = [
-            any((each.index, each.subindex) == wanted for each in codec.layout.objects) for codec in self._codecs
-        ]
-        of = carries.index(True) if any(carries) else 0
-        return of, self._codecs[of].position(*wanted)
+        return None if received is None or received.t_ns <= after_ns else received.values[at]

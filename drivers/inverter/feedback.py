@@ -6,14 +6,13 @@ all of that cycle are there.
 
 from __future__ import annotations
 
-import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 
 from drivers.canopen.pdo_map import PdoCodec
 from drivers.inverter.cia402 import PowerState, StatusBit, state_of
+from drivers.inverter.tpdos import TpdoReceiver
 from drivers.scaling import TorqueScale, VelocityScale
 
 _LIMITED, _FOLLOWS = StatusBit.INTERNAL_LIMIT_ACTIVE.value, StatusBit.FOLLOWS_TARGET.value
@@ -55,8 +54,8 @@ class InverterFeedback:
     follows: bool = True
 
 
-class FeedbackReceiver:
-    """Takes the TPDOs of one inverter where frames are received and hands the latest to the caller's thread.
+class FeedbackReceiver(TpdoReceiver):
+    """Hands the latest feedback of one inverter to the caller's thread.
 
     Parameters
     ----------
@@ -72,17 +71,12 @@ class FeedbackReceiver:
     """
 
     def __init__(self, codecs: Sequence[PdoCodec], torque: TorqueScale, velocity: VelocityScale) -> None:
-        self._codecs = tuple(codecs)
+        super().__init__(codecs)
         self._torque = torque
         self._velocity = velocity
-        self._statusword_at, self._torque_at, self._speed_at = (
-            _place(self._codecs, index) for index in (0x6041, 0x6077, 0x606C)
-        )
-        self._received: list[tuple[tuple[int, ...], int] | None] = [None] * len(self._codecs)
+        self._places = tuple(self._place(index) for index in (0x6041, 0x6077, 0x606C))
         self._counts = [0] * len(self._codecs)
-        self._arrived = threading.Condition()
         self._sequence = 0
-        self._started = False
         self.latest: InverterFeedback | None = None
 
     @property
@@ -90,51 +84,34 @@ class FeedbackReceiver:
         """How often all TPDOs have come; it never starts anew."""
         return min(self._counts)
 
-    @property
-    def subscriptions(self) -> list[tuple[int, Callable[[bytes, int], None]]]:
-        """Identifier of each TPDO, and what takes its frames: data and arrival [ns]."""
-        return [(codec.layout.cob_id, partial(self.on_frame, n)) for n, codec in enumerate(self._codecs)]
-
-    def on_frame(self, part: int, data: bytes, t_ns: int) -> None:
-        """Take the TPDO of that number; before `start_anew` its mapping is unknown, and it is left alone.
+    def _take(self, part: int) -> None:
+        """Make feedback of the TPDOs, once each has come.
 
         Raises
         ------
         ProtocolViolation
-            If it has not the length of its mapping, or the statusword is no state.
+            If the statusword is no state.
         """
-        if not self._started:
-            return
-        self._received[part] = self._codecs[part].unpack(data), t_ns
         self._counts[part] += 1
         received = [each for each in self._received if each is not None]
         if len(received) < len(self._codecs):
             return
-        statusword, torque_raw, speed_raw = (
-            received[n][0][at] for n, at in (self._statusword_at, self._torque_at, self._speed_at)
-        )
-        feedback = InverterFeedback(
+        statusword, torque_raw, speed_raw = (received[n].values[at] for n, at in self._places)
+        self.latest = InverterFeedback(
             torque_nm=self._torque.to_nm(torque_raw),
             speed_rad_s=self._velocity.to_rad_s(speed_raw),
             state=state_of(statusword),
-            t_ns=min(arrival_ns for _, arrival_ns in received),
+            t_ns=min(each.t_ns for each in received),
             sequence=self._sequence + 1,
             torque_raw=torque_raw,
             speed_raw=speed_raw,
             limited=bool(statusword & _LIMITED),
             follows=bool(statusword & _FOLLOWS),
         )
-        with self._arrived:
-            self._sequence = feedback.sequence
-            self.latest = feedback
-            self._arrived.notify_all()
+        self._sequence = self.latest.sequence
 
-    def start_anew(self) -> None:
-        """Take frames from now on, and forget what came before: mapping or state were other than now."""
-        with self._arrived:
-            self._started = True
-            self._received = [None] * len(self._codecs)
-            self.latest = None
+    def _forget(self) -> None:
+        self.latest = None
 
     def await_after(self, after_ns: int, timeout_s: float) -> InverterFeedback | None:
         """Wait for feedback that arrived after ``after_ns`` [ns]; None if there is none in time."""
@@ -147,9 +124,3 @@ class FeedbackReceiver:
                 if not self._arrived.wait(deadline - time.monotonic()):
                     return None
             return self.latest
-
-
-def _place(codecs: tuple[PdoCodec, ...], index: int) -> tuple[int, int]:
-    """Find an object: number of the TPDO, and place among its values."""
-    of = next((n for n, codec in enumerate(codecs) if index in codec.indices), 0)
-    return of, codecs[of].position(index)

@@ -9,26 +9,20 @@ success when the drive has not followed.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Final
 
 from drivers.canopen.can_link import CanLink
 from drivers.canopen.heartbeat import NMT_COB_ID, NmtCommand, NmtState, nmt_frame
-from drivers.canopen.sdo import SdoChannel
-from drivers.canopen.sdo_node import SdoNode
-from drivers.capability.carrier import ObjectId
 from drivers.errors import CommandRefused, ConfigMismatch, DriverError
-from drivers.inverter.check import Difference, configurable_differences, fixed_differences, remarks
+from drivers.inverter.check import Difference, fixed_differences
 from drivers.inverter.cia402 import Command
-from drivers.inverter.commissioned import CommissionedValue, commissioned_values
-from drivers.inverter.drive_settings import drive_settings
 from drivers.inverter.feedback import InverterFeedback
 from drivers.inverter.follow_watch import FollowWatch
 from drivers.inverter.health import InverterHealth
+from drivers.inverter.inspection import InspectedInverter
 from drivers.inverter.pdo_setup import set_up_pdos
-from drivers.inverter.pdos import TARGET_TORQUE, TORQUE_OFFSET, InverterPdos, TorqueCounts
+from drivers.inverter.pdos import TARGET_TORQUE, TORQUE_OFFSET, TorqueCounts
 from drivers.inverter.power_control import PowerControl
-from drivers.inverter.protection import Protection, protections, require_protections
 from drivers.inverter.settings import InverterSettings
 from drivers.inverter.stop_proof import StopProof
 from drivers.torque_guard import GuardedTorque
@@ -38,8 +32,8 @@ __all__ = ["Difference", "Inverter", "InverterFeedback", "InverterSettings"]
 NO_TORQUE: Final = TorqueCounts()
 
 
-class Inverter:
-    """One inverter on a link.
+class Inverter(InspectedInverter):
+    """One inverter on a link: what its set-up reads (`InspectedInverter`), and what commands it.
 
     Parameters
     ----------
@@ -51,22 +45,11 @@ class Inverter:
     Raises
     ------
     ConfigMismatch
-        If the EDS can't be read, has no PDOs that carry the torque command and its feedback or can be made to, or would
-        have the drive keep its torque without a host, and nobody has accepted that.
+        As `InspectedInverter`.
     """
 
     def __init__(self, link: CanLink, settings: InverterSettings) -> None:
-        self.settings = settings
-        self._link = link
-        self._where = settings.where
-        self._pdos = InverterPdos(settings)
-        self._plan = self._pdos.plan
-        self._given = drive_settings(self._plan, settings)
-        require_protections(self._plan, settings)
-        self._proof: dict[str, str] = {}
-        node = SdoNode(settings.node_id, self._pdos.eds.dictionary)
-        link.network.add_node(node)
-        self._sdo = SdoChannel(node, self._pdos.eds, self._where, settings.sdo_timeout_s)
+        super().__init__(link, settings)
         self._feedback = self._pdos.receiver()
         self._channels = self._pdos.channel_receiver()
         for cob_id, take in (*self._feedback.subscriptions, *self._channels.subscriptions):
@@ -98,52 +81,6 @@ class Inverter:
         latest = self.latest
         return latest is not None and (latest.limited or self._following.is_ignored(latest))
 
-    def check(self) -> tuple[Difference, ...]:
-        """Compare the device with rig file and EDS; reads objects, writes none.
-
-        Returns
-        -------
-        tuple of Difference
-            Empty if everything agrees.
-
-        Raises
-        ------
-        DeviceTimeout
-            If the node does not answer.
-        ConfigMismatch
-            If it lacks an object of the EDS.
-        """
-        return (
-            *fixed_differences(self._sdo, self._plan, self.settings),
-            *configurable_differences(self._sdo, self._plan, self.settings, self._given),
-        )
-
-    def remarks(self) -> tuple[str, ...]:
-        """Say what a run will set that the drive does not have yet; reads objects, writes none.
-
-        Raises
-        ------
-        DeviceTimeout, ConfigMismatch
-            As `check`.
-        """
-        return tuple(remarks(self._sdo, self._plan, self.settings, self._given))
-
-    def commissioned(self) -> tuple[CommissionedValue, ...]:
-        """List where DCF, device and rig file are not of one mind; empty without a DCF. Reads objects, writes none.
-
-        Raises
-        ------
-        DeviceTimeout
-            If the node does not answer.
-        """
-        return tuple(commissioned_values(self._sdo, self._plan, self.settings))
-
-    def protections(self) -> tuple[Protection, ...]:
-        """List what stands between a dead host and torque, with what the last `prove_stop` has seen of it."""
-        return tuple(
-            replace(each, proof=self._proof.get(each.name, "")) for each in protections(self._plan, self.settings)
-        )
-
     def fault(self) -> str | None:
         """Tell what fault the drive is in: power state, error code in words, what to do; None without fault.
 
@@ -157,18 +94,6 @@ class Inverter:
             If its statusword is none of CiA 402.
         """
         return self._power.fault()
-
-    def device_name(self) -> str:
-        """Read the name the maker gave the drive, object 0x1008; in segments, for it is a text.
-
-        Raises
-        ------
-        ConfigMismatch
-            If the drive has no such object: it is optional.
-        DeviceTimeout, ProtocolViolation
-            If the drive does not answer, or not with a text.
-        """
-        return self._sdo.upload_text(0x1008)
 
     def configure(self) -> None:
         """Give the device its PDO layout, option codes and what it watches the host by; start NMT operation.
@@ -260,16 +185,6 @@ class Inverter:
             The count of each of ``settings.channels``; None for one that did not come in ``timeout_s``.
         """
         return self._channels.await_after(after_ns, timeout_s)
-
-    def read_channel(self, channel: ObjectId) -> int:
-        """Read the count of a further object over SDO.
-
-        Raises
-        ------
-        DeviceTimeout, ConfigMismatch
-            If the node does not answer, or lacks the object.
-        """
-        return self._sdo.upload(*channel)
 
     def quick_stop(self) -> None:
         """Stop as the quick stop option code 0x605A has it, confirmed by statusword and torque actual value.

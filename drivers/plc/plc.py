@@ -21,7 +21,8 @@ from enum import Enum
 from types import TracebackType
 from typing import Final, Self, TypeVar
 
-from drivers.errors import ConfigMismatch, DeviceFault, DeviceTimeout
+from drivers.errors import ConfigMismatch, DeviceFault
+from drivers.plc.host_watchdog import HostWatchdog
 from drivers.plc.map_needs import require_usable
 from drivers.plc.modbus_link import ModbusLink
 from drivers.plc.modbus_security import ClientSecurity
@@ -51,9 +52,6 @@ STATUS: Final = (
     "prbs_seed",
     "prbs_source",
 )
-
-COUNTS: Final = 65536
-"""The host's watchdog starts over here, so that it fits 16 bits."""
 
 GENERATOR_OFF: Final = PrbsSettings(False, 0.0, 1, 1, PrbsSource.HOST)
 """The PLC's own generator stands still, whatever it was set to."""
@@ -94,17 +92,15 @@ class Plc:
     """
 
     __slots__ = (
-        "_beat_timeout_s",
         "_clock_ns",
         "_greeting_timeout_s",
-        "_host_count",
         "_latest",
         "_link",
         "_map",
         "_mode_timeout_s",
         "_registers",
-        "_seen_ns",
         "_setting_prbs",
+        "_watchdog",
     )
 
     def __init__(
@@ -125,12 +121,10 @@ class Plc:
         self._map = register_map
         self._registers = NamedRegisters(self._link, register_map)
         self._mode_timeout_s = mode_timeout_s
-        self._beat_timeout_s = beat_timeout_s
+        self._watchdog = HostWatchdog(self._registers, self._link.place, beat_timeout_s, clock_ns)
         self._greeting_timeout_s = greeting_timeout_s
         self._clock_ns = clock_ns
-        self._host_count: int | None = None
         self._latest: PlcStatus | None = None
-        self._seen_ns = 0
         self._setting_prbs = asyncio.Lock()  # who switches it off comes behind who still switches it on
 
     @property
@@ -171,7 +165,7 @@ class Plc:
     def close(self) -> None:
         """Disconnect; safe to call twice."""
         self._link.close()
-        self._host_count = None
+        self._watchdog.start_anew()
 
     async def greet(self) -> PlcStatus:
         """Beat until the PLC permits torque, for ``greeting_timeout_s`` at most, and give its status then.
@@ -204,6 +198,16 @@ class Plc:
         while continues():
             await asyncio.sleep(BEAT_EVERY_S)
             await self.beat()
+
+    async def beat(self) -> None:
+        """Count the host's watchdog on by one, and see that the PLC has seen the beats before.
+
+        Raises
+        ------
+        DeviceTimeout
+            If the PLC has not seen the last beat for ``beat_timeout_s``: its program stands still.
+        """
+        await self._watchdog.beat()
 
     async def read_status(self) -> PlcStatus:
         """Read everything the PLC reports.
@@ -298,33 +302,6 @@ class Plc:
                     f"expected {mode.value}. Look at the PLC for what keeps it from changing the mode."
                 )
             await asyncio.sleep(POLL_S)
-
-    async def beat(self) -> None:
-        """Count the host's watchdog on by one, and see that the PLC has seen the beats before.
-
-        Raises
-        ------
-        DeviceTimeout
-            If the PLC has not seen the last beat for ``beat_timeout_s``: its program stands still.
-        """
-        now_ns = self._clock_ns()
-        if self._host_count is None:
-            self._seen_ns = now_ns
-        else:
-            await self._require_seen(self._host_count, now_ns)
-        count = 0 if self._host_count is None else (self._host_count + 1) % COUNTS
-        await self._registers.write(self._registers.encoded({"host_count": count}))
-        self._host_count = count
-
-    async def _require_seen(self, count: int, now_ns: int) -> None:
-        seen = (await self._registers.read(("host_count_seen",)))["host_count_seen"]
-        if seen == count:
-            self._seen_ns = now_ns
-        elif now_ns - self._seen_ns > self._beat_timeout_s * NS_PER_S:
-            raise DeviceTimeout(
-                f"{self._link.place}: watchdog: expected beat {count} seen by the PLC within "
-                f"{self._beat_timeout_s:g} s, it has seen {seen}. Check that the PLC's program runs."
-            )
 
     async def _drive_mode(self) -> DriveMode:
         return _member(DriveMode, (await self._registers.read(("drive_mode",)))["drive_mode"])

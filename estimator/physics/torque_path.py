@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 
 import numpy as np
-from scipy.signal import lfilter
 
 from estimator.physics.acting import Place
 from estimator.physics.catalogue import BUILT_IN
@@ -60,6 +59,8 @@ def warmth(torque: FloatArray, since_start_s: FloatArray, period_s: float, p: Fl
     if p[_HEATED] <= 0.0:
         rows_and_end = np.append(since_start_s, since_start_s[-1] + period_s)
         return np.asarray(-np.expm1(-rows_and_end / p[_DERATING_TIME]))
+    from scipy.signal import lfilter  # half a second that few need
+
     kept = float(np.exp(-period_s / p[_DERATING_TIME]))
     heat = (1.0 - kept) * (torque / p[_HEATED]) ** 2
     warm, _ = lfilter([1.0], [1.0, -kept], heat, zi=[kept * begun])

@@ -109,7 +109,17 @@ def _read(
         )
     records = read_records(recordings, file.signals, dbc=dbc, tell=tell)
     tell_scales(records, recordings, file.model, file.signals, dbc, tell)
+    _tell_unused(records[0])
     return records, file.model
+
+
+def _tell_unused(record: Record) -> None:
+    """Say which signals the model file names and no estimator here takes."""
+    unused = [f"the output {channel.label}" for channel in record.channels]
+    if record.load_nm is not None:
+        unused.append("the measured load torque")
+    if unused:
+        tell(f"identified from motor torque to the first output; not used: {', '.join(unused)}. See hil diagnose.")
 
 
 def _identified(records: Sequence[Record], settings: Settings) -> list[Study]:

@@ -118,6 +118,8 @@ def _plain(text: str) -> str:
 
 
 def _rate(group: Group) -> str:
+    if group.rows < 2:
+        return "\none row: no period"
     if group.period_s is None:
         return "\nno channel is a time"
     gaps = f", {group.gaps} gaps" if group.gaps else ""

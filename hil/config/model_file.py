@@ -14,117 +14,26 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self, TypeVar
+from typing import Any, TypeVar
 
-import tomlkit
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
-from tomlkit.items import InlineTable, Table
+from pydantic import BaseModel, ConfigDict, ValidationError
 
 from estimator.errors import BadModel
 from estimator.physics.law_name import LawName
-from estimator.physics.model import DrivelineModel, EffectValue, Load, Motion, Parameter, Structure, parameter_unit
-from hil.config.file_schema import FileKind, schema_line
+from estimator.physics.model import DrivelineModel, EffectValue, Load, Motion, Parameter, Structure
 from hil.config.laws import LawTable, laws_of, moved
+from hil.config.model_tables import ModelDocument, Prepared
+from hil.config.model_text import as_toml
 from hil.errors import ModelFileError
-from hil.problems import Fault, problem_lines, read_toml, refuse
+from hil.problems import problem_lines, read_toml
 from hil.recording import columns
 from hil.recording.signals_config import SignalsConfig
 
 Kind = TypeVar("Kind", bound=Enum)
 Default = TypeVar("Default", float, None)
 
-SCHEMA = "hil.model/1"
-
 NEUTRAL = 1.0
 """Stands for a number of the wrong type while the rest is checked: allowed for every parameter."""
-
-
-class _Strict(BaseModel):
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class _Entry(_Strict):
-    value: float
-
-    @model_validator(mode="before")
-    @classmethod
-    def _is_a_table(cls, entry: object) -> object:
-        if not isinstance(entry, Mapping):
-            raise ValueError(f"a table of {', '.join(cls.model_fields)}, such as {{ value = 1.5, ... }}")
-        return entry
-
-
-class _ParameterEntry(_Entry):
-    tolerance: float
-
-
-class _EffectEntry(_Entry):
-    ci95: Annotated[list[float], Field(min_length=2, max_length=2)] | None = None
-    tolerance: float = 0.0
-
-    @model_validator(mode="after")
-    def _interval_is_ordered(self) -> Self:
-        if self.ci95 and self.ci95[0] > self.ci95[1]:
-            refuse([Fault("ci95", "the lower bound first", self.ci95)])
-        return self
-
-
-class _Geometry(_Strict):
-    gear_ratio: float = Field(gt=0)
-
-
-class _Load(_Strict):
-    constant: Literal["own", "shared"] | float = "own"
-
-
-class PreparedRecording(_Strict):
-    """A recording that was used.
-
-    Attributes
-    ----------
-    sha256 : str
-        Of its file; empty where it was not read from one.
-    samples_used : int
-        How many of its samples counted.
-    events : dict
-        From when to when each event was found in it, since it began [s].
-    """
-
-    name: str
-    sha256: str
-    samples_used: int
-    events: dict[str, Annotated[list[float], Field(min_length=2, max_length=2)]] = {}
-
-
-class Prepared(_Strict):
-    """What ``hil diagnose`` did to recordings before it fitted: ``hil simulate`` and ``hil compare`` do it again.
-
-    Attributes
-    ----------
-    fixed : bool
-        Whether wrapped positions are put together, and what was cut off, held or interpolated does not count.
-    one_in : int
-        To one in how many samples recordings are thinned.
-    """
-
-    mended: bool = True
-    one_in: int = Field(default=1, ge=1)
-    recordings: list[PreparedRecording] = []
-
-
-class ModelDocument(_Strict):
-    """The file's tables, before the model is made of them."""
-
-    schema_: Literal["hil.model/1"] = Field(alias="schema")
-    structure: Annotated[Structure, Field(strict=False)]
-    motion: Annotated[Motion, Field(strict=False)] = Motion.ROTATION
-    parameters: dict[str, _ParameterEntry]
-    geometry: _Geometry | None = None
-    load: _Load | None = None
-    effects: dict[str, dict[str, _EffectEntry]] = {}
-    laws: dict[str, LawTable] = {}
-    signals: SignalsConfig | None = None
-    prepared: Prepared | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -252,7 +161,7 @@ def write_model(
     path = Path(path)
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        part.write_text(_as_toml(model, signals, laws or {}, prepared), encoding="utf-8")
+        part.write_text(as_toml(model, signals, laws or {}, prepared), encoding="utf-8")
         part.replace(path)
     finally:
         part.unlink(missing_ok=True)
@@ -313,90 +222,3 @@ def _effect_value(entry: object) -> EffectValue:
         case [int() | float() as low, int() | float() as high]:
             return EffectValue(value, (float(low), float(high)), tolerance)
     return EffectValue(value, None, tolerance)
-
-
-def _as_toml(
-    model: DrivelineModel,
-    signals: SignalsConfig | None,
-    laws: Mapping[str, LawTable],
-    prepared: Prepared | None = None,
-) -> str:
-    document = tomlkit.document()
-    document["schema"] = SCHEMA
-    document["structure"] = model.structure.value
-    document["motion"] = model.motion.value
-    parameters = tomlkit.table()
-    for name in model.structure.parameter_names:
-        parameter = model.parameters[name]
-        entry = {"value": float(parameter.value), "tolerance": float(parameter.tolerance)}
-        parameters[name] = _inline(entry).comment(parameter_unit(name, model.motion))
-    document["parameters"] = parameters
-    if model.gear_ratio is not None:
-        document["geometry"] = {"gear_ratio": float(model.gear_ratio)}
-    if model.load is not Load.OWN:
-        constant = model.load.value if isinstance(model.load, Load) else float(model.load)
-        document["load"] = {"constant": constant}
-    if model.effects:
-        document["effects"] = _effects_table(model)
-    if laws:
-        document["laws"] = _laws_table(laws)
-    if signals is not None:
-        document["signals"] = _signals_table(signals)
-    if prepared is not None:
-        document["prepared"] = _prepared_table(prepared)
-    return f"{schema_line(FileKind.MODEL)}\n{tomlkit.dumps(document)}"
-
-
-def _effects_table(model: DrivelineModel) -> Table:
-    effects = tomlkit.table(is_super_table=True)
-    for name, values in model.effects.items():
-        effect = tomlkit.table()
-        for key, value in values.items():
-            entry: dict[str, Any] = {"value": float(value.value)}
-            if value.ci95 is not None and all(math.isfinite(bound) for bound in value.ci95):
-                entry["ci95"] = [float(bound) for bound in value.ci95]
-            if value.tolerance > 0:
-                entry["tolerance"] = float(value.tolerance)
-            effect[key] = _inline(entry)
-        effects[name] = effect
-    return effects
-
-
-def _laws_table(laws: Mapping[str, LawTable]) -> Table:
-    tables = tomlkit.table(is_super_table=True)
-    for name, law in laws.items():
-        table = tomlkit.table()
-        table.update({"function": law.function, "element": law.element, "folder": law.folder})
-        table["parameters"] = {key: _inline(parameter.model_dump()) for key, parameter in law.parameters.items()}
-        tables[name] = table
-    return tables
-
-
-def _signals_table(signals: SignalsConfig) -> Table:
-    """Write the keys that were given, in the contract's way: one inline table each."""
-    table = tomlkit.table()
-    given = signals.model_dump(mode="json", exclude_unset=True, exclude_none=True)
-    for key, value in given.items():
-        if isinstance(value, list):
-            rows = tomlkit.array()
-            rows.extend([_inline(entry) for entry in value])
-            table[key] = rows
-        else:
-            table[key] = _inline(value) if isinstance(value, dict) else value
-    return table
-
-
-def _prepared_table(prepared: Prepared) -> Table:
-    table = tomlkit.table()
-    table.comment("what was done to the recordings before the fit; hil simulate and hil compare do it again")
-    table.update({"mended": prepared.mended, "one_in": prepared.one_in})
-    recordings = tomlkit.array().multiline(True)
-    recordings.extend([_inline(each.model_dump(exclude_defaults=True)) for each in prepared.recordings])
-    table["recordings"] = recordings
-    return table
-
-
-def _inline(entry: Mapping[str, Any]) -> InlineTable:
-    inline = tomlkit.inline_table()
-    inline.update(entry)
-    return inline

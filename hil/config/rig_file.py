@@ -2,11 +2,10 @@
 
 Strict and frozen: a number is no text, an unknown key is a fault, and nothing that limits torque has a
 default. Rules that hold across keys stand next to the keys they concern; `hil.problems` reports all
-faults at once. Those across tables are looked at once every table is right by itself.
+faults at once. Those across tables are in `hil.config.rig_rules`.
 
 The base torque of an experiment is that of both inverters together and is split evenly between them, unless its
-``share_m1`` says otherwise; so is the PRBS, unless ``[prbs] target`` does. The rules across keys check the worst case
-of each experiment against the limits of the torque guard: what the run would refuse is refused before it.
+``share_m1`` says otherwise; so is the PRBS, unless ``[prbs] target`` does.
 """
 
 from __future__ import annotations
@@ -14,7 +13,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
-from enum import Enum
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
@@ -29,27 +27,18 @@ from drivers.plc.types import PrbsSource
 from drivers.resources import data_file
 from drivers.torque_guard import ErrorLimits, GuardLimits
 from hil.config.channel_table import ChannelTable
-from hil.config.experiment_tables import EVEN_SHARE, AnyExperiment
+from hil.config.experiment_tables import AnyExperiment
 from hil.config.guard_table import GuardTable
 from hil.config.inverter_table import InvertersTable, NodeId
 from hil.config.inverter_table import InverterTable as InverterTable
 from hil.config.plc_tables import PlcTable as PlcTable
 from hil.config.plc_tables import SimulatedPlcSecurityTable
+from hil.config.prbs_table import PrbsTable
+from hil.config.prbs_table import PrbsTarget as PrbsTarget
+from hil.config.rig_rules import faults_across_tables
 from hil.config.table import ExistingFile, NotNegative, Positive, Table, Text
 from hil.errors import RigFileError
-from hil.problems import Fault, read_toml, refuse, validate
-
-
-class PrbsTarget(Enum):
-    """Which inverter carries the PRBS."""
-
-    BOTH = "both"
-    M1 = "m1"
-    M2 = "m2"
-    SHARED = "shared"
-
-
-_PARTS_M1 = {PrbsTarget.BOTH: 0.5, PrbsTarget.M1: 1.0, PrbsTarget.M2: 0.0}
+from hil.problems import read_toml, refuse, validate
 
 
 class CanTable(Table):
@@ -62,39 +51,6 @@ class CanTable(Table):
     url: Text
     host_node_id: NodeId | None = None
     monitor_node_id: NodeId | None = None
-
-
-class PrbsTable(Table):
-    """The pseudo-random binary torque; ``amplitude_nm`` is that of both inverters together."""
-
-    amplitude_nm: Positive
-    cells: Annotated[int, Field(ge=2, le=16)] = 10
-    clock_divider: Annotated[int, Field(ge=1, le=65535)]
-    seed: Annotated[int, Field(ge=1, le=65535)]
-    source: Annotated[PrbsSource, Field(strict=False)]
-    target: Annotated[PrbsTarget, Field(strict=False)]
-    share_m1: Annotated[float, Field(ge=0, le=1)] | None = None
-
-    @property
-    def part_m1(self) -> float:
-        """Part of the PRBS that inverter m1 carries, 0 to 1; m2 carries the rest."""
-        return _PARTS_M1.get(self.target, self.share_m1 or 0.0)
-
-    @model_validator(mode="after")
-    def _consistent(self) -> Self:
-        refuse(self._faults())
-        return self
-
-    def _faults(self) -> Iterator[Fault]:
-        shared = self.target is PrbsTarget.SHARED
-        if shared and self.share_m1 is None:
-            yield Fault("share_m1", "the part of inverter m1, 0 to 1, since target is 'shared'", None)
-        if not shared and self.share_m1 is not None:
-            yield Fault("share_m1", f"no such key while target is '{self.target.value}'", self.share_m1)
-        if self.seed >= 2**self.cells:
-            yield Fault("seed", f"at most {2**self.cells - 1}, what {self.cells} cells hold", self.seed)
-        if self.source is PrbsSource.PLC and self.cells != 10:
-            yield Fault("cells", "10, the PLC's own shift register, since source is 'plc'", self.cells)
 
 
 class VehicleTable(Table):
@@ -197,7 +153,7 @@ class Rig(Table):
         """The limits of this rig's torque guard: a PRBS that the PLC adds by itself is kept free under each."""
         if self.prbs.source is PrbsSource.HOST:
             return self.torque_limits
-        parts_nm = self._prbs_parts_nm()
+        parts_nm = self.prbs.parts_nm
         return replace(
             self.torque_limits,
             torque_limit_m1_nm=self.inverters.m1.torque_limit_nm - parts_nm["m1"],
@@ -218,107 +174,8 @@ class Rig(Table):
 
     @model_validator(mode="after")
     def _within_limits(self) -> Self:
-        refuse(
-            [
-                *self._guard_faults(),
-                *self._deadline_faults(),
-                *self._node_faults(),
-                *self._channel_faults(),
-                *self._prbs_faults(),
-                *self._experiment_faults(),
-                *self._security_faults(),
-            ]
-        )
+        refuse(faults_across_tables(self))
         return self
-
-    def _prbs_parts_nm(self) -> dict[str, float]:
-        part_m1 = self.prbs.part_m1
-        return {"m1": part_m1 * self.prbs.amplitude_nm, "m2": (1.0 - part_m1) * self.prbs.amplitude_nm}
-
-    def _guard_faults(self) -> Iterator[Fault]:
-        both_nm = self.inverters.m1.torque_limit_nm + self.inverters.m2.torque_limit_nm
-        if self.guard.sum_limit_nm > both_nm:
-            expected = f"at most the torque limits of m1 and m2 together ({both_nm:g})"
-            yield Fault("guard.sum_limit_nm", expected, self.guard.sum_limit_nm)
-        if self.guard.feedback_timeout_s < self.period_s:
-            expected = f"at least one period ({self.period_s:g})"
-            yield Fault("guard.feedback_timeout_s", expected, self.guard.feedback_timeout_s)
-
-    def _deadline_faults(self) -> Iterator[Fault]:
-        least_ms = 2000.0 * self.period_s
-        for name, table in (("m1", self.inverters.m1), ("m2", self.inverters.m2)):
-            if table.rpdo_deadline_ms is not None and table.rpdo_deadline_ms < least_ms:
-                expected = f"at least two periods ({least_ms:g}), or one RPDO that is late stops the drive"
-                yield Fault(f"inverters.{name}.rpdo_deadline_ms", expected, table.rpdo_deadline_ms)
-
-    def _node_faults(self) -> Iterator[Fault]:
-        """See that every node has an id of its own."""
-        used = [self.inverters.m1.node_id, self.inverters.m2.node_id]
-        for name in ("host_node_id", "monitor_node_id"):
-            node_id = getattr(self.can, name)
-            if node_id in used:
-                yield Fault(f"can.{name}", f"another node id than {', '.join(map(str, used))}", node_id)
-            elif node_id is not None:
-                used.append(node_id)
-
-    def _channel_faults(self) -> Iterator[Fault]:
-        """See that every channel has a column of its own."""
-        names = [channel.column for channel in self.channels]
-        for number, name in enumerate(names):
-            if name in names[:number]:
-                yield Fault(f"channels.{number}.column", "another column than the channels before it", name)
-        noisy = {} if self.simulation is None else self.simulation.channel_noise
-        for name in (name for name in noisy if name not in names):
-            yield Fault(
-                f"simulation.channel_noise.{name}", f"a column of [[channels]] ({', '.join(names)})", noisy[name]
-            )
-
-    def _security_faults(self) -> Iterator[Fault]:
-        """See that the simulated PLC wants TLS if, and only if, the host speaks it."""
-        if self.simulation is not None and (self.plc.security is None) != (self.simulation.plc_security is None):
-            expected = "this table if and only if there is [plc.security]: both sides speak TLS, or neither"
-            yield Fault("simulation.plc_security", expected, self.simulation.plc_security and {})
-
-    def _prbs_faults(self) -> Iterator[Fault]:
-        largest_nm = max(self._prbs_parts_nm().values())
-        if largest_nm > self.guard.prbs_limit_nm:
-            expected = (
-                f"a part of at most guard.prbs_limit_nm ({self.guard.prbs_limit_nm:g}) for each inverter, "
-                f"but one carries {largest_nm:g}"
-            )
-            yield Fault("prbs.amplitude_nm", expected, self.prbs.amplitude_nm)
-        if self.prbs.source is PrbsSource.PLC:
-            yield from self._room_faults()
-
-    def _room_faults(self) -> Iterator[Fault]:
-        """See that a PRBS the PLC adds by itself leaves the guard something to guard."""
-        for rest_nm, of in self._torque_rests(EVEN_SHARE):
-            if rest_nm <= 0.0:
-                expected = f"less than {of} allows, since source is 'plc'"
-                yield Fault("prbs.amplitude_nm", expected, self.prbs.amplitude_nm)
-
-    def _experiment_faults(self) -> Iterator[Fault]:
-        for name, experiment in self.experiments.items():
-            key = f"experiments.{name}"
-            for rest_nm, of in self._torque_rests(experiment.share_m1):
-                if experiment.torque_nm > rest_nm:
-                    expected = f"at most {rest_nm:g}, what {of} leaves besides the PRBS"
-                    yield Fault(f"{key}.torque_nm", expected, experiment.torque_nm)
-            fastest = self.guard.rate_limit_nm_per_s / max(experiment.share_m1, 1.0 - experiment.share_m1)
-            if experiment.slew_nm_per_s > fastest:
-                expected = f"at most {fastest:g}, of which one inverter gets what guard.rate_limit_nm_per_s allows"
-                yield Fault(f"{key}.slew_nm_per_s", expected, experiment.slew_nm_per_s)
-
-    def _torque_rests(self, share_m1: float) -> Iterator[tuple[float, str]]:
-        """Largest base torque of both inverters that each limit leaves besides the PRBS [Nm], and its key.
-
-        ``share_m1`` is the part of the base torque that inverter m1 gives, 0 to 1.
-        """
-        parts_nm = self._prbs_parts_nm()
-        yield self.guard.sum_limit_nm - self.prbs.amplitude_nm, "guard.sum_limit_nm"
-        for name, table, share in (("m1", self.inverters.m1, share_m1), ("m2", self.inverters.m2, 1.0 - share_m1)):
-            if share > 0.0:
-                yield (table.torque_limit_nm - parts_nm[name]) / share, f"inverters.{name}.torque_limit_nm"
 
 
 def read_rig(path: Path | str) -> Rig:

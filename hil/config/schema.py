@@ -15,7 +15,7 @@ from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
 from hil.config.file_schema import FileKind
-from hil.config.model_file import ModelDocument
+from hil.config.model_tables import ModelDocument
 from hil.config.rig_file import Rig
 
 DIALECT: Final = GenerateJsonSchema.schema_dialect

@@ -108,7 +108,7 @@ class MonitorApp(App[None]):
     def compose(self) -> ComposeResult:
         """Lay the screen out."""
         yield Panel(head_panels.headline, "headline")
-        yield from pages()
+        yield from pages(len(self._state.channel_units))
         yield Static("", id="too-small")
         yield Panel(head_panels.message, "message")
         yield Static("", id="keys", classes="keys", markup=False)

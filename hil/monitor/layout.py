@@ -61,14 +61,26 @@ def page(name: str, *parts: Widget) -> Container:
     return Container(*parts, id=name, classes="page")
 
 
-def pages() -> ComposeResult:
-    """Give every page, in the order of `PAGES`."""
+MOST_CHANNELS = 4
+"""Lines that further channels take from the plots of the first page."""
+
+
+def _channels(count: int) -> list[Panel]:
+    """Give the further channels a panel, where there are any."""
+    panel = Panel(signal_panels.channels, "channels")
+    panel.styles.height = min(count, MOST_CHANNELS)
+    return [panel] if count else []
+
+
+def pages(channels: int = 0) -> ComposeResult:
+    """Give every page, in the order of `PAGES`, with room for so many further channels."""
     yield page(
         "overview",
         Horizontal(
             Vertical(
                 Panel(signal_panels.torque, "torque"),
                 Panel(signal_panels.speed, "speed"),
+                *_channels(channels),
                 Panel(signal_panels.prbs, "prbs"),
                 Panel(signal_panels.twist, "twist"),
                 classes="left",

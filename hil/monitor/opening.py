@@ -64,7 +64,7 @@ def open_rig(
     require_folder(out)
     _require_chain(rig.period_s, setup)
     warm, shaft = WarmUp(rig.period_s, setup), _shaft(model, rig, trust_laws)
-    state = LiveState(rig.name, rig.period_s, shaft, can_drive=True, is_ready=warm.is_done, setup=setup)
+    state = LiveState(rig.name, rig.period_s, shaft, True, warm.is_done, setup, rig.channel_units)
     source = RigSource(Job(rig_path.absolute(), rig.of_monitor, out.absolute(), simulate, trust_laws, setup))
     return Opening(source, state, tuple(Choice(name, _summary(rig, name, trust_laws)) for name in rig.experiments))
 
@@ -94,17 +94,17 @@ def open_recording(
     if is_trace(path):
         if rig is None:
             raise UsageError(f"{path}: expected its rig file as well: hil monitor RIG --replay {path.name}; got none")
-        samples = list(replay(path, rig, whole=True, channel=channel))
+        samples, units = list(replay(path, rig, whole=True, channel=channel)), rig.channel_units
         measured = _has_prbs
     else:
-        samples = recorded_samples(path)
+        samples, units = recorded_samples(path)
         measured = _always
     if len(samples) < 2:
         raise RecordingError(path, f"expected samples to play, got {len(samples)}. Record again.")
     period_s = float(np.median(np.diff([sample.time_s for sample in samples])))
     _require_chain(period_s, setup)
     warm, shaft = WarmUp(period_s, setup), _shaft(model, rig, trust_laws)
-    state = LiveState(path.name, period_s, shaft, can_drive=False, is_ready=warm.is_done, setup=setup)
+    state = LiveState(path.name, period_s, shaft, False, warm.is_done, setup, units)
     return Opening(ReplaySource(path.name, samples, speed, measured), state)
 
 

@@ -15,6 +15,8 @@ from hil.errors import RecordingError
 from hil.monitor.messages import Began, Order, Over, Report, Samples
 from hil.recording import columns
 from hil.recording.formats import read_table
+from hil.recording.kinds import Kind
+from hil.recording.table import Table
 from hil.rig.experiments.base import Phase
 from hil.sample import Sample, SampleFlag
 
@@ -101,8 +103,8 @@ class ReplaySource:
         self._over = True
 
 
-def recorded_samples(path: Path) -> list[Sample]:
-    """Read the samples of a rig's own recording.
+def recorded_samples(path: Path) -> tuple[list[Sample], dict[str, str]]:
+    """Read the samples of a rig's own recording, and column and unit of each of its further channels.
 
     Raises
     ------
@@ -115,6 +117,8 @@ def recorded_samples(path: Path) -> list[Sample]:
     given = table.numeric(name for name in OPTIONAL if name in table.columns)
     if not np.all(np.diff(needed[columns.TIME]) > 0.0):
         raise RecordingError(path, f"column {columns.TIME}: expected values that rise, got some that do not")
+    channels = {name: table.units[name] for name in table.units if name not in columns.UNITS and _is_read(table, name)}
+    further = table.numeric(channels)
     zero = np.zeros(n)
     rows = zip(
         needed[columns.TIME].tolist(),
@@ -122,13 +126,18 @@ def recorded_samples(path: Path) -> list[Sample]:
         needed[columns.TORQUE_M2].tolist(),
         needed[columns.SPEED].tolist(),
         *(given.get(name, zero).tolist() for name in OPTIONAL),
+        *(further[name].tolist() for name in channels),
         strict=True,
     )
-    return list(_samples(rows))
+    return list(_samples(rows)), channels
+
+
+def _is_read(table: Table, name: str) -> bool:
+    return name in table.columns and Kind.of(table.columns[name]) is not Kind.TEXT
 
 
 def _samples(rows: Iterator[tuple[float, ...]]) -> Iterator[Sample]:
-    for cycle, (time_s, torque_m1, torque_m2, speed, reference, prbs, flags) in enumerate(rows):
+    for cycle, (time_s, torque_m1, torque_m2, speed, reference, prbs, flags, *channels) in enumerate(rows):
         yield Sample(
             cycle=cycle,
             t_ns=round(time_s * NS_PER_S),
@@ -141,4 +150,5 @@ def _samples(rows: Iterator[tuple[float, ...]]) -> Iterator[Sample]:
             speed_rad_s=speed,
             age_ns=0,
             flags=SampleFlag.GOOD if math.isnan(flags) else SampleFlag(int(flags)),
+            channels=tuple(channels),
         )

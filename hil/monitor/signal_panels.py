@@ -73,6 +73,18 @@ def twist(snapshot: Snapshot, width: int, height: int) -> list[str]:
     return [*lines, time_axis(s.window_s, width)]
 
 
+def channels(snapshot: Snapshot, width: int, height: int) -> list[str]:
+    """Give each further channel of the rig file a line: its column, unit and value."""
+    lines = []
+    for channel in snapshot.signals.channels:
+        now = _or_why_not(snapshot, f"{_latest(channel.values):.5g}".replace("nan", "--"))
+        room = max(0, width - len(now) - 1)
+        lines.append(f"{f'{channel.name} [{channel.unit}]'[:room]:<{room}} {now}"[:width])
+    if len(lines) > height > 0:
+        lines = [*lines[: height - 1], f"+{len(lines) - height + 1} more channels"[:width]]
+    return lines
+
+
 def _draw(signals: Signals, trace: Trace, width: int, height: int) -> list[str]:
     y_range = nice_range(trace.values, trace.least)
     plot = strip(signals.time_s, trace.values, Range(-signals.window_s, 0.0), y_range, width, height - 1)

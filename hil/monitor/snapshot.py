@@ -65,6 +65,15 @@ class Headline:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Channel:
+    """A further measured channel: its column in recordings, its unit, and its values, shape (N,)."""
+
+    name: str
+    unit: str
+    values: FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Signals:
     """The last seconds.
 
@@ -82,6 +91,8 @@ class Signals:
         Where the numbers behind the twist are from, or why there is none.
     twist_std_rad
         Its standard deviation by the filter's own reckoning [rad]; NaN while there is none.
+    channels
+        The further ones of the rig file, in its order.
     """
 
     time_s: FloatArray
@@ -95,6 +106,7 @@ class Signals:
     window_s: float
     twist_of: str
     twist_std_rad: float
+    channels: tuple[Channel, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +15,7 @@ from hil.monitor.messages import Began, Ended, Health, Kind, Lost, Notice, Over,
 from hil.monitor.outcome import as_known, outcome
 from hil.monitor.quality import QualityWatch
 from hil.monitor.ring import Ring
-from hil.monitor.snapshot import Activity, Headline, Signals, Snapshot
+from hil.monitor.snapshot import Activity, Channel, Headline, Signals, Snapshot
 from hil.rig.experiments.base import Phase
 from hil.rig.live import USUAL, OnlineSetup
 from hil.sample import Sample
@@ -29,6 +29,9 @@ KEPT_NOTICES = 200
 
 RETUNE_SHARE = 0.02
 """Change of the resonance by which the twist filter takes new numbers: computing its gain is not for every sample."""
+
+OWN_SIGNALS = 6
+"""Columns of the ring before those of the channels: time, torque, its reference, PRBS, speed, twist."""
 
 NO_MODEL = "no model: give --model"
 
@@ -52,6 +55,8 @@ class LiveState:
         Whether the estimator may be used already.
     setup
         What estimates.
+    channel_units
+        Column and unit of each further channel of its samples.
     """
 
     def __init__(
@@ -62,8 +67,10 @@ class LiveState:
         can_drive: bool,
         is_ready: Callable[[], bool] = lambda: True,
         setup: OnlineSetup = USUAL,
+        channel_units: Mapping[str, str] | None = None,
     ) -> None:
-        self._ring = Ring(math.ceil(WINDOWS_S[-1] / period_s), 6)
+        self.channel_units = dict(channel_units or {})
+        self._ring = Ring(math.ceil(WINDOWS_S[-1] / period_s), OWN_SIGNALS + len(self.channel_units))
         self._window = FIRST_WINDOW
         self._model_shaft = shaft
         self._twist = None if shaft is None else TwistFilter(shaft, period_s)
@@ -162,7 +169,15 @@ class LiveState:
             torque_nm, speed_rad_s = math.nan, math.nan
         self._now_ns = sample.t_ns
         self._ring.append(
-            (sample.t_ns / NS_PER_S, torque_nm, sample.torque_ref_nm, sample.prbs_nm, speed_rad_s, twist_rad)
+            (
+                sample.t_ns / NS_PER_S,
+                torque_nm,
+                sample.torque_ref_nm,
+                sample.prbs_nm,
+                speed_rad_s,
+                twist_rad,
+                *sample.channels,
+            )
         )
 
     def _retune(self) -> None:
@@ -189,6 +204,10 @@ class LiveState:
             window_s=window_s,
             twist_of=NO_MODEL if self._twist is None else f"k, c: {self._twist.shaft.source}",
             twist_std_rad=math.nan if self._twist is None else self._twist.twist_std_rad,
+            channels=tuple(
+                Channel(name, unit, rows[:, OWN_SIGNALS + number])
+                for number, (name, unit) in enumerate(self.channel_units.items())
+            ),
         )
 
     def _begin(self, report: Began) -> None:

@@ -22,6 +22,7 @@ from estimator.physics.free_run import FreeRun
 from estimator.physics.model import Motion
 from estimator.physics.start import Start
 from estimator.signals.record import FloatArray, OutputKind, Record
+from estimator.undisturbed import Deferred
 from hil.errors import UsageError
 from hil.plants.names import Names, names
 
@@ -168,7 +169,9 @@ class FmuPlant:
         since_s = record.time_s - record.time_s[0]
         kind = "CoSimulation" if self._described.coSimulation is not None else "ModelExchange"
         try:
-            with redirect_stdout(sys.stderr):  # an FMU may say what it likes, but not in the midst of JSON
+            # An FMU may say what it likes, but not in the midst of JSON. Its solver calls back into Python, where
+            # ctypes loses an exception, and with it a Ctrl-C: it waits for the end of a step.
+            with Deferred() as signals, redirect_stdout(sys.stderr):
                 result = self._fmpy.simulate_fmu(
                     self._folder,
                     model_description=self._described,
@@ -179,6 +182,7 @@ class FmuPlant:
                     start_values=start,
                     input=self._given(torque_nm, named, since_s, held, kind),
                     output=[named.output],
+                    step_finished=lambda time_s, recorder: not signals.is_interrupted,
                 )
         except Exception as error:
             raise UsageError(

@@ -9,7 +9,7 @@ from estimator.diagnosis.preconditions import as_moved, thin
 from estimator.diagnosis.result import Diagnosis
 from estimator.physics.catalogue import EFFECTS
 from estimator.signals.record import Record
-from hil.config.model_file import Prepared, PreparedRecording
+from hil.config.model_tables import Prepared, PreparedRecording
 from hil.plants.plant import Events
 from hil.provenance import Source
 from hil.recording.signals import Tell

@@ -30,7 +30,7 @@ from hil.recording.kinds import Kind
 from hil.recording.request import Request
 from hil.recording.sidecar import Sidecar, as_metadata, read_sidecar, write_sidecar
 from hil.recording.table import Column, Table, line_of
-from hil.recording.text.cells import as_column, seconds_of
+from hil.recording.text.columns import as_column, seconds_of
 from hil.recording.text.encoding import decoded
 from hil.recording.text.form import BLANKS, TextForm
 from hil.recording.text.recognise import SAMPLE_LINES, recognise, split

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 from hil.errors import RecordingError
-from hil.recording import csv_format, hdf5_format, mat_format, mdf_format, parquet_format
 from hil.recording.apart import READER
 from hil.recording.checksum import require_whole
 from hil.recording.request import Request
@@ -37,18 +38,39 @@ class Format:
     tables: Callable[[Path, Request], list[Table]] | None = None
 
 
+def _of(name: str) -> Callable[..., Any]:
+    """Return a function of a format's module, which is imported with the first call: its library takes time."""
+    module, _, function = name.partition(".")
+
+    def called(*arguments: object) -> Any:
+        return getattr(import_module(f"hil.recording.{module}"), function)(*arguments)
+
+    return called
+
+
 FORMATS: Mapping[str, Format] = MappingProxyType(
     {
-        ".csv": Format(csv_format.read, csv_format.write, read_sidecar_metadata, sidecar_of, apart=False),
-        ".txt": Format(csv_format.read, None, read_sidecar_metadata, sidecar_of, apart=False),
-        ".tsv": Format(csv_format.read, None, read_sidecar_metadata, sidecar_of, apart=False),
-        ".parquet": Format(parquet_format.read, parquet_format.write, parquet_format.read_metadata),
-        ".mf4": Format(mdf_format.read, mdf_format.write, mdf_format.read_metadata, tables=mdf_format.read_all),
-        ".mdf": Format(mdf_format.read, None, mdf_format.read_metadata, tables=mdf_format.read_all),
-        ".dat": Format(mdf_format.read, None, mdf_format.read_metadata, tables=mdf_format.read_all),
-        ".h5": Format(hdf5_format.read, hdf5_format.write, hdf5_format.read_metadata),
-        ".hdf5": Format(hdf5_format.read, hdf5_format.write, hdf5_format.read_metadata),
-        ".mat": Format(mat_format.read, mat_format.write, mat_format.read_metadata),
+        ".csv": Format(_of("csv_format.read"), _of("csv_format.write"), read_sidecar_metadata, sidecar_of, apart=False),
+        ".txt": Format(_of("csv_format.read"), None, read_sidecar_metadata, sidecar_of, apart=False),
+        ".tsv": Format(_of("csv_format.read"), None, read_sidecar_metadata, sidecar_of, apart=False),
+        ".parquet": Format(
+            _of("parquet_format.read"), _of("parquet_format.write"), _of("parquet_format.read_metadata")
+        ),
+        ".mf4": Format(
+            _of("mdf_format.read"),
+            _of("mdf_format.write"),
+            _of("mdf_format.read_metadata"),
+            tables=_of("mdf_format.read_all"),
+        ),
+        ".mdf": Format(
+            _of("mdf_format.read"), None, _of("mdf_format.read_metadata"), tables=_of("mdf_format.read_all")
+        ),
+        ".dat": Format(
+            _of("mdf_format.read"), None, _of("mdf_format.read_metadata"), tables=_of("mdf_format.read_all")
+        ),
+        ".h5": Format(_of("hdf5_format.read"), _of("hdf5_format.write"), _of("hdf5_format.read_metadata")),
+        ".hdf5": Format(_of("hdf5_format.read"), _of("hdf5_format.write"), _of("hdf5_format.read_metadata")),
+        ".mat": Format(_of("mat_format.read"), _of("mat_format.write"), _of("mat_format.read_metadata")),
     }
 )
 

@@ -9,10 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.csv
 
 from hil.recording import columns
 from hil.recording.checksum import CHECKSUM, SAID, DataDigest, said_sha256
@@ -70,8 +69,8 @@ def _names(path: Path) -> list[str]:
         return file.readline(LONGEST_HEADER).decode("utf-8", "replace").rstrip("\n").split(",")
 
 
-def _type(name: str) -> pa.DataType:
-    return pa.int64() if name == columns.FLAGS else pa.float64()
+def _type(name: str) -> np.dtype[Any]:
+    return np.dtype(np.int64 if name == columns.FLAGS else np.float64)
 
 
 def extent(path: Path) -> Extent:
@@ -79,7 +78,7 @@ def extent(path: Path) -> Extent:
 
     Raises
     ------
-    pyarrow.ArrowInvalid
+    ValueError
         If a row is not as the rig writes it.
     """
     n_rows = flagged = 0
@@ -97,7 +96,7 @@ def data_sha256_at(path: Path, n_rows: int) -> str:
 
     Raises
     ------
-    pyarrow.ArrowInvalid
+    ValueError
         If a row is not as the rig writes it.
     """
     digest, names = DataDigest(), sorted(_names(path))
@@ -117,7 +116,7 @@ def own_sidecar(path: Path, metadata: Mapping[str, str], units: Mapping[str, str
     """
     try:
         data = data_sha256_at(path, extent(path).n_rows)
-    except pa.ArrowInvalid as error:
+    except ValueError as error:
         raise damaged(path, "the rows that were written", error) from error
     checksums = {CHECKSUM: data, SAID: said_sha256(units, metadata)}
     return Sidecar(as_metadata({**metadata, **checksums}), units)
@@ -126,7 +125,7 @@ def own_sidecar(path: Path, metadata: Mapping[str, str], units: Mapping[str, str
 def _take(digest: DataDigest, path: Path, names: Sequence[str], n_rows: int) -> None:
     """Give some columns to a digest: the first of them as it is read, the others when it is."""
     held: dict[str, list[Column]] = {name: [] for name in names[1:]}
-    digest.begin(names[0], np.dtype(_type(names[0]).to_pandas_dtype()), n_rows)
+    digest.begin(names[0], _type(names[0]), n_rows)
     for first, *others in _blocks(path, names):
         digest.take(first)
         for blocks, block in zip(held.values(), others, strict=True):
@@ -139,12 +138,17 @@ def _take(digest: DataDigest, path: Path, names: Sequence[str], n_rows: int) -> 
 
 def _blocks(path: Path, names: Sequence[str]) -> Iterator[list[Column]]:
     """Read some columns, block by block of rows."""
+    import pyarrow as pa  # a tenth of a second, and not before a run is over
+    import pyarrow.csv
+
     with pa.csv.open_csv(
         path,
         pa.csv.ReadOptions(use_threads=False, block_size=BLOCK_BYTES),
         pa.csv.ParseOptions(newlines_in_values=False, ignore_empty_lines=False, quote_char=False),
         pa.csv.ConvertOptions(
-            column_types={name: _type(name) for name in names}, include_columns=names, null_values=[]
+            column_types={name: pa.from_numpy_dtype(_type(name)) for name in names},
+            include_columns=names,
+            null_values=[],
         ),
     ) as rows:
         for block in rows:

@@ -5,6 +5,7 @@ A key left out means the contract's: ``time_s``, ``torque_m1_nm`` and ``torque_m
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Self
 
@@ -161,10 +162,20 @@ class SignalsConfig(_Strict):
         taken = [*(each.column for each in self.torques()), self.output()[1].column]
         if self.load is not None and self.load.column in taken:
             refuse([Fault("load.column", "a column of its own", self.load.column)])
+        refuse(self._outputs_taken())
         if self.outputs and not given and not self.is_own_recording and self._first_of_outputs is None:
             expected = "a speed or a position among them, or speed = { ... } for one"
             refuse([Fault("outputs", expected, ", ".join(output.kind.value for output in self.outputs))])
         return self
+
+    def _outputs_taken(self) -> Iterator[Fault]:
+        """Find outputs whose column is another one's, or an input; the one that ``speed`` names may be among them."""
+        taken = {} if self._taken else dict.fromkeys((signal.column for signal in self.inputs()), "the inputs")
+        for k, output in enumerate(self.outputs):
+            if output.column in taken:
+                expected = f"a column of its own, another than that of {taken[output.column]}"
+                yield Fault(f"outputs.{k}.column", expected, output.column)
+            taken.setdefault(output.column, f"outputs.{k}")
 
     @property
     def _first_of_outputs(self) -> MeasuredOutput | None:
@@ -196,11 +207,9 @@ class SignalsConfig(_Strict):
         return bool(self._outputs())
 
     def further(self) -> list[MeasuredOutput]:
-        """Return the outputs beyond the first one, each column once."""
-        first = self.output()[1]
-        taken = {first.column, *(torque.column for torque in self.inputs())}
-        others = [each for each in self.outputs if each.column not in taken]
-        return list({each.column: each for each in others}.values())
+        """Return the outputs beyond the first one, and beyond what an imposed motion takes."""
+        taken = {self.output()[1].column, *(signal.column for signal in self.inputs())}
+        return [each for each in self.outputs if each.column not in taken]
 
     @property
     def names_bench(self) -> bool:

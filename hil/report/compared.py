@@ -7,7 +7,8 @@ from pathlib import Path
 
 from estimator.diagnosis.preconditions.channels import with_usable_channels
 from estimator.signals.record import Record
-from hil.config.model_file import ModelFile, Prepared, read_model_for_recordings
+from hil.config.model_file import ModelFile, read_model_for_recordings
+from hil.config.model_tables import Prepared
 from hil.errors import UsageError
 from hil.plants.fmu_plant import FmuPlant, is_fmu
 from hil.plants.plant import ModelPlant, Plant

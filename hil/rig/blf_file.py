@@ -10,7 +10,6 @@ import zlib
 from collections.abc import Iterator
 from typing import Any, BinaryIO, Final
 
-import can
 from can.io.blf import (
     LOG_CONTAINER,
     LOG_CONTAINER_STRUCT,
@@ -20,6 +19,8 @@ from can.io.blf import (
     BLFParseError,
     BLFReader,
 )
+
+from drivers.canopen import can
 
 CONTAINER_BYTES: Final = 16 << 20
 """A container holds 128 KiB in files of Vector and of python-can."""

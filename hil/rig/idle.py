@@ -127,6 +127,7 @@ class Listening:
 
     def __init__(self, devices: Devices, pacer: Pacer, timing: RunTiming) -> None:
         self._link = devices.link
+        self._channels = devices.channels
         self._pacer = pacer
         self._m1 = _Ear(devices.m1, SampleFlag.M1_STALE)
         self._m2 = _Ear(devices.m2, SampleFlag.M2_STALE)
@@ -196,6 +197,9 @@ class Listening:
             waited_ns = deadline_ns - sync_ns if feedback is None else feedback.t_ns - sync_ns
             self.timing.answer(None if feedback is None else waited_ns)
             flags |= ear.take(feedback)
+        channels = self._channels.read(sync_ns, max(0, deadline_ns - sync_ns - waited_ns) / NS_PER_S)
+        if any(map(math.isnan, channels)):
+            flags |= SampleFlag.CHANNEL_LOST
         first = tick.cycle if self._first is None else self._first
         self._first = first
         return Sample(
@@ -210,6 +214,7 @@ class Listening:
             speed_rad_s=self._m1.speed_rad_s,
             age_ns=sync_ns - min(self._answered_ns(ear, sync_ns) for ear in (self._m1, self._m2)),
             flags=flags,
+            channels=channels,
         )
 
     def _answered_ns(self, ear: _Ear, sync_ns: int) -> int:

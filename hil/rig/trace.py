@@ -13,8 +13,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-import can
-
+from drivers.canopen import can
 from hil.errors import RecordingError
 from hil.recording.no_room import no_room
 

@@ -11,8 +11,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import IO, Any
 
-import can
-
+from drivers.canopen import can
 from drivers.canopen.can_link import is_canopen
 from hil.errors import RecordingError
 from hil.rig.blf_file import BoundedBlfReader

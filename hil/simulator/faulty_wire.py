@@ -16,9 +16,9 @@ from copy import copy
 from types import TracebackType
 from typing import Self
 
-import can
 import numpy as np
 
+from drivers.canopen import can
 from drivers.canopen.can_link import SYNC_COB_ID, is_canopen
 from drivers.canopen.inline_bus import InlineBus
 from hil.simulator.bus_faults import BusFaults, Since

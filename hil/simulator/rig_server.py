@@ -13,8 +13,7 @@ from dataclasses import dataclass, field
 from types import TracebackType
 from typing import Self
 
-import can
-
+from drivers.canopen import can
 from drivers.canopen.can_link import open_bus
 from drivers.canopen.inline_bus import InlineBus
 from drivers.capability.carrier import ObjectId

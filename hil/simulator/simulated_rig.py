@@ -6,8 +6,7 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Self
 
-import can
-
+from drivers.canopen import can
 from drivers.canopen.can_link import SYNC_COB_ID, CanLink
 from hil.simulator.inverter_node import InverterNode
 from hil.simulator.inverter_settings import SimulatedInverter

@@ -85,21 +85,12 @@ def served_here(rig: Rig) -> Iterator[Rig]:
 
 
 @contextmanager
-def served_elsewhere(rig: Rig) -> Iterator[Rig]:
+def served_elsewhere(rig: Rig, *options: str) -> Iterator[Rig]:
     """Serve a rig from a process of its own (``hil sim``), over loopback; yields it at its addresses."""
     if rig.period_s != read_rig(EXAMPLE).period_s:
         raise ValueError(f"expected the example's period, got {rig.period_s:g} s: hil sim reads the example's file")
-    command = [
-        sys.executable,
-        "-m",
-        "hil",
-        "sim",
-        str(EXAMPLE),
-        "--bus",
-        "ws://127.0.0.1:0/",
-        "--modbus",
-        "127.0.0.1:0",
-    ]
+    served = ("--bus", "ws://127.0.0.1:0/", "--modbus", "127.0.0.1:0")
+    command = [sys.executable, "-m", "hil", "sim", str(EXAMPLE), *served, *options]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         try:
             yield with_addresses(rig, *_addresses(process.stdout.readline if process.stdout else str))

@@ -7,13 +7,10 @@ rig's process has someone at the other end who takes the samples and draws nothi
 from __future__ import annotations
 
 import argparse
-import subprocess
 import sys
 import tempfile
 import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 from hil.config.rig_file import Rig, read_rig
@@ -23,34 +20,7 @@ from hil.monitor.messages import Health, Over, Ready, Report, Samples, Start, St
 from hil.monitor.source import RigSource
 from hil.monitor.state import LiveState
 from hil.monitor.warm_up import run_once
-from hil.rig.addresses import with_addresses
-
-EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "rig.toml"
-
-
-@contextmanager
-def simulated() -> Iterator[Rig]:
-    """Serve the example's rig from a process of its own."""
-    command = [
-        sys.executable,
-        "-m",
-        "hil",
-        "sim",
-        str(EXAMPLE),
-        "--bus",
-        "ws://127.0.0.1:0/",
-        "--modbus",
-        "127.0.0.1:0",
-    ]
-    process = subprocess.Popen([*command, "--real-time"], stdout=subprocess.PIPE, text=True)
-    try:
-        if process.stdout is None:
-            raise RuntimeError("expected a pipe from hil sim")
-        _, bus, modbus = process.stdout.readline().split()
-        yield with_addresses(read_rig(EXAMPLE), bus.removeprefix("bus="), modbus.removeprefix("modbus="))
-    finally:
-        process.terminate()
-        process.wait()
+from tests.benchmarks.host import EXAMPLE, served_elsewhere
 
 
 class Noted:
@@ -113,7 +83,7 @@ def main() -> None:
     arguments = parser.parse_args()
     run_once(read_rig(EXAMPLE).period_s)
     sys.stdout.write(f"{'':14}{'p50':>8}{'p99':>8}{'max':>8} ms   cycles  late  missed  no answer\n")
-    with simulated() as rig, tempfile.TemporaryDirectory() as folder:
+    with served_elsewhere(read_rig(EXAMPLE), "--real-time") as rig, tempfile.TemporaryDirectory() as folder:
         for _ in range(arguments.rounds):
             for with_view in (False, True):
                 t = measure(rig, with_view, arguments.seconds, Path(folder))

@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 import json
+import signal
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from fmpy.simulation import Recorder
+from fmpy.sundials import CVodeSolver
 
 from hil.cli.main import run
+from hil.plants.fmu_plant import FmuPlant
+from hil.recording import read_record
 from tests.cli import bench
 
 LATE = 3
@@ -86,6 +93,31 @@ def test_a_recorded_angle_is_held_against_the_fmus(fmu: str, tmp_path: Path) -> 
     (tmp_path / "signals.toml").write_text(SIGNALS.replace("speed", "position").replace('"w"', '"x"'))
     given = ["--signals", str(tmp_path / "signals.toml"), "--trust-fmu", "--map", "torque=T_M1", "--budget-s", "5"]
     assert run(["diagnose", str(tmp_path / "turned.csv"), "--model", fmu, "--out", str(tmp_path / "out"), *given]) == 0
+
+
+@pytest.mark.parametrize(
+    ("kind", "called_back"), [("modelExchange", CVodeSolver.f), ("coSimulation", Recorder.sample)], ids=["ME", "CS"]
+)
+def test_an_interruption_is_not_lost_in_a_callback_of_the_simulation(
+    kind: str, called_back: Callable[..., Any], fmu: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """ctypes prints what is raised in a callback and continues: Ctrl-C in one of CVode's was of no effect."""
+    bench.record(tmp_path / "run_1.csv", 1, n=300)
+    plant = FmuPlant(Path(fmu), [], trusted=True)
+    monkeypatch.setattr(plant._described, "coSimulation" if kind == "modelExchange" else "modelExchange", None)
+    calls = []
+
+    def interrupted(*arguments: Any, **named: Any) -> Any:
+        calls.append(arguments)
+        if len(calls) == 100:
+            signal.raise_signal(signal.SIGINT)
+        return called_back(*arguments, **named)
+
+    owner = CVodeSolver if kind == "modelExchange" else Recorder
+    monkeypatch.setattr(owner, called_back.__name__, interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        plant.run(read_record(tmp_path / "run_1.csv"))
+    assert 100 <= len(calls) < 150  # to the end of that step, and no further
 
 
 def test_a_model_file_takes_no_map(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -19,20 +19,8 @@ from hil.cli.main import run
 from hil.recording import read_record
 from hil.report.identification.terminal import compared_summary
 from tests.benchmarks.buses.line import Line
+from tests.cli.bus_model import MODEL
 from tests.estimator.identification.driveline import cruise, true_resonance
-
-MODEL = """schema = "hil.model/1"
-structure = "two_mass"
-motion = "rotation"
-
-[parameters]
-J_M = { value = 1.6, tolerance = 0.2 }
-J_L = { value = 100.0, tolerance = 0.2 }
-k = { value = 4200, tolerance = 0.2 }
-c = { value = 9.0, tolerance = 0.2 }
-b_M = { value = 0.35, tolerance = 0.2 }
-b_L = { value = 0.9, tolerance = 0.2 }
-"""
 
 ONE_MASS = """schema = "hil.model/1"
 structure = "one_mass"
@@ -122,6 +110,25 @@ def test_a_model_file_adds_what_was_expected(
     model.write_text(ONE_MASS)
     assert run(arguments(recordings[:1], tmp_path, "--model", str(model))) == 0
     assert json.loads((tmp_path / "identification.json").read_text())["nominal_resonance"] is None
+
+
+def test_signals_that_no_estimator_takes_are_named(
+    recordings: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    header, *rows = recordings[0].read_text(encoding="utf-8").splitlines()
+    more = [f"{header},wheel,brake", *(f"{row},{row.rpartition(',')[2]},0.0" for row in rows)]
+    (tmp_path / "more.csv").write_text("\n".join(more), encoding="utf-8")
+    model = tmp_path / "model.toml"
+    wheel = '{ kind = "speed", at = "load", column = "wheel" }'
+    model.write_text(f'{MODEL}\n[signals]\noutputs = [{wheel}]\nload = {{ column = "brake" }}\n', encoding="utf-8")
+    assert run(arguments([tmp_path / "more.csv"], tmp_path / "out", "--model", str(model))) == 0
+    said = [line for line in capsys.readouterr().err.splitlines() if "not used" in line]
+    assert said == [
+        "note: identified from motor torque to the first output; not used: the output wheel, the measured load torque. "
+        "See hil diagnose."
+    ]
+    assert run(arguments(recordings[:1], tmp_path / "plain")) == 0
+    assert "not used" not in capsys.readouterr().err
 
 
 def test_samples_and_period_can_be_chosen(recordings: list[Path], tmp_path: Path) -> None:

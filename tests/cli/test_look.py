@@ -83,6 +83,15 @@ def uneven(path: Path) -> None:
     path.write_text("\n".join(["t,u,w", *rows(",", stamps, np.sin(TIME), np.cos(TIME))]))
 
 
+def test_one_row_shows_no_period(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    header, row = "time_s,torque_m1_nm,torque_m2_nm,speed_rad_s", "0.0,1.0,2.0,3.0"
+    (tmp_path / "run.csv").write_text(f"{header}\n{row}\n", encoding="utf-8")
+    assert run(["look", str(tmp_path / "run.csv")]) == 0
+    printed = capsys.readouterr().out
+    assert "one row: no period" in printed
+    assert printed.endswith("[signals]\n# one row shows no period and nothing that moves: look at a longer recording\n")
+
+
 @pytest.mark.parametrize(
     ("make", "said"),
     [

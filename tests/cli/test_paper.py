@@ -10,23 +10,11 @@ import pytest
 from hil.cli import paper
 from hil.cli.main import run
 from hil.recording import read_record
+from tests.cli.bus_model import MODEL
 
 RUNS = 2
 DURATION_S = 14.0
 FIGURES = [f"{figure}.{suffix}" for figure in ("fig2", "fig4", "fig5") for suffix in ("pdf", "svg")]
-
-MODEL = """schema = "hil.model/1"
-structure = "two_mass"
-motion = "rotation"
-
-[parameters]
-J_M = { value = 1.6, tolerance = 0.2 }
-J_L = { value = 100.0, tolerance = 0.2 }
-k = { value = 4200, tolerance = 0.2 }
-c = { value = 9.0, tolerance = 0.2 }
-b_M = { value = 0.35, tolerance = 0.2 }
-b_L = { value = 0.9, tolerance = 0.2 }
-"""
 
 
 @pytest.fixture(scope="module")

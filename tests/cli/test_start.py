@@ -2,30 +2,82 @@
 
 from __future__ import annotations
 
+import json
+import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
-SLOW = ("asammdf", "pandas", "scipy.signal", "scipy.stats", "plotly", "textual", "matplotlib")
+SCIPY = ("scipy.interpolate", "scipy.linalg", "scipy.optimize", "scipy.signal", "scipy.special", "scipy.stats")
+SLOW = (*SCIPY, "asammdf", "h5py", "matplotlib", "pandas", "plotly", "pyarrow", "textual")
+RIG = str(Path(__file__).parents[2] / "examples" / "rig.toml")
+NOBODY = "ws://127.0.0.1:1/"
+
+BUS_COMMANDS = {
+    "run": (["run", RIG, "cruise", "--out", "run.parquet", "--bus", NOBODY], SLOW),
+    "run without an estimate": (
+        ["run", RIG, "cruise", "--out", "run.csv", "--no-estimate", "--bus", NOBODY],
+        (*SLOW, "numba"),
+    ),
+    "check": (["check", RIG, "--bus", NOBODY], (*SLOW, "numba")),
+    "commission": (["commission", RIG, "--out", "job", "--yes", "--bus", NOBODY], SLOW),
+    "sim": (["sim", RIG, "--bus", "ws://127.0.0.1:0/", "--modbus", "127.0.0.1:0"], SLOW),
+}
+"""Command lines, and what each has not imported when it first turns to the bus."""
+
+AT_THE_BUS = """
+import json, os, sys
+
+def look(event, arguments):
+    if event in ("socket.connect", "socket.bind"):
+        with open("modules.json", "w") as file:
+            json.dump(list(sys.modules), file)
+        os._exit(0)
+
+sys.addaudithook(look)
+from hil.cli.main import run
+sys.exit(f"no bus was opened: status {run(sys.argv[1:])}")
+"""
 
 
 @pytest.mark.parametrize(
-    ("modules", "also"),
+    ("modules", "absent"),
     [
-        ("hil.cli.main, hil.cli.overview", ("can", "numba", "numpy", "pydantic", "rich", "typer")),
-        ("hil.cli.check, hil.rig.check, hil.rig.build", ("numba",)),
-        ("hil.cli.run.job, hil.cli.run.live, hil.rig.live, hil.rig.build, hil.rig.session", ()),
+        ("hil.cli.main, hil.cli.overview", (*SLOW, "can", "numba", "numpy", "pydantic", "rich", "scipy", "typer")),
+        ("hil.monitor.host", SLOW),
+        (
+            "hil.monitor.opening, hil.monitor.app",
+            ("asammdf", "h5py", "pandas", "plotly", "scipy.signal", "scipy.stats"),
+        ),
     ],
-    ids=["help", "check", "run"],
+    ids=["help", "monitor: process of the rig", "monitor: process of the view"],
 )
-def test_what_a_command_needs_not(modules: str, also: tuple[str, ...]) -> None:
-    program = f"import sys, {modules}; print(*(name for name in {(*SLOW, *also)} if name in sys.modules))"
+def test_what_is_not_needed_is_not_imported(modules: str, absent: tuple[str, ...]) -> None:
+    program = f"import sys, {modules}; print(*(name for name in {absent} if name in sys.modules))"
     done = subprocess.run([sys.executable, "-P", "-c", program], capture_output=True, text=True, check=True)
     assert done.stdout.split() == []
 
 
-def test_python_can_is_whole_but_for_the_format_that_is_not_used() -> None:
-    program = "import drivers.canopen, can, sys; print(can.__version__, 'asammdf' in sys.modules); import asammdf"
+@pytest.mark.parametrize("command", BUS_COMMANDS)
+def test_what_is_not_needed_is_not_imported_before_the_bus_is_opened(command: str, tmp_path: Path) -> None:
+    line, absent = BUS_COMMANDS[command]
+    environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}  # imported all the same, and nothing has to be compiled
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", AT_THE_BUS, *line],
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+        env=environment,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert sorted(set(absent) & set(json.loads((tmp_path / "modules.json").read_text()))) == []
+
+
+@pytest.mark.parametrize("first", ["drivers.canopen", "hil.rig.trace", "hil.simulator.rig_server"])
+def test_python_can_is_whole_but_for_the_format_that_is_not_used(first: str) -> None:
+    program = f"import {first}, can, sys; print(can.__version__, 'asammdf' in sys.modules); import asammdf"
     done = subprocess.run([sys.executable, "-P", "-c", program], capture_output=True, text=True, check=True)
     assert done.stdout.split()[1] == "False"

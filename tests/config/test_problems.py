@@ -148,3 +148,13 @@ def test_what_is_right_is_returned() -> None:
 
 def test_nothing_is_refused_without_a_fault() -> None:
     refuse([])
+
+
+def test_one_table_in_place_of_a_list_of_tables_is_named_with_both_ways_to_write_it() -> None:
+    (line,) = lines({"inputs": {"column": "a"}})
+    assert line == "inputs | expected a list of tables, [[inputs]] or [ { ... } ] | got one table, [inputs] or { ... }"
+
+
+def test_a_list_of_tables_in_place_of_one_is_refused_in_words_of_toml() -> None:
+    (line,) = lines({"limits": [{"low": 1.0, "high": 2.0}]})
+    assert line == "limits | expected a table | got [{'low': 1.0, 'high': 2.0}]"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -12,10 +13,11 @@ from textual.pilot import Pilot
 from hil.monitor.app import MonitorApp
 from hil.monitor.dialogs import Choice
 from hil.monitor.layout import PAGES
-from hil.monitor.messages import Began, Ended, Mark, Quit, Ready, Reset, Start, Stop
+from hil.monitor.messages import Began, Ended, Mark, Quit, Ready, Reset, Samples, Start, Stop
+from hil.monitor.panel import Panel
 from hil.monitor.snapshot import Activity
 from hil.monitor.state import LiveState
-from tests.monitor.fake_source import PERIOD_S, FakeSource
+from tests.monitor.fake_source import PERIOD_S, FakeSource, sample
 from tests.monitor.test_panels import snapshot
 
 CHOICES = (Choice("cruise", "holds a speed"), Choice("tip", "steps the torque"))
@@ -191,5 +193,29 @@ def test_the_view_survives_every_resize_while_a_model_is_shown(page: str) -> Non
             app._draw()
             await pilot.pause()
             assert app.is_running
+
+    play(script)
+
+
+def test_further_channels_stand_on_the_first_page() -> None:
+    units = {"speed_load_rad_s": "rad/s"}
+    source = FakeSource(coming=[Ready(), Samples(((replace(sample(0), channels=(12.5,)), None),))])
+    app = MonitorApp(source, LiveState("bus", PERIOD_S, None, True, channel_units=units))
+
+    async def go() -> None:
+        async with app.run_test(size=(80, 24)) as pilot:
+            await settled(pilot)
+            (panel,) = app.query(".channels").results(Panel)
+            assert panel.size.height == 1
+            assert str(panel.render()).split() == ["speed_load_rad_s", "[rad/s]", "12.5"]
+            for name in ("torque", "speed", "prbs", "twist"):
+                assert app.query_one(f".{name}").size.height >= 3
+
+    asyncio.run(go())
+
+
+def test_a_rig_without_further_channels_has_no_panel_for_them() -> None:
+    async def script(pilot: Pilot[None], source: FakeSource, app: MonitorApp) -> None:
+        assert not app.query(".channels")
 
     play(script)

@@ -25,6 +25,7 @@ DRAWN: tuple[Draw, ...] = (
     signal_panels.speed,
     signal_panels.prbs,
     signal_panels.twist,
+    signal_panels.channels,
     model_panels.response,
     model_panels.poles,
     model_panels.resonance,
@@ -66,10 +67,14 @@ ALARM = Alarm(
 
 def snapshot(m1: NodeHealth | None = None, plc: PlcHealth | None = None) -> Snapshot:
     """A run under way, with a model whose resonance is at 8 Hz and an alarm."""
-    live = LiveState("a bus with a long name that does not fit", PERIOD_S, None, can_drive=True)
+    units = {f"torque_shaft_{k}_nm": "Nm" for k in range(5)}
+    live = LiveState("a bus with a long name that does not fit", PERIOD_S, None, can_drive=True, channel_units=units)
     live.take(Ready())
     live.take(Began("cruise", "runs/cruise.parquet", 30.0))
-    live.take(Samples(tuple((sample(k, 20.0 * (-1) ** k, 0.1 * k, 120.0), Phase.MEASURE) for k in range(700))))
+    rows = (sample(k, 20.0 * (-1) ** k, 0.1 * k, 120.0) for k in range(700))
+    live.take(
+        Samples(tuple((replace(row, channels=(1.5 * row.cycle, *[math.nan] * 4)), Phase.MEASURE) for row in rows))
+    )
     live.take(Notice(0, Kind.MARK, "a very long note " * 20))
     live.take(health(m1, plc or PlcHealth(STATUS, 0.05, None)))
     shown = live.snapshot()
@@ -114,8 +119,15 @@ def test_a_panel_draws_at_every_size_that_a_terminal_passes_through(draw: Draw) 
 
 @pytest.mark.parametrize("draw", DRAWN)
 def test_a_panel_draws_when_nothing_is_known_yet(draw: Draw) -> None:
-    empty = LiveState("bus", PERIOD_S, None, can_drive=False).snapshot()
+    empty = LiveState("bus", PERIOD_S, None, can_drive=False, channel_units={"accel_rad_s2": "rad/s^2"}).snapshot()
     assert all(len(line) <= 40 for line in draw(empty, 40, 8))
+
+
+def test_channels_have_their_names_units_and_last_values() -> None:
+    lines = signal_panels.channels(snapshot(), 60, 3)
+    assert lines[0].split() == ["torque_shaft_0_nm", "[Nm]", "1048.5"]
+    assert lines[1].split() == ["torque_shaft_1_nm", "[Nm]", "--"]
+    assert lines[2].strip() == "+3 more channels"
 
 
 def test_the_peak_of_the_response_stands_over_its_frequency() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -48,6 +49,17 @@ def test_a_run_that_failed_says_why() -> None:
     live = state()
     live.take(failed)
     assert live.snapshot().log[-1].kind is Kind.FAULT
+
+
+def test_channels_are_those_of_the_samples_with_their_names_and_units() -> None:
+    units = {"speed_load_rad_s": "rad/s", "torque_shaft_nm": "Nm"}
+    live = LiveState("bus", PERIOD_S, None, can_drive=True, channel_units=units)
+    read = [(1.0, 5.0), (2.0, math.nan)]
+    live.take(Samples(tuple((replace(sample(k), channels=read[k]), None) for k in range(2))))
+    first, second = live.snapshot().signals.channels
+    assert [(each.name, each.unit) for each in (first, second)] == list(units.items())
+    np.testing.assert_array_equal(first.values, [1.0, 2.0])
+    np.testing.assert_array_equal(second.values, [5.0, math.nan])
 
 
 def test_a_flagged_sample_is_a_gap_and_not_a_value() -> None:

@@ -3,11 +3,7 @@
 from __future__ import annotations
 
 import random
-import resource
 import shutil
-import signal
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,6 +17,7 @@ from hil.recording.differences import losses
 from hil.recording.formats import FORMATS, read_metadata
 from hil.recording.kinds import as_text
 from hil.recording.sidecar import sidecar_of
+from tests.full_disk import largest_file
 
 WRITABLE = [suffix for suffix, form in FORMATS.items() if form.write]
 
@@ -128,19 +125,6 @@ def test_what_is_no_recording_is_refused_by_name(tmp_path: Path, suffix: str, co
     path.write_bytes(content)
     with pytest.raises(RecordingError, match=rf"run{suffix}: .*expected"):
         read_table(path)
-
-
-@contextmanager
-def largest_file(n_bytes: int) -> Iterator[None]:
-    """Let no file of this process grow beyond: what a full disk does, without one."""
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (n_bytes, before[1]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
-        signal.signal(signal.SIGXFSZ, handler)
 
 
 @pytest.mark.parametrize("suffix", WRITABLE)

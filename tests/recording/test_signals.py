@@ -9,11 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.io
-from pydantic import ValidationError
 
 from estimator.signals.record import Location, OutputKind
 from hil.errors import InputError, RecordingError, UsageError
-from hil.problems import problem_lines
 from hil.recording import SignalsConfig, Table, read_record, read_records, write_table
 from hil.recording.columns import COUNTING_FLAGS
 from hil.recording.signals import to_record
@@ -331,98 +329,3 @@ def test_a_scale_that_leaves_no_numbers_is_refused(tmp_path: Path, changed: Call
     write_table(changed(torque_m1_nm=np.full(40, 100.0)), path)
     with pytest.raises(RecordingError, match="column torque_m1_nm: expected a signal in SI units"):
         read_record(path, signals(torque=[{"column": "torque_m1_nm", "scale": 1e308}]))
-
-
-BOTH = [
-    {"kind": "speed", "at": "motor", "column": "speed_rad_s"},
-    {"kind": "torque", "at": "shaft", "column": "torque_ref_nm", "scale": 2.0},
-]
-
-
-def test_the_first_speed_is_the_output_and_the_others_are_further_ones(changed: Changed) -> None:
-    torque = np.arange(40.0)
-    torque[7] = np.nan
-    record = to_record(changed(torque_ref_nm=torque), signals(outputs=BOTH))
-    assert (record.kind, record.location) == (OutputKind.SPEED, Location.MOTOR)
-    (channel,) = record.channels
-    assert (channel.label, channel.kind, channel.location) == ("torque_ref_nm", OutputKind.TORQUE, Location.SHAFT)
-    np.testing.assert_array_equal(channel.output, 2.0 * torque)
-    assert np.flatnonzero(~channel.okay).tolist() == [7]
-    assert record.okay.all()  # a reading that is missing elsewhere is missing there alone
-
-
-@pytest.mark.parametrize(
-    ("keys", "first", "further"),
-    [
-        ({"outputs": BOTH[1:]}, "speed_rad_s", ["torque_ref_nm"]),  # next to the contract's motor speed
-        ({"outputs": [*BOTH, BOTH[1]]}, "speed_rad_s", ["torque_ref_nm"]),
-        ({"outputs": BOTH, "position": {"column": "age_s"}}, "age_s", ["speed_rad_s", "torque_ref_nm"]),
-        ({"outputs": BOTH, "torque": [{"column": "torque_ref_nm"}]}, "speed_rad_s", []),  # an input is no output
-    ],
-)
-def test_each_column_has_one_role(keys: dict[str, Any], first: str, further: list[str]) -> None:
-    config = signals(**keys)
-    assert config.output()[1].column == first
-    assert [each.column for each in config.further()] == further
-    assert set(config.columns()) >= {first, *further}
-
-
-def test_what_an_imposed_motion_takes_may_be_named_as_the_torque_at_the_shaft() -> None:
-    config = signals(position={"column": "x"}, outputs=[{"kind": "torque", "at": "shaft", "column": "F", "scale": 3.0}])
-    assert config.names_bench
-    assert [(each.column, each.scale) for each in config.torques()] == [("F", 3.0)]
-    assert config.further() == []
-
-
-@pytest.mark.parametrize(
-    ("keys", "expected"),
-    [
-        ({"outputs": [{"kind": "speed", "at": "shaft", "column": "w"}]}, "speed at the shaft"),
-        ({"outputs": [{"kind": "torque", "at": "motor", "column": "T"}]}, "torque at the motor"),
-        ({"outputs": [{"kind": "force", "at": "load", "column": "F"}]}, "force at the load"),
-        ({"outputs": [BOTH[1]], "torque": [{"column": "T"}]}, "a speed or a position among them"),
-    ],
-)
-def test_outputs_that_no_structure_has_are_refused(keys: dict[str, Any], expected: str) -> None:
-    with pytest.raises(ValidationError) as caught:
-        signals(**keys)
-    (line,) = problem_lines(SignalsConfig, caught.value)
-    assert expected in line
-
-
-LOAD = {"load": {"column": "torque_ref_nm", "scale": -2.0}}
-
-
-def test_a_measured_load_torque_is_an_input(changed: Changed) -> None:
-    read = np.linspace(1.0, 9.0, 40)
-    read[[0, 7]] = np.nan
-    record = to_record(changed(torque_ref_nm=read), signals(**LOAD))
-    due = -2.0 * read
-    due[[0, 7]] = due[[1, 6]]  # held, at the start the first one
-    np.testing.assert_array_equal(record.known_load_nm, due)
-    assert np.flatnonzero(~record.okay).tolist() == [0, 7]
-    assert record.torque_okay is None
-    assert to_record(changed(), SignalsConfig()).known_load_nm == 0.0
-
-
-def test_a_load_torque_is_no_output_too(changed: Changed) -> None:
-    assert to_record(changed(torque_ref_nm=np.arange(40.0)), signals(outputs=BOTH, **LOAD)).channels == ()
-
-
-@pytest.mark.parametrize("column", ["torque_m1_nm", "speed_rad_s"])
-def test_a_load_torque_is_no_other_signal_too(column: str) -> None:
-    with pytest.raises(ValidationError) as caught:
-        signals(load={"column": column})
-    assert "expected a column of its own" in problem_lines(SignalsConfig, caught.value)[0]
-
-
-def test_a_load_torque_without_a_number_is_refused(changed: Changed) -> None:
-    with pytest.raises(RecordingError, match="torque_ref_nm: expected a load torque, got no number"):
-        to_record(changed(torque_ref_nm=np.full(40, np.nan)), signals(**LOAD))
-
-
-def test_a_joint_has_no_load() -> None:
-    with pytest.raises(ValidationError) as caught:
-        signals(position={"column": "x"}, force={"column": "F"}, **LOAD)
-    (line,) = problem_lines(SignalsConfig, caught.value)
-    assert "no such key next to an imposed motion" in line

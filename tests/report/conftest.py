@@ -31,6 +31,55 @@ from estimator.diagnosis.result import (
 from estimator.physics.effect import Element
 from estimator.physics.model import DrivelineModel, Parameter, Structure
 
+NAN = float("nan")
+
+MISMATCH = Mismatch(
+    detected=True,
+    element=Element.SHAFT,
+    time_s={"run_1": ((1.5, 6.2), (17.0, 22.1))},
+    band_hz=(6.5, 11.0),
+    region=Region("shaft torque", -20.0, 20.0),
+    p_value=0.0,
+)
+
+BACKLASH = FoundEffect(
+    name="backlash",
+    element=Element.SHAFT,
+    statement="the shaft has a backlash of 0.021 rad in total",
+    parameters={
+        "gap_rad": Estimated(0.0210000000000001, (0.020, 0.022), "rad"),
+        "contact_rad": Estimated(0.0012, (NAN, NAN), "rad"),
+    },
+    time_s={"run_1": ((1.5, 6.2),)},
+    indistinguishable_from=("shaft_hysteresis",),
+    evidence=Evidence(5321.0, 0.41, 0.052, 1e-12),
+    share=0.94,
+    probability=0.999,
+)
+
+PARAMETERS = {
+    "J_M": Retuned(1.6, 1.52, (1.51, 1.53), "kg m^2"),
+    "J_L": Retuned(95.0, 99.7, (99.0, 100.4), "kg m^2"),
+    "k": Retuned(4200.0, 4310.0, (4290.0, 4330.0), "Nm/rad"),
+    "c": Retuned(9.0, 8.4, (8.1, 8.7), "Nm s/rad"),
+    "b_M": Retuned(0.0, 0.31, (NAN, NAN), "Nm s/rad"),
+    "b_L": Retuned(0.9, 0.92, (0.8, float("inf")), "Nm s/rad"),
+}
+
+
+def grade() -> FoundEffect:
+    knots = np.linspace(0, 30, 16)
+    return FoundEffect(
+        name="road_grade",
+        element=Element.LOAD,
+        statement="the load torque wanders by 12 Nm (rms) over time, as a road's grade does",
+        parameters={"grade_rms_nm": Estimated(12.0, (11.0, 13.0), "Nm")},
+        time_s={},
+        indistinguishable_from=(),
+        evidence=Evidence(120.5, 0.06, 0.052, 2e-7),
+        profiles={"run_1": Profile(knots, 10 * np.sin(knots), 10 * np.sin(knots) - 2, 10 * np.sin(knots) + 2, "Nm")},
+    )
+
 
 def trace(name: str, holdout: bool, seed: int, n: int = 3000) -> Trace:
     rng = np.random.default_rng(seed)
@@ -88,47 +137,11 @@ def discrepancy() -> Discrepancy:
 
 @pytest.fixture
 def diagnosis() -> Diagnosis:
-    nan = float("nan")
-    knots = np.linspace(0, 30, 16)
     return Diagnosis(
         verdict=Verdict.EXPLAINED,
         statement="The shaft has a backlash of 0.021 rad <in total>: reversals cross it & ring at 8.2 Hz.",
-        mismatch=Mismatch(
-            detected=True,
-            element=Element.SHAFT,
-            time_s={"run_1": ((1.5, 6.2), (17.0, 22.1))},
-            band_hz=(6.5, 11.0),
-            region=Region("shaft torque", -20.0, 20.0),
-            p_value=0.0,
-        ),
-        effects=(
-            FoundEffect(
-                name="backlash",
-                element=Element.SHAFT,
-                statement="the shaft has a backlash of 0.021 rad in total",
-                parameters={
-                    "gap_rad": Estimated(0.0210000000000001, (0.020, 0.022), "rad"),
-                    "contact_rad": Estimated(0.0012, (nan, nan), "rad"),
-                },
-                time_s={"run_1": ((1.5, 6.2),)},
-                indistinguishable_from=("shaft_hysteresis",),
-                evidence=Evidence(5321.0, 0.41, 0.052, 1e-12),
-                share=0.94,
-                probability=0.999,
-            ),
-            FoundEffect(
-                name="road_grade",
-                element=Element.LOAD,
-                statement="the load torque wanders by 12 Nm (rms) over time, as a road's grade does",
-                parameters={"grade_rms_nm": Estimated(12.0, (11.0, 13.0), "Nm")},
-                time_s={},
-                indistinguishable_from=(),
-                evidence=Evidence(120.5, 0.06, 0.052, 2e-7),
-                profiles={
-                    "run_1": Profile(knots, 10 * np.sin(knots), 10 * np.sin(knots) - 2, 10 * np.sin(knots) + 2, "Nm")
-                },
-            ),
-        ),
+        mismatch=MISMATCH,
+        effects=(BACKLASH, grade()),
         rejected=(
             RejectedEffect("stiffness_nonlinearity", "explains 48 % of what backlash explains", -2210.0),
             RejectedEffect("stribeck_friction", "its interval holds the null", -17.2),
@@ -142,14 +155,7 @@ def diagnosis() -> Diagnosis:
         ),
         unnamed=None,
         fit=Fit("rad/s", 1.72, 1.41, 0.0521, 1.38, 0.0533, 0.0502),
-        parameters={
-            "J_M": Retuned(1.6, 1.52, (1.51, 1.53), "kg m^2"),
-            "J_L": Retuned(95.0, 99.7, (99.0, 100.4), "kg m^2"),
-            "k": Retuned(4200.0, 4310.0, (4290.0, 4330.0), "Nm/rad"),
-            "c": Retuned(9.0, 8.4, (8.1, 8.7), "Nm s/rad"),
-            "b_M": Retuned(0.0, 0.31, (nan, nan), "Nm s/rad"),
-            "b_L": Retuned(0.9, 0.92, (0.8, float("inf")), "Nm s/rad"),
-        },
+        parameters=PARAMETERS,
         load_torque={"run_1": Estimated(58.3, (57.9, 58.7), "Nm")},
         timing_s={"total": 4.2},
         augmented=DrivelineModel(

@@ -45,6 +45,11 @@ def test_the_text_is_strict_json_of_the_contract(diagnosis: Diagnosis) -> None:
     ]
     assert content["schema"] == "hil.diagnosis/1"
     assert content["verdict"] == "explained"
+    assert content["timing_s"] == {"total": 4.2}
+
+
+def test_where_the_mismatch_is_and_what_it_was_found_to_be_is_written(diagnosis: Diagnosis) -> None:
+    content = diagnosis_json(diagnosis)
     assert content["mismatch"] == {
         "detected": True,
         "element": "shaft",
@@ -72,6 +77,10 @@ def test_the_text_is_strict_json_of_the_contract(diagnosis: Diagnosis) -> None:
             "p_value": 1e-12,
         },
     }
+
+
+def test_what_was_not_found_and_how_well_it_fits_is_written(diagnosis: Diagnosis) -> None:
+    content = diagnosis_json(diagnosis)
     assert content["rejected"][1] == {
         "name": "stribeck_friction",
         "reason": "its interval holds the null",
@@ -94,7 +103,6 @@ def test_the_text_is_strict_json_of_the_contract(diagnosis: Diagnosis) -> None:
         "ci95": [0.8, None],
         "unit": "Nm s/rad",
     }
-    assert content["timing_s"] == {"total": 4.2}
 
 
 def test_remainder_and_traces_are_given_where_they_are_known(diagnosis: Diagnosis) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import pytest
 
@@ -14,6 +15,7 @@ from hil.sample import SampleFlag
 from hil.simulator.inverter_settings import FaultAtStep, InverterFaults
 from hil.simulator.rig_server import RigFaults
 from tests.rig.observer import assert_disarmed
+from tests.rig.sensed import sensed_rig, served_with_sensors
 from tests.rig.serving import fast, served
 
 
@@ -32,6 +34,19 @@ def test_both_answer_and_stay_disarmed() -> None:
     assert [sample.time_s for sample in samples[:3]] == [0.0, 0.01, 0.02]
     assert listening.timing.cycles == 50
     assert listening.timing.unanswered == 0
+
+
+def test_channels_are_read_at_rest_too(tmp_path: Path) -> None:
+    rig = sensed_rig(tmp_path)
+    with served_with_sensors(rig) as at, open_devices(at) as devices:
+        listening = Listening(devices, fast(at), RunTiming(10_000_000))
+        listening.begin()
+        samples = [listening.step() for _ in range(20)]
+        listening.plc.finish()
+    assert {len(sample.channels) for sample in samples} == {len(rig.channels)}
+    assert all(map(math.isfinite, samples[-1].channels))
+    lost = [any(map(math.isnan, sample.channels)) for sample in samples]
+    assert lost == [SampleFlag.CHANNEL_LOST in sample.flags for sample in samples]
 
 
 def test_a_missing_drive_is_reported_and_the_other_is_heard() -> None:

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import resource
 import shutil
-import signal
 import sqlite3
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -18,6 +15,7 @@ from hil.errors import StoreError
 from hil.store import RunStore, connection, register_run, schema, store_of
 from hil.store.rebuild import rebuild
 from hil.store.schema import MIGRATIONS
+from tests.full_disk import largest_file
 
 Record = Callable[..., Path]
 
@@ -127,19 +125,6 @@ def test_a_step_that_fails_half_way_leaves_the_store_as_it_was(filled: Path, mon
     with sqlite3.connect(store_of(filled)) as database:
         assert database.execute("SELECT count(*) FROM sqlite_master WHERE name = 'half'").fetchone() == (0,)
     database.close()
-
-
-@contextmanager
-def largest_file(n_bytes: int) -> Iterator[None]:
-    """Let no file of this process grow beyond: what a full disk does, without one."""
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (n_bytes, before[1]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
-        signal.signal(signal.SIGXFSZ, handler)
 
 
 def test_a_full_disk_costs_only_what_was_being_entered(filled: Path) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from scipy.interpolate import BSpline
 
 from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start, Untestable
 from estimator.physics.model import DrivelineModel, Motion, unit
@@ -37,6 +36,8 @@ def basis(time_s: FloatArray, at_s: FloatArray | None = None) -> FloatArray:
     ndarray, shape (K, M)
         Value of each of the K splines at each time.
     """
+    from scipy.interpolate import BSpline  # a third of a second that few need
+
     first, last = float(time_s[0]), float(time_s[-1])
     inner = np.linspace(first, last, max(2, round((last - first) / KNOT_SPACING_S) + 1))
     knots = np.concatenate([[first] * DEGREE, inner, [last] * DEGREE])

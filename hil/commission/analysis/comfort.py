@@ -11,7 +11,6 @@ and nothing else of a model. What is slower than 0.5 Hz is the way the test is d
 from __future__ import annotations
 
 import numpy as np
-from scipy.signal import butter, sosfiltfilt
 
 from estimator.physics.model import DrivelineModel, Structure
 from estimator.signals.record import FloatArray
@@ -46,6 +45,8 @@ def vibration_m_s2(
     travel_m_per_rad
         Way the vehicle makes per radian of the motor shaft.
     """
+    from scipy.signal import butter, sosfiltfilt  # half a second, and the bus comes first
+
     values = model.values()
     acceleration = np.gradient(speed_rad_s, period_s)
     if model.structure is not Structure.ONE_MASS:

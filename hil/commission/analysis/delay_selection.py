@@ -8,12 +8,15 @@ the least information criterion.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from estimator.identification.linear_model import Orders
-from estimator.identification.offline.output_error import OutputErrorFit, fit_output_error
 from estimator.signals.decimate import decimate
 from estimator.signals.record import Record
 from hil.commission.analysis.response_ratio import HIGH_PASS_HZ
+
+if TYPE_CHECKING:
+    from estimator.identification.offline.output_error import OutputErrorFit
 
 NATURAL_DELAY = 1
 """Samples of delay that sampling alone makes."""
@@ -40,6 +43,8 @@ def select_delay(record: Record) -> DelaySelection:
         If the recording can't determine a model.
     """
     data = decimate(record, 1, HIGH_PASS_HZ)
+    from estimator.identification.offline.output_error import fit_output_error  # a second, and the bus comes first
+
     fits = [fit_output_error(data, Orders(nk=nk)) for nk in range(NATURAL_DELAY, LONGEST + 1)]
     best = min(range(len(fits)), key=lambda i: fits[i].rms)
     return DelaySelection(best, fits[best], tuple(fit.rms for fit in fits))

@@ -6,12 +6,14 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import t as student
 
 from estimator.signals.record import FloatArray
 
 Z95 = 1.959963984540054
 """97.5 % point of the normal distribution."""
+
+TRUSTED = 0.2
+"""Tolerance that the parameters of a model from here are given: temperature, load and tyres move them by as much."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,5 +55,7 @@ def of_repeats(values: FloatArray) -> Measured:
     n = values.shape[0]
     if n < 2:
         return Measured(float(np.mean(values)) if n else math.nan, math.inf)
+    from scipy.stats import t as student  # half a second, and the bus comes first
+
     spread = float(student.ppf(0.975, n - 1) * np.std(values, ddof=1) / math.sqrt(n))
     return Measured(float(np.mean(values)), spread)

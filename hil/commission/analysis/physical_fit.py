@@ -23,13 +23,10 @@ from estimator.physics.problem import make_problem
 from estimator.physics.starts import best_fit
 from estimator.physics.unknowns import Shared
 from estimator.signals.record import Record
-from hil.commission.analysis.measured import Z95, Measured
+from hil.commission.analysis.measured import TRUSTED, Z95, Measured
 
 WIDEST = 100.0
 """A parameter may end so many times above or below where it starts."""
-
-TRUSTED = 0.2
-"""Tolerance that the parameters of a model from here are given: temperature, load and tyres move them by as much."""
 
 MOTOR_SHARES = (0.01, 0.03, 0.1, 0.3)
 """Parts of the total inertia that the motor may have: starts of the two-mass fit."""

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from estimator.identification.linear_model import LinearModel
 from estimator.identification.modes.modes import Mode, resonance
-from estimator.identification.offline.output_error import OutputErrorFit
 from estimator.signals.record import FloatArray
+
+if TYPE_CHECKING:
+    from estimator.identification.offline.output_error import OutputErrorFit
 
 STEP = 1e-3
 """Step of the differences, in standard deviations of each direction of theta."""

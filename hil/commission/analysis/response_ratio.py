@@ -12,14 +12,16 @@ errors (`estimator.identification.spectral.welch`). Which of the two is right, n
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import least_squares
 
-from estimator.identification.spectral.welch import SpectralEstimate, spectral_estimate
 from estimator.signals.decimate import decimate
 from estimator.signals.record import BoolArray, FloatArray, Record
 from hil.commission.analysis.measured import Z95, Measured
+
+if TYPE_CHECKING:
+    from estimator.identification.spectral.welch import SpectralEstimate
 
 HIGH_PASS_HZ = 0.3
 """As in the identification: what is slower is the road's."""
@@ -62,6 +64,8 @@ def response_ratio(first: Record, second: Record) -> ResponseRatio:
 
 
 def _response(record: Record) -> SpectralEstimate:
+    from estimator.identification.spectral.welch import spectral_estimate  # half a second, and the bus comes first
+
     samples = 2 * round(SEGMENT_S / record.sample_time_s / 2)
     return spectral_estimate(decimate(record, 1, HIGH_PASS_HZ), samples)
 
@@ -74,6 +78,8 @@ def _ratio(a: SpectralEstimate, b: SpectralEstimate, use: BoolArray) -> Response
         difference = b.response[use] - gain * np.exp(-1e-3j * omega * delay_ms) * a.response[use]
         spread = np.hypot(b.magnitude_std[use], gain * a.magnitude_std[use])
         return np.concatenate([difference.real / spread, difference.imag / spread])
+
+    from scipy.optimize import least_squares
 
     start = float(np.real(np.vdot(a.response[use], b.response[use])) / np.sum(np.abs(a.response[use]) ** 2))
     found = least_squares(errors, [start, 0.0])

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from estimator.diagnosis.diagnose import diagnose
-from estimator.diagnosis.result import Diagnosis, Verdict
+from typing import TYPE_CHECKING
+
 from estimator.physics.model import DrivelineModel
 from hil.commission.finding import Finding, stated
 from hil.commission.model_json import model_from_json
@@ -13,11 +13,11 @@ from hil.commission.steps.identification import cruises
 from hil.config.model_file import write_model
 from hil.errors import UsageError
 from hil.provenance import Provenance, provenance
-from hil.report.diagnosis_html import diagnosis_page
-from hil.report.diagnosis_json import diagnosis_text
 from hil.report.numbers import shown
 from hil.report.outputs import publish
-from hil.report.wording import headline
+
+if TYPE_CHECKING:
+    from estimator.diagnosis.result import Diagnosis
 
 FOLDER = "diagnosis"
 MODEL_FILE = "model.toml"
@@ -42,6 +42,8 @@ def _about(job: Job) -> str:
 
 
 def _do(job: Job) -> Outcome:
+    from estimator.diagnosis.diagnose import diagnose  # a second, and the bus comes first; so do those below
+
     nominal = _nominal(job)
     runs = {run.name: run for run in cruises(job)}
     slow_to_fast = sorted(runs.values(), key=lambda run: run.measured["speed_measured_rad_s"][0])
@@ -68,6 +70,9 @@ def _nominal(job: Job) -> DrivelineModel:
 
 
 def _publish(job: Job, result: Diagnosis, nominal: DrivelineModel, made: Provenance) -> None:
+    from hil.report.diagnosis_html import diagnosis_page
+    from hil.report.diagnosis_json import diagnosis_text
+
     publish(
         job.folder / FOLDER,
         {
@@ -85,6 +90,9 @@ def _publish(job: Job, result: Diagnosis, nominal: DrivelineModel, made: Provena
 
 
 def _findings(result: Diagnosis) -> list[Finding]:
+    from estimator.diagnosis.result import Verdict
+    from hil.report.wording import headline
+
     fit = result.fit
     advice = {
         Verdict.NO_MISMATCH: "",
@@ -115,6 +123,8 @@ def _findings(result: Diagnosis) -> list[Finding]:
 
 
 def _evidence(result: Diagnosis) -> dict[str, object]:
+    from hil.report.wording import headline
+
     return {
         "verdict": result.verdict.value,
         "headline": headline(result),

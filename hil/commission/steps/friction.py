@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from hil.commission.analysis.measured import Measured
-from hil.commission.analysis.physical_fit import fit_rigid
 from hil.commission.finding import Finding, stated
 from hil.commission.order import Order, as_table
 from hil.commission.readings import record_of, thinned
@@ -45,6 +44,8 @@ def _do(job: Job) -> Outcome:
     if table is None:
         return Outcome([_missing()])
     record = record_of(job.recording(job.run("friction", orders[0])))
+    from hil.commission.analysis.physical_fit import fit_rigid  # a second, and the bus comes first
+
     fit = fit_rigid([record], job.rig.vehicle.inertia_kg_m2)
     inertia, dry = fit.parameters["J_M"], fit.parameters["friction_nm"]
     viscous, load = fit.parameters["b_M"], fit.load_nm[record.name]

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-from estimator.identification.best import BestEstimate, Verdict, best_estimate
-from estimator.identification.identify import Identification
-from estimator.identification.identify import identify as identify_record
 from estimator.identification.modes.modes import Mode
 from estimator.identification.online.recursive import Status as OnlineStatus
 from estimator.identification.settings import Settings
@@ -17,6 +14,10 @@ from hil.commission.finding import Finding
 from hil.commission.readings import record_of, rounded
 from hil.commission.step import Job, Outcome, Step
 from hil.errors import UsageError
+
+if TYPE_CHECKING:
+    from estimator.identification.best import BestEstimate
+    from estimator.identification.identify import Identification
 
 SPREAD = 0.02
 """Largest standard deviation of the resonance between runs, relative: what the paper's runs agree to in its figures."""
@@ -30,7 +31,7 @@ LEAST_FIT_PERCENT = 70.0
 DRAWN_HZ = (0.5, 25.0)
 
 
-Found = tuple[Identification, BestEstimate]
+Found: TypeAlias = "tuple[Identification, BestEstimate]"
 """What one run gave."""
 
 
@@ -60,6 +61,9 @@ def _about(job: Job) -> str:
 
 
 def _do(job: Job) -> Outcome:
+    from estimator.identification.best import best_estimate  # a second, and the bus comes first
+    from estimator.identification.identify import identify as identify_record
+
     runs = cruises(job)
     found: list[Found] = []
     for i, run in enumerate(runs):
@@ -95,6 +99,8 @@ def _resonance_findings(modes: list[Mode | None]) -> list[Finding]:
 
 
 def _quality_findings(found: list[Found]) -> list[Finding]:
+    from estimator.identification.best import Verdict
+
     pairs = [(each.online_resonance, best.mode) for each, best in found]
     both = [(a.frequency_hz, b.frequency_hz.value) for a, b in pairs if a is not None and b is not None]
     worst = max((abs(a / b - 1.0) for a, b in both), default=float("nan"))

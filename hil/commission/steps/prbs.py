@@ -16,7 +16,6 @@ import numpy as np
 from estimator.errors import NotExciting
 from estimator.identification.linear_model import Orders
 from estimator.identification.modes.modes import Mode
-from estimator.identification.offline.output_error import fit_output_error
 from estimator.identification.settings import Settings
 from estimator.signals.decimate import decimate
 from estimator.signals.record import FloatArray, Record
@@ -154,6 +153,8 @@ def _course(speed_rad_s: FloatArray, period_s: float) -> tuple[float, float]:
 
 
 def _spread(job: Job, record: Record) -> ResonanceSpread | None:
+    from estimator.identification.offline.output_error import fit_output_error  # half a second, and the bus comes first
+
     extra = int(job.evidence("scales").get("extra_samples") or 0)
     try:
         fit = fit_output_error(decimate(record, 1, HIGH_PASS_HZ), Orders(nk=1 + extra))

@@ -11,7 +11,6 @@ from estimator.errors import NotExciting
 from estimator.identification.settings import Settings
 from estimator.signals.record import Record
 from hil.commission.analysis.delay_selection import NATURAL_DELAY, DelaySelection, select_delay
-from hil.commission.analysis.physical_fit import fit_two_mass
 from hil.commission.analysis.pulse_response import reading_lag
 from hil.commission.analysis.resonance_spread import ResonanceSpread, resonance_spread
 from hil.commission.analysis.response_ratio import ResponseRatio, response_ratio
@@ -109,6 +108,8 @@ def _do(job: Job) -> Outcome:
         )
         evidence["resonance"] = [mode.frequency_hz, mode.damping]
         evidence["spread"] = [first.spread.frequency_std, first.spread.damping_std]
+        from hil.commission.analysis.physical_fit import fit_two_mass  # half a second, and the bus comes first
+
         rough = fit_two_mass([first.record, second.record], job.rig.vehicle.inertia_kg_m2, mode)
         evidence["model"] = model_json(rough.model)
     else:

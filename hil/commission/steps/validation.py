@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from estimator.identification.modes.modes import Mode, two_mass_resonance
 from estimator.physics.model import parameter_unit
-from hil.commission.analysis.physical_fit import TRUSTED, PhysicalFit, fit_two_mass
+from hil.commission.analysis.measured import TRUSTED
 from hil.commission.finding import Finding, stated
 from hil.commission.model_json import model_json
 from hil.commission.readings import record_of, thinned
 from hil.commission.step import Job, Outcome, Step
 from hil.commission.steps.identification import cruises
 from hil.errors import UsageError
-from hil.plants import ModelPlant
-from hil.report.comparison import Comparison, compare_record
 from hil.report.numbers import shown
+
+if TYPE_CHECKING:
+    from hil.commission.analysis.physical_fit import PhysicalFit
+    from hil.report.comparison import Comparison
 
 UNSEEN = 1.2
 """Largest error on unseen runs over that on the runs of the fit: beyond, the model is made for those runs only."""
@@ -39,6 +41,10 @@ def _about(job: Job) -> str:
 
 
 def _do(job: Job) -> Outcome:
+    from hil.commission.analysis.physical_fit import fit_two_mass  # a second, and the bus comes first
+    from hil.plants import ModelPlant
+    from hil.report.comparison import compare_record
+
     runs = cruises(job)
     records = [record_of(job.recording(run)) for run in runs]
     seen, unseen = records[::2], records[1::2]

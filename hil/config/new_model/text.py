@@ -8,7 +8,7 @@ from pathlib import Path
 
 from estimator.physics.model import DrivelineModel, Motion, parameter_unit
 from hil.config.file_schema import FileKind, schema_line
-from hil.config.model_file import SCHEMA, ModelDocument
+from hil.config.model_tables import SCHEMA, ModelDocument
 from hil.config.new_model.values import MEANINGS, Known
 from hil.errors import ModelFileError
 from hil.printable import printable

@@ -41,6 +41,9 @@ def is_own(survey: Survey) -> bool:
 
 
 def _lines(survey: Survey, roles: Roles) -> Iterator[str]:
+    if not survey.shows_a_course:
+        yield "# one row shows no period and nothing that moves: look at a longer recording"
+        return
     used = _groups_used(survey, roles)
     yield _time_line(used[0] if used else survey.groups[0])
     if roles.torques:

@@ -83,6 +83,11 @@ class Group:
     gaps: int
     channels: tuple[Channel, ...]
 
+    @property
+    def rows(self) -> int:
+        """Rows of the longest channel."""
+        return max((channel.rows for channel in self.channels), default=0)
+
 
 @dataclass(frozen=True, slots=True)
 class Survey:
@@ -91,6 +96,11 @@ class Survey:
     groups: tuple[Group, ...]
     said: tuple[str, ...] = ()
     metadata: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def shows_a_course(self) -> bool:
+        """Whether any channel has two rows: of one alone nobody can tell what is a time, its period, or what moves."""
+        return any(group.rows > 1 for group in self.groups)
 
     def as_document(self) -> dict[str, Any]:
         """Return it as JSON has it."""

@@ -1,0 +1,115 @@
+"""What is to be known of an inverter by reading its objects: nothing here writes one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from drivers.canopen.can_link import CanLink
+from drivers.canopen.sdo import SdoChannel
+from drivers.canopen.sdo_node import SdoNode
+from drivers.capability.carrier import ObjectId
+from drivers.inverter.check import Difference, configurable_differences, fixed_differences, remarks
+from drivers.inverter.commissioned import CommissionedValue, commissioned_values
+from drivers.inverter.drive_settings import drive_settings
+from drivers.inverter.pdos import InverterPdos
+from drivers.inverter.protection import Protection, protections, require_protections
+from drivers.inverter.settings import InverterSettings
+
+
+class InspectedInverter:
+    """One inverter on a link, compared with the rig file, its EDS and its DCF.
+
+    Parameters
+    ----------
+    link
+        The bus it is on.
+    settings
+        What the rig file says of it.
+
+    Raises
+    ------
+    ConfigMismatch
+        If the EDS can't be read, has no PDOs that carry the torque command and its feedback or can be made to, or would
+        have the drive keep its torque without a host, and nobody has accepted that.
+    """
+
+    def __init__(self, link: CanLink, settings: InverterSettings) -> None:
+        self.settings = settings
+        self._link = link
+        self._where = settings.where
+        self._pdos = InverterPdos(settings)
+        self._plan = self._pdos.plan
+        self._given = drive_settings(self._plan, settings)
+        require_protections(self._plan, settings)
+        self._proof: dict[str, str] = {}
+        node = SdoNode(settings.node_id, self._pdos.eds.dictionary)
+        link.network.add_node(node)
+        self._sdo = SdoChannel(node, self._pdos.eds, self._where, settings.sdo_timeout_s)
+
+    def check(self) -> tuple[Difference, ...]:
+        """Compare the device with rig file and EDS; reads objects, writes none.
+
+        Returns
+        -------
+        tuple of Difference
+            Empty if everything agrees.
+
+        Raises
+        ------
+        DeviceTimeout
+            If the node does not answer.
+        ConfigMismatch
+            If it lacks an object of the EDS.
+        """
+        return (
+            *fixed_differences(self._sdo, self._plan, self.settings),
+            *configurable_differences(self._sdo, self._plan, self.settings, self._given),
+        )
+
+    def remarks(self) -> tuple[str, ...]:
+        """Say what a run will set that the drive does not have yet; reads objects, writes none.
+
+        Raises
+        ------
+        DeviceTimeout, ConfigMismatch
+            As `check`.
+        """
+        return tuple(remarks(self._sdo, self._plan, self.settings, self._given))
+
+    def commissioned(self) -> tuple[CommissionedValue, ...]:
+        """List where DCF, device and rig file are not of one mind; empty without a DCF. Reads objects, writes none.
+
+        Raises
+        ------
+        DeviceTimeout
+            If the node does not answer.
+        """
+        return tuple(commissioned_values(self._sdo, self._plan, self.settings))
+
+    def protections(self) -> tuple[Protection, ...]:
+        """List what stands between a dead host and torque, with what the last `prove_stop` has seen of it."""
+        return tuple(
+            replace(each, proof=self._proof.get(each.name, "")) for each in protections(self._plan, self.settings)
+        )
+
+    def device_name(self) -> str:
+        """Read the name the maker gave the drive, object 0x1008; in segments, for it is a text.
+
+        Raises
+        ------
+        ConfigMismatch
+            If the drive has no such object: it is optional.
+        DeviceTimeout, ProtocolViolation
+            If the drive does not answer, or not with a text.
+        """
+        return self._sdo.upload_text(0x1008)
+
+    def read_channel(self, channel: ObjectId) -> int:
+        """Read the count of a further object over SDO.
+
+        Raises
+        ------
+        DeviceTimeout, ConfigMismatch
+            If the node does not answer, or lacks the object.
+        """
+        return self._sdo.upload(*channel)
