@@ -133,7 +133,6 @@ def _simulate(
         path = write_shown(case, name, data, unseen)
         record = records[name] = read_record(path, file.signals, file.on_bench)
         if name in run.held_out and case.judged is Judged.BLOCKS:
-            path.unlink()
             write_shown(case, name, data, unseen, {column: inner_blocks(record) for column in _output_columns(file)})
         for stage, model in _FILES.items():
             arguments = ["simulate", "--model", f"../out/{model}.toml", "--input", path.name, "--out", f"{stage}.csv"]

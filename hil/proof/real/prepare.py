@@ -83,5 +83,5 @@ def write_shown(case: CaseFile, name: str, data: Path, place: Path, hide: dict[s
     for column, rows in (hide or {}).items():
         columns[column] = np.where(rows, np.nan, columns[column].astype(np.float64))
     path = place / f"{name}.csv"
-    write_table(Table(path, columns), path)
+    write_table(Table(path, columns), path, replace=True)
     return path

@@ -45,6 +45,15 @@ def test_hidden_samples_are_missing_and_all_others_are_there(case, data, place):
     np.testing.assert_array_equal(record.okay, ~hide)
 
 
+def test_a_recording_is_written_again_with_samples_hidden(case, data, place):
+    """Also where names such as "speed [rad/s]" give it metadata next to it."""
+    path = write_shown(case, "first", data, place)
+    path.with_name("first.csv.json").write_text('{"schema": "hil.recording/1"}')
+    hide = np.ones(made_up.N, dtype=bool)
+    assert write_shown(case, "first", data, place, {"speed": hide}) == path
+    assert np.isnan(read_table(path).columns["speed"]).all()
+
+
 def _signals():
     from hil.recording.signals_config import SignalsConfig
 
