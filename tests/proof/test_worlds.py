@@ -20,6 +20,8 @@ ROWS = [
         "named": ["backlash", "tyre_slip"],
         "false": ["tyre_slip"],
         "probability": {"backlash": 0.99, "tyre_slip": 0.95},
+        "alike": {"backlash": ["stiffness_nonlinearity"], "tyre_slip": []},
+        "untestable": ["gravity", "grounded_spring"],
         "time_s": 5.0,
         "cpu_s": 7.0,
     },
@@ -38,7 +40,7 @@ ROWS = [
 
 
 def test_the_table_counts_what_was_named_and_what_is_not_there() -> None:
-    assert table(ROWS).splitlines()[2] == "| dirty | 2 | 1 of 1 | 2 | 1 | 1 | 1 of 2 | 5.0, 5.0 | 7.0, 7.0 |"
+    assert table(ROWS).splitlines()[2] == "| dirty, 1 | 2 | 1 of 1 | 2 | 1 | 1 | 1 of 2 | 1 | 2 | 5.0, 5.0 | 7.0, 7.0 |"
 
 
 def test_what_is_answered_is_not_answered_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
