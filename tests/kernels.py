@@ -14,6 +14,8 @@ from estimator.identification.settings import Settings
 from hil.rig.live import tracking_settings
 from hil.rig.live_replay import Pace, play_record
 from tests.benchmarks.cases import make
+from tests.estimator.physics import test_own_law as own_law
+from tests.estimator.physics.bench import TWO_MASS
 
 SHORT_S = 4.0
 
@@ -25,6 +27,7 @@ def main() -> None:
     case = make("backlash", 1, SHORT_S)
     with suppress(EstimatorError):  # so short they need not tell anything: all there is to compile has been by then
         diagnose(case.records, case.model)
+    own_law.simulated({"mine": {"size": 0.01}}, TWO_MASS, own_law.law(own_law.square))
     for settings in (Settings(), tracking_settings()):
         play_record(case.records[0], settings, Pace(), lambda course, now_s: None, None)
 

@@ -17,6 +17,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numba
 from numba.core import types
 from numba.core.types import boolean, float64, int64
 
@@ -33,20 +34,25 @@ COMPILING = "compiling, once on this machine: about a minute"
 _ROW, _ROWS, _STACK, _INDICES = float64[::1], float64[:, ::1], float64[:, :, ::1], int64[::1]
 _fields: Any = types.NamedTuple
 _TUPLE: Any = types.UniTuple
+_NOTHING: Any = numba.typeof(())
 _NUDGES = _fields((_INDICES, _ROW, float64), Nudges)
-_EACH = (_ROWS, _ROWS, _INDICES, _INDICES, _ROW, _ROWS, _ROWS, int64, boolean, _ROWS)
+_EACH = (_ROWS, _ROWS, _INDICES, _INDICES, _ROW, _ROWS, _ROWS, _INDICES, boolean, _STACK)
 _CHAIN = _fields((_STACK, _ROWS, _ROWS, _ROW, float64, float64), Chain)
 _FILTERED = _fields((_ROWS, _STACK, _ROWS, _ROW, _ROW), Filtered)
 
 
 def signatures(masses: int) -> dict[Any, tuple[Any, ...]]:
     """Return the types that a diagnosis calls the largest kernels with."""
-    grid = (_TUPLE(int64, masses), float64, int64, float64)
-    setting = _fields((*grid, _ROW, int64, boolean, _ROW, _ROWS), Setting)
+    inertias, own = _TUPLE(int64, masses), _NOTHING
+    steps = (float64, int64, float64)
+    setting = _fields((inertias, *steps, _ROW, _INDICES, boolean, _ROWS, _ROWS), Setting)
     return {
-        integrate: (*grid, int64, float64, _ROW, _ROW, _ROW, _ROW, _ROW, int64, boolean, _ROW, _ROWS),
-        integrate_side_by_side: (*grid, int64, float64, _INDICES, *_EACH),
-        integrate_each: (*grid, float64, *_EACH, _STACK, _INDICES),
+        integrate: (
+            *(inertias, own, *steps, int64, int64, float64),
+            *(_ROW, _ROW, _ROW, _ROW, _ROW, _INDICES, boolean, _ROWS, _ROWS),
+        ),
+        integrate_side_by_side: (inertias, *steps, int64, float64, _INDICES, *_EACH),
+        integrate_each: (inertias, own, *steps, float64, *_EACH, _STACK, _INDICES),
         linearise: (setting, _NUDGES, _ROW, _ROW, _ROW, _ROW, _ROW, int64, int64),
         least: (_ROWS, _ROW, _ROW, _ROW, int64, int64),
         run_filter: (_CHAIN, _ROW, _ROW, float64, _ROWS, _FILTERED),

@@ -10,6 +10,7 @@ from estimator.errors import BadModel
 from estimator.physics.law_name import LawName
 from estimator.physics.model import DrivelineModel, Plant, Structure, natural_frequencies_rad_s
 from estimator.physics.motion import reverses, speed_scale
+from estimator.physics.own_forces import Forces
 from estimator.signals.record import FloatArray, Record
 
 RADIANS_PER_STEP = 0.2
@@ -47,6 +48,15 @@ class Grid:
     def active(self, p: FloatArray) -> list[LawName]:
         """Return the user's laws that a parameter vector switches on."""
         return [law for law in self.laws if law.is_active(p)]
+
+    def acting(self, lines: Sequence[FloatArray]) -> list[LawName]:
+        """Return those that any of some parameter vectors switches on."""
+        return [law for law in self.laws if any(law.is_active(p) for p in lines)]
+
+    def forces(self, laws: tuple[LawName, ...]) -> Forces:
+        """Return some of the user's laws as one function; compiled where they are asked for first."""
+        known = laws[0].compiled
+        return known.setdefault(laws, Forces(laws)) if laws not in known else known[laws]
 
 
 def substeps_for(values: Mapping[str, float], period_s: float) -> int:

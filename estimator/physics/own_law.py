@@ -1,16 +1,17 @@
 """A user's own law: a Python function that takes part in a diagnosis like an entry of the catalogue.
 
-The function stands outside the compiled kernel. It is given what happens in the line and returns a torque, or an error
-of the reading; ``estimator.physics.own_law_run`` lets it act on the simulation.
+It is given what happens in the line and returns a torque, or an error of the reading; the compiled simulation calls it
+(``estimator.physics.own_forces``).
 """
 
 from __future__ import annotations
 
+import dis
 import inspect
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import cast
+from typing import Any
 
 import numba
 import numpy as np
@@ -35,23 +36,6 @@ STRUCTURES = {
 
 TRIAL = np.array([[0.0, 0.5, 1.0], [-2.0, 0.0, 3.0], [-1.0, 0.0, 2.0], [-0.01, 0.0, 0.02], [-5.0, 0.0, 7.0]])
 """Arguments on which a law is tried before it is used: both signs and standstill; shape (5, 3)."""
-
-
-Columns = Callable[[FloatArray, tuple[float, ...]], FloatArray]
-"""Arguments of shape (5, N) and parameters to the law over each column, (N,)."""
-
-
-def over_columns(law: Callable[..., float]) -> Columns:
-    """Return the compiled function that calls a compiled law for each column of its arguments."""
-
-    def columns(arguments: FloatArray, values: tuple[float, ...]) -> FloatArray:
-        found = np.empty(arguments.shape[1])
-        for k in range(found.size):
-            given = arguments[:, k]
-            found[k] = law(given[0], given[1], given[2], given[3], given[4], *values)
-        return found
-
-    return cast(Columns, numba.njit(columns))
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +87,7 @@ class OwnLaw:
     parameters: tuple[OwnParameter, ...]
     label: str = ""
     takes_arrays: bool = field(init=False, default=False)
-    columns: Columns | None = field(init=False, default=None)
+    compiled: Callable[..., float] | None = field(init=False, default=None)
 
     def __post_init__(self) -> None:
         problems = self._problems()
@@ -142,8 +126,7 @@ class OwnLaw:
             ) from error
         self(TRIAL, starts)
         object.__setattr__(self, "takes_arrays", self._same_of_arrays(starts))
-        if not self.takes_arrays:
-            object.__setattr__(self, "columns", self._compiled(starts))
+        object.__setattr__(self, "compiled", self._compiled(starts))
         first = self.parameters[0]
         idle = self(TRIAL, starts | {first.name: first.null})
         if np.any(idle != 0.0):
@@ -189,30 +172,31 @@ class OwnLaw:
         return together.shape in ((), TRIAL.shape[1:]) and bool(np.all(together == self._one_by_one(TRIAL, values)))
 
     @property
-    def is_compiled(self) -> bool:
-        """Whether a function of numbers could be compiled, so that it is not called from Python for each of them."""
-        return self.columns is not None
+    def taken(self) -> list[str]:
+        """The parameters in the order in which the function takes them behind its arguments."""
+        return list(inspect.signature(self.function).parameters)[len(ARGUMENTS) :]
 
-    def _compiled(self, values: Mapping[str, float]) -> Columns | None:
-        """Return the function over columns, compiled; None where it can't be, or returns something else then."""
+    def at(
+        self, time_s: float, motor: float, load: float, twist: float, torque: float, values: Mapping[str, float]
+    ) -> float:
+        """Return the law of one moment; see ``__call__``."""
+        return float(self(np.array([[time_s], [motor], [load], [twist], [torque]]), values)[0])
+
+    def _compiled(self, values: Mapping[str, float]) -> Callable[..., float] | None:
+        """Return the function compiled; None where it can't be, raises by itself, or returns something else then."""
         try:
-            columns = over_columns(numba.njit(self.function))
-            found = columns(TRIAL, self._in_order(values))
+            if any(each.opname == "RAISE_VARARGS" for each in dis.get_instructions(self.function)):
+                return None
+            law: Any = numba.njit(error_model="numpy")(self.function)
+            found = [law(*column, *(float(values[name]) for name in self.taken)) for column in TRIAL.T.tolist()]
         except Exception:  # noqa: BLE001  # a compiler refuses a function in any way: it is called as it is
             return None
-        return columns if np.array_equal(found, self._one_by_one(TRIAL, values)) else None
-
-    def _in_order(self, values: Mapping[str, float]) -> tuple[float, ...]:
-        """Return the parameters in the order in which the function takes them behind its arguments."""
-        taken = list(inspect.signature(self.function).parameters)[len(ARGUMENTS) :]
-        return tuple(float(values[name]) for name in taken)
+        return law if np.array_equal(found, self._one_by_one(TRIAL, values)) else None
 
     def _called(self, arguments: FloatArray, values: Mapping[str, float]) -> FloatArray:
         if self.takes_arrays:
             returned = np.asarray(self.function(*arguments, **values), dtype=np.float64)
             return np.broadcast_to(returned, arguments.shape[1:])
-        if self.columns is not None:
-            return self.columns(np.ascontiguousarray(arguments), self._in_order(values))
         return self._one_by_one(arguments, values)
 
     def _one_by_one(self, arguments: FloatArray, values: Mapping[str, float]) -> FloatArray:
@@ -267,6 +251,7 @@ def named(laws: Sequence[OwnLaw]) -> tuple[LawName, ...]:
     for law in laws:
         name = LawName(law.name)
         name.law, name.entry = law, replace(law.effect(), name=name)
+        name.compiled = {}
         name.places = {each.name: size + i for i, each in enumerate(law.parameters)}
         size += len(law.parameters)
         found.append(name)

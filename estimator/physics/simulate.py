@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from estimator.errors import BadModel
-from estimator.physics import catalogue, joint, own_law_run
+from estimator.physics import catalogue, joint
+from estimator.physics.effect import Element
 from estimator.physics.grid import Grid
 from estimator.physics.inputs import Case, inputs_of, load_of
-from estimator.physics.kernel import integration, many, state_vector
+from estimator.physics.kernel import many, state_vector
 from estimator.physics.kernel.makes import Masses
 from estimator.physics.layout import slot
 from estimator.physics.model import Structure
 from estimator.physics.motion import motor_angle
+from estimator.physics.own_forces import FORCES
 from estimator.physics.start import Start
 from estimator.signals.record import FloatArray, IntArray, Location, OutputKind, Record
 
@@ -160,14 +163,13 @@ def _simulated(
     if grid.structure is Structure.JOINT:
         imposed = joint.imposed_in(record)
         return np.array([[_joint_output(record, imposed, case, int(state)) for state in wanted] for case in cases])
-    if any(grid.active(case.p) for case in cases):
-        return np.array([_under_laws(grid, outputs, case, wanted, recorded) for case in cases])
-    given = inputs_of([record], [0] * len(cases), cases)
+    own, given = _own_of(grid, record, cases), inputs_of([record], [0] * len(cases), cases)
     count, samples = len(cases), record.time_s.size
     slopes = np.zeros((count, 2, samples if recorded and is_steep(record) else 0))
     out = np.empty((count, wanted.size, samples))
     many.integrate_each(
         MASSES[grid.structure],
+        own,
         record.sample_time_s,
         grid.substeps,
         grid.sign_width,
@@ -185,7 +187,14 @@ def _simulated(
         slopes,
         _samples_alike(record, count, alike_s),
     )
-    return _read(outputs, out, slopes) if recorded else out
+    if own and own[1].fault is not None:
+        raise own[1].fault
+    if not recorded:
+        return out
+    if grid.laws and record.lead is None:
+        for row, case in zip(out, cases, strict=True):
+            row[0] += _misread(grid, record, case)
+    return _read(outputs, out, slopes)
 
 
 def _read(outputs: Sequence[Record], out: FloatArray, slopes: FloatArray) -> FloatArray:
@@ -228,39 +237,24 @@ def _joint_output(record: Record, imposed: joint.Imposed, case: Case, output: in
     return joint.simulate(record, imposed, case.p, load, start.twist_rad, start.preload_nm, output)
 
 
-def _under_laws(grid: Grid, outputs: Sequence[Record], case: Case, wanted: IntArray, recorded: bool) -> FloatArray:
-    """Simulate with laws of a user's own: their torques are held over an integration step, which is a sample then."""
-    record = outputs[0]
-    laws, given = grid.active(case.p), inputs_of([record], [0], [case])
-    torque, load, state = given.torque[0], given.load[0], given.state[0]
-    angle, masses = _angle(record, given.p), MASSES[grid.structure]
-    run = own_law_run.Run.of(masses, grid.substeps, grid.sign_width, record, torque, load, angle, case.p).under(
-        laws, state
-    )
-    slopes = np.zeros((2, run.torque.size if recorded and is_steep(record) else 0))
-    out = np.empty((wanted.size, run.torque.size))
-    integration.integrate(
-        masses,
-        run.step_s,
-        1,
-        grid.sign_width,
-        0,
-        run.torque.size,
-        record.since_start_s[0],
-        run.torque,
-        run.load,
-        run.angle,
-        case.p,
-        state.copy(),
-        wanted,
-        recorded and is_sensed(record, wanted[0]),
-        out,
-        slopes,
-    )
-    if recorded and record.lead is None:
-        out[0] += run.misread(laws, state)
-    out, slopes = out[:, :: grid.substeps], slopes[:, :: grid.substeps]
-    return _read(outputs, out, slopes) if recorded else out
+def _own_of(grid: Grid, record: Record, cases: Sequence[Case]) -> tuple[Any, ...]:
+    """Return the user's own laws that any of some cases switches on, as the kernel takes them."""
+    laws = [law for law in grid.acting([case.p for case in cases]) if law.law.element in FORCES]
+    return (record.total_torque_nm, grid.forces(tuple(laws)), 0.0, 0.0) if laws else ()
+
+
+def _misread(grid: Grid, record: Record, case: Case) -> FloatArray | float:
+    """Return the error that a user's own laws at the sensor add to the reading, shape (N,); 0 without any."""
+    laws = [law for law in grid.active(case.p) if law.law.element is Element.SPEED_SENSOR]
+    if not laws:
+        return 0.0
+    states = np.array([state_vector.SPEED, state_vector.LOAD_SPEED, state_vector.TWIST])
+    motion = _simulated(grid, [record], [case], states, False, None)[0]
+    if grid.structure is Structure.ONE_MASS:
+        motion[1:] = motion[0], np.zeros(motion.shape[1])
+    arguments = np.vstack([record.since_start_s, motion, record.total_torque_nm])
+    error: FloatArray = np.sum([law.law(arguments, law.values(case.p)) for law in laws], axis=0)
+    return error
 
 
 TIMED = np.array([slot(e.name, e.parameters[0].name) for e in catalogue.BUILT_IN.values() if e.event or e.timed])

@@ -82,6 +82,7 @@ class Stepper:
         last = self._torque.size - 1
         integration.integrate_period(
             self._masses,
+            (),
             self._period_s,
             self._substeps,
             SIGN_WIDTH_RAD_S,

@@ -102,6 +102,7 @@ def simulate_together(grid: Grid, drives: Sequence[Outputs], of: Sequence[int], 
     out = np.empty((len(cases), wanted.size, given.torque.shape[1]))
     many.integrate_each(
         MASSES[grid.structure],
+        (),
         first.sample_time_s,
         grid.substeps,
         grid.sign_width,

@@ -44,6 +44,7 @@ class SensedDriveline(Stepper):
         out, slopes = np.zeros((1, size)), np.zeros((2, size))
         integration.integrate_period(
             MASSES[self._structure],
+            (),
             self._period_s,
             FINER * self._substeps if is_slope else self._substeps,
             SIGN_WIDTH_RAD_S,

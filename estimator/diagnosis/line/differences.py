@@ -141,6 +141,7 @@ def run_block(setting: Setting, first: int, torques: Torques, p: FloatArray, sta
     torque, load = torques
     integration.integrate(
         setting.masses,
+        (),
         setting.sample_time_s,
         setting.substeps,
         setting.sign_width,

@@ -27,6 +27,7 @@ from estimator.physics.kernel.feed import begun_feed, fed, is_late
 from estimator.physics.kernel.line import Line, is_bristled, is_within
 from estimator.physics.kernel.linear import WORTHWHILE_SAMPLES, Answers, answers, has_dry_friction, is_linear, led_on
 from estimator.physics.kernel.makes import Masses, for_its_make
+from estimator.physics.kernel.own import at_moment
 from estimator.physics.kernel.rates import read_out
 from estimator.physics.kernel.sensing import entry, reading, shown, smoothed
 from estimator.physics.kernel.state_vector import (
@@ -143,7 +144,7 @@ def integrate_made(
             out[i, k] = shown(reading(value, angle[k], p), filtered, p) if sensor and i == 0 else value
         leave_slope(k, slope, slopes)
         time_s = start_s + k * sample_time_s
-        varying = waving or is_changing(time_s - sample_time_s, time_s + sample_time_s, p)
+        varying = waving or len(line.own) > 0 or is_changing(time_s - sample_time_s, time_s + sample_time_s, p)
         if not varying:
             now = with_torques(now, now.torque, load[k])
         summing = linear and not varying
@@ -156,7 +157,8 @@ def integrate_made(
                 now = conditions(line.masses, start_s + place * sample_time_s, h, middle, load[k], sign_width, p)
             mean, rise, lagged, lag_rise = fed(torque, feed, k, j * length, length, lagged, lag_rise, p)
             before = x
-            x, bristles = rubbed_on(line, summing, to, now, mean, rise, before, bristles, p, h)
+            moment_s = start_s + (k + (j + 0.5) * length) * sample_time_s
+            x, bristles = rubbed_on(at_moment(line, moment_s, k), summing, to, now, mean, rise, before, bristles, p, h)
             slope = (entry(x, output, p) - entry(before, output, p)) / h
             if filtering:
                 turned, turns = angle[k] + turn * j * length, angle[k] + turn * (j + 1) * length
@@ -174,6 +176,7 @@ def integrate_made(
 @compiled
 def integrate(
     masses: Masses,
+    own: tuple[Any, ...],
     sample_time_s: float,
     substeps: int,
     sign_width: float,
@@ -198,6 +201,8 @@ def integrate(
     ----------
     masses : tuple of int
         An entry for each of them, 1 to 3.
+    own : tuple
+        Empty, or what ``Line.own`` says.
     sample_time_s : float
         Sampling period [s].
     substeps : int
@@ -239,7 +244,7 @@ def integrate(
         borrowed(p),
     )
     given_back = (borrowed(state), borrowed(outputs), sensor, borrowed(out), borrowed(slopes))
-    for_its_make(len(masses), integrate_made, borrowed(p), (*given, *given_back))
+    for_its_make(len(masses), own, integrate_made, borrowed(p), (*given, *given_back))
 
 
 @brief

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from estimator.compiled import inlined
 from estimator.lanes import some
@@ -24,12 +24,16 @@ class Line(NamedTuple):
     extended : bool
         Whether it has states beyond those of its masses and a slider: an extra mode, a tyre that slips, a shaft that
         relaxes.
+    own : tuple
+        Empty, or the torque readings, a user's own laws as one function, and what they are given of the moment: time
+        [s] and torque reading [Nm].
     """
 
     masses: int
     elastic: bool
     sliding: bool
     extended: bool
+    own: tuple[Any, ...]
 
 
 @inlined

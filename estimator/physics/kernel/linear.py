@@ -71,7 +71,8 @@ def is_linear(line: Line, p: FloatArray) -> bool:
 
     Bristles leave it linear at any speed: what they hold is a torque like another.
     """
-    if not (line.elastic and (is_bristled_at_motor(p) or p[slots.STRIBECK] == p[slots.STRIBECK_COULOMB] == 0.0)):
+    stribeck = not is_bristled_at_motor(p) and (p[slots.STRIBECK] != 0.0 or p[slots.STRIBECK_COULOMB] != 0.0)
+    if len(line.own) > 0 or not line.elastic or stribeck:
         return False
     for i in range(BENDING.size):
         if p[BENDING[i]] != NULLS[i]:

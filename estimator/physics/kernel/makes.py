@@ -22,29 +22,31 @@ Masses = tuple[int, ...]
 
 
 @ir_inlined
-def for_its_make(masses: int, made: Made, p: FloatArray, given: tuple[Any, ...]) -> None:
+def for_its_make(masses: int, own: tuple[Any, ...], made: Made, p: FloatArray, given: tuple[Any, ...]) -> None:
     """Call what is compiled for the make of the line that has these parameters, of 1, 2 or 3 masses."""
     if masses == 1:
-        _for_its_states(1, True, made, p, given)
+        _for_its_states(1, True, own, made, p, given)
     elif masses == 2:
-        _for_its_shaft(2, made, p, given)
+        _for_its_shaft(2, own, made, p, given)
     else:
-        _for_its_shaft(3, made, p, given)
+        _for_its_shaft(3, own, made, p, given)
 
 
 @ir_inlined
-def _for_its_shaft(masses: int, made: Made, p: FloatArray, given: tuple[Any, ...]) -> None:
+def _for_its_shaft(masses: int, own: tuple[Any, ...], made: Made, p: FloatArray, given: tuple[Any, ...]) -> None:
     if is_elastic(p):
-        _for_its_states(masses, True, made, p, given)
+        _for_its_states(masses, True, own, made, p, given)
     else:
-        _for_its_states(masses, False, made, p, given)
+        _for_its_states(masses, False, own, made, p, given)
 
 
 @ir_inlined
-def _for_its_states(masses: int, elastic: bool, made: Made, p: FloatArray, given: tuple[Any, ...]) -> None:
+def _for_its_states(
+    masses: int, elastic: bool, own: tuple[Any, ...], made: Made, p: FloatArray, given: tuple[Any, ...]
+) -> None:
     if is_extended(p):
-        made(Line(masses, elastic, not elastic, True), *given)
+        made(Line(masses, elastic, not elastic, True, own), *given)
     elif not elastic and p[slots.SLIDER] != 0.0:
-        made(Line(masses, elastic, True, False), *given)
+        made(Line(masses, elastic, True, False, own), *given)
     else:
-        made(Line(masses, elastic, False, False), *given)
+        made(Line(masses, elastic, False, False, own), *given)

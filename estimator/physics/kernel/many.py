@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from estimator.compiled import compiled
@@ -15,6 +17,7 @@ from estimator.signals.record import FloatArray, IntArray
 @compiled
 def integrate_each(
     masses: Masses,
+    own: tuple[Any, ...],
     sample_time_s: float,
     substeps: int,
     sign_width: float,
@@ -46,14 +49,14 @@ def integrate_each(
     while i < order.size:
         rows = order[i : i + LANES]
         rows = rows[: leading_kin(p, rows)]
-        together = slopes.shape[2] == 0 and go_side_by_side(masses, p, rows)
+        together = len(own) == 0 and slopes.shape[2] == 0 and go_side_by_side(masses, p, rows)
         if not together:
             rows = rows[:1]
         i += rows.size
         common = 0 if apart else alike[rows[0]]
         if common > reached:
             known = (torque[fed_by[0]], load[loaded_by[0]], angle, p[0], state[0])
-            integrate(masses, *given, reached, common, start_s, *known, outputs, sensor, out[0], slopes[0])
+            integrate(masses, own, *given, reached, common, start_s, *known, outputs, sensor, out[0], slopes[0])
             reached = common
         if reached > 0:
             for row in rows:
@@ -71,7 +74,7 @@ def integrate_each(
         else:
             row = rows[0]
             it = (torque[fed_by[row]], load[loaded_by[row]], angle, p[row], state[row])
-            integrate(masses, *given, reached, samples, start_s, *it, outputs, sensor, out[row], slopes[row])
+            integrate(masses, own, *given, reached, samples, start_s, *it, outputs, sensor, out[row], slopes[row])
     if not apart:
         rest = (torque[fed_by[0]], load[loaded_by[0]], angle, p[0], state[0])
-        integrate(masses, *given, reached, samples, start_s, *rest, outputs, sensor, out[0], slopes[0])
+        integrate(masses, own, *given, reached, samples, start_s, *rest, outputs, sensor, out[0], slopes[0])

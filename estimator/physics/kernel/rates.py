@@ -16,6 +16,7 @@ from estimator.physics.kernel import slots
 from estimator.physics.kernel.conditions import line_share
 from estimator.physics.kernel.declared import held_by_angle, load_drag, motor_drag, shaft_loss
 from estimator.physics.kernel.line import Line, is_within
+from estimator.physics.kernel.own import under_own
 from estimator.physics.kernel.sensing import entry
 from estimator.physics.kernel.state_vector import SHAFT_TORQUE, Conditions, State
 from estimator.physics.laws import beyond_gap, dry_friction, smooth_sign
@@ -98,6 +99,7 @@ def read_out(line: Line, now: Conditions, x: State, output: int, p: FloatArray) 
 @inlined
 def rates(line: Line, now: Conditions, x: State, p: FloatArray) -> State:
     """Return the time derivative of the mechanical state under the conditions ``now``."""
+    now = under_own(line, now, x, p)
     drive = now.torque - motor_friction(x.speed, p, now.width_motor, now.dry_motor)
     if line.masses == 1:
         drag = load_friction(x.speed, x.speed, now, p) + now.load + held_by_angle(x.angle, p)

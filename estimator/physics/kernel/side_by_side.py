@@ -51,7 +51,7 @@ def go_side_by_side(masses: Masses, p: FloatArray, rows: IntArray) -> bool:
     first = p[rows[0]]
     if rows.size == 1 or not IS_COMPILED:
         return False
-    if is_linear(Line(len(masses), len(masses) == 1 or is_elastic(first), False, False), first):
+    if is_linear(Line(len(masses), len(masses) == 1 or is_elastic(first), False, False, ()), first):
         return False
     return leading_kin(p, rows) == rows.size
 
@@ -258,7 +258,7 @@ def integrate_side_by_side(
     given = (sample_time_s, substeps, sign_width, first, start_s, mean, rise, loads, angle)
     filtering = sensor and p[rows[0], slots.FILTER] > 0.0
     them = (in_lanes(p, rows), in_lanes(state, rows), low_passes(rows, p, sample_time_s / substeps))
-    for_its_make(len(masses), advance, p[rows[0]], (*given, p[rows[0]], *them, outputs, filtering, values))
+    for_its_make(len(masses), (), advance, p[rows[0]], (*given, p[rows[0]], *them, outputs, filtering, values))
     for lane in range(rows.size):
         own = p[rows[lane]]
         for k in range(first, torque.shape[1]):

@@ -20,9 +20,11 @@ def of_one_recording(
 ) -> np.ndarray:
     """Return the derivatives by two unknowns of the samples that count, a row each."""
     found = np.zeros((2, int(use.sum())))
-    both, one = np.arange(2), np.zeros(2, dtype=int)
+    both, one = np.arange(2), np.zeros((2, 1), dtype=int)
     limits, leasts, begins = np.array([limit]), np.array([least]), np.array([0, use.sum()])
-    fill_differences(moved, one, output[np.newaxis], use[np.newaxis], STEPS, limits, leasts, both, begins, found)
+    fill_differences(
+        moved[:, np.newaxis], one, output[np.newaxis], use[np.newaxis], STEPS, limits, leasts, both, begins, found
+    )
     return found
 
 
@@ -59,9 +61,11 @@ def test_each_recording_has_its_own_samples_limit_and_place(output: np.ndarray) 
     moved = np.full((2, 50), 5e-5) + outputs[::-1]
     moved[0, 20:] = np.nan
     found = np.zeros((3, 68))
-    of, columns = np.array([1, 0]), np.array([2, 0])
+    of, columns = np.array([[1], [0]]), np.array([2, 0])
     limits, least = np.array([1e3, 0.5]), np.zeros(2)
-    fill_differences(moved, of, outputs, use, STEPS, limits, least, columns, np.array([0, 48, 68]), found)
+    fill_differences(
+        moved[:, np.newaxis], of, outputs, use, STEPS, limits, least, columns, np.array([0, 48, 68]), found
+    )
     np.testing.assert_array_equal(found[0, :48], (moved[1] - output)[2:] / STEPS[1])
     np.testing.assert_array_equal(found[2, 48:], (np.clip(moved[0], -0.5, 0.5) - output[::-1])[:20] / STEPS[0])
     assert not found[1].any()

@@ -9,6 +9,7 @@ import pytest
 
 from estimator.lanes import LANES
 from estimator.physics import simulate as simulate_module
+from estimator.physics import together as together_module
 from estimator.physics.grid import Grid
 from estimator.physics.jacobian import changes, jacobian_at
 from estimator.physics.model import DrivelineModel
@@ -44,7 +45,7 @@ def by_themselves(problem: Problem, x: FloatArray) -> FloatArray:
     blocks = []
     shared = len(problem.shared)
     for i, (run, basis, use) in enumerate(zip(problem.records, problem.local, problem.use, strict=True)):
-        alone = replace(problem, records=(run,), local=(basis,), use=(use,))
+        alone = replace(problem, records=(run,), local=(basis,), use=(use,), leads=(0,))
         mine = own_part(problem, i)
         mine_x = np.concatenate([x[:shared], x[mine]])
         block = np.zeros((int(use.sum()), x.size))
@@ -98,7 +99,8 @@ def test_derivatives_are_those_of_each_recording_by_itself(
         widths.append(len(set(of)))
         return given(records, of, cases)
 
-    monkeypatch.setattr(simulate_module, "inputs_of", noted)
+    for module in (simulate_module, together_module):
+        monkeypatch.setattr(module, "inputs_of", noted)
     found = jacobian_at(problem, x, outputs)
     assert (max(widths) > 1) is together
     alone = by_themselves(problem, x)
