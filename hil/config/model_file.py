@@ -126,16 +126,11 @@ def read_model_for_recordings(path: Path | str, trust_laws: bool = False) -> Mod
     ------
     ModelFileError
         As `read_model`; also if the model is of a translation and would be held against the motor speed of a
-        rig's own recording, or of a joint whose imposed motion is not named.
+        rig's own recording, or of a joint whose imposed motion is not named, or that has further outputs.
     """
     file = read_model(path, trust_laws)
     if file.on_bench:
-        if file.signals is None or not file.signals.names_bench:
-            raise ModelFileError(
-                path,
-                "signals | expected position (the imposed motion) and torque or force (what it takes) for a joint | "
-                "got neither or one of them: name both columns in [signals]",
-            )
+        _require_bench(path, file.signals)
         return file
     names_output = file.signals is not None and file.signals.names_output
     if file.model.motion is Motion.TRANSLATION and not names_output:
@@ -145,6 +140,22 @@ def read_model_for_recordings(path: Path | str, trust_laws: bool = False) -> Mod
             "no speed, position or force | got 'translation': correct it, or name the column in [signals]",
         )
     return file
+
+
+def _require_bench(path: Path | str, signals: SignalsConfig | None) -> None:
+    """See that the signals of a joint are the imposed motion and what it takes, and no others."""
+    if signals is None or not signals.names_bench:
+        raise ModelFileError(
+            path,
+            "signals | expected position (the imposed motion) and torque or force (what it takes) for a joint | "
+            "got neither or one of them: name both columns in [signals]",
+        )
+    if further := signals.further():
+        raise ModelFileError(
+            path,
+            "signals.outputs | expected no further output for a joint, which has one, what the imposed motion takes | "
+            f"got {', '.join(repr(each.column) for each in further)}: take it out",
+        )
 
 
 def write_model(

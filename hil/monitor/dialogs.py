@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import ClassVar
 
 from textual.app import ComposeResult
@@ -13,15 +12,8 @@ from textual.screen import ModalScreen
 from textual.widgets import Input, OptionList, Static
 from textual.widgets.option_list import Option
 
+from hil.monitor.choice import Choice
 from hil.monitor.panel import printable
-
-
-@dataclass(frozen=True, slots=True)
-class Choice:
-    """An experiment as it is offered: its name, and what it will command, in words."""
-
-    name: str
-    summary: str
 
 
 class StartDialog(ModalScreen[str | None]):

@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 
 SCIPY = ("scipy.interpolate", "scipy.linalg", "scipy.optimize", "scipy.signal", "scipy.special", "scipy.stats")
-SLOW = (*SCIPY, "asammdf", "h5py", "matplotlib", "pandas", "plotly", "pyarrow", "textual")
+OF_FILES = ("asammdf", "h5py", "matplotlib", "pandas", "plotly", "pyarrow")
+SLOW = (*SCIPY, *OF_FILES, "textual")
 RIG = str(Path(__file__).parents[2] / "examples" / "rig.toml")
 NOBODY = "ws://127.0.0.1:1/"
 
@@ -47,12 +48,10 @@ sys.exit(f"no bus was opened: status {run(sys.argv[1:])}")
     [
         ("hil.cli.main, hil.cli.overview", (*SLOW, "can", "numba", "numpy", "pydantic", "rich", "scipy", "typer")),
         ("hil.monitor.host", SLOW),
-        (
-            "hil.monitor.opening, hil.monitor.app",
-            ("asammdf", "h5py", "pandas", "plotly", "scipy.signal", "scipy.stats"),
-        ),
+        ("hil.monitor.opening", (*OF_FILES, "scipy.signal", "scipy.stats", "textual")),
+        ("hil.monitor.opening, hil.monitor.app", (*OF_FILES, "scipy.signal", "scipy.stats")),
     ],
-    ids=["help", "monitor: process of the rig", "monitor: process of the view"],
+    ids=["help", "monitor: process of the rig", "monitor: before that is started", "monitor: process of the view"],
 )
 def test_what_is_not_needed_is_not_imported(modules: str, absent: tuple[str, ...]) -> None:
     program = f"import sys, {modules}; print(*(name for name in {absent} if name in sys.modules))"

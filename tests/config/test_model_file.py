@@ -118,6 +118,19 @@ def test_a_joint_needs_both_its_motion_and_what_it_takes(tmp_path: Path, signals
     assert read_model(path).on_bench
 
 
+def test_a_joint_has_no_further_outputs(tmp_path: Path) -> None:
+    path = tmp_path / "joint.toml"
+    parameters = "k = { value = 1, tolerance = 0.2 }\nc = { value = 1, tolerance = 0.2 }"
+    signals = 'position = { column = "x" }\nforce = { column = "F" }\n'
+    outputs = 'outputs = [ { kind = "speed", at = "load", column = "w" } ]\n'
+    head = f'schema = "hil.model/1"\nstructure = "joint"\n[parameters]\n{parameters}\n[signals]\n{signals}'
+    path.write_text(head + outputs)
+    with pytest.raises(ModelFileError, match=r"signals\.outputs \| expected no further output .* \| got 'w'"):
+        read_model_for_recordings(path)
+    path.write_text(head)
+    assert read_model_for_recordings(path).on_bench
+
+
 def test_the_example_of_the_linear_drive_is_a_nominal_model() -> None:
     file = read_model(Path(__file__).parents[2] / "examples" / "emps.toml")
     assert file.model.structure is Structure.ONE_MASS
