@@ -130,7 +130,7 @@ def _gaps_warning(record: Record, found: Sequence[slice], long: Sequence[slice])
         return f"{text}, none of which holds {least:g} s of good samples; it is not used. Check flags and mask."
     used = sum(int(record.okay[part].sum()) for part in long) / int(record.okay.sum())
     short = len(found) - len(long)
-    left_out = f"; left out as holding less than {least:g} s: {short}; used: {used:.0%} of the good samples"
+    left_out = f"; {short} of less than {least:g} s left out; used: {used:.0%} of the good samples"
     return f"{text}, each with its own initial state and constant load{left_out if short else ''}."
 
 

@@ -33,8 +33,8 @@ def check(
         bool,
         typer.Option(
             "--prove-stop",
-            help="Play dead before drives that agree, and see that they stop. Configures them and leaves them "
-            "disabled; no torque is commanded. Not while another program drives them.",
+            help="Stop heartbeat and RPDOs of drives that agree, and see that they stop. Configures them and leaves "
+            "them disabled; no torque is commanded. Not while another program drives them.",
         ),
     ] = False,
     proof: Annotated[

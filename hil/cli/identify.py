@@ -47,7 +47,7 @@ def identify(
         help="Sampling period of all models, a multiple of the recording's. Without it: 20 ms on line, off line the "
         "recording's own.",
     ),
-    order: str = typer.Option("4", "--order", metavar="N|auto", help="nA = nB; auto: what the data pay for."),
+    order: str = typer.Option("4", "--order", metavar="N|auto", help="nA = nB; auto: by an information criterion."),
     delay: str = typer.Option("1", "--delay", metavar="N|auto", help="Total delay in samples; auto: what fits."),
     estimator: list[str] = typer.Option(
         [], "--estimator", metavar="NAME", help="Another recursive estimator to compare on the same data; repeatable."

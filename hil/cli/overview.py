@@ -21,7 +21,7 @@ def overview(commands: Mapping[str, str]) -> str:
     width = min(shutil.get_terminal_size((80, 24)).columns, WIDEST)
     sections = [
         "Usage: hil [OPTIONS] COMMAND [ARGS]...",
-        *_wrapped(("Identify a driveline over its fieldbus and name the physics its model left out.",), width),
+        *_wrapped(("Identify a driveline over its fieldbus and name the physics its model lacks.",), width),
         "Commands:",
         *_rows(commands, width),
         "",

@@ -34,7 +34,7 @@ def replay(
         typer.Argument(metavar="REC", help="Recording, or bus trace of a run: .blf, .log (candump), .asc or .trc."),
     ],
     speed: Annotated[
-        float | None, typer.Option(metavar="X", help="Multiple of real time; as fast as it goes without it.")
+        float | None, typer.Option(metavar="X", help="Multiple of real time; without it as fast as possible.")
     ] = None,
     estimate: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Where the course of the estimate goes, as JSON.")

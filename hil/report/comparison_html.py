@@ -19,9 +19,9 @@ from hil.report.numbers import shown, shown_p
 from hil.report.wording import quantity, torque_axis
 
 RESIDUALS = (
-    "A model that lacks nothing leaves an error that has nothing to do with the torque that went before: p is the "
-    "probability of a correlation like this one if there is none. Below 0.05 the model misses a part of the response. "
-    "An error that goes with its own past alone is noise with a colour, or drift."
+    "The error of a complete model does not depend on past torque: p is the probability of such a correlation by "
+    "chance. Below 0.05 the model misses a part of the response. An error that depends only on its own past is "
+    "coloured noise or drift."
 )
 
 
@@ -84,7 +84,7 @@ def _recording(of_recording: Sequence[Comparison], number: int, recordings: int)
         time_figure(f"time-{number}", record.time_s, comparison_panels(of_recording), recordings),
         "<h3>Spectrum of the error</h3>",
         *spectra,
-        "<h3>Does the error go with the torque?</h3>",
+        "<h3>Does the error depend on the torque?</h3>",
         html.paragraph(RESIDUALS, "note"),
         correlation_figure(f"residual-{number}", _tests(of_recording)),
     )

@@ -74,8 +74,8 @@ def _top(diagnosis: Diagnosis, one_in: int) -> str:
     warnings = "".join(html.paragraph(f"Note: {text}", "warning") for text in diagnosis.warnings)
     if one_in > 1:
         warnings += html.paragraph(
-            f"Of the recordings one in {one_in} samples was used, the torque as the mean of those between: the line "
-            "answers to no more. All figures and plots are of these.",
+            f"One in {one_in} samples was used, with the mean torque in between: the line responds to nothing faster. "
+            "All figures and plots are of these samples.",
             "note",
         )
     figures = html.tiles(

@@ -122,7 +122,7 @@ def belief(effect: FoundEffect) -> str:
     """Say how much of the mismatch goes with an effect and how probable it is; "" where that is not known."""
     if not (math.isfinite(effect.share) and math.isfinite(effect.probability)):
         return ""
-    return f"{effect.share:.0%} of the squared error goes with it; probability {probability(effect.probability)}. "
+    return f"{effect.share:.0%} of the squared error explained; probability {probability(effect.probability)}. "
 
 
 def _title(name: str) -> str:

@@ -213,7 +213,7 @@ def test_a_torque_that_moves_the_speed_next_to_nothing_is_reported(
     weak = write(tmp_path / "weak.csv", 1, prbs_nm=2.0)
     assert run(arguments([weak], tmp_path / "out")) == 0
     printed = " ".join(capsys.readouterr().out.split())
-    assert "most of the speed comes from elsewhere than from the torque" in printed
+    assert "most of the speed is not caused by the torque" in printed
     assert "Raise the PRBS" in printed
 
 

@@ -223,10 +223,10 @@ def test_a_law_without_a_name_is_shown(diagnosis):
 
 def test_share_and_probability_of_an_effect_are_shown(diagnosis: Diagnosis) -> None:
     page = diagnosis_page(diagnosis)
-    assert page.count("% of the squared error goes with it") == 1
-    assert "94% of the squared error goes with it; probability 99.9 %. Evidence:" in page
+    assert page.count("% of the squared error explained") == 1
+    assert "94% of the squared error explained; probability 99.9 %. Evidence:" in page
 
 
 def test_thinned_recordings_are_reported(diagnosis: Diagnosis) -> None:
-    assert "one in 10 samples was used" in diagnosis_page(diagnosis, one_in=10)
+    assert "One in 10 samples was used" in diagnosis_page(diagnosis, one_in=10)
     assert "samples was used" not in diagnosis_page(diagnosis)

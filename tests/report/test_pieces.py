@@ -111,7 +111,7 @@ def test_the_terminal_tells_the_verdict_and_what_it_rests_on(diagnosis: Diagnosi
     text = rendered(diagnosis_summary(diagnosis))
     expected = ("✓ explained", diagnosis.statement, "[rad/s]", "gap_rad", "0.021 rad", "J_M", "1.51 … 1.53")
     expected += ("rejected: stiffness_nonlinearity", "can't tell: coulomb_friction_motor", "note: run_2")
-    expected += ("backlash: 94% of the squared error goes with it; probability 99.9 %.",)
+    expected += ("backlash: 94% of the squared error explained; probability 99.9 %.",)
     assert "road_grade: " not in text  # of which neither is known
     assert [part for part in expected if part not in text] == []
 

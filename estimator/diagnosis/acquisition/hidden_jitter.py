@@ -112,7 +112,7 @@ def hidden_jitter(
         parameters={"jitter_s": Sized(jitter_s, ci95, "s")},
         cells=_outputs(records, okay),
         p_value=max(p_value, SMALLEST_P),
-        statement=f"the samples were taken off their time by {1e3 * jitter_s:.2g} ms (rms), which no stamp tells",
+        statement=f"the samples were taken {1e3 * jitter_s:.2g} ms (rms) off their time, which no time stamp shows",
     )
 
 

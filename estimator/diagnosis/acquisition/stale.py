@@ -43,7 +43,7 @@ def stale_samples(records: Sequence[Record]) -> Finding | None:
 def _statement(share: float, names: tuple[str, ...], records: Sequence[Record]) -> str:
     inputs = max(record.torque_nm.shape[1] for record in records)
     where = "whole rows" if len(names) == 1 + inputs else " and ".join(names)
-    return f"{100.0 * share:.2g}% of the samples are stale: the value before is repeated without a flag in {where}"
+    return f"{100.0 * share:.2g}% of the samples are stale: the previous value is repeated without a flag in {where}"
 
 
 def _of_output(records: Sequence[Record], cells: Cells) -> Size | None:

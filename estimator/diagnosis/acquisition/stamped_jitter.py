@@ -63,7 +63,7 @@ def stamped_jitter(records: Sequence[Record]) -> Finding | None:
         parameters={"jitter_s": Sized(jitter_s, (low, high), "s")},
         cells=cells,
         p_value=max(p_value, SMALLEST_P),
-        statement=f"the samples were taken off their time by {1e3 * jitter_s:.2g} ms (rms), as their stamps tell",
+        statement=f"the samples were taken {1e3 * jitter_s:.2g} ms (rms) off their time, as their time stamps show",
     )
 
 

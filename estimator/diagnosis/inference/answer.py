@@ -208,9 +208,9 @@ def _stopped(search: Search, budget_s: float) -> str:
     untried = sorted({*search.names} - {*search.rivals} - {name for effects in search.visited for name in effects})
     fitted = f"; no fit was made of {', '.join(untried)}" if untried else ""
     return (
-        f"the search ended after its {budget_s:g} s with the best set of effects so far: not tried were further "
-        f"effects on top of it, and look-alikes in the place of those named{fitted}. Give it more time (--budget-s), "
-        "or fewer or shorter recordings."
+        f"the search ended after its {budget_s:g} s with the best set of effects so far; further effects, and "
+        f"look-alikes of those named, were not tried{fitted}. Give it more time (--budget-s), or fewer or shorter "
+        "recordings."
     )
 
 
@@ -269,7 +269,7 @@ def _rejected(search: Search, decision: Decision) -> tuple[RejectedEffect, ...]:
     fitted = [
         RejectedEffect(
             name,
-            "fitted: neither in the place of what was found nor in addition does it explain the recordings better",
+            "tried instead of what was found and in addition to it: the recordings are explained no better",
             min(best - score, 0.0) if name not in decision.best.effects else 0.0,
         )
         for name, score in sorted(search.rivals.items(), key=lambda item: item[1])

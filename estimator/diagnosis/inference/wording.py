@@ -55,9 +55,9 @@ def _errors(fit: Fit) -> str:
 
 def _wrong_values(fit: Fit, strays: Sequence[Stray]) -> str:
     return (
-        f"No physics need be missing, but the data sheet is off: with {in_words(strays)} the nominal line explains the "
-        f"recordings to the noise. Inside its tolerances it leaves {_errors(fit)}. Check the data sheet, or widen the "
-        "tolerance where it is a guess, and diagnose again."
+        f"No physics need be missing, but the data sheet is off: with {in_words(strays)} the nominal model explains "
+        f"the recordings down to the noise. Inside its tolerances it leaves {_errors(fit)}. Check the data sheet, or "
+        "widen the tolerance where it is a guess, and diagnose again."
     )
 
 

@@ -81,7 +81,7 @@ def _without_dead(record: Record, channel: Channel) -> tuple[Channel, list[str]]
             okay[first:end] = False
             said.append(
                 f"stays at {channel.output[first]:g} from {record.time_s[first]:g} to {record.time_s[end - 1]:g} s, "
-                "where the motor moves: dead there, and not used there."
+                "while the motor moves: its sensor is dead there, and it is not used there."
             )
     return replace(channel, okay=okay), said
 
@@ -111,14 +111,14 @@ def _turned(channel: Channel, mine: FloatArray, its: FloatArray, independent: fl
     alike = float(mine @ its) / both if both else 0.0
     if channel.kind is not OutputKind.TORQUE or channel.location is not Location.LOAD:
         if abs(alike) < CHANCE / np.sqrt(independent):
-            return "it does not go with the motor at all: another signal, or a sensor that shows noise alone."
+            return "it does not follow the motor at all: it is another signal, or the sensor shows only noise."
     if alike < -ALIKE:
-        return "it goes the other way than the motor: turned round. Give it a negative scale."
+        return "it moves opposite to the motor: its sign is turned. Give it a negative scale."
     if channel.kind is OutputKind.SPEED and alike > ALIKE:
         ratio = float(np.linalg.norm(mine) / np.linalg.norm(its))
         if not 1.0 / MOST_RATIO < ratio < MOST_RATIO:
             return (
-                f"it is {ratio:.3g} times the motor's speed: outputs are given as the motor shaft sees them. "
+                f"it is {ratio:.3g} times the motor's speed: outputs must be reflected to the motor shaft. "
                 f"Multiply its scale by {1.0 / ratio:.4g}, the gear's ratio."
             )
     return ""
@@ -142,8 +142,8 @@ def _off_clock(record: Record, mine: FloatArray, its: FloatArray, seen: BoolArra
     if abs(rate) <= CLEARLY * float(np.sqrt(spread[0, 0])) or apart_s <= record.sample_time_s:
         return ""
     return (
-        f"its clock and that of the first output run apart by {abs(rate) * 1e6:.0f} ppm, {apart_s:.3g} s over the "
-        "recording. Record both by one device, or bring them to one clock before."
+        f"its clock and that of the first output differ by {abs(rate) * 1e6:.0f} ppm, {apart_s:.3g} s over the "
+        "recording. Record both with one device, or correct the clock first."
     )
 
 

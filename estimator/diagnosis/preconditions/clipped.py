@@ -98,8 +98,8 @@ def _torques(record: Record) -> list[str]:
     trusted = record.torque_trusted
     return [
         f"recording {record.name}: {found.channel} stands at its limit {found.value:g} in {found.rows.mean():.1%} of "
-        "the rows. If the drive held it there all is well; if its reading is cut off, the verdict is of no use: "
-        "mask these rows ([signals] mask) or widen the range."
+        "the rows. If the drive limited it, the reading is right; if the reading is cut off, the verdict can't be "
+        "trusted: mask these rows ([signals] mask) or widen the range."
         for i in range(record.torque_nm.shape[1])
         for found in clipped(f"torque input {i + 1}", record.torque_nm[:, i], trusted[:, i])
     ]

@@ -36,5 +36,5 @@ def _damping(values: Mapping[str, float]) -> list[str]:
         return []
     return [
         f"model: with c = {values['c']:g} and k = {values['k']:g} the first mode ({first / (2.0 * math.pi):.3g} Hz) is "
-        f"damped {ratio:.3g} times critically: the line never swings. Are k and c in the right unit and order?"
+        f"damped {ratio:.3g} times critically: the line does not oscillate. Are k and c in the right unit and order?"
     ]

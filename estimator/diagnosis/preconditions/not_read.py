@@ -99,7 +99,7 @@ def without_not_read(records: Sequence[Record]) -> tuple[list[Record], list[str]
             why = "its reading had stopped" if found.held else "it was interpolated, not read"
             warnings.append(
                 f"recording {record.name}: the {found.channel} {what} in {found.rows.mean():.1%} of the rows: {why} "
-                "there; these rows are not used. Give the recording as it was read, gaps as gaps."
+                "there; these rows are not used. Give the raw recording, with its gaps."
             )
         mended.append(record if np.array_equal(okay, record.okay) else replace(record, okay=okay))
     return mended, warnings

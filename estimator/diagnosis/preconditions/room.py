@@ -57,5 +57,5 @@ def _warning(used: Sequence[Record], pieces: Sequence[Record]) -> str:
     return (
         f"{len(used)} of {len(pieces)} recordings are used (each piece between long gaps, or stretch of a long one, "
         f"counts as one), drawn from the whole list: {', '.join(piece.name for piece in used)}. Each has unknowns of "
-        "its own, so that more take gigabytes. Name those that matter, and keep others back by --holdout."
+        "its own, so more would take gigabytes. Give those that matter, and the others by --holdout."
     )

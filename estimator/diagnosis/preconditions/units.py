@@ -130,13 +130,13 @@ def _require_plausible_load(record: Record) -> None:
     if load > MOST_LOAD * torque:
         raise Implausible(
             f"recording {record.name} is implausible: its measured load torque reaches {load:.3g} Nm, its torque "
-            f"{torque:.3g} Nm. Is load in another unit, or not as the motor shaft sees it? Divide its scale in "
+            f"{torque:.3g} Nm. Is load in another unit, or not reflected to the motor shaft? Divide its scale in "
             "[signals] by the gear's ratio."
         )
 
 
 def _refuse_swapped_columns(record: Record, line: DrivelineModel) -> None:
-    """Refuse a recording that is plausible with a torque and the output changed for one another."""
+    """Refuse a recording that is plausible with a torque and the output exchanged."""
     for i in range(record.torque_nm.shape[1]):
         torque = record.torque_nm.copy()
         good = np.flatnonzero(record.okay)
@@ -145,7 +145,7 @@ def _refuse_swapped_columns(record: Record, line: DrivelineModel) -> None:
         if other is not None and _is_within_tolerance(other, line) and other.share >= SWAPPED_TELLS:
             raise Implausible(
                 f"recording {record.name} is implausible: it fits the nominal inertia with torque input {i + 1} and "
-                "the output changed for one another. Are their columns swapped in [signals]?",
+                "the output exchanged. Are their columns swapped in [signals]?",
                 Cure(record.name, swapped=i),
             )
 
@@ -189,7 +189,7 @@ def _refuse_per_mille(record: Record, line: DrivelineModel, found: Inertia) -> N
         f"recording {record.name} is implausible: its torques are whole numbers, and fit an inertia "
         f"{times(found.ratio)} times the nominal {_nominal(line)}. Are they per mille of a rated torque of about "
         f"{scale / PER_MILLE:.0f} Nm? "
-        "Then the scale is a thousandth of the rated torque. Where they are Nm, correct the inertia in the model file, "
+        "Then the scale is a thousandth of the rated torque. If they are in Nm, correct the inertia in the model file, "
         "or its tolerance.",
         Cure(record.name, torque=scale),
     )

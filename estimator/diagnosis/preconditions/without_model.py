@@ -71,8 +71,8 @@ def _refuse_swapped(record: Record, found: Inertia) -> None:
         other = _moved(replace(record, torque_nm=torque, output=record.torque_nm[:, i], torque_okay=None))
         if other.ratio > 0.0 and _is_clearer(other, found):
             raise Implausible(
-                f"recording {record.name}: torque input {i + 1} moves as the {record.kind.value} should, and the other "
-                "way round. Are their columns swapped?",
+                f"recording {record.name}: torque input {i + 1} moves as the {record.kind.value} should, and vice "
+                "versa. Are their columns swapped?",
                 Cure(record.name, swapped=i),
             )
 

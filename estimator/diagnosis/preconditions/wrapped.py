@@ -74,7 +74,7 @@ def unwrapped(records: Sequence[Record]) -> tuple[list[Record], list[str]]:
         output[seen] = np.unwrap(output[seen], period=period)
         mended.append(replace(record, output=output))
         warnings.append(
-            f"recording {record.name}: the position begins anew after {period:.6g}: it was put together again. Where "
-            "it is no angle that wraps, give it as it was read, without jumps."
+            f"recording {record.name}: the position wraps after {period:.6g} and was unwrapped. If it is no wrapped "
+            "angle, give it as it was read, without jumps."
         )
     return mended, warnings

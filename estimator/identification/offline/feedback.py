@@ -62,7 +62,7 @@ def judge_feedback(validation: Validation) -> Feedback:
         return Feedback(False, p_value, MappingProxyType({}), statement)
     statement = (
         f"The torque follows the speed (p = {p_value:.2g}): a driver or controller closes the loop. The output-error, "
-        "recursive and spectral estimates are biased by what noise it feeds back. Believe the Box-Jenkins model, or "
-        "record with the torque held but for the PRBS."
+        "recursive and spectral estimates are biased by the noise it feeds back. Use the Box-Jenkins model, or "
+        "hold the torque except for the PRBS."
     )
     return Feedback(True, p_value, CONSEQUENCES, statement)

@@ -32,7 +32,7 @@ Model = Annotated[
 ]
 Travel = Annotated[
     float | None,
-    typer.Option(metavar="M_PER_RAD", min=1e-6, help="Way of the vehicle in metres per radian of the motor shaft."),
+    typer.Option(metavar="M_PER_RAD", min=1e-6, help="Distance of the vehicle in metres per radian of the shaft."),
 ]
 Bus = Annotated[str | None, typer.Option(metavar="URL", help="CAN bus in place of the rig file's.")]
 Modbus = Annotated[str | None, typer.Option(metavar="HOST:PORT", help="PLC in place of the rig file's.")]

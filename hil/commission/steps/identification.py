@@ -92,7 +92,7 @@ def _resonance_findings(modes: list[Mode | None]) -> list[Finding]:
             f"the same within {100.0 * SPREAD:g} % (standard deviation)",
             f"{of_repeats(frequency).shown('Hz')}; between runs {100.0 * spread:.2f} %",
             spread <= SPREAD,
-            "See whether it goes with speed or time: the diagnosis looks for what does",
+            "See whether it depends on speed or time; the diagnosis looks for the cause",
         ),
         Finding("damping, mean of the runs", "–", of_repeats(damping).shown(), None),
     ]
@@ -128,7 +128,7 @@ def _quality_findings(found: list[Found]) -> list[Finding]:
             f"at least {LEAST_FIT_PERCENT:g} %",
             f"{min(fits):.1f} to {max(fits):.1f} %",
             min(fits) >= LEAST_FIT_PERCENT,
-            "A linear model does not tell the whole: see the diagnosis",
+            "A linear model does not explain everything: see the diagnosis",
         ),
     ]
 

@@ -44,8 +44,8 @@ class Probe:
 
 def _about(job: Job) -> str:
     return (
-        "asks the torque guard for a little more than each limit of the rig file and sees it refuse, and compares the "
-        "PLC's limits with what the runs to come need. Commands no torque."
+        "asks the torque guard for a little more than each limit of the rig file and checks that it refuses; compares "
+        "the PLC's limits with what the runs need. Commands no torque."
     )
 
 

@@ -64,7 +64,7 @@ def _about(job: Job) -> str:
     choice = _choice(job)
     return (
         f"drives at {cruise_of(job.rig).speed_rad_s:g} rad/s with a PRBS of ±{choice.amplitude_nm:g} Nm of both "
-        f"inverters together ({choice.reason}), measures what it does, and changes it where it has to."
+        f"inverters together ({choice.reason}), measures, and corrects the amplitude if needed."
     )
 
 

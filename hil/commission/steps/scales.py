@@ -174,7 +174,7 @@ def _mutual_findings(ratio: ResponseRatio, period_s: float) -> list[Finding]:
             f"equal within ±{100.0 * (GAIN[1] - 1.0):g} %",
             f"m2 gives {difference.shown_as('more', 'less', '%', 100.0)}",
             gain.is_within(*GAIN),
-            "Calibrate one against a torque transducer or a known inertia: no test here tells which is right",
+            "Calibrate one against a torque transducer or a known inertia: no test here shows which is right",
             blocking=gain.value < 0.0,
         ),
         Finding(

@@ -95,7 +95,7 @@ def _findings(job: Job, fit: PhysicalFit, mode: Mode, compared: list[Comparison]
                 f"at most {NOISE:g} times",
                 f"{unseen / noise:.2f} times {shown(noise, 'rad/s')}",
                 unseen <= NOISE * noise,
-                "More is there than motor, shaft and load: see the diagnosis",
+                "There is more than motor, shaft and load: see the diagnosis",
             )
         )
     if physical is not None:
@@ -106,7 +106,7 @@ def _findings(job: Job, fit: PhysicalFit, mode: Mode, compared: list[Comparison]
                 f"that of the runs, {shown(mode.frequency_hz, 'Hz')}, within {100.0 * RESONANCE:g} %",
                 f"{shown(physical.frequency_hz, 'Hz')}, {100.0 * off:+.2f} %",
                 abs(off) <= RESONANCE,
-                "Two masses and a spring do not tell the whole: see the diagnosis",
+                "Two masses and a spring do not explain everything: see the diagnosis",
             )
         )
     return [*findings, *_parameter_findings(fit)]

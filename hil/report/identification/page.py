@@ -59,9 +59,7 @@ def identification_page(
         *(recording_section(model, each, number) for number, (model, each) in enumerate(drawn)),
     ]
     if left := len(models) - len(drawn):
-        sections.append(
-            html.section("More recordings", html.paragraph(f"{left} more are in the tables alone.", "note"))
-        )
+        sections.append(html.section("More recordings", html.paragraph(f"{left} more are only in the tables.", "note")))
     sections.append(made_section(made))
     return html.page(f"Identification: {headline(studies)}", sections, FOOTER)
 
@@ -99,7 +97,7 @@ def _tiles(studies: Sequence[Study]) -> list[tuple[str, str, str]]:
 
 def _physical(studies: Sequence[Study]) -> str:
     note = (
-        "The two-mass drive, at the motor shaft, whose response the third-order Box-Jenkins model is. "
+        "The two-mass drive, at the motor shaft, that has the response of the third-order Box-Jenkins model. "
         "Sums are often known where their parts are not."
     )
     return html.section("Physical parameters", html.paragraph(note, "note"), *physical_tables(studies))
@@ -110,9 +108,7 @@ def _together(models: Sequence[LocalModel]) -> str:
         PoleSet(model.name, model.online.poles, model.online.zeros, series_colour(number))
         for number, model in enumerate(models)
     ]
-    note = (
-        "Lines: on-line models. Dots: spectral estimates. Click a name to take it away, double click to see it alone."
-    )
+    note = "Lines: on-line models. Dots: spectral estimates. Click a name to hide it, double click to see it alone."
     return html.section(
         "All recordings",
         html.paragraph(note, "note"),

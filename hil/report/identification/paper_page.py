@@ -161,8 +161,8 @@ def _signals(models: Sequence[LocalModel]) -> str:
 
 def _responses(models: Sequence[LocalModel]) -> str:
     text = (
-        "Lines: on-line models. Dots: spectral estimates of the same data. Click a name in the legend to take a line "
-        "away, double click to see it alone; the off-line models wait there."
+        "Lines: on-line models. Dots: spectral estimates of the same data. Click a name in the legend to hide a line, "
+        "double click to see it alone; the off-line models are hidden at first."
     )
     return html.section(
         "Fig. 4: on-line models against spectral estimates",
@@ -185,7 +185,7 @@ def _poles(models: Sequence[LocalModel]) -> str:
         "Fig. 5: poles and zeros",
         html.paragraph(
             "Crosses are poles, circles zeros, in the plane of z; what is known is black. Dotted: damping 0.1, 0.3, "
-            "0.6. A sampled model has its zeros where the continuous one's are only roughly.",
+            "0.6. The zeros of a sampled model are only roughly those of the continuous one.",
             "note",
         ),
         f"<h3>As identified, nA = {order}</h3>",

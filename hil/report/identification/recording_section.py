@@ -140,7 +140,7 @@ def _tests(study: Study) -> str:
         (
             "output error, with itself",
             shown_p(tests.autocorrelation.p_value),
-            "shown; road and load colour it, and say nothing against the model",
+            "shown only: road and load correlate it, which is no fault of the model",
         ),
     ]
     return html.table(("residual of", "p", "result"), rows, numbers=(1,))
@@ -150,7 +150,7 @@ def _feedback(study: Study) -> str:
     if not study.feedback.detected:
         return "none seen: the torque does not follow the speed"
     if not study.best.linearity.is_linear:
-        return "seen, which a drive that is not linear explains as well"
+        return "seen, but a nonlinear drive can cause it, too"
     return "the torque follows the speed"
 
 

@@ -35,8 +35,8 @@ def numbers_table(models: Sequence[LocalModel], studies: Sequence[Study]) -> str
         rows.append((known[0].reference.name, shown(mode.frequency_hz), shown(mode.damping), "", "", "", "", "", ""))
     note = (
         "Best: the Box-Jenkins model. ± is half the 95 % interval. Free-run fit, of the output-error model: 100 % less "
-        "the simulation error over the output's own variation; one step ahead uses the measured output and is no "
-        "measure of a model. Unseen: free run on the others."
+        "the simulation error over the output's own variation; one step ahead uses the measured output and does not "
+        "measure a model. Unseen: free run on the others."
     )
     return html.table(headings, rows, numbers=range(1, 8)) + html.paragraph(note, "note")
 
@@ -81,7 +81,7 @@ def physical_tables(studies: Sequence[Study]) -> list[str]:
         ]
     headings = ("recording", "parameter", "value", "95 % interval", "unit", "")
     table = html.table(headings, rows, numbers=(2, 3)) if rows else ""
-    return [table, *warnings, html.details("What is open, and what would tell", *is_open) if is_open else ""]
+    return [table, *warnings, html.details("What is open, and what would determine it", *is_open) if is_open else ""]
 
 
 def orders_table(choice: OrderChoice) -> str:

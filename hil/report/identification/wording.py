@@ -35,8 +35,8 @@ ADVICE = {
 CURES = {
     Verdict.GOOD: "",
     Verdict.NOT_LINEAR: "Take frequency and damping for this torque only; hil diagnose names the cause",
-    Verdict.CLOSED_LOOP: "Hold the torque but for the PRBS, or believe the Box-Jenkins model",
-    Verdict.NOT_EXCITED: "Raise the PRBS, record longer or faster, or expect none",
+    Verdict.CLOSED_LOOP: "Hold the torque constant except for the PRBS, or use the Box-Jenkins model",
+    Verdict.NOT_EXCITED: "Raise the PRBS, record longer or faster; or there is none",
     Verdict.INCOMPLETE: "Look at the residual tests; try --order auto, or diagnose the recording",
 }
 
@@ -117,7 +117,7 @@ def statement(models: Sequence[LocalModel], studies: Sequence[Study]) -> str:
         widest = max(mode.frequency_hz.ci95[1] - mode.frequency_hz.ci95[0] for mode in modes) / 2.0
         text += f" The resonance is known to ± {shown(widest, 'Hz')} in each (95 %)."
     low, high = studies[0].best.band_hz
-    text += f" It was looked for between {low:g} and {high:.3g} Hz, what the sampling allows."
+    text += f" It was sought between {low:g} and {high:.3g} Hz, as the sampling allows."
     fits = [each.validation.own.fit_percent for each in studies]
     text += f" Simulated in free run, the output-error model reproduces {_span(fits, '%')} of its recording"
     unseen = [run.fit_percent for each in studies for run in each.validation.unseen]
@@ -133,9 +133,8 @@ def warnings(studies: Sequence[Study]) -> list[str]:
             texts.append(f"{each.name}: the on-line estimate is {estimate.status.value}: {estimate.reason.message}.")
         if (fit := each.found.batch.fit_percent) < LITTLE_PERCENT:
             texts.append(
-                f"{each.name}: the off-line model reproduces {fit:.0f} % of its recording: most of the speed comes "
-                "from elsewhere than from the torque, and a resonance of such a model is none to believe. Raise the "
-                "PRBS or record longer."
+                f"{each.name}: the off-line model reproduces {fit:.0f} % of its recording: most of the speed is "
+                "not caused by the torque. Do not trust a resonance of such a model. Raise the PRBS or record longer."
             )
     for each in studies:
         used_s, whole_s = (x.time_s.shape[0] * x.sample_time_s for x in (each.found.offline, each.found.data))

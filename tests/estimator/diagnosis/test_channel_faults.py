@@ -52,7 +52,7 @@ def test_a_channel_by_another_clock_is_left_out(ppm: float) -> None:
     mended, (warning,) = with_usable_channels([with_channel(drifting)])
     assert mended[0].channels == ()
     assert "the output w2 is not used: its clock" in warning
-    apart = float(warning.split("apart by ")[1].split(" ppm")[0])
+    apart = float(warning.split("differ by ")[1].split(" ppm")[0])
     assert apart == pytest.approx(abs(ppm), rel=0.2)
 
 
@@ -61,7 +61,7 @@ def test_a_channel_by_another_clock_is_left_out(ppm: float) -> None:
 def test_a_channel_that_shows_noise_alone_is_left_out(kind: OutputKind, seed: int) -> None:
     mended, (warning,) = with_usable_channels([with_channel(np.full(N, 3.0), kind, seed=seed)])
     assert mended[0].channels == ()
-    assert "does not go with the motor at all" in warning
+    assert "does not follow the motor at all" in warning
 
 
 def test_where_a_channel_is_dead_it_is_not_used() -> None:
@@ -72,7 +72,7 @@ def test_where_a_channel_is_dead_it_is_not_used() -> None:
     mended, (warning,) = with_usable_channels([replace(whole, channels=(replace(whole.channels[0], output=dead),))])
     (channel,) = mended[0].channels
     assert np.flatnonzero(~channel.okay).tolist() == list(range(999, 1400))
-    assert "from 9.99 to 13.99 s, where the motor moves" in warning
+    assert "from 9.99 to 13.99 s, while the motor moves" in warning
 
 
 def test_a_channel_that_stands_with_the_motor_is_not_dead() -> None:

@@ -83,7 +83,7 @@ def test_a_torque_at_its_limit_is_reported_and_stays() -> None:
     assert mended is cut
     assert len(warnings) == 1
     assert "recording run: torque input 2 stands at its limit 8 in " in warnings[0]
-    assert "the verdict is of no use: mask these rows" in warnings[0]
+    assert "the verdict can't be trusted: mask these rows" in warnings[0]
 
 
 def test_sound_recordings_pass_as_they_are() -> None:

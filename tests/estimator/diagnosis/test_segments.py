@@ -73,7 +73,7 @@ def test_segments_keep_the_time_and_go_by_names_of_their_own() -> None:
     assert np.array_equal(second.torque_nm, whole.torque_nm[1400:])
     assert found.warnings == (
         "recording run: gaps of more than 1 s cut it into 3 segments, each with its own initial state and constant "
-        "load; left out as holding less than 2 s: 1; used: 100% of the good samples.",
+        "load; 1 of less than 2 s left out; used: 100% of the good samples.",
     )
 
 

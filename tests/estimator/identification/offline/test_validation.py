@@ -101,7 +101,7 @@ def test_a_controller_that_answers_the_speed_is_detected_and_its_effects_reporte
         found = judge_feedback(validate(fit_box_jenkins(record, THIRD), record))
         assert found.detected
         assert "The torque follows the speed" in found.statement
-        assert "Believe the Box-Jenkins model" in found.statement
+        assert "Use the Box-Jenkins model" in found.statement
         assert set(found.consequences) >= {"output_error", "box_jenkins", "spectral"}
 
 
