@@ -53,7 +53,8 @@ def test_recording_says_what_it_is(short_rig: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "number", [signal.SIGINT, signal.SIGTERM, pytest.param(signal.SIGHUP, marks=pytest.mark.campaign)]
+    "number",
+    [signal.SIGTERM, *(pytest.param(number, marks=pytest.mark.campaign) for number in (signal.SIGINT, signal.SIGHUP))],
 )
 def test_signal_in_the_middle_keeps_the_recording_and_disarms(
     spawn: Callable[..., subprocess.Popen[str]], short_rig: Path, tmp_path: Path, number: signal.Signals

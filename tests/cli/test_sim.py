@@ -15,7 +15,8 @@ from hil.simulator.loopback import Address
 
 
 @pytest.mark.parametrize(
-    "number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.campaign), signal.SIGHUP]
+    "number",
+    [signal.SIGHUP, *(pytest.param(number, marks=pytest.mark.campaign) for number in (signal.SIGINT, signal.SIGTERM))],
 )
 def test_serves_until_a_signal_and_prints_one_line(
     simulate: Callable[..., Any], short_rig: Path, number: signal.Signals
