@@ -239,7 +239,7 @@ def test_a_run_enters_itself_also_one_that_was_stopped(
         process = spawn("run", str(short_rig), "cruise", *addresses, "--out", str(tmp_path / "cut.csv"))
         await_rows(tmp_path / "cut.part.csv", process)
         process.send_signal(signal.SIGINT)
-        assert process.wait(30) == 130
+        assert process.wait(60) == 130
     capsys.readouterr()
     whole, cut = documents(capsys, "--store", str(tmp_path))["runs"]
     assert (whole["experiment"], whole["outcome"]) == ("reversal", "complete")
