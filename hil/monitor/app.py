@@ -28,7 +28,7 @@ from hil.monitor.log_panel import LogPanel
 from hil.monitor.messages import Kind, Mark, Notice, Quit, Reset, Start, Stop
 from hil.monitor.panel import Panel
 from hil.monitor.snapshot import Activity
-from hil.monitor.source import LONGEST_END_S, Source
+from hil.monitor.source import Source
 from hil.monitor.state import LiveState
 from hil.rig.stop import STOP_SIGNALS
 
@@ -41,8 +41,8 @@ _NOT_OURS = re.compile(r"@font-face\s*\{[^}]*\}|<!--.*?-->", re.DOTALL)
 INTERRUPTED = 130
 """Exit status, as `hil.cli.main` has it; that module is not to be imported from below."""
 
-GRACE_S = LONGEST_END_S + 5.0
-"""Time from a stop signal to an end without ceremony [s]."""
+LAST_WORDS_S = 5.0
+"""Time from the end of the rig to an end without ceremony, after a stop signal [s]."""
 
 
 class MonitorApp(App[None]):
@@ -134,7 +134,7 @@ class MonitorApp(App[None]):
 
     def _on_signal(self, number: int, frame: FrameType | None) -> None:
         """Quit; a terminal that is gone may hold the screen's last words up for ever, so the end is seen to."""
-        threading.Thread(target=_end_for_good, name="last resort", daemon=True).start()
+        threading.Thread(target=_end_for_good, args=(self._source,), name="last resort", daemon=True).start()
         self._events.call_soon_threadsafe(self.action_interrupt)
 
     def on_resize(self, event: Resize) -> None:
@@ -158,6 +158,8 @@ class MonitorApp(App[None]):
             self.exit()
 
     def _draw(self) -> None:
+        if not self.screen_stack:
+            return  # the view is ending: its clock may outlive its screens
         snapshot = self._state.snapshot(time.monotonic() - self._heard_s)
         for panel in self.screen_stack[0].query(Panel):
             panel.show(snapshot)
@@ -258,7 +260,8 @@ class MonitorApp(App[None]):
         return not allowed
 
 
-def _end_for_good() -> None:
-    """End this program if it has not ended by itself; the rig's process then ends its run without it."""
-    time.sleep(GRACE_S)
+def _end_for_good(source: Source) -> None:
+    """End this program if it has not ended by itself soon after the rig has; a rig that has not ends without it."""
+    source.await_end()
+    time.sleep(LAST_WORDS_S)
     os._exit(INTERRUPTED)

@@ -88,6 +88,9 @@ class ReplaySource:
     def send(self, order: Order) -> None:
         """Do nothing: there is no rig."""
 
+    def await_end(self) -> None:
+        """Return at once: nothing drives."""
+
     def _due(self) -> int:
         """Count the samples that are due now."""
         passed_s = (self._clock_ns() - self._began_ns) / NS_PER_S * self._speed

@@ -5,6 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import time
 from collections.abc import Sequence
+from multiprocessing.connection import wait
 from types import TracebackType
 from typing import Protocol, Self
 
@@ -35,6 +36,10 @@ class Source(Protocol):
 
     def send(self, order: Order) -> None:
         """Give an order; nothing happens where nothing can take it."""
+        ...
+
+    def await_end(self) -> None:
+        """Return once nothing can drive any more, at the latest after `LONGEST_END_S`; from any thread."""
         ...
 
     def __enter__(self) -> Self:
@@ -101,6 +106,10 @@ class RigSource:
             self._connection.send(order)
         except OSError:
             return
+
+    def await_end(self) -> None:
+        """Return once the rig's process has ended, at the latest after `LONGEST_END_S`; from any thread."""
+        wait([self._process.sentinel], LONGEST_END_S)
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None

@@ -43,7 +43,7 @@ def test_while_it_reads(spawn: Spawn, drive: Path, command: str, number: signal.
     process = spawn(*(words.get(word, word) for word in command.split()))
     writing = opened_by(process, pipe)
     process.send_signal(number)
-    printed, complaint = process.communicate(timeout=20)
+    printed, complaint = process.communicate(timeout=60)
     os.close(writing)
     assert (process.returncode, printed, complaint) == (130, "", "interrupted\n")
     assert not out.exists()
@@ -59,7 +59,7 @@ def test_while_it_computes(spawn: Spawn, drive: Path, number: signal.Signals) ->
     os.write(writing, (drive / "drive.toml").read_bytes())
     os.close(writing)
     process.send_signal(number)
-    printed, complaint = process.communicate(timeout=20)
+    printed, complaint = process.communicate(timeout=60)
     assert (process.returncode, printed, complaint) == (130, "", "interrupted\n")
     assert not out.exists()
 

@@ -41,7 +41,7 @@ def test_a_full_disk_takes_nothing_and_a_stalled_one_takes_it_later(tmp_path: Pa
         mounted.stall(0.3)
         began_s = time.monotonic()
         file.write(b"late")
-        assert time.monotonic() - began_s > 0.2
+        assert time.monotonic() - began_s > 0.2  # of the disk's own stall; a busy machine makes it longer
         mounted.await_end_of_stall()
         mounted.fill()
         with file, pytest.raises(OSError, match="No space left"):

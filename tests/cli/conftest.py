@@ -11,6 +11,10 @@ from pathlib import Path
 
 import pytest
 
+from tests.without_budget import all_the_time_it_needs
+
+__all__ = ["all_the_time_it_needs"]
+
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "rig.toml"
 ANY_ADDRESS = ("--bus", "ws://127.0.0.1:0/", "--modbus", "127.0.0.1:0")
 

@@ -118,7 +118,7 @@ def test_signal_in_the_middle_and_the_way_on(
         process = spawn(*words)
         await_rows(out / "runs" / "noise-rest.part.csv", process)
         process.send_signal(number)
-        process.communicate(timeout=30)
+        process.communicate(timeout=60)
         assert process.returncode == status
         if number is not signal.SIGKILL:  # then the drives themselves have to notice, see test_dead_host
             assert_disarmed(server.bus_url, 1, 2)

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
 import math
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -46,13 +49,37 @@ def recordings(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     return [write(folder / f"run_{seed}.csv", seed) for seed in (1, 2)]
 
 
+@dataclass(frozen=True)
+class Identified:
+    """What one command printed and wrote."""
+
+    said: str
+    complaints: str
+    out: Path
+
+    @property
+    def document(self) -> dict:
+        return dict(json.loads((self.out / "identification.json").read_text()))
+
+
+@pytest.fixture(scope="module")
+def both(recordings: list[Path], tmp_path_factory: pytest.TempPathFactory) -> Identified:
+    """Both recordings identified once, with a model and two estimators compared."""
+    folder = tmp_path_factory.mktemp("identified")
+    (folder / "bus.toml").write_text(MODEL)
+    out = folder / "made" / "out"
+    more = ("--model", str(folder / "bus.toml"), "--estimator", "rls", "--estimator", "ekf")
+    with contextlib.redirect_stdout(io.StringIO()) as said, contextlib.redirect_stderr(io.StringIO()) as complaints:
+        assert run(arguments(recordings, out, *more)) == 0
+    return Identified(said.getvalue(), complaints.getvalue(), out)
+
+
 def arguments(recordings: list[Path], out: Path, *more: str) -> list[str]:
     return ["identify", *map(str, recordings), "--out", str(out), *more]
 
 
-def test_writes_the_identification_of_every_recording(recordings: list[Path], tmp_path: Path) -> None:
-    assert run(arguments(recordings, tmp_path / "made" / "out")) == 0
-    document = json.loads((tmp_path / "made" / "out" / "identification.json").read_text())
+def test_writes_the_identification_of_every_recording(both: Identified) -> None:
+    document = both.document
     assert document["schema"] == "hil.identification/1"
     assert [entry["name"] for entry in document["recordings"]] == ["run_1", "run_2"]
     frequency_hz, damping = true_resonance()
@@ -64,12 +91,11 @@ def test_writes_the_identification_of_every_recording(recordings: list[Path], tm
         assert entry["online"]["samples_used"] == 1024
         spectral = entry["spectral"]
         assert {len(spectral[key]) for key in ("frequency_hz", "magnitude", "phase_rad", "coherence")} == {256}
-    assert sorted(path.name for path in (tmp_path / "made" / "out").iterdir()) == ["identification.json", "report.html"]
+    assert sorted(path.name for path in both.out.iterdir()) == ["identification.json", "report.html"]
 
 
-def test_the_models_read_back_are_those_of_the_estimator_to_the_bit(recordings: list[Path], tmp_path: Path) -> None:
-    run(arguments(recordings[:1], tmp_path))
-    entry = json.loads((tmp_path / "identification.json").read_text())["recordings"][0]
+def test_the_models_read_back_are_those_of_the_estimator_to_the_bit(recordings: list[Path], both: Identified) -> None:
+    entry = both.document["recordings"][0]
     result = identify(read_record(recordings[0]))
     assert entry["online"]["theta"] == result.online.theta.tolist()
     assert entry["batch"]["A"] == result.batch.model.A.tolist()
@@ -81,35 +107,27 @@ def test_the_models_read_back_are_those_of_the_estimator_to_the_bit(recordings: 
     np.testing.assert_array_equal(poles, online.poles)
 
 
-def test_prints_a_short_table(recordings: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    run(arguments(recordings, tmp_path))
-    printed = capsys.readouterr()
-    assert "run_2" in printed.out
-    assert "8.2" in printed.out
-    assert "Hz" in printed.out
-    assert str(tmp_path / "identification.json") in printed.out.replace("\n", "")
-    assert printed.err == ""  # no progress where nobody watches
+def test_prints_a_short_table(both: Identified) -> None:
+    assert "run_2" in both.said
+    assert "8.2" in both.said
+    assert "Hz" in both.said
+    assert str(both.out / "identification.json") in both.said.replace("\n", "")
+    assert both.complaints == ""  # no progress where nobody watches
 
 
-def test_prints_json_that_is_the_file(
-    recordings: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    run(arguments(recordings[:1], tmp_path, "--json"))
-    assert capsys.readouterr().out == (tmp_path / "identification.json").read_text()
-
-
-def test_a_model_file_adds_what_was_expected(
-    recordings: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    model = tmp_path / "bus.toml"
-    model.write_text(MODEL)
-    assert run(arguments(recordings[:1], tmp_path, "--model", str(model))) == 0
-    nominal = json.loads((tmp_path / "identification.json").read_text())["nominal_resonance"]
+def test_a_model_file_adds_what_was_expected(both: Identified) -> None:
+    nominal = both.document["nominal_resonance"]
     assert (nominal["frequency_hz"], nominal["damping"]) == pytest.approx(true_resonance())
-    assert "model file" in capsys.readouterr().out
-    model.write_text(ONE_MASS)
-    assert run(arguments(recordings[:1], tmp_path, "--model", str(model))) == 0
+    assert "model file" in both.said
+
+
+def test_a_model_of_one_mass_has_no_resonance(
+    recordings: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "bus.toml").write_text(ONE_MASS)
+    assert run(arguments(recordings[:1], tmp_path, "--model", str(tmp_path / "bus.toml"))) == 0
     assert json.loads((tmp_path / "identification.json").read_text())["nominal_resonance"] is None
+    assert "model file" not in capsys.readouterr().out
 
 
 def test_signals_that_no_estimator_takes_are_named(
@@ -131,8 +149,11 @@ def test_signals_that_no_estimator_takes_are_named(
     assert "not used" not in capsys.readouterr().err
 
 
-def test_samples_and_period_can_be_chosen(recordings: list[Path], tmp_path: Path) -> None:
-    assert run(arguments(recordings[:1], tmp_path, "--samples", "300", "--sample-time", "0.01")) == 0
+def test_samples_and_period_can_be_chosen_and_the_json_printed_is_the_file(
+    recordings: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(arguments(recordings[:1], tmp_path, "--samples", "300", "--sample-time", "0.01", "--json")) == 0
+    assert capsys.readouterr().out == (tmp_path / "identification.json").read_text()
     entry = json.loads((tmp_path / "identification.json").read_text())["recordings"][0]
     assert entry["online"]["samples_used"] == 300
     assert entry["online"]["sample_time_s"] == 0.01
@@ -142,10 +163,9 @@ def test_samples_and_period_can_be_chosen(recordings: list[Path], tmp_path: Path
     assert entry["batch"]["sample_time_s"] == 0.01  # off line the recording's own, on line the paper's
 
 
-def test_each_entry_says_how_sure_it_is_and_what_speaks_against_it(recordings: list[Path], tmp_path: Path) -> None:
-    assert run(arguments(recordings, tmp_path)) == 0
+def test_each_entry_says_how_sure_it_is_and_what_speaks_against_it(both: Identified) -> None:
     frequency_hz, damping = true_resonance()
-    for entry in json.loads((tmp_path / "identification.json").read_text())["recordings"]:
+    for entry in both.document["recordings"]:
         interval = entry["resonance_interval"]
         low, high = interval["frequency_hz"]["ci95"]
         best = entry["best"]
@@ -168,11 +188,8 @@ def test_each_entry_says_how_sure_it_is_and_what_speaks_against_it(recordings: l
         assert J_M["value"] == pytest.approx(1.6, rel=0.1)
 
 
-def test_the_report_says_what_was_identified(recordings: list[Path], tmp_path: Path) -> None:
-    model = tmp_path / "bus.toml"
-    model.write_text(MODEL)
-    assert run(arguments(recordings, tmp_path, "--model", str(model), "--estimator", "rls", "--estimator", "ekf")) == 0
-    page = (tmp_path / "report.html").read_text()
+def test_the_report_says_what_was_identified(both: Identified) -> None:
+    page = (both.out / "report.html").read_text()
     wanted = (
         "Resonance at 8.2",
         "From 2 recordings",
@@ -185,7 +202,7 @@ def test_the_report_says_what_was_identified(recordings: list[Path], tmp_path: P
     )
     assert [text for text in wanted if text not in page] == []
     assert page.count('class="plotly-graph-div"') == 2 + 5 * 2
-    compared = json.loads((tmp_path / "identification.json").read_text())["compared"]
+    compared = both.document["compared"]
     assert [(each["recording"], each["estimator"]) for each in compared] == [
         (name, estimator) for name in ("run_1", "run_2") for estimator in ("rls", "ekf")
     ]
@@ -220,7 +237,7 @@ def test_a_torque_that_moves_the_speed_next_to_nothing_is_reported(
 def test_order_and_delay_are_chosen_where_they_are_left_open(
     recordings: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert run(arguments(recordings, tmp_path, "--order", "3", "--delay", "auto", "--json")) == 0
+    assert run(arguments(recordings[:1], tmp_path, "--order", "3", "--delay", "auto", "--json")) == 0
     document = json.loads(capsys.readouterr().out)
     candidates = document["order_choice"]["candidates"]
     assert sorted(each["nk"] for each in candidates) == [0, 1, 2, 3]

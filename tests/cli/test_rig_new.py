@@ -208,7 +208,7 @@ def test_a_person_at_a_terminal(terminal: tuple[subprocess.Popen[bytes], int, Pa
             assert "expected a whole number from 1 to 127" in read_until(end, question.asks)
         os.write(end, f"{VEHICLE.get(question.name, '')}\n".encode())
     assert "written" in read_until(end, "hil check")
-    assert process.wait(timeout=20) == 0
+    assert process.wait(timeout=60) == 0
     assert read_rig(path).inverters.m2.torque_limit_nm == 90.0
 
 
@@ -224,5 +224,5 @@ def test_the_end_of_the_input_writes_nothing(terminal: tuple[subprocess.Popen[by
     read_until(end, "Name of the rig")
     os.write(end, b"\x04")
     assert "the end of the input" in read_until(end, "end of the input")
-    assert process.wait(timeout=20) == 2
+    assert process.wait(timeout=60) == 2
     assert list(path.parent.iterdir()) == []

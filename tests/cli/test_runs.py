@@ -15,10 +15,12 @@ import numpy as np
 import pytest
 
 from hil.cli.main import run as hil
+from hil.config.rig_file import read_rig
 from hil.recording import Table, write_table
 from hil.recording.checksum import text_sha256
 from hil.store import RunStore, register_run, store_of
-from tests.cli.conftest import Simulation, await_rows
+from tests.cli.conftest import await_rows
+from tests.rig.serving import served
 
 Capture = pytest.CaptureFixture[str]
 
@@ -228,19 +230,16 @@ def test_a_look_makes_no_store(
 
 
 def test_a_run_enters_itself_also_one_that_was_stopped(
-    simulate: Callable[..., Simulation],
-    spawn: Callable[..., subprocess.Popen[str]],
-    short_rig: Path,
-    tmp_path: Path,
-    capsys: Capture,
+    spawn: Callable[..., subprocess.Popen[str]], short_rig: Path, tmp_path: Path, capsys: Capture
 ) -> None:
-    addresses = simulate(short_rig).addresses
-    run = ["run", str(short_rig), "reversal", *addresses, "--out"]
-    assert hil([*run, str(tmp_path / "whole.csv"), "--pace", "fast"]) == 0
-    process = spawn("run", str(short_rig), "cruise", *addresses, "--out", str(tmp_path / "cut.csv"))
-    await_rows(tmp_path / "cut.part.csv", process)
-    process.send_signal(signal.SIGINT)
-    assert process.wait(30) == 130
+    with served(read_rig(short_rig), bus_url="ws://127.0.0.1:0/") as (server, _):
+        addresses = ("--bus", server.bus_url, "--modbus", str(server.modbus))
+        run = ["run", str(short_rig), "reversal", *addresses, "--out"]
+        assert hil([*run, str(tmp_path / "whole.csv"), "--pace", "fast"]) == 0
+        process = spawn("run", str(short_rig), "cruise", *addresses, "--out", str(tmp_path / "cut.csv"))
+        await_rows(tmp_path / "cut.part.csv", process)
+        process.send_signal(signal.SIGINT)
+        assert process.wait(60) == 130
     capsys.readouterr()
     whole, cut = documents(capsys, "--store", str(tmp_path))["runs"]
     assert (whole["experiment"], whole["outcome"]) == ("reversal", "complete")

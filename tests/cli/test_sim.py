@@ -15,7 +15,8 @@ from hil.simulator.loopback import Address
 
 
 @pytest.mark.parametrize(
-    "number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.campaign), signal.SIGHUP]
+    "number",
+    [signal.SIGHUP, *(pytest.param(number, marks=pytest.mark.campaign) for number in (signal.SIGINT, signal.SIGTERM))],
 )
 def test_serves_until_a_signal_and_prints_one_line(
     simulate: Callable[..., Any], short_rig: Path, number: signal.Signals
@@ -24,7 +25,7 @@ def test_serves_until_a_signal_and_prints_one_line(
     assert simulation.bus.startswith("ws://127.0.0.1:")
     assert not simulation.bus.endswith(":0/")
     simulation.process.send_signal(number)
-    rest, complaints = simulation.process.communicate(timeout=20)
+    rest, complaints = simulation.process.communicate(timeout=60)
     assert simulation.process.returncode == 0
     assert (rest, complaints) == ("", "")
 

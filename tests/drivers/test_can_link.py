@@ -67,7 +67,7 @@ def test_frame_is_stamped_after_the_sync_that_caused_it(channel: str) -> None:
         assert sync is not None
         assert (sync.arbitration_id, bytes(sync.data)) == (0x080, b"")
         device.send(frame(0x185, b"\x01\x02"))
-        assert event.wait(5.0)
+        assert event.wait(60.0)
     [(data, arrival_ns)] = arrived
     assert data == b"\x01\x02"
     assert arrival_ns > t_ns
@@ -82,7 +82,7 @@ def test_remote_and_error_frames_are_not_data(channel: str) -> None:
         device.send(can.Message(arbitration_id=0x185, is_remote_frame=True, is_extended_id=False))
         device.send(can.Message(arbitration_id=0x185, is_error_frame=True, is_extended_id=False))
         device.send(frame(0x186, b""))
-        assert event.wait(5.0)
+        assert event.wait(60.0)
     assert arrived == []
 
 
@@ -172,7 +172,7 @@ def test_frames_travel_both_ways_through_a_server(channel: str) -> None:
     ):
         link.subscribe(0x185, lambda data, t_ns: event.set())
         device.send(frame(0x185, b"\x01"))
-        assert event.wait(5.0)
+        assert event.wait(60.0)
         link.send(0x205, b"\x02")
         message = device.recv(5.0)
         assert message is not None
@@ -183,7 +183,7 @@ def test_server_that_goes_away_is_bus_down_at_the_next_call(channel: str) -> Non
     with CanBridge(Address("127.0.0.1", 0), channel) as bridge:
         link = CanLink.open(bridge.url)
     with link:
-        link._thread.join(5.0)
+        link._thread.join(60.0)
         with pytest.raises(BusDown, match=r"receiving ended.*hil sim"):
             link.sync()
 
@@ -203,7 +203,7 @@ def test_bus_that_goes_away_is_bus_down_at_every_call(channel: str) -> None:
     bus = virtual_bus(channel)
     with CanLink(bus) as link:
         bus.shutdown()
-        link._thread.join(5.0)
+        link._thread.join(60.0)
         for _ in range(2):
             with pytest.raises(BusDown, match=r"receiving ended .*closed bus"):
                 link.sync()
@@ -247,7 +247,7 @@ def test_frame_that_can_not_be_read_is_raised_once_and_receiving_continues(
         link.subscribe(0x186, lambda data, t_ns: event.set())
         device.send(frame(0x000, b""))
         device.send(frame(0x186, b""))
-        assert event.wait(5.0)
+        assert event.wait(60.0)
         with pytest.raises(ProtocolViolation, match=r"frame of 3 bytes|frame 0x000 with data \[\]"):
             link.sync()
         link.sync()
@@ -263,7 +263,7 @@ def test_defect_of_a_subscriber_ends_receiving_and_is_raised_at_the_end(channel:
         link.subscribe(0x185, fail)
         device.send(frame(0x185, b""))
         if link._thread is not None:
-            link._thread.join(5.0)
+            link._thread.join(60.0)
     with pytest.raises(BusDown, match=r"receiving ended .a defect."):
         link.sync()
     with pytest.raises(ZeroDivisionError):

@@ -113,7 +113,7 @@ def test_two_that_answer_each_other_in_two_threads_do_not_wait_for_each_other(ch
         for thread in threads:
             thread.start()
         for thread in threads:
-            thread.join(20.0)
+            thread.join(60.0)
     assert sorted(got) == [1, 2, 11, 12]
 
 

@@ -26,7 +26,7 @@ from tests.real.conftest import real_recording
 from tests.rig.serving import changed, served
 
 SHORT = 40
-MUTANTS = 4
+MUTANTS = 2
 
 
 def written(maker: Maker, folder: Path) -> Path:

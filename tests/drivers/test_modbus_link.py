@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import re
-import time
 
 import pytest
 
@@ -144,17 +143,17 @@ def test_what_is_no_whole_answer_is_shown(answer: Answer, got: str) -> None:
 
 
 def test_a_lost_connection_is_not_a_timeout_and_ends_the_wait_at_once() -> None:
-    async def run() -> float:
+    """A wait to its end would take the hour, which no test is given."""
+
+    async def run() -> None:
         async with peer(lambda request: None) as port:
-            link = ModbusLink("127.0.0.1", port, 1, timeout_s=30.0)
+            link = ModbusLink("127.0.0.1", port, 1, timeout_s=3600.0)
             await link.open()
-            began = time.monotonic()
             with pytest.raises(BusDown, match=r"the connection was lost.*\[plc\.security\]"):
                 await link.read(HOLDING, 5, 2)
             assert not link.connected
-            return time.monotonic() - began
 
-    assert asyncio.run(run()) < 10.0
+    asyncio.run(run())
 
 
 def test_a_confirmed_write_passes() -> None:

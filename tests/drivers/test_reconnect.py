@@ -43,7 +43,7 @@ def test_controller_that_says_it_is_off_the_bus_is_bus_down() -> None:
     link = CanLink(OffBus(new_channel()))
     with link:
         assert link._thread is not None
-        link._thread.join(5.0)
+        link._thread.join(60.0)
         with pytest.raises(BusDown, match="bus-off"):
             link.sync()
 

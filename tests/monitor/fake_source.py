@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import asyncio
 import math
 from collections.abc import Sequence
 from types import TracebackType
 from typing import Self
 
+from textual.pilot import Pilot
+
+from hil.monitor.app import MonitorApp
 from hil.monitor.messages import (
     Health,
     NodeHealth,
@@ -35,6 +39,9 @@ class FakeSource:
 
     def send(self, order: Order) -> None:
         self.sent.append(order)
+
+    def await_end(self) -> None:
+        """Nothing drives."""
 
     def __enter__(self) -> Self:
         return self
@@ -89,3 +96,17 @@ def health(m1: NodeHealth | None = None, plc: PlcHealth | None = None) -> Health
     nan = math.nan
     timing = TimingHealth(PERIOD_S, 0, 0, 0, 0, nan, nan, nan, nan, nan, nan)
     return Health(m1 or node(), node(node_id=2), plc or PlcHealth(None, None, None), timing)
+
+
+async def settled(pilot: Pilot[None]) -> None:
+    """Let the view take what has come and draw it now, not at its next picture."""
+    assert isinstance(pilot.app, MonitorApp)
+    pilot.app._tick()
+    await pilot.pause()
+
+
+async def ended(app: MonitorApp) -> None:
+    """Let the view take what has come, and wait until it has ended."""
+    app._tick()
+    while app.is_running:
+        await asyncio.sleep(0.01)

@@ -17,7 +17,7 @@ from hil.monitor.messages import Began, Ended, Mark, Quit, Ready, Reset, Samples
 from hil.monitor.panel import Panel
 from hil.monitor.snapshot import Activity
 from hil.monitor.state import LiveState
-from tests.monitor.fake_source import PERIOD_S, FakeSource, sample
+from tests.monitor.fake_source import PERIOD_S, FakeSource, ended, sample, settled
 from tests.monitor.test_panels import snapshot
 
 CHOICES = (Choice("cruise", "holds a speed"), Choice("tip", "steps the torque"))
@@ -37,11 +37,6 @@ def play(script: Script, source: FakeSource | None = None) -> tuple[FakeSource, 
 
     asyncio.run(go())
     return source, app
-
-
-async def settled(pilot: Pilot[None]) -> None:
-    """Wait for two pictures."""
-    await pilot.pause(0.3)
 
 
 def activity(app: MonitorApp) -> Activity:
@@ -111,8 +106,7 @@ def test_quitting_waits_for_the_rig_to_end(key: str, interrupted: bool) -> None:
         assert source.sent == [Quit()]
         assert app.is_running
         source.coming = [Ended()]
-        await settled(pilot)
-        assert not app.is_running
+        await ended(app)
 
     _, app = play(script)
     assert app.interrupted is interrupted
@@ -121,8 +115,7 @@ def test_quitting_waits_for_the_rig_to_end(key: str, interrupted: bool) -> None:
 def test_a_second_interrupt_does_not_wait() -> None:
     async def script(pilot: Pilot[None], source: FakeSource, app: MonitorApp) -> None:
         await pilot.press("ctrl+c", "ctrl+c")
-        await settled(pilot)
-        assert not app.is_running
+        await ended(app)
 
     play(script)
 
@@ -130,8 +123,7 @@ def test_a_second_interrupt_does_not_wait() -> None:
 def test_a_source_that_fails_ends_the_view() -> None:
     async def script(pilot: Pilot[None], source: FakeSource, app: MonitorApp) -> None:
         source.coming = [Ended("CAN bus: gone")]
-        await settled(pilot)
-        assert not app.is_running
+        await ended(app)
 
     _, app = play(script)
     assert app._state.ended == Ended("CAN bus: gone")
@@ -143,8 +135,7 @@ def test_a_recording_takes_no_orders() -> None:
         assert source.sent == []
         assert "no rig to drive" in app._state.snapshot().headline.message
         await pilot.press("q")
-        await settled(pilot)
-        assert not app.is_running
+        await ended(app)
 
     play(script, FakeSource(can_drive=False, coming=[]))
 

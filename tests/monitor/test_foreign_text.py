@@ -13,7 +13,7 @@ from hil.monitor.choice import Choice
 from hil.monitor.messages import Began, Kind, Mark, Notice, Ready
 from hil.monitor.panel import printable
 from hil.monitor.state import LiveState
-from tests.monitor.fake_source import PERIOD_S, FakeSource, health, node
+from tests.monitor.fake_source import PERIOD_S, FakeSource, health, node, settled
 
 TEXT = "[bold]x[/]"
 WRONG = "[/red] [[x]"
@@ -28,10 +28,10 @@ def shown(*keys: str, text: str = TEXT, coming: tuple[object, ...] = ()) -> str:
 
     async def go() -> None:
         async with app.run_test(size=(80, 24)) as pilot:
-            await pilot.pause(0.3)
+            await settled(pilot)
             for key in keys:
                 await pilot.press(key)
-            await pilot.pause(0.3)
+            await settled(pilot)
             drawn.append(app.export_screenshot())
 
     asyncio.run(go())
@@ -67,7 +67,7 @@ def test_a_mark_is_sent_as_it_was_typed() -> None:
 
     async def go() -> None:
         async with app.run_test(size=(80, 24)) as pilot:
-            await pilot.pause(0.3)
+            await settled(pilot)
             await pilot.press("m", *TEXT, "enter")
 
     asyncio.run(go())

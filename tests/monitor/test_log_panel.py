@@ -10,7 +10,7 @@ from hil.monitor.app import MonitorApp
 from hil.monitor.log_panel import LogPanel, ago, log, log_lines
 from hil.monitor.messages import Kind, Notice, Samples
 from hil.monitor.state import LiveState
-from tests.monitor.fake_source import PERIOD_S, FakeSource, sample
+from tests.monitor.fake_source import PERIOD_S, FakeSource, sample, settled
 
 LONG = " ".join(f"word{k}" for k in range(200))
 """Ten lines of a terminal of 80 columns, and more than a third of its page."""
@@ -48,11 +48,11 @@ def shown_after(*keys: str, then: str = "") -> list[str]:
     async def go() -> None:
         app = MonitorApp(FakeSource(), live, page="log")
         async with app.run_test(size=(80, 24)) as pilot:
-            await pilot.pause(0.3)
+            await settled(pilot)
             await pilot.press(*keys)
             if then:
                 live.take(Notice(0, Kind.FAULT, then))
-            await pilot.pause(0.3)
+            await settled(pilot)
             lines.extend(app.query_one(LogPanel).render().plain.splitlines())
 
     asyncio.run(go())

@@ -17,7 +17,7 @@ from hil.config.rig_file import read_rig
 from hil.recording.formats import read_table
 from hil.simulator.rig_server import RigServer
 from hil.store import RunStore
-from tests.monitor.terminal import LEAVE_SCREEN, Terminal
+from tests.monitor.terminal import LEAVE_SCREEN, PATIENCE_S, Terminal
 from tests.rig.observer import assert_disarmed
 from tests.rig.serving import served
 
@@ -115,7 +115,7 @@ def test_a_killed_view_leaves_nothing_armed(rig_path: Path, tmp_path: Path) -> N
     with watched(rig_path, tmp_path / "runs") as (terminal, server):
         start(terminal)
         terminal.signal(signal.SIGKILL)
-        until = time.monotonic() + 30.0
+        until = time.monotonic() + PATIENCE_S
         while server.torque_nm != (0.0, 0.0) or not list((tmp_path / "runs").glob("cruise-*.parquet")):
             assert time.monotonic() < until
             time.sleep(0.05)

@@ -8,6 +8,9 @@ from contextlib import contextmanager
 import pytest
 
 from hil.proof.truth import experiments
+from tests.without_budget import all_the_time_it_needs
+
+__all__ = ["all_the_time_it_needs"]
 
 
 @contextmanager

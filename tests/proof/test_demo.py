@@ -41,7 +41,7 @@ def test_an_interrupted_demo_leaves_nothing_running_and_nothing_half_written(tmp
         if line.startswith("3/6"):
             break
     demo.send_signal(stop)
-    demo.communicate(timeout=30)
+    demo.communicate(timeout=60)
     assert demo.returncode == 130
     assert not out.exists()
     assert list(workshop.iterdir()) == []

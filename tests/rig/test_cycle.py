@@ -36,10 +36,10 @@ def answer_every(syncs: int, link: CanLink) -> None:
     link.subscribe(0x700 + M2, lambda data, t_ns: operational.set() if data[0] == OPERATIONAL else None)
     link.send(0x000, bytes((0x80, M2)))  # PRE-OPERATIONAL: a mapping in use can't be changed
     link.send(0x600 + M2, bytes((0x2F, 0x00, 0x18, 0x02, syncs, 0, 0, 0)))
-    assert answered.wait(5.0)
+    assert answered.wait(60.0)
     operational.clear()
     link.send(0x000, bytes((0x01, M2)))
-    assert operational.wait(5.0)
+    assert operational.wait(60.0)
 
 
 @contextmanager

@@ -35,12 +35,24 @@ def faulty(*texts: str) -> Any:
 
 
 def run_with(*texts: str, patience_s: float = 0.1) -> tuple[RunSummary, Samples]:
-    """Run with faults that do not end it; each answer that is lost costs the patience."""
+    """Run, if with faults then with such as do not end it; each answer that is lost costs the patience."""
     samples = Samples()
     with faulty(*texts) as (server, rig):
         summary = run_once(rig, samples, experiment="reversal", pacer=fast(rig, patience_s))
         assert_disarmed(server.bus_url, 1, 2)
     return summary, samples
+
+
+@pytest.fixture(scope="module")
+def clean() -> Samples:
+    """The same run without a fault."""
+    return run_with()[1]
+
+
+@pytest.fixture(scope="module")
+def lossy() -> tuple[RunSummary, Samples]:
+    """A run in which a tenth of the first drive's answers is lost."""
+    return run_with("bus.lose=0.1:0x181")
 
 
 @pytest.mark.parametrize(
@@ -87,7 +99,7 @@ def test_drive_that_can_not_be_configured_is_not_armed(fault: str, error: type[D
     assert samples.rows == []
 
 
-def assert_torque_ends(server: RigServer, within_s: float = 5.0) -> None:
+def assert_torque_ends(server: RigServer, within_s: float = 60.0) -> None:
     deadline_s = time.monotonic() + within_s
     while server.torque_nm != (0.0, 0.0):
         assert time.monotonic() < deadline_s, f"torque is still {server.torque_nm}"
@@ -112,28 +124,28 @@ def test_host_that_is_off_the_bus_disarms_nobody_but_the_drives_miss_it(within_s
     assert isinstance(caught.value.__cause__, BusDown)
 
 
-def test_lost_answers_are_flagged_and_the_run_continues() -> None:
-    summary, samples = run_with("bus.lose=0.1:0x181")
+def test_lost_answers_are_flagged_and_the_run_continues(lossy: tuple[RunSummary, Samples]) -> None:
+    summary, samples = lossy
     stale = [row for row in samples.rows if row.flags is SampleFlag.M1_STALE]
     assert summary.recorded == 100
     assert 2 <= len(stale) <= 25  # 100 draws of 0.1: outside with a chance below 1e-4
     assert summary.flagged == len(stale)
 
 
-def test_the_same_seed_loses_the_same_frames() -> None:
-    flags = [[row.flags for row in run_with("bus.lose=0.1:0x182")[1].rows] for _ in range(2)]
-    assert flags[0] == flags[1]
+def test_the_same_seed_loses_the_same_frames(lossy: tuple[RunSummary, Samples]) -> None:
+    again = run_with("bus.lose=0.1:0x181")[1]
+    assert again.column("flags") == lossy[1].column("flags")
 
 
-def test_repeated_frames_change_nothing() -> None:
-    clean, repeated = (run_with(*texts)[1] for texts in ([], ["bus.repeat=0.3"]))
+def test_repeated_frames_change_nothing(clean: Samples) -> None:
+    repeated = run_with("bus.repeat=0.3")[1]
     for name in ("torque_m1_nm", "torque_m2_nm", "speed_rad_s", "flags"):
         assert repeated.column(name) == clean.column(name)
 
 
 @pytest.mark.parametrize("fault", ["bus.reorder=0.2:0x181", "bus.delay=0.002", "bus.jitter=0.002"])
-def test_frames_that_come_late_within_the_patience_change_nothing(fault: str) -> None:
-    clean, late = (run_with(*texts, patience_s=5.0)[1] for texts in ([], [fault]))
+def test_frames_that_come_late_within_the_patience_change_nothing(fault: str, clean: Samples) -> None:
+    late = run_with(fault, patience_s=5.0)[1]
     for name in ("torque_m1_nm", "torque_m2_nm", "speed_rad_s", "flags"):
         assert late.column(name) == clean.column(name)
 
@@ -147,9 +159,11 @@ def test_frames_that_come_late_within_the_patience_change_nothing(fault: str) ->
         ("m1.clock_drift=5000", "speed_rad_s", SampleFlag.GOOD),
     ],
 )
-def test_limits_of_a_drive_are_seen_in_what_it_tells(fault: str, changes: str, remark: SampleFlag) -> None:
+def test_limits_of_a_drive_are_seen_in_what_it_tells(
+    fault: str, changes: str, remark: SampleFlag, clean: Samples
+) -> None:
     """A sample in which a limit acts is flagged, and counts: its torque was read."""
-    clean, limited = (run_with(*texts)[1] for texts in ([], [fault]))
+    limited = run_with(fault)[1]
     assert limited.column(changes) != clean.column(changes)
     assert {row.flags for row in limited.rows} <= {SampleFlag.GOOD, remark}
     assert remark in {row.flags for row in limited.rows}

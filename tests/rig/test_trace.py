@@ -321,7 +321,7 @@ def test_disk_that_fills_up_is_reported_and_the_cycle_continues(tmp_path: Path) 
     trace._writer.stop()
     trace._writer = _FullDisk()
     trace.take(can.Message(arbitration_id=1), 0)
-    trace._thread.join(5.0)
+    trace._thread.join(60.0)
     trace.take(can.Message(arbitration_id=1), 0)
     for tell in (trace.raise_if_failed, lambda: trace.__exit__(None, None, None)):
         with pytest.raises(RecordingError, match="No space left"):

@@ -34,7 +34,7 @@ def master() -> Iterator[tuple[SimulatedRig, BaseNode402]]:
             network.add_node(node)
             node.sdo.RESPONSE_TIMEOUT = 2.0
             node.sdo[0x1017].raw = 50
-            node.nmt.wait_for_heartbeat(timeout=5.0)
+            node.nmt.wait_for_heartbeat(timeout=60.0)
             node.setup_402_state_machine()
             node.nmt.state = "OPERATIONAL"
             node.rpdo[1].start(SYNC_S)  # the library leaves the sending of a synchronous RPDO to its user
@@ -69,7 +69,7 @@ def test_its_torque_is_the_inverter_s_and_ends_with_the_state() -> None:
         rpdo[0x6071].raw = 200
         rpdo[0x60B2].raw = -50
         for _ in range(5):  # an RPDO on its way, the SYNC that takes it, the TPDO that tells
-            assert node.tpdo[1].wait_for_reception(timeout=5.0) is not None
+            assert node.tpdo[1].wait_for_reception(timeout=60.0) is not None
         assert rig.torque_nm[0] == pytest.approx(90.0)  # 150 per mille of 600 Nm
         assert node.tpdo[1][0x6077].raw == pytest.approx(150, abs=6)  # noise of one count
         node.state = "SWITCH ON DISABLED"
@@ -81,10 +81,10 @@ def test_it_sees_the_fault_and_its_emergency_and_resets_it() -> None:
         device = rig._nodes[0]._device
         node.state = "OPERATION ENABLED"
         device.fail(0x2310)
-        emergency = node.emcy.wait(0x2310, timeout=5.0)
+        emergency = node.emcy.wait(0x2310, timeout=60.0)
         assert emergency is not None
         assert emergency.register == 0x03
-        node.tpdo[1].wait_for_reception(timeout=5.0)
+        node.tpdo[1].wait_for_reception(timeout=60.0)
         assert node.is_faulted()
         node.state = "SWITCH ON DISABLED"
         assert not node.is_faulted()

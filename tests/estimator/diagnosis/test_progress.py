@@ -33,7 +33,7 @@ def misread(records: list[Record]) -> list[Record]:
     "records",
     [
         rubbing(lambda speed: 0.0),
-        rubbing(lambda speed: 12.0),
+        pytest.param(rubbing(lambda speed: 12.0), marks=pytest.mark.campaign),
         late(rubbing(lambda speed: 12.0)),
         misread(quiet(values=ONE_MASS)),
     ],

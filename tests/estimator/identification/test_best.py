@@ -55,7 +55,7 @@ def pair(best: BestEstimate) -> tuple[float, float]:
     return best.mode.frequency_hz.value, best.mode.damping.value
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.campaign) for seed in (2, 3))])
 def test_with_a_gap_the_damping_is_near_the_linear_one_and_what_it_depends_on_is_shown(seed: int) -> None:
     best = best_estimate(with_gap(seed))
     assert best.verdict is Verdict.NOT_LINEAR
@@ -77,11 +77,14 @@ def test_buses_on_which_other_minima_are_near(seed: int) -> None:
         assert value == pytest.approx(truth, rel=within)
 
 
-def test_healthy_recordings_pass_their_own_residual_tests() -> None:
-    """A test at 95 % fails on one in twenty: on three or more of ten with a probability of 1.2 %."""
-    found = [best_estimate(drive(draw_bus(seed), world=CLEAN)) for seed in range(5000, 5010)]
-    assert sum(best.validation.independence.is_independent for best in found) >= 8
-    assert sum(best.verdict is Verdict.GOOD for best in found) >= 6  # tests of linearity and feedback fail, too
+@pytest.mark.parametrize(
+    ("buses", "independent", "good"), [(4, 3, 2), pytest.param(10, 8, 6, marks=pytest.mark.campaign)]
+)
+def test_healthy_recordings_pass_their_own_residual_tests(buses: int, independent: int, good: int) -> None:
+    """A test at 95 % fails on one in twenty: on 2 or more of 4 with a probability of 1.4 %, on 3 of 10 with 1.2 %."""
+    found = [best_estimate(drive(draw_bus(seed), world=CLEAN)) for seed in range(5000, 5000 + buses)]
+    assert sum(best.validation.independence.is_independent for best in found) >= independent
+    assert sum(best.verdict is Verdict.GOOD for best in found) >= good  # tests of linearity and feedback fail, too
     assert all(best.linearity.is_linear for best in found)
 
 

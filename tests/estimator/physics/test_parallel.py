@@ -35,7 +35,7 @@ def test_results_come_in_the_order_of_the_items() -> None:
 
     def work(item: int) -> int:
         if item == 0:
-            assert last_began.wait(10.0)
+            assert last_began.wait(60.0)
         if item == 5:
             last_began.set()
         return item**2

@@ -21,7 +21,7 @@ TIGHT = 1e-22 * np.eye(6)
 @pytest.fixture(scope="module")
 def fits() -> list[LinearFit]:
     """Models of third order at the recordings' own period."""
-    return [fit_box_jenkins(decimate(cruise(seed, 30.0).record, 1), Orders(3, 3, 1)) for seed in range(100, 106)]
+    return [fit_box_jenkins(decimate(cruise(seed, 20.0).record, 1), Orders(3, 3, 1)) for seed in range(100, 106)]
 
 
 def test_the_sampled_drive_has_the_exact_response() -> None:

@@ -10,6 +10,9 @@ from estimator.signals.record import Record
 from tests.estimator.identification.closed_loop import controlled
 from tests.estimator.identification.driveline import cruise
 
+DURATION_S = 20.0
+"""Half of what the estimators' benchmark has: the criterion of too low an order is still a hundred above the best."""
+
 AMONG = [Orders(2, 2, 1), Orders(3, 3, 1), Orders(4, 4, 1), Orders(3, 3, 2)]
 
 
@@ -23,7 +26,7 @@ def test_three_states_and_one_sample_of_delay_are_found() -> None:
     """The truth wins in most runs and its criterion is never far from the best; too low an order always is."""
     chosen = []
     for seed in (400, 401, 403):
-        choice = select_orders(controlled(seed, 0.0)[0], AMONG)
+        choice = select_orders(controlled(seed, 0.0, DURATION_S)[0], AMONG)
         by_orders = {candidate.orders: candidate.criterion for candidate in choice.candidates}
         chosen.append(choice.chosen)
         assert choice.chosen.nk == 1
@@ -42,16 +45,16 @@ def test_a_load_that_swings_by_itself_costs_one_order_and_no_more() -> None:
 
 
 def test_a_longer_delay_is_found() -> None:
-    late = delayed(cruise(400, 40.0).record, -1)  # torque written down one sample early
-    assert select_orders(late, AMONG).chosen.nk == 2
+    late = delayed(cruise(400, DURATION_S).record, -1)  # torque written down one sample early
+    assert select_orders(late, [Orders(3, 3, 1), Orders(3, 3, 2)]).chosen.nk == 2
 
 
 def test_unseen_recordings_stand_next_to() -> None:
-    choice = select_orders(cruise(400, 30.0).record, AMONG[:3], [cruise(401, 30.0).record])
+    choice = select_orders(cruise(400, 15.0).record, AMONG[:2], [cruise(401, 15.0).record])
     assert all(80 < candidate.unseen_fit_percent < 100 for candidate in choice.candidates)
     assert choice.candidates[0].criterion == 0.0
     assert "Free-run fit on unseen recordings" in choice.statement
-    assert "unseen" not in select_orders(cruise(400, 30.0).record, AMONG[:2]).statement
+    assert "unseen" not in select_orders(cruise(400, 15.0).record, AMONG[:1]).statement
 
 
 def test_no_candidate_is_refused() -> None:

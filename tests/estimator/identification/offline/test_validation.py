@@ -21,7 +21,7 @@ THIRD = Orders(3, 3, 1)
 
 @pytest.fixture(scope="module")
 def records() -> list[Record]:
-    return [decimate(cruise(seed, 30.0, name=f"run_{seed}").record, 1) for seed in range(300, 306)]
+    return [decimate(cruise(seed, 20.0, name=f"run_{seed}").record, 1) for seed in range(300, 306)]
 
 
 @pytest.fixture(scope="module")
