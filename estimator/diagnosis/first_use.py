@@ -17,7 +17,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import numba
 from numba.core import types
 from numba.core.types import boolean, float64, int64
 
@@ -34,7 +33,8 @@ COMPILING = "compiling, once on this machine: about a minute"
 _ROW, _ROWS, _STACK, _INDICES = float64[::1], float64[:, ::1], float64[:, :, ::1], int64[::1]
 _fields: Any = types.NamedTuple
 _TUPLE: Any = types.UniTuple
-_NOTHING: Any = numba.typeof(())
+_JOINED: Any = types.Tuple
+_NOTHING: Any = _JOINED(())
 _NUDGES = _fields((_INDICES, _ROW, float64), Nudges)
 _EACH = (_ROWS, _ROWS, _INDICES, _INDICES, _ROW, _ROWS, _ROWS, _INDICES, boolean, _STACK)
 _CHAIN = _fields((_STACK, _ROWS, _ROWS, _ROW, float64, float64), Chain)
