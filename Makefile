@@ -41,6 +41,7 @@ campaign: $(READY)
 bench: $(READY)
 	$(BIN)/python -m tests.benchmarks.fit
 	$(BIN)/python -m tests.benchmarks.diagnosis
+	$(BIN)/python -m tests.benchmarks.own_laws
 	$(BIN)/python -m tests.benchmarks.fieldbus
 	$(BIN)/python -m tests.benchmarks.recursive
 	$(BIN)/python -m tests.benchmarks.reports

@@ -10,6 +10,7 @@ import dis
 import inspect
 import math
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -179,7 +180,11 @@ class OwnLaw:
     def at(
         self, time_s: float, motor: float, load: float, twist: float, torque: float, values: Mapping[str, float]
     ) -> float:
-        """Return the law of one moment; see ``__call__``."""
+        """Return the law of one moment; see ``__call__``, which says what is wrong where something is."""
+        with suppress(Exception):
+            found = float(self.function(time_s, motor, load, twist, torque, **values))  # type: ignore[arg-type]
+            if math.isfinite(found):
+                return found
         return float(self(np.array([[time_s], [motor], [load], [twist], [torque]]), values)[0])
 
     def _compiled(self, values: Mapping[str, float]) -> Callable[..., float] | None:
