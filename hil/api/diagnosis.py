@@ -99,7 +99,7 @@ class DiagnosisResult:
 def diagnose(
     recordings: Recordings, model: Model, holdout: Recordings = (), budget_s: float | None = None
 ) -> DiagnosisResult:
-    """Say where simulation and recordings differ, and which physics the model left out.
+    """Say where simulation and recordings differ, and which physics the model lacks.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def diagnose(
     holdout : the same
         Kept back to judge the explanation on.
     budget_s : float, optional
-        Time after which the best so far is the answer [s]; 30 by default.
+        Time after which the best answer so far is given [s]; 30 by default.
 
     Raises
     ------

@@ -16,7 +16,7 @@ def bugreport(
     rig: Annotated[list[Path] | None, typer.Option(metavar="RIG", help="Rig file; may be repeated.")] = None,
     runs: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the recordings: their last run.")] = Path(),
 ) -> None:
-    """Pack versions, rig file, logs and what the last run says of itself; list what is in it.
+    """Pack versions, rig file, logs and the metadata of the last run; list the contents.
 
     Keys, passwords, certificates, folders and names of user and machine are taken out. Nothing is sent anywhere.
     """

@@ -47,11 +47,11 @@ def check(
 ) -> None:
     """Find both inverters and the PLC and compare them with rig file, EDS and register map.
 
-    Reads only, but for --prove-stop: nothing is armed, no torque is commanded. Exit status 3 if a device is
+    Only reads, except with --prove-stop: nothing is armed, no torque is commanded. Exit status 3 if a device is
     missing or differs.
 
     With --eds, check such a file line by line against CiA 306 and against what this program needs of a drive:
-    exit status 2 if it can't be used. Without RIG no device is looked for.
+    exit status 2 if it can't be used. Without RIG no device is accessed.
     """
     from drivers.eds_check import check_eds
     from hil.config.rig_file import read_rig

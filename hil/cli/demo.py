@@ -36,7 +36,7 @@ app = typer.Typer(add_completion=False)
 def demo(
     seed: Annotated[
         int | None,
-        typer.Option(min=0, help="What bus and effect are drawn from; else at random, and printed."),
+        typer.Option(min=0, help="Seed of bus and effect; else at random, and printed."),
     ] = None,
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for report, recordings and opened seal.")] = Path(
         "out/demo"
@@ -44,7 +44,7 @@ def demo(
 ) -> None:
     """Conceal an effect in a simulated rig, find it over CANopen and Modbus, then open the seal.
 
-    Takes about a minute. The verdict is written before the seal is opened, and is judged as it stands.
+    Takes about a minute. The verdict is written before the seal is opened, and is judged unchanged.
     """
     from rich.console import Console
 

@@ -51,11 +51,13 @@ app = typer.Typer(add_completion=False)
 )
 def diagnose(
     recordings: Annotated[list[Path], typer.Argument(metavar="REC", help="Recordings to explain.")],
-    model: Annotated[Path, typer.Option("--model", metavar="MODEL", help="Model file to question, or an FMU.")],
+    model: Annotated[
+        Path, typer.Option("--model", metavar="MODEL", help="Model file, nominal or augmented, or an FMU.")
+    ],
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the results.")],
     holdout: Annotated[
         list[Path] | None,
-        typer.Option(HOLDOUT, metavar="REC...", help="Recordings kept back to judge the explanation on."),
+        typer.Option(HOLDOUT, metavar="REC...", help="Recordings kept out of the fit to test the result on."),
     ] = None,
     budget_s: Annotated[
         float | None,
@@ -63,7 +65,7 @@ def diagnose(
             "--budget-s",
             min=0.0,
             metavar="S",
-            help="Time after which the best so far is the answer \\[s]; 30 by default.",
+            help="Time after which the best answer so far is given \\[s]; 30 by default.",
         ),
     ] = None,
     dbc: Dbc = None,
@@ -79,7 +81,7 @@ def diagnose(
     jobs: Jobs = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print diagnosis.json instead of the summary.")] = False,
 ) -> None:
-    """Say where simulation and recordings differ, and which physics the model left out.
+    """Say where simulation and recordings differ, and which physics the model lacks.
 
     Writes DIR/diagnosis.json, DIR/augmented.toml and DIR/report.html. Of an FMU, what acts at its inputs and outputs is
     sought, and no augmented.toml written.

@@ -26,7 +26,7 @@ FilterOf = Annotated[
     ),
 ]
 FilterRun = Annotated[
-    str | None, typer.Option("--filter-run", metavar="NAME", help="Which recording of that file, where it has several.")
+    str | None, typer.Option("--filter-run", metavar="NAME", help="Which recording of that file, if it has several.")
 ]
 
 

@@ -38,7 +38,7 @@ def identify(
         help="Model file: how to read foreign recordings, and what to compare with.",
     ),
     samples: int = typer.Option(
-        1024, "--samples", metavar="N", help="Good samples the on-line estimate is run through; 0 for all."
+        1024, "--samples", metavar="N", help="Good samples for the on-line estimate; 0 for all."
     ),
     sample_time: float | None = typer.Option(
         None,
@@ -48,7 +48,7 @@ def identify(
         "recording's own.",
     ),
     order: str = typer.Option("4", "--order", metavar="N|auto", help="nA = nB; auto: by an information criterion."),
-    delay: str = typer.Option("1", "--delay", metavar="N|auto", help="Total delay in samples; auto: what fits."),
+    delay: str = typer.Option("1", "--delay", metavar="N|auto", help="Total delay in samples; auto: the same way."),
     estimator: list[str] = typer.Option(
         [], "--estimator", metavar="NAME", help="Another recursive estimator to compare on the same data; repeatable."
     ),

@@ -22,7 +22,7 @@ def look(
     dbc: Dbc = None,
     model: Annotated[
         Path | None,
-        typer.Option("--model", metavar="MODEL", help="Model file to read FILE by: tells which scale is wrong."),
+        typer.Option("--model", metavar="MODEL", help="Model file to read FILE by: shows which scale is wrong."),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:

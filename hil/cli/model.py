@@ -51,13 +51,14 @@ def new(
         typer.Option("--from", metavar="FILE", help="identification.json of hil identify: values and tolerances."),
     ] = None,
     run: Annotated[
-        str | None, typer.Option("--run", metavar="NAME", help="Recording of --from; else the surest of all.")
+        str | None,
+        typer.Option("--run", metavar="NAME", help="Recording of --from; else the most certain one."),
     ] = None,
     recording: Annotated[
         Path | None, typer.Option("--recording", metavar="REC", help="Look into it, and write its \\[signals].")
     ] = None,
     dbc: Dbc = None,
-    yes: Annotated[bool, typer.Option("--yes", help="Ask nothing: what is missing is refused.")] = False,
+    yes: Annotated[bool, typer.Option("--yes", help="Ask nothing: missing values are an error.")] = False,
 ) -> None:
     """Ask for structure, values and tolerances, and write a model file with a comment on every line.
 

@@ -52,9 +52,7 @@ def paper(
             "--model", metavar="MODEL", help="Model file: how to read foreign recordings, and what to compare with."
         ),
     ] = None,
-    seed: Annotated[
-        int, typer.Option(min=0, help="What payload, road, wind and driver of each experiment are drawn from.")
-    ] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of payload, road, wind and driver of each experiment.")] = 1,
     duration: Annotated[float, typer.Option(metavar="SECONDS", help="Length of each experiment.")] = 30.0,
     delay: Annotated[
         int, typer.Option(metavar="N", min=0, help="Total delay of the models in samples; the paper's d is 1.")

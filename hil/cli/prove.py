@@ -23,9 +23,7 @@ SHORT = 12
 Folder = Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a set of cases.")]
 Jobs = Annotated[int, typer.Option(min=1, help="Cases at a time.")]
 Cases = Annotated[int, typer.Option(min=1, max=999, help="How many cases.")]
-Seed = Annotated[
-    int | None, typer.Option(min=0, help="What everything is drawn from; else at random, and not reported.")
-]
+Seed = Annotated[int | None, typer.Option(min=0, help="Seed of everything; else at random, and not reported.")]
 KeyFile = Annotated[Path | None, typer.Option("--key-file", metavar="FILE", help="File of the key, outside DIR.")]
 Data = Annotated[
     Path | None, typer.Option(metavar="DATA", help="Folder of the real recordings; without it they are left out.")
@@ -46,7 +44,7 @@ def prove(
     rigs: Annotated[bool, typer.Option(help="Drive the sealed rigs too: CANopen and Modbus.")] = True,
     data: Data = None,
 ) -> None:
-    """Prove the claim: sealed cases, sealed rigs and, where they are at hand, real recordings; one scoreboard.
+    """Prove the claim: sealed cases, sealed rigs and, with --data, real recordings; one scoreboard.
 
     Called again it continues where it was interrupted. The key is kept next to DIR, in DIR.key. To check the claim
     yourself, make the set on one machine, answer it on another, and open it with the key.
@@ -97,7 +95,7 @@ def make(
 
 @app.command(epilog="Example: hil prove run proof")
 def run(folder: Folder, jobs: Jobs = 2) -> None:
-    """Let the public command answer every case; it is shown DIR/cases, one case at a time, and nothing else."""
+    """Let the public command answer every case; it sees only DIR/cases, one case at a time."""
     from hil.proof.prove.answer import answer
 
     with _progress() as progress:
@@ -141,8 +139,8 @@ def open_(
 @app.command(epilog="Example: hil prove wire proof")
 def wire(
     folder: Folder,
-    only: Annotated[list[str] | None, typer.Option(metavar="RIG", help="This one alone; may be repeated.")] = None,
-    seed: Annotated[int, typer.Option(min=0, help="What buses and sizes are drawn from.")] = RIG_SEED,
+    only: Annotated[list[str] | None, typer.Option(metavar="RIG", help="Only this one; may be repeated.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of buses and sizes.")] = RIG_SEED,
 ) -> None:
     """Drive rigs with something concealed in their slaves, over CANopen and Modbus; writes DIR/wire/wire.json."""
     from hil.proof.prove.scoreboard import WIRE
@@ -161,10 +159,10 @@ def wire(
 def real(
     data: Annotated[Path, typer.Argument(metavar="DATA", help="Folder of the real recordings.")],
     folder: Folder,
-    only: Annotated[list[str] | None, typer.Option(metavar="NAME", help="This one alone; may be repeated.")] = None,
+    only: Annotated[list[str] | None, typer.Option(metavar="NAME", help="Only this one; may be repeated.")] = None,
     jobs: Jobs = 1,
 ) -> None:
-    """Conceal what is known of real recordings, ask for it, compare; writes DIR/real/real.json."""
+    """Conceal what is known of real recordings, diagnose, compare; writes DIR/real/real.json."""
     from hil.proof.prove.scoreboard import REAL
     from hil.proof.real.run import run_real
 

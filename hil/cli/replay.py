@@ -37,7 +37,7 @@ def replay(
         float | None, typer.Option(metavar="X", help="Multiple of real time; without it as fast as possible.")
     ] = None,
     estimate: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Where the course of the estimate goes, as JSON.")
+        Path | None, typer.Option(metavar="FILE", help="File for the course of the estimate, as JSON.")
     ] = None,
     model: Annotated[
         Path | None, typer.Option(metavar="MODEL", help="Model file: how to read a foreign recording.")

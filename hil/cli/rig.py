@@ -39,7 +39,7 @@ def new(
             "--eds", metavar="EDS", help="Data sheet (EDS, DCF) of both inverters, in place of the shipped one."
         ),
     ] = None,
-    yes: Annotated[bool, typer.Option("--yes", help="Ask nothing: defaults stand for what is not given.")] = False,
+    yes: Annotated[bool, typer.Option("--yes", help="Ask nothing: use defaults for what is not given.")] = False,
     name: Annotated[str | None, _answer("Name of the rig, for people.")] = None,
     can: Annotated[str | None, _answer("CAN bus, INTERFACE:CHANNEL.")] = None,
     period_s: Annotated[str | None, _answer("SYNC period in seconds.")] = None,

@@ -66,7 +66,7 @@ def sim(
         ),
     ] = False,
     trust_laws: TrustLaws = False,
-    seed: Annotated[int | None, typer.Option(min=0, help="Of all that is random; else the rig file's.")] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="Seed of all noise; else the rig file's.")] = None,
 ) -> None:
     """Serve two inverters, the PLC and the driveline to other programs on this machine.
 

@@ -44,7 +44,7 @@ READ_MORE = {
 STATUSES = {
     ExitStatus.DONE: "done; a verdict is a result, whatever it says",
     ExitStatus.BAD_INPUT: "wrong use or unreadable input; the message names file, line or key, what was expected, "
-    "what came",
+    "what was found",
     ExitStatus.DEVICE_FAULT: "a device or the bus is at fault, or the vehicle is not fit for the run",
     ExitStatus.REFUSED_BY_GUARD: "the torque guard refused a torque",
     ExitStatus.INTERRUPTED: "interrupted",
@@ -86,7 +86,7 @@ def _statuses() -> Iterator[str]:
     yield from (f"| {status.value} | {STATUSES[status]} |" for status in ExitStatus)
     yield from (
         "",
-        "Torque is zero and the drives are disarmed on every way out; where a drive can't confirm it, that is said.",
+        "Torque is zero and the drives are disarmed on every way out; if a drive can't confirm it, a message says so.",
         "",
     )
 
@@ -126,7 +126,7 @@ def _sign(argument: Any) -> str:
 def _names(option: Any) -> str:
     takes = "" if option.is_flag else f" {option.metavar or _kind(option)}"
     names = ", ".join(f"`{name}{takes}`" for name in (*option.opts, *option.secondary_opts))
-    return names + (", again and again" if option.multiple else "") + (", needed" if option.required else "")
+    return names + (", repeatable" if option.multiple else "") + (", needed" if option.required else "")
 
 
 def _kind(option: Any) -> str:

@@ -28,7 +28,7 @@ KeepResults = Annotated[
 ]
 Model = Annotated[
     Path | None,
-    typer.Option(metavar="MODEL", help="Model file to predict with and to question; else one is made."),
+    typer.Option(metavar="MODEL", help="Model file for predictions and the diagnosis; else one is made."),
 ]
 Travel = Annotated[
     float | None,

@@ -19,7 +19,7 @@ def compare(
     store: Folder = HERE,
     as_json: AsJson = False,
 ) -> None:
-    """Set two runs alongside each other: facts, results, and the lines in which their rig files differ."""
+    """Compare two runs: facts, results, and the lines in which their rig files differ."""
     from hil.store.compare import compare_runs
 
     with opened(store) as runs:

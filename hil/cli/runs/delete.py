@@ -18,9 +18,9 @@ def delete(
     yes: Annotated[bool, typer.Option("--yes", help="Don't ask; for scripts.")] = False,
     store: Folder = HERE,
 ) -> None:
-    """Take a run out of the store, after asking; its recording stays, unless that is asked for.
+    """Delete a run from the store, after asking; its recording stays, except with --with-recording.
 
-    As long as the recording is there, 'hil runs rebuild' enters it again.
+    While the recording exists, 'hil runs rebuild' enters it again.
     """
     from hil.store.remove import remove_files, require_own
 

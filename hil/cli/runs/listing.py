@@ -19,15 +19,15 @@ if TYPE_CHECKING:
 def listed(
     context: typer.Context,
     experiment: Annotated[str, typer.Option(help="Only runs of this experiment.")] = "",
-    since: Annotated[str, typer.Option(metavar="DATE", help="Begun on that day (UTC) or later, 2026-11-21.")] = "",
-    until: Annotated[str, typer.Option(metavar="DATE", help="Begun on that day (UTC) or earlier.")] = "",
+    since: Annotated[str, typer.Option(metavar="DATE", help="Started on that day (UTC) or later: 2026-11-21.")] = "",
+    until: Annotated[str, typer.Option(metavar="DATE", help="Started on that day (UTC) or earlier.")] = "",
     rig: Annotated[str, typer.Option(help="Name of the rig, or the beginning of its file's SHA-256.")] = "",
     verdict: Annotated[str, typer.Option(help="explained, partly_explained, unexplained or no_mismatch.")] = "",
     text: Annotated[str, typer.Option(help="In notes, rig file, results, names.")] = "",
     store: Folder = HERE,
     as_json: AsJson = False,
 ) -> None:
-    """List the runs of a folder, oldest first; all that is asked for must hold."""
+    """List the runs of a folder, oldest first; all filters must hold."""
     if context.invoked_subcommand is not None:
         return
     from hil.store import RunFilter

@@ -14,9 +14,9 @@ if TYPE_CHECKING:
 
 
 def rebuild(store: Folder = HERE, as_json: AsJson = False) -> None:
-    """Bring the store up to what is in the folder: enter recordings, find moved ones, fix a damaged store.
+    """Update the store from the folder: enter recordings, find moved ones, fix a damaged store.
 
-    What can still be read of a damaged store is kept, notes and results included; the damaged file is put aside.
+    What can still be read of a damaged store is kept, notes and results included; the damaged file is kept.
     """
     from hil.errors import StoreError
     from hil.store.rebuild import rebuild as rebuilt

@@ -13,7 +13,7 @@ from hil.cli.runs.options import HERE, Folder, RunId
 
 def note(
     run: RunId,
-    text: Annotated[str, typer.Argument(metavar="TEXT", help="What is to be remembered of it.")],
+    text: Annotated[str, typer.Argument(metavar="TEXT", help="Text of the note.")],
     store: Folder = HERE,
 ) -> None:
     """Write a note to a run."""
@@ -25,7 +25,7 @@ def note(
 def attach(
     run: RunId,
     kind: Annotated[str, typer.Argument(metavar="KIND", help="diagnosis, identification, model, or your own word.")],
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="What came of the run.")],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="Result of the run.")],
     store: Folder = HERE,
 ) -> None:
     """Attach a result to a run; its text is kept as it is now."""

@@ -19,7 +19,7 @@ HEAD = ("recording", "experiment", "started_utc", "duration_s", "samples", "flag
 
 
 def show(run: RunId, store: Folder = HERE, as_json: AsJson = False) -> None:
-    """Show everything about one run, and whether its recording is still what it was."""
+    """Show everything about one run, and whether its recording has changed."""
     from hil.store.facts import alarms_of, facts_of, results_of
     from hil.store.recording_state import recording_state
 
