@@ -13,6 +13,7 @@ from typing import Any
 
 import numba
 
+from estimator.compiled import IS_COMPILED
 from estimator.lanes.tools import types
 from estimator.physics.effect import Element
 from estimator.physics.law_name import LawName
@@ -45,11 +46,17 @@ class Forces(types.WrapperAddressProtocol):  # type: ignore[misc]  # numba has n
         forces = numba.njit(_none)
         for law in laws:
             forces = _with(forces, self._bound(law), *FORCES[law.law.element])
-        self._compiled = numba.cfunc(SIGNATURE)(forces.py_func)
+        self._forces = forces
+        self._compiled = numba.cfunc(SIGNATURE)(forces.py_func) if IS_COMPILED else None
+
+    def __call__(self, *given: Any) -> tuple[float, float]:
+        """Return the torques where the simulation is run by Python."""
+        torques: tuple[float, float] = self._forces(*given)
+        return torques
 
     def __wrapper_address__(self) -> int:
-        address: Any = self._compiled.address
-        return int(address)
+        compiled: Any = self._compiled
+        return int(compiled.address)
 
     def signature(self) -> Any:
         """Return numba's signature of the function."""
@@ -77,6 +84,8 @@ class Forces(types.WrapperAddressProtocol):  # type: ignore[misc]  # numba has n
                 self.fault = self.fault or fault
                 return math.nan
 
+        if not IS_COMPILED:
+            return lambda time_s, motor, load, twist, torque, p: call(time_s, motor, load, twist, torque, p.ctypes.data)
         back = BACK(call)
         self._kept.append(back)
 

@@ -29,7 +29,7 @@ def _at_moment(line: Any, time_s: Any, k: Any) -> Any:
     return at_moment
 
 
-def under_own(line: Line, now: Conditions, x: State, p: FloatArray) -> Conditions:
+def under_own(now: Conditions, line: Line, x: State, p: FloatArray) -> Conditions:
     """Return the conditions with the torques of a line's own laws on the motor and against the load."""
     if len(line.own) == 0:
         return now
@@ -41,7 +41,7 @@ def under_own(line: Line, now: Conditions, x: State, p: FloatArray) -> Condition
 
 
 @overload(under_own, strict=False)
-def _under_own(line: Any, now: Any, x: Any, p: Any) -> Any:
+def _under_own(now: Any, line: Any, x: Any, p: Any) -> Any:
     if len(line.types[-1]) == 0:
-        return lambda line, now, x, p: now
+        return lambda now, line, x, p: now
     return under_own

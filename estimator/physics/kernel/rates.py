@@ -99,7 +99,7 @@ def read_out(line: Line, now: Conditions, x: State, output: int, p: FloatArray) 
 @inlined
 def rates(line: Line, now: Conditions, x: State, p: FloatArray) -> State:
     """Return the time derivative of the mechanical state under the conditions ``now``."""
-    now = under_own(line, now, x, p)
+    now = under_own(now, line, x, p)
     drive = now.torque - motor_friction(x.speed, p, now.width_motor, now.dry_motor)
     if line.masses == 1:
         drag = load_friction(x.speed, x.speed, now, p) + now.load + held_by_angle(x.angle, p)

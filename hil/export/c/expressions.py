@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from estimator import lanes
+from estimator.physics.kernel.own import under_own
 from estimator.signals.record import FloatArray
 from hil.export.c.types import Type, c_name, fields, is_record
 
@@ -32,8 +33,8 @@ _FUNCTIONS: dict[Any, str] = {
     **dict.fromkeys((min, np.minimum), "lesser"),
     **dict.fromkeys((max, np.maximum), "greater"),
 }
-_TRANSPARENT = (lanes.every, lanes.some, lanes.like, lanes.borrowed, np.asarray)
-"""Functions that return their first argument where there is one number only."""
+_TRANSPARENT = (lanes.every, lanes.some, lanes.like, lanes.borrowed, np.asarray, under_own)
+"""Functions that return their first argument where there is one number only, and no law of a user's own."""
 
 
 class NotTranslatable(ValueError):

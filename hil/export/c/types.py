@@ -10,6 +10,9 @@ from estimator.signals.record import FloatArray
 Type = Any
 """``float``, ``int``, ``bool``, a NamedTuple's class, ``FloatArray``, or a tuple of types for several values."""
 
+OF_ANY = tuple[Any, ...]
+"""What is known when a simulation is compiled only, as a user's own laws: an exported model has none."""
+
 PRELUDE = """\
 #include <math.h>
 
@@ -31,7 +34,7 @@ def fields(kind: Type) -> dict[str, Type]:
     """Return names and types of what a NamedTuple or several values hold."""
     if is_record(kind):
         hints = typing.get_type_hints(kind)
-        return {name: hints[name] for name in kind._fields}
+        return {name: hints[name] for name in kind._fields if hints[name] != OF_ANY}
     return {f"item{i}": each for i, each in enumerate(kind)}
 
 

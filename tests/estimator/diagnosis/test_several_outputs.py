@@ -144,7 +144,7 @@ def faulty(what: str, record: Record) -> FloatArray:
     some = np.arange(speed.size)
     return {
         "it stays at": np.full_like(speed, 3.0),
-        "turned round": -speed,
+        "its sign is turned": -speed,
         "the gear's ratio": speed / 5.6,
         "the same signal as the recording's first output": record.output.copy(),
         "good rows hold a reading": np.where(some % 3 == 0, speed, np.nan),
@@ -155,7 +155,7 @@ def faulty(what: str, record: Record) -> FloatArray:
     "what",
     [
         "it stays at",
-        "turned round",
+        "its sign is turned",
         "the gear's ratio",
         "the same signal as the recording's first output",
         "good rows hold a reading",

@@ -99,10 +99,10 @@ def test_sums_are_the_sub_steps_of_a_mode_within_the_line(values: str, place: st
 
 
 def test_what_is_nonlinear_slips_or_drags_is_not_linear() -> None:
-    elastic = Line(2, True, False, False)
+    elastic = Line(2, True, False, False, ())
     p = flat(model(TWO_MASS))
     assert linear.is_linear(elastic, p)
-    assert not linear.is_linear(Line(2, False, False, False), p)
+    assert not linear.is_linear(Line(2, False, False, False, ()), p)
     for effect, parameter in (
         ("quadratic_friction", "quadratic_nm_s2"),
         ("aerodynamic_drag", "drag_nm_s2"),
@@ -125,7 +125,7 @@ def test_dry_friction_is_constant_on_one_side_of_zero(begun: float, ended: float
 def test_whatever_is_nonlinear_in_the_catalogue_takes_the_sub_steps() -> None:
     """A new effect is not taken for linear before its entry says so."""
     nulls = flat(model(TWO_MASS))
-    elastic = Line(2, True, False, False)
+    elastic = Line(2, True, False, False, ())
     for name, entry in BUILT_IN.items():
         for parameter in entry.parameters:
             p = nulls.copy()
