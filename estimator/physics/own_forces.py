@@ -32,16 +32,10 @@ Function = Callable[..., Any]
 
 
 class Forces(types.WrapperAddressProtocol):  # type: ignore[misc]  # numba has no types
-    """The torques of some laws together, by the address of their compiled function.
-
-    Attributes
-    ----------
-    fault : BaseException or None
-        What the last law that failed raised; its torque was no number.
-    """
+    """The torques of some laws together, by the address of their compiled function."""
 
     def __init__(self, laws: Sequence[LawName]) -> None:
-        self.fault: BaseException | None = None
+        self._fault: BaseException | None = None
         self._kept: list[object] = []  # callbacks live as long as what calls them
         forces = numba.njit(_none)
         for law in laws:
@@ -57,6 +51,12 @@ class Forces(types.WrapperAddressProtocol):  # type: ignore[misc]  # numba has n
     def __wrapper_address__(self) -> int:
         compiled: Any = self._compiled
         return int(compiled.address)
+
+    def finish(self) -> None:
+        """Raise what a law has raised in a simulation that is over; its torque was no number there."""
+        fault, self._fault = self._fault, None
+        if fault is not None:
+            raise fault
 
     def signature(self) -> Any:
         """Return numba's signature of the function."""
@@ -81,7 +81,7 @@ class Forces(types.WrapperAddressProtocol):  # type: ignore[misc]  # numba has n
                 given = {name: values[place] for name, place in zip(names, places, strict=True)}
                 return law.law.at(time_s, motor, load, twist, torque, given)
             except BaseException as fault:  # noqa: BLE001  # raised once the simulation is over
-                self.fault = self.fault or fault
+                self._fault = self._fault or fault
                 return math.nan
 
         if not IS_COMPILED:

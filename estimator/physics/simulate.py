@@ -187,8 +187,8 @@ def _simulated(
         slopes,
         _samples_alike(record, count, alike_s),
     )
-    if own and own[1].fault is not None:
-        raise own[1].fault
+    if own:
+        own[1].finish()
     if not recorded:
         return out
     if grid.laws and record.lead is None:

@@ -132,6 +132,20 @@ def test_one_that_can_not_be_compiled_is_called_back_and_acts_alike() -> None:
         simulated({"mine": {"size": 0.01}}, bench.TWO_MASS, law(fails_late))
 
 
+def test_a_law_that_failed_in_one_simulation_is_asked_again_in_the_next() -> None:
+    def fails_late(t: float, w: float, load: float, twist: float, torque: float, size: float) -> float:
+        if t > 5.0:
+            raise ValueError("no map for so late")
+        return size * w
+
+    grid = Grid(Structure.TWO_MASS, 4, 0.02, named([law(fails_late)]))
+    p = flat_values(bench.TWO_MASS, {"mine": {"size": 0.01}}, grid.laws)
+    long, short = (bench.record(bench.random_steps(count, 1)) for count in (1500, 100))
+    with pytest.raises(BadModel, match="no map for so late"):
+        simulate(grid, long, p, START)
+    assert np.isfinite(simulate(grid, short, p, START)).all()
+
+
 def test_its_name_finds_it_in_catalogue_and_layout() -> None:
     mine, other = named([law(square), law(air, Element.LOAD, "other")])
     assert (mine, other) == ("mine", "other")
