@@ -10,19 +10,11 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any
 
+from hil.proof.compare import Comparison, compare
+
 Json = Mapping[str, Any]
 
 NOTHING = "none"
-
-SAME_SIZE = {
-    ("coulomb_friction_motor", "coulomb_nm"): "friction_nm",
-    ("stribeck_friction", "coulomb_nm"): "coulomb_nm",
-    ("stribeck_friction", "stribeck_speed_rad_s"): "stribeck_rad_s",
-    ("backlash", "gap_rad"): "gap_rad",
-    ("actuator_lag", "current_loop_time_s"): "time_constant_s",
-    ("transport_delay", "delay_s"): "delay_s",
-}
-"""Sizes of the truth that the fitted law has too, by its name for them. Other laws are other formulations."""
 
 
 class Outcome(Enum):
@@ -38,22 +30,6 @@ class Outcome(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Comparison:
-    """One true size next to the estimated one; ``inside`` says whether the 95 % interval holds the truth."""
-
-    what: str
-    unit: str
-    true: float
-    found: float
-    ci95: tuple[float, float] | None
-
-    @property
-    def inside(self) -> bool | None:
-        """None where no interval was given."""
-        return None if self.ci95 is None else self.ci95[0] <= self.true <= self.ci95[1]
-
-
-@dataclass(frozen=True, slots=True)
 class Judgement:
     """What became of one verdict.
 
@@ -63,7 +39,7 @@ class Judgement:
     hidden, named : tuple of str
         Effects that were there, and that were named.
     sizes : tuple of Comparison
-        The hidden sizes that can be compared, then the six parameters.
+        The hidden sizes that can be compared, then the nominal model's parameters.
     """
 
     outcome: Outcome
@@ -88,7 +64,7 @@ def judge(diagnosis: Json, truth: Json) -> Judgement:
         outcome=_outcome(diagnosis, set(hidden)),
         hidden=hidden,
         named=named,
-        sizes=(*_hidden_sizes(diagnosis, truth), *_parameters(diagnosis, truth)),
+        sizes=tuple(compare(diagnosis, truth)),
     )
 
 
@@ -109,27 +85,3 @@ def _where_nothing_is_hidden(diagnosis: Json, something_named: bool) -> Outcome:
     if something_named:
         return Outcome.INVENTED
     return Outcome.RIGHT if diagnosis["verdict"] == "no_mismatch" else Outcome.ABSTAINED
-
-
-def _hidden_sizes(diagnosis: Json, truth: Json) -> list[Comparison]:
-    found = {effect["name"]: effect["parameters"] for effect in diagnosis["effects"]}
-    return [
-        _comparison(f"{effect}: {size}", true, found[effect][SAME_SIZE[effect, size]])
-        for effect, sizes in truth["hidden"].items()
-        for size, true in sizes.items()
-        if (effect, size) in SAME_SIZE and SAME_SIZE[effect, size] in found.get(effect, {})
-    ]
-
-
-def _parameters(diagnosis: Json, truth: Json) -> list[Comparison]:
-    return [
-        _comparison(name, truth["true"][name], entry)
-        for name, entry in diagnosis["parameters"].items()
-        if name in truth["true"]
-    ]
-
-
-def _comparison(what: str, true: float, entry: Json) -> Comparison:
-    low, high = entry["ci95"] or (None, None)
-    interval = None if low is None or high is None else (low, high)
-    return Comparison(what, entry["unit"], true, entry["value"], interval)

@@ -10,7 +10,8 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
-from hil.proof.judge import Comparison, Judgement, Outcome
+from hil.proof.compare import Comparison
+from hil.proof.judge import Judgement, Outcome
 
 _COLOURS = {Outcome.RIGHT: "green", Outcome.ABSTAINED: "yellow", Outcome.INCOMPLETE: "yellow"}
 

@@ -29,6 +29,7 @@ from hil.proof.make_case import write_shown
 from hil.proof.truth.bus import NOMINAL_TOLERANCE
 from hil.proof.truth.case import Case, make_case
 from hil.proof.truth.dirty import Known, make_dirty
+from hil.proof.truth.hidden import same_recording
 from hil.proof.truth.registry import EFFECTS
 from hil.recording import read_records
 from hil.report.diagnosis_json import diagnosis_json
@@ -39,10 +40,8 @@ SURE = 0.9
 
 KINDS = [name for name, effect in EFFECTS.items() if effect.catalogued and name != NOTHING]
 OUTSIDE = [name for name, effect in EFFECTS.items() if not effect.catalogued]
-ACQUIRED = {"stale_samples", "lost_samples", "sample_jitter", "clock_drift", "speed_quantisation", "speed_sign_blind"}
-"""Effects of the acquisition, recognised before any engine; none of them is the strong one of a dirty world."""
-
-STRONG = [name for name in KINDS if name not in ACQUIRED]
+STRONG = [name for name in KINDS if EFFECTS[name].corrupt is same_recording]
+"""Effects that can be the strong one of a dirty world: what happens to a recording alone is recognised by itself."""
 
 Row = dict[str, Any]
 

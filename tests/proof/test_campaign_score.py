@@ -7,7 +7,7 @@ from hil.errors import UsageError
 from hil.proof.campaign.case import Answer
 from hil.proof.campaign.kinds import PAIRS, Group, kind, parse_kinds, parse_seeds
 from hil.proof.campaign.score import ALIKE, FAILED, iou, right_columns, score
-from hil.proof.campaign.sizes import COUNTERPARTS, compare
+from hil.proof.compare import compare
 from hil.proof.truth.registry import EFFECTS
 from hil.proof.truth.specimen import draw_specimen
 
@@ -127,13 +127,15 @@ def test_a_simulation_that_ran_away_leaves_a_gap_and_not_an_unreadable_file():
     assert _scored("none", answer)["fresh_over_floor"] == [1.0, None, None]
 
 
-@pytest.mark.parametrize("effect", COUNTERPARTS)
+@pytest.mark.parametrize(
+    "effect", [effect for effect in EFFECTS.values() if effect.fitted], ids=lambda effect: effect.name
+)
 def test_each_counterpart_exists_on_both_sides_and_has_a_value_for_some_draw(effect):
-    fitted = {parameter.name for parameter in CATALOGUE[effect].parameters}
-    assert set(COUNTERPARTS[effect]) <= fitted
-    for name, convert in COUNTERPARTS[effect].items():
-        truths = [draw_specimen(effect, seed).truth() for seed in range(20)]
-        values = [convert(truth["hidden"][effect], truth["true"]) for truth in truths]
+    fitted = {parameter.name for parameter in CATALOGUE[effect.name].parameters}
+    assert set(effect.fitted) <= fitted
+    truths = [draw_specimen(effect.name, seed).truth() for seed in range(20)]
+    for name in effect.fitted:
+        values = [effect.should_be(name, truth["hidden"][effect.name], truth["true"]) for truth in truths]
         assert any(value is not None for value in values), name
         assert all(isinstance(value, float) for value in values if value is not None), name
 

@@ -11,9 +11,8 @@ import numpy as np
 from estimator.physics.catalogue import EFFECTS as CATALOGUE
 from hil.proof.campaign.case import Answer
 from hil.proof.campaign.kinds import NOTHING, Group, Kind
-from hil.proof.campaign.sizes import compare
 from hil.proof.campaign.statistics import ABSTAINED, NO_MISMATCH, finite
-from hil.proof.judge import Outcome, judge
+from hil.proof.judge import Judgement, Outcome, judge
 
 Json = Mapping[str, Any]
 Intervals = Sequence[Sequence[float]]
@@ -47,7 +46,8 @@ def score(kind: Kind, seed: int, truth: Json, answer: Answer) -> dict[str, Any]:
     if answer.diagnosis is None:
         return row
     diagnosis = _with_all_equivalents(answer.diagnosis)
-    outcome = _outcome(diagnosis, truth)
+    judgement = judge(diagnosis, truth)
+    outcome = _outcome(judgement)
     return {
         **row,
         "outcome": outcome,
@@ -57,7 +57,7 @@ def score(kind: Kind, seed: int, truth: Json, answer: Answer) -> dict[str, Any]:
         "element": diagnosis["mismatch"]["element"],
         "element_right": _element_right(diagnosis, truth),
         "event_iou": _event_ious(diagnosis, truth),
-        "sizes": [{**asdict(size), "inside": size.inside} for size in compare(diagnosis, truth)],
+        "sizes": [{**asdict(size), "inside": size.inside} for size in judgement.sizes],
         "fit": dict(diagnosis["fit"]),
     }
 
@@ -93,8 +93,7 @@ def _with_all_equivalents(diagnosis: Json) -> dict[str, Any]:
     return {**diagnosis, "effects": effects}
 
 
-def _outcome(diagnosis: Json, truth: Json) -> str:
-    judgement = judge(diagnosis, {**truth, "hidden": {}})
+def _outcome(judgement: Judgement) -> str:
     if judgement.outcome is Outcome.RIGHT and set(judgement.named) != set(judgement.hidden):
         return ALIKE
     return _name(judgement.outcome)

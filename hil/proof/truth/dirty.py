@@ -14,25 +14,25 @@ import numpy as np
 
 from hil.proof.truth.bus import NOMINAL_ERROR
 from hil.proof.truth.case import TESTS, Case, record
-from hil.proof.truth.hidden import Sizes, log_uniform
-from hil.proof.truth.registry import PAIR_SIGN
+from hil.proof.truth.hidden import HiddenEffect, Sizes, log_uniform
+from hil.proof.truth.registry import EFFECTS, PAIR_SIGN
 from hil.proof.truth.sensors import Noise
 from hil.proof.truth.specimen import Stream, draw_specimen, stream
 
-SMALL: Mapping[str, tuple[str, ...]] = {
-    "coulomb_friction_motor": ("coulomb_nm",),
-    "coulomb_friction_load": ("coulomb_nm",),
-    "aerodynamic_drag": ("drag_nm_s2",),
-    "quadratic_friction": ("drag_nm_s2",),
-    "actuator_lag": ("current_loop_time_s",),
-    "transport_delay": ("delay_s",),
-    "torque_ripple": ("ripple_nm", "ripple_over_torque"),
-    "load_imbalance": ("imbalance_nm", "imbalance_twice_nm"),
-    "resolver_error": ("resolver_once_rad", "resolver_twice_rad"),
-    "shaft_hysteresis": ("sliding_share",),
-    "cardan_second_order": ("joint_angle_rad",),
-}
-"""Effects that every vehicle has a little of, and the sizes that say how much."""
+IMPERFECTIONS = (
+    "coulomb_friction_motor",
+    "coulomb_friction_load",
+    "aerodynamic_drag",
+    "quadratic_friction",
+    "actuator_lag",
+    "transport_delay",
+    "torque_ripple",
+    "load_imbalance",
+    "resolver_error",
+    "shaft_hysteresis",
+    "cardan_second_order",
+)
+"""What every vehicle has a little of. The bus of a seed is drawn from them in this order: another list makes others."""
 
 FEWEST, MOST = 3, 6
 LEAST_PART, MOST_PART = 0.05, 0.35
@@ -45,19 +45,6 @@ class Known(Enum):
     NONE = "none"
     EXACT = "exact"
     OFF = "off"
-
-
-KNOWN_AS: Mapping[tuple[str, str], str] = {
-    ("coulomb_friction_motor", "coulomb_nm"): "friction_nm",
-    ("coulomb_friction_load", "coulomb_nm"): "friction_nm",
-    ("aerodynamic_drag", "drag_nm_s2"): "drag_nm_s2",
-    ("quadratic_friction", "drag_nm_s2"): "quadratic_nm_s2",
-    ("actuator_lag", "current_loop_time_s"): "time_constant_s",
-    ("transport_delay", "delay_s"): "delay_s",
-    ("resolver_error", "resolver_once_rad"): "once_rad",
-    ("resolver_error", "resolver_twice_rad"): "twice_rad",
-}
-"""Sizes that a model file can state in the same words; imperfections without any stay unknown."""
 
 
 def make_dirty(strong: str, seed: int, known: Known = Known.NONE) -> tuple[Case, dict[str, dict[str, float]]]:
@@ -90,12 +77,12 @@ def _small(strong: str, seed: int, rng: np.random.Generator) -> tuple[list[str],
     names: list[str] = []
     sizes: dict[str, Sizes] = {}
     count = int(rng.integers(FEWEST, MOST + 1))
-    for name in rng.permutation(list(SMALL)).tolist():
+    for name in rng.permutation(IMPERFECTIONS).tolist():
         fields = _fields(name, seed)
         if len(names) < count and not fields & taken:
             whole = draw_specimen(name, seed).sizes[name]
             part = log_uniform(rng, LEAST_PART, MOST_PART)
-            sizes[name] = {key: value * (part if key in SMALL[name] else 1.0) for key, value in whole.items()}
+            sizes[name] = {**whole, **{key: part * whole[key] for key in EFFECTS[name].strength(whole)}}
             names.append(name)
             taken |= fields
     return names, sizes
@@ -126,10 +113,15 @@ def _stated(sizes: Mapping[str, Sizes], known: Known, rng: np.random.Generator) 
     if known is Known.NONE:
         return {}
     error = NOMINAL_ERROR if known is Known.OFF else 0.0
-    stated: dict[str, dict[str, float]] = {}
-    for name, mine in sizes.items():
-        for key, value in mine.items():
-            if (name, key) in KNOWN_AS:
-                off = 1.0 + float(rng.uniform(-error, error))
-                stated.setdefault(name, {})[KNOWN_AS[name, key]] = value * off
-    return stated
+    return {
+        name: {word: mine[size] * (1.0 + float(rng.uniform(-error, error))) for word, size in words.items()}
+        for name, mine in sizes.items()
+        if (words := in_a_model_file(EFFECTS[name], mine))
+    }
+
+
+def in_a_model_file(effect: HiddenEffect, sizes: Sizes) -> dict[str, str]:
+    """Return words of a model file to the sizes that they state; empty where some of the effect's strength has none."""
+    strength = effect.strength(sizes)
+    words = {word: size for word, size in effect.fitted.items() if isinstance(size, str) and size in strength}
+    return words if set(words.values()) == set(strength) else {}

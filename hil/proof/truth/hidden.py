@@ -1,10 +1,11 @@
-"""What a hidden effect is: name, place, the draw of its sizes, and what it changes in the physics."""
+"""What a hidden effect is: name, place, the draw of its sizes, what it changes, and what a fit of it should find."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
+from typing import Any
 
 import numpy as np
 
@@ -20,6 +21,9 @@ Apply = Callable[[Physics, Sizes, np.random.Generator], Physics]
 Corrupt = Callable[[Acquisition, Sizes], Acquisition]
 Interval = tuple[float, float]
 When = Callable[[Physics], Interval]
+
+Convert = Callable[[Sizes, Mapping[str, float]], float | None]
+"""Sizes and true bus to the value that a fitted parameter should have; None where this draw has none."""
 
 ABSENT_IN = "absent_in"
 """Size that says in which of the three tests (0, 1, 2) an event does not take place."""
@@ -51,6 +55,28 @@ class Place(Enum):
 
 
 @dataclass(frozen=True, slots=True)
+class Scale:
+    """How an effect with one size is made greater and smaller.
+
+    Attributes
+    ----------
+    unit : str
+    start : float
+        A size, in ``unit``, from which a search begins.
+    absent : float
+        Value at which the effect is not there; its size is the distance from it.
+    least : float
+        Size that stands for none. Above 0 where the truth's law does not end in the linear one when it vanishes: a
+        joint without any play still has contacts that cannot pull.
+    """
+
+    unit: str
+    start: float
+    absent: float = 0.0
+    least: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
 class HiddenEffect:
     """One effect that can be concealed in a bus.
 
@@ -71,6 +97,13 @@ class HiddenEffect:
         Acquisition and sizes to the acquisition with the effect.
     when : callable, optional
         Physics with an event to when it begins and ends [s]; None for what is always there.
+    fitted : mapping of str to str or callable
+        Parameter of the law that is fitted to the size that it should equal, or to how it follows from the sizes. What
+        is missing has no counterpart: the truth's formulation is another one.
+    unscaled : tuple of str
+        Sizes that stay as they are where the effect is made smaller: they say of what kind it is, not how much.
+    scale : Scale, optional
+        Of an effect with one size, for a study of how small it may be.
     """
 
     name: str
@@ -80,10 +113,38 @@ class HiddenEffect:
     apply: Apply = same_physics
     corrupt: Corrupt = same_recording
     when: When | None = None
+    fitted: Mapping[str, str | Convert] = field(default_factory=dict)
+    unscaled: tuple[str, ...] = ()
+    scale: Scale | None = None
 
     def happens_in(self, test: int, sizes: Sizes) -> bool:
         """Say whether the effect takes place in one of the three tests, counted from 0."""
         return test == sizes.get(ONLY_IN, test) and test != sizes.get(ABSENT_IN)
+
+    def should_be(self, parameter: str, sizes: Sizes, bus: Mapping[str, float]) -> float | None:
+        """Return the value that a parameter of `fitted` should have; None where this draw has none."""
+        how = self.fitted[parameter]
+        return sizes[how] if isinstance(how, str) else how(sizes, bus)
+
+    def strength(self, sizes: Sizes) -> list[str]:
+        """Return which of the sizes say how much of it there is."""
+        return [size for size in sizes if size not in self.unscaled]
+
+
+def sets(*fields: str, **renamed: str) -> Apply:
+    """Return the change that sets fields of the physics to the sizes of their names, or of another name each."""
+    size_of = {**dict(zip(fields, fields, strict=True)), **renamed}
+
+    def apply(physics: Physics, sizes: Sizes, rng: np.random.Generator) -> Physics:
+        values: dict[str, Any] = {field: sizes[size] for field, size in size_of.items()}
+        return physics._replace(**values)
+
+    return apply
+
+
+def unless_zero(size: str) -> Convert:
+    """Return the conversion of a size that is 0 where another variant of the effect was drawn."""
+    return lambda sizes, bus: sizes[size] or None
 
 
 def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:

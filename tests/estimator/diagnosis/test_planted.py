@@ -22,7 +22,6 @@ from estimator.diagnosis.result import FoundEffect
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.model import DrivelineModel, Parameter, Structure
 from estimator.signals.record import Record
-from hil.proof.campaign.sizes import COUNTERPARTS
 from hil.proof.truth.bus import NOMINAL_ERROR
 from hil.proof.truth.case import TESTS, TruthRecording, record
 from hil.proof.truth.registry import EFFECTS as HIDDEN
@@ -120,8 +119,8 @@ def assert_sized(case: Planted, name: str) -> None:
     """
     found = case.effect_that_stands_for(name).parameters
     bus = asdict(case.specimen.bus)
-    for parameter, true_size in COUNTERPARTS.get(name, {}).items():
-        true = true_size(case.specimen.sizes[name], bus)
+    for parameter in HIDDEN[name].fitted:
+        true = HIDDEN[name].should_be(parameter, case.specimen.sizes[name], bus)
         if parameter in found and true is not None:
             low, high = found[parameter].ci95
             assert found[parameter].value == pytest.approx(true, rel=0.25) or low <= true <= high, parameter

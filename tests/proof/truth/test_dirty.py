@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from hil.errors import UsageError
-from hil.proof.truth.dirty import FEWEST, KNOWN_AS, LEAST_PART, MOST, MOST_PART, SMALL, Known, make_dirty
+from hil.proof.truth.dirty import FEWEST, IMPERFECTIONS, LEAST_PART, MOST, MOST_PART, Known, in_a_model_file, make_dirty
+from hil.proof.truth.registry import EFFECTS
 from hil.proof.truth.sensors import USUAL, coloured, speed_reading
 from hil.proof.truth.specimen import draw_specimen
 
@@ -16,12 +17,12 @@ def test_small_effects_are_some_and_small_and_not_the_strong_one_again(strong: s
     case, known = make_dirty(strong, seed)
     small = {name: sizes for name, sizes in case.specimen.sizes.items() if name != strong}
     assert FEWEST <= len(small) <= MOST
-    assert set(small) <= set(SMALL)
+    assert set(small) <= set(IMPERFECTIONS)
     assert known == {}
     assert case.specimen.sizes[strong] == draw_specimen(strong, seed).sizes[strong]
     for name, sizes in small.items():
         whole = draw_specimen(name, seed).sizes[name]
-        for key in SMALL[name]:
+        for key in EFFECTS[name].strength(whole):
             assert LEAST_PART * abs(whole[key]) <= abs(sizes[key]) <= MOST_PART * abs(whole[key])
 
 
@@ -36,15 +37,24 @@ def test_the_model_file_knows_what_it_is_to_know(known: Known) -> None:
     case, stated = make_dirty("none", 6, known)
     sizes = case.specimen.sizes
     true = {
-        (name, word): sizes[name][key]
-        for (name, key), word in KNOWN_AS.items()
-        if name in sizes and known is not Known.NONE
+        (name, word): sizes[name][size]
+        for name in sizes
+        for word, size in in_a_model_file(EFFECTS[name], sizes[name]).items()
+        if known is not Known.NONE
     }
     assert {(name, word) for name, words in stated.items() for word in words} == set(true)
     for (name, word), value in true.items():
         assert stated[name][word] == pytest.approx(value, rel=0.15 if known is Known.OFF else 1e-12)
     if known is Known.OFF:
         assert any(stated[name][word] != value for (name, word), value in true.items())
+
+
+def test_an_imperfection_is_stated_where_a_model_file_has_words_for_all_that_is_small_in_it() -> None:
+    stated = {name: in_a_model_file(EFFECTS[name], draw_specimen(name, 1).sizes[name]) for name in IMPERFECTIONS}
+    assert stated["quadratic_friction"] == {"quadratic_nm_s2": "drag_nm_s2"}
+    assert stated["resolver_error"] == {"once_rad": "resolver_once_rad", "twice_rad": "resolver_twice_rad"}
+    unknown = {"torque_ripple", "load_imbalance", "shaft_hysteresis", "cardan_second_order"}
+    assert {name for name, words in stated.items() if not words} == unknown
 
 
 def test_an_unknown_strong_effect_is_refused() -> None:

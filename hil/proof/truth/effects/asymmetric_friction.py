@@ -8,8 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from hil.proof.truth.bus import Bus
-from hil.proof.truth.hidden import HiddenEffect, Place, Sizes, either, log_uniform
-from hil.proof.truth.physics import Physics
+from hil.proof.truth.hidden import HiddenEffect, Place, Sizes, either, log_uniform, sets
 
 
 def _draw(rng: np.random.Generator, bus: Bus) -> Sizes:
@@ -17,8 +16,11 @@ def _draw(rng: np.random.Generator, bus: Bus) -> Sizes:
     return {"viscous_forward_nm_s": more, "dry_forward_nm": 5.0 * more}
 
 
-def _apply(physics: Physics, sizes: Sizes, rng: np.random.Generator) -> Physics:
-    return physics._replace(viscous_forward=sizes["viscous_forward_nm_s"], dry_forward_nm=sizes["dry_forward_nm"])
-
-
-EFFECT = HiddenEffect("asymmetric_friction", Place.MOTOR, True, _draw, _apply)
+EFFECT = HiddenEffect(
+    "asymmetric_friction",
+    Place.MOTOR,
+    True,
+    _draw,
+    sets("dry_forward_nm", viscous_forward="viscous_forward_nm_s"),
+    fitted={"difference_nm_s": "viscous_forward_nm_s"},
+)

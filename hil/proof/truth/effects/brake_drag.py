@@ -22,4 +22,4 @@ def _when(physics: Physics) -> Interval:
     return physics.brake_from_s, physics.brake_to_s
 
 
-EFFECT = HiddenEffect("brake_drag", Place.LOAD, True, _draw, _apply, when=_when)
+EFFECT = HiddenEffect("brake_drag", Place.LOAD, True, _draw, _apply, when=_when, fitted={"brake_nm": "brake_nm"})

@@ -5,6 +5,9 @@ Each recording begins at another angle.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
+
 import numpy as np
 
 from hil.proof.truth.bus import Bus
@@ -20,4 +23,9 @@ def _apply(physics: Physics, sizes: Sizes, rng: np.random.Generator) -> Physics:
     return physics._replace(joint_angle_rad=sizes["joint_angle_rad"], joint_phase_rad=rng.uniform(0.0, np.pi))
 
 
-EFFECT = HiddenEffect("cardan_second_order", Place.SHAFT, True, _draw, _apply)
+def _true_angle(sizes: Sizes, bus: Mapping[str, float]) -> float:
+    """Second harmonic of the joint's lead: the square of the tangent of half its bend."""
+    return math.tan(0.5 * sizes["joint_angle_rad"]) ** 2
+
+
+EFFECT = HiddenEffect("cardan_second_order", Place.SHAFT, True, _draw, _apply, fitted={"angle_rad": _true_angle})

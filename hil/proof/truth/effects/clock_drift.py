@@ -19,4 +19,4 @@ def _corrupt(acquisition: Acquisition, sizes: Sizes) -> Acquisition:
     return replace(acquisition, clock_error=sizes["clock_error"])
 
 
-EFFECT = HiddenEffect("clock_drift", Place.ACQUISITION, True, _draw, corrupt=_corrupt)
+EFFECT = HiddenEffect("clock_drift", Place.ACQUISITION, True, _draw, corrupt=_corrupt, fitted={"rate": "clock_error"})

@@ -8,8 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from hil.proof.truth.bus import Bus
-from hil.proof.truth.hidden import HiddenEffect, Place, Sizes, log_uniform
-from hil.proof.truth.physics import Physics
+from hil.proof.truth.hidden import HiddenEffect, Place, Sizes, log_uniform, sets
 
 
 def _draw(rng: np.random.Generator, bus: Bus) -> Sizes:
@@ -20,10 +19,11 @@ def _draw(rng: np.random.Generator, bus: Bus) -> Sizes:
     }
 
 
-def _apply(physics: Physics, sizes: Sizes, rng: np.random.Generator) -> Physics:
-    return physics._replace(
-        eddy_nm=sizes["eddy_nm"], eddy_speed_rad_s=sizes["eddy_speed_rad_s"], eddy_exponent=sizes["eddy_exponent"]
-    )
-
-
-EFFECT = HiddenEffect("eddy_drag", Place.MOTOR, True, _draw, _apply)
+EFFECT = HiddenEffect(
+    "eddy_drag",
+    Place.MOTOR,
+    True,
+    _draw,
+    sets("eddy_nm", "eddy_speed_rad_s", "eddy_exponent"),
+    fitted={"peak_nm": "eddy_nm", "peak_rad_s": "eddy_speed_rad_s"},
+)

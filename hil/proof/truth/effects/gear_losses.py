@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from hil.proof.truth.bus import Bus
-from hil.proof.truth.hidden import HiddenEffect, Place, Sizes, log_uniform
-from hil.proof.truth.physics import Physics
+from hil.proof.truth.hidden import HiddenEffect, Place, Sizes, log_uniform, sets
 
 
 def _draw(rng: np.random.Generator, bus: Bus) -> Sizes:
@@ -14,8 +15,10 @@ def _draw(rng: np.random.Generator, bus: Bus) -> Sizes:
     return {"efficiency": efficiency, "efficiency_back": 1.0 - (1.0 - efficiency) * rng.uniform(1.0, 1.8)}
 
 
-def _apply(physics: Physics, sizes: Sizes, rng: np.random.Generator) -> Physics:
-    return physics._replace(efficiency=sizes["efficiency"], efficiency_back=sizes["efficiency_back"])
+def _true_loss(sizes: Sizes, bus: Mapping[str, float]) -> float:
+    return 1.0 - sizes["efficiency"]
 
 
-EFFECT = HiddenEffect("gear_losses", Place.SHAFT, True, _draw, _apply)
+EFFECT = HiddenEffect(
+    "gear_losses", Place.SHAFT, True, _draw, sets("efficiency", "efficiency_back"), fitted={"driving_share": _true_loss}
+)

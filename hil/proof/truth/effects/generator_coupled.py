@@ -38,4 +38,6 @@ def _when(physics: Physics) -> Interval:
     return physics.clutch_from_s, physics.clutch_to_s
 
 
-EFFECT = HiddenEffect("generator_coupled", Place.MOTOR, True, _draw, _apply, when=_when)
+EFFECT = HiddenEffect(
+    "generator_coupled", Place.MOTOR, True, _draw, _apply, when=_when, fitted={"inertia_kg_m2": "inertia_kg_m2"}
+)

@@ -5,16 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from hil.proof.truth.bus import Bus
-from hil.proof.truth.hidden import HiddenEffect, Place, Sizes, log_uniform
-from hil.proof.truth.physics import Physics
+from hil.proof.truth.hidden import HiddenEffect, Place, Sizes, log_uniform, sets
 
 
 def _draw(rng: np.random.Generator, bus: Bus) -> Sizes:
     return {"drawn_share": log_uniform(rng, 0.08, 0.3), "drawn_half_rad_s": rng.uniform(10.0, 30.0)}
 
 
-def _apply(physics: Physics, sizes: Sizes, rng: np.random.Generator) -> Physics:
-    return physics._replace(drawn_share=sizes["drawn_share"], drawn_half_rad_s=sizes["drawn_half_rad_s"])
-
-
-EFFECT = HiddenEffect("inertia_by_speed", Place.MOTOR, False, _draw, _apply)
+EFFECT = HiddenEffect("inertia_by_speed", Place.MOTOR, False, _draw, sets("drawn_share", "drawn_half_rad_s"))

@@ -6,6 +6,8 @@ constant load torque stays as it is.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from hil.proof.truth.bus import Bus
@@ -32,4 +34,10 @@ def _when(physics: Physics) -> Interval:
     return physics.payload_at_s, DURATION_S
 
 
-EFFECT = HiddenEffect("inertia_change", Place.LOAD, True, _draw, _apply, when=_when)
+def _true_change(sizes: Sizes, bus: Mapping[str, float]) -> float:
+    return sizes["payload_share"] * bus["J_L"]
+
+
+EFFECT = HiddenEffect(
+    "inertia_change", Place.LOAD, True, _draw, _apply, when=_when, fitted={"change_kg_m2": _true_change}
+)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hil.proof.truth.bus import Bus
-from hil.proof.truth.hidden import HiddenEffect, Place, Sizes, log_uniform
-from hil.proof.truth.physics import Physics
+from hil.proof.truth.hidden import HiddenEffect, Place, Scale, Sizes, log_uniform, sets
 
 
 def _draw(rng: np.random.Generator, bus: Bus) -> Sizes:
@@ -14,8 +13,12 @@ def _draw(rng: np.random.Generator, bus: Bus) -> Sizes:
     return {"gain_m1": 1.0 + size if rng.random() < 0.5 else 1.0 - size}
 
 
-def _apply(physics: Physics, sizes: Sizes, rng: np.random.Generator) -> Physics:
-    return physics._replace(gain_m1=sizes["gain_m1"])
-
-
-EFFECT = HiddenEffect("inverter_gain_mismatch", Place.TORQUE_PATH, True, _draw, _apply)
+EFFECT = HiddenEffect(
+    "inverter_gain_mismatch",
+    Place.TORQUE_PATH,
+    True,
+    _draw,
+    sets("gain_m1"),
+    fitted={"gain_m1": "gain_m1"},
+    scale=Scale("1", 0.01, absent=1.0),
+)

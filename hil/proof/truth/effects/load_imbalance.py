@@ -28,4 +28,4 @@ def _apply(physics: Physics, sizes: Sizes, rng: np.random.Generator) -> Physics:
     )
 
 
-EFFECT = HiddenEffect("load_imbalance", Place.LOAD, True, _draw, _apply)
+EFFECT = HiddenEffect("load_imbalance", Place.LOAD, True, _draw, _apply, fitted={"amplitude_nm": "imbalance_nm"})

@@ -5,16 +5,19 @@ from __future__ import annotations
 import numpy as np
 
 from hil.proof.truth.bus import Bus
-from hil.proof.truth.hidden import HiddenEffect, Place, Sizes, log_uniform
-from hil.proof.truth.physics import Physics
+from hil.proof.truth.hidden import HiddenEffect, Place, Scale, Sizes, log_uniform, sets
 
 
 def _draw(rng: np.random.Generator, bus: Bus) -> Sizes:
     return {"drag_nm_s2": log_uniform(rng, 0.02, 0.08)}
 
 
-def _apply(physics: Physics, sizes: Sizes, rng: np.random.Generator) -> Physics:
-    return physics._replace(quadratic_motor=sizes["drag_nm_s2"])
-
-
-EFFECT = HiddenEffect("quadratic_friction", Place.MOTOR, True, _draw, _apply)
+EFFECT = HiddenEffect(
+    "quadratic_friction",
+    Place.MOTOR,
+    True,
+    _draw,
+    sets(quadratic_motor="drag_nm_s2"),
+    fitted={"quadratic_nm_s2": "drag_nm_s2"},
+    scale=Scale("Nm s^2/rad^2", 1e-3),
+)

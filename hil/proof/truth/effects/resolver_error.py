@@ -32,4 +32,12 @@ def _apply(physics: Physics, sizes: Sizes, rng: np.random.Generator) -> Physics:
     )
 
 
-EFFECT = HiddenEffect("resolver_error", Place.SPEED_SENSOR, True, _draw, _apply)
+EFFECT = HiddenEffect(
+    "resolver_error",
+    Place.SPEED_SENSOR,
+    True,
+    _draw,
+    _apply,
+    fitted={"once_rad": "resolver_once_rad", "twice_rad": "resolver_twice_rad"},
+    unscaled=("resolver_once_phase_rad", "resolver_twice_phase_rad"),
+)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -23,4 +25,11 @@ def _corrupt(acquisition: Acquisition, sizes: Sizes) -> Acquisition:
     return replace(acquisition, jitter_s=sizes["jitter_s"], stamps_told=bool(sizes["stamps_told"]))
 
 
-EFFECT = HiddenEffect("sample_jitter", Place.ACQUISITION, True, _draw, corrupt=_corrupt)
+def _true_jitter(sizes: Sizes, bus: Mapping[str, float]) -> float:
+    """Root mean square of a uniform deviation over its greatest: 1 / sqrt(3)."""
+    return sizes["jitter_s"] / math.sqrt(3.0)
+
+
+EFFECT = HiddenEffect(
+    "sample_jitter", Place.ACQUISITION, True, _draw, corrupt=_corrupt, fitted={"jitter_s": _true_jitter}
+)

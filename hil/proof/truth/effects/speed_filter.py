@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hil.proof.truth.bus import Bus
-from hil.proof.truth.hidden import HiddenEffect, Place, Sizes, log_uniform
-from hil.proof.truth.physics import Physics
+from hil.proof.truth.hidden import HiddenEffect, Place, Sizes, log_uniform, sets, unless_zero
 
 
 def _draw(rng: np.random.Generator, bus: Bus) -> Sizes:
@@ -17,10 +16,11 @@ def _draw(rng: np.random.Generator, bus: Bus) -> Sizes:
     return {"time_constant_s": 0.0, "corner_rad_s": 2.0 * damping / time_s, "damping": damping}
 
 
-def _apply(physics: Physics, sizes: Sizes, rng: np.random.Generator) -> Physics:
-    return physics._replace(
-        filter_time_s=sizes["time_constant_s"], filter_rad_s=sizes["corner_rad_s"], filter_damping=sizes["damping"]
-    )
-
-
-EFFECT = HiddenEffect("speed_filter", Place.SPEED_SENSOR, True, _draw, _apply)
+EFFECT = HiddenEffect(
+    "speed_filter",
+    Place.SPEED_SENSOR,
+    True,
+    _draw,
+    sets(filter_time_s="time_constant_s", filter_rad_s="corner_rad_s", filter_damping="damping"),
+    fitted={"time_constant_s": unless_zero("time_constant_s")},
+)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -28,4 +29,10 @@ def _corrupt(acquisition: Acquisition, sizes: Sizes) -> Acquisition:
     )
 
 
-EFFECT = HiddenEffect("speed_quantisation", Place.SPEED_SENSOR, True, _draw, corrupt=_corrupt)
+def _true_step(sizes: Sizes, bus: Mapping[str, float]) -> float:
+    return sizes["grid_rad_s"] or sizes["count_rad"] / sizes["count_time_s"]
+
+
+EFFECT = HiddenEffect(
+    "speed_quantisation", Place.SPEED_SENSOR, True, _draw, corrupt=_corrupt, fitted={"step_rad_s": _true_step}
+)

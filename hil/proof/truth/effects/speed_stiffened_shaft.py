@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hil.proof.truth.bus import Bus
-from hil.proof.truth.hidden import HiddenEffect, Place, Sizes, either, log_uniform
-from hil.proof.truth.physics import Physics
+from hil.proof.truth.hidden import HiddenEffect, Place, Sizes, either, log_uniform, sets
 
 
 def _draw(rng: np.random.Generator, bus: Bus) -> Sizes:
@@ -16,10 +15,10 @@ def _draw(rng: np.random.Generator, bus: Bus) -> Sizes:
     }
 
 
-def _apply(physics: Physics, sizes: Sizes, rng: np.random.Generator) -> Physics:
-    return physics._replace(
-        stiffness_speed_share=sizes["stiffness_share"], stiffness_speed_rad_s=sizes["half_speed_rad_s"]
-    )
-
-
-EFFECT = HiddenEffect("speed_stiffened_shaft", Place.SHAFT, False, _draw, _apply)
+EFFECT = HiddenEffect(
+    "speed_stiffened_shaft",
+    Place.SHAFT,
+    False,
+    _draw,
+    sets(stiffness_speed_share="stiffness_share", stiffness_speed_rad_s="half_speed_rad_s"),
+)

@@ -5,6 +5,7 @@ Of the speed or of the whole row; at random, or in a fixed beat of two clocks.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -35,4 +36,9 @@ def _corrupt(acquisition: Acquisition, sizes: Sizes) -> Acquisition:
     )
 
 
-EFFECT = HiddenEffect("stale_samples", Place.ACQUISITION, True, _draw, corrupt=_corrupt)
+def _true_share(sizes: Sizes, bus: Mapping[str, float]) -> float | None:
+    """Share of repeats in a beat; of random ones each recording has its own."""
+    return 1.0 / sizes["every"] if sizes["every"] else None
+
+
+EFFECT = HiddenEffect("stale_samples", Place.ACQUISITION, True, _draw, corrupt=_corrupt, fitted={"share": _true_share})

@@ -31,4 +31,6 @@ def _when(physics: Physics) -> Interval:
     return physics.stiffness_step_at_s, DURATION_S
 
 
-EFFECT = HiddenEffect("stiffness_change", Place.SHAFT, True, _draw, _apply, when=_when)
+EFFECT = HiddenEffect(
+    "stiffness_change", Place.SHAFT, True, _draw, _apply, when=_when, fitted={"change": "stiffness_step"}
+)

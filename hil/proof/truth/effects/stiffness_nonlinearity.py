@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from hil.proof.truth.bus import Bus
-from hil.proof.truth.hidden import HiddenEffect, Place, Sizes, log_uniform
-from hil.proof.truth.physics import Physics
+from hil.proof.truth.hidden import HiddenEffect, Place, Sizes, log_uniform, sets
 
 
 def _draw(rng: np.random.Generator, bus: Bus) -> Sizes:
@@ -18,10 +19,18 @@ def _draw(rng: np.random.Generator, bus: Bus) -> Sizes:
     }
 
 
-def _apply(physics: Physics, sizes: Sizes, rng: np.random.Generator) -> Physics:
-    return physics._replace(
-        hardening_twist_rad=sizes["hardening_twist_rad"], softening_twist_rad=sizes["softening_twist_rad"]
-    )
+def _true_hardening(sizes: Sizes, bus: Mapping[str, float]) -> float:
+    """First term of sinh(x) / x and asinh(x) / x beyond 1: x^2 / 6 with either sign."""
+    if sizes["hardening_twist_rad"]:
+        return 1.0 / (6.0 * sizes["hardening_twist_rad"] ** 2)
+    return -1.0 / (6.0 * sizes["softening_twist_rad"] ** 2)
 
 
-EFFECT = HiddenEffect("stiffness_nonlinearity", Place.SHAFT, True, _draw, _apply)
+EFFECT = HiddenEffect(
+    "stiffness_nonlinearity",
+    Place.SHAFT,
+    True,
+    _draw,
+    sets("hardening_twist_rad", "softening_twist_rad"),
+    fitted={"hardening_per_rad2": _true_hardening},
+)

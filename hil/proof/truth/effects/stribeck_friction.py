@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from hil.proof.truth.bus import Bus
-from hil.proof.truth.hidden import HiddenEffect, Place, Sizes, log_uniform
-from hil.proof.truth.physics import Physics
+from hil.proof.truth.hidden import HiddenEffect, Place, Sizes, log_uniform, sets
 
 
 def _draw(rng: np.random.Generator, bus: Bus) -> Sizes:
@@ -18,12 +19,15 @@ def _draw(rng: np.random.Generator, bus: Bus) -> Sizes:
     }
 
 
-def _apply(physics: Physics, sizes: Sizes, rng: np.random.Generator) -> Physics:
-    return physics._replace(
-        friction_motor_nm=sizes["coulomb_nm"],
-        breakaway_motor_nm=sizes["breakaway_nm"],
-        stribeck_speed_rad_s=sizes["stribeck_speed_rad_s"],
-    )
+def _true_excess(sizes: Sizes, bus: Mapping[str, float]) -> float:
+    return sizes["breakaway_nm"] - sizes["coulomb_nm"]
 
 
-EFFECT = HiddenEffect("stribeck_friction", Place.MOTOR, True, _draw, _apply)
+EFFECT = HiddenEffect(
+    "stribeck_friction",
+    Place.MOTOR,
+    True,
+    _draw,
+    sets("stribeck_speed_rad_s", friction_motor_nm="coulomb_nm", breakaway_motor_nm="breakaway_nm"),
+    fitted={"coulomb_nm": "coulomb_nm", "excess_nm": _true_excess, "stribeck_rad_s": "stribeck_speed_rad_s"},
+)

@@ -5,16 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from hil.proof.truth.bus import Bus
-from hil.proof.truth.hidden import HiddenEffect, Place, Sizes, log_uniform
-from hil.proof.truth.physics import Physics
+from hil.proof.truth.hidden import HiddenEffect, Place, Sizes, log_uniform, sets
 
 
 def _draw(rng: np.random.Generator, bus: Bus) -> Sizes:
     return {"dropout_every_s": rng.uniform(0.7, 3.0), "dropout_s": log_uniform(rng, 0.015, 0.06)}
 
 
-def _apply(physics: Physics, sizes: Sizes, rng: np.random.Generator) -> Physics:
-    return physics._replace(dropout_every_s=sizes["dropout_every_s"], dropout_s=sizes["dropout_s"])
-
-
-EFFECT = HiddenEffect("torque_dropouts", Place.TORQUE_PATH, False, _draw, _apply)
+EFFECT = HiddenEffect("torque_dropouts", Place.TORQUE_PATH, False, _draw, sets("dropout_every_s", "dropout_s"))

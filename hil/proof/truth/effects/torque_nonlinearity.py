@@ -8,8 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from hil.proof.truth.bus import Bus
-from hil.proof.truth.hidden import HiddenEffect, Place, Sizes, log_uniform
-from hil.proof.truth.physics import Physics
+from hil.proof.truth.hidden import HiddenEffect, Place, Sizes, log_uniform, sets
 
 
 def _draw(rng: np.random.Generator, bus: Bus) -> Sizes:
@@ -18,8 +17,6 @@ def _draw(rng: np.random.Generator, bus: Bus) -> Sizes:
     return {"saturating_nm": positive, "saturating_back_nm": negative}
 
 
-def _apply(physics: Physics, sizes: Sizes, rng: np.random.Generator) -> Physics:
-    return physics._replace(saturating_nm=sizes["saturating_nm"], saturating_back_nm=sizes["saturating_back_nm"])
-
-
-EFFECT = HiddenEffect("torque_nonlinearity", Place.TORQUE_PATH, True, _draw, _apply)
+EFFECT = HiddenEffect(
+    "torque_nonlinearity", Place.TORQUE_PATH, True, _draw, sets("saturating_nm", "saturating_back_nm")
+)

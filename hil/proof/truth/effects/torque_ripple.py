@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from hil.proof.truth.bus import Bus
-from hil.proof.truth.hidden import HiddenEffect, Place, Sizes, log_uniform
+from hil.proof.truth.hidden import HiddenEffect, Place, Sizes, log_uniform, unless_zero
 from hil.proof.truth.physics import Physics
 
 ORDERS = (1, 3, 4, 6, 12)
@@ -38,4 +38,12 @@ def _apply(physics: Physics, sizes: Sizes, rng: np.random.Generator) -> Physics:
     )
 
 
-EFFECT = HiddenEffect("torque_ripple", Place.TORQUE_PATH, True, _draw, _apply)
+EFFECT = HiddenEffect(
+    "torque_ripple",
+    Place.TORQUE_PATH,
+    True,
+    _draw,
+    _apply,
+    fitted={"order": "order", "amplitude_nm": unless_zero("ripple_nm"), "share": unless_zero("ripple_over_torque")},
+    unscaled=("order",),
+)

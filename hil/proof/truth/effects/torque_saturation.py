@@ -8,8 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from hil.proof.truth.bus import Bus
-from hil.proof.truth.hidden import HiddenEffect, Place, Sizes, log_uniform
-from hil.proof.truth.physics import Physics
+from hil.proof.truth.hidden import HiddenEffect, Place, Sizes, log_uniform, sets, unless_zero
 
 LIMITS_NM = {("m1",): (180.0, 310.0), ("m2",): (130.0, 220.0), ("m1", "m2"): (150.0, 280.0), ("sum",): (300.0, 480.0)}
 """What is limited, and to what: where the strongest of the three tests asks for somewhat more."""
@@ -26,13 +25,15 @@ def _draw(rng: np.random.Generator, bus: Bus) -> Sizes:
     }
 
 
-def _apply(physics: Physics, sizes: Sizes, rng: np.random.Generator) -> Physics:
-    return physics._replace(
-        limit_m1_nm=sizes["limit_m1_nm"],
-        limit_m2_nm=sizes["limit_m2_nm"],
-        limit_total_nm=sizes["limit_total_nm"],
-        limit_knee=sizes["knee"],
-    )
-
-
-EFFECT = HiddenEffect("torque_saturation", Place.TORQUE_PATH, True, _draw, _apply)
+EFFECT = HiddenEffect(
+    "torque_saturation",
+    Place.TORQUE_PATH,
+    True,
+    _draw,
+    sets("limit_m1_nm", "limit_m2_nm", "limit_total_nm", limit_knee="knee"),
+    fitted={
+        "limit_m1_nm": unless_zero("limit_m1_nm"),
+        "limit_m2_nm": unless_zero("limit_m2_nm"),
+        "limit_sum_nm": unless_zero("limit_total_nm"),
+    },
+)

@@ -8,16 +8,11 @@ from __future__ import annotations
 import numpy as np
 
 from hil.proof.truth.bus import Bus
-from hil.proof.truth.hidden import HiddenEffect, Place, Sizes, log_uniform
-from hil.proof.truth.physics import Physics
+from hil.proof.truth.hidden import HiddenEffect, Place, Sizes, log_uniform, sets
 
 
 def _draw(rng: np.random.Generator, bus: Bus) -> Sizes:
     return {"slew_nm_s": log_uniform(rng, 2500.0, 12000.0)}
 
 
-def _apply(physics: Physics, sizes: Sizes, rng: np.random.Generator) -> Physics:
-    return physics._replace(slew_nm_s=sizes["slew_nm_s"])
-
-
-EFFECT = HiddenEffect("torque_slew", Place.TORQUE_PATH, False, _draw, _apply)
+EFFECT = HiddenEffect("torque_slew", Place.TORQUE_PATH, False, _draw, sets("slew_nm_s"))

@@ -5,16 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from hil.proof.truth.bus import Bus
-from hil.proof.truth.hidden import HiddenEffect, Place, Sizes, log_uniform
-from hil.proof.truth.physics import Physics
+from hil.proof.truth.hidden import HiddenEffect, Place, Sizes, log_uniform, sets
 
 
 def _draw(rng: np.random.Generator, bus: Bus) -> Sizes:
     return {"delay_s": log_uniform(rng, 0.002, 0.04)}
 
 
-def _apply(physics: Physics, sizes: Sizes, rng: np.random.Generator) -> Physics:
-    return physics._replace(delay_s=sizes["delay_s"])
-
-
-EFFECT = HiddenEffect("transport_delay", Place.TORQUE_PATH, True, _draw, _apply)
+EFFECT = HiddenEffect("transport_delay", Place.TORQUE_PATH, True, _draw, sets("delay_s"), fitted={"delay_s": "delay_s"})

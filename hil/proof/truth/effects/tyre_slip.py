@@ -5,11 +5,15 @@ The wheels' inertia is part of the load's.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
+
 import numpy as np
 
 from hil.proof.truth.bus import Bus
 from hil.proof.truth.hidden import HiddenEffect, Place, Sizes, log_uniform
 from hil.proof.truth.physics import Physics
+from hil.proof.truth.tyre import SHAPE
 
 
 def _draw(rng: np.random.Generator, bus: Bus) -> Sizes:
@@ -30,4 +34,33 @@ def _apply(physics: Physics, sizes: Sizes, rng: np.random.Generator) -> Physics:
     )
 
 
-EFFECT = HiddenEffect("tyre_slip", Place.LOAD, True, _draw, _apply)
+def _true_slip(sizes: Sizes, bus: Mapping[str, float]) -> float:
+    return 1.0 / sizes["slip_stiffness_nm"]
+
+
+def _true_share(sizes: Sizes, bus: Mapping[str, float]) -> float:
+    return sizes["wheel_inertia_kg_m2"] / bus["J_L"]
+
+
+def _true_relaxation(sizes: Sizes, bus: Mapping[str, float]) -> float:
+    return sizes["relaxation_m"] * bus["gear_ratio"] / bus["wheel_radius_m"]
+
+
+def _true_grip(sizes: Sizes, bus: Mapping[str, float]) -> float:
+    """Grip of the ``G tanh(x / G)`` that levels off as ``D sin(C atan(x / (C D)))`` does: their terms in x^3 agree."""
+    return sizes["grip_nm"] / math.sqrt(0.5 + SHAPE**-2)
+
+
+EFFECT = HiddenEffect(
+    "tyre_slip",
+    Place.LOAD,
+    True,
+    _draw,
+    _apply,
+    fitted={
+        "slip_per_nm": _true_slip,
+        "wheel_share": _true_share,
+        "relaxation_rad": _true_relaxation,
+        "grip_nm": _true_grip,
+    },
+)

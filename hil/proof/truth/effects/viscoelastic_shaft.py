@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hil.proof.truth.bus import Bus
-from hil.proof.truth.hidden import HiddenEffect, Place, Sizes, log_uniform
-from hil.proof.truth.physics import Physics
+from hil.proof.truth.hidden import HiddenEffect, Place, Sizes, log_uniform, sets
 
 
 def _draw(rng: np.random.Generator, bus: Bus) -> Sizes:
@@ -17,12 +16,10 @@ def _draw(rng: np.random.Generator, bus: Bus) -> Sizes:
     }
 
 
-def _apply(physics: Physics, sizes: Sizes, rng: np.random.Generator) -> Physics:
-    return physics._replace(
-        maxwell_stiffness=sizes["maxwell_stiffness_nm_per_rad"],
-        maxwell_time_s=sizes["maxwell_time_s"],
-        maxwell_fast_share=sizes["maxwell_fast_share"],
-    )
-
-
-EFFECT = HiddenEffect("viscoelastic_shaft", Place.SHAFT, True, _draw, _apply)
+EFFECT = HiddenEffect(
+    "viscoelastic_shaft",
+    Place.SHAFT,
+    True,
+    _draw,
+    sets("maxwell_time_s", "maxwell_fast_share", maxwell_stiffness="maxwell_stiffness_nm_per_rad"),
+)

@@ -8,16 +8,11 @@ from __future__ import annotations
 import numpy as np
 
 from hil.proof.truth.bus import Bus
-from hil.proof.truth.hidden import HiddenEffect, Place, Sizes, log_uniform
-from hil.proof.truth.physics import Physics
+from hil.proof.truth.hidden import HiddenEffect, Place, Sizes, log_uniform, sets
 
 
 def _draw(rng: np.random.Generator, bus: Bus) -> Sizes:
     return {"cold_factor": 1.0 + log_uniform(rng, 0.12, 1.5), "warming_time_s": log_uniform(rng, 4.0, 15.0)}
 
 
-def _apply(physics: Physics, sizes: Sizes, rng: np.random.Generator) -> Physics:
-    return physics._replace(cold_factor=sizes["cold_factor"], warming_time_s=sizes["warming_time_s"])
-
-
-EFFECT = HiddenEffect("warming_friction", Place.LOAD, True, _draw, _apply)
+EFFECT = HiddenEffect("warming_friction", Place.LOAD, True, _draw, sets("cold_factor", "warming_time_s"))
