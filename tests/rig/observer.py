@@ -17,7 +17,7 @@ def read_object(bus_url: str, node_id: int, index: int, subindex: int = 0) -> in
     with CanLink.open(bus_url) as link:
         link.subscribe(0x580 + node_id, lambda data, t_ns: answers.put(data))
         link.send(0x600 + node_id, bytes((UPLOAD, index & 0xFF, index >> 8, subindex, 0, 0, 0, 0)))
-        answer = answers.get(timeout=5.0)
+        answer = answers.get(timeout=60.0)
     assert answer[0] & 0xE3 == 0x43, f"expected an expedited upload, got [{answer.hex(' ')}]"
     return int.from_bytes(answer[4 : 8 - ((answer[0] >> 2) & 3)], "little")
 
