@@ -24,7 +24,7 @@ prove: $(READY)
 # Three workers on two cores: a third of the time a test waits, for a process that starts or a rig that stays silent.
 test: $(READY)
 	$(MAKE) --jobs 2 --output-sync lint kernels
-	$(BIN)/python -m pytest -n 3 -m "not campaign"
+	$(BIN)/python -m pytest -n 2 -m "not campaign"
 
 # Compiled once, while lint has the other core; else each of pytest's workers would.
 kernels: $(READY)

@@ -116,8 +116,12 @@ def test_an_interruption_is_not_lost_in_a_callback_of_the_simulation(
 
     owner = CVodeSolver if kind == "modelExchange" else Recorder
     monkeypatch.setattr(owner, called_back.__name__, interrupted)
-    with pytest.raises(KeyboardInterrupt):
-        plant.run(read_record(tmp_path / "run_1.csv"))
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a worker of pytest ignores it
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            plant.run(read_record(tmp_path / "run_1.csv"))
+    finally:
+        signal.signal(signal.SIGINT, before)
     assert 100 <= len(calls) < 150  # to the end of that step, and no further
 
 
