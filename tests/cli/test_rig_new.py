@@ -9,6 +9,7 @@ import pty
 import subprocess
 import sys
 import termios
+import time
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -191,8 +192,10 @@ def read_until(end: int, text: str) -> str:
 
 
 def ended_by_ctrl_c(process: subprocess.Popen[bytes], end: int) -> int:
-    """Press Ctrl-C as a person does, once more where it came between the prompt and the wait for the line."""
+    """Press Ctrl-C as a person does, when the prompt waits; once more where it was between the prompt and the wait."""
     for _ in range(4):
+        while Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()[0] != "S":
+            time.sleep(0.01)
         os.write(end, b"\x03")
         with contextlib.suppress(subprocess.TimeoutExpired):
             return process.wait(timeout=25)  # one more while the program ends would end it by the signal itself
