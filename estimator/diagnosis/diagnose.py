@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from threadpoolctl import threadpool_limits
 
-from estimator.diagnosis.first_use import COMPILING, compile_kernels, is_first_use
+from estimator.diagnosis.first_use import COMPILING, compile_kernels, compile_laws, is_first_use
 from estimator.diagnosis.hypotheses import Progress, silent
 from estimator.diagnosis.inference.answer import answer
 from estimator.diagnosis.preconditions import prepare
@@ -64,6 +64,9 @@ def diagnose(
         progress = _telling(progress)
         progress("preparing", 0.0)
         compile_kernels(masses)
+    if masses and model.laws:
+        progress("compiling the model's own laws", 0.0)
+        compile_laws(model, records[0].sample_time_s)
     with threadpool_limits(1, user_api="blas"):  # on tall, thin matrices more threads only wait for each other
         progress("checking the recordings", 0.0)
         ready = prepare(records, model, holdout)

@@ -17,6 +17,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numba.core import types
 from numba.core.types import boolean, float64, int64
 
@@ -24,9 +25,15 @@ from estimator.compiled import IS_COMPILED
 from estimator.diagnosis.line.differences import Nudges, Setting, linearise
 from estimator.diagnosis.line.kalman import Chain, Filtered, run_filter, run_smoother
 from estimator.physics.bounded import least
+from estimator.physics.grid import Grid
 from estimator.physics.kernel.integration import integrate
 from estimator.physics.kernel.many import integrate_each
 from estimator.physics.kernel.side_by_side import integrate_side_by_side
+from estimator.physics.layout import flat
+from estimator.physics.model import DrivelineModel
+from estimator.physics.simulate import simulate
+from estimator.physics.start import Start
+from estimator.signals.record import Record
 
 COMPILING = "compiling, once on this machine: about a minute"
 
@@ -90,6 +97,19 @@ def compile_kernels(masses: int) -> None:
             pass
     _marker(masses).parent.mkdir(parents=True, exist_ok=True)
     _marker(masses).touch()
+
+
+def compile_laws(model: DrivelineModel, sample_time_s: float) -> None:
+    """Compile the simulation with a model's own laws, where it has any: before a diagnosis counts its time."""
+    p = flat(model)
+    for law in model.laws:
+        for parameter in law.law.parameters:
+            p[law.places[parameter.name]] = parameter.start
+    nothing = np.zeros(2)
+    time_s = np.array([0.0, sample_time_s])
+    record = Record("compiled", sample_time_s, time_s, nothing[:, None], nothing, nothing == 0.0)
+    if model.laws:
+        simulate(Grid(model.structure, 1, 1.0, model.laws), record, p, Start(0.0, 0.0, 0.0))
 
 
 def compile_named(masses: int, *names: str) -> None:

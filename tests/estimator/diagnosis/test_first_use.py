@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
@@ -12,6 +13,8 @@ import pytest
 
 from estimator.diagnosis import diagnose, first_use
 from estimator.diagnosis.first_use import COMPILING, is_first_use, signatures
+from estimator.physics.effect import Element
+from estimator.physics.own_law import OwnLaw, OwnParameter, named
 from tests.estimator.diagnosis.planted import quiet
 from tests.estimator.physics.bench import ONE_MASS, model
 
@@ -77,6 +80,25 @@ def test_what_is_on_disk_is_what_is_called() -> None:
     for kernel, signature in signatures(1).items():
         kernel.compile(signature)
     assert {kernel: sum(kernel.stats.cache_misses.values()) for kernel in signatures(1)} == had
+
+
+def test_a_models_own_laws_are_compiled_before_a_diagnosis_counts_its_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The budget is for the search: compiling within it would leave no time for that."""
+    asked = []
+
+    def noted(t: float, w: float, load: float, twist: float, torque: float, size: float) -> float:
+        asked.append(f"{w}")
+        return size * w
+
+    def answered(*_: object) -> None:
+        raise InterruptedError(f"asked {len(asked)} times")
+
+    plain = model(ONE_MASS)
+    owner = replace(plain, laws=named([OwnLaw("mine", noted, Element.MOTOR, (OwnParameter("size", "", 0, 0, 9, 1),))]))
+    asked.clear()  # it was tried when it was read
+    monkeypatch.setattr(import_module("estimator.diagnosis.diagnose"), "answer", answered)
+    with pytest.raises(InterruptedError, match=r"asked [1-9]\d* times"):
+        diagnose(quiet(values=ONE_MASS, samples=1200), owner)
 
 
 @pytest.mark.campaign
