@@ -1,6 +1,6 @@
 """Laws of a user's own in the equations of motion: one function of the motion for all laws of a model.
 
-Most lines have none. ``Own`` is then an empty tuple, of another type, and the simulation is compiled without them.
+Most lines have none. ``Line.own`` is then an empty tuple, of another type, and the simulation is compiled without them.
 """
 
 from __future__ import annotations
