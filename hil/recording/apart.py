@@ -67,13 +67,7 @@ class _Process:
         )
 
     def ask(self, path: Path, what: What, limit_s: float, asked: Request) -> tuple[Document, dict[str, Column]]:
-        """Have a file read.
-
-        Raises
-        ------
-        _Gone
-            If it does not answer, within the limit or at all.
-        """
+        """Have a file read."""
         watchdog = threading.Timer(limit_s, self._process.kill)
         watchdog.start()
         try:
@@ -113,35 +107,17 @@ class Reader:
         self._process: _Process | None = None
 
     def table(self, path: Path, request: Request = EVERYTHING) -> Table:
-        """Read a recording.
-
-        Raises
-        ------
-        RecordingError
-            If it can't be read, also where that ends the process, or takes more than it may.
-        """
+        """Read a recording."""
         document, columns = self._read(path, "table", request)
         return table_of(path, document, columns)
 
     def metadata(self, path: Path) -> Mapping[str, str]:
-        """Read what a recording says of itself.
-
-        Raises
-        ------
-        RecordingError
-            As `table`.
-        """
+        """Read what a recording says of itself."""
         said: Mapping[str, str] = self._read(path, "metadata", Request())[0]["metadata"]
         return said
 
     def survey(self, path: Path, request: Request) -> Survey:
-        """Read what is in a recording, in figures.
-
-        Raises
-        ------
-        RecordingError
-            As `table`.
-        """
+        """Read what is in a recording, in figures."""
         return Survey.of_document(self._read(path, "survey", request)[0]["survey"])
 
     def end(self) -> None:

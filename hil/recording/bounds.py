@@ -42,13 +42,7 @@ def processor_s(file_bytes: int) -> float:
 
 
 def require_cells(path: Path, cells: int) -> None:
-    """Refuse what is more than a recording of its file's size can be, before any of it is read.
-
-    Raises
-    ------
-    RecordingError
-        With how many there may be.
-    """
+    """Refuse what is more than a recording of its file's size can be, before any of it is read."""
     most = most_cells(path.stat().st_size)
     if cells > most:
         raise RecordingError(
@@ -59,12 +53,6 @@ def require_cells(path: Path, cells: int) -> None:
 
 
 def require_columns(path: Path, columns: int) -> None:
-    """Refuse more columns than a recording has.
-
-    Raises
-    ------
-    RecordingError
-        With how many there may be.
-    """
+    """Refuse more columns than a recording has."""
     if columns > COLUMNS:
         raise RecordingError(path, f"expected at most {COLUMNS} columns, got {columns}. Leave out what is not needed.")

@@ -27,13 +27,7 @@ def is_bus_log(mdf: MDF) -> bool:
 
 
 def decoded(path: Path, mdf: MDF, dbc: Path) -> MDF:
-    """Return the signals of a logged bus, a J1939 one among them, as a file of their own in memory.
-
-    Raises
-    ------
-    RecordingError
-        If the file holds no frames, the DBC can't be read, or none of the frames is in it.
-    """
+    """Return the signals of a logged bus, a J1939 one among them, as a file of their own in memory."""
     if not any(int(getattr(group.channel_group, "flags", 0)) & BUS_EVENT for group in mdf.groups):
         raise RecordingError(path, "expected the frames of a bus for --dbc, got signals. Leave --dbc out.")
     signals = mdf.extract_bus_logging({"CAN": [(_database(path, dbc), ANY_BUS)]})
@@ -46,13 +40,7 @@ def decoded(path: Path, mdf: MDF, dbc: Path) -> MDF:
 
 
 def _database(path: Path, dbc: Path) -> Path:
-    """Return a DBC file that can be read.
-
-    Raises
-    ------
-    RecordingError
-        If it can't be.
-    """
+    """Return a DBC file that can be read."""
     from asammdf.blocks.utils import load_can_database
 
     if dbc.suffix.lower() != ".dbc":

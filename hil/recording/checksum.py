@@ -106,24 +106,12 @@ def _units_of(table: Table) -> dict[str, str]:
 
 
 def require_whole(table: Table) -> None:
-    """Refuse a table that is not what it was when it was written; one without a checksum passes.
-
-    Raises
-    ------
-    RecordingError
-        With what was expected and what came.
-    """
+    """Refuse a table that is not what it was when it was written; one without a checksum passes."""
     require_unchanged(table.path, table.metadata, _units_of(table), lambda: data_sha256(table.columns))
 
 
 def require_unchanged(path: Path, said: Mapping[str, str], units: Mapping[str, str], data: Callable[[], str]) -> None:
-    """Refuse metadata, units and data (given by their checksum) that are not what they were when they were written.
-
-    Raises
-    ------
-    RecordingError
-        As `require_whole`.
-    """
+    """Refuse metadata, units and data (given by their checksum) that are not what they were when they were written."""
     problems = []
     if CHECKSUM in said and (got := data()) != said[CHECKSUM]:
         problems.append(

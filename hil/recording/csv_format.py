@@ -49,14 +49,7 @@ TRAILING = "\0"
 
 
 def read(path: Path, request: Request) -> Table:
-    """Read a text recording, in the form that it is recognised to have or that was set by hand.
-
-    Raises
-    ------
-    RecordingError
-        With the line of the fault, if the file is not text in its encoding, has no row, a column without a name, or a
-        row with another number of cells.
-    """
+    """Read a text recording, in the form that it is recognised to have or that was set by hand."""
     hints, said = request.form, read_sidecar(path)
     text, encoding = decoded(path, path.read_bytes(), hints.encoding)
     if not text or text.isspace():
@@ -107,13 +100,7 @@ def form_of(text: str, hints: FormatHints) -> TextForm:
 
 
 def write(table: Table, path: Path) -> None:
-    """Write a table as CSV, and what it says of itself next to it.
-
-    Raises
-    ------
-    RecordingError
-        If a text cell holds a line break.
-    """
+    """Write a table as CSV, and what it says of itself next to it."""
     columns = [_cells(table, path, name) for name in table.columns]
     with path.open("w", encoding="utf-8", newline="") as file:
         file.write(",".join(map(_quoted, table.columns)) + "\n")
@@ -148,13 +135,7 @@ def _require_names(path: Path, form: TextForm) -> None:
 
 
 def _rows(path: Path, text: str, form: TextForm) -> tuple[bytes, tuple[int, ...]]:
-    """Return the lines that are rows, and the numbers of the lines among them that are none.
-
-    Raises
-    ------
-    RecordingError
-        For an empty line among the rows: it may stand for a row, or for nothing.
-    """
+    """Return the lines that are rows, and the numbers of the lines among them that are none."""
     start = 0
     for _ in range(form.first_row_line - 1):
         start = text.find("\n", start) + 1

@@ -21,13 +21,7 @@ from hil.recording.table import Table
 def with_the_line_to_write(
     paths: Sequence[Path], signals: SignalsConfig | None, dbc: Path | None = None
 ) -> Iterator[None]:
-    """Add to a refusal the lines of ``[signals]`` that cure it.
-
-    Raises
-    ------
-    Implausible
-        As in the block, with a note.
-    """
+    """Add to a refusal the lines of ``[signals]`` that cure it."""
     try:
         yield
     except Implausible as error:

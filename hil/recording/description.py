@@ -37,23 +37,7 @@ def description_of(table: Table, stored_as: Mapping[str, str]) -> str:
 
 
 def described_table(path: Path, text: str, column: Callable[[str, Kind], Column]) -> Table:
-    """Read a table by its description.
-
-    Parameters
-    ----------
-    path : Path
-        The recording.
-    text : str
-        Its description.
-    column : callable
-        Returns the cells of the column stored under a name, as the kind they were; raises KeyError where there is
-        none.
-
-    Raises
-    ------
-    RecordingError
-        If the description is damaged, or names a column that is not there.
-    """
+    """Read a table by its description."""
     try:
         document = parse_json(text)
         entries = [(str(e["name"]), str(e["stored_as"]), e["unit"], Kind(e["kind"])) for e in document["columns"]]
@@ -76,13 +60,7 @@ def described_table(path: Path, text: str, column: Callable[[str, Kind], Column]
 
 
 def metadata_of(path: Path, text: str) -> dict[str, str]:
-    """Return the metadata of a description alone.
-
-    Raises
-    ------
-    RecordingError
-        If it is damaged.
-    """
+    """Return the metadata of a description alone."""
     try:
         return {str(key): str(value) for key, value in parse_json(text)["metadata"].items()}
     except (ValueError, KeyError, TypeError, AttributeError) as error:

@@ -28,13 +28,7 @@ class Facts:
 
 
 def facts_of(table: Table) -> Facts:
-    """Return the facts of a table.
-
-    Raises
-    ------
-    RecordingError
-        If its times or flags are no numbers.
-    """
+    """Return the facts of a table."""
     there = table.numeric([name for name in (columns.TIME, columns.FLAGS) if name in table.columns])
     time_s = there.get(columns.TIME, np.zeros(1))
     flagged = int(np.count_nonzero(there[columns.FLAGS])) if columns.FLAGS in there else 0
@@ -42,13 +36,7 @@ def facts_of(table: Table) -> Facts:
 
 
 def read_facts(path: Path) -> Facts:
-    """Read a recording once, in memory that does not grow where it is a CSV of this rig, and return its facts.
-
-    Raises
-    ------
-    RecordingError
-        As `hil.recording.formats.read_table`.
-    """
+    """Read a recording once, in memory that does not grow where it is a CSV of this rig, and return its facts."""
     format_of(path)
     if path.suffix.lower() == CSV and is_own(path) and (said := read_sidecar(path)).found and not said.types:
         try:

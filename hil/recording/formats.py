@@ -92,13 +92,7 @@ def read_table(path: Path | str, request: Request | None = None) -> Table:
 
 
 def read_metadata(path: Path | str) -> Mapping[str, str]:
-    """Read what a recording says of itself, without its rows where the format allows.
-
-    Raises
-    ------
-    RecordingError
-        As `read_table`, but for the checksum.
-    """
+    """Read what a recording says of itself, without its rows where the format allows."""
     path = Path(path)
     known = format_of(path)
     return READER.metadata(path) if known.apart else metadata_of(known, path)
@@ -110,13 +104,7 @@ def metadata_of(known: Format, path: Path) -> Mapping[str, str]:
 
 
 def writer_for(path: Path, replace: bool = False) -> Callable[[Table, Path], None]:
-    """Return what writes a recording of that name, a new one unless it may replace another.
-
-    Raises
-    ------
-    RecordingError
-        If the suffix is not one that can be written, the file is there already, or its folder is not.
-    """
+    """Return what writes a recording of that name, a new one unless it may replace another."""
     known = FORMATS.get(path.suffix.lower())
     if known is None or known.write is None:
         writable = ", ".join(suffix for suffix, form in FORMATS.items() if form.write)
@@ -131,13 +119,7 @@ def writer_for(path: Path, replace: bool = False) -> Callable[[Table, Path], Non
 
 
 def format_of(path: Path) -> Format:
-    """Return the format of a file that is there and can be read.
-
-    Raises
-    ------
-    RecordingError
-        If its suffix is unknown, or it can't be opened.
-    """
+    """Return the format of a file that is there and can be read."""
     known = FORMATS.get(path.suffix.lower())
     if known is None:
         raise RecordingError(path, f"expected a recording ({', '.join(FORMATS)}), got {path.suffix!r}")

@@ -22,24 +22,7 @@ DAMAGED = (OSError, KeyError, ValueError, TypeError, RuntimeError, IndexError, A
 
 @contextmanager
 def reading(path: Path, what: str) -> Iterator[Any]:
-    """Open a file for reading.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    what : str
-        What kind of file is expected, for people.
-
-    Yields
-    ------
-    h5py.File
-
-    Raises
-    ------
-    RecordingError
-        For everything that goes wrong in the block because the file is no whole one.
-    """
+    """Open a file for reading."""
     import h5py
 
     try:
@@ -89,22 +72,7 @@ def text_of(name: bytes | str) -> str:
 
 
 def write_whole(path: Path, fill: Callable[[Any], None], header: bytes = b"") -> None:
-    """Write a file; it is made in memory, so that a full disk is reported by Python, in words, and not by HDF5.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    fill : callable
-        Puts the content into the h5py.File it is given.
-    header : bytes
-        What stands before HDF5's own content, in a user block of 512 bytes.
-
-    Raises
-    ------
-    OSError
-        If the disk does not take it.
-    """
+    """Write a file; it is made in memory, so that a full disk is reported by Python, in words, and not by HDF5."""
     import h5py
 
     content = io.BytesIO()

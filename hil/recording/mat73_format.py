@@ -47,13 +47,7 @@ LONGEST_NAME = 63
 
 
 def read(path: Path, request: Request = EVERYTHING) -> Table:
-    """Read a .mat recording of version 7.3.
-
-    Raises
-    ------
-    RecordingError
-        If the file is damaged, or holds no vector of numbers.
-    """
+    """Read a .mat recording of version 7.3."""
     with reading(path, ".mat") as file:
         return _own(path, file) if DESCRIPTION in file else _foreign(path, file, request)
 

@@ -26,13 +26,7 @@ DAMAGED = (ValueError, TypeError, IndexError, KeyError, OSError, NotImplementedE
 
 
 def read(path: Path, request: Request) -> Table:
-    """Read a .mat recording.
-
-    Raises
-    ------
-    RecordingError
-        If the file is damaged, or holds no numeric vector.
-    """
+    """Read a .mat recording."""
     import scipy.io
     from scipy.io.matlab import MatReadError
 

@@ -17,13 +17,7 @@ NS: Final = 1e-9
 
 
 def with_tables(path: Path) -> dict[str, Any]:
-    """Return the variables of a .mat file, tables among them as data frames.
-
-    Raises
-    ------
-    RecordingError
-        If the library can't read it.
-    """
+    """Return the variables of a .mat file, tables among them as data frames."""
     from matio import load_from_mat
 
     try:

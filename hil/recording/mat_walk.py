@@ -17,17 +17,7 @@ DEEPEST: Final = 12
 def walk(
     name: str, value: Any, vectors: dict[str, Column], scalars: dict[str, str], other: list[str], depth: int = 0
 ) -> None:
-    """Put what is in a variable where it belongs.
-
-    Parameters
-    ----------
-    name : str
-        Its address.
-    value
-        As `scipy.io.loadmat` returns it, structs as objects.
-    vectors, scalars, other
-        Vectors and scalars of numbers by their address, and addresses of what is neither: added to.
-    """
+    """Put what is in a variable where it belongs."""
     if is_table(value):
         fields = columns_of(value)
     elif hasattr(value, "_fieldnames"):

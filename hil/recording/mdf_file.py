@@ -40,13 +40,7 @@ IDENTIFICATION_BYTES = 64
 
 
 def require_mdf(path: Path, content: bytes) -> None:
-    """Refuse what does not begin like an MDF file.
-
-    Raises
-    ------
-    RecordingError
-        With what it begins like.
-    """
+    """Refuse what does not begin like an MDF file."""
     start = content[: len(FINISHED)]
     if len(content) < IDENTIFICATION_BYTES or start not in (FINISHED, UNFINISHED):
         raise RecordingError(
@@ -67,15 +61,6 @@ def opened(path: Path) -> Iterator[MDF]:
     """Open a file for reading; one that is not finalised is finalised in a copy.
 
     The copy is in memory, always: asammdf maps a file, and a mapped file that is cut while it is read ends the process.
-
-    Yields
-    ------
-    MDF
-
-    Raises
-    ------
-    RecordingError
-        For everything that goes wrong in the block because the file is no whole one.
     """
     from asammdf import MDF
     from asammdf.blocks.utils import MdfException

@@ -53,13 +53,7 @@ class Raster:
 
 
 def foreign_table(path: Path, mdf: MDF, request: Request) -> Table:
-    """Read the channels asked for, or those that share the time of most; physical values, invalid ones as NaN.
-
-    Raises
-    ------
-    RecordingError
-        If the file holds frames of a bus, and nothing says what they mean.
-    """
+    """Read the channels asked for, or those that share the time of most; physical values, invalid ones as NaN."""
     mdf = readable(path, mdf, request)
     rasters, remarks = rasters_of(path, mdf)
     if request.resample_s is not None and (found := _found(rasters, request)):
@@ -88,26 +82,14 @@ def foreign_table(path: Path, mdf: MDF, request: Request) -> Table:
 
 
 def foreign_tables(path: Path, mdf: MDF, request: Request) -> list[Table]:
-    """Read all channels, a table for each time.
-
-    Raises
-    ------
-    RecordingError
-        As `foreign_table`.
-    """
+    """Read all channels, a table for each time."""
     mdf = readable(path, mdf, request)
     rasters, _ = rasters_of(path, mdf)
     return [raster_table(path, mdf, raster) for raster in rasters]
 
 
 def readable(path: Path, mdf: MDF, request: Request) -> MDF:
-    """Return a file whose channels are signals: a logged bus decoded.
-
-    Raises
-    ------
-    RecordingError
-        If nothing says what its frames mean.
-    """
+    """Return a file whose channels are signals: a logged bus decoded."""
     if request.dbc is not None:
         return decoded(path, mdf, request.dbc)
     if is_bus_log(mdf):

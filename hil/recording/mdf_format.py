@@ -43,26 +43,14 @@ LONGEST_PROPERTY = 200
 
 
 def read(path: Path, request: Request) -> Table:
-    """Read an MDF recording.
-
-    Raises
-    ------
-    RecordingError
-        If the file is damaged, or holds no channel with a time.
-    """
+    """Read an MDF recording."""
     _require_mdf(path)
     with opened(path) as mdf:
         return parse(path, mdf, request)
 
 
 def read_all(path: Path, request: Request) -> list[Table]:
-    """Read an MDF recording, a table for each of its times.
-
-    Raises
-    ------
-    RecordingError
-        As `read`.
-    """
+    """Read an MDF recording, a table for each of its times."""
     _require_mdf(path)
     with opened(path) as mdf:
         return parse_all(path, mdf, request)

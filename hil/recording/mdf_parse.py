@@ -25,13 +25,7 @@ FINALISED = "its writer never finished it: it was finalised in a copy and read f
 
 
 def parse(path: Path, mdf: MDF, request: Request) -> Table:
-    """Read a file's content.
-
-    Raises
-    ------
-    RecordingError
-        If its description is damaged, or it holds no channel with a time.
-    """
+    """Read a file's content."""
     text = _description(mdf)
     table = foreign_table(path, mdf, request) if text is None else _own(path, mdf, text)
     # The columns become plain arrays of their own, not views into the file.

@@ -74,13 +74,7 @@ def _type(name: str) -> np.dtype[Any]:
 
 
 def extent(path: Path) -> Extent:
-    """Return how much a recording of this rig holds.
-
-    Raises
-    ------
-    ValueError
-        If a row is not as the rig writes it.
-    """
+    """Return how much a recording of this rig holds."""
     n_rows = flagged = 0
     first_s = last_s = 0.0
     for time_s, flags in _blocks(path, (columns.TIME, columns.FLAGS)):
@@ -92,13 +86,7 @@ def extent(path: Path) -> Extent:
 
 
 def data_sha256_at(path: Path, n_rows: int) -> str:
-    """Return the checksum of the cells of a recording of this rig (`hil.recording.checksum`), hexadecimal.
-
-    Raises
-    ------
-    ValueError
-        If a row is not as the rig writes it.
-    """
+    """Return the checksum of the cells of a recording of this rig (`hil.recording.checksum`), hexadecimal."""
     digest, names = DataDigest(), sorted(_names(path))
     at_once = max(HELD_BYTES // (8 * max(n_rows, 1)), 1)
     for first in range(0, len(names), at_once):
@@ -107,13 +95,7 @@ def data_sha256_at(path: Path, n_rows: int) -> str:
 
 
 def own_sidecar(path: Path, metadata: Mapping[str, str], units: Mapping[str, str]) -> Sidecar:
-    """Return what has to stand next to a recording of this rig: metadata, units and checksums.
-
-    Raises
-    ------
-    RecordingError
-        If a row is not as the rig writes it.
-    """
+    """Return what has to stand next to a recording of this rig: metadata, units and checksums."""
     try:
         data = data_sha256_at(path, extent(path).n_rows)
     except ValueError as error:

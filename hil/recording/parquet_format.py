@@ -27,13 +27,7 @@ FOREIGN_KEYS = frozenset({b"pandas", b"ARROW:schema"})
 
 
 def read(path: Path, request: Request) -> Table:
-    """Read a Parquet recording.
-
-    Raises
-    ------
-    RecordingError
-        If the file is no whole Parquet file, or holds no rows.
-    """
+    """Read a Parquet recording."""
     try:
         with pa.parquet.ParquetFile(path, page_checksum_verification=True) as file:
             _require_sizes(path, file.metadata)
@@ -69,13 +63,7 @@ def _names(path: Path, content: pa.Table) -> list[str]:
 
 
 def read_metadata(path: Path) -> dict[str, str]:
-    """Read what a Parquet recording says of itself.
-
-    Raises
-    ------
-    RecordingError
-        If the file is no whole Parquet file.
-    """
+    """Read what a Parquet recording says of itself."""
     try:
         schema = pa.parquet.read_schema(path)
     except DAMAGED as error:

@@ -60,23 +60,7 @@ class Series:
 def resampled(
     path: Path, series: Mapping[str, Series], period_s: float
 ) -> tuple[FloatArray, dict[str, FloatArray], list[str]]:
-    """Bring channels to one period, over the time that all of them have.
-
-    Returns
-    -------
-    ndarray, shape (N,)
-        Time [s].
-    dict of name to ndarray, shape (N,)
-        The channels; NaN where one has a gap.
-    list of str
-        What was done to each.
-
-    Raises
-    ------
-    RecordingError
-        If a channel's time runs backwards or is missing, they have no time in common, or there would be more samples
-        than a recording of the file's size may have.
-    """
+    """Bring channels to one period, over the time that all of them have."""
     usable = {name: _in_order(path, name, one) for name, one in series.items()}
     start = max(float(one.time_s[0]) for one in usable.values())
     end = min(float(one.time_s[-1]) for one in usable.values())

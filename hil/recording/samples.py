@@ -32,13 +32,7 @@ def cells_of(sample: Sample) -> tuple[float | int, ...]:
 def table_of(
     samples: Iterable[Sample], path: Path, metadata: Mapping[str, str], channel_units: Mapping[str, str] | None = None
 ) -> Table:
-    """Make a table of samples, a row each, with a column of each channel of theirs.
-
-    Raises
-    ------
-    RecordingError
-        If there is none.
-    """
+    """Make a table of samples, a row each, with a column of each channel of theirs."""
     rows = [cells_of(sample) for sample in samples]
     units = {**columns.UNITS, **(channel_units or {})}
     kinds = {name: np.int64 if name == columns.FLAGS else np.float64 for name in units}

@@ -45,13 +45,7 @@ ALIKE: Final = 4.0
 
 
 def scale_of(table: Table, column: str, role: Role, given: float | None) -> float:
-    """Return what a column is multiplied by to be in SI units.
-
-    Raises
-    ------
-    RecordingError
-        If its unit is one of another quantity, or a share of a value that isn't said; with the line to write.
-    """
+    """Return what a column is multiplied by to be in SI units."""
     if given is not None:
         return given
     text = table.units.get(column, "")
@@ -81,11 +75,6 @@ def wrapped_at(values: FloatArray) -> float | None:
 
     It jumps by nearly the whole range of a counter, between values near 0 and values near its end, where the next
     reading of a motion is. A counter has 8, 16 or 32 bit of the least step of the readings.
-
-    Parameters
-    ----------
-    values : ndarray, shape (N,)
-        In the file's own unit; NaN is missing.
     """
     seen = values[np.isfinite(values)]
     if seen.size < 3 or seen.min() < 0.0:

@@ -14,13 +14,6 @@ def columns_of_shared_length(
     """Choose the vectors of the length that most of those wanted share, or most of all.
 
     The longest, where two lengths are equally frequent.
-
-    Returns
-    -------
-    dict of name to ndarray
-        The chosen.
-    tuple of str
-        One remark for each that was left out.
     """
     asked = [vectors[name] for name in wanted if name in vectors]
     counts = Counter(vector.size for vector in asked or vectors.values())

@@ -52,13 +52,7 @@ def sidecar_of(recording: Path) -> Path:
 
 
 def write_sidecar(recording: Path, said: Sidecar, needed: bool = False) -> None:
-    """Write what a recording says of itself; nothing where it says nothing, unless it is needed all the same.
-
-    Raises
-    ------
-    RecordingError
-        If the disk does not take it.
-    """
+    """Write what a recording says of itself; nothing where it says nothing, unless it is needed all the same."""
     if said.is_empty and not needed:
         return
     path = sidecar_of(recording)
@@ -84,13 +78,7 @@ def is_sidecar(path: Path) -> bool:
 
 
 def read_sidecar(recording: Path) -> Sidecar:
-    """Read what a recording says of itself; empty where no file of ours is next to it.
-
-    Raises
-    ------
-    RecordingError
-        If it is there and can't be read.
-    """
+    """Read what a recording says of itself; empty where no file of ours is next to it."""
     path = sidecar_of(recording)
     if not path.is_file():
         return Sidecar()

@@ -162,13 +162,7 @@ def _channel(table: Table, signal: MeasuredOutput, values: FloatArray) -> Channe
 
 
 def _signed(table: Table, signal: TorqueSignal | LoadSignal | OutputSignal, values: FloatArray) -> FloatArray:
-    """Return a reading with its sign.
-
-    Raises
-    ------
-    RecordingError
-        If it was read without the sign it was stored with, and nobody has said so; with the line to write.
-    """
+    """Return a reading with its sign."""
     if signal.wraps_at is not None:
         return with_sign(values, signal.wraps_at)
     end = wrapped_at(values)

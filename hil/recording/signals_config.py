@@ -25,17 +25,7 @@ class _Strict(BaseModel):
 
 
 class _Scaled(_Strict):
-    """A column times ``scale`` is the SI quantity, reflected to the motor shaft.
-
-    Attributes
-    ----------
-    scale
-        Left out, the unit that the file gives the column counts; 1 where it gives none.
-    wraps_at
-        Where the reading begins anew at 0: values from half of it on are negative. In the file's own unit.
-    hold
-        Whether a value counts until the next where the column is brought to another period.
-    """
+    """A column times ``scale`` is the SI quantity, reflected to the motor shaft."""
 
     column: Column
     scale: float = 1.0

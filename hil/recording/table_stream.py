@@ -37,13 +37,7 @@ def send(stream: IO[bytes], document: Document, columns: Mapping[str, Column] | 
 
 
 def receive(stream: IO[bytes]) -> tuple[Document, dict[str, Column]]:
-    """Read what `send` has written.
-
-    Raises
-    ------
-    EOFError
-        If it ends before.
-    """
+    """Read what `send` has written."""
     document: Document = json.loads(_receive_text(stream))
     return document, {name: _column(stream, Kind(kind), size) for name, kind, size in document["columns"]}
 

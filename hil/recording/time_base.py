@@ -39,22 +39,7 @@ ROUND = 0.01
 
 
 def time_base(table: Table, signal: TimeSignal) -> tuple[FloatArray, float, tuple[str, ...]]:
-    """Return the time of each row and the sampling period.
-
-    Returns
-    -------
-    ndarray, shape (N,)
-        Time [s], as recorded; without the rounding of stamps coarser than the period, and without wide jitter.
-    float
-        Sampling period [s].
-    tuple of str
-        What was done to the stamps; empty where they are as recorded.
-
-    Raises
-    ------
-    RecordingError
-        If there are fewer than two rows, or time is missing, runs backwards, or is not uniform.
-    """
+    """Return the time of each row and the sampling period."""
     if table.n_rows < 2:
         raise RecordingError(table.path, f"expected two rows or more, got {table.n_rows}. Record longer.")
     if signal.sample_time_s is not None:

@@ -21,13 +21,7 @@ WORST_SHARE = 0.05
 
 
 def require_even_cycles(paths: Iterable[Path]) -> None:
-    """See that the runs that left a timing record kept their cycles; a recording without one passes.
-
-    Raises
-    ------
-    RecordingError
-        Naming the recording, what was counted, and what to do; or if its timing record can't be read.
-    """
+    """See that the runs that left a timing record kept their cycles; a recording without one passes."""
     for path in paths:
         if "timing" in (metadata := read_metadata(path)):
             _require_even(path, metadata["timing"])

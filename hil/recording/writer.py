@@ -126,11 +126,6 @@ class RecordingWriter:
         """Open the part file, a new one or one that a run has left which was killed before its first sample.
 
         Unbuffered: what the thread writes reaches the operating system at once. It is held while the run lasts.
-
-        Raises
-        ------
-        FileExistsError
-            If there is one with samples, or one that another run holds.
         """
         try:
             file = self.part_path.open("xb", buffering=0)
@@ -216,13 +211,7 @@ class RecordingWriter:
             error.add_note(str(failure))  # what ended the run comes first
 
     def _closed(self, file: FileIO) -> RecordingError | None:
-        """Have the disk take what waits, and close the file; give what keeps the recording from being whole.
-
-        Raises
-        ------
-        RecordingError
-            If the disk hangs: the file is left to it.
-        """
+        """Have the disk take what waits, and close the file; give what keeps the recording from being whole."""
         writing = self._writing
         if writing is None:
             return None

@@ -26,13 +26,7 @@ class Look:
 
 
 def look(path: Path, dbc: Path | None = None) -> Look:
-    """Look into a recording.
-
-    Raises
-    ------
-    RecordingError
-        As `hil.recording.read_table`.
-    """
+    """Look into a recording."""
     known = format_of(path)
     encoding = None
     if known.apart:

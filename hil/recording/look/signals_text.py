@@ -19,15 +19,7 @@ EPOCH_S = 1e9
 
 
 def signals_lines(survey: Survey, roles: Roles, encoding: str | None = None) -> list[str]:
-    """Return the lines of a ``[signals]`` table; none where the file has the contract's columns.
-
-    Parameters
-    ----------
-    survey, roles
-        What is in the file, and what its channels are taken for.
-    encoding : str, optional
-        Of a text file, where it has to be set by hand.
-    """
+    """Return the lines of a ``[signals]`` table; none where the file has the contract's columns."""
     lines = [] if is_own(survey) else list(_lines(survey, roles))
     if encoding is not None:
         lines.append(f'format = {{ encoding = "{encoding}" }}')

@@ -40,13 +40,7 @@ def encoding_of(content: bytes, given: str) -> str:
 
 
 def decoded(path: Path, content: bytes, given: str) -> tuple[str, str]:
-    """Return a file's text with line feeds only and no empty lines at the end, and its encoding.
-
-    Raises
-    ------
-    RecordingError
-        With the line, where a byte does not belong to the encoding.
-    """
+    """Return a file's text with line feeds only and no empty lines at the end, and its encoding."""
     encoding = encoding_of(content, given)
     try:
         text = content.decode(encoding)

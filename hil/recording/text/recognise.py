@@ -106,15 +106,7 @@ class _Cut:
 
 
 def recognise(lines: Sequence[str], hints: FormatHints) -> TextForm:
-    """Return the form of a text recording.
-
-    Parameters
-    ----------
-    lines : sequence of str
-        The first lines of the file, `SAMPLE_LINES` at most, without line ends.
-    hints : FormatHints
-        What was set by hand counts as it is.
-    """
+    """Return the form of a text recording."""
     skipped = hints.skip_lines
     delimiter = hints.delimiter
     if len(lines) > skipped and lines[skipped].strip().lower().startswith(NAMES_THE_DELIMITER):
