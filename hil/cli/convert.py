@@ -102,8 +102,7 @@ def _recording(source: Path, encoding: str, delimiter: str, dbc: Path | None) ->
 
     from hil.errors import UsageError
     from hil.recording import read_table
-    from hil.recording.format_hints import FormatHints
-    from hil.recording.request import Request
+    from hil.recording.request import FormatHints, Request
 
     try:
         hints = FormatHints(encoding=encoding, delimiter=delimiter)
@@ -117,7 +116,7 @@ def _recording(source: Path, encoding: str, delimiter: str, dbc: Path | None) ->
 def _trace(source: Path, rig: Path | None, every: bool, channel: str | None) -> Table:
     from hil.config.rig_file import read_rig
     from hil.errors import UsageError
-    from hil.recording.samples import table_of
+    from hil.recording.writer import table_of
     from hil.rig.metadata import replay_metadata
     from hil.rig.replay import replay
 
@@ -134,7 +133,7 @@ def _trace(source: Path, rig: Path | None, every: bool, channel: str | None) -> 
 
 def _document(source: Path, target: Path, table: Table, lost: list[str]) -> dict[str, Any]:
     from hil.recording.formats import read_metadata
-    from hil.recording.kinds import Kind
+    from hil.recording.table import Kind
 
     return {
         "schema": "hil.convert/1",
@@ -154,6 +153,6 @@ def _document(source: Path, target: Path, table: Table, lost: list[str]) -> dict
 def _said(target: Path) -> list[str]:
     """Say what the recording says of itself."""
     from hil.recording.formats import read_metadata
-    from hil.recording.self_description import self_description
+    from hil.recording.recordings import self_description
 
     return self_description(read_metadata(target))

@@ -64,7 +64,7 @@ def identify(
     from estimator.identification.compare import compare
     from estimator.identification.settings import Settings
     from hil.provenance import provenance
-    from hil.recording.timing_check import require_even_cycles
+    from hil.recording.recordings import require_even_cycles
     from hil.report.identification.choices import chosen_estimators, chosen_orders, start_values
     from hil.report.outputs import require_folder
     from hil.store import attach_to_runs

@@ -10,8 +10,8 @@ import typer
 from hil.cli.dbc_option import Dbc
 
 if TYPE_CHECKING:
-    from hil.recording.look.look import Look
-    from hil.recording.look.survey import Group
+    from hil.recording.look import Look
+    from hil.recording.survey import Group
 
 app = typer.Typer(add_completion=False)
 
@@ -30,7 +30,7 @@ def look(
     import json
 
     from hil.printable import printable
-    from hil.recording.look.look import look as look_into
+    from hil.recording.look import look as look_into
 
     found = look_into(file, dbc)
     if as_json:
@@ -92,7 +92,7 @@ def _show(found: Look) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from hil.recording.look.roles import guesses
+    from hil.recording.survey import guesses
 
     console = Console()
     for group in found.survey.groups:

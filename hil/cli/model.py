@@ -68,7 +68,7 @@ def new(
     from hil.config.new_model.text import model_text
     from hil.config.new_model.values import TOLERANCE, assignments, parameters
     from hil.errors import UsageError
-    from hil.recording.look.look import look
+    from hil.recording.look import look
     from hil.support.new_file import refuse_existing, write_new
 
     refuse_existing(file)

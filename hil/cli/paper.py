@@ -94,7 +94,7 @@ def _recorded(recordings: list[Path], model: Path | None, trust_laws: bool, sett
     from hil.config.model_file import read_model_for_recordings
     from hil.figures.experiments import recorded_models
     from hil.recording import read_records
-    from hil.recording.timing_check import require_even_cycles
+    from hil.recording.recordings import require_even_cycles
 
     require_even_cycles(recordings)
     file = None if model is None else read_model_for_recordings(model, trust_laws)
@@ -196,7 +196,7 @@ def _kept(driven: list[Driven]) -> dict[str, Callable[[Path], object]]:
     from functools import partial
 
     from hil.figures.road.drive import RIG_FILE
-    from hil.recording.sidecar import sidecar_of
+    from hil.recording.description import sidecar_of
 
     recordings = [path for each in driven for path in (each.path, sidecar_of(each.path))]
     kept = {path.name: path for path in recordings} | ({"rig.toml": RIG_FILE} if driven else {})

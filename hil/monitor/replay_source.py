@@ -15,8 +15,7 @@ from hil.errors import RecordingError
 from hil.monitor.messages import Began, Order, Over, Report, Samples
 from hil.recording import columns
 from hil.recording.formats import read_table
-from hil.recording.kinds import Kind
-from hil.recording.table import Table
+from hil.recording.table import Kind, Table
 from hil.rig.experiments.base import Phase
 from hil.sample import Sample, SampleFlag
 

@@ -7,7 +7,7 @@ What may come in: files, `hil.sample`, `hil.problems`; no rig, no model.
 
 from hil.recording.formats import read_table
 from hil.recording.publish import write_table
-from hil.recording.read_all import read_records
+from hil.recording.recordings import read_records
 from hil.recording.signals import read_record
 from hil.recording.signals_config import SignalsConfig
 from hil.recording.table import Table

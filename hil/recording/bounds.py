@@ -56,3 +56,20 @@ def require_columns(path: Path, columns: int) -> None:
     """Refuse more columns than a recording has."""
     if columns > COLUMNS:
         raise RecordingError(path, f"expected at most {COLUMNS} columns, got {columns}. Leave out what is not needed.")
+
+
+def damaged(path: Path, expected: str, error: Exception) -> RecordingError:
+    """Return what is raised for a file of which a library says that it is not whole."""
+    got = str(error) or type(error).__name__
+    return RecordingError(
+        path,
+        f"expected {expected}, got a damaged or truncated one ({got.rstrip('.')}). Take a copy that is whole.",
+    )
+
+
+CURE = "Make room, or choose another disk."
+
+
+def no_room(path: Path, what: str, error: OSError, then: str = CURE) -> RecordingError:
+    """Return what is raised for a file that could not be written; ``then`` says what is kept and what to do."""
+    return RecordingError(path, f"expected room for {what}, got: {error.strerror or error}. {then}".rstrip())

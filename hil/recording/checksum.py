@@ -1,6 +1,6 @@
 """A checksum of what a recording holds, the same in every format, by which damage is recognised.
 
-SHA-256 over the columns in the order of their names. Of each: its name, the word for its kind (`hil.recording.kinds`)
+SHA-256 over the columns in the order of their names. Of each: its name, the word for its kind (`hil.recording.table`)
 and its cells; a float as IEEE 754 binary64 and an integer as 64 bit two's complement, both little-endian, a truth
 value as one byte, a text as UTF-8. Every name, kind and text is preceded by its length in bytes, every column by its
 number of cells; lengths are unsigned 64 bit little-endian. All NaN are one, 0x7FF8000000000000: sign and payload of a
@@ -22,8 +22,7 @@ from typing import Any
 import numpy as np
 
 from hil.errors import RecordingError
-from hil.recording.kinds import Column, Kind
-from hil.recording.table import Table
+from hil.recording.table import Column, Kind, Table
 
 CHECKSUM = "data_sha256"
 """Key of the metadata it is kept under."""

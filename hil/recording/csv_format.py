@@ -1,11 +1,11 @@
 """Text recordings: written as plain CSV, one header line and one line per row; read in the forms that people write.
 
-- What form a file has is recognised (`hil.recording.text.recognise`) or set by hand; pyarrow parses it.
+- What form a file has is recognised (`hil.recording.text_form`) or set by hand; pyarrow parses it.
 
 - Floats are written as the shortest decimal that reads back to the same bits, integers without a point; that
   difference is how a reader distinguishes them, so that CSV to Parquet and back loses nothing. Units, metadata and the
-  kind of columns whose cells do not tell it stand in a file next to (`hil.recording.sidecar`); without that file text
-  that looks like a number becomes one, and an empty cell among numbers is NaN.
+  kind of columns whose cells do not tell it stand in a file beside it (`hil.recording.description`); without that
+  file text that looks like a number becomes one, and an empty cell among numbers is NaN.
 - A last line without line end is taken (RFC 4180 allows it): a file cut inside its very last number can't be
   distinguished from a whole one. A cut anywhere else leaves a row with cells missing, and is refused.
 - A quoted cell must end on its line, so that a row is a line and every fault has its number.
@@ -21,19 +21,67 @@ from typing import Final
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute
 import pyarrow.csv
 
 from hil.errors import RecordingError
 from hil.recording.bounds import require_columns
-from hil.recording.format_hints import FormatHints
-from hil.recording.kinds import Kind
-from hil.recording.request import Request
-from hil.recording.sidecar import Sidecar, as_metadata, read_sidecar, write_sidecar
-from hil.recording.table import Column, Table, line_of
-from hil.recording.text.columns import as_column, seconds_of
-from hil.recording.text.encoding import decoded
-from hil.recording.text.form import BLANKS, TextForm
-from hil.recording.text.recognise import SAMPLE_LINES, recognise, split
+from hil.recording.description import Sidecar, as_metadata, read_sidecar, write_sidecar
+from hil.recording.encoding import decoded
+from hil.recording.request import FormatHints, Request
+from hil.recording.table import Column, Kind, Table, as_text, line_of
+from hil.recording.text_form import BLANKS, DATE_TIME, MISSING, SAMPLE_LINES, TextForm, recognise, split
+
+NS: Final = 1e-9
+
+
+def as_column(cells: pa.ChunkedArray, kind: Kind | None = None, decimal: str = ".") -> Column:
+    """Turn text into the kind it is said to be; unsaid into int64, float64 or text, whichever first fits every cell.
+
+    In a column with a number in it, a missing cell is NaN.
+    """
+    if kind is Kind.TEXT:
+        return as_text(cells.to_pylist())
+    if kind is Kind.BOOLEAN and pa.compute.all(pa.compute.is_in(cells, pa.array(["True", "False"]))).as_py():
+        return np.asarray(pa.compute.equal(cells, "True").to_numpy())
+    trimmed = pa.compute.utf8_trim_whitespace(cells)
+    present = pa.compute.if_else(pa.compute.is_in(trimmed, pa.array(MISSING)), pa.scalar(None, pa.string()), trimmed)
+    plain = present
+    if decimal == ",":
+        swapped = pa.compute.replace_substring(present, ".", "_")
+        plain = pa.compute.replace_substring(swapped, ",", ".")
+    for numeric in (pa.int64(), pa.float64()):
+        try:
+            numbers = pa.compute.cast(plain, numeric)
+        except pa.ArrowInvalid:
+            continue
+        if numbers.null_count == len(numbers):
+            break  # nothing but missing cells: an empty text is one, too
+        return np.asarray((numbers.cast(pa.float64()) if numbers.null_count else numbers).to_numpy())
+    return as_text(trimmed.to_pylist())
+
+
+def seconds_of(column: Column) -> tuple[Column, str] | None:
+    """Return a column of dates and times as seconds since the first of them, and that one; None where it is none."""
+    if column.dtype != object or not all(DATE_TIME.fullmatch(cell) or not cell for cell in column.tolist()):
+        return None
+    texts = [cell.replace(",", ".") or None for cell in column.tolist()]
+    zoned = any(text and re.search(r"(?:Z|[+-]\d\d:?\d\d)$", text[10:]) for text in texts)
+    try:
+        stamps = pa.array(texts, pa.string()).cast(pa.timestamp("ns", "UTC" if zoned else None))
+    except pa.ArrowInvalid:
+        return None
+    if stamps.null_count == len(stamps):
+        return None
+    first = next(stamp for stamp in stamps if stamp.is_valid).value
+    since = np.asarray(stamps.cast(pa.int64()).to_numpy(zero_copy_only=False), dtype=np.float64)
+    if not stamps.null_count:
+        since = (stamps.cast(pa.int64()).to_numpy() - first).astype(np.float64)
+    else:
+        since -= float(first)
+    start = next(text for text in texts if text)
+    return since * NS, start
+
 
 SPECIAL = ",;\t|"
 """Characters that a reader could take for a delimiter."""

@@ -13,10 +13,10 @@ from types import MappingProxyType
 from typing import Any
 
 from hil.errors import RecordingError
-from hil.recording.apart import READER
 from hil.recording.checksum import require_whole
+from hil.recording.description import read_sidecar_metadata, sidecar_of
 from hil.recording.request import Request
-from hil.recording.sidecar import read_sidecar_metadata, sidecar_of
+from hil.recording.sandbox import READER
 from hil.recording.table import Table
 
 
@@ -27,7 +27,7 @@ class Format:
     ``write`` is None for a format that is only read, ``metadata`` for one whose metadata come with the table alone.
     ``companion`` names the file that belongs to a recording in a format that has no place for all there is to say.
     ``tables`` reads a table for each time of a format that may have several.
-    ``apart`` is True where a compiled library parses it: in a process of its own (`hil.recording.apart`).
+    ``apart`` is True where a compiled library parses it: in a process of its own (`hil.recording.sandbox`).
     """
 
     read: Callable[[Path, Request], Table]

@@ -19,15 +19,11 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from hil.recording.address import under_names, vectors_of
 from hil.recording.description import described_table, description_of, metadata_of
-from hil.recording.hdf5_file import reading, text_of, write_whole
-from hil.recording.kinds import Column, Kind, as_column, as_text
-from hil.recording.mat_tables import with_tables
-from hil.recording.mat_walk import walk
-from hil.recording.request import Request
-from hil.recording.shared_length import columns_of_shared_length
-from hil.recording.table import Table
+from hil.recording.hdf5_format import reading, text_of, write_whole
+from hil.recording.mat_variables import walk, with_tables
+from hil.recording.request import Request, under_names, vectors_of
+from hil.recording.table import Column, Kind, Table, as_column, as_text, columns_of_shared_length
 
 File: TypeAlias = Any
 Dataset: TypeAlias = Any

@@ -11,15 +11,10 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from hil.recording import mat73_format
-from hil.recording.address import under_names
-from hil.recording.bounds import require_columns
-from hil.recording.damaged import damaged
-from hil.recording.kinds import Column, as_column
-from hil.recording.mat_tables import with_tables_if_possible
-from hil.recording.mat_walk import walk
-from hil.recording.request import Request
-from hil.recording.shared_length import columns_of_shared_length
-from hil.recording.table import Table
+from hil.recording.bounds import damaged, require_columns
+from hil.recording.mat_variables import walk, with_tables_if_possible
+from hil.recording.request import Request, under_names
+from hil.recording.table import Column, Table, as_column, columns_of_shared_length
 
 DAMAGED = (ValueError, TypeError, IndexError, KeyError, OSError, NotImplementedError, zlib.error)
 """What scipy raises, besides its own, on a file that is cut or no .mat file."""

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hil.errors import RecordingError
-from hil.recording.damaged import damaged
+from hil.recording.bounds import damaged
 
 if TYPE_CHECKING:
     from asammdf import MDF

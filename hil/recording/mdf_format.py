@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Mapping
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,15 +22,62 @@ import numpy as np
 from hil import __version__
 from hil.recording import columns
 from hil.recording.checksum import RIG_TEXT
-from hil.recording.description import description_of
-from hil.recording.kinds import Column, Kind
-from hil.recording.mdf_file import IDENTIFICATION_BYTES, opened, require_mdf
-from hil.recording.mdf_parse import DESCRIPTION, parse, parse_all, parse_metadata
+from hil.recording.description import described_table, description_of, metadata_of
+from hil.recording.mdf_file import IDENTIFICATION_BYTES, channels_of, is_unfinished, opened, require_mdf
+from hil.recording.mdf_foreign import foreign_metadata, foreign_table, foreign_tables
 from hil.recording.request import Request
-from hil.recording.table import Table
+from hil.recording.table import Column, Kind, Table, as_column
 
 if TYPE_CHECKING:
     from asammdf import MDF, Signal
+
+
+DESCRIPTION = "recording.json"
+
+FINALISED = "its writer never finished it: it was finalised in a copy and read from there, the file stays as it is"
+
+
+def parse(path: Path, mdf: MDF, request: Request) -> Table:
+    """Read a file's content."""
+    text = _description(mdf)
+    table = foreign_table(path, mdf, request) if text is None else _own(path, mdf, text)
+    # The columns become plain arrays of their own, not views into the file.
+    columns = {name: column.copy() for name, column in table.columns.items()}
+    remarks = (*table.remarks, FINALISED) if is_unfinished(path) else table.remarks
+    return replace(table, columns=columns, remarks=remarks)
+
+
+def parse_all(path: Path, mdf: MDF, request: Request) -> list[Table]:
+    """Read a file's content, a table for each of its times; see `parse`."""
+    text = _description(mdf)
+    return foreign_tables(path, mdf, request) if text is None else [_own(path, mdf, text)]
+
+
+def parse_metadata(path: Path, mdf: MDF) -> Mapping[str, str]:
+    """Read what a file says of itself."""
+    text = _description(mdf)
+    return foreign_metadata(mdf) if text is None else metadata_of(path, text)
+
+
+def _description(mdf: MDF) -> str | None:
+    if mdf.version < "4":  # such files have no attachments, and asammdf refuses to say so
+        return None
+    for number, attachment in enumerate(mdf.attachments):
+        if str(attachment.file_name) == DESCRIPTION:
+            content: Any = mdf.extract_attachment(number)[0]
+            return content if isinstance(content, str) else bytes(content).decode("utf-8")
+    return None
+
+
+def _own(path: Path, mdf: MDF, text: str) -> Table:
+    places = {channel.name: number for number, channel in enumerate(channels_of(mdf, 0))}
+
+    def column(stored_as: str, kind: Kind) -> Column:
+        cells = as_column(mdf.get(group=0, index=places[stored_as]).samples)
+        return cells.astype(np.bool_) if kind is Kind.BOOLEAN else cells
+
+    return described_table(path, text, column)
+
 
 VERSION = "4.10"
 RIG_NAME = "rig.toml"

@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 
 from hil.recording import columns
+from hil.recording.bounds import damaged
 from hil.recording.checksum import CHECKSUM, SAID, DataDigest, said_sha256
-from hil.recording.damaged import damaged
-from hil.recording.kinds import Column
-from hil.recording.sidecar import Sidecar, as_metadata
+from hil.recording.description import Sidecar, as_metadata
+from hil.recording.table import Column
 
 HEADER = ",".join(columns.UNITS)
 """Begin of the first line of such a recording; the channels of its rig file follow."""

@@ -11,11 +11,9 @@ import pyarrow as pa
 import pyarrow.parquet
 
 from hil.errors import RecordingError
-from hil.recording.bounds import require_cells, require_columns
-from hil.recording.damaged import damaged
-from hil.recording.kinds import Column, as_column, as_text
+from hil.recording.bounds import damaged, require_cells, require_columns
 from hil.recording.request import Request
-from hil.recording.table import Table
+from hil.recording.table import Column, Table, as_column, as_text
 
 UNIT_KEY = b"unit"
 

@@ -2,12 +2,66 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import codecs
+import re
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Final, Literal
 
-from hil.recording.format_hints import FormatHints
+from pydantic import BaseModel, ConfigDict, Field, field_validator
+
+from hil.recording.table import Column, is_column
+
+
+class FormatHints(BaseModel):
+    """How a text recording is written; what is left out is recognised.
+
+    Attributes
+    ----------
+    delimiter : str
+        One character between cells; empty to recognise it, a blank for any number of blanks.
+    decimal : str
+        Decimal mark; empty to recognise it.
+    encoding : str
+        Name of the text encoding, as Python knows it; a byte order mark is recognised in any case.
+    header_line : int, optional
+        Line of the column names, from 1; 0 where there is none: the columns are called 1, 2, 3 and so on.
+    units_line : int, optional
+        Line of the units, from 1; 0 where there is none.
+    skip_lines : int
+        Lines at the beginning that are not looked at.
+    comment : str
+        What a line that is no row begins with; empty to recognise it, where the header line is not set.
+    """
+
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
+
+    delimiter: str = Field(default="", max_length=1)
+    decimal: Literal["", ".", ","] = ""
+    encoding: str = "utf-8"
+    header_line: int | None = Field(default=None, ge=0)
+    units_line: int | None = Field(default=None, ge=0)
+    skip_lines: int = Field(default=0, ge=0)
+    comment: str = Field(default="", max_length=8)
+
+    @field_validator("delimiter")
+    @classmethod
+    def _separates(cls, delimiter: str) -> str:
+        if delimiter and (delimiter in "\"'\r\n.-+" or delimiter.isalnum()):
+            raise ValueError("a character that can't be part of a number or a quote, such as ',' or ';'")
+        return delimiter
+
+    @field_validator("encoding")
+    @classmethod
+    def _is_known(cls, encoding: str) -> str:
+        try:
+            known = codecs.lookup(encoding)
+        except LookupError:
+            raise ValueError("a text encoding such as 'utf-8' or 'latin-1'") from None
+        if not getattr(known, "_is_text_encoding", True):
+            raise ValueError("a text encoding such as 'utf-8' or 'latin-1'")
+        return encoding
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,3 +119,41 @@ class Request:
             document["resample_s"],
             None if dbc is None else Path(dbc),
         )
+
+
+MOST_SLICES: Final = 512
+"""Columns of a matrix that have an address each."""
+
+_SLICE: Final = re.compile(r"(?P<open>[\[(])\s*(?P<row>:|\d+)\s*,\s*(?P<column>:|\d+)\s*[\])]")
+
+
+def canonical(address: str) -> str:
+    """Return an address as it is listed: counted from 1, without blanks around its parts."""
+
+    def counted(match: re.Match[str]) -> str:
+        more = 1 if match["open"] == "[" else 0
+        row, column = (part if part == ":" else str(int(part) + more) for part in (match["row"], match["column"]))
+        return f"({row},{column})"
+
+    return _SLICE.sub(counted, address.strip())
+
+
+def vectors_of(name: str, values: Column) -> Iterator[tuple[str, Column]]:
+    """Yield the vectors of an array with their addresses: the whole one, or a matrix's columns."""
+    if not is_column(values) or values.size < 2:
+        return
+    if max(values.shape) == values.size:
+        yield name, values.ravel()
+    elif values.ndim == 2 and min(values.shape) <= MOST_SLICES:
+        rows, columns = values.shape
+        if rows >= columns:
+            yield from ((f"{name}(:,{k + 1})", values[:, k]) for k in range(columns))
+        else:
+            yield from ((f"{name}({k + 1},:)", values[k, :]) for k in range(rows))
+
+
+def under_names(vectors: Mapping[str, Column], wanted: Iterable[str]) -> dict[str, Column]:
+    """Return vectors, those that are wanted by another spelling of their address under that one, too."""
+    found = dict(vectors)
+    found.update({name: vectors[canonical(name)] for name in wanted if canonical(name) in vectors})
+    return found

@@ -6,14 +6,103 @@ are swapped then; so is a share of a rated value, for what that is the file does
 
 from __future__ import annotations
 
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
 from enum import Enum
+from types import MappingProxyType
 from typing import Final
 
 import numpy as np
 
 from hil.errors import RecordingError
 from hil.recording.table import FloatArray, Table
-from hil.recording.units import Quantity, Unit, unit_of
+
+
+class Quantity(Enum):
+    """What a unit is of; the value is the word for people."""
+
+    TIME = "time"
+    TORQUE = "torque"
+    FORCE = "force"
+    SPEED = "speed"
+    VELOCITY = "velocity"
+    ANGLE = "angle"
+    LENGTH = "length"
+    ACCELERATION = "acceleration"
+    SHARE = "share"  # of a rated value that the unit does not say
+    OTHER = "other"
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """One unit: a value in it times ``factor`` is in SI."""
+
+    quantity: Quantity
+    factor: float
+
+
+TURN: Final = 2.0 * math.pi
+FOOT_M, POUND_N = 0.3048, 4.4482216152605
+
+_SPELLED: Final[Mapping[tuple[Quantity, float], str]] = {
+    (Quantity.TIME, 1.0): "s sec second seconds",
+    (Quantity.TIME, 1e-3): "ms msec millisecond milliseconds",
+    (Quantity.TIME, 1e-6): "us µs microsecond microseconds",
+    (Quantity.TIME, 1e-9): "ns nanosecond nanoseconds",
+    (Quantity.TIME, 60.0): "min",
+    (Quantity.TIME, 3600.0): "h",
+    (Quantity.TORQUE, 1.0): "nm n*m newtonmeter newtonmetre",
+    (Quantity.TORQUE, 1e3): "knm kn*m",
+    (Quantity.TORQUE, 1e-3): "mnm mn*m",
+    (Quantity.TORQUE, 1e-2): "ncm n*cm",
+    (Quantity.TORQUE, FOOT_M * POUND_N): "lbft lbf*ft lb*ft ftlb ft*lb ft*lbf lb-ft ft-lb lbf-ft",
+    (Quantity.FORCE, 1.0): "n newton",
+    (Quantity.FORCE, 1e3): "kn",
+    (Quantity.SPEED, 1.0): "rad/s 1/s rad*s^-1",
+    (Quantity.SPEED, TURN / 60.0): "rpm 1/min r/min rev/min u/min min^-1 min-1 turns/min",
+    (Quantity.SPEED, TURN): "rps rev/s r/s u/s turns/s",
+    (Quantity.SPEED, math.pi / 180.0): "deg/s °/s",
+    (Quantity.VELOCITY, 1.0): "m/s",
+    (Quantity.VELOCITY, 1.0 / 3.6): "km/h kmh kph",
+    (Quantity.VELOCITY, 0.44704): "mph mi/h",
+    (Quantity.VELOCITY, 1e-3): "mm/s",
+    (Quantity.ANGLE, 1.0): "rad radian radians",
+    (Quantity.ANGLE, math.pi / 180.0): "deg ° degree degrees",
+    (Quantity.ANGLE, TURN): "rev turn turns",
+    (Quantity.LENGTH, 1.0): "m",
+    (Quantity.LENGTH, 1e-3): "mm",
+    (Quantity.ACCELERATION, 1.0): "rad/s^2 rad/s2 m/s^2 m/s2",
+    (Quantity.SHARE, 1e-2): "% percent prozent",
+    (Quantity.SHARE, 1e-3): "‰ permille permil promille o/oo 0/00",
+    (Quantity.OTHER, 1.0): "- 1 v mv a ma w kw kwh ah ohm °c degc c k hz khz bar pa kpa g kg l bit enum count",
+}
+_UNITS: Final[Mapping[str, Unit]] = MappingProxyType(
+    {spelling: Unit(*meaning) for meaning, spellings in _SPELLED.items() for spelling in spellings.split()}
+)
+
+_IN_BRACKETS: Final = re.compile(r"\s*(?:\[([^\[\]]*)\]|\(([^()]*)\))\s*$")
+_NAMED_AT_THE_END: Final = re.compile(r"\s*(?:\[[^\[\]]*[\]\)]|\([^()]*\))\s*$")
+
+
+def unit_of(text: str) -> Unit | None:
+    """Return what a unit means, however it is spelled; None where it is none that is known here."""
+    plain = text.strip().strip("[]()").strip().lower().replace("\u03bc", "\u00b5").replace("²", "^2")
+    plain = re.sub(r"\s*[·⋅*.]\s*|(?<=[a-z])\s+(?=[a-z])", "*", plain)
+    return _UNITS.get(plain) or _UNITS.get(plain.replace(" ", "").replace("*", ""))
+
+
+def unit_in(name: str) -> str:
+    """Return the unit that a column's name ends in, such as ``Drehzahl [1/min]``; empty where it has none known."""
+    found = _IN_BRACKETS.search(name)
+    text = "" if found is None else (found[1] or found[2] or "").strip()
+    return text if unit_of(text) else ""
+
+
+def without_unit(name: str) -> str:
+    """Return a column's name without the unit that it ends in."""
+    return _NAMED_AT_THE_END.sub("", name) or name
 
 
 class Role(Enum):

@@ -22,7 +22,7 @@ from estimator.signals.record import Channel, OutputKind, Record
 from hil.errors import RecordingError
 from hil.recording import columns
 from hil.recording.formats import read_table
-from hil.recording.resample import Series, resampled
+from hil.recording.resample import Series, resampled, time_base
 from hil.recording.scales import Role, scale_of, with_sign, wrapped_at
 from hil.recording.signals_config import (
     LoadSignal,
@@ -34,7 +34,6 @@ from hil.recording.signals_config import (
     TorqueSignal,
 )
 from hil.recording.table import FloatArray, Table
-from hil.recording.time_base import time_base
 
 SMALLEST, GREATEST = 1e-15, 1e15
 """Between them is the largest value of any signal of a drive, in SI units; their squares and products are numbers."""

@@ -14,8 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from estimator.signals.record import Location, OutputKind
 from hil.problems import Fault, refuse
 from hil.recording import columns
-from hil.recording.format_hints import FormatHints
-from hil.recording.request import Request
+from hil.recording.request import FormatHints, Request
 
 Column = Annotated[str, Field(min_length=1)]
 

@@ -7,15 +7,97 @@ may carry columns nobody asks for; it is refused, with its place, when such a co
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from enum import Enum
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hil.errors import RecordingError
-from hil.recording.kinds import Column as Column
+
+Column = NDArray[Any]
+
+_LARGEST_INTEGER = np.iinfo(np.int64).max
+
+
+class Kind(Enum):
+    """What the cells of a column are; the value is the word that files use for it."""
+
+    FLOAT = "float"  # float64
+    INTEGER = "integer"  # int64
+    BOOLEAN = "boolean"  # bool
+    TEXT = "text"  # object, every cell a str
+
+    @staticmethod
+    def of(column: Column) -> Kind:
+        """Tell the kind of a column of a table."""
+        return Kind.of_dtype(column.dtype)
+
+    @staticmethod
+    def of_dtype(dtype: np.dtype[Any]) -> Kind:
+        """Tell the kind of a column by the type of its cells."""
+        return _KINDS.get(dtype.kind, Kind.TEXT)
+
+
+_KINDS = {"f": Kind.FLOAT, "i": Kind.INTEGER, "b": Kind.BOOLEAN}
+
+
+def is_column(values: Column) -> bool:
+    """Whether an array holds numbers, truth values or texts, and so can become a column."""
+    return values.dtype.kind in "fiubSUO"
+
+
+def as_column(values: Column) -> Column:
+    """Return any array of numbers, truth values or texts as a column of one of the four kinds.
+
+    Unsigned integers beyond the range of int64 become text: their digits. Bytes are read as UTF-8, what is none as
+    latin-1.
+    """
+    if values.dtype.kind == "u" and values.size and values.max() > _LARGEST_INTEGER:
+        return as_text([str(value) for value in values.tolist()])
+    wide = {"f": np.float64, "i": np.int64, "u": np.int64, "b": np.bool_}.get(values.dtype.kind)
+    if wide is not None:
+        return np.ascontiguousarray(values, dtype=wide)
+    return as_text([_decoded(cell) for cell in values.tolist()])
+
+
+def as_text(cells: list[str]) -> Column:
+    """Return texts as a column."""
+    column = np.empty(len(cells), dtype=object)
+    column[:] = cells
+    return column
+
+
+def _decoded(cell: object) -> str:
+    if not isinstance(cell, bytes):
+        return "" if cell is None else str(cell)
+    try:
+        return cell.decode("utf-8")
+    except UnicodeDecodeError:
+        return cell.decode("latin-1")
+
+
+def columns_of_shared_length(
+    vectors: Mapping[str, Column], wanted: Iterable[str] = ()
+) -> tuple[dict[str, Column], tuple[str, ...]]:
+    """Choose the vectors of the length that most of those wanted share, or most of all.
+
+    The longest, where two lengths are equally frequent.
+    """
+    asked = [vectors[name] for name in wanted if name in vectors]
+    counts = Counter(vector.size for vector in asked or vectors.values())
+    length = max(counts, key=lambda size: (counts[size], size), default=0)
+    chosen = {name: vector for name, vector in vectors.items() if vector.size == length}
+    return chosen, tuple(
+        f"{name}: left out, it has {vector.size} values and the recording {length}"
+        for name, vector in vectors.items()
+        if vector.size != length
+    )
+
 
 FloatArray = NDArray[np.float64]
 

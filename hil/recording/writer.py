@@ -15,24 +15,152 @@ Parquet could not do that itself: without its footer, written last, it can't be 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+import threading
+import time
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from io import FileIO
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Protocol, Self
+
+import numpy as np
 
 from hil.errors import RecordingError
 from hil.recording import columns
-from hil.recording.description import OUTCOME
+from hil.recording.bounds import no_room
+from hil.recording.description import OUTCOME, write_sidecar
 from hil.recording.formats import read_table, writer_for
-from hil.recording.no_room import no_room
 from hil.recording.own_csv import own_sidecar
 from hil.recording.publish import write_table
-from hil.recording.samples import cells_of
-from hil.recording.sidecar import write_sidecar
 from hil.recording.table import Table
-from hil.recording.writing_thread import WritingThread
 from hil.sample import Sample
+
+
+def cells_of(sample: Sample) -> tuple[float | int, ...]:
+    """Return one sample in the order of ``columns.UNITS``, then its channels; the flags alone are an integer."""
+    return (
+        float(sample.time_s),
+        float(sample.torque_ref_nm),
+        float(sample.torque_m1_nm),
+        float(sample.torque_m2_nm),
+        float(sample.speed_rad_s),
+        float(sample.prbs_nm),
+        int(sample.flags),
+        float(sample.torque_ref_m1_nm),
+        float(sample.torque_ref_m2_nm),
+        sample.age_ns / 1e9,
+        *map(float, sample.channels),
+    )
+
+
+def table_of(
+    samples: Iterable[Sample], path: Path, metadata: Mapping[str, str], channel_units: Mapping[str, str] | None = None
+) -> Table:
+    """Make a table of samples, a row each, with a column of each channel of theirs."""
+    rows = [cells_of(sample) for sample in samples]
+    units = {**columns.UNITS, **(channel_units or {})}
+    kinds = {name: np.int64 if name == columns.FLAGS else np.float64 for name in units}
+    cells = zip(*rows, strict=True) if rows else [() for _ in kinds]
+    return Table(
+        path,
+        {name: np.array(column, dtype=kind) for (name, kind), column in zip(kinds.items(), cells, strict=True)},
+        units,
+        metadata,
+    )
+
+
+PAUSE_S = 0.002
+"""After what was written [s]: lines that come faster, as those of a run without a clock, are written together."""
+
+
+class Unbuffered(Protocol):
+    """A file that hands to the system what it is given, and tells how much of it that has taken."""
+
+    def write(self, data: bytes, /) -> int | None:
+        """Write, perhaps only the first bytes."""
+
+    def close(self) -> None:
+        """Close it."""
+
+
+class WritingThread:
+    """Writes lines in their order, all that wait at once, from its making to `finish`.
+
+    Parameters
+    ----------
+    file
+        Where to; its maker closes it, unless `finish` gives up. Nothing is written after an OSError.
+    capacity
+        Lines that may wait, those that are being written included.
+    """
+
+    def __init__(self, file: Unbuffered, capacity: int) -> None:
+        self._file = file
+        self._capacity = capacity
+        self._lines: list[str] = []
+        self._in_hand = 0
+        self._changed = threading.Condition()
+        self._ending = self._given_up = False
+        self.n_written = 0
+        self.failed: OSError | None = None
+        self._thread = threading.Thread(target=self._run, name="recording", daemon=True)
+        self._thread.start()
+
+    @property
+    def n_waiting(self) -> int:
+        """Lines that wait for the disk."""
+        return len(self._lines) + self._in_hand
+
+    def put(self, line: str, patience_s: float) -> bool:
+        """Hand over one line; False if there is no room for it within a time [s]."""
+        with self._changed:
+            if not self._changed.wait_for(lambda: self.n_waiting < self._capacity, patience_s):
+                return False
+            self._lines.append(line)
+            if len(self._lines) == 1:
+                self._changed.notify_all()
+        return True
+
+    def finish(self, patience_s: float) -> bool:
+        """End the thread when everything is written; False if that takes longer than a time [s]: it is given up."""
+        with self._changed:
+            self._ending = True
+            self._changed.notify_all()
+        self._thread.join(patience_s)
+        self._given_up = self._thread.is_alive()
+        return not self._given_up
+
+    def _run(self) -> None:
+        while lines := self._next():
+            if self.failed is None:
+                self._write("".join(lines).encode("ascii"))
+            if self._given_up:
+                break
+            time.sleep(PAUSE_S)
+        if self._given_up:
+            with suppress(OSError):
+                self._file.close()
+
+    def _next(self) -> list[str]:
+        """Wait for lines; none when all are written and no more will come."""
+        with self._changed:
+            self._in_hand = 0
+            self._changed.notify_all()
+            self._changed.wait_for(lambda: self._lines or self._ending)
+            lines, self._lines = self._lines, []
+            self._in_hand = len(lines)
+        return lines
+
+    def _write(self, data: bytes) -> None:
+        try:
+            while data:
+                taken = self._file.write(data) or 0
+                self.n_written += data.count(b"\n", 0, taken)
+                data = data[taken:]
+        except OSError as error:
+            self.failed = error
+
 
 CSV = ".csv"
 
@@ -70,7 +198,7 @@ class RecordingWriter:
         The recording to make; its suffix chooses the format.
     metadata : mapping of str to str
         What the recording shall say of itself; more can be said until it is closed, by `describe`. CSV has no
-        place for it: there it is in a file next to the recording (`hil.recording.sidecar`).
+        place for it: there it is in a file next to the recording (`hil.recording.description`).
     channel_units : mapping of str to str
         Column and unit of each channel of its samples.
     patience_s : float

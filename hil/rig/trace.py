@@ -15,7 +15,7 @@ from typing import Self
 
 from drivers.canopen import can
 from hil.errors import RecordingError
-from hil.recording.no_room import no_room
+from hil.recording.bounds import no_room
 
 SUFFIXES = (".blf", ".log", ".asc")
 """Vector's binary and text logs, and the text of Linux's candump: what ``can.Logger`` writes by these names."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from hil.errors import RecordingError
 from hil.recording.checksum import CHECKSUM
-from hil.recording.facts import read_facts
+from hil.recording.recordings import read_facts
 from hil.store.entry import RunEntry
 
 VERIFIED = "whole, checksum verified"

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from hil.recording.checksum import CHECKSUM, CHECKSUMS, RIG_CHECKSUM, RIG_TEXT
 from hil.recording.description import OUTCOME
-from hil.recording.facts import Facts, facts_of, read_facts
+from hil.recording.recordings import Facts, facts_of, read_facts
 from hil.recording.table import Table
 from hil.store.entry import COMPLETE, RunEntry
 from hil.store.run_store import RunStore

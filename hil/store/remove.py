@@ -7,8 +7,8 @@ from pathlib import Path
 from hil.errors import RecordingError, UsageError
 from hil.parse_json import read_json
 from hil.recording.checksum import CHECKSUM
+from hil.recording.description import is_sidecar
 from hil.recording.formats import FORMATS, read_metadata
-from hil.recording.sidecar import is_sidecar
 from hil.store.entry import RunEntry
 from hil.store.register import is_run
 from hil.store.results import ONLINE_SCHEMA, ONLINE_SUFFIX

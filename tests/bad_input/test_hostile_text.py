@@ -24,7 +24,7 @@ from hil.errors import InputError, RecordingError, RigFileError
 from hil.parse_json import LARGEST_BYTES, parse_json, read_json
 from hil.problems import read_toml
 from hil.recording import Table, read_table, write_table
-from hil.recording.sidecar import sidecar_of
+from hil.recording.description import sidecar_of
 from hil.rig import replay as replaying
 from hil.rig.blf_file import CONTAINER_BYTES
 from hil.rig.replay import replay

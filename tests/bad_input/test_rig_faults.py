@@ -17,7 +17,7 @@ from drivers.inverter.cia402 import PowerState
 from hil.cli.main import run
 from hil.config.rig_file import read_rig
 from hil.recording import read_table
-from hil.recording.sidecar import sidecar_of
+from hil.recording.description import sidecar_of
 from hil.rig.live_course import course_path
 from hil.simulator.fault_spec import rig_faults
 from hil.store import store_of

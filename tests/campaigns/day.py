@@ -17,7 +17,7 @@ from unittest import mock
 
 from drivers.plc.plc import Plc
 from hil.cli.run.job import Job, record
-from hil.recording.facts import read_facts
+from hil.recording.recordings import read_facts
 from hil.rig.experiments.base import Phase
 from hil.rig.live import LiveEstimate, tracking_chain
 from hil.rig.metadata import run_metadata

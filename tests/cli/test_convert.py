@@ -12,8 +12,8 @@ import pytest
 from hil.cli.main import run as hil
 from hil.config.rig_file import read_rig
 from hil.recording import Table, read_table, write_table
-from hil.recording.differences import losses
-from hil.recording.kinds import as_text
+from hil.recording.publish import losses
+from hil.recording.table import as_text
 from hil.rig.replay import replay
 from tests.cli.conftest import Simulation
 

@@ -13,7 +13,7 @@ import scipy.io
 
 from hil.errors import RecordingError
 from hil.recording import SignalsConfig, read_record, read_table
-from hil.recording.address import canonical
+from hil.recording.request import canonical
 
 TIME = np.arange(50) * 0.01
 TORQUE, SPEED = np.sin(TIME), np.cos(TIME)

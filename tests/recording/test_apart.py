@@ -20,11 +20,12 @@ import scipy.io
 
 from hil.child import python
 from hil.errors import RecordingError
-from hil.recording import Table, apart, read_table, write_table
-from hil.recording.apart import ENVIRONMENT, Reader
+from hil.recording import Table, read_table, write_table
+from hil.recording import sandbox as apart
 from hil.recording.bounds import CELLS, MEMORY_BYTES, most_cells
 from hil.recording.formats import FORMATS, read_metadata
-from hil.recording.kinds import as_text
+from hil.recording.sandbox import ENVIRONMENT, Reader
+from hil.recording.table import as_text
 
 GIB = 1 << 30
 
@@ -35,7 +36,7 @@ def peak_bytes(path: Path) -> int:
         import resource
         from hil.errors import RecordingError
         from hil.recording import read_table
-        from hil.recording.apart import READER
+        from hil.recording.sandbox import READER
         try:
             read_table({str(path)!r})
         except RecordingError as error:
@@ -265,7 +266,7 @@ def test_every_kind_of_column_comes_through(tmp_path: Path, suffix: str) -> None
 
 
 def test_the_limits_are_set_where_it_reads() -> None:
-    program = "from hil.recording.apart_process import _limit; import resource; _limit(0)\n" + "".join(
+    program = "from hil.recording.reader_process import _limit; import resource; _limit(0)\n" + "".join(
         f"print(resource.getrlimit(resource.{name})[0])\n" for name in ("RLIMIT_CORE", "RLIMIT_CPU", "RLIMIT_AS")
     )
     done = subprocess.run(

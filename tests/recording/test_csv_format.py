@@ -9,8 +9,7 @@ import pytest
 
 from hil.errors import RecordingError
 from hil.recording import Table, csv_format, read_table, write_table
-from hil.recording.format_hints import FormatHints
-from hil.recording.request import Request
+from hil.recording.request import FormatHints, Request
 
 
 def read(tmp_path: Path, content: str | bytes, hints: FormatHints | None = None) -> Table:

@@ -13,10 +13,10 @@ import pytest
 from hil.errors import RecordingError
 from hil.recording import RecordingWriter, Table, read_table, write_table
 from hil.recording.checksum import CHECKSUM, CHECKSUMS, data_sha256, sealed, text_sha256
-from hil.recording.differences import losses
+from hil.recording.description import sidecar_of
 from hil.recording.formats import FORMATS, read_metadata
-from hil.recording.kinds import as_text
-from hil.recording.sidecar import sidecar_of
+from hil.recording.publish import losses
+from hil.recording.table import as_text
 from tests.full_disk import largest_file
 
 WRITABLE = [suffix for suffix, form in FORMATS.items() if form.write]

@@ -13,8 +13,8 @@ import pytest
 from hil.errors import RecordingError
 from hil.recording import SignalsConfig, Table, read_record, read_table, write_table
 from hil.recording.formats import read_metadata
-from hil.recording.kinds import as_text
 from hil.recording.mat73_format import variable_names
+from hil.recording.table import as_text
 
 
 @pytest.fixture

@@ -11,8 +11,8 @@ import pytest
 from hil.errors import RecordingError
 from hil.recording import RecordingWriter, own_csv, read_table
 from hil.recording.checksum import CHECKSUM, data_sha256
-from hil.recording.facts import facts_of, read_facts
-from hil.recording.sidecar import sidecar_of
+from hil.recording.description import sidecar_of
+from hil.recording.recordings import facts_of, read_facts
 from tests.recording.test_writer import sample
 
 ROW = "1.0,0.5,nan,-0.0,5e-324,1e+16,16,inf,0.1,0.0\n"

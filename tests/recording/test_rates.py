@@ -18,7 +18,7 @@ from estimator.signals import decimate
 from hil.cli.main import run
 from hil.errors import RecordingError
 from hil.recording import SignalsConfig, read_record, read_table, resample
-from hil.recording.look.look import look
+from hil.recording.look import look
 from hil.recording.request import Request
 from hil.recording.resample import Series, resampled
 

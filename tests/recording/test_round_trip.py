@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 from hil.errors import RecordingError
 from hil.recording import Table, read_table, write_table
 from hil.recording.checksum import CHECKSUMS
-from hil.recording.differences import losses
 from hil.recording.formats import FORMATS, read_metadata
-from hil.recording.kinds import as_text
+from hil.recording.publish import losses
+from hil.recording.table import as_text
 
 WRITABLE = [suffix for suffix, form in FORMATS.items() if form.write]
 

@@ -11,7 +11,7 @@ import pytest
 
 from hil.errors import RecordingError
 from hil.recording import RecordingWriter, read_table, writer
-from hil.recording.writing_thread import WritingThread
+from hil.recording.writer import WritingThread
 from tests.recording.test_writer import sample
 
 

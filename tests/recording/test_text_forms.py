@@ -10,10 +10,9 @@ import pytest
 
 from hil.errors import RecordingError
 from hil.recording import SignalsConfig, Table, read_record, read_table
-from hil.recording.format_hints import FormatHints
-from hil.recording.request import Request
+from hil.recording.request import FormatHints, Request
 from hil.recording.scales import wrapped_at
-from hil.recording.text.cells import CellKind, kind_of
+from hil.recording.text_form import CellKind, kind_of
 
 ROWS = 60
 TIME = np.arange(ROWS) * 0.01
@@ -315,7 +314,7 @@ def test_a_line_of_millions_of_cells_is_refused_before_they_are_looked_at(
         looked_at += 1
         return kind_of(cell, decimal)
 
-    monkeypatch.setattr("hil.recording.text.recognise.kind_of", counted)
+    monkeypatch.setattr("hil.recording.text_form.kind_of", counted)
     with pytest.raises(RecordingError, match="expected"):
         read_table(written(tmp_path, line))
     assert looked_at < 200_000

@@ -12,9 +12,9 @@ import pytest
 from hil.cli.main import run as hil
 from hil.errors import RecordingError
 from hil.recording import Table, write_table
+from hil.recording.description import sidecar_of
 from hil.recording.formats import read_metadata
-from hil.recording.sidecar import sidecar_of
-from hil.recording.timing_check import WORST_SHARE, require_even_cycles
+from hil.recording.recordings import WORST_SHARE, require_even_cycles
 
 EVEN = {"cycles": 1000, "missed": 0, "late": 0, "unanswered": 0}
 

@@ -13,7 +13,7 @@ from hil.config.table import Positive, Table, Text
 from hil.errors import FileProblem, UsageError
 from hil.inside import PLAIN
 from hil.problems import Fault, read_toml, refuse, validate
-from hil.recording.format_hints import FormatHints
+from hil.recording.request import FormatHints
 
 ROOM = Path(__file__).parent
 CASE, MODEL, TRUTH, PROVENANCE = "case.toml", "model.toml", "truth.toml", "provenance.md"

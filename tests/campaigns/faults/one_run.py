@@ -19,7 +19,7 @@ from drivers.plc.plc import Plc
 from hil.config.rig_file import Rig
 from hil.errors import RecordingError
 from hil.recording import RecordingWriter, read_table, writer
-from hil.recording.writing_thread import Unbuffered, WritingThread
+from hil.recording.writer import Unbuffered, WritingThread
 from hil.rig import build
 from hil.rig.addresses import with_addresses
 from hil.rig.build import open_devices

@@ -26,8 +26,8 @@ from hil.export.identification_file import plc_estimator
 from hil.export.structured_text import structured_text
 from hil.recording import Table, read_table, write_table
 from hil.recording.formats import read_metadata
-from hil.recording.kinds import as_text
 from hil.recording.signals import read_record
+from hil.recording.table import as_text
 from hil.rig.replay import replay
 from hil.store import RunStore, register_run
 from hil.store.row_faults import NEUTRAL

@@ -14,7 +14,7 @@ from typing import Any
 
 from hil.errors import RecordingError
 from hil.recording import RecordingWriter, columns, read_table
-from hil.recording.samples import cells_of
+from hil.recording.writer import cells_of
 from tests.recording.test_writer import sample
 
 ROWS = 2000

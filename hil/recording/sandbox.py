@@ -1,10 +1,4 @@
-"""Recordings read in a process apart: what a damaged or malicious file does to a compiled library ends there.
-
-Libraries that read binary formats trust what they read: a few changed bytes have them loop for ever, ask for all
-memory, or end the process. So none of them is let near a file here, whoever wrote it. The process is bounded in memory
-and time, runs nothing of the folder it is called in, and answers with plain arrays. It is started with the first file
-and serves the next ones, for starting takes a second; after anything but an answer it is ended, and a new one started.
-"""
+"""A table through a pipe: a header in JSON, then the cells. Whoever reads it runs nothing, whatever comes."""
 
 from __future__ import annotations
 
@@ -16,18 +10,103 @@ import tempfile
 import threading
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import IO, Any, Final, Literal
+
+import numpy as np
 
 from hil.child import environment, python
 from hil.errors import RecordingError
 from hil.recording.bounds import memory_bytes, processor_s
-from hil.recording.kinds import Column
-from hil.recording.look.survey import Survey
 from hil.recording.request import Request
-from hil.recording.table import Table
-from hil.recording.table_stream import Document, receive, table_of
+from hil.recording.survey import Survey
+from hil.recording.table import Column, Kind, Table, as_text
 
-PROCESS: Final = "hil.recording.apart_process"
+_LENGTH_BYTES: Final = 8
+
+_DTYPES: Final[Mapping[Kind, type[np.generic]]] = {
+    Kind.FLOAT: np.float64,
+    Kind.INTEGER: np.int64,
+    Kind.BOOLEAN: np.bool_,
+}
+
+Document = dict[str, Any]
+
+
+def send(stream: IO[bytes], document: Document, columns: Mapping[str, Column] | None = None) -> None:
+    """Write a document, and the columns it is about."""
+    named = columns or {}
+    kinds = [[name, Kind.of(column).value, int(column.size)] for name, column in named.items()]
+    _send_text(stream, json.dumps({**document, "columns": kinds}))
+    for column in named.values():
+        if Kind.of(column) is Kind.TEXT:
+            _send_text(stream, json.dumps(column.tolist()))
+        else:
+            stream.write(np.ascontiguousarray(column).data)
+    stream.flush()
+
+
+def receive(stream: IO[bytes]) -> tuple[Document, dict[str, Column]]:
+    """Read what `send` has written."""
+    document: Document = json.loads(_receive_text(stream))
+    return document, {name: _column(stream, Kind(kind), size) for name, kind, size in document["columns"]}
+
+
+def described(table: Table) -> Document:
+    """Return all of a table but its columns and path."""
+    return {
+        "units": dict(table.units),
+        "metadata": dict(table.metadata),
+        "remarks": list(table.remarks),
+        "master": table.master,
+        "elsewhere": dict(table.elsewhere),
+    }
+
+
+def table_of(path: Path, document: Document, columns: Mapping[str, Column]) -> Table:
+    """Return the table that `described` was made of."""
+    return Table(
+        path,
+        columns,
+        document["units"],
+        document["metadata"],
+        remarks=tuple(document["remarks"]),
+        master=document["master"],
+        elsewhere=document["elsewhere"],
+    )
+
+
+def _column(stream: IO[bytes], kind: Kind, size: int) -> Column:
+    if kind is Kind.TEXT:
+        return as_text(json.loads(_receive_text(stream)))
+    column = np.empty(size, dtype=_DTYPES[kind])
+    _fill(stream, column.data.cast("B"))
+    return column
+
+
+def _send_text(stream: IO[bytes], text: str) -> None:
+    raw = text.encode("ascii")
+    stream.write(len(raw).to_bytes(_LENGTH_BYTES, "little"))
+    stream.write(raw)
+
+
+def _receive_text(stream: IO[bytes]) -> str:
+    length = bytearray(_LENGTH_BYTES)
+    _fill(stream, memoryview(length))
+    raw = bytearray(int.from_bytes(length, "little"))
+    _fill(stream, memoryview(raw))
+    return raw.decode("ascii")
+
+
+def _fill(stream: IO[bytes], place: memoryview) -> None:
+    done = 0
+    while done < len(place):
+        count = stream.readinto(place[done:])  # type: ignore[attr-defined]  # a buffered reader has it
+        if not count:
+            raise EOFError
+        done += count
+
+
+PROCESS: Final = "hil.recording.reader_process"
 
 WAITING: Final = 6.0
 """How much longer than its processor's time a reading may last, on a machine that does other things."""

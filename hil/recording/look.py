@@ -1,18 +1,22 @@
-"""A ``[signals]`` table to paste, for what was found in a file; what is not sure stands in its comments."""
+"""What is in a recording, and what its channels could be: ``hil look``."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
 
 import tomlkit
 
 from hil.printable import printable
 from hil.recording import columns
-from hil.recording.look.roles import Guess, Roles
-from hil.recording.look.survey import Group, Survey, rounded
-from hil.recording.scales import Role
-from hil.recording.units import Quantity, unit_of
+from hil.recording.encoding import FALLBACK, likely_encoding
+from hil.recording.formats import format_of
+from hil.recording.request import FormatHints, Request
+from hil.recording.sandbox import READER
+from hil.recording.scales import Quantity, Role, unit_of
+from hil.recording.survey import Group, Guess, Roles, Survey, roles_of, rounded, survey_of
 
 EPOCH_S = 1e9
 """Seconds since 1970 that no recording lasts: what is larger is a time of day."""
@@ -103,3 +107,27 @@ def _units_comment(found: tuple[Guess, ...]) -> str:
 
 def _quoted(name: str) -> str:
     return tomlkit.item(name).as_string()
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """What is in a recording, what its channels could be, and the table that reads it."""
+
+    path: Path
+    survey: Survey
+    roles: Roles
+    signals: tuple[str, ...]
+
+
+def look(path: Path, dbc: Path | None = None) -> Look:
+    """Look into a recording."""
+    known = format_of(path)
+    encoding = None
+    if known.apart:
+        survey = READER.survey(path, Request(dbc=dbc))
+    else:
+        encoding = likely_encoding(path.read_bytes())
+        survey = survey_of([known.read(path, Request(FormatHints(encoding=encoding)))])
+    roles = roles_of(survey.groups)
+    by_hand = encoding if encoding == FALLBACK else None
+    return Look(path, survey, roles, tuple(signals_lines(survey, roles, by_hand)))

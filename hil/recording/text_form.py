@@ -1,24 +1,113 @@
-"""What form a text recording has: a pure function of its first lines and of what was set by hand.
-
-Delimiter and decimal mark are the pair under which most cells of the rows are numbers; on a tie, the one with more
-cells a row. A row has numbers where the rows after it do. The names are in the last line of texts before the rows that
-has a name for each of their cells; between them only units, words for data types and comments may stand. Whatever else
-stands there is a row, and at fault as such: nothing in a table is passed over.
-"""
+"""Cells of a text file: what one alone may be."""
 
 from __future__ import annotations
 
 import csv
+import re
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
 from typing import Final
 
 from hil.recording.bounds import COLUMNS
-from hil.recording.format_hints import FormatHints
-from hil.recording.text.cells import CellKind, kind_of
-from hil.recording.text.form import BLANKS, COMMA, TAB, TextForm
-from hil.recording.units import unit_in, unit_of
+from hil.recording.request import FormatHints
+from hil.recording.scales import unit_in, unit_of
+
+MISSING: Final = ("", "NA", "N/A", "#N/A", "n/a", "null", "NULL")
+"""Cells that say that nothing was read, in addition to nan in any spelling."""
+
+NUMBER: Final = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:inf|infinity)", re.IGNORECASE)
+
+DATE_TIME: Final = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(?::\d\d(?:[.,]\d{1,9})?)?(?:Z|[+-]\d\d:?\d\d)?")
+"""A date with a time of day (ISO 8601)."""
+
+
+class CellKind(Enum):
+    """What a cell alone says of itself."""
+
+    MISSING = "missing"
+    NUMBER = "number"
+    DATE_TIME = "date_time"
+    TEXT = "text"
+
+
+def kind_of(cell: str, decimal: str = ".") -> CellKind:
+    """Tell what a cell is, with a decimal mark."""
+    plain = cell.strip()
+    if plain in MISSING or plain.lower() == "nan":
+        return CellKind.MISSING
+    if decimal == ",":
+        plain = plain.replace(".", "_").replace(",", ".")
+    if NUMBER.fullmatch(plain):
+        return CellKind.NUMBER
+    return CellKind.DATE_TIME if DATE_TIME.fullmatch(cell.strip()) else CellKind.TEXT
+
+
+COMMA, TAB, BLANKS = ",", "\t", " "
+
+DELIMITER_WORDS: Final[Mapping[str, str]] = {TAB: "a tab", BLANKS: "blanks", COMMA: "a comma", ";": "a semicolon"}
+
+
+@dataclass(frozen=True, slots=True)
+class TextForm:
+    """How the lines of a text recording become rows.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Of the columns, none twice.
+    delimiter, decimal, encoding : str
+        As in `hil.recording.request`.
+    first_row_line : int
+        Line of the first row, from 1.
+    header_line, units_line : int
+        Lines of names and units; 0 where there is none.
+    units : mapping of name to str
+        Of the columns that have one.
+    comment : str
+        What a line that is no row begins with; empty where none does.
+    trailing : bool
+        Whether every row ends in a delimiter.
+    repeated : tuple of str
+        Names that the header has more than once.
+    """
+
+    names: tuple[str, ...]
+    delimiter: str = COMMA
+    decimal: str = "."
+    encoding: str = "utf-8"
+    first_row_line: int = 2
+    header_line: int = 1
+    units_line: int = 0
+    units: Mapping[str, str] = field(default_factory=dict)
+    comment: str = ""
+    trailing: bool = False
+    repeated: tuple[str, ...] = ()
+
+    @property
+    def width(self) -> int:
+        """Cells of a row."""
+        return len(self.names) + self.trailing
+
+    def said(self) -> Iterator[str]:
+        """Say what a plain CSV file would not have, one part each."""
+        between = DELIMITER_WORDS.get(self.delimiter, repr(self.delimiter))
+        behind = max(self.header_line, self.units_line)
+        parts = (
+            (self.encoding not in ("utf-8", "utf-8-sig"), f"{self.encoding} text"),
+            (self.delimiter != COMMA and len(self.names) > 1, f"{between} between cells"),
+            (self.decimal == ",", "decimal comma"),
+            (self.header_line == 0, f"no line of names: columns are called 1 to {len(self.names)}"),
+            (self.header_line > 1, f"names in line {self.header_line}"),
+            (self.units_line > 0, f"units in line {self.units_line}"),
+            (self.first_row_line > behind + 1, f"rows from line {self.first_row_line}"),
+            (bool(self.comment), f"lines that begin with {self.comment} are comments"),
+            (self.trailing, "a delimiter ends every row"),
+            (bool(self.repeated), f"{', '.join(self.repeated)} more than once, numbered"),
+        )
+        return (text for holds, text in parts if holds)
+
 
 SAMPLE_LINES: Final = 200
 """Lines that are looked at: more than any header has, and enough rows to tell what a column holds."""

@@ -1,4 +1,4 @@
-"""The process that reads recordings for another one; see `hil.recording.apart`. Ends with its standard input."""
+"""The process that reads recordings for another one; see `hil.recording.sandbox`. Ends with its standard input."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from typing import IO, Any
 from hil.errors import RecordingError
 from hil.recording.bounds import memory_bytes, processor_s
 from hil.recording.formats import FORMATS, metadata_of
-from hil.recording.look.survey import survey_of
 from hil.recording.request import Request
-from hil.recording.table_stream import described, send
+from hil.recording.sandbox import described, send
+from hil.recording.survey import survey_of
 
 
 def main() -> None:

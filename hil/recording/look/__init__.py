@@ -1,1 +1,0 @@
-"""What is in a recording, and what its channels could be: ``hil look``."""

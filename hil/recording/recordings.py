@@ -1,0 +1,183 @@
+"""The recordings of one command, read together: all at fault are reported, and they must fit together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from estimator.signals.record import Record
+from hil.errors import InputError, RecordingError, UsageError
+from hil.parse_json import parse_json
+from hil.recording import columns
+from hil.recording.checksum import CHECKSUM, RIG_CHECKSUM, RIG_TEXT, SAID, require_unchanged
+from hil.recording.description import read_sidecar
+from hil.recording.formats import format_of, read_metadata, read_table
+from hil.recording.own_csv import Extent, data_sha256_at, extent, is_own
+from hil.recording.signals import Tell, read_record
+from hil.recording.signals_config import SignalsConfig
+from hil.recording.table import Table
+
+
+def read_records(
+    paths: Sequence[Path],
+    signals: SignalsConfig | None = None,
+    on_bench: bool = False,
+    dbc: Path | None = None,
+    tell: Tell | None = None,
+) -> tuple[Record, ...]:
+    """Read recordings that are to be explained by one model; see :func:`read_record` for the arguments.
+
+    Raises
+    ------
+    UsageError
+        If two have the same name: results are reported by it; or the same samples: they would count twice as
+        evidence, and held out they would prove nothing.
+    RecordingError
+        If one can't be read, or has another sampling period than the first.
+    InputError
+        If several can't be read; with the faults of each.
+    """
+    _require_own_names(paths)
+    records: list[Record] = []
+    errors: list[RecordingError] = []
+    for path in paths:
+        try:
+            records.append(read_record(path, signals, on_bench, dbc, tell))
+        except RecordingError as error:
+            errors.append(error)
+    if len(errors) == 1:
+        raise errors[0]
+    if errors:
+        raise InputError("\n".join(str(error) for error in errors))
+    _require_one_period(paths, records)
+    _require_own_samples(paths, records)
+    return tuple(records)
+
+
+def _require_own_names(paths: Sequence[Path]) -> None:
+    names: dict[str, Path] = {}
+    for path in paths:
+        if path.stem in names:
+            raise UsageError(
+                f"{path}: expected recordings of different names, got {path.stem!r} twice "
+                f"(also {names[path.stem]}). Rename one, or give it once."
+            )
+        names[path.stem] = path
+
+
+def _require_one_period(paths: Sequence[Path], records: Sequence[Record]) -> None:
+    for path, record in zip(paths, records, strict=True):
+        if abs(record.sample_time_s - records[0].sample_time_s) > 1e-6 * records[0].sample_time_s:
+            raise RecordingError(
+                path,
+                f"expected the sampling period of {paths[0]}, {records[0].sample_time_s:g} s, "
+                f"got {record.sample_time_s:g} s. Give recordings of one period.",
+            )
+
+
+def _require_own_samples(paths: Sequence[Path], records: Sequence[Record]) -> None:
+    known: dict[tuple[bytes, bytes], Path] = {}
+    for path, record in zip(paths, records, strict=True):
+        samples = (record.torque_nm.tobytes(), record.output.tobytes())
+        if samples in known:
+            raise UsageError(
+                f"{path}: expected samples of its own, got those of {known[samples]}, every one the same. "
+                "Give each recording once; hold out one that was not used."
+            )
+        known[samples] = path
+
+
+CSV = ".csv"
+
+
+@dataclass(frozen=True, slots=True)
+class Facts:
+    """What is known of a recording whose rows are not kept."""
+
+    path: Path
+    metadata: Mapping[str, str]
+    extent: Extent
+
+
+def facts_of(table: Table) -> Facts:
+    """Return the facts of a table."""
+    there = table.numeric([name for name in (columns.TIME, columns.FLAGS) if name in table.columns])
+    time_s = there.get(columns.TIME, np.zeros(1))
+    flagged = int(np.count_nonzero(there[columns.FLAGS])) if columns.FLAGS in there else 0
+    return Facts(table.path, table.metadata, Extent(table.n_rows, float(time_s[0]), float(time_s[-1]), flagged))
+
+
+def read_facts(path: Path) -> Facts:
+    """Read a recording once, in memory that does not grow where it is a CSV of this rig, and return its facts."""
+    format_of(path)
+    if path.suffix.lower() == CSV and is_own(path) and (said := read_sidecar(path)).found and not said.types:
+        try:
+            held = extent(path)
+            require_unchanged(path, said.metadata, said.units, lambda: data_sha256_at(path, held.n_rows))
+        except ValueError:  # changed by hand: the reader of all forms of text says where
+            return facts_of(read_table(path))
+        if held.n_rows:
+            return Facts(path, said.metadata, held)
+    return facts_of(read_table(path))
+
+
+_SHOWN = 16
+"""Digits of a checksum that are shown: enough to distinguish any two that a person will ever compare."""
+
+_SINGLE_LINE = 100
+
+
+def self_description(metadata: Mapping[str, str]) -> list[str]:
+    """Return a line for each thing that is said; long texts by their length, the rig file by its checksum."""
+    if not metadata:
+        return ["says nothing of itself: no units, no rig file, no checksum"]
+    lines = []
+    for key, value in metadata.items():
+        if key == RIG_TEXT:
+            checksum = metadata.get(RIG_CHECKSUM, "")
+            seal = f", SHA-256 {checksum[:_SHOWN]}" if checksum else ""
+            lines.append(f"{key}: {len(value.splitlines())} lines{seal}")
+        elif key == CHECKSUM:
+            lines.append(f"{key}: {value[:_SHOWN]} (verified)")
+        elif key not in ("schema", RIG_CHECKSUM, SAID):
+            shown = value[:_SHOWN] if key.endswith("_sha256") else value
+            is_short = len(shown) <= _SINGLE_LINE and "\n" not in shown
+            lines.append(f"{key}: {shown}" if is_short else f"{key}: {len(value)} characters")
+    return lines
+
+
+# A single late or missing sample is flagged and left out. That does not help where hardly a stretch between two of them
+# is whole: the torque of a flagged sample is held, wrong by a step of the PRBS half of the time. With one bad cycle in
+# 20 a stretch is 20 cycles long on average, which the default model (four coefficients at twice the period) needs twice
+# over to forget where it began. A diagnosis refuses nothing: the acquisition is among what it looks into.
+WORST_SHARE = 0.05
+"""Part of the cycles that may have been late, missing or without an answer."""
+
+
+def require_even_cycles(paths: Iterable[Path]) -> None:
+    """See that the runs that left a timing record kept their cycles; a recording without one passes."""
+    for path in paths:
+        if "timing" in (metadata := read_metadata(path)):
+            _require_even(path, metadata["timing"])
+
+
+def _require_even(path: Path, text: str) -> None:
+    try:
+        timing = parse_json(text)
+        cycles, missed = int(timing["cycles"]), int(timing["missed"])
+        late, unanswered = int(timing["late"]), int(timing["unanswered"])
+    except (ValueError, TypeError, KeyError) as error:
+        raise RecordingError(
+            path, f"metadata timing: expected a record hil.timing/1, got one that can't be read ({error!r})"
+        ) from error
+    bad, due = missed + late + unanswered, cycles + missed
+    if bad > WORST_SHARE * due:
+        raise RecordingError(
+            path,
+            f"expected at most {WORST_SHARE:.0%} of the cycles late or incomplete, got {bad / due:.0%} of {due}: "
+            f"{missed} missed, {late} late by more than half a period, {unanswered} answers missing. Record again "
+            "on a machine that is less busy or grants real-time scheduling, or at a longer period.",
+        )
