@@ -12,6 +12,7 @@ import numpy as np
 from estimator.signals import record as base
 from hil.api.models import Model, signals_of
 from hil.recording import columns
+from hil.recording.channels import column_of, understood
 from hil.recording.signals import read_record, to_record, under_imposed_motion
 from hil.recording.table import Table
 from hil.report.figures import Line, Panel, Style, input_lines, time_panels
@@ -67,11 +68,11 @@ class Record(base.Record):
             If the columns are not those of a recording, by name.
         """
         known, on_bench = signals_of(signals, model)
-        cells = {str(key): frame[key].to_numpy() for key in frame.columns}
+        cells = {str(key): column_of(frame[key].to_numpy()) for key in frame.columns}
         time = known.time.column or columns.TIME
         if known.time.column is not None and time not in cells:
-            cells[time] = _seconds(frame.index.to_numpy())
-        record = to_record(Table(Path(name), cells), known)
+            cells[time] = column_of(frame.index.to_numpy())
+        record = to_record(understood(Table(Path(name), cells)), known)
         return cls.of(under_imposed_motion(record) if on_bench else record)
 
     def to_dataframe(self) -> pandas.DataFrame:
@@ -101,13 +102,6 @@ class Record(base.Record):
             f"<Record {self.name}: {duration_s:.4g} s at {self.sample_time_s:g} s, {inputs}, {self.kind.value}, "
             f"{int(self.okay.sum())} of {self.okay.size} samples count>"
         )
-
-
-def _seconds(index: Any) -> Any:
-    """Return an index as time in seconds: moments since the first of them."""
-    if np.issubdtype(index.dtype, np.datetime64) or np.issubdtype(index.dtype, np.timedelta64):
-        return (index - index[0]) / np.timedelta64(1, "s")
-    return index.astype(np.float64)
 
 
 def read(path: Path | str, signals: Mapping[str, Any] | None = None, model: Model | None = None) -> Record:

@@ -26,13 +26,12 @@ import pyarrow.csv
 
 from hil.errors import RecordingError
 from hil.recording.bounds import require_columns
-from hil.recording.description import Sidecar, as_metadata, read_sidecar, write_sidecar
+from hil.recording.channels import numbers_of_texts
+from hil.recording.description import NO_SIDECAR, Sidecar, as_metadata, read_sidecar, write_sidecar
 from hil.recording.encoding import decoded
 from hil.recording.request import FormatHints, Request
 from hil.recording.table import Column, Kind, Table, as_text, line_of
-from hil.recording.text_form import BLANKS, DATE_TIME, MISSING, SAMPLE_LINES, TextForm, recognise, split
-
-NS: Final = 1e-9
+from hil.recording.text_form import BLANKS, MISSING, SAMPLE_LINES, TextForm, recognise, split
 
 
 def as_column(cells: pa.ChunkedArray, kind: Kind | None = None, decimal: str = ".") -> Column:
@@ -61,28 +60,6 @@ def as_column(cells: pa.ChunkedArray, kind: Kind | None = None, decimal: str = "
     return as_text(trimmed.to_pylist())
 
 
-def seconds_of(column: Column) -> tuple[Column, str] | None:
-    """Return a column of dates and times as seconds since the first of them, and that one; None where it is none."""
-    if column.dtype != object or not all(DATE_TIME.fullmatch(cell) or not cell for cell in column.tolist()):
-        return None
-    texts = [cell.replace(",", ".") or None for cell in column.tolist()]
-    zoned = any(text and re.search(r"(?:Z|[+-]\d\d:?\d\d)$", text[10:]) for text in texts)
-    try:
-        stamps = pa.array(texts, pa.string()).cast(pa.timestamp("ns", "UTC" if zoned else None))
-    except pa.ArrowInvalid:
-        return None
-    if stamps.null_count == len(stamps):
-        return None
-    first = next(stamp for stamp in stamps if stamp.is_valid).value
-    since = np.asarray(stamps.cast(pa.int64()).to_numpy(zero_copy_only=False), dtype=np.float64)
-    if not stamps.null_count:
-        since = (stamps.cast(pa.int64()).to_numpy() - first).astype(np.float64)
-    else:
-        since -= float(first)
-    start = next(text for text in texts if text)
-    return since * NS, start
-
-
 SPECIAL = ",;\t|"
 """Characters that a reader could take for a delimiter."""
 
@@ -98,12 +75,21 @@ TRAILING = "\0"
 
 def read(path: Path, request: Request) -> Table:
     """Read a text recording, in the form that it is recognised to have or that was set by hand."""
-    hints, said = request.form, read_sidecar(path)
-    text, encoding = decoded(path, path.read_bytes(), hints.encoding)
+    said = read_sidecar(path)
+    text, encoding = decoded(path, path.read_bytes(), request.form.encoding)
+    if path.suffix.lower() == ".lvm":
+        text = labview_text(text)
+    return table_of_text(path, text, request.form, encoding, said)
+
+
+def table_of_text(
+    path: Path, text: str, hints: FormatHints, encoding: str = "utf-8", said: Sidecar = NO_SIDECAR, remark: str = ""
+) -> Table:
+    """Return the table that a text is."""
     if not text or text.isspace():
         return Table(path, {})  # refuses: nothing in it
     form = replace(form_of(text, hints.model_copy(update=OWN) if said.found else hints), encoding=encoding)
-    _require_names(path, form)
+    form = _with_every_name(path, form)
     rows, skipped = _rows(path, text, form)
     del text
     if not rows:
@@ -111,25 +97,17 @@ def read(path: Path, request: Request) -> Table:
     cells = _parse(path, rows, form, skipped)
     del rows
     columns: dict[str, Column] = {}
-    units = dict(said.units if said.found else form.units)
-    remarks = [", ".join(form.said())]
     for name in form.names:
-        column = as_column(cells[name], said.types.get(name), form.decimal)
+        columns[name] = as_column(cells[name], said.types.get(name), form.decimal)
         cells = cells.drop_columns([name])  # a cell as text takes several times what it does as a number
-        since = None if said.found else seconds_of(column)
-        if since is not None:
-            column, start = since
-            units[name] = "s"
-            remarks.append(f"{name}: dates and times, read as seconds since {start}")
-        columns[name] = column
     pa.default_memory_pool().release_unused()
-    return Table(
+    table = Table(
         path,
         columns,
-        units,
+        dict(said.units if said.found else form.units),
         said.metadata,
         form.first_row_line,
-        tuple(remark for remark in remarks if remark),
+        tuple(line for line in (remark, ", ".join(form.said())) if line),
         skipped,
         elsewhere={
             name: f"line {form.header_line}: column {name} comes twice or more, as {name} (1) and {name} (2): name "
@@ -137,6 +115,41 @@ def read(path: Path, request: Request) -> Table:
             for name in form.repeated
         },
     )
+    return pivoted(table) if LONG_FORM <= columns.keys() else table
+
+
+LONG_FORM: Final = frozenset({"_time", "_field", "_value"})
+"""Columns of a text of InfluxDB, with a row for each value of each series."""
+
+
+def pivoted(table: Table) -> Table:
+    """Return a table with a column for each series of one that has a row for each value."""
+    stamps, fields, values = (table.columns[name] for name in ("_time", "_field", "_value"))
+    if Kind.of(values) is Kind.TEXT or Kind.of(fields) is not Kind.TEXT:
+        return table
+    times = np.unique(stamps)
+    columns: dict[str, Column] = {"_time": times}
+    for name in dict.fromkeys(fields.tolist()):
+        of_it = fields == name
+        columns[name] = np.full(times.size, np.nan)
+        columns[name][np.searchsorted(times, stamps[of_it])] = values[of_it]
+    return replace(table, columns=columns, first_line=None, skipped=(), remarks=(*table.remarks, "series by _field"))
+
+
+END_OF_HEADER: Final = "***End_of_Header***"
+
+
+def labview_text(text: str) -> str:
+    """Return the last table of a LabVIEW measurement file, its units as a line behind the names."""
+    head, _, body = text.rpartition(END_OF_HEADER)
+    lines = body.lstrip("\t").lstrip("\r\n").split("\n")
+    names = lines[0].rstrip("\r").split("\t")
+    if names[-1] == "Comment":
+        names.pop()
+    units = next((line.split("\t")[1:] for line in head.split("\n") if line.startswith("Y_Unit_Label")), [])
+    listed = ["s", *units, *[""] * len(names)][: len(names)]
+    rows = [line.rstrip("\r\t") for line in lines[1:]]
+    return "\n".join(["\t".join(names), "\t".join(listed), *rows])
 
 
 def form_of(text: str, hints: FormatHints) -> TextForm:
@@ -171,15 +184,18 @@ def description_of(table: Table) -> Sidecar:
     return Sidecar(as_metadata(table.metadata), table.units, types)
 
 
-def _require_names(path: Path, form: TextForm) -> None:
+def _with_every_name(path: Path, form: TextForm) -> TextForm:
+    """Return a form whose columns all have names: the first is an index where it has none, as pandas writes it."""
     require_columns(path, form.width)
+    names = ("index", *form.names[1:]) if form.names and not form.names[0] and len(form.names) > 1 else form.names
     problems = [
         f"line {form.header_line}: cell {number} of the header is empty, expected a column name"
-        for number, name in enumerate(form.names or ("",), start=1)
+        for number, name in enumerate(names or ("",), start=1)
         if not name
     ]
     if problems:
         raise RecordingError(path, *problems)
+    return replace(form, names=names)
 
 
 def _rows(path: Path, text: str, form: TextForm) -> tuple[bytes, tuple[int, ...]]:
@@ -247,7 +263,7 @@ def _tells_its_kind(column: Column) -> bool:
     if Kind.of(column) is not Kind.TEXT:
         return Kind.of(column) is not Kind.BOOLEAN
     read = as_column(pa.chunked_array([pa.array(column, type=pa.string())]))
-    if seconds_of(read) is not None:
+    if Kind.of(read) is Kind.TEXT and numbers_of_texts(read) is not None:
         return False
     return Kind.of(read) is Kind.TEXT and bool(np.all(read == column))
 

@@ -92,6 +92,9 @@ class Sidecar:
         return not (self.metadata or self.units or self.types)
 
 
+NO_SIDECAR = Sidecar()
+
+
 def as_metadata(metadata: Mapping[str, str]) -> dict[str, str]:
     """Leave out what has a meaning of its own in the file next to, and so can't be metadata."""
     return {key: value for key, value in metadata.items() if key not in {SCHEMA_KEY, UNITS_KEY, TYPES_KEY}}

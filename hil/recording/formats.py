@@ -13,7 +13,8 @@ from types import MappingProxyType
 from typing import Any
 
 from hil.errors import RecordingError
-from hil.recording.checksum import require_whole
+from hil.recording.channels import understood
+from hil.recording.checksum import CHECKSUM, require_whole
 from hil.recording.description import read_sidecar_metadata, sidecar_of
 from hil.recording.request import Request
 from hil.recording.sandbox import READER
@@ -48,11 +49,19 @@ def _of(name: str) -> Callable[..., Any]:
     return called
 
 
+def _measured(kind: str) -> Format:
+    """Return a format whose channels have times of their own."""
+    reads = _of(f"measurement_formats.read_{kind}"), _of(f"measurement_formats.read_{kind}_tables")
+    return Format(reads[0], None, tables=reads[1])
+
+
 FORMATS: Mapping[str, Format] = MappingProxyType(
     {
         ".csv": Format(_of("csv_format.read"), _of("csv_format.write"), read_sidecar_metadata, sidecar_of, apart=False),
         ".txt": Format(_of("csv_format.read"), None, read_sidecar_metadata, sidecar_of, apart=False),
         ".tsv": Format(_of("csv_format.read"), None, read_sidecar_metadata, sidecar_of, apart=False),
+        ".ascii": Format(_of("csv_format.read"), None, apart=False),
+        ".lvm": Format(_of("csv_format.read"), None, apart=False),
         ".parquet": Format(
             _of("parquet_format.read"), _of("parquet_format.write"), _of("parquet_format.read_metadata")
         ),
@@ -70,6 +79,17 @@ FORMATS: Mapping[str, Format] = MappingProxyType(
         ),
         ".h5": Format(_of("hdf5_format.read"), _of("hdf5_format.write"), _of("hdf5_format.read_metadata")),
         ".hdf5": Format(_of("hdf5_format.read"), _of("hdf5_format.write"), _of("hdf5_format.read_metadata")),
+        ".feather": Format(_of("parquet_format.read_feather"), None),
+        ".jsonl": Format(_of("parquet_format.read_json_lines"), None),
+        ".npz": Format(_of("array_formats.read_numpy"), None),
+        ".npy": Format(_of("array_formats.read_numpy"), None),
+        ".xlsx": Format(_of("array_formats.read_xlsx"), None),
+        ".tdms": _measured("tdms"),
+        ".mcap": _measured("mcap"),
+        ".blf": _measured("bus_log"),
+        ".asc": _measured("bus_log"),
+        ".log": _measured("bus_log"),
+        ".trc": _measured("bus_log"),
         ".mat": Format(_of("mat_format.read"), _of("mat_format.write"), _of("mat_format.read_metadata")),
     }
 )
@@ -86,9 +106,15 @@ def read_table(path: Path | str, request: Request | None = None) -> Table:
     path = Path(path)
     known = format_of(path)
     asked = request or Request()
-    table = READER.table(path, asked) if known.apart else known.read(path, asked)
+    table = READER.table(path, asked) if known.apart else tables_of(known, path, asked)[0]
     require_whole(table)
     return table
+
+
+def tables_of(known: Format, path: Path, request: Request, every: bool = False) -> list[Table]:
+    """Read the table of a file, or ``every`` one it has, in this process; what the columns mean is understood."""
+    tables = known.tables(path, request) if every and known.tables is not None else [known.read(path, request)]
+    return [table if CHECKSUM in table.metadata else understood(table) for table in tables]
 
 
 def read_metadata(path: Path | str) -> Mapping[str, str]:

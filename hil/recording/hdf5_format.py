@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import io
 import math
+import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -96,6 +97,9 @@ File: TypeAlias = Any
 Dataset: TypeAlias = Any
 """Those of h5py, which has no types."""
 
+PICKLED_TEXT = re.compile(r"(?:^|\n)a?V([^\n]*)\n")
+"""A text in a pickle of protocol 0, read as what it is: nothing is unpickled."""
+
 DESCRIPTION = "recording_json"
 COLUMNS = "columns"
 
@@ -171,10 +175,16 @@ def _foreign(path: Path, file: File, request: Request) -> Table:
     vectors: dict[str, Column] = {}
     units: dict[str, str] = {}
     remarks: list[str] = []
+    frames: list[str] = []
 
     def take(raw: str | bytes, entry: Any) -> None:
         name = text_of(raw)
         if not hasattr(entry, "dtype"):
+            if found := _of_pandas(entry):
+                frames.append(name)
+                vectors.update(found)
+            return
+        if any(name.startswith(f"{frame}/") for frame in frames):
             return
         fields = (
             {f"{name}/{text_of(field)}": entry[field] for field in entry.dtype.names or ()} if entry.ndim == 1 else {}
@@ -190,6 +200,36 @@ def _foreign(path: Path, file: File, request: Request) -> Table:
     file.visititems(take)
     chosen, others = columns_of_shared_length(under_names(vectors, request.names), request.names)
     return Table(path, chosen, units, _attributes(file), remarks=(*others, *remarks))
+
+
+def _of_pandas(group: Any) -> dict[str, Column]:
+    """Return the columns of a frame that pandas wrote, fixed or as a table, without its library, which unpickles."""
+    kind = group.attrs.get("pandas_type")
+    if kind == b"frame" or kind == "frame":
+        found = {"index": group["axis1"][()]} if "axis1" in group else {}
+        for block in range(int(group.attrs["nblocks"])):
+            items = [text_of(name) for name in group[f"block{block}_items"][()].tolist()]
+            values = group[f"block{block}_values"][()]
+            found.update({name: values[:, k] for k, name in enumerate(items)})
+        order = [text_of(name) for name in group["axis0"][()].tolist()]
+        found = {name: found[name] for name in ("index", *order) if name in found}
+    elif kind in (b"frame_table", "frame_table"):
+        rows = group["table"][()]
+        found = {"index": rows["index"]}
+        for field in (name for name in rows.dtype.names if name != "index"):
+            names = _names_of_block(group["table"], field)
+            values = rows[field].reshape(rows.size, -1)
+            found.update({name: values[:, k] for k, name in enumerate(names)} if names else {field: values[:, 0]})
+    else:
+        return {}
+    return {name: as_column(values) for name, values in found.items() if is_column(values)}
+
+
+def _names_of_block(table: Any, field: str) -> list[str]:
+    """Return the names of the columns in a block of a table of pandas, which are pickled as a list of plain texts."""
+    raw = table.attrs.get(f"{field}_kind")
+    text = bytes(raw).decode("latin-1") if raw is not None else ""
+    return PICKLED_TEXT.findall(text)
 
 
 def _unit(dataset: Dataset) -> str:

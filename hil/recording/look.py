@@ -12,11 +12,14 @@ import tomlkit
 from hil.printable import printable
 from hil.recording import columns
 from hil.recording.encoding import FALLBACK, likely_encoding
-from hil.recording.formats import format_of
+from hil.recording.formats import format_of, tables_of
 from hil.recording.request import FormatHints, Request
 from hil.recording.sandbox import READER
 from hil.recording.scales import Quantity, Role, unit_of
 from hil.recording.survey import Group, Guess, Roles, Survey, roles_of, rounded, survey_of
+
+LONG_PERIOD_S = 1.0
+"""A period that no recording of a drive has: a time without a unit whose rows are as far is one in ms, perhaps."""
 
 EPOCH_S = 1e9
 """Seconds since 1970 that no recording lasts: what is larger is a time of day."""
@@ -66,11 +69,14 @@ def _groups_used(survey: Survey, roles: Roles) -> list[Group]:
 
 def _time_line(group: Group) -> str:
     if group.time is None:
-        return "time = { sample_time_s = 0.01 }   # no channel is a time: write the true period"
+        return "# time = { sample_time_s = ... }   # no channel is a time: write the true period"
     channel = next(channel for channel in group.channels if channel.name == group.time)
     unit = unit_of(channel.unit) if channel.unit else None
-    scale = "" if unit is not None and unit.quantity is Quantity.TIME else _epoch_scale(channel.high)
-    return f"time = {{ column = {_quoted(channel.name)}{scale} }}"
+    is_timed = unit is not None and unit.quantity is Quantity.TIME
+    scale = "" if is_timed else _epoch_scale(channel.high)
+    unsure = not (is_timed or scale) and (group.period_s or 0.0) >= LONG_PERIOD_S
+    comment = f"   # no unit: rows every {group.period_s:g} s, or give scale = 0.001 for ms" if unsure else ""
+    return f"time = {{ column = {_quoted(channel.name)}{scale} }}{comment}"
 
 
 def _epoch_scale(high: float | None) -> str:
@@ -127,7 +133,7 @@ def look(path: Path, dbc: Path | None = None) -> Look:
         survey = READER.survey(path, Request(dbc=dbc))
     else:
         encoding = likely_encoding(path.read_bytes())
-        survey = survey_of([known.read(path, Request(FormatHints(encoding=encoding)))])
+        survey = survey_of(tables_of(known, path, Request(FormatHints(encoding=encoding))))
     roles = roles_of(survey.groups)
     by_hand = encoding if encoding == FALLBACK else None
     return Look(path, survey, roles, tuple(signals_lines(survey, roles, by_hand)))

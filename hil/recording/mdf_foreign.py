@@ -45,7 +45,8 @@ def decoded(path: Path, mdf: MDF, dbc: Path) -> MDF:
     """Return the signals of a logged bus, a J1939 one among them, as a file of their own in memory."""
     if not any(int(getattr(group.channel_group, "flags", 0)) & BUS_EVENT for group in mdf.groups):
         raise RecordingError(path, "expected the frames of a bus for --dbc, got signals. Leave --dbc out.")
-    signals = mdf.extract_bus_logging({"CAN": [(_database(path, dbc), ANY_BUS)]})
+    database_of(path, dbc)
+    signals = mdf.extract_bus_logging({"CAN": [(dbc, ANY_BUS)]})
     if not any(group.channel_group.cycles_nr for group in signals.groups):
         raise RecordingError(
             path,
@@ -54,20 +55,20 @@ def decoded(path: Path, mdf: MDF, dbc: Path) -> MDF:
     return signals
 
 
-def _database(path: Path, dbc: Path) -> Path:
-    """Return a DBC file that can be read."""
-    from asammdf.blocks.utils import load_can_database
+def database_of(path: Path, dbc: Path) -> Any:
+    """Read a DBC file that says what the frames of a log mean."""
+    import cantools
 
     if dbc.suffix.lower() != ".dbc":
         raise RecordingError(path, f"--dbc {dbc}: expected a DBC file, named .dbc, got {dbc.suffix!r}")
     try:
         size = dbc.stat().st_size
-        database = load_can_database(dbc) if size <= LARGEST_DBC_BYTES else None
+        database: Any = cantools.database.load_file(dbc, "dbc") if size <= LARGEST_DBC_BYTES else None
     except Exception as error:
         raise RecordingError(path, f"--dbc {dbc}: expected a DBC file, got: {type(error).__name__}: {error}") from error
-    if database is None or not database.frames:
+    if database is None or not database.messages:
         raise RecordingError(path, f"--dbc {dbc}: expected a DBC file that describes messages, got one without any")
-    return dbc
+    return database
 
 
 @dataclass(frozen=True, slots=True)

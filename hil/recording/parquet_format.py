@@ -1,4 +1,4 @@
-"""Parquet: columns with their unit as field metadata, the recording's own metadata in the schema."""
+"""Parquet, Feather and lines of JSON: what Arrow reads. Parquet is also written, units and metadata in the schema."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import pyarrow.parquet
 
 from hil.errors import RecordingError
 from hil.recording.bounds import damaged, require_cells, require_columns
+from hil.recording.channels import column_of
 from hil.recording.request import Request
 from hil.recording.table import Column, Table, as_column, as_text
 
@@ -33,15 +34,49 @@ def read(path: Path, request: Request) -> Table:
             names = _names(path, content)
     except DAMAGED as error:
         raise damaged(path, "a whole Parquet file", error) from error
+    return _table(path, content, names, "a whole Parquet file")
+
+
+def read_feather(path: Path, request: Request) -> Table:
+    """Read a Feather file (Arrow IPC)."""
+    from pyarrow import feather
+
+    what = "a whole Feather file"
+    try:
+        content = feather.read_table(path, memory_map=False)
+    except DAMAGED as error:
+        raise damaged(path, what, error) from error
+    require_cells(path, content.num_rows * content.num_columns)
+    return _table(path, content, _names(path, content), what)
+
+
+def read_json_lines(path: Path, request: Request) -> Table:
+    """Read lines of JSON, an object each; what is in an object of its own is called by its path."""
+    from pyarrow import json
+
+    what = "a JSON object on every line"
+    try:
+        content = json.read_json(path)
+        while any(pa.types.is_struct(each.type) for each in content.schema):
+            content = content.flatten()
+    except DAMAGED as error:
+        raise damaged(path, what, error) from error
+    require_cells(path, content.num_rows * content.num_columns)
+    return _table(path, content, _names(path, content), what)
+
+
+def _table(path: Path, content: pa.Table, names: list[str], what: str) -> Table:
+    require_columns(path, len(names))
     units = {
         f.name: f.metadata[UNIT_KEY].decode("utf-8", "replace")
         for f in content.schema
         if f.metadata and UNIT_KEY in f.metadata
     }
+    units.update({f.name: "s" for f in content.schema if _is_time(f.type)})
     try:
         columns = {name: _column(content.column(number)) for number, name in enumerate(names)}
     except DAMAGED as error:
-        raise damaged(path, "a whole Parquet file", error) from error
+        raise damaged(path, what, error) from error
     return Table(path, columns, units, _metadata(content.schema.metadata or {}))
 
 
@@ -89,9 +124,16 @@ def _metadata(raw: Mapping[bytes, bytes]) -> dict[str, str]:
     }
 
 
+def _is_time(kind: pa.DataType) -> bool:
+    return bool(pa.types.is_timestamp(kind) or pa.types.is_duration(kind))
+
+
 def _column(cells: pa.ChunkedArray) -> Column:
-    """Turn a column into one of the four kinds; a null is NaN, in a text empty."""
+    """Turn a column into one of the four kinds; a null is NaN, in a text empty, a moment seconds since the first."""
     kind = cells.type
+    if _is_time(kind):
+        unit = "M8[ns]" if pa.types.is_timestamp(kind) else "m8[ns]"
+        return column_of(np.asarray(cells.to_numpy()).astype(unit))
     is_whole = pa.types.is_integer(kind) or pa.types.is_boolean(kind)
     if pa.types.is_floating(kind) or pa.types.is_null(kind) or (is_whole and cells.null_count):
         return np.asarray(cells.cast(pa.float64(), safe=False).to_numpy(), dtype=np.float64)

@@ -13,7 +13,7 @@ from typing import IO, Any
 
 from hil.errors import RecordingError
 from hil.recording.bounds import memory_bytes, processor_s
-from hil.recording.formats import FORMATS, metadata_of
+from hil.recording.formats import FORMATS, metadata_of, tables_of
 from hil.recording.request import Request
 from hil.recording.sandbox import described, send
 from hil.recording.survey import survey_of
@@ -38,10 +38,9 @@ def _answer(answers: IO[bytes], request: dict[str, Any]) -> None:
             send(answers, {"metadata": dict(metadata_of(form, path))})
         elif request["what"] == "survey":
             asked = Request.of_document(request["request"])
-            tables = form.tables(path, asked) if form.tables is not None else [form.read(path, asked)]
-            send(answers, {"survey": survey_of(tables).as_document()})
+            send(answers, {"survey": survey_of(tables_of(form, path, asked, every=True)).as_document()})
         else:
-            table = form.read(path, Request.of_document(request["request"]))
+            table = tables_of(form, path, Request.of_document(request["request"]))[0]
             send(answers, described(table), table.columns)
     except RecordingError as error:
         send(answers, {"problems": list(error.problems)})

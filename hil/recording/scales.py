@@ -52,18 +52,19 @@ _SPELLED: Final[Mapping[tuple[Quantity, float], str]] = {
     (Quantity.TIME, 1e-6): "us µs microsecond microseconds",
     (Quantity.TIME, 1e-9): "ns nanosecond nanoseconds",
     (Quantity.TIME, 60.0): "min",
-    (Quantity.TIME, 3600.0): "h",
-    (Quantity.TORQUE, 1.0): "nm n*m newtonmeter newtonmetre",
+    (Quantity.TIME, 3600.0): "h hr hour hours",
+    (Quantity.TIME, 86_400.0): "d day days",
+    (Quantity.TORQUE, 1.0): "nm n*m n-m newtonmeter newtonmetre newton-meter newton*meter newton*meters newton-metre",
     (Quantity.TORQUE, 1e3): "knm kn*m",
     (Quantity.TORQUE, 1e-3): "mnm mn*m",
     (Quantity.TORQUE, 1e-2): "ncm n*cm",
     (Quantity.TORQUE, FOOT_M * POUND_N): "lbft lbf*ft lb*ft ftlb ft*lb ft*lbf lb-ft ft-lb lbf-ft",
     (Quantity.FORCE, 1.0): "n newton",
     (Quantity.FORCE, 1e3): "kn",
-    (Quantity.SPEED, 1.0): "rad/s 1/s rad*s^-1",
-    (Quantity.SPEED, TURN / 60.0): "rpm 1/min r/min rev/min u/min min^-1 min-1 turns/min",
+    (Quantity.SPEED, 1.0): "rad/s rad/sec 1/s rad*s^-1 radians/s radians/second",
+    (Quantity.SPEED, TURN / 60.0): "rpm 1/min r/min rev/min u/min upm min^-1 min-1 turns/min revolutions/minute",
     (Quantity.SPEED, TURN): "rps rev/s r/s u/s turns/s",
-    (Quantity.SPEED, math.pi / 180.0): "deg/s °/s",
+    (Quantity.SPEED, math.pi / 180.0): "deg/s deg/sec °/s °/sec",
     (Quantity.VELOCITY, 1.0): "m/s",
     (Quantity.VELOCITY, 1.0 / 3.6): "km/h kmh kph",
     (Quantity.VELOCITY, 0.44704): "mph mi/h",
@@ -74,7 +75,7 @@ _SPELLED: Final[Mapping[tuple[Quantity, float], str]] = {
     (Quantity.LENGTH, 1.0): "m",
     (Quantity.LENGTH, 1e-3): "mm",
     (Quantity.ACCELERATION, 1.0): "rad/s^2 rad/s2 m/s^2 m/s2",
-    (Quantity.SHARE, 1e-2): "% percent prozent",
+    (Quantity.SHARE, 1e-2): "% pct percent prozent",
     (Quantity.SHARE, 1e-3): "‰ permille permil promille o/oo 0/00",
     (Quantity.OTHER, 1.0): "- 1 v mv a ma w kw kwh ah ohm °c degc c k hz khz bar pa kpa g kg l bit enum count",
 }
@@ -82,27 +83,82 @@ _UNITS: Final[Mapping[str, Unit]] = MappingProxyType(
     {spelling: Unit(*meaning) for meaning, spellings in _SPELLED.items() for spelling in spellings.split()}
 )
 
+_SUPERSCRIPTS: Final = str.maketrans("\u2070\u00b9\u00b2\u00b3\u207b", "0123-")
+
+_SUFFIXES: Final[Mapping[str, str]] = {
+    "rpm": "rpm",
+    "1_min": "1/min",
+    "rad_s": "rad/s",
+    "radps": "rad/s",
+    "rad_per_s": "rad/s",
+    "deg_s": "deg/s",
+    "nm": "Nm",
+    "knm": "kNm",
+    "deg": "deg",
+    "rad": "rad",
+    "kmh": "km/h",
+    "km_h": "km/h",
+    "m_s": "m/s",
+    "ms": "ms",
+    "us": "us",
+    "ns": "ns",
+    "pct": "%",
+    "percent": "%",
+    "permille": "permille",
+}
+"""What a name may end in behind an underscore or a blank, and the unit that it is."""
+
+_AFTER_WORD: Final = re.compile(r"(?:\sin|\s*[/;])\s+(\S+(?:\s\S+)?)$")
+"""``n in 1/min``, and ``n / min⁻¹`` as ISO 80000 has it."""
+
 _IN_BRACKETS: Final = re.compile(r"\s*(?:\[([^\[\]]*)\]|\(([^()]*)\))\s*$")
 _NAMED_AT_THE_END: Final = re.compile(r"\s*(?:\[[^\[\]]*[\]\)]|\([^()]*\))\s*$")
 
 
 def unit_of(text: str) -> Unit | None:
     """Return what a unit means, however it is spelled; None where it is none that is known here."""
-    plain = text.strip().strip("[]()").strip().lower().replace("\u03bc", "\u00b5").replace("²", "^2")
+    plain = text.strip().strip("[]()").strip().lower().replace("\u03bc", "\u00b5")
+    plain = re.sub(r"[\u2070\u00b9\u00b2\u00b3\u207b]+", lambda found: "^" + found[0].translate(_SUPERSCRIPTS), plain)
     plain = re.sub(r"\s*[·⋅*.]\s*|(?<=[a-z])\s+(?=[a-z])", "*", plain)
     return _UNITS.get(plain) or _UNITS.get(plain.replace(" ", "").replace("*", ""))
 
 
 def unit_in(name: str) -> str:
-    """Return the unit that a column's name ends in, such as ``Drehzahl [1/min]``; empty where it has none known."""
+    """Return the unit that a column's name ends in: ``Drehzahl [1/min]``, ``n_rpm``, ``n / min⁻¹``; else nothing."""
+    return _unit_at_the_end(name) or _unit_at_the_end(called(name))
+
+
+def _unit_at_the_end(name: str) -> str:
     found = _IN_BRACKETS.search(name)
     text = "" if found is None else (found[1] or found[2] or "").strip()
-    return text if unit_of(text) else ""
+    if unit_of(text):
+        return text
+    lower = name.lower()
+    for suffix, unit in _SUFFIXES.items():
+        if lower.endswith((f"_{suffix}", f" {suffix}")):
+            return unit
+    after = _AFTER_WORD.search(name)
+    return after[1] if after is not None and unit_of(after[1]) else ""
 
 
 def without_unit(name: str) -> str:
     """Return a column's name without the unit that it ends in."""
-    return _NAMED_AT_THE_END.sub("", name) or name
+    bare = _NAMED_AT_THE_END.sub("", name)
+    after = _AFTER_WORD.search(bare)
+    if after is not None and unit_of(after[1]):
+        bare = bare[: after.start()]
+    return bare or name
+
+
+WITHOUT_MEANING: Final = re.compile(r"(values?|data|signals?|samples?|y)(\(.*\))?|\d+", re.IGNORECASE)
+"""Parts of a path that say nothing of what a channel is."""
+
+
+def called(path: str) -> str:
+    """Return the part of a channel's path that tells what it is."""
+    parts = [part.strip() for part in re.split(r"[./]", path) if part.strip()]
+    telling = [part for part in parts if not WITHOUT_MEANING.fullmatch(part)]
+    return (telling or parts or [path])[-1]
 
 
 class Role(Enum):

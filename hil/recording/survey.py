@@ -10,8 +10,9 @@ from typing import Any, Final
 
 import numpy as np
 
+from hil.recording.channels import are_row_numbers, is_even_time, time_quantity
 from hil.recording.resample import GAP, straightened
-from hil.recording.scales import EXPECTED, Quantity, Role, unit_of, without_unit, wrapped_at
+from hil.recording.scales import EXPECTED, Quantity, Role, called, unit_of, without_unit, wrapped_at
 from hil.recording.table import LARGEST, Column, Kind, Table
 from hil.recording.text_form import MISSING
 
@@ -166,11 +167,10 @@ def _time_rank(table: Table, channel: Channel) -> int:
     column = table.columns[channel.name]
     if not bool((np.diff(column.astype(np.float64)) >= 0.0).all()):
         return 0
-    name = channel.name.lower().rpartition(".")[2].rpartition("/")[2]
-    unit = unit_of(channel.unit)
+    name = channel.name.lower().rpartition(".")[2].rpartition("/")[2].strip("_ ")
     is_named = name in TIME_NAMES or name.startswith(("time", "zeit"))
-    is_unit = unit is not None and unit.quantity is Quantity.TIME
-    return 2 * is_named + is_unit
+    is_rising = is_even_time(column) and unit_of(channel.unit) is None
+    return 4 * (is_named and not are_row_numbers(column)) + 2 * time_quantity(channel.unit) + is_rising
 
 
 def rounded(period_s: float) -> float:
@@ -238,8 +238,8 @@ def guesses(channel: Channel) -> list[Guess]:
     """Return what a channel could be; nothing where it stands still or was asked for."""
     if channel.kind != "number" or not channel.moves:
         return []
-    bare = without_unit(channel.name)
-    last = re.sub(r"\(.*\)$", "", re.split(r"[./]", bare)[-1].strip()) or bare
+    bare = called(without_unit(channel.name))
+    last = re.sub(r"\(.*\)$", "", bare) or bare
     if NOT_MEASURED.search(last):
         return []
     unit = unit_of(channel.unit) if channel.unit else None

@@ -187,7 +187,7 @@ class _Cut:
     def names_all(self, line: _Line, width: int) -> bool:
         """Tell whether a line has a text for every column, but for what may follow a delimiter at the end."""
         if len(line.cells) == width:
-            return all(line.cells[:-1])
+            return all(line.cells[1:-1]) and any(line.cells)  # an index has no name where pandas writes one
         if len(line.cells) == width + 1:
             return all(line.cells[:-1]) and not line.cells[-1]
         rows = [other for other in self.lines if other.is_data and len(other.cells) == width]
@@ -249,7 +249,8 @@ def _formed(cut: _Cut, lines: Sequence[str], hints: FormatHints, comment: str, s
     if names and not names[-1] and (trailing or len(names) == width + 1):
         names.pop()
     called, repeated = _numbered(names or [str(number) for number in range(1, width - trailing + 1)])
-    units_at = hints.units_line if hints.units_line is not None else _units_line(between, first)
+    above = [line for line in cut.lines if line.number < at and len(line.cells) == width and _are_all_units(line)]
+    units_at = hints.units_line if hints.units_line is not None else _units_line([*above[-1:], *between], first)
     return TextForm(
         names=tuple(called),
         delimiter=cut.delimiter,
@@ -283,8 +284,9 @@ def _header(cut: _Cut, width: int, hints: FormatHints) -> _Line | None:
     if not cut.lines or (_is_row(cut.lines[0], cut, width) and not cut.lines[0].has(CellKind.TEXT)):
         return None
     strict, loose = None, None
-    for line in cut.lines:
-        if line.is_data or not cut.names_all(line, width):
+    for line, after in zip(cut.lines, [*cut.lines[1:], None], strict=True):
+        is_named = not line.is_data or (after is not None and _are_all_units(after) and line.has(CellKind.TEXT))
+        if not is_named or not cut.names_all(line, width) or _is_above_the_names(line, after, width):
             continue
         behind = _without_preamble([other for other in cut.lines if other.number > line.number])
         if not behind or len(behind[0].cells) != width:
@@ -328,6 +330,17 @@ def _are_units(line: _Line) -> bool:
     return not line.is_data and any(unit_of(cell) is not None for cell in line.cells if cell not in ("", "-"))
 
 
+def _are_all_units(line: _Line) -> bool:
+    return not line.is_data and bool(line.cells) and all(unit_of(cell) is not None for cell in line.cells)
+
+
+def _is_above_the_names(line: _Line, after: _Line | None, width: int) -> bool:
+    """Tell whether a line holds the units of the names that stand in the next."""
+    if after is None or after.is_data or len(after.cells) != width or not all(after.cells):
+        return False
+    return _are_all_units(line) and not _are_all_units(after)
+
+
 def _are_types(line: _Line) -> bool:
     return all(cell.lower() in TYPE_WORDS for cell in line.cells if cell) and any(line.cells)
 
@@ -363,7 +376,7 @@ def _numbered(names: list[str]) -> tuple[list[str], list[str]]:
 
 
 def _units(names: list[str], written: list[str], cells: list[str]) -> dict[str, str]:
-    """Return the unit of each column: of the line of units, else the one that its name, as written, ends in."""
+    """Return the unit of each column: of the line of units; of a numbered name the one that it ends in as written."""
     listed = {name: cell.strip("[]() ") for name, cell in zip(names, cells, strict=False) if cell.strip("[]() ")}
-    named = dict(zip(names, map(unit_in, written), strict=False))
+    named = {name: unit_in(text) for name, text in zip(names, written, strict=False) if name != text}
     return {name: unit for name in names if (unit := listed.get(name) or named.get(name, ""))}

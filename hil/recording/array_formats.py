@@ -1,0 +1,80 @@
+"""Files of NumPy and of spreadsheets: .npz, .npy, .xlsx. Nothing in them is run: no pickled objects, no formulas."""
+
+from __future__ import annotations
+
+import csv
+import io
+from datetime import date, datetime, time
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from hil.errors import RecordingError
+from hil.recording.bounds import damaged, require_cells
+from hil.recording.channels import column_of
+from hil.recording.csv_format import table_of_text
+from hil.recording.measurement_formats import library
+from hil.recording.request import Request, under_names, vectors_of
+from hil.recording.table import Table, columns_of_shared_length, is_column
+
+MOMENTS: Final = "mM"
+
+
+def read_numpy(path: Path, request: Request) -> Table:
+    """Read arrays: vectors by their names, columns of matrices by address, fields of structured arrays."""
+    try:
+        with path.open("rb") as file:
+            loaded: Any = np.load(file, allow_pickle=False)
+            arrays = {path.stem: loaded} if isinstance(loaded, np.ndarray) else dict(loaded)
+    except Exception as error:  # zipfile and NumPy raise anything on a damaged file
+        raise damaged(path, "arrays of numbers, as numpy.save and numpy.savez write them", error) from error
+    require_cells(path, sum(array.size for array in arrays.values()))
+    fields = {
+        name if len(arrays) == 1 else f"{key}.{name}": array[name]
+        for key, array in arrays.items()
+        for name in array.dtype.names or ()
+    }
+    plain = {key: array for key, array in arrays.items() if array.dtype.names is None}
+    vectors = {
+        name: column_of(values)
+        for key, array in {**fields, **plain}.items()
+        for name, values in (vectors_of(key, array) if array.dtype.kind not in MOMENTS else [(key, array.ravel())])
+        if values.dtype.kind in MOMENTS or is_column(values)
+    }
+    chosen, left_out = columns_of_shared_length(under_names(vectors, request.names), request.names)
+    return Table(path, chosen, remarks=left_out)
+
+
+def read_xlsx(path: Path, request: Request) -> Table:
+    """Read the sheet with the most rows of a workbook, as if it had been saved as CSV."""
+    openpyxl = library(path, "openpyxl", "openpyxl")
+    try:
+        book = openpyxl.load_workbook(path, read_only=True, data_only=True)
+        sheets = {sheet.title: _text_of(path, sheet) for sheet in book.worksheets}
+        book.close()
+    except RecordingError:
+        raise
+    except Exception as error:  # the library raises anything on a damaged file
+        raise damaged(path, "a whole workbook", error) from error
+    name, text = max(sheets.items(), key=lambda sheet: sheet[1].count("\n"))
+    hints = request.form.model_copy(update={"delimiter": ",", "decimal": "."})
+    return table_of_text(path, text, hints, remark=f"sheet {name}" if len(sheets) > 1 else "")
+
+
+def _text_of(path: Path, sheet: Any) -> str:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    cells = 0
+    for row in sheet.iter_rows(values_only=True):
+        cells += len(row)
+        require_cells(path, cells)
+        if any(cell is not None for cell in row):
+            writer.writerow([_cell(cell) for cell in row])
+    return text.getvalue().rstrip("\n")
+
+
+def _cell(cell: object) -> str:
+    if isinstance(cell, datetime | date | time):
+        return str(cell)
+    return "" if cell is None else repr(cell) if isinstance(cell, float) else str(cell)

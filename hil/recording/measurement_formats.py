@@ -1,0 +1,290 @@
+"""Files of measurement programs whose channels have times of their own: TDMS (NI), MCAP (robotics), logs of a CAN bus.
+
+What a file holds becomes groups of channels that share a time; from there on they are read as the groups of an MDF file
+are (`hil.recording.mdf_foreign`): the recording is made of those asked for, others are named, `resample_s` brings all
+to one period. The libraries of TDMS and MCAP are extras: ``pip install hil-driveline[formats]``.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from importlib import import_module
+from itertools import chain
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from hil.errors import RecordingError
+from hil.recording.bounds import damaged, require_cells
+from hil.recording.mdf_foreign import database_of, foreign_table, foreign_tables
+from hil.recording.request import Request
+from hil.recording.table import Column, Table, as_column, is_column
+
+NS: Final = 1e-9
+
+MOST_ODD_LINES: Final = 0.01
+"""Share of the lines of a log that may be none of its form, skipped and counted; beyond, the log is damaged."""
+
+
+@dataclass(slots=True)
+class Group:
+    """Channels that share a time [s]; shapes (n,)."""
+
+    time_s: Column
+    channels: dict[str, Column] = field(default_factory=dict)
+    units: dict[str, str] = field(default_factory=dict)
+
+
+def _table(path: Path, groups: Iterable[Group], request: Request, remarks: Iterable[str] = ()) -> Table:
+    table = foreign_table(path, _as_mdf(groups), replace(request, dbc=None))
+    return replace(table, remarks=(*remarks, *table.remarks), metadata={})
+
+
+def _tables(path: Path, groups: Iterable[Group], request: Request, remarks: Iterable[str] = ()) -> list[Table]:
+    tables = foreign_tables(path, _as_mdf(groups), replace(request, dbc=None))
+    return [replace(table, remarks=(*remarks, *table.remarks)) for table in tables]
+
+
+def _as_mdf(groups: Iterable[Group]) -> Any:
+    from asammdf import MDF, Signal
+
+    mdf = MDF()
+    for group in groups:
+        signals = [
+            Signal(values, group.time_s, name=name, unit=group.units.get(name, ""))
+            for name, values in group.channels.items()
+        ]
+        if signals:
+            mdf.append(signals)
+    return mdf
+
+
+def library(path: Path, module: str, package: str) -> Any:
+    """Import the library of a format, or say how to get it."""
+    try:
+        return import_module(module)
+    except ImportError:
+        raise RecordingError(
+            path,
+            f"expected the library {package}, which reads {path.suffix} files, got none. Install it: "
+            f"pip install 'hil-driveline[formats]'; or save the recording as Parquet or CSV.",
+        ) from None
+
+
+# --- TDMS
+
+
+def read_tdms(path: Path, request: Request) -> Table:
+    """Read a TDMS file of LabVIEW or DIAdem."""
+    return _table(path, _tdms(path), request)
+
+
+def read_tdms_tables(path: Path, request: Request) -> list[Table]:
+    """Read a TDMS file, a table for each time."""
+    return _tables(path, _tdms(path), request)
+
+
+def _tdms(path: Path) -> list[Group]:
+    nptdms = library(path, "nptdms", "npTDMS")
+    groups: dict[bytes, Group] = {}
+    try:
+        with nptdms.TdmsFile.open(path) as file:
+            channels = [channel for group in file.groups() for channel in group.channels()]
+            require_cells(path, sum(len(channel) for channel in channels))
+            for channel in channels:
+                values = channel[:]
+                if not len(values) or not is_column(values):
+                    continue
+                time_s = _tdms_time(channel, len(values))
+                group = groups.setdefault(np.ascontiguousarray(time_s).tobytes(), Group(time_s))
+                group.channels[str(channel.name)] = as_column(values)
+                group.units[str(channel.name)] = str(channel.properties.get("unit_string", ""))
+    except RecordingError:
+        raise
+    except Exception as error:  # the library raises anything on a damaged file
+        raise damaged(path, "a whole TDMS file", error) from error
+    return list(groups.values())
+
+
+def _tdms_time(channel: Any, n: int) -> Column:
+    """Return the times of a channel: of its waveform's properties, else the numbers of its values."""
+    step_s = float(channel.properties.get("wf_increment", 0.0)) or 1.0
+    return float(channel.properties.get("wf_start_offset", 0.0)) + step_s * np.arange(n)
+
+
+# --- MCAP
+
+
+def read_mcap(path: Path, request: Request) -> Table:
+    """Read an MCAP file whose messages are JSON."""
+    return _table(path, _mcap(path), request)
+
+
+def read_mcap_tables(path: Path, request: Request) -> list[Table]:
+    """Read an MCAP file, a table for each topic."""
+    return _tables(path, _mcap(path), request)
+
+
+def _mcap(path: Path) -> list[Group]:
+    reader = library(path, "mcap.reader", "mcap")
+    rows: dict[str, list[tuple[int, dict[str, float]]]] = {}
+    others: set[str] = set()
+    try:
+        with path.open("rb") as file:
+            for _, channel, message in reader.make_reader(file).iter_messages():
+                if channel.message_encoding != "json":
+                    others.add(f"{channel.topic} ({channel.message_encoding})")
+                    continue
+                topic = str(channel.topic).strip("/").replace("/", ".")
+                rows.setdefault(topic, []).append((message.log_time, dict(_leaves("", json.loads(message.data)))))
+    except Exception as error:  # the library raises anything on a damaged file
+        raise damaged(path, "a whole MCAP file", error) from error
+    if not rows and others:
+        raise RecordingError(
+            path, f"expected messages in JSON, got {', '.join(sorted(others))}. Export the topic as CSV or Parquet."
+        )
+    return [_topic(topic, messages, len(rows) > 1) for topic, messages in rows.items()]
+
+
+def _leaves(name: str, value: Any) -> Iterator[tuple[str, float]]:
+    """Yield the numbers of a message with their place in it."""
+    if isinstance(value, Mapping):
+        yield from chain.from_iterable(_leaves(f"{name}.{key}".strip("."), each) for key, each in value.items())
+    elif isinstance(value, int | float):
+        yield name, float(value)
+
+
+def _topic(topic: str, messages: list[tuple[int, dict[str, float]]], is_one_of_several: bool) -> Group:
+    start = messages[0][0]
+    names = dict.fromkeys(chain.from_iterable(values for _, values in messages))
+    group = Group(np.array([(stamp - start) * NS for stamp, _ in messages]))
+    for name in names:
+        called = f"{topic}.{name}" if is_one_of_several else name
+        group.channels[called] = np.array([values.get(name, np.nan) for _, values in messages])
+    return group
+
+
+# --- logs of a CAN bus
+
+
+def read_bus_log(path: Path, request: Request) -> Table:
+    """Read the frames of a bus as a logger keeps them (BLF, ASC, candump, TRC), as the signals of a DBC file."""
+    groups, remarks = _bus_log(path, request)
+    return _table(path, groups, request, remarks)
+
+
+def read_bus_log_tables(path: Path, request: Request) -> list[Table]:
+    """Read the frames of a bus, a table for each message."""
+    groups, remarks = _bus_log(path, request)
+    return _tables(path, groups, request, remarks)
+
+
+def _bus_log(path: Path, request: Request) -> tuple[list[Group], list[str]]:
+    if request.dbc is None:
+        raise RecordingError(
+            path, "expected signals, got the frames of a bus as they were logged. Say what they mean: --dbc FILE"
+        )
+    known = {message.frame_id: message for message in database_of(path, request.dbc).messages}
+    rows: dict[int, list[tuple[float, bytes]]] = {}
+    log = _Log(path)
+    for frame in log:
+        if not frame.is_error_frame and not frame.is_remote_frame and frame.arbitration_id in known:
+            rows.setdefault(frame.arbitration_id, []).append((frame.timestamp, bytes(frame.data)))
+    if not rows:
+        raise RecordingError(
+            path,
+            f"--dbc {request.dbc}: expected a description of the frames in this file, got none of its "
+            f"{log.frames} frames described. Is it of another bus?",
+        )
+    start = min(frames[0][0] for frames in rows.values())
+    groups = [_message(known[number], frames, start) for number, frames in rows.items()]
+    odd = [f"{log.odd} lines skipped that are no frames"] if log.odd else []
+    return groups, odd
+
+
+def _message(message: Any, frames: list[tuple[float, bytes]], start: float) -> Group:
+    """Decode the frames of one message; a frame that is too short has no values."""
+    decoded = []
+    for _, data in frames:
+        try:
+            decoded.append(message.decode(data, decode_choices=False, allow_truncated=True))
+        except (ValueError, KeyError):
+            decoded.append({})
+    group = Group(np.array([stamp - start for stamp, _ in frames]))
+    for signal in message.signals:
+        group.channels[signal.name] = np.array([float(values.get(signal.name, np.nan)) for values in decoded])
+        group.units[signal.name] = str(signal.unit or "")
+    return group
+
+
+class _Log:
+    """The frames of a log by python-can; lines of a text log that it can't read are skipped and counted."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.frames = self.odd = 0
+
+    def __iter__(self) -> Iterator[Any]:
+        import can
+
+        if self.path.suffix.lower() == ".blf":
+            yield from self._counted(can.BLFReader(self.path))
+            return
+        readers = {".asc": can.ASCReader, ".log": can.CanutilsLogReader, ".trc": can.TRCReader}
+        lines = self.path.read_text("utf-8", errors="replace").splitlines(keepends=True)
+        head = [line for line in lines[:HEAD_LINES] if _is_head(line)]
+        while lines:
+            source = _Lines(lines)
+            try:
+                yield from self._counted(readers[self.path.suffix.lower()](source))
+                lines = []
+            except (ValueError, IndexError, KeyError, NotImplementedError, AttributeError, AssertionError) as error:
+                self.odd += 1
+                if source.read_lines == 0 or self.odd > MOST_ODD_LINES * (self.frames + self.odd) + FEW_ODD_LINES:
+                    raise damaged(self.path, "a whole log of a bus", error) from error
+                rest = lines[source.read_lines :]
+                lines = [*head, *rest] if rest else []
+
+    def _counted(self, frames: Iterable[Any]) -> Iterator[Any]:
+        try:
+            for frame in frames:
+                self.frames += 1
+                yield frame
+        except Exception as error:
+            if self.path.suffix.lower() == ".blf":
+                raise damaged(self.path, "a whole log of a bus", error) from error
+            raise
+
+
+HEAD_LINES: Final = 40
+"""Lines among which a log says in which form it is."""
+
+FEW_ODD_LINES: Final = 3
+"""Lines that may be odd in a log of any length: its beginning is often cut."""
+
+
+def _is_head(line: str) -> bool:
+    return line.startswith((";", "date", "base", "internal", "//"))
+
+
+class _Lines(io.StringIO):  # typeshed has its lines as bytes
+    """Lines of a text that count how many were read."""
+
+    def __init__(self, lines: list[str]) -> None:
+        super().__init__("".join(lines))
+        self.read_lines = 0
+
+    def readline(self, size: int | None = -1, /) -> str:  # type: ignore[override]
+        line = super().readline(-1 if size is None else size)
+        self.read_lines += bool(line)
+        return line
+
+    def __next__(self) -> str:  # type: ignore[override]
+        line = self.readline()
+        if not line:
+            raise StopIteration
+        return line
