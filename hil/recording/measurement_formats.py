@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from importlib import import_module
@@ -237,17 +238,20 @@ class _Log:
         readers = {".asc": can.ASCReader, ".log": can.CanutilsLogReader, ".trc": can.TRCReader}
         lines = self.path.read_text("utf-8", errors="replace").splitlines(keepends=True)
         head = [line for line in lines[:HEAD_LINES] if _is_head(line)]
+        events = sum(EVENT.match(line) is not None for line in lines)
+        faults = 0
         while lines:
             source = _Lines(lines)
             try:
                 yield from self._counted(readers[self.path.suffix.lower()](source))
                 lines = []
             except (ValueError, IndexError, KeyError, NotImplementedError, AttributeError, AssertionError) as error:
-                self.odd += 1
-                if source.read_lines == 0 or self.odd > MOST_ODD_LINES * (self.frames + self.odd) + FEW_ODD_LINES:
+                faults += 1
+                if source.read_lines == 0 or faults > MOST_ODD_LINES * events + FEW_ODD_LINES:
                     raise damaged(self.path, "a whole log of a bus", error) from error
                 rest = lines[source.read_lines :]
                 lines = [*head, *rest] if rest else []
+        self.odd = events - self.frames  # python-can leaves some out without a word
 
     def _counted(self, frames: Iterable[Any]) -> Iterator[Any]:
         try:
@@ -259,6 +263,9 @@ class _Log:
                 raise damaged(self.path, "a whole log of a bus", error) from error
             raise
 
+
+EVENT: Final = re.compile(r"\s*\(?\d")
+"""What a line of a text log begins with that is a frame, or should be one."""
 
 HEAD_LINES: Final = 40
 """Lines among which a log says in which form it is."""

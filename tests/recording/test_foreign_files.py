@@ -13,7 +13,10 @@ import pytest
 import scipy.io
 
 from estimator.signals.record import Record
+from hil.errors import RecordingError
+from hil.recording import read_table
 from hil.recording.look import look
+from hil.recording.request import Request
 from hil.recording.signals import read_record
 from hil.recording.signals_config import SignalsConfig
 from tests.recording import foreign_files as made
@@ -55,3 +58,60 @@ def test_a_file_without_a_time_gets_no_period_that_was_not_measured(tmp_path: Pa
 @pytest.mark.parametrize("suffix", made.BUS_LOGS)
 def test_a_log_of_a_bus_is_read_with_a_dbc(suffix: str, tmp_path: Path) -> None:
     _is_as_made(_read(made.BUS_LOGS[suffix](tmp_path), made.dbc_of(tmp_path)), 2e-2)
+
+
+@pytest.mark.parametrize("suffix", [".log", ".asc", ".trc"])
+def test_odd_lines_of_a_bus_log_are_skipped_and_counted(suffix: str, tmp_path: Path) -> None:
+    path = made.BUS_LOGS[suffix](tmp_path)
+    lines = path.read_text().splitlines(keepends=True)
+    for number in (300, 600, 900):
+        lines.insert(number, "   17)  1.2.3 DT what is this\n")
+    path.write_text("".join(lines))
+    told: list[str] = []
+    table = tomllib.loads("\n".join(look(path, made.dbc_of(tmp_path)).signals))["signals"]
+    record = read_record(path, SignalsConfig.model_validate(table), dbc=tmp_path / "drive.dbc", tell=told.append)
+    _is_as_made(record, 2e-2)
+    assert any("3 lines skipped" in line for line in told)
+
+
+def test_a_log_that_is_mostly_odd_is_damaged(tmp_path: Path) -> None:
+    path = tmp_path / "a.log"
+    path.write_text("(0.1) can0 181#00\n" + "(0.1 can0 what\n" * 50)
+    with pytest.raises(RecordingError, match="expected a whole log of a bus"):
+        look(path, made.dbc_of(tmp_path))
+
+
+@pytest.mark.parametrize(
+    ("dbc", "said"),
+    [
+        (made.DBC.replace("BO_ 385", "BO_ 386"), "none of its 1000 frames described"),
+        (made.DBC.replace("16|16@1-", "8|16@1-"), "overlapping"),
+        ("nothing", "expected a DBC file"),
+    ],
+)
+def test_a_dbc_that_does_not_describe_the_log_is_named(dbc: str, said: str, tmp_path: Path) -> None:
+    path = made.BUS_LOGS[".log"](tmp_path)
+    (tmp_path / "other.dbc").write_text(dbc)
+    with pytest.raises(RecordingError, match=said):
+        look(path, tmp_path / "other.dbc")
+
+
+def test_a_log_without_a_dbc_asks_for_it(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match="--dbc FILE"):
+        look(made.BUS_LOGS[".trc"](tmp_path))
+
+
+@pytest.mark.parametrize("suffix", [".npz", ".npy", ".xlsx", ".feather", ".jsonl", ".tdms", ".mcap", ".blf", ".h5"])
+@pytest.mark.parametrize("content", [b"", b"\x00" * 100, b"PK\x03\x04 no archive", bytes(range(256)) * 8])
+def test_what_is_no_such_file_is_refused(suffix: str, content: bytes, tmp_path: Path) -> None:
+    path = tmp_path / f"a{suffix}"
+    path.write_bytes(content)
+    with pytest.raises(RecordingError, match=r"expected"):
+        read_table(path, Request(dbc=made.dbc_of(tmp_path)))
+
+
+def test_an_array_of_pickled_objects_is_refused_and_not_run(tmp_path: Path) -> None:
+    path = tmp_path / "a.npy"
+    np.save(path, np.array([{"run": print}], dtype=object), allow_pickle=True)
+    with pytest.raises(RecordingError, match="arrays of numbers"):
+        read_table(path)
