@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from estimator.signals.time_stamps import uniform_period_s
 from hil.errors import RecordingError
 from hil.recording.bounds import require_cells
+from hil.recording.channels import are_row_numbers
 from hil.recording.scales import Role, scale_of
 from hil.recording.signals_config import TimeSignal
 from hil.recording.table import FloatArray, Table
@@ -54,6 +55,12 @@ def time_base(table: Table, signal: TimeSignal) -> tuple[FloatArray, float, tupl
         return np.arange(table.n_rows, dtype=np.float64) * signal.sample_time_s, signal.sample_time_s, ()
     column = str(signal.column)
     time = table.numeric([column])[column]
+    if signal.given_scale is None and not table.units.get(column) and are_row_numbers(time):
+        raise RecordingError(
+            table.path,
+            f"column {column}: expected the time of each row, got the numbers of the rows. Write the true period: "
+            "time = { sample_time_s = ... }; or, where rows are seconds, scale = 1.0.",
+        )
     time *= scale_of(table, column, Role.TIME, signal.given_scale)
     straight = straightened(time)
     if straight is not None:

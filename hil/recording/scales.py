@@ -108,6 +108,8 @@ _SUFFIXES: Final[Mapping[str, str]] = {
 }
 """What a name may end in behind an underscore or a blank, and the unit that it is."""
 
+_TIME_IN_S: Final = re.compile(r"(t|time|zeit)(_\w+)?_s")
+
 _AFTER_WORD: Final = re.compile(r"(?:\sin|\s*[/;])\s+(\S+(?:\s\S+)?)$")
 """``n in 1/min``, and ``n / min⁻¹`` as ISO 80000 has it."""
 
@@ -134,6 +136,8 @@ def _unit_at_the_end(name: str) -> str:
     if unit_of(text):
         return text
     lower = name.lower()
+    if _TIME_IN_S.fullmatch(lower):
+        return "s"
     for suffix, unit in _SUFFIXES.items():
         if lower.endswith((f"_{suffix}", f" {suffix}")):
             return unit

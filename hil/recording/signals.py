@@ -22,6 +22,7 @@ from estimator.signals.record import Channel, OutputKind, Record
 from hil.errors import RecordingError
 from hil.recording import columns
 from hil.recording.formats import read_table
+from hil.recording.plausible import doubts, require_plausible_torques
 from hil.recording.resample import Series, resampled, time_base
 from hil.recording.scales import Role, scale_of, with_sign, wrapped_at
 from hil.recording.signals_config import (
@@ -103,8 +104,11 @@ def to_record(table: Table, signals: SignalsConfig, tell: Tell | None = None) ->
     signed: list[TorqueSignal | LoadSignal | OutputSignal] = [*signals.inputs(), output, *further]
     for signal in signed:
         numbers[signal.column] = _signed(table, signal, numbers[signal.column])
+    names = [torque.column for torque in torques]
+    require_plausible_torques(table, names, numbers)
     if tell is not None:
-        for line in (*table.recognised, *remark, *_units_used(table, signals)):
+        doubtful = doubts(names, output.column, numbers)
+        for line in (*table.recognised, *remark, *_units_used(table, signals), *doubtful):
             tell(f"{table.path}: {line}")
     masks = {mask: _inside(numbers[mask.column], mask) for mask in signals.mask}
     flagged = _flagged(table, signals)

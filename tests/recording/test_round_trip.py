@@ -57,7 +57,7 @@ def test_through_every_format_in_any_order_nothing_is_lost(table: Table, order: 
             assert dict(read_metadata(path)) == dict(now.metadata)
         assert losses(table, now) == []
         assert set(now.metadata) <= {*table.metadata, *CHECKSUMS, "schema"}
-        assert dict(now.units) == dict(table.units)
+        assert dict(table.units).items() <= dict(now.units).items()  # a name may tell a unit, too
 
 
 @pytest.fixture

@@ -329,3 +329,59 @@ def test_a_scale_that_leaves_no_numbers_is_refused(tmp_path: Path, changed: Call
     write_table(changed(torque_m1_nm=np.full(40, 100.0)), path)
     with pytest.raises(RecordingError, match="column torque_m1_nm: expected a signal in SI units"):
         read_record(path, signals(torque=[{"column": "torque_m1_nm", "scale": 1e308}]))
+
+
+def _drive(path: Path, **changed: np.ndarray) -> Path:
+    n = 400
+    t = 0.01 * np.arange(n)
+    torque = np.where(np.sin(7.0 * t) > 0.0, 40.0, -20.0)
+    columns = {"t": t, "T1": torque, "T2": torque + 0.1 * np.sin(t), "n": 50.0 + np.sin(t) + t, **changed}
+    rows = zip(*columns.values(), strict=True)
+    path.write_text(",".join(columns) + "\n" + "".join(",".join(map(repr, map(float, row))) + "\n" for row in rows))
+    return path
+
+
+_BY_NAME = {"time": {"column": "t"}, "torque": [{"column": "T1"}, {"column": "T2"}], "speed": {"column": "n"}}
+
+
+def _told(path: Path, signals: dict[str, object] = _BY_NAME) -> list[str]:
+    lines: list[str] = []
+    read_record(path, SignalsConfig.model_validate(signals), tell=lines.append)
+    return lines
+
+
+def test_good_channels_raise_no_doubt(tmp_path: Path) -> None:
+    assert not [line for line in _told(_drive(tmp_path / "a.csv")) if "row" in line]
+
+
+def test_a_dead_torque_is_told(tmp_path: Path) -> None:
+    lines = _told(_drive(tmp_path / "a.csv", T2=np.zeros(400)))
+    assert any("T2: 0 in every row" in line for line in lines)
+
+
+def test_a_clipped_reading_is_told(tmp_path: Path) -> None:
+    speed = np.minimum(50.0 + np.sin(0.01 * np.arange(400)) + 0.01 * np.arange(400), 52.0)
+    assert any("n: " in line and "clipped" in line for line in _told(_drive(tmp_path / "a.csv", n=speed)))
+
+
+@pytest.mark.parametrize(
+    ("changed", "signals", "said"),
+    [
+        ({}, {**_BY_NAME, "torque": [{"column": "T1"}, {"column": "T1"}]}, "got it twice"),
+        ({"t": np.arange(400.0)}, _BY_NAME, "got the numbers of the rows"),
+        ({"T2": -np.where(np.sin(0.07 * np.arange(400)) > 0.0, 40.0, -20.0)}, _BY_NAME, "scale = -1.0"),
+    ],
+    ids=["twice", "row numbers", "turned"],
+)
+def test_channels_that_can_not_be_what_they_are_named_are_refused(
+    changed: dict[str, np.ndarray], signals: dict[str, object], said: str, tmp_path: Path
+) -> None:
+    with pytest.raises(RecordingError, match=said):
+        _told(_drive(tmp_path / "a.csv", **changed), signals)
+
+
+def test_decimal_commas_in_a_file_of_commas_are_named(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("t,T1,n\n" + "".join(f"0,0{k},1,{k},5,{k}\n" for k in range(9)))
+    with pytest.raises(RecordingError, match="decimal commas"):
+        read_record(path)
