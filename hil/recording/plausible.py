@@ -30,8 +30,8 @@ def require_plausible_torques(table: Table, names: Sequence[str], values: Mappin
     if twice is not None:
         raise RecordingError(
             table.path,
-            f"column {twice}: expected every torque once, got it twice in [signals] torque: it would count double. Name "
-            "the other inverter's column, or leave one out and give scale = 2.",
+            f"column {twice}: expected every torque once, got it twice in [signals] torque: it would count double. "
+            "Name the other inverter's column, or leave one out and give scale = 2.",
         )
     spreads = [float(np.nanstd(values[name])) for name in names]
     if len(names) == 2 and min(spreads) > 0.0:
