@@ -93,7 +93,7 @@ def read_record(
 def to_record(table: Table, signals: SignalsConfig, tell: Tell | None = None) -> Record:
     """Pick the signals out of a table; see :func:`read_record`."""
     signals = signals.model_copy(update={"time": time_signal(table, signals.time)})
-    table = at_one_period(table, signals)
+    table, inside = _cut(at_one_period(table, signals), signals)
     torques = signals.torques()
     kind, output = signals.output()
     numbers = table.numeric([*([] if signals.time.column is None else [signals.time.column]), *signals.columns()])
@@ -119,7 +119,7 @@ def to_record(table: Table, signals: SignalsConfig, tell: Tell | None = None) ->
         measured = numbers[output.column] * scale
         channels = [_channel(table, each, numbers[each.column]) for each in further]
         load_nm, load_read = _load(table, signals, numbers)
-    counted = trusted.all(axis=1) & load_read & np.logical_and.reduce([~flagged, *masks.values()])
+    counted = trusted.all(axis=1) & load_read & np.logical_and.reduce([~flagged, inside, *masks.values()])
     okay = counted & np.isfinite(measured)
     _require_sizes(
         table, [*((torque.column, torque_nm[:, k]) for k, torque in enumerate(torques)), (output.column, measured)]
@@ -141,6 +141,25 @@ def to_record(table: Table, signals: SignalsConfig, tell: Tell | None = None) ->
         load_nm=load_nm,
         channels=tuple(channels),
     )
+
+
+def _cut(table: Table, signals: SignalsConfig) -> tuple[Table, NDArray[np.bool_]]:
+    """Return a table from the first to the last row of the stretches that are to be read, and which rows are in one."""
+    kept = signals.kept()
+    if not kept:
+        return table, np.ones(table.n_rows, dtype=np.bool_)
+    time_s, _, _ = time_base(table, signals.time)
+    inside = np.logical_or.reduce([(time_s >= start) & (time_s <= end) for start, end in kept])
+    if not inside.any():
+        raise RecordingError(
+            table.path,
+            f"expected rows in the stretch that [signals] names, got none: the recording is from {time_s[0]:g} to "
+            f"{time_s[-1]:g} s",
+        )
+    rows = slice(int(np.argmax(inside)), int(inside.size - np.argmax(inside[::-1])))
+    first_line = None if table.first_line is None else table.first_line + rows.start
+    columns = {name: column[rows] for name, column in table.columns.items()}
+    return replace(table, columns=columns, first_line=first_line), inside[rows]
 
 
 def _load(

@@ -5,6 +5,7 @@ A key left out means the contract's: ``time_s``, ``torque_m1_nm`` and ``torque_m
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Self
@@ -123,6 +124,10 @@ class SignalsConfig(_Strict):
         among them is the recording's output; the others are further ones.
     mask
         Rows that count only inside these ranges.
+    from_s, to_s
+        The stretch that is read [s], in the recording's own time; all before and behind it is cut off.
+    stretches
+        Several such stretches, as pairs; rows between them are missing samples.
     format
         How a text file is written, where that can't be recognised.
     resample_s
@@ -137,8 +142,28 @@ class SignalsConfig(_Strict):
     load: LoadSignal | None = None
     outputs: list[MeasuredOutput] = []
     mask: list[MaskRange] = []
+    from_s: float | None = None
+    to_s: float | None = None
+    stretches: list[Annotated[list[float], Field(min_length=2, max_length=2)]] = []
     format: FormatHints = FormatHints()
     resample_s: float | None = Field(default=None, gt=0)
+
+    @model_validator(mode="after")
+    def _stretches_are_stretches(self) -> Self:
+        if self.stretches and (self.from_s, self.to_s) != (None, None):
+            refuse([Fault("stretches", "either from_s and to_s, or stretches", "both")])
+        for number, (start_s, end_s) in enumerate(self.kept()):
+            if not start_s < end_s:
+                where = f"stretches.{number}" if self.stretches else "to_s"
+                refuse([Fault(where, f"an end after {start_s:g} s", end_s)])
+        return self
+
+    def kept(self) -> list[tuple[float, float]]:
+        """Return the stretches that are read [s]; none where all is."""
+        if (self.from_s, self.to_s) == (None, None):
+            return [(start_s, end_s) for start_s, end_s in self.stretches]
+        start_s = -math.inf if self.from_s is None else self.from_s
+        return [(start_s, math.inf if self.to_s is None else self.to_s)]
 
     @model_validator(mode="after")
     def _has_one_output(self) -> Self:

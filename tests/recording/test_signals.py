@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.io
+from pydantic import ValidationError
 
 from estimator.signals.record import Location, OutputKind
 from hil.errors import InputError, RecordingError, UsageError
@@ -385,3 +386,31 @@ def test_decimal_commas_in_a_file_of_commas_are_named(tmp_path: Path) -> None:
     path.write_text("t,T1,n\n" + "".join(f"0,0{k},1,{k},5,{k}\n" for k in range(9)))
     with pytest.raises(RecordingError, match="decimal commas"):
         read_record(path)
+
+
+@pytest.mark.parametrize(
+    ("keys", "times", "counted"),
+    [
+        ({"from_s": 1.0, "to_s": 2.0}, (1.0, 2.0), 101),
+        ({"from_s": 1.0}, (1.0, 3.99), 300),
+        ({"stretches": [[0.5, 1.0], [2.0, 3.0]]}, (0.5, 3.0), 51 + 101),
+    ],
+)
+def test_only_the_stretches_named_are_read(
+    keys: dict[str, object], times: tuple[float, float], counted: int, tmp_path: Path
+) -> None:
+    record = read_record(_drive(tmp_path / "a.csv"), SignalsConfig.model_validate({**_BY_NAME, **keys}))
+    assert (record.time_s[0], record.time_s[-1]) == pytest.approx(times)
+    assert int(record.okay.sum()) == counted
+
+
+def test_a_stretch_outside_the_recording_is_refused(tmp_path: Path) -> None:
+    signals = SignalsConfig.model_validate({**_BY_NAME, "from_s": 90.0})
+    with pytest.raises(RecordingError, match=r"the recording is from 0 to 3\.99 s"):
+        read_record(_drive(tmp_path / "a.csv"), signals)
+
+
+@pytest.mark.parametrize("keys", [{"from_s": 2.0, "to_s": 1.0}, {"from_s": 1.0, "stretches": [[0.0, 1.0]]}])
+def test_stretches_that_are_none_are_refused(keys: dict[str, object]) -> None:
+    with pytest.raises(ValidationError):
+        SignalsConfig.model_validate({**_BY_NAME, **keys})
