@@ -1,4 +1,4 @@
-"""Channels as all formats hand them over: units told by names, and times in whatever form people write them.
+"""Channels as all formats hand them over: units that names give, and times in whatever form people write them.
 
 A reader returns what its file holds. What a column means beyond that is understood here, once for every format: the
 unit in a name (``n [1/min]``, ``n_rpm``), dates, times of day and durations as seconds since the first, day numbers of
@@ -204,7 +204,7 @@ def _matched(form: re.Pattern[str], text: str) -> re.Match[str]:
 
 
 def _over_midnight(seconds: FloatArray) -> FloatArray:
-    """Return times of day as times that go on after midnight."""
+    """Return times of day as times that continue after midnight."""
     steps = np.diff(seconds, prepend=seconds[:1])
     unrolled: FloatArray = seconds + DAY_S * np.cumsum(steps < -0.5 * DAY_S)
     return unrolled

@@ -4,7 +4,7 @@
 
 - Floats are written as the shortest decimal that reads back to the same bits, integers without a point; that
   difference is how a reader distinguishes them, so that CSV to Parquet and back loses nothing. Units, metadata and the
-  kind of columns whose cells do not tell it stand in a file beside it (`hil.recording.description`); without that
+  kind of columns whose cells do not tell it stand in a file next to it (`hil.recording.description`); without that
   file text that looks like a number becomes one, and an empty cell among numbers is NaN.
 - A last line without line end is taken (RFC 4180 allows it): a file cut inside its very last number can't be
   distinguished from a whole one. A cut anywhere else leaves a row with cells missing, and is refused.

@@ -68,11 +68,11 @@ def test_odd_lines_of_a_bus_log_are_skipped_and_counted(suffix: str, tmp_path: P
     for number in (300, 600, 900):
         lines.insert(number, "   17)  1.2.3 DT what is this\n")
     path.write_text("".join(lines))
-    told: list[str] = []
+    lines: list[str] = []
     table = tomllib.loads("\n".join(look(path, made.dbc_of(tmp_path)).signals))["signals"]
-    record = read_record(path, SignalsConfig.model_validate(table), dbc=tmp_path / "drive.dbc", tell=told.append)
+    record = read_record(path, SignalsConfig.model_validate(table), dbc=tmp_path / "drive.dbc", tell=lines.append)
     _is_as_made(record, 2e-2)
-    assert any(re.search(r"\b[34] lines skipped", line) for line in told)  # a header line of .asc looks like a frame
+    assert any(re.search(r"\b[34] lines skipped", line) for line in lines)  # a header line of .asc looks like a frame
 
 
 def test_a_log_that_is_mostly_odd_is_damaged(tmp_path: Path) -> None:

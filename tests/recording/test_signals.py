@@ -345,24 +345,24 @@ def _drive(path: Path, **changed: np.ndarray) -> Path:
 _BY_NAME = {"time": {"column": "t"}, "torque": [{"column": "T1"}, {"column": "T2"}], "speed": {"column": "n"}}
 
 
-def _told(path: Path, signals: dict[str, object] = _BY_NAME) -> list[str]:
+def _lines_of(path: Path, signals: dict[str, object] = _BY_NAME) -> list[str]:
     lines: list[str] = []
     read_record(path, SignalsConfig.model_validate(signals), tell=lines.append)
     return lines
 
 
 def test_good_channels_raise_no_doubt(tmp_path: Path) -> None:
-    assert not [line for line in _told(_drive(tmp_path / "a.csv")) if "row" in line]
+    assert not [line for line in _lines_of(_drive(tmp_path / "a.csv")) if "row" in line]
 
 
-def test_a_dead_torque_is_told(tmp_path: Path) -> None:
-    lines = _told(_drive(tmp_path / "a.csv", T2=np.zeros(400)))
+def test_a_dead_torque_is_lines_of(tmp_path: Path) -> None:
+    lines = _lines_of(_drive(tmp_path / "a.csv", T2=np.zeros(400)))
     assert any("T2: 0 in every row" in line for line in lines)
 
 
-def test_a_clipped_reading_is_told(tmp_path: Path) -> None:
+def test_a_clipped_reading_is_lines_of(tmp_path: Path) -> None:
     speed = np.minimum(50.0 + np.sin(0.01 * np.arange(400)) + 0.01 * np.arange(400), 52.0)
-    assert any("n: " in line and "clipped" in line for line in _told(_drive(tmp_path / "a.csv", n=speed)))
+    assert any("n: " in line and "clipped" in line for line in _lines_of(_drive(tmp_path / "a.csv", n=speed)))
 
 
 @pytest.mark.parametrize(
@@ -378,7 +378,7 @@ def test_channels_that_can_not_be_what_they_are_named_are_refused(
     changed: dict[str, np.ndarray], signals: dict[str, object], said: str, tmp_path: Path
 ) -> None:
     with pytest.raises(RecordingError, match=said):
-        _told(_drive(tmp_path / "a.csv", **changed), signals)
+        _lines_of(_drive(tmp_path / "a.csv", **changed), signals)
 
 
 def test_decimal_commas_in_a_file_of_commas_are_named(tmp_path: Path) -> None:
