@@ -55,6 +55,7 @@ class RigSource:
     text: str
     bus: str | None = None
     modbus: str | None = None
+    take_over: bool = False
 
     def rig(self) -> Rig:
         """Return the rig as the user wrote it.
@@ -87,7 +88,7 @@ class RigSource:
 
     def _checked(self, text: str) -> Rig:
         rig = validate(Rig, tomlkit.parse(text).unwrap(), self.path, RigFileError)
-        return with_addresses(rig, self.bus, self.modbus)
+        return with_addresses(rig, self.bus, self.modbus, self.take_over)
 
 
 def as_table(experiment: AnyExperiment, **changes: object) -> dict[str, Any]:

@@ -25,6 +25,7 @@ from hil.config.channel_table import ChannelTable
 from hil.config.rig_file import InverterTable, PlcTable, Rig
 from hil.rig.build import inverter_settings, plc_client
 from hil.rig.fitness import Needs, reasons_against
+from hil.rig.sole_host import require_sole_host
 
 NO_NEEDS = Needs(torque_of_one_nm=0.0)
 """A check asks for no torque."""
@@ -127,6 +128,7 @@ def _can(rig: Rig, prove_stop: bool) -> tuple[Finding, ...]:
             *(Finding(name, _node(table), Verdict.FAILED, notes=lost) for name, table in tables.items()),
         )
     with link:
+        require_sole_host(link, rig, inverter_settings("m1", rig).host_heartbeat_s if prove_stop else None)
         bus = Finding("can", rig.can.url, Verdict.AGREES)
         return (
             bus,
