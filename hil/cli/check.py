@@ -151,6 +151,7 @@ def _print(name: str, findings: tuple[Finding, ...]) -> None:
 
 def _details(finding: Finding) -> Iterator[str]:
     """Say what is no difference: what a run sets, where the DCF is of another mind, what stops a dead host's torque."""
+    yield from finding.questions
     yield from finding.remarks
     yield from (f"not the same everywhere: {each}" for each in finding.commissioned)
     yield from (f"without its host: {each}" for each in finding.protections)
@@ -208,6 +209,7 @@ def _device(finding: Finding) -> dict[str, Any]:
         ],
         "notes": list(finding.notes),
         "remarks": list(finding.remarks),
+        **({"questions": list(finding.questions)} if finding.questions else {}),
         "commissioned": [asdict(each) for each in finding.commissioned],
         "protections": [asdict(each) for each in finding.protections],
         **({"registers": [_register(each) for each in finding.registers]} if finding.registers else {}),

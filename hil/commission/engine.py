@@ -171,6 +171,8 @@ class Commissioning:
     def _after(self, step: Step, outcome: Outcome) -> Answer:
         findings = list(outcome.findings)
         self.show(step, findings)
+        for question in outcome.questions:
+            self._confirm(step, question)
         stops = [finding for finding in findings if finding.stops]
         outside = sum(finding.within is False for finding in findings)
         answer = self.talk.after(step.name, outside, bool(stops))
@@ -182,6 +184,16 @@ class Commissioning:
                 f"Then call again; it continues from here. To continue without: --skip {step.name} --because TEXT."
             )
         return answer
+
+    def _confirm(self, step: Step, question: str) -> None:
+        self.job.say(f"  {question}")
+        if self.talk.confirm(question).what is not What.GO:
+            step.record(self.job).end(Status.BLOCKED, f"answered no: {question}")
+            self.job.state.save()
+            raise RunAborted(
+                f"step {step.name}: {question} The answer was no, expected yes. Correct the register map, the PLC or "
+                "the rig file; then call again; it continues from here."
+            )
 
 
 def _quit_if_asked(answer: Answer) -> None:

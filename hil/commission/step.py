@@ -23,10 +23,11 @@ MODEL_STEPS = ("validation", "scales")
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What a step came to: findings for people, evidence for the steps after it and for the report."""
+    """What a step came to: findings and questions for people, evidence for the steps after it and for the report."""
 
     findings: Sequence[Finding]
     evidence: Mapping[str, Any] = field(default_factory=dict)
+    questions: Sequence[str] = ()
 
 
 @dataclass(slots=True)

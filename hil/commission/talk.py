@@ -41,6 +41,10 @@ class Talk(Protocol):
         """Ask how to continue after a step with findings outside their limits."""
         ...
 
+    def confirm(self, question: str) -> Answer:
+        """Ask whether something read is right: `GO`, or `QUIT`."""
+        ...
+
     def keep_results(self, changes: Sequence[str]) -> Answer:
         """Ask whether results from before the rig file was changed are kept (`GO`, with the reason) or repeated."""
         ...
@@ -78,6 +82,10 @@ class Script:
 
     def after(self, step: str, outside: int, blocked: bool) -> Answer:
         """Continue; what blocks ends the commissioning all the same."""
+        return GO
+
+    def confirm(self, question: str) -> Answer:
+        """Take it for right: it was printed, and what can't be right is refused without asking."""
         return GO
 
     def keep_results(self, changes: Sequence[str]) -> Answer:
@@ -129,6 +137,12 @@ class Person:
             return self._answer(question, {"r": What.REPEAT, "s": What.SKIP, "q": What.QUIT, "": What.QUIT})
         question = "  Go [o]n, [r]epeat, [q]uit: "
         return self._answer(question, {"o": What.GO, "": What.GO, "r": What.REPEAT, "q": What.QUIT})
+
+    def confirm(self, question: str) -> Answer:
+        """Ask, also where torque was agreed to on the command line: nobody has seen the value before."""
+        return self._answer(
+            f"  {question} [y]es, [n]o: ", {"y": What.GO, "yes": What.GO, "n": What.QUIT, "no": What.QUIT}
+        )
 
     def keep_results(self, changes: Sequence[str]) -> Answer:
         """Ask, unless a reason to keep them was given."""

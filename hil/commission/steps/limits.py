@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 from drivers.errors import CommandRefused
 from drivers.guard_limits import NS_PER_S
+from drivers.plc.types import PlcStatus
 from drivers.torque_guard import Evidence, GuardLimits, TorqueGuard, TorqueRequest
 from hil.commission.finding import Finding
 from hil.commission.order import Order
@@ -20,12 +21,15 @@ from hil.commission.steps import experiments
 from hil.rig.build import open_devices
 from hil.rig.excitation import NO_TORQUE
 from hil.rig.plan import plan_run
+from hil.rig.plc_limits import max_speed_rad_s, plc_limits
 
 BEYOND = 1.001
 """A probe is so many times its limit: by less than any drive resolves."""
 
 FRESH = Evidence(0, 0, 0.0)
 """Feedback and permission of this moment, at rest."""
+
+MAP = "Compare scale and unit of its register with the register map"
 
 DEFECT = "Connect nothing; this is a defect of the program: report it"
 
@@ -52,7 +56,17 @@ def _about(job: Job) -> str:
 def _do(job: Job) -> Outcome:
     limits = job.rig.guard_limits
     findings = [_probed(limits, probe) for probe in _probes(limits)]
-    return Outcome([*findings, _rate(limits), _silent(limits), *_plc(job)])
+    with open_devices(job.rig) as devices:
+        status = devices.plc_loop.call(devices.plc.read_status())
+        speeds = [speed for each in (devices.m1, devices.m2) if (speed := max_speed_rad_s(each)) is not None]
+    read = tuple(plc_limits(status, job.rig, min(speeds, default=None)))
+    believed = [
+        Finding(f"PLC: {each.what}", f"at most {each.most}", each.found, each.believed, MAP, True)
+        for each in read
+        if each.most is not None
+    ]
+    findings += [_rate(limits), _silent(limits), *believed, *_needed(job, status)]
+    return Outcome(findings, questions=[each.question for each in read if each.believed])
 
 
 def _probes(limits: GuardLimits) -> Iterator[Probe]:
@@ -152,10 +166,8 @@ def _silent(limits: GuardLimits) -> Finding:
     return Finding("guard: any torque before it is enabled", "refused", measured, within, DEFECT, True)
 
 
-def _plc(job: Job) -> Iterator[Finding]:
+def _needed(job: Job, status: PlcStatus) -> Iterator[Finding]:
     """Compare what the PLC permits with what the largest of the runs to come need."""
-    with open_devices(job.rig) as devices:
-        status = devices.plc_loop.call(devices.plc.read_status())
     orders = experiments.orders(job)
     if not orders:
         return
