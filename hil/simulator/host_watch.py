@@ -1,17 +1,84 @@
-"""How a simulated node tells that its host is gone: by its heartbeat, and by its RPDOs, as the host has configured.
-
-The heartbeat is of the wall clock; the RPDOs' deadline is of simulated time, or of the wall clock in a rig that runs
-in real time. Simulated time stands still between two SYNCs, however long that takes, and an RPDO is as old as the SYNC
-that puts it into effect. Time is passed in; nothing here reads a clock.
-"""
+"""How a simulated drive notices that its host is gone: heartbeat, RPDO deadline, and a clock of its own."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Final
+import threading
+from collections.abc import Callable, Mapping
+from typing import Final, Self
 
-from hil.simulator.heartbeat_consumer import HeartbeatConsumer
-from hil.simulator.rpdo_deadline import RpdoDeadline
+from drivers.canopen.heartbeat import HEARTBEAT_COB_ID
+from drivers.canopen.silence import Silence
+
+NS_PER_MS = 1_000_000
+
+GRACE_NS = 40 * NS_PER_MS
+"""What this program, which is no drive, leaves for reading heartbeats that came while it was held up itself [ns]."""
+
+LONGEST_LOOK_NS = 15 * NS_PER_MS
+"""It looks every 10 ms: a longer time between two looks is one in which it was held up."""
+
+
+class HeartbeatConsumer:
+    """Watches one heartbeat, from the first that comes; off by default.
+
+    Parameters
+    ----------
+    node_id
+        Whose heartbeat it is.
+    timeout_ms
+        Longest time between two [ms]; 0 for no watching.
+    """
+
+    __slots__ = ("_silence", "_watches", "cob_id")
+
+    def __init__(self, node_id: int = 0, timeout_ms: int = 0) -> None:
+        self.cob_id = HEARTBEAT_COB_ID + node_id
+        self._watches = timeout_ms > 0
+        self._silence = Silence(timeout_ms * NS_PER_MS, GRACE_NS, LONGEST_LOOK_NS)
+
+    @classmethod
+    def from_object(cls, value: int) -> Self:
+        """Read the object: node id in bits 16 to 22, time in bits 0 to 15 [ms]."""
+        return cls(value >> 16 & 0x7F, value & 0xFFFF)
+
+    def beat(self, t_ns: int) -> None:
+        """Take one heartbeat."""
+        self._silence.beat(t_ns)
+
+    def lost(self, now_ns: int) -> bool:
+        """Whether the heartbeat has ended; once, then watching starts anew with the next one."""
+        if not self._watches or not self._silence.has_ended(now_ns):
+            return False
+        self._silence.end()
+        return True
+
+
+class RpdoDeadline:
+    """Watches one RPDO, from the first that comes.
+
+    Parameters
+    ----------
+    deadline_ms
+        Longest time between two [ms]; 0 for no watching.
+    """
+
+    __slots__ = ("_deadline_ns", "_last_ns")
+
+    def __init__(self, deadline_ms: int) -> None:
+        self._deadline_ns = deadline_ms * NS_PER_MS
+        self._last_ns: int | None = None
+
+    def received(self, now_ns: int) -> None:
+        """Take the RPDO."""
+        self._last_ns = now_ns
+
+    def missed(self, now_ns: int) -> bool:
+        """Whether the deadline is past; once, then watching starts anew with the next RPDO."""
+        if self._deadline_ns == 0 or self._last_ns is None or now_ns - self._last_ns <= self._deadline_ns:
+            return False
+        self._last_ns = None
+        return True
+
 
 HEARTBEAT_ERROR: Final = 0x8130
 RPDO_TIMEOUT: Final = 0x8250
@@ -62,3 +129,33 @@ class HostWatch:
         now_ns = wall_ns if self._real_time else self._sync_ns
         missed = [deadline.missed(now_ns) for deadline in self._deadlines.values()]  # every one is asked
         return any(missed)
+
+
+class Ticker:
+    """Calls until stopped.
+
+    Parameters
+    ----------
+    period_s
+        Time between two calls [s].
+    call
+        What is called; it raises nothing.
+    name
+        Of the thread.
+    """
+
+    def __init__(self, period_s: float, call: Callable[[], None], name: str) -> None:
+        self._period_s = period_s
+        self._call = call
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End the thread; nothing is called after this returns."""
+        self._stopping.set()
+        self._thread.join()
+
+    def _run(self) -> None:
+        while not self._stopping.wait(self._period_s):
+            self._call()

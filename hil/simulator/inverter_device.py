@@ -24,10 +24,7 @@ from drivers.inverter.cia402 import (
     next_state,
 )
 from drivers.scaling import VelocityScale
-from hil.simulator.dc_link import DcLink
-from hil.simulator.drive_sensors import DriveSensors
-from hil.simulator.error_list import ErrorList
-from hil.simulator.inverter_settings import SimulatedInverter
+from hil.simulator.drive_physics import DcLink, DriveSensors, ErrorList, Heat, SimulatedInverter
 from hil.simulator.stop_reactions import (
     KNOWN_CODES,
     STANDARD_CODES,
@@ -37,7 +34,6 @@ from hil.simulator.stop_reactions import (
     halt_ramp,
     stop_between,
 )
-from hil.simulator.torque_limits import Heat
 
 VALUE_RANGE_EXCEEDED, VALUE_TOO_HIGH, VALUE_TOO_LOW = 0x06090030, 0x06090031, 0x06090032
 """SDO abort codes."""
@@ -105,6 +101,7 @@ class InverterDevice:
         self.added_nm = 0.0  # what another controller adds to the reference, past CANopen: the PLC's PRBS
         self._readings = self._reading_of()
         self.hung = False
+        self._has_left = False
         self.reset()
 
     def reset(self) -> None:
@@ -194,7 +191,7 @@ class InverterDevice:
             self.fail(UNDER_VOLTAGE)
         self._torque = self._torque_in_effect(true_speed_rad_s, period_s)
         self._heat.pass_time(self._torque, period_s)
-        self._sensors.sample(true_speed_rad_s, self._torque)
+        self._sensors.sample(true_speed_rad_s, self._torque, self._steps)
 
     def lose_connection(self, error_code: int) -> None:
         """Act on the abort connection option code, 0x6007: the host is gone, or has taken the bus away.
@@ -234,6 +231,11 @@ class InverterDevice:
 
     def _meet_faults(self) -> None:
         faults = self._settings.faults
+        leaves = faults.leaves_operation
+        if leaves is not None and not self._has_left and self._steps >= leaves.step:
+            if self.state is PowerState.OPERATION_ENABLED:
+                self._has_left = True
+                self._enter(leaves.state)
         if faults.hang_at_step == self._steps:
             self.hung = True
             self._torque = 0.0

@@ -27,21 +27,28 @@ from drivers.canopen.pdo_map import COB_ID_INVALID
 from drivers.datasheet.file import EdsFile
 from drivers.errors import BusDown
 from drivers.scaling import IntegerType
-from hil.simulator.described_drive import INTEGERS, fitting, power_on_values, velocity_scale
-from hil.simulator.heartbeat_consumer import HeartbeatConsumer
-from hil.simulator.host_watch import HEARTBEAT_ERROR, RPDO_TIMEOUT, HostWatch
+from hil.simulator.drive_physics import SimulatedInverter
+from hil.simulator.host_watch import HEARTBEAT_ERROR, RPDO_TIMEOUT, HeartbeatConsumer, HostWatch, Ticker
 from hil.simulator.inverter_device import LOST_CONNECTION, InverterDevice, ObjectRefused
-from hil.simulator.inverter_settings import SimulatedInverter
-from hil.simulator.object_server import ObjectServer
-from hil.simulator.pdo_frame import PdoFrame
-from hil.simulator.pdo_objects import ACYCLIC, EVENT_DRIVEN, PdoObjects
-from hil.simulator.ticker import Ticker
+from hil.simulator.object_server import (
+    ACYCLIC,
+    EVENT_DRIVEN,
+    INTEGERS,
+    ObjectServer,
+    PdoFrame,
+    PdoObjects,
+    fitting,
+    power_on_values,
+    velocity_scale,
+)
 
 _SDO_REQUEST_COB_ID = 0x600
 _CONSUMER_HEARTBEAT_TIME = (0x1016, 1)
 _PRODUCER_HEARTBEAT_TIME = 0x1017
 _ERROR_BEHAVIOUR = (0x1029, 1)
 _EMCY_COB_ID = 0x1014
+_VELOCITY = 0x606C
+_SERIAL_NUMBER = (0x1018, 4)
 _PDO_LENGTH_ERROR = 0x8210
 """Error code of CiA 301."""
 
@@ -80,6 +87,7 @@ class InverterNode:
         self._lock = RLock()  # frames are taken in one thread, the heartbeat is sent by another
         self._eds = EdsFile(settings.eds_path, settings.node_id)
         self._sensors = settings.sensors
+        self._serial_number = settings.serial_number
         self._identity = {1: settings.identity[0], 2: settings.identity[1]}
         self._device = InverterDevice(settings, power_on_values(self._eds), velocity_scale(self._eds, settings), seed)
         self._random = np.random.default_rng([seed, settings.node_id, _STALE_STREAM])
@@ -157,6 +165,9 @@ class InverterNode:
                 return
             for tpdo in self._tpdos:
                 self._send_if_due(tpdo)
+            second = self._faults.second_tpdo
+            if second is not None and self._syncs >= second.step and self._syncs % second.every == 0:
+                self._send_second()
 
     def close(self) -> None:
         """End heartbeat and watch; the link is its owner's to close."""
@@ -180,6 +191,15 @@ class InverterNode:
                 self._send(cob_id, self._last_sent[tpdo.layout.communication_index])
         elif kind in _CYCLIC and self._syncs % kind == 0:
             self._send(cob_id, self._tpdo_data(tpdo))
+
+    def _send_second(self) -> None:
+        """Send each TPDO with a speed once more, the speed 0: a frame of somebody else with the drive's identifier."""
+        for tpdo in self._tpdos:
+            mapped = [each.index for each in tpdo.layout.objects]
+            if _VELOCITY in mapped:
+                values = [read() for read in self._sources[tpdo.layout.communication_index]]
+                no_speed = [0 if index == _VELOCITY else value for index, value in zip(mapped, values, strict=True)]
+                self._send(tpdo.layout.cob_id, tpdo.pack(no_speed))
 
     def _meet_faults(self) -> None:
         if self._faults.reset_at_step == self._syncs:
@@ -314,6 +334,8 @@ class InverterNode:
         value = self._device.read(index, subindex)
         if (index, subindex) in self._sensors:
             value = self._sensed(index, subindex)
+        elif (index, subindex) == _SERIAL_NUMBER:
+            value = self._serial_number
         elif value is None and index == 0x1018 and self._eds.sheet.value(index, subindex) is None:
             value = self._identity.get(subindex)
         return None if value is None else fitting(value, od.data_type)

@@ -22,7 +22,7 @@ from typing import Final
 
 from drivers.plc.register import Value
 from drivers.plc.types import ClutchState, DriveMode, PrbsSource
-from hil.simulator.plc_answers import Answers
+from hil.simulator.faults import Answers, PlcFaults
 from hil.simulator.plc_prbs import CELLS, PlcPrbs
 
 IDENTITY: Final = MappingProxyType({"vendor_code": 0x00484944, "device_code": 0x2024, "map_version": 1})
@@ -62,60 +62,6 @@ class PlcSetup:
     torque_limit_nm: float = 450.0
     period_s: float = 0.01
     host_timeout_s: float = math.inf
-
-
-@dataclass(frozen=True, slots=True)
-class PlcFaults:
-    """What goes wrong, and when in simulated time [s]; nothing by default.
-
-    Attributes
-    ----------
-    clutch_closes_at_s : float
-        The clutch closes by itself and stays closed.
-    permissive_withdrawn_at_s : float
-        The permissive goes and stays away.
-    mode_changes_at_s : float
-        The driver selects electric mode.
-    hangs_at_s : float
-        The PLC keeps its connections and answers nothing.
-    exceptions_at_s, late_at_s, half_at_s, resets_at_s, too_few_at_s : float
-        From then on it answers with exception 04, late, with half an answer, by resetting the connection, or with
-        one register less than was asked for. How it answers is for whoever serves it to carry out.
-    wrong_unit_at_s, wrong_transaction_at_s : float
-        From then on its answers have another unit or transaction identifier than the request.
-    swaps_floats : bool
-        Its floating-point values have their two words in the other order than the register map says.
-    refused_modes : frozenset of DriveMode
-        The PLC takes the request and does not follow it.
-    """
-
-    clutch_closes_at_s: float = math.inf
-    permissive_withdrawn_at_s: float = math.inf
-    mode_changes_at_s: float = math.inf
-    hangs_at_s: float = math.inf
-    exceptions_at_s: float = math.inf
-    late_at_s: float = math.inf
-    half_at_s: float = math.inf
-    resets_at_s: float = math.inf
-    too_few_at_s: float = math.inf
-    wrong_unit_at_s: float = math.inf
-    wrong_transaction_at_s: float = math.inf
-    swaps_floats: bool = False
-    refused_modes: frozenset[DriveMode] = frozenset()
-
-    def answers(self, time_s: float) -> Answers:
-        """Tell how the PLC answers at a simulated time [s]; of several faults the one that came last."""
-        begun = {
-            self.hangs_at_s: Answers.NOT,
-            self.exceptions_at_s: Answers.EXCEPTION,
-            self.late_at_s: Answers.LATE,
-            self.half_at_s: Answers.HALF,
-            self.resets_at_s: Answers.RESET,
-            self.too_few_at_s: Answers.TOO_FEW,
-            self.wrong_unit_at_s: Answers.WRONG_UNIT,
-            self.wrong_transaction_at_s: Answers.WRONG_TRANSACTION,
-        }
-        return begun[max(due)] if (due := [at_s for at_s in begun if at_s <= time_s]) else Answers.WELL
 
 
 _ACCEPTED: Final[Mapping[str, tuple[str, Callable[[Value], bool]]]] = MappingProxyType(

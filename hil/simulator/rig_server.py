@@ -9,7 +9,7 @@ from __future__ import annotations
 import uuid
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import replace
 from types import TracebackType
 from typing import Self
 
@@ -19,30 +19,22 @@ from drivers.canopen.inline_bus import InlineBus
 from drivers.capability.carrier import ObjectId
 from hil.config.rig_file import InverterTable, Rig, SimulationTable
 from hil.errors import UsageError
-from hil.simulator.bus_faults import BusFaults
 from hil.simulator.can_bridge import CanBridge
 from hil.simulator.channel_sensors import ChannelSensors
+from hil.simulator.drive_physics import SimulatedInverter
+from hil.simulator.faults import InverterFaults, RigFaults
 from hil.simulator.faulty_wire import FaultyWire
-from hil.simulator.inverter_settings import InverterFaults, SimulatedInverter
 from hil.simulator.loopback import IN_PROCESS, SOCKETCAN, Address, bus_address
 from hil.simulator.plant import Plant
-from hil.simulator.plc_access import PlcSecurity
-from hil.simulator.plc_device import PlcDevice, PlcFaults, PlcSetup
-from hil.simulator.plc_server import PlcServer
+from hil.simulator.plc_device import PlcDevice, PlcSetup
+from hil.simulator.plc_server import PlcSecurity, PlcServer
 from hil.simulator.simulated_rig import SimulatedRig
+
+SERIAL_NUMBERS = (1, 2)
+"""Of the drives behind m1 and m2; they stay with them where the node ids are swapped."""
 
 HOST_TIMEOUT_S = 1.0
 """Simulated time without a beat of the host after which the PLC permits no torque [s]: ten of the host's polls."""
-
-
-@dataclass(frozen=True, slots=True)
-class RigFaults:
-    """What is wrong with the simulated devices; by default nothing."""
-
-    m1: InverterFaults = field(default_factory=InverterFaults)
-    m2: InverterFaults = field(default_factory=InverterFaults)
-    bus: BusFaults = field(default_factory=BusFaults)
-    plc: PlcFaults = field(default_factory=PlcFaults)
 
 
 class RigServer:
@@ -92,7 +84,7 @@ class RigServer:
         self._faults = faults or RigFaults()
         self._real_time = real_time
         self._bridged = None if bus_url.startswith((IN_PROCESS, SOCKETCAN)) else bus_address(bus_url)
-        if bus_url.startswith(SOCKETCAN) and self._faults.bus != BusFaults():
+        if bus_url.startswith(SOCKETCAN) and self._faults.bus.touch_frames:
             raise UsageError(
                 f"bus {bus_url!r}: expected faults of the devices alone, got faults of the bus: frames of the "
                 "kernel's own bus are out of reach. Serve it at ws://127.0.0.1:0/ for them."
@@ -151,7 +143,7 @@ class RigServer:
         """Open the devices' end of the bus."""
         if self._bus_url.startswith(SOCKETCAN):
             return open_bus(self._bus_url)
-        if self._faults.bus == BusFaults():
+        if not self._faults.bus.touch_frames:
             return InlineBus(channel)
         devices = str(uuid.uuid4())
         stack.enter_context(FaultyWire(channel, devices, self._faults.bus, self._seed))
@@ -178,11 +170,12 @@ class RigServer:
         return part_m1 * prbs_nm, (1.0 - part_m1) * prbs_nm
 
     def _inverters(self) -> tuple[SimulatedInverter, SimulatedInverter]:
-        tables = self._rig.inverters
-        return (
-            _inverter(tables.m1, self._simulation, self._faults.m1, self._sensors.objects("m1")),
-            _inverter(tables.m2, self._simulation, self._faults.m2, self._sensors.objects("m2")),
-        )
+        tables, faults = self._rig.inverters, self._faults
+        m1 = _inverter(tables.m1, self._simulation, faults.m1, self._sensors.objects("m1"), SERIAL_NUMBERS[0])
+        m2 = _inverter(tables.m2, self._simulation, faults.m2, self._sensors.objects("m2"), SERIAL_NUMBERS[1])
+        if faults.bus.swapped_nodes:
+            return replace(m1, node_id=m2.node_id), replace(m2, node_id=m1.node_id)
+        return m1, m2
 
 
 def required_simulation(rig: Rig) -> SimulationTable:
@@ -212,6 +205,7 @@ def _inverter(
     simulation: SimulationTable,
     faults: InverterFaults,
     sensors: Mapping[ObjectId, Callable[[], int]],
+    serial_number: int,
 ) -> SimulatedInverter:
     return SimulatedInverter(
         node_id=table.node_id,
@@ -224,6 +218,7 @@ def _inverter(
         rated_torque_unit_nm=table.rated_torque_unit.nm,
         sensors=sensors,
         faults=faults,
+        serial_number=serial_number,
     )
 
 

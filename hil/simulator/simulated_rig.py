@@ -8,8 +8,8 @@ from typing import Self
 
 from drivers.canopen import can
 from drivers.canopen.can_link import SYNC_COB_ID, CanLink
+from hil.simulator.drive_physics import SimulatedInverter
 from hil.simulator.inverter_node import InverterNode
-from hil.simulator.inverter_settings import SimulatedInverter
 from hil.simulator.plant import Plant
 
 StepCallback = Callable[[float], None]

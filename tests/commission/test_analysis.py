@@ -25,7 +25,7 @@ from hil.commission.analysis.response_ratio import response_ratio
 from hil.commission.predict import rigid_model
 from hil.config.rig_file import read_rig
 from hil.rig.experiments.pulses import LEAD_S, Pulses
-from hil.simulator.simulation_model import DEFAULT_BUS
+from hil.simulator.plant import DEFAULT_BUS
 from tests.commission.rigs import EXAMPLE
 
 PERIOD_S = 0.01
