@@ -122,13 +122,7 @@ class _Connection(RemoteServerProtocol):  # type: ignore[misc]  # the library ca
 
 
 def _classic(message: can.Message) -> can.Message:
-    """Return a frame that a classic CAN bus can carry.
-
-    Raises
-    ------
-    ValueError
-        For any other: the devices behind it would meet what no wire delivers.
-    """
+    """Return a frame that a classic CAN bus can carry."""
     highest = 0x1FFFFFFF if message.is_extended_id else 0x7FF
     if message.is_fd or message.is_error_frame or not 0 <= message.arbitration_id <= highest or len(message.data) > 8:
         raise ValueError("expected a classic CAN frame of at most 8 bytes")

@@ -214,17 +214,7 @@ class DriveSensors:
         self.torque = self.current = self.speed = 0
 
     def sample(self, true_speed_rad_s: float, torque_permille: float, step: int) -> None:
-        """Read the machine at this SYNC.
-
-        Parameters
-        ----------
-        true_speed_rad_s
-            Motor speed [rad/s].
-        torque_permille
-            Torque in effect [per mille of rated].
-        step
-            Number of the SYNC, from 1.
-        """
+        """Read the machine at this SYNC."""
         speed_rad_s, torque = self._clock.sample(true_speed_rad_s, torque_permille)
         torque_noise, speed_noise = next(self._noise), next(self._noise)
         torque += self._settings.torque_noise_counts * torque_noise

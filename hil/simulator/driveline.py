@@ -43,11 +43,6 @@ class SensedDriveline(Stepper):
         """Return what an ideal sensor shows now, an acceleration as under the torque that acts until now.
 
         It is the output before a step that is not taken, or the slope at its beginning.
-
-        Raises
-        ------
-        BadModel
-            If the structure has no such output.
         """
         is_slope = kind is OutputKind.ACCELERATION
         size, last = self._torque.size, self._torque.size - 1
@@ -107,23 +102,11 @@ class DrivelinePlant:
         return self._stepper.speed_rad_s
 
     def measured(self, kind: OutputKind, at: Location) -> float:
-        """Return what a sensor there shows now [rad/s, rad, Nm, rad/s^2].
-
-        Raises
-        ------
-        BadModel
-            If the structure has no such output.
-        """
+        """Return what a sensor there shows now [rad/s, rad, Nm, rad/s^2]."""
         return self._stepper.measured(kind, at)
 
     def advance(self, torque_nm: tuple[float, float], duration_s: float) -> None:
-        """Let the driveline run with both torques held [Nm] for one period.
-
-        Raises
-        ------
-        ValueError
-            If the duration is not the period this plant was made for.
-        """
+        """Let the driveline run with both torques held [Nm] for one period."""
         if duration_s != self._period_s:
             raise ValueError(
                 f"driveline: asked for a step of {duration_s:g} s, expected the {self._period_s:g} s it was made "
@@ -141,19 +124,7 @@ NO_EXPERIMENT_S = 60.0
 
 
 def out_of_bounds(rig: Rig, model: DrivelineModel, name: str, values: Mapping[str, float]) -> Iterator[str]:
-    """Name every parameter of an effect that is outside its bounds.
-
-    Parameters
-    ----------
-    rig
-        Whose limits count.
-    model
-        The driveline, the effect included.
-    name
-        The effect, one of the catalogue.
-    values
-        Its parameters as they were given [SI].
-    """
+    """Name every parameter of an effect that is outside its bounds."""
     effect = EFFECTS[name]
     scales = effect.scales(model, [_widest_record(rig)])
     for parameter, scale in zip(effect.shared_parameters, scales, strict=True):
@@ -189,26 +160,7 @@ def _widest_record(rig: Rig) -> Record:
 
 
 def plant_for(rig: Rig, effects: Sequence[EffectSpec] = (), trust_laws: bool = False) -> Plant:
-    """Build the driveline of a rig file.
-
-    Parameters
-    ----------
-    rig
-        The rig file, with a table ``[simulation]``.
-    effects
-        Effects put in on top of those of its model, or in place of one of the same name; each once.
-    trust_laws
-        Whether the code of its model's own laws may run.
-
-    Raises
-    ------
-    UsageError
-        If the rig file has no ``[simulation]``, its model is of a translation, or an effect comes twice,
-        without any parameter, with one outside the catalogue's bounds, or as a profile over time.
-    BadModel
-        If an effect is none of the catalogue, lacks a parameter or has another, or the line has a mode too fast to
-        simulate at the rig's period.
-    """
+    """Build the driveline of a rig file."""
     model = simulation_model(required_simulation(rig), trust_laws)
     if model.motion is not Motion.ROTATION:
         raise UsageError(

@@ -265,20 +265,7 @@ def known_faults() -> str:
 
 
 def rig_faults(texts: Iterable[str], period_s: float) -> RigFaults:
-    """Read faults ``DEVICE.KIND[@S][=SIZE]``, as given to ``hil sim --fault``.
-
-    Parameters
-    ----------
-    texts
-        The faults.
-    period_s
-        Simulated time of one SYNC [s].
-
-    Raises
-    ------
-    UsageError
-        If one is none of the known, has a moment or a size too many, too few or wrong, or comes twice.
-    """
+    """Read faults ``DEVICE.KIND[@S][=SIZE]``, as given to ``hil sim --fault``."""
     faults = RigFaults()
     known: set[tuple[str, str, Any]] = set()
     for text in texts:

@@ -25,7 +25,7 @@ from drivers.inverter.cia402 import (
 )
 from drivers.scaling import VelocityScale
 from hil.simulator.drive_physics import DcLink, DriveSensors, ErrorList, Heat, SimulatedInverter
-from hil.simulator.stop_reactions import (
+from hil.simulator.stopping import (
     KNOWN_CODES,
     STANDARD_CODES,
     AbortConnection,
@@ -145,13 +145,7 @@ class InverterDevice:
         return self._readings.get(index)
 
     def write(self, index: int, value: int) -> None:
-        """Take a new value of an object; one the device does not act on is ignored.
-
-        Raises
-        ------
-        ObjectRefused
-            If the value is not allowed.
-        """
+        """Take a new value of an object; one the device does not act on is ignored."""
         if value not in KNOWN_CODES.get(index, (value,)):
             raise ObjectRefused(VALUE_RANGE_EXCEEDED)
         if index == 0x6040:
@@ -175,15 +169,7 @@ class InverterDevice:
         self._parameters[index] = value
 
     def step(self, true_speed_rad_s: float, period_s: float) -> None:
-        """Take one SYNC: put the commands into effect, sample the readings.
-
-        Parameters
-        ----------
-        true_speed_rad_s
-            Motor speed now [rad/s].
-        period_s
-            Time until the next SYNC, for slopes, heat and DC link [s].
-        """
+        """Take one SYNC: put the commands into effect, sample the readings."""
         self._steps += 1
         self._meet_faults()
         self._dc_link.pass_time(period_s)
@@ -194,13 +180,7 @@ class InverterDevice:
         self._sensors.sample(true_speed_rad_s, self._torque, self._steps)
 
     def lose_connection(self, error_code: int) -> None:
-        """Act on the abort connection option code, 0x6007: the host is gone, or has taken the bus away.
-
-        Parameters
-        ----------
-        error_code
-            Cause, for a drive that goes into fault; `LOST_CONNECTION` if there is no better one.
-        """
+        """Act on the abort connection option code, 0x6007: the host is gone, or has taken the bus away."""
         code = self._parameters[0x6007]
         if code == AbortConnection.FAULT and self.state is not PowerState.SWITCH_ON_DISABLED:
             self.fail(error_code)

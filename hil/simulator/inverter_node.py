@@ -4,7 +4,7 @@ NMT is done here, for the library's slave sends no boot-up message after a reset
 the bus. PDOs follow the configured mapping, identifiers and transmission types, from those of the EDS on. An event is a
 changed value; values change at SYNC, for that is when simulated time advances.
 
-It looks for its host (`hil.simulator.host_watch`) at every frame it takes and, once it is ordered to watch the host's
+It looks for its host (`hil.simulator.stopping`) at every frame it takes and, once it is ordered to watch the host's
 heartbeat, by a clock of its own, so that it also notices when nothing comes any more.
 """
 
@@ -28,7 +28,6 @@ from drivers.datasheet.file import EdsFile
 from drivers.errors import BusDown
 from drivers.scaling import IntegerType
 from hil.simulator.drive_physics import SimulatedInverter
-from hil.simulator.host_watch import HEARTBEAT_ERROR, RPDO_TIMEOUT, HeartbeatConsumer, HostWatch, Ticker
 from hil.simulator.inverter_device import LOST_CONNECTION, InverterDevice, ObjectRefused
 from hil.simulator.object_server import (
     ACYCLIC,
@@ -41,6 +40,7 @@ from hil.simulator.object_server import (
     power_on_values,
     velocity_scale,
 )
+from hil.simulator.stopping import HEARTBEAT_ERROR, RPDO_TIMEOUT, HeartbeatConsumer, HostWatch, Ticker
 
 _SDO_REQUEST_COB_ID = 0x600
 _CONSUMER_HEARTBEAT_TIME = (0x1016, 1)
@@ -121,17 +121,7 @@ class InverterNode:
         self._device.added_nm = torque_nm
 
     def step(self, t_ns: int, true_speed_rad_s: float, period_s: float) -> None:
-        """Take one SYNC: look for the host, put the RPDOs received since the last into effect, sample speed and torque.
-
-        Parameters
-        ----------
-        t_ns
-            When the SYNC came, by the wall clock [ns].
-        true_speed_rad_s
-            Motor speed now [rad/s].
-        period_s
-            Time until the next SYNC [s].
-        """
+        """Take one SYNC: look for the host, put the RPDOs since the last into effect, sample speed and torque."""
         with self._lock:
             self._syncs += 1
             self._host.take_sync(period_s)

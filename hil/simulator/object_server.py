@@ -196,13 +196,7 @@ class PdoObjects:
         self._read = read
 
     def check_write(self, index: int, subindex: int, value: int) -> None:
-        """Check a new value of any object; those that are no PDO parameter pass.
-
-        Raises
-        ------
-        ObjectRefused
-            If the order of CiA 301, 7.5.2.36 is not kept, or the PDO can't be made.
-        """
+        """Check a new value of any object; those that are no PDO parameter pass."""
         for direction in (RPDO, TPDO):
             if index - direction.communication in PDO_NUMBERS:
                 self._check_communication(index, subindex, value)

@@ -92,13 +92,7 @@ class EffectSpec:
 
     @classmethod
     def parse(cls, text: str) -> EffectSpec:
-        """Read ``NAME[:k=v,...]``.
-
-        Raises
-        ------
-        UsageError
-            If there is no name, or a parameter is no ``key=number`` or comes twice.
-        """
+        """Read ``NAME[:k=v,...]``."""
         name, _, rest = text.partition(":")
         if not name.strip():
             raise UsageError(f"effect {text!r}: expected NAME:key=number, got no name. List them by: hil effects")

@@ -1,15 +1,4 @@
-"""A simulated drive PLC: what its program does, in simulated time; nothing of registers, sockets or clocks.
-
-- A drive mode takes effect as it is requested, unless the PLC refuses it. Parallel mode closes the clutch,
-  the other two open it.
-- The watchdog counts one per PLC cycle; the host's count is taken over as it is written.
-- The permissive needs nothing of the host until its first beat. From then on it is there while beats come, and
-  comes back with them.
-- The PRBS generator runs while it is enabled, the source is the PLC, and torque is permitted; it starts at the
-  seed whenever one of its settings is written.
-
-The device is stepped by the thread of the CAN bus and asked by that of the Modbus server: one lock for both.
-"""
+"""A simulated drive PLC: what its program does, in simulated time; nothing of registers, sockets or clocks."""
 
 from __future__ import annotations
 
@@ -23,7 +12,45 @@ from typing import Final
 from drivers.plc.register import Value
 from drivers.plc.types import ClutchState, DriveMode, PrbsSource
 from hil.simulator.faults import Answers, PlcFaults
-from hil.simulator.plc_prbs import CELLS, PlcPrbs
+
+CELLS: Final = 10
+TAPS: Final = (10, 7)
+
+
+class PlcPrbs:
+    """The generator, clocked by the PLC's cycle.
+
+    Parameters
+    ----------
+    amplitude_nm : float
+        The level is plus or minus this torque [Nm].
+    divider : int
+        PLC cycles each level is held.
+    seed : int
+        First state, 1 to 1023.
+    """
+
+    __slots__ = ("_amplitude_nm", "_divider", "_held", "_state")
+
+    def __init__(self, amplitude_nm: float, divider: int, seed: int) -> None:
+        self._amplitude_nm = amplitude_nm
+        self._divider = divider
+        self._state = seed
+        self._held = 0
+
+    @property
+    def torque_nm(self) -> float:
+        """Level of this cycle [Nm]; its sign is that of the last cell."""
+        return self._amplitude_nm if self._state >> (CELLS - 1) else -self._amplitude_nm
+
+    def clock(self) -> None:
+        """Let one PLC cycle pass."""
+        self._held += 1
+        if self._held >= self._divider:
+            feedback = sum(self._state >> (cell - 1) for cell in TAPS) & 1
+            self._state = ((self._state << 1) | feedback) & (2**CELLS - 1)
+            self._held = 0
+
 
 IDENTITY: Final = MappingProxyType({"vendor_code": 0x00484944, "device_code": 0x2024, "map_version": 1})
 """What this PLC identifies as; the shipped map expects the same, which a test sees to."""
@@ -192,13 +219,7 @@ class PlcDevice:
             }
 
     def write(self, values: Mapping[str, Value]) -> None:
-        """Take what the host writes, by register name: all of it or nothing.
-
-        Raises
-        ------
-        ValueRefusedError
-            If the program does not accept a value, or the host may not write a register.
-        """
+        """Take what the host writes, by register name: all of it or nothing."""
         for name, value in values.items():
             expected, accepts = _ACCEPTED.get(name, ("no write: this register is read only", _nothing))
             if not accepts(value):

@@ -339,31 +339,7 @@ async def serve_plc(
     port: int = 0,
     security: PlcSecurity | None = None,
 ) -> AsyncIterator[ServedPlc]:
-    """Serve a PLC in the running event loop, for the time of the block.
-
-    Parameters
-    ----------
-    device : PlcDevice
-        What is served.
-    register_map : RegisterMap
-        Where each of its values is.
-    host, port
-        Address to listen on; the system chooses port 0.
-    security : PlcSecurity or None
-        Its certificate and what roles may do; None for plain Modbus TCP.
-
-    Yields
-    ------
-    ServedPlc
-        With the port it listens on.
-
-    Raises
-    ------
-    BusDown
-        If the address can't be listened on.
-    ConfigMismatch
-        If the map has a register that the device knows nothing of, or the files of its security can't be used.
-    """
+    """Serve a PLC in the running event loop, for the time of the block."""
     registers = PlcRegisters(device, register_map)
     served = ServedPlc(device)
     server = PlcTcpServer(registers, host, port, served.answers, security)
@@ -448,13 +424,7 @@ class PlcServer:
         return self._ready.result().port
 
     def start(self) -> Self:
-        """Start the thread and wait until it listens.
-
-        Raises
-        ------
-        BusDown, ConfigMismatch
-            As for `serve_plc`.
-        """
+        """Start the thread and wait until it listens."""
         self._thread.start()
         try:
             self._ready.result()

@@ -90,13 +90,7 @@ class SimulatedRig:
         self._added = source
 
     def close(self) -> None:
-        """Take the slaves off the bus and shut it down.
-
-        Raises
-        ------
-        Exception
-            What plant, slaves or a callback raised in the rig's thread: a defect, which stopped the rig.
-        """
+        """Take the slaves off the bus and shut it down."""
         for node in self._nodes:
             node.close()
         self._link.close()

@@ -8,13 +8,10 @@ from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from hil.commission.engine import Asked, Commissioning
-from hil.commission.finding import Finding
+from hil.commission.engine import NAMES, Asked, Commissioning
 from hil.commission.order import RigSource
-from hil.commission.record import StepRecord
-from hil.commission.registry import NAMES
 from hil.commission.runner import Conditions, Runner
-from hil.commission.state import State, load_state
+from hil.commission.state import Finding, State, StepRecord, load_state
 from hil.commission.step import Job, Step
 from hil.commission.talk import Script, Talk
 from hil.config.rig_file import read_rig

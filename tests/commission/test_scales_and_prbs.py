@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from hil.commission.model_json import model_json
+from hil.commission.state import model_json
 from hil.commission.steps import prbs
 from hil.simulator.plant import DEFAULT_BUS
 from tests.commission.rigs import bench

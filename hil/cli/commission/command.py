@@ -102,7 +102,7 @@ def _to_its_report(job: Job, talk: Talk, asked: Asked, console: Console, as_json
 def _commission(job: Job, talk: Talk, asked: Asked, console: Console) -> None:
     from hil.cli.commission.bar import Bar
     from hil.commission.engine import Commissioning
-    from hil.commission.text import findings_table
+    from hil.commission.talk import findings_table
 
     pacer = job.runner.conditions.pacer(job.rig)  # refuses a pace this rig must not be driven at, before anything
     job.say(f"{job.rig.name}: commissioning in {job.folder}, one cycle every {pacer.period_ns / 1e6:g} ms")

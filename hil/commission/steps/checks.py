@@ -1,27 +1,85 @@
-"""Limits: the torque guard refuses what is beyond each limit of the rig file, and the PLC permits what will be asked.
-
-No torque is commanded and no bus is used for the guard: it is asked, with the limits a run would have.
-"""
+"""The first two steps: every device found and proven to stop, and each limit refused beyond. No torque."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
-from drivers.errors import CommandRefused
+from drivers.errors import CommandRefused, DriverError
 from drivers.guard_limits import NS_PER_S
 from drivers.plc.types import PlcStatus
 from drivers.torque_guard import Evidence, GuardLimits, TorqueGuard, TorqueRequest
-from hil.commission.finding import Finding
 from hil.commission.order import Order
-from hil.commission.predict import rigid_model
+from hil.commission.runner import rigid_model
+from hil.commission.state import Finding, stated
 from hil.commission.step import Job, Outcome, Step
 from hil.commission.steps import experiments
+from hil.config.rig_file import Rig
 from hil.rig.build import open_devices
+from hil.rig.check import Finding as Found
+from hil.rig.check import Verdict, check_rig
 from hil.rig.excitation import NO_TORQUE
 from hil.rig.plan import plan_run
 from hil.rig.plc_limits import max_speed_rad_s, plc_limits
+
+MENDING = "Correct the rig file, or fix or connect the device it describes; see: hil check RIG"
+
+
+def _about_devices(job: Job) -> str:
+    return (
+        "looks for both inverters and the PLC, compares identity, PDO map, scales and limits with rig file and EDS, "
+        "and has each drive show that it stops when its host falls silent. Configures the drives; commands no torque."
+    )
+
+
+def _do_devices(job: Job) -> Outcome:
+    found = check_rig(job.rig, prove_stop=True)
+    written = 0
+    if any(each.verdict is Verdict.DIFFERS for each in found):
+        before = sum(len(each.differences) for each in found)
+        _configure(job.rig)
+        found = check_rig(job.rig, prove_stop=True)
+        written = before - sum(len(each.differences) for each in found)
+    findings = [finding for each in found for finding in (*_findings(each), *_protections(each))]
+    if written > 0:
+        findings.append(stated("entries written by configuring", str(written)))
+    return Outcome(findings)
+
+
+def _configure(rig: Rig) -> None:
+    """Write what a run writes; what does not take it is found by the check that follows."""
+    with suppress(DriverError), open_devices(rig) as devices:
+        devices.m1.configure()
+        devices.m2.configure()
+
+
+def _protections(found: Found) -> list[Finding]:
+    """Keep what stands between a dead host and torque, and who accepted what is missing."""
+    return [
+        stated(f"{found.device} without its host: {each.name}", str(each).partition(": ")[2])
+        for each in found.protections
+    ]
+
+
+def _findings(found: Found) -> list[Finding]:
+    expected = "there, and as rig file and EDS describe it"
+    name = f"{found.device} at {found.address}"
+    if found.differences:
+        return [
+            Finding(f"{name}: {each.what}", f"{each.expected} ({each.source})", each.found, False, MENDING, True)
+            for each in found.differences
+        ]
+    agrees = found.verdict is Verdict.AGREES
+    unfit = [note for note in found.notes if not note.startswith("EDS ")]
+    advice = "" if agrees and not unfit else "Bring the vehicle into that state" if agrees else MENDING
+    measured = "; ".join((found.verdict.value, *found.notes))
+    return [Finding(name, expected, measured, agrees and not unfit, advice, True)]
+
+
+DEVICES = Step("devices", "Devices", _about_devices, _do_devices)
+
 
 BEYOND = 1.001
 """A probe is so many times its limit: by less than any drive resolves."""
@@ -46,14 +104,14 @@ class Probe:
     evidence_beyond: Evidence = FRESH
 
 
-def _about(job: Job) -> str:
+def _about_limits(job: Job) -> str:
     return (
         "asks the torque guard for a little more than each limit of the rig file and checks that it refuses; compares "
         "the PLC's limits with what the runs need. Commands no torque."
     )
 
 
-def _do(job: Job) -> Outcome:
+def _do_limits(job: Job) -> Outcome:
     limits = job.rig.guard_limits
     findings = [_probed(limits, probe) for probe in _probes(limits)]
     with open_devices(job.rig) as devices:
@@ -204,4 +262,4 @@ def _fastest_rad_s(job: Job, order: Order) -> float:
     return max(abs(speed.low), abs(speed.high))
 
 
-STEP = Step("limits", "Limits", _about, _do, needs=("devices",))
+LIMITS = Step("limits", "Limits", _about_limits, _do_limits, needs=("devices",))

@@ -1,19 +1,17 @@
-"""Physical parameters from free-run simulations, with nothing but rough values to start from.
-
-The estimator's own fit (`estimator.physics.fit`), its unknowns left as wide as can be: a commissioning has no nominal
-model with tolerances yet, it makes one.
-"""
+"""Physical parameters of one or two masses from runs, and the delay between torque and speed."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from estimator.diagnosis.assemble import load_torques
 from estimator.diagnosis.intervals import reported_covariance
+from estimator.identification.linear_model import Orders
 from estimator.identification.modes.modes import Mode
 from estimator.physics.effects import coulomb_friction_motor
 from estimator.physics.fit import FitResult
@@ -22,8 +20,13 @@ from estimator.physics.motion import torque_scale
 from estimator.physics.problem import make_problem
 from estimator.physics.starts import best_fit
 from estimator.physics.unknowns import Shared
+from estimator.signals.decimate import decimate
 from estimator.signals.record import Record
-from hil.commission.analysis.measured import TRUSTED, Z95, Measured
+from hil.commission.responses import HIGH_PASS_HZ, TRUSTED, Z95, Measured
+
+if TYPE_CHECKING:
+    from estimator.identification.offline.output_error import OutputErrorFit
+
 
 WIDEST = 100.0
 """A parameter may end so many times above or below where it starts."""
@@ -120,3 +123,29 @@ def _summary(model: DrivelineModel, result: FitResult) -> PhysicalFit:
         for name, load in load_torques(result, model).items()
     }
     return PhysicalFit(DrivelineModel(model.structure, parameters), values, loads, result.rms)
+
+
+NATURAL_DELAY = 1
+"""Samples of delay that sampling alone makes."""
+
+LONGEST = 5
+"""Longest delay tried [samples]."""
+
+
+@dataclass(frozen=True, slots=True)
+class DelaySelection:
+    """The delay that suits best, beyond the sample that is natural, and the model with it."""
+
+    extra_samples: int
+    fit: OutputErrorFit
+    rms_by_delay: tuple[float, ...]
+
+
+def select_delay(record: Record) -> DelaySelection:
+    """Choose the delay from torque to speed."""
+    data = decimate(record, 1, HIGH_PASS_HZ)
+    from estimator.identification.offline.output_error import fit_output_error  # a second, and the bus comes first
+
+    fits = [fit_output_error(data, Orders(nk=nk)) for nk in range(NATURAL_DELAY, LONGEST + 1)]
+    best = min(range(len(fits)), key=lambda i: fits[i].rms)
+    return DelaySelection(best, fits[best], tuple(fit.rms for fit in fits))
