@@ -9,6 +9,6 @@ import typer
 TakeOver = Annotated[
     bool,
     typer.Option(
-        "--take-over", help="Go on though another host is heard on the bus; refused where a drive may carry torque."
+        "--take-over", help="Continue though another host is heard on the bus; refused where a drive may carry torque."
     ),
 ]

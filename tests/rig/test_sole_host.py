@@ -101,7 +101,7 @@ def test_an_enabled_drive_is_refused_and_stays_enabled(take_over: bool) -> None:
         assert states == [PowerState.OPERATION_ENABLED] * 2
 
 
-def test_take_over_goes_on_where_the_drives_are_disabled() -> None:
+def test_take_over_continues_where_the_drives_are_disabled() -> None:
     with served(bus_url=WS) as (server, rig), sending(server.bus_url, 0x080, b""), open_devices(rig.taking_over()):
         pass
 
