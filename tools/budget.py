@@ -27,7 +27,7 @@ def main() -> int:
     """Write a line for each room above its budget; return 1 if there are any."""
     budgets: dict[str, int] = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["hil"]["budget"]
     over = [
-        f"{room}: {used} lines, its budget is {budget}: make it smaller, or raise it in pyproject.toml with the reason\n"
+        f"{room}: {used} lines, budget {budget}: make it smaller, or raise the budget in pyproject.toml and say why\n"
         for room, budget in budgets.items()
         if (used := lines_of(room)) > budget
     ]

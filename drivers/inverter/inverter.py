@@ -106,10 +106,13 @@ class Inverter(InspectedInverter):
             If identity, rated torque, scale, limit or modes differ, or a write does not hold.
         DeviceTimeout
             If the node does not answer or does not become operational.
+        ForeignController
+            If the drive is enabled, which this program has not done.
         """
         self._armed = False
         self._health.frozen.start_anew()
         self._monitor.expect(None)
+        self._power.require_disabled()
         self._send_nmt(NmtCommand.ENTER_PRE_OPERATIONAL)
         if differences := tuple(fixed_differences(self._sdo, self._plan, self.settings)):
             raise ConfigMismatch(

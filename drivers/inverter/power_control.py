@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from typing import TypeVar
 
 from drivers.canopen.emcy_codes import cause_of
 from drivers.canopen.sdo import SdoChannel
-from drivers.errors import ConfigMismatch, DeviceFault, DeviceTimeout
+from drivers.errors import ConfigMismatch, DeviceFault, DeviceTimeout, ForeignController, ProtocolViolation
 from drivers.inverter.cia402 import (
     FAULT_STATES,
     TORQUE_STATES,
@@ -195,6 +196,23 @@ class PowerControl:
                 f"expected {expected}. Check enable inputs, mains contactor and interlocks of the drive."
             )
         return state
+
+    def require_disabled(self) -> None:
+        """Refuse a drive that is enabled before it is configured: an NMT command would take its torque from it.
+
+        One that does not say, as in NMT STOPPED, has no torque to lose.
+
+        Raises
+        ------
+        ForeignController
+            If it is in OPERATION_ENABLED.
+        """
+        with suppress(DeviceTimeout, ProtocolViolation):
+            if self.state() is PowerState.OPERATION_ENABLED:
+                raise ForeignController(
+                    f"{self._where}: power state is {PowerState.OPERATION_ENABLED.value} before it is configured, "
+                    "expected a drive that is disabled. Another host drives it: end that one first."
+                )
 
     def raise_if_fault(self, state: PowerState) -> None:
         """Refuse a fault state, with the cause the drive gives in its error code 0x603F, or in its EMCY without one.

@@ -12,7 +12,7 @@ from rich.markup import escape
 from hil.cli.completers import effect_names
 from hil.cli.trust_option import TrustLaws
 from hil.rig.stop import StopRequest, stop_on_signals
-from hil.simulator.fault_spec import known_faults
+from hil.simulator.fault_table import known_faults
 
 if TYPE_CHECKING:
     from hil.config.rig_file import Rig
@@ -73,10 +73,10 @@ def sim(
     Prints one line, `ready bus=... modbus=...`, and runs until SIGINT or SIGTERM. Port 0 takes a free one.
     """
     from hil.config.rig_file import read_rig
-    from hil.simulator.fault_spec import rig_faults
-    from hil.simulator.plant_factory import plant_for
+    from hil.simulator.driveline import plant_for
+    from hil.simulator.fault_table import rig_faults
+    from hil.simulator.plant import EffectSpec
     from hil.simulator.rig_server import RigServer
-    from hil.simulator.simulation_model import EffectSpec
 
     rig_file = read_rig(rig)
     effects = [EffectSpec.parse(text) for text in effect or ()]

@@ -1,24 +1,131 @@
-"""Go through the steps: announce, ask, do, note; skip, repeat, resume.
-
-Whatever happens in a step, its record says so before anything else is done, and the next call begins there. Drives are
-disarmed by the run itself (`hil.rig.session`), long before this hears of it.
-"""
+"""The steps of a commissioning in their order: announce, ask, do, note; skip, repeat, resume."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any
 
-from hil.commission.announce import announcement, plan_of
-from hil.commission.finding import Finding
+from hil.commission.order import changed_keys, rig_digest
 from hil.commission.readings import json_safe
-from hil.commission.record import Status, now_utc
-from hil.commission.registry import STEPS
-from hil.commission.rig_change import changed_keys, rig_digest
+from hil.commission.runner import Prediction
+from hil.commission.state import Finding, Status, now_utc
 from hil.commission.step import Job, Outcome, Step
+from hil.commission.steps.checks import DEVICES, LIMITS
+from hil.commission.steps.experiments import EXPERIMENTS, IDENTIFICATION
+from hil.commission.steps.models import DIAGNOSIS, VALIDATION
+from hil.commission.steps.noise_friction import FRICTION, NOISE
+from hil.commission.steps.prbs import PRBS
+from hil.commission.steps.signs_scales import SCALES, SIGNS
 from hil.commission.talk import Answer, Talk, What
 from hil.errors import RunAborted, UsageError
 from hil.report.numbers import moment
+
+STEPS = (
+    DEVICES,
+    LIMITS,
+    NOISE,
+    SIGNS,
+    SCALES,
+    FRICTION,
+    PRBS,
+    EXPERIMENTS,
+    IDENTIFICATION,
+    VALIDATION,
+    DIAGNOSIS,
+)
+
+NAMES = tuple(step.name for step in STEPS)
+
+
+CONNECT_S = 3.0
+"""Opening, configuring, arming and disarming, per run [s]; see docs/benchmarks.md."""
+
+QUESTION_S = 30.0
+"""A person reads and answers, per step with torque [s]."""
+
+MOST_VEHICLE_S = 40 * 60
+"""A commissioning should not take the vehicle for longer [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedRun:
+    """One run of a plan: what is predicted of it [s, Nm, rad/s]."""
+
+    name: str
+    seconds: float
+    torque_m1_nm: tuple[float, float]
+    torque_m2_nm: tuple[float, float]
+    speed_rad_s: tuple[float, float]
+
+    @classmethod
+    def of(cls, name: str, prediction: Prediction) -> PlannedRun:
+        """Make it from a prediction."""
+        m1, m2, speed = prediction.torque_m1_nm, prediction.torque_m2_nm, prediction.speed_rad_s
+        return cls(name, prediction.seconds, (m1.low, m1.high), (m2.low, m2.high), (speed.low, speed.high))
+
+
+def plan_of(job: Job, step: Step) -> list[PlannedRun]:
+    """Predict the runs of a step; none where it commands no torque."""
+    runs, speed_rad_s = [], job.rolling_rad_s()
+    for order in step.orders(job):
+        prediction = job.predict(order, speed_rad_s)
+        speed_rad_s = prediction.last_rad_s
+        runs.append(PlannedRun.of(order.name, prediction))
+    return runs
+
+
+def vehicle_seconds(runs: Sequence[PlannedRun]) -> float:
+    """Return how long the vehicle is needed for the runs of one step [s]."""
+    return sum(run.seconds + CONNECT_S for run in runs) + (QUESTION_S if runs else 0.0)
+
+
+def announcement(job: Job, step: Step, runs: Sequence[PlannedRun]) -> list[str]:
+    """Return the lines that announce a step."""
+    number = [each.name for each in STEPS].index(step.name) + 1
+    lines = ["", f"{number}/{len(STEPS)} {step.title} ({step.name})", f"  It {step.about(job)}"]
+    if not runs:
+        return lines
+    width = max(len(run.name) for run in runs)
+    lines.append("  predicted, through the torque guard:")
+    lines += [
+        f"    {run.name:{width}}  {run.seconds:5.1f} s   m1 {_range(run.torque_m1_nm)} Nm   "
+        f"m2 {_range(run.torque_m2_nm)} Nm   speed {_range(run.speed_rad_s, 1)} rad/s"
+        for run in runs
+    ]
+    lines.append(f"  {sum(run.seconds for run in runs):.0f} s of driving")
+    return lines
+
+
+def _range(values: tuple[float, float], digits: int = 0) -> str:
+    low, high = (round(value, digits) + 0.0 for value in values)
+    return f"{low:{6 + digits}.{digits}f} to {high:{4 + digits}.{digits}f}"
+
+
+def plan_document(job: Job) -> dict[str, Any]:
+    """Return the whole plan (schema ``hil.commission_plan/1``), as far as it can be known before."""
+    steps: list[dict[str, Any]] = []
+    total_s = 0.0
+    for step in STEPS:
+        runs = plan_of(job, step)
+        total_s += vehicle_seconds(runs)
+        steps.append(
+            {
+                "name": step.name,
+                "title": step.title,
+                "about": f"It {step.about(job)}",
+                "status": step.record(job).status.value,
+                "runs": [asdict(run) for run in runs],
+                "vehicle_s": round(vehicle_seconds(runs), 1),
+            }
+        )
+    return {
+        "schema": "hil.commission_plan/1",
+        "rig": job.rig.name,
+        "steps": steps,
+        "vehicle_s": round(total_s, 1),
+        "most_vehicle_s": MOST_VEHICLE_S,
+    }
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,17 +160,7 @@ class Commissioning:
     _redone: set[str] = field(default_factory=set)
 
     def run(self) -> None:
-        """Do every step that is not settled.
-
-        Raises
-        ------
-        RunAborted
-            If a finding blocks, or a run was ended.
-        KeyboardInterrupt
-            On Ctrl-C, or where the person quits.
-        HilError, DriverError, EstimatorError, OSError
-            Whatever a step raises; its record names it.
-        """
+        """Do every step that is not settled."""
         self._look_for_changes()
         for step in STEPS:
             self._through(step)
@@ -171,6 +268,8 @@ class Commissioning:
     def _after(self, step: Step, outcome: Outcome) -> Answer:
         findings = list(outcome.findings)
         self.show(step, findings)
+        for question in outcome.questions:
+            self._confirm(step, question)
         stops = [finding for finding in findings if finding.stops]
         outside = sum(finding.within is False for finding in findings)
         answer = self.talk.after(step.name, outside, bool(stops))
@@ -182,6 +281,16 @@ class Commissioning:
                 f"Then call again; it continues from here. To continue without: --skip {step.name} --because TEXT."
             )
         return answer
+
+    def _confirm(self, step: Step, question: str) -> None:
+        self.job.say(f"  {question}")
+        if self.talk.confirm(question).what is not What.GO:
+            step.record(self.job).end(Status.BLOCKED, f"answered no: {question}")
+            self.job.state.save()
+            raise RunAborted(
+                f"step {step.name}: {question} The answer was no, expected yes. Correct the register map, the PLC or "
+                "the rig file; then call again; it continues from here."
+            )
 
 
 def _quit_if_asked(answer: Answer) -> None:

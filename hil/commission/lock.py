@@ -22,16 +22,6 @@ def sole_use(folder: Path) -> Iterator[None]:
 
     The operating system lets go of it when the process ends, however it ends: a lock is never left behind. The file
     stays, for a lock on a file that is removed and made anew holds nobody off.
-
-    Parameters
-    ----------
-    folder
-        Of the commissioning; it is there.
-
-    Raises
-    ------
-    UsageError
-        If another call holds it, naming that process; or if nothing can be written there.
     """
     with _opened(folder / LOCK) as file:
         if not _taken(file):

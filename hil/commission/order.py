@@ -1,21 +1,20 @@
-"""One run as a step orders it, and the rig file it is run with: the user's, with that one experiment and its PRBS.
-
-The changed file is checked like any rig file, so that what an order asks for is held against the same limits; it is
-what the recording is given to say of itself.
-"""
+"""One run as a step orders it, with the rig file it is run with, and what was changed in that file."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import hashlib
+import json
+import tomllib
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import tomlkit
 
-from hil.config.experiment_tables import AnyExperiment
+from hil.config.experiment_tables import AnyExperiment, CruiseTable
 from hil.config.rig_file import Rig
-from hil.errors import RigFileError
+from hil.errors import RigFileError, UsageError
 from hil.problems import validate
 from hil.rig.addresses import with_addresses
 
@@ -55,25 +54,14 @@ class RigSource:
     text: str
     bus: str | None = None
     modbus: str | None = None
+    take_over: bool = False
 
     def rig(self) -> Rig:
-        """Return the rig as the user wrote it.
-
-        Raises
-        ------
-        RigFileError
-            If the file has faults.
-        """
+        """Return the rig as the user wrote it."""
         return self._checked(self.text)
 
     def ordered(self, order: Order) -> tuple[Rig, str]:
-        """Return the rig to run an order with, and the text of its file.
-
-        Raises
-        ------
-        RigFileError
-            If the order breaks a rule of rig files: a limit, for one.
-        """
+        """Return the rig to run an order with, and the text of its file."""
         document = tomlkit.parse(self.text)
         document["experiments"] = {order.name: dict(order.table)}
         prbs: Any = document["prbs"]
@@ -87,9 +75,64 @@ class RigSource:
 
     def _checked(self, text: str) -> Rig:
         rig = validate(Rig, tomlkit.parse(text).unwrap(), self.path, RigFileError)
-        return with_addresses(rig, self.bus, self.modbus)
+        return with_addresses(rig, self.bus, self.modbus, self.take_over)
 
 
 def as_table(experiment: AnyExperiment, **changes: object) -> dict[str, Any]:
     """Return an experiment of a rig file as a table to order, with changes."""
     return {**experiment.model_dump(), **changes}
+
+
+def rig_digest(text: str) -> str:
+    """Return a digest of what a rig file says."""
+    return hashlib.sha256(json.dumps(tomllib.loads(text), sort_keys=True, default=str).encode()).hexdigest()
+
+
+def changed_keys(before: str, after: str) -> list[str]:
+    """Name the keys that differ, each with its old and its new value."""
+    old, new = (dict(_leaves(tomllib.loads(text))) for text in (before, after))
+    return [
+        f"{key}: {_shown(old, key)} → {_shown(new, key)}"
+        for key in dict.fromkeys((*old, *new))
+        if old.get(key) != new.get(key)
+    ]
+
+
+def _leaves(table: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    for key, value in table.items():
+        if isinstance(value, dict):
+            yield from _leaves(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", value
+
+
+def _shown(leaves: dict[str, Any], key: str) -> str:
+    return repr(leaves[key]) if key in leaves else "not there"
+
+
+Kind = TypeVar("Kind", bound=AnyExperiment)
+
+HALT_S = 1.0
+"""Recorded part of coming to a stand [s]."""
+
+
+def first_of(rig: Rig, kind: type[Kind]) -> Kind | None:
+    """Return the first experiment of a kind in a rig file; None without one."""
+    return next((table for table in rig.experiments.values() if isinstance(table, kind)), None)
+
+
+def cruise_of(rig: Rig) -> CruiseTable:
+    """Return the cruise of a rig file: its speed is the one the vehicle is commissioned at."""
+    table = first_of(rig, CruiseTable)
+    if table is None:
+        raise UsageError(
+            f"rig {rig.name!r}: expected an experiment of kind 'cruise', which says at what speed and torque the "
+            "vehicle may be driven, there is none. Add [experiments.cruise] to the rig file; see examples/rig.toml."
+        )
+    return table
+
+
+def halt(rig: Rig) -> Order:
+    """Order the vehicle to a stand, by the torque that brought it to speed."""
+    table = as_table(cruise_of(rig), speed_rad_s=0.0, duration_s=HALT_S, prbs=False)
+    return Order("halt", table, least_margin_rad_s=2.0)

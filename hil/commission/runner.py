@@ -1,7 +1,4 @@
-"""Drive one ordered run: predicted, banded, recorded, entered into the store, and noted in the step's record.
-
-Everything that commands torque goes through here, and from here through `plan_run`, `run_plan` and the torque guard.
-"""
+"""Drive one ordered run: predicted, kept within a band of speed, recorded, and noted in the step's record."""
 
 from __future__ import annotations
 
@@ -12,20 +9,24 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Protocol
 
-from estimator.physics.model import DrivelineModel
-from hil.commission.band import WithinBand, margin_rad_s
+import numpy as np
+
+from drivers.torque_guard import Evidence, TorqueGuard
+from estimator.physics.model import DrivelineModel, Parameter, Structure
+from estimator.physics.stepper import Stepper
+from estimator.signals.record import FloatArray
 from hil.commission.order import Order, RigSource
-from hil.commission.predict import Prediction, predict
-from hil.commission.record import RunRecord
+from hil.commission.state import RunRecord
 from hil.config.rig_file import Rig
-from hil.errors import StoreError
+from hil.errors import RunAborted, StoreError
 from hil.recording.checksum import RIG_CHECKSUM, RIG_TEXT, text_sha256
 from hil.recording.writer import RecordingWriter
 from hil.rig.build import open_devices
 from hil.rig.dry_run import Range
-from hil.rig.experiments.base import Phase
+from hil.rig.experiments.base import BaseTorque, Experiment, Phase
+from hil.rig.experiments.low_pass import LowPass
 from hil.rig.metadata import run_metadata
-from hil.rig.pacing import Pacer, disk_patience_s, heartbeat_patience_ms
+from hil.rig.pacing import FreePacer, Pacer, disk_patience_s, heartbeat_patience_ms, period_ns
 from hil.rig.plan import Plan, plan_run
 from hil.rig.realtime import RealTimeGrants
 from hil.rig.session import run_plan
@@ -33,6 +34,146 @@ from hil.rig.stop import StopRequest, stop_on_signals
 from hil.rig.timing import RunTiming
 from hil.sample import Sample
 from hil.store import register_run
+
+NO_DRAG = 1e-3
+"""Viscous friction of a vehicle of which only the inertia is known, over that inertia [1/s]: next to none."""
+
+
+@dataclass(frozen=True, slots=True)
+class Prediction:
+    """What to expect of a run.
+
+    Attributes
+    ----------
+    seconds
+        Length of the whole run.
+    torque_m1_nm, torque_m2_nm
+        Range of each inverter's torque, PRBS included.
+    speed_rad_s, speed_measured_rad_s
+        Range of the speed over the whole run and over its recorded part.
+    last_rad_s
+        Speed at the end.
+    torque_nm, course_rad_s
+        Total torque and speed of the recorded part, shape (N,).
+    """
+
+    seconds: float
+    torque_m1_nm: Range
+    torque_m2_nm: Range
+    speed_rad_s: Range
+    speed_measured_rad_s: Range
+    last_rad_s: float
+    torque_nm: FloatArray
+    course_rad_s: FloatArray
+
+    def as_json(self) -> dict[str, list[float]]:
+        """Return the ranges for the state file."""
+        return {
+            "torque_m1_nm": [self.torque_m1_nm.low, self.torque_m1_nm.high],
+            "torque_m2_nm": [self.torque_m2_nm.low, self.torque_m2_nm.high],
+            "speed_rad_s": [self.speed_rad_s.low, self.speed_rad_s.high],
+            "speed_measured_rad_s": [self.speed_measured_rad_s.low, self.speed_measured_rad_s.high],
+        }
+
+
+def rigid_model(rig: Rig) -> DrivelineModel:
+    """Return what the rig file alone says of the vehicle: its inertia."""
+    inertia = rig.vehicle.inertia_kg_m2
+    return DrivelineModel(
+        Structure.ONE_MASS, {"J_M": Parameter(inertia, 0.5), "b_M": Parameter(NO_DRAG * inertia, 0.5)}
+    )
+
+
+def predict(rig: Rig, name: str, model: DrivelineModel, speed_rad_s: float = 0.0) -> Prediction:
+    """Predict a run of one experiment of a rig file, from standstill or rolling at a speed [rad/s]."""
+    plan = plan_run(rig, name)
+    vehicle = Stepper(model, rig.period_s, speed_rad_s=speed_rad_s)
+    guard = TorqueGuard(rig.guard_limits)
+    guard.enable()
+    pacer = FreePacer(period_ns(rig.period_s))
+    guard.check(plan.split.request(0.0, 0.0), pacer.next().due_ns, Evidence(0, 0, vehicle.speed_rad_s))
+    m1, m2, speed, measured = Range(), Range(), Range(), Range()
+    torque: list[float] = []
+    course: list[float] = []
+    cycles, phase = 0, Phase.APPROACH
+    while phase is not Phase.DONE:
+        tick = pacer.next()
+        base = plan.experiment.torque(cycles * rig.period_s, vehicle.speed_rad_s)
+        phase, cycles = base.phase, cycles + 1
+        request = plan.split.request(base.torque_nm, plan.prbs_nm(phase))
+        guard.check(request, tick.due_ns, Evidence(0, 0, vehicle.speed_rad_s))
+        if plan.plc_prbs is not None:  # not the host's to send, but there all the same
+            request = plan.split.request(base.torque_nm, plan.expected_plc_prbs_nm(phase))
+        m1.see(request.total_m1_nm)
+        m2.see(request.total_m2_nm)
+        speed.see(vehicle.speed_rad_s)
+        if phase is Phase.MEASURE:
+            measured.see(vehicle.speed_rad_s)
+            torque.append(request.total_m1_nm + request.total_m2_nm)
+            course.append(vehicle.speed_rad_s)
+        vehicle.step(request.total_m1_nm, request.total_m2_nm)
+    seconds = cycles * rig.period_s
+    last_rad_s = vehicle.speed_rad_s
+    return Prediction(seconds, m1, m2, speed, measured, last_rad_s, np.array(torque), np.array(course))
+
+
+FILTER_S = 0.2
+"""Low-pass of the speed [s]: a resonance at 8 Hz is a tenth of itself behind it."""
+
+MARGIN_SHARE = 0.25
+"""How far a speed may leave its predicted range, in parts of the range: grade and drag are not in the prediction."""
+
+
+@dataclass(slots=True)
+class WithinBand:
+    """An experiment inside a speed band.
+
+    Where the vehicle rolls at the beginning, the band reaches from there.
+
+    Attributes
+    ----------
+    experiment
+        What is driven.
+    low_rad_s, high_rad_s
+        Ends of the band [rad/s].
+    margin_rad_s
+        What the speed at the beginning is given next to it.
+    period_s
+        Time between two cycles [s].
+    """
+
+    experiment: Experiment
+    low_rad_s: float
+    high_rad_s: float
+    margin_rad_s: float
+    period_s: float
+    _speed: LowPass | None = None
+
+    @property
+    def duration_s(self) -> float:
+        """Length of the measured part [s]."""
+        return self.experiment.duration_s
+
+    def torque(self, time_s: float, speed_rad_s: float) -> BaseTorque:
+        """Torque and phase of one cycle; see `hil.rig.experiments.base.Experiment`."""
+        if self._speed is None:
+            self._speed = LowPass(FILTER_S, self.period_s)
+            self.low_rad_s = min(self.low_rad_s, speed_rad_s - self.margin_rad_s)
+            self.high_rad_s = max(self.high_rad_s, speed_rad_s + self.margin_rad_s)
+        smooth_rad_s = self._speed.update(speed_rad_s)
+        if not self.low_rad_s <= smooth_rad_s <= self.high_rad_s:
+            raise RunAborted(
+                f"speed band: the speed is {smooth_rad_s:.1f} rad/s, expected {self.low_rad_s:.1f} to "
+                f"{self.high_rad_s:.1f} rad/s, what was predicted and a margin. The run was ended at zero torque. Look "
+                "for a grade, a wrong sign, or an inertia in the rig file that is far off."
+            )
+        return self.experiment.torque(time_s, speed_rad_s)
+
+
+def margin_rad_s(low_rad_s: float, high_rad_s: float, least_rad_s: float) -> float:
+    """Return the margin of a predicted range [rad/s]."""
+    return max(least_rad_s, MARGIN_SHARE * (high_rad_s - low_rad_s))
+
 
 RUNS = "runs"
 """Folder of the recordings, and of the store of runs, inside that of the commissioning."""
@@ -138,24 +279,7 @@ class Runner:
         speed_rad_s: float,
         note: Callable[[RunRecord], None],
     ) -> RunRecord:
-        """Drive an order.
-
-        Parameters
-        ----------
-        step
-            Name of the step that ordered it.
-        model
-            What it is predicted with.
-        speed_rad_s
-            Speed the vehicle was last seen at.
-        note
-            Called with the summary of a run, also of one that was ended early.
-
-        Raises
-        ------
-        RunAborted, DriverError, RecordingError, KeyboardInterrupt
-            As `hil.rig.session.run_plan`; also if the speed leaves its band.
-        """
+        """Drive an order."""
         rig, text = self.source.ordered(order)
         prediction = self.predict(order, model, speed_rad_s)
         path, seen = self._free_path(step, order), _Seen()

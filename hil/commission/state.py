@@ -1,23 +1,169 @@
-"""The state file of a commissioning: ``commission.json`` (schema ``hil.commission/1``), whole after every change.
-
-It is written next to itself and moved over the old one, so that neither an interruption nor a full disk nor the end of
-power leaves half of it.
-"""
+"""What is kept of a commissioning: its steps, their findings, evidence and runs, in commission.json."""
 
 from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, field, fields
+from datetime import UTC, datetime
+from enum import Enum
 from pathlib import Path
 from typing import Any, Final
 
+from estimator.physics.model import DrivelineModel, Parameter, Structure
 from hil import __version__
-from hil.commission.record import Status, StepRecord, now_utc
 from hil.errors import UsageError
 from hil.inside import is_inside
 from hil.parse_json import read_json
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One line of a step's verdict.
+
+    Attributes
+    ----------
+    what
+        The quantity, in a few words.
+    expected
+        The limit, with its unit.
+    measured
+        The value, with its unit and interval.
+    within
+        Whether it is; None where the data don't tell, or there is no limit to keep.
+    advice
+        What to do where it is not within; empty where nothing need be done.
+    blocking
+        Whether continuing would be unsafe, or without meaning.
+    """
+
+    what: str
+    expected: str
+    measured: str
+    within: bool | None
+    advice: str = ""
+    blocking: bool = False
+
+    @property
+    def stops(self) -> bool:
+        """Whether the commissioning ends here."""
+        return self.blocking and self.within is not True
+
+    def as_json(self) -> dict[str, Any]:
+        """Return it for the state file."""
+        return asdict(self)
+
+
+def stated(what: str, measured: str) -> Finding:
+    """State a value that has no limit."""
+    return Finding(what, "–", measured, None)
+
+
+class Status(Enum):
+    """How far a step is."""
+
+    PENDING = "pending"
+    RUNNING = "running"
+    DONE = "done"
+    BLOCKED = "blocked"
+    SKIPPED = "skipped"
+    INTERRUPTED = "interrupted"
+
+    @property
+    def is_settled(self) -> bool:
+        """Whether the next call goes past it."""
+        return self in (Status.DONE, Status.SKIPPED)
+
+
+@dataclass(slots=True)
+class RunRecord:
+    """One run of a step: its recording next to the state file, and what was predicted and measured [Nm, rad/s].
+
+    ``whole`` is False where the run was ended early; its recording then holds what there was.
+    """
+
+    name: str
+    recording: str | None
+    whole: bool
+    seconds: float
+    predicted: dict[str, list[float]]
+    measured: dict[str, list[float]]
+    flagged: int = 0
+    recorded: int = 0
+    prbs_nm: float = 0.0
+    last_rad_s: float = 0.0
+
+
+@dataclass(slots=True)
+class StepRecord:
+    """One step; see the module's text."""
+
+    status: Status = Status.PENDING
+    because: str = ""
+    attempt: int = 0
+    rig_digest: str = ""
+    started_utc: str = ""
+    ended_utc: str = ""
+    findings: list[Finding] = field(default_factory=list)
+    evidence: dict[str, Any] = field(default_factory=dict)
+    runs: list[RunRecord] = field(default_factory=list)
+    history: list[dict[str, Any]] = field(default_factory=list)
+
+    def begin(self, rig_digest: str, keep_runs: bool) -> None:
+        """Begin an attempt; the one before it goes to the history, its whole runs stay where ``keep_runs``."""
+        if self.attempt:
+            self.history.append(
+                {
+                    "attempt": self.attempt,
+                    "status": self.status.value,
+                    "because": self.because,
+                    "ended_utc": self.ended_utc,
+                    "recordings": [run.recording for run in self.runs if run.recording],
+                    "findings": [finding.as_json() for finding in self.findings],
+                }
+            )
+        self.attempt += 1
+        self.runs = [run for run in self.runs if run.whole] if keep_runs else []
+        self.status, self.because, self.rig_digest = Status.RUNNING, "", rig_digest
+        self.findings, self.evidence = [], {}
+        self.started_utc, self.ended_utc = now_utc(), ""
+
+    def end(self, status: Status, because: str = "") -> None:
+        """End the attempt."""
+        self.status, self.because, self.ended_utc = status, because, now_utc()
+
+    def run(self, name: str) -> RunRecord | None:
+        """Return the whole run of a name, if there is one."""
+        return next((run for run in self.runs if run.name == name and run.whole), None)
+
+    def as_json(self) -> dict[str, Any]:
+        """Return it for the state file."""
+        document = {each.name: getattr(self, each.name) for each in fields(self)}
+        return document | {
+            "status": self.status.value,
+            "findings": [finding.as_json() for finding in self.findings],
+            "runs": [asdict(run) for run in self.runs],
+        }
+
+    @classmethod
+    def from_json(cls, document: dict[str, Any]) -> StepRecord:
+        """Read it from the state file."""
+        known = {each.name: document[each.name] for each in fields(cls)}
+        return cls(
+            **known
+            | {
+                "status": Status(known["status"]),
+                "findings": [Finding(**finding) for finding in known["findings"]],
+                "runs": [RunRecord(**run) for run in known["runs"]],
+            }
+        )
+
+
+def now_utc() -> str:
+    """Return the present time as text."""
+    return datetime.now(UTC).isoformat(timespec="seconds")
+
 
 SCHEMA: Final = "hil.commission/1"
 FILE_NAME: Final = "commission.json"
@@ -71,13 +217,7 @@ class State:
         }
 
     def save(self) -> None:
-        """Write the file, whole or not at all.
-
-        Raises
-        ------
-        UsageError
-            If the disk does not take it; the file before it is still there.
-        """
+        """Write the file, whole or not at all."""
         text = json.dumps(self.document(), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
         part = self.path.with_name(f".{FILE_NAME}.{os.getpid()}.part")
         try:
@@ -106,13 +246,7 @@ class State:
 
 
 def load_state(folder: Path, names: Iterable[str]) -> State | None:
-    """Read the state of a folder; None where there is none. A step that is new to it is pending.
-
-    Raises
-    ------
-    UsageError
-        If the file is none of a commissioning, or damaged.
-    """
+    """Read the state of a folder; None where there is none. A step that is new to it is pending."""
     path = folder / FILE_NAME
     if not path.exists():
         return None
@@ -148,3 +282,17 @@ def _step(folder: Path, document: Any) -> StepRecord:
     if record.status is Status.RUNNING:  # the program was killed, or its machine went down
         record.end(Status.INTERRUPTED, "the program ended without a word: it was killed, or the machine went down")
     return record
+
+
+def model_json(model: DrivelineModel) -> dict[str, Any]:
+    """Return structure and parameters; effects are left to model files."""
+    return {
+        "structure": model.structure.value,
+        "parameters": {name: [each.value, each.tolerance] for name, each in model.parameters.items()},
+    }
+
+
+def model_from_json(document: Mapping[str, Any]) -> DrivelineModel:
+    """Return the model again."""
+    parameters = {name: Parameter(value, tolerance) for name, (value, tolerance) in document["parameters"].items()}
+    return DrivelineModel(Structure(document["structure"]), parameters)

@@ -8,13 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from estimator.physics.model import DrivelineModel
-from hil.commission.finding import Finding
-from hil.commission.model_json import model_from_json
 from hil.commission.order import Order, RigSource
-from hil.commission.predict import Prediction, rigid_model
-from hil.commission.record import RunRecord, StepRecord
-from hil.commission.runner import Runner
-from hil.commission.state import State
+from hil.commission.runner import Prediction, Runner, rigid_model
+from hil.commission.state import Finding, RunRecord, State, StepRecord, model_from_json
 from hil.config.rig_file import Rig
 
 MODEL_STEPS = ("validation", "scales")
@@ -23,10 +19,11 @@ MODEL_STEPS = ("validation", "scales")
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What a step came to: findings for people, evidence for the steps after it and for the report."""
+    """What a step came to: findings and questions for people, evidence for the steps after it and for the report."""
 
     findings: Sequence[Finding]
     evidence: Mapping[str, Any] = field(default_factory=dict)
+    questions: Sequence[str] = ()
 
 
 @dataclass(slots=True)
@@ -146,5 +143,4 @@ class Step:
     needs: tuple[str, ...] = ()
 
     def record(self, job: Job) -> StepRecord:
-        """Return its record."""
         return job.state.steps[self.name]

@@ -16,7 +16,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, PrivateAttr, model_validator
 
 from drivers.capability.plan import plan_drive
 from drivers.datasheet.file import EdsFile
@@ -89,6 +89,18 @@ class Rig(Table):
     channels: list[ChannelTable] = Field(default_factory=list)
     experiments: dict[str, AnyExperiment] = Field(default_factory=dict)
     simulation: SimulationTable | None = None
+    _takes_over: bool = PrivateAttr(default=False)
+
+    @property
+    def takes_over(self) -> bool:
+        """Whether another host on the bus is put up with: asked for by the command line, and nothing of the file."""
+        return self._takes_over
+
+    def taking_over(self) -> Self:
+        """Return the same rig, with another host put up with where its drives are disabled."""
+        rig = self.model_copy()
+        rig._takes_over = True  # noqa: SLF001 - of this very class
+        return rig
 
     @property
     def host_node_id(self) -> int:
@@ -115,9 +127,8 @@ class Rig(Table):
     @property
     def of_monitor(self) -> Self:
         """The same rig for `hil monitor`, which is a host with a heartbeat of its own."""
-        return self.model_copy(
-            update={"can": self.can.model_copy(update={"host_node_id": self.monitor_node_id, "monitor_node_id": None})}
-        )
+        ids = {"host_node_id": self.monitor_node_id, "monitor_node_id": self.host_node_id}
+        return self.model_copy(update={"can": self.can.model_copy(update=ids)})
 
     def rpdo_deadline_ms(self, table: InverterTable) -> int:
         """Give the deadline of an inverter's RPDO: 150 ms where the rig file has none, at long periods two and a half.

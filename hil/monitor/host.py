@@ -229,8 +229,8 @@ def _rig(job: Job) -> Iterator[Rig]:
     if not job.simulate:
         yield job.rig
         return
+    from hil.simulator.driveline import plant_for
     from hil.simulator.loopback import IN_PROCESS, Address
-    from hil.simulator.plant_factory import plant_for
     from hil.simulator.rig_server import RigServer
 
     plant = plant_for(job.rig, [], job.trust_laws)

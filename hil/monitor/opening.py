@@ -26,8 +26,8 @@ from hil.rig.live import USUAL, OnlineSetup
 from hil.rig.replay import replay
 from hil.rig.trace import is_trace
 from hil.sample import Sample
+from hil.simulator.plant import simulation_model
 from hil.simulator.rig_server import required_simulation
-from hil.simulator.simulation_model import simulation_model
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,6 +20,7 @@ from hil.config.rig_file import InverterTable, PlcTable, Rig
 from hil.errors import UsageError
 from hil.rig.channels import Channels
 from hil.rig.plc_loop import PlcLoop
+from hil.rig.sole_host import require_sole_host
 from hil.simulator.loopback import is_simulated_bus
 
 NAMES = ("m1", "m2")
@@ -54,6 +55,8 @@ def open_devices(rig: Rig, least_host_timeout_ms: int = 0) -> Iterator[Devices]:
         If the bus may hold real drives, and nobody has filled in who accepts what they lack.
     BusDown
         If the CAN bus or the PLC's address is not there.
+    ForeignController
+        If another host is on the bus, or a drive may carry torque already.
     ConfigMismatch
         If an EDS or the register map can't be used, or the PLC is another one.
     DeviceTimeout
@@ -62,6 +65,7 @@ def open_devices(rig: Rig, least_host_timeout_ms: int = 0) -> Iterator[Devices]:
     _require_acceptances(rig)
     with CanLink.open(rig.can.url) as link, PlcLoop() as loop:
         m1, m2 = (Inverter(link, _watching(inverter_settings(name, rig), least_host_timeout_ms)) for name in NAMES)
+        require_sole_host(link, rig, min(m1.settings.host_heartbeat_s, m2.settings.host_heartbeat_s))
         with connected_plc(rig.plc, loop) as plc:
             channels = Channels(rig.channels, rig.register_map, {"m1": m1, "m2": m2}, loop, plc)
             yield Devices(link, m1, m2, TorqueGuard(rig.guard_limits), loop, plc, channels)

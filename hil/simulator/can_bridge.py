@@ -13,7 +13,10 @@ import hmac
 import logging
 import socket
 import threading
+import time
+from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from http import HTTPStatus
 from types import TracebackType
 from typing import Any, Final, Self
@@ -33,10 +36,13 @@ POLL_S = 0.05
 """How often the accepting thread looks whether it should end [s]."""
 
 HANDSHAKE_S: Final = 5.0
-"""Time a host has for its HTTP request [s]."""
+"""Time from a connection's first moment to its end of the handshake, HTTP and bus request together [s]."""
 
 MOST_HOSTS: Final = 16
-"""Connections at a time."""
+"""Connections at a time that have named the token."""
+
+MOST_WAITING: Final = 64
+"""Connections at a time that have not; one more ends the oldest of them, so that they keep no host out."""
 
 LONGEST_FRAME_BYTES: Final = 4096
 """Of a WebSocket; a CAN frame in JSON has some 200."""
@@ -68,9 +74,10 @@ class _Connection(RemoteServerProtocol):  # type: ignore[misc]  # the library ca
     What a host asks of the bus is not heeded: it gets the served channel as it is.
     """
 
-    def __init__(self, config: dict[str, Any], websocket: WebSocket) -> None:
+    def __init__(self, config: dict[str, Any], websocket: WebSocket, in_time: Callable[[], None]) -> None:
         super(RemoteServerProtocol, self).__init__(websocket)
         request = self.recv(HANDSHAKE_S)
+        in_time()
         if not isinstance(request, dict) or request.get("type") != "bus_request":
             raise WebsocketClosed(POLICY_VIOLATION, "expected a bus_request first")
         self.config = config
@@ -115,13 +122,7 @@ class _Connection(RemoteServerProtocol):  # type: ignore[misc]  # the library ca
 
 
 def _classic(message: can.Message) -> can.Message:
-    """Return a frame that a classic CAN bus can carry.
-
-    Raises
-    ------
-    ValueError
-        For any other: the devices behind it would meet what no wire delivers.
-    """
+    """Return a frame that a classic CAN bus can carry."""
     highest = 0x1FFFFFFF if message.is_extended_id else 0x7FF
     if message.is_fd or message.is_error_frame or not 0 <= message.arbitration_id <= highest or len(message.data) > 8:
         raise ValueError("expected a classic CAN frame of at most 8 bytes")
@@ -135,6 +136,8 @@ class _Handler(ClientRequestHandler):  # type: ignore[misc]  # the library carri
 
     def do_GET(self) -> None:  # noqa: N802 - the name http.server calls
         refusal = self._refusal()
+        if refusal is None and not self.server.admit(self.request):
+            refusal = HTTPStatus.SERVICE_UNAVAILABLE
         if refusal is not None:
             self.close_connection = True
             self.send_error(refusal)
@@ -161,8 +164,9 @@ class _Handler(ClientRequestHandler):  # type: ignore[misc]  # the library carri
         self.end_headers()
         self.request.settimeout(None)
         self.close_connection = True
+        in_time = partial(self.server.end_handshake, self.request)
         try:
-            _Connection(self.server.config, _BoundedWebSocket(None, protocol, sock=self.request)).run()
+            _Connection(self.server.config, _BoundedWebSocket(None, protocol, sock=self.request), in_time).run()
         except WebsocketClosed as end:
             LOGGER.info("connection ended: %s", end)
 
@@ -174,23 +178,49 @@ class _ClosableServer(RemoteServer):  # type: ignore[misc]  # the library carrie
 
     def __init__(self, address: Address, channel: str) -> None:
         self._connections: set[socket.socket] = set()
+        self._hosts: set[socket.socket] = set()
+        self._deadlines: dict[socket.socket, float] = {}  # of handshakes, the oldest first
         self._lock = threading.Lock()
         self.token = new_token()
         super().__init__(address.host, address.port, interface="virtual", channel=channel)
         self.RequestHandlerClass = _Handler
 
-    def verify_request(self, request: socket.socket, client_address: Any) -> bool:
-        with self._lock:
-            return len(self._connections) < MOST_HOSTS
-
     def process_request(self, request: socket.socket, client_address: Any) -> None:
         with self._lock:
+            waiting = [each for each in self._deadlines if each not in self._hosts]
+            if len(waiting) >= MOST_WAITING:
+                _cut(waiting[0])
+                del self._deadlines[waiting[0]]
             self._connections.add(request)
+            self._deadlines[request] = time.monotonic() + HANDSHAKE_S
         super().process_request(request, client_address)
+
+    def admit(self, request: socket.socket) -> bool:
+        """Count a connection that has named the token as a host's; False where there are enough."""
+        with self._lock:
+            if len(self._hosts) >= MOST_HOSTS:
+                return False
+            self._hosts.add(request)
+            return True
+
+    def end_handshake(self, request: socket.socket) -> None:
+        """Take a handshake for done: the connection may last as long as it likes."""
+        with self._lock:
+            self._deadlines.pop(request, None)
+
+    def service_actions(self) -> None:
+        """End the handshakes that are over time; called by the accepting thread every `POLL_S`."""
+        now = time.monotonic()
+        with self._lock:
+            for request in [request for request, deadline in self._deadlines.items() if deadline <= now]:
+                _cut(request)
+                del self._deadlines[request]
 
     def shutdown_request(self, request: socket.socket) -> None:
         with self._lock:
             self._connections.discard(request)
+            self._hosts.discard(request)
+            self._deadlines.pop(request, None)
         super().shutdown_request(request)
 
     def handle_error(self, request: socket.socket, client_address: Any) -> None:
@@ -201,8 +231,13 @@ class _ClosableServer(RemoteServer):  # type: ignore[misc]  # the library carrie
         """End every connection; the threads that serve them then return."""
         with self._lock:
             for connection in self._connections:
-                with suppress(OSError):  # already ended by the other side, its thread is on the way out
-                    connection.shutdown(socket.SHUT_RDWR)
+                _cut(connection)
+
+
+def _cut(connection: socket.socket) -> None:
+    """End a connection; the thread that serves it then returns."""
+    with suppress(OSError):  # already ended by the other side, its thread is on the way out
+        connection.shutdown(socket.SHUT_RDWR)
 
 
 class CanBridge:

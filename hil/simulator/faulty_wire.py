@@ -21,7 +21,7 @@ import numpy as np
 from drivers.canopen import can
 from drivers.canopen.can_link import SYNC_COB_ID, is_canopen
 from drivers.canopen.inline_bus import InlineBus
-from hil.simulator.bus_faults import BusFaults, Since
+from hil.simulator.faults import BusFaults, Since
 
 BUS_OFF_ERROR = 0x040
 """Error frame of a controller that has left the bus, as SocketCAN codes it."""

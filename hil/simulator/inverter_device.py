@@ -24,11 +24,8 @@ from drivers.inverter.cia402 import (
     next_state,
 )
 from drivers.scaling import VelocityScale
-from hil.simulator.dc_link import DcLink
-from hil.simulator.drive_sensors import DriveSensors
-from hil.simulator.error_list import ErrorList
-from hil.simulator.inverter_settings import SimulatedInverter
-from hil.simulator.stop_reactions import (
+from hil.simulator.drive_physics import DcLink, DriveSensors, ErrorList, Heat, SimulatedInverter
+from hil.simulator.stopping import (
     KNOWN_CODES,
     STANDARD_CODES,
     AbortConnection,
@@ -37,7 +34,6 @@ from hil.simulator.stop_reactions import (
     halt_ramp,
     stop_between,
 )
-from hil.simulator.torque_limits import Heat
 
 VALUE_RANGE_EXCEEDED, VALUE_TOO_HIGH, VALUE_TOO_LOW = 0x06090030, 0x06090031, 0x06090032
 """SDO abort codes."""
@@ -105,6 +101,7 @@ class InverterDevice:
         self.added_nm = 0.0  # what another controller adds to the reference, past CANopen: the PLC's PRBS
         self._readings = self._reading_of()
         self.hung = False
+        self._has_left = False
         self.reset()
 
     def reset(self) -> None:
@@ -148,13 +145,7 @@ class InverterDevice:
         return self._readings.get(index)
 
     def write(self, index: int, value: int) -> None:
-        """Take a new value of an object; one the device does not act on is ignored.
-
-        Raises
-        ------
-        ObjectRefused
-            If the value is not allowed.
-        """
+        """Take a new value of an object; one the device does not act on is ignored."""
         if value not in KNOWN_CODES.get(index, (value,)):
             raise ObjectRefused(VALUE_RANGE_EXCEEDED)
         if index == 0x6040:
@@ -178,15 +169,7 @@ class InverterDevice:
         self._parameters[index] = value
 
     def step(self, true_speed_rad_s: float, period_s: float) -> None:
-        """Take one SYNC: put the commands into effect, sample the readings.
-
-        Parameters
-        ----------
-        true_speed_rad_s
-            Motor speed now [rad/s].
-        period_s
-            Time until the next SYNC, for slopes, heat and DC link [s].
-        """
+        """Take one SYNC: put the commands into effect, sample the readings."""
         self._steps += 1
         self._meet_faults()
         self._dc_link.pass_time(period_s)
@@ -194,16 +177,10 @@ class InverterDevice:
             self.fail(UNDER_VOLTAGE)
         self._torque = self._torque_in_effect(true_speed_rad_s, period_s)
         self._heat.pass_time(self._torque, period_s)
-        self._sensors.sample(true_speed_rad_s, self._torque)
+        self._sensors.sample(true_speed_rad_s, self._torque, self._steps)
 
     def lose_connection(self, error_code: int) -> None:
-        """Act on the abort connection option code, 0x6007: the host is gone, or has taken the bus away.
-
-        Parameters
-        ----------
-        error_code
-            Cause, for a drive that goes into fault; `LOST_CONNECTION` if there is no better one.
-        """
+        """Act on the abort connection option code, 0x6007: the host is gone, or has taken the bus away."""
         code = self._parameters[0x6007]
         if code == AbortConnection.FAULT and self.state is not PowerState.SWITCH_ON_DISABLED:
             self.fail(error_code)
@@ -234,6 +211,11 @@ class InverterDevice:
 
     def _meet_faults(self) -> None:
         faults = self._settings.faults
+        leaves = faults.leaves_operation
+        if leaves is not None and not self._has_left and self._steps >= leaves.step:
+            if self.state is PowerState.OPERATION_ENABLED:
+                self._has_left = True
+                self._enter(leaves.state)
         if faults.hang_at_step == self._steps:
             self.hung = True
             self._torque = 0.0

@@ -4,7 +4,7 @@ NMT is done here, for the library's slave sends no boot-up message after a reset
 the bus. PDOs follow the configured mapping, identifiers and transmission types, from those of the EDS on. An event is a
 changed value; values change at SYNC, for that is when simulated time advances.
 
-It looks for its host (`hil.simulator.host_watch`) at every frame it takes and, once it is ordered to watch the host's
+It looks for its host (`hil.simulator.stopping`) at every frame it takes and, once it is ordered to watch the host's
 heartbeat, by a clock of its own, so that it also notices when nothing comes any more.
 """
 
@@ -27,21 +27,28 @@ from drivers.canopen.pdo_map import COB_ID_INVALID
 from drivers.datasheet.file import EdsFile
 from drivers.errors import BusDown
 from drivers.scaling import IntegerType
-from hil.simulator.described_drive import INTEGERS, fitting, power_on_values, velocity_scale
-from hil.simulator.heartbeat_consumer import HeartbeatConsumer
-from hil.simulator.host_watch import HEARTBEAT_ERROR, RPDO_TIMEOUT, HostWatch
+from hil.simulator.drive_physics import SimulatedInverter
 from hil.simulator.inverter_device import LOST_CONNECTION, InverterDevice, ObjectRefused
-from hil.simulator.inverter_settings import SimulatedInverter
-from hil.simulator.object_server import ObjectServer
-from hil.simulator.pdo_frame import PdoFrame
-from hil.simulator.pdo_objects import ACYCLIC, EVENT_DRIVEN, PdoObjects
-from hil.simulator.ticker import Ticker
+from hil.simulator.object_server import (
+    ACYCLIC,
+    EVENT_DRIVEN,
+    INTEGERS,
+    ObjectServer,
+    PdoFrame,
+    PdoObjects,
+    fitting,
+    power_on_values,
+    velocity_scale,
+)
+from hil.simulator.stopping import HEARTBEAT_ERROR, RPDO_TIMEOUT, HeartbeatConsumer, HostWatch, Ticker
 
 _SDO_REQUEST_COB_ID = 0x600
 _CONSUMER_HEARTBEAT_TIME = (0x1016, 1)
 _PRODUCER_HEARTBEAT_TIME = 0x1017
 _ERROR_BEHAVIOUR = (0x1029, 1)
 _EMCY_COB_ID = 0x1014
+_VELOCITY = 0x606C
+_SERIAL_NUMBER = (0x1018, 4)
 _PDO_LENGTH_ERROR = 0x8210
 """Error code of CiA 301."""
 
@@ -80,6 +87,7 @@ class InverterNode:
         self._lock = RLock()  # frames are taken in one thread, the heartbeat is sent by another
         self._eds = EdsFile(settings.eds_path, settings.node_id)
         self._sensors = settings.sensors
+        self._serial_number = settings.serial_number
         self._identity = {1: settings.identity[0], 2: settings.identity[1]}
         self._device = InverterDevice(settings, power_on_values(self._eds), velocity_scale(self._eds, settings), seed)
         self._random = np.random.default_rng([seed, settings.node_id, _STALE_STREAM])
@@ -113,17 +121,7 @@ class InverterNode:
         self._device.added_nm = torque_nm
 
     def step(self, t_ns: int, true_speed_rad_s: float, period_s: float) -> None:
-        """Take one SYNC: look for the host, put the RPDOs received since the last into effect, sample speed and torque.
-
-        Parameters
-        ----------
-        t_ns
-            When the SYNC came, by the wall clock [ns].
-        true_speed_rad_s
-            Motor speed now [rad/s].
-        period_s
-            Time until the next SYNC [s].
-        """
+        """Take one SYNC: look for the host, put the RPDOs since the last into effect, sample speed and torque."""
         with self._lock:
             self._syncs += 1
             self._host.take_sync(period_s)
@@ -157,6 +155,9 @@ class InverterNode:
                 return
             for tpdo in self._tpdos:
                 self._send_if_due(tpdo)
+            second = self._faults.second_tpdo
+            if second is not None and self._syncs >= second.step and self._syncs % second.every == 0:
+                self._send_second()
 
     def close(self) -> None:
         """End heartbeat and watch; the link is its owner's to close."""
@@ -180,6 +181,15 @@ class InverterNode:
                 self._send(cob_id, self._last_sent[tpdo.layout.communication_index])
         elif kind in _CYCLIC and self._syncs % kind == 0:
             self._send(cob_id, self._tpdo_data(tpdo))
+
+    def _send_second(self) -> None:
+        """Send each TPDO with a speed once more, the speed 0: a frame of somebody else with the drive's identifier."""
+        for tpdo in self._tpdos:
+            mapped = [each.index for each in tpdo.layout.objects]
+            if _VELOCITY in mapped:
+                values = [read() for read in self._sources[tpdo.layout.communication_index]]
+                no_speed = [0 if index == _VELOCITY else value for index, value in zip(mapped, values, strict=True)]
+                self._send(tpdo.layout.cob_id, tpdo.pack(no_speed))
 
     def _meet_faults(self) -> None:
         if self._faults.reset_at_step == self._syncs:
@@ -314,6 +324,8 @@ class InverterNode:
         value = self._device.read(index, subindex)
         if (index, subindex) in self._sensors:
             value = self._sensed(index, subindex)
+        elif (index, subindex) == _SERIAL_NUMBER:
+            value = self._serial_number
         elif value is None and index == 0x1018 and self._eds.sheet.value(index, subindex) is None:
             value = self._identity.get(subindex)
         return None if value is None else fitting(value, od.data_type)

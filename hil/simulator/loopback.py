@@ -33,35 +33,17 @@ class Address:
 
 
 def host_port(text: str) -> Address:
-    """Read ``HOST:PORT``, on whatever machine.
-
-    Raises
-    ------
-    UsageError
-        If it is no such pair.
-    """
+    """Read ``HOST:PORT``, on whatever machine."""
     return _read(f"//{text}", text, "HOST:PORT, for example 127.0.0.1:5020")
 
 
 def modbus_address(text: str) -> Address:
-    """Read ``HOST:PORT`` of this machine.
-
-    Raises
-    ------
-    UsageError
-        If it is no such pair, or not on this machine.
-    """
+    """Read ``HOST:PORT`` of this machine."""
     return _on_this_machine(host_port(text), text)
 
 
 def bus_address(url: str) -> Address:
-    """Read ``ws://HOST:PORT/`` of this machine.
-
-    Raises
-    ------
-    UsageError
-        If it is no such URL, or not on this machine.
-    """
+    """Read ``ws://HOST:PORT/`` of this machine."""
     expected = "ws://HOST:PORT/, for example ws://127.0.0.1:0/"
     if urlsplit(url).scheme != "ws":
         raise UsageError(f"bus {url!r}: expected {expected}. Give it with --bus or in [can] of the rig file.")

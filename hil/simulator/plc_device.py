@@ -1,15 +1,4 @@
-"""A simulated drive PLC: what its program does, in simulated time; nothing of registers, sockets or clocks.
-
-- A drive mode takes effect as it is requested, unless the PLC refuses it. Parallel mode closes the clutch,
-  the other two open it.
-- The watchdog counts one per PLC cycle; the host's count is taken over as it is written.
-- The permissive needs nothing of the host until its first beat. From then on it is there while beats come, and
-  comes back with them.
-- The PRBS generator runs while it is enabled, the source is the PLC, and torque is permitted; it starts at the
-  seed whenever one of its settings is written.
-
-The device is stepped by the thread of the CAN bus and asked by that of the Modbus server: one lock for both.
-"""
+"""A simulated drive PLC: what its program does, in simulated time; nothing of registers, sockets or clocks."""
 
 from __future__ import annotations
 
@@ -22,8 +11,46 @@ from typing import Final
 
 from drivers.plc.register import Value
 from drivers.plc.types import ClutchState, DriveMode, PrbsSource
-from hil.simulator.plc_answers import Answers
-from hil.simulator.plc_prbs import CELLS, PlcPrbs
+from hil.simulator.faults import Answers, PlcFaults
+
+CELLS: Final = 10
+TAPS: Final = (10, 7)
+
+
+class PlcPrbs:
+    """The generator, clocked by the PLC's cycle.
+
+    Parameters
+    ----------
+    amplitude_nm : float
+        The level is plus or minus this torque [Nm].
+    divider : int
+        PLC cycles each level is held.
+    seed : int
+        First state, 1 to 1023.
+    """
+
+    __slots__ = ("_amplitude_nm", "_divider", "_held", "_state")
+
+    def __init__(self, amplitude_nm: float, divider: int, seed: int) -> None:
+        self._amplitude_nm = amplitude_nm
+        self._divider = divider
+        self._state = seed
+        self._held = 0
+
+    @property
+    def torque_nm(self) -> float:
+        """Level of this cycle [Nm]; its sign is that of the last cell."""
+        return self._amplitude_nm if self._state >> (CELLS - 1) else -self._amplitude_nm
+
+    def clock(self) -> None:
+        """Let one PLC cycle pass."""
+        self._held += 1
+        if self._held >= self._divider:
+            feedback = sum(self._state >> (cell - 1) for cell in TAPS) & 1
+            self._state = ((self._state << 1) | feedback) & (2**CELLS - 1)
+            self._held = 0
+
 
 IDENTITY: Final = MappingProxyType({"vendor_code": 0x00484944, "device_code": 0x2024, "map_version": 1})
 """What this PLC identifies as; the shipped map expects the same, which a test sees to."""
@@ -62,60 +89,6 @@ class PlcSetup:
     torque_limit_nm: float = 450.0
     period_s: float = 0.01
     host_timeout_s: float = math.inf
-
-
-@dataclass(frozen=True, slots=True)
-class PlcFaults:
-    """What goes wrong, and when in simulated time [s]; nothing by default.
-
-    Attributes
-    ----------
-    clutch_closes_at_s : float
-        The clutch closes by itself and stays closed.
-    permissive_withdrawn_at_s : float
-        The permissive goes and stays away.
-    mode_changes_at_s : float
-        The driver selects electric mode.
-    hangs_at_s : float
-        The PLC keeps its connections and answers nothing.
-    exceptions_at_s, late_at_s, half_at_s, resets_at_s, too_few_at_s : float
-        From then on it answers with exception 04, late, with half an answer, by resetting the connection, or with
-        one register less than was asked for. How it answers is for whoever serves it to carry out.
-    wrong_unit_at_s, wrong_transaction_at_s : float
-        From then on its answers have another unit or transaction identifier than the request.
-    swaps_floats : bool
-        Its floating-point values have their two words in the other order than the register map says.
-    refused_modes : frozenset of DriveMode
-        The PLC takes the request and does not follow it.
-    """
-
-    clutch_closes_at_s: float = math.inf
-    permissive_withdrawn_at_s: float = math.inf
-    mode_changes_at_s: float = math.inf
-    hangs_at_s: float = math.inf
-    exceptions_at_s: float = math.inf
-    late_at_s: float = math.inf
-    half_at_s: float = math.inf
-    resets_at_s: float = math.inf
-    too_few_at_s: float = math.inf
-    wrong_unit_at_s: float = math.inf
-    wrong_transaction_at_s: float = math.inf
-    swaps_floats: bool = False
-    refused_modes: frozenset[DriveMode] = frozenset()
-
-    def answers(self, time_s: float) -> Answers:
-        """Tell how the PLC answers at a simulated time [s]; of several faults the one that came last."""
-        begun = {
-            self.hangs_at_s: Answers.NOT,
-            self.exceptions_at_s: Answers.EXCEPTION,
-            self.late_at_s: Answers.LATE,
-            self.half_at_s: Answers.HALF,
-            self.resets_at_s: Answers.RESET,
-            self.too_few_at_s: Answers.TOO_FEW,
-            self.wrong_unit_at_s: Answers.WRONG_UNIT,
-            self.wrong_transaction_at_s: Answers.WRONG_TRANSACTION,
-        }
-        return begun[max(due)] if (due := [at_s for at_s in begun if at_s <= time_s]) else Answers.WELL
 
 
 _ACCEPTED: Final[Mapping[str, tuple[str, Callable[[Value], bool]]]] = MappingProxyType(
@@ -246,13 +219,7 @@ class PlcDevice:
             }
 
     def write(self, values: Mapping[str, Value]) -> None:
-        """Take what the host writes, by register name: all of it or nothing.
-
-        Raises
-        ------
-        ValueRefusedError
-            If the program does not accept a value, or the host may not write a register.
-        """
+        """Take what the host writes, by register name: all of it or nothing."""
         for name, value in values.items():
             expected, accepts = _ACCEPTED.get(name, ("no write: this register is read only", _nothing))
             if not accepts(value):

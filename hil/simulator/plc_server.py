@@ -1,33 +1,305 @@
-"""The simulated PLC on Modbus TCP: pymodbus's asyncio server; the register map says where each value is.
-
-Every request is answered from the device as it is at that moment; the server holds no values of its own. A
-write is decoded and put to the device, and refused with an exception code where the device refuses it.
-
-What a client may do, and how an answer can go wrong, is `hil.simulator.plc_session`'s.
-
-`serve_plc` runs in the caller's event loop; `PlcServer` brings a thread with a loop of its own, for callers
-that have none. Both report the port they listen on, which the system chooses where port 0 is asked for.
-"""
+"""The simulated PLC on Modbus TCP: registers from the device, roles by certificate, and answers that go wrong."""
 
 from __future__ import annotations
 
 import asyncio
 import logging
+import socket
+import struct
 from asyncio.trsock import TransportSocket
-from collections.abc import AsyncIterator, Sequence
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import asynccontextmanager
+from dataclasses import dataclass, field
 from threading import Thread
 from types import TracebackType
-from typing import Final, Self
+from typing import Any, Final, Self
 
-from drivers.errors import BusDown
+from pymodbus.constants import ExcCodes
+from pymodbus.exceptions import NoSuchIdException
+from pymodbus.pdu import ExceptionResponse, ModbusPDU
+from pymodbus.pdu.register_message import ReadHoldingRegistersResponse, ReadInputRegistersResponse
+from pymodbus.server import ModbusTcpServer
+from pymodbus.server.requesthandler import ServerRequestHandler
+from pymodbus.simulator import DataType, SimData, SimDevice
+from pymodbus.simulator.simcore import SimCore
+from pymodbus.transport import CommParams, CommType
+
+from drivers.errors import BusDown, ConfigMismatch, ProtocolViolation
+from drivers.plc.modbus_security import Credentials, role_of, server_context
+from drivers.plc.register import Access, Register, RegisterKind, Value, ValueType, WordOrder
 from drivers.plc.register_map import RegisterMap
-from hil.simulator.plc_access import PlcSecurity
-from hil.simulator.plc_answers import Answers
-from hil.simulator.plc_device import PlcDevice
-from hil.simulator.plc_registers import PlcRegisters
-from hil.simulator.plc_session import PlcTcpServer
+from hil.simulator.faults import LATE_BY_S, Answers
+from hil.simulator.plc_device import PlcDevice, ValueRefusedError
+
+KIND: Final = {
+    1: RegisterKind.COIL,
+    2: RegisterKind.DISCRETE_INPUT,
+    3: RegisterKind.HOLDING_REGISTER,
+    4: RegisterKind.INPUT_REGISTER,
+    5: RegisterKind.COIL,
+    6: RegisterKind.HOLDING_REGISTER,
+    15: RegisterKind.COIL,
+    16: RegisterKind.HOLDING_REGISTER,
+}
+"""What each function code works on; Modbus Application Protocol V1.1b3, section 6."""
+
+
+class PlcRegisters(SimCore):
+    """pymodbus's view of the device: the two methods its server calls, for exactly the addresses of the map.
+
+    Parameters
+    ----------
+    device : PlcDevice
+        Holds all values.
+    register_map : RegisterMap
+        Where they are.
+
+    Raises
+    ------
+    ConfigMismatch
+        If the map has a register that the device knows nothing of.
+    """
+
+    def __init__(self, device: PlcDevice, register_map: RegisterMap) -> None:
+        super().__init__(SimDevice(0, SimData(0, values=0, datatype=DataType.REGISTERS)))
+        if unknown := sorted(set(register_map.registers) - set(device.values())):
+            raise ConfigMismatch(
+                f"register map {register_map.name!r}: expected registers the simulated PLC knows, got "
+                f"{', '.join(unknown)}. Use the shipped plc.toml with the simulated PLC."
+            )
+        self._device = device
+        self._map = register_map
+
+    async def async_getValues(  # noqa: N802 - pymodbus's name
+        self, device_id: int, func_code: int, address: int, count: int = 1
+    ) -> list[int] | list[bool] | ExcCodes:
+        """Answer a read, or say why not."""
+        self._require_device(device_id)
+        kind = KIND.get(func_code)
+        if kind is None:
+            return ExcCodes.ILLEGAL_FUNCTION
+        image = self._image(kind)
+        if any(each not in image for each in range(address, address + count)):
+            return ExcCodes.ILLEGAL_ADDRESS
+        words = [image[each] for each in range(address, address + count)]
+        return [bool(word) for word in words] if kind.is_bit else words
+
+    async def async_setValues(  # noqa: N802 - pymodbus's name
+        self, device_id: int, func_code: int, address: int, values: Sequence[int] | Sequence[bool]
+    ) -> ExcCodes | None:
+        """Take a write, or say why not."""
+        self._require_device(device_id)
+        kind = KIND.get(func_code)
+        if kind is None:
+            return ExcCodes.ILLEGAL_FUNCTION
+        names = self._written(kind, address, len(values))
+        if names is None:
+            return ExcCodes.ILLEGAL_ADDRESS
+        try:
+            self._device.write({name: self._decoded(name, address, values) for name in names})
+        except (ProtocolViolation, ValueRefusedError):
+            return ExcCodes.ILLEGAL_VALUE
+        return None
+
+    def _require_device(self, device_id: int) -> None:
+        if device_id != self._map.device_id:
+            raise NoSuchIdException(f"expected device id {self._map.device_id}, got {device_id}")
+
+    def _image(self, kind: RegisterKind) -> dict[int, int]:
+        """Put every register of a kind into words, by address."""
+        values = self._device.values()
+        return {
+            register.address + offset: word
+            for name, register in self._map.registers.items()
+            if register.kind is kind
+            for offset, word in enumerate(self._ordered(register).encode(values[name]))
+        }
+
+    def _ordered(self, register: Register) -> Register:
+        """Give a register as this PLC has it: a fault of its own may have the words of floats the other way round."""
+        if register.type is not ValueType.FLOAT32 or not self._device.swaps_floats:
+            return register
+        other = next(each for each in WordOrder if each is not register.word_order)
+        return register.model_copy(update={"word_order": other})
+
+    def _written(self, kind: RegisterKind, address: int, count: int) -> list[str] | None:
+        """Name the registers that make up a range; None unless it is writable registers from end to end."""
+        inside = {
+            name: register
+            for name, register in self._map.registers.items()
+            if register.kind is kind
+            and register.access is Access.READ_WRITE
+            and address <= register.address
+            and register.end <= address + count
+        }
+        covered = sum(register.size for register in inside.values())
+        return list(inside) if covered == count else None
+
+    def _decoded(self, name: str, address: int, values: Sequence[int] | Sequence[bool]) -> Value:
+        register = self._map[name]
+        offset = register.address - address
+        return self._ordered(register).decode([int(value) for value in values[offset : offset + register.size]])
+
+
+READ_CODES: Final = frozenset({1, 2, 3, 4})
+"""Function codes that only read; Modbus Application Protocol V1.1b3, section 6. All others count as writing."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlcSecurity:
+    """The PLC's own certificate, and what each role may do.
+
+    Attributes
+    ----------
+    credentials : Credentials
+        What the PLC shows, and the authority that must have signed a client's certificate.
+    roles : mapping of str to Access
+        What each role may do.
+    """
+
+    credentials: Credentials
+    roles: Mapping[str, Access] = field(default_factory=dict)
+
+    def allows(self, role: str | None, function_code: int) -> bool:
+        """Whether a client of this role, None for no role, may send a request of this function code."""
+        access = None if role is None else self.roles.get(role)
+        if access is Access.READ:
+            return function_code in READ_CODES
+        return access is Access.READ_WRITE
+
+
+REGISTERS: Final = (ReadHoldingRegistersResponse, ReadInputRegistersResponse)
+"""Answers that can be a register short."""
+
+NO_LINGER: Final = struct.pack("ii", 1, 0)
+"""Value of SO_LINGER: closing such a socket sends RST and not FIN."""
+
+
+class PlcTcpServer(ModbusTcpServer):
+    """pymodbus's server for one PLC, with TLS where its security is given.
+
+    Parameters
+    ----------
+    registers : PlcRegisters
+        What it answers from.
+    host, port
+        Address to listen on.
+    answers : callable
+        How the PLC answers at the moment of asking.
+    security : PlcSecurity or None
+        Its certificate and what roles may do; None for plain Modbus TCP, where everybody may do everything.
+
+    Raises
+    ------
+    ConfigMismatch
+        If the files of its security can't be used.
+    """
+
+    def __init__(
+        self,
+        registers: PlcRegisters,
+        host: str,
+        port: int,
+        answers: Callable[[], Answers],
+        security: PlcSecurity | None,
+    ) -> None:
+        if security is not None:
+            self.tls_setup = CommParams(  # where pymodbus's own constructor looks for it
+                comm_type=CommType.TLS,
+                comm_name="server_listener",
+                reconnect_delay=0.0,
+                sslctx=server_context(security.credentials),
+            )
+        placeholder = SimDevice(0, SimData(0, values=0, datatype=DataType.REGISTERS))
+        super().__init__(placeholder, address=(host, port))
+        self.context = registers
+        self.answers = answers
+        self.security = security
+
+    def callback_new_connection(self) -> PlcSession:
+        """Serve one more client."""
+        return PlcSession(self)
+
+
+class PlcSession(ServerRequestHandler):
+    """One connection.
+
+    Parameters
+    ----------
+    plc : PlcTcpServer
+        Whose it is.
+    """
+
+    def __init__(self, plc: PlcTcpServer) -> None:
+        super().__init__(plc, self._pass_packet, None, None)  # type: ignore[no-untyped-call]
+        self._plc = plc
+        self._role: str | None = None
+
+    def callback_connected(self) -> None:
+        """Take the role from the client's certificate; TLS has verified it by now."""
+        super().callback_connected()
+        channel = self.transport.get_extra_info("ssl_object")
+        if channel is not None:
+            self._role = role_of(channel.getpeercert(binary_form=True))
+
+    def close(self, reconnect: bool = False) -> None:
+        """Disconnect; over TLS with a word of goodbye, but without waiting for one."""
+        channel: asyncio.Transport | None = self.transport  # type: ignore[assignment]
+        super().close(reconnect)
+        if channel is not None and channel.get_extra_info("ssl_object") is not None:
+            channel.abort()
+
+    async def handle_request(self) -> None:
+        """Answer a request, or say why not."""
+        request, sender = self.last_pdu, self.last_addr
+        if request is None:
+            return
+        if self._plc.security is not None and not self._plc.security.allows(self._role, request.function_code):
+            self._send_exception(request, ExcCodes.ILLEGAL_FUNCTION)
+            return
+        match self._plc.answers():
+            case Answers.NOT:  # a program that hangs does not do what it is asked either
+                return
+            case Answers.EXCEPTION:
+                self._send_exception(request, ExcCodes.DEVICE_FAILURE)
+                return
+            case Answers.RESET:
+                self._reset()
+                return
+            case Answers.LATE:
+                await asyncio.sleep(LATE_BY_S)
+                self.last_pdu, self.last_addr = request, sender  # another may have come meanwhile
+        await super().handle_request()  # type: ignore[no-untyped-call]
+
+    def server_send(self, pdu: ModbusPDU, addr: Any) -> None:
+        """Send an answer, one register short if that is how the PLC answers."""
+        if self._plc.answers() is Answers.TOO_FEW and isinstance(pdu, REGISTERS):
+            pdu.registers = pdu.registers[:-1]
+        super().server_send(pdu, addr)  # type: ignore[no-untyped-call]
+
+    def _pass_packet(self, sending: bool, packet: bytes) -> bytes:
+        """Stand in every packet's way (pymodbus's ``trace_packet``)."""
+        if sending and self._plc.answers() is Answers.NOT:
+            return b""
+        if sending and self._plc.answers() is Answers.HALF:
+            return packet[: len(packet) // 2]
+        if sending and self._plc.answers() is Answers.WRONG_UNIT:
+            return packet[:6] + bytes((packet[6] ^ 0x80,)) + packet[7:]
+        if sending and self._plc.answers() is Answers.WRONG_TRANSACTION:
+            return bytes((packet[0] ^ 0x80,)) + packet[1:]
+        return packet
+
+    def _send_exception(self, request: ModbusPDU, code: ExcCodes) -> None:
+        answer = ExceptionResponse(request.function_code, code, device_id=request.dev_id)
+        answer.transaction_id = request.transaction_id
+        self.server_send(answer, self.last_addr)
+
+    def _reset(self) -> None:
+        channel = self.transport
+        channel.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, NO_LINGER)
+        channel.abort()  # type: ignore[attr-defined]
+
 
 logging.getLogger("pymodbus").addHandler(logging.NullHandler())  # else it logs to standard error by itself
 
@@ -67,31 +339,7 @@ async def serve_plc(
     port: int = 0,
     security: PlcSecurity | None = None,
 ) -> AsyncIterator[ServedPlc]:
-    """Serve a PLC in the running event loop, for the time of the block.
-
-    Parameters
-    ----------
-    device : PlcDevice
-        What is served.
-    register_map : RegisterMap
-        Where each of its values is.
-    host, port
-        Address to listen on; the system chooses port 0.
-    security : PlcSecurity or None
-        Its certificate and what roles may do; None for plain Modbus TCP.
-
-    Yields
-    ------
-    ServedPlc
-        With the port it listens on.
-
-    Raises
-    ------
-    BusDown
-        If the address can't be listened on.
-    ConfigMismatch
-        If the map has a register that the device knows nothing of, or the files of its security can't be used.
-    """
+    """Serve a PLC in the running event loop, for the time of the block."""
     registers = PlcRegisters(device, register_map)
     served = ServedPlc(device)
     server = PlcTcpServer(registers, host, port, served.answers, security)
@@ -176,13 +424,7 @@ class PlcServer:
         return self._ready.result().port
 
     def start(self) -> Self:
-        """Start the thread and wait until it listens.
-
-        Raises
-        ------
-        BusDown, ConfigMismatch
-            As for `serve_plc`.
-        """
+        """Start the thread and wait until it listens."""
         self._thread.start()
         try:
             self._ready.result()

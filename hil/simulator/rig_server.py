@@ -1,48 +1,126 @@
-"""A simulated rig at two addresses: the CAN bus with both inverters and the driveline, and the PLC.
-
-Nothing here knows what the plant is: `hil sim` puts the driveline of the rig file behind it, the proof
-another one.
-"""
+"""A simulated rig at two addresses: the CAN bus with both inverters and the driveline, and the PLC."""
 
 from __future__ import annotations
 
 import uuid
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import replace
+from functools import partial
 from types import TracebackType
 from typing import Self
+
+import numpy as np
 
 from drivers.canopen import can
 from drivers.canopen.can_link import open_bus
 from drivers.canopen.inline_bus import InlineBus
 from drivers.capability.carrier import ObjectId
+from drivers.plc.register import Register, ValueType
+from hil.config.channel_table import ChannelTable
 from hil.config.rig_file import InverterTable, Rig, SimulationTable
 from hil.errors import UsageError
-from hil.simulator.bus_faults import BusFaults
 from hil.simulator.can_bridge import CanBridge
-from hil.simulator.channel_sensors import ChannelSensors
+from hil.simulator.drive_physics import SimulatedInverter
+from hil.simulator.faults import InverterFaults, RigFaults
 from hil.simulator.faulty_wire import FaultyWire
-from hil.simulator.inverter_settings import InverterFaults, SimulatedInverter
 from hil.simulator.loopback import IN_PROCESS, SOCKETCAN, Address, bus_address
-from hil.simulator.plant import Plant
-from hil.simulator.plc_access import PlcSecurity
-from hil.simulator.plc_device import PlcDevice, PlcFaults, PlcSetup
-from hil.simulator.plc_server import PlcServer
+from hil.simulator.plant import Plant, SensedPlant
+from hil.simulator.plc_device import PlcDevice, PlcSetup
+from hil.simulator.plc_server import PlcSecurity, PlcServer
 from hil.simulator.simulated_rig import SimulatedRig
+
+_OF_SENSORS = 2
+"""Of a rig's random numbers: those of its nodes have streams of their own."""
+
+_RANGES = {
+    ValueType.UINT16: (0, (1 << 16) - 1),
+    ValueType.INT16: (-(1 << 15), (1 << 15) - 1),
+    ValueType.UINT32: (0, (1 << 32) - 1),
+    ValueType.INT32: (-(1 << 31), (1 << 31) - 1),
+}
+
+
+class ChannelSensors:
+    """The channels of one rig file on one plant.
+
+    Parameters
+    ----------
+    rig
+        With a table ``[simulation]``.
+    plant
+        The driveline.
+    seed
+        Of the noise.
+
+    Raises
+    ------
+    UsageError
+        If there are channels, and the driveline has nothing to measure but its motor's speed.
+    BadModel
+        If its structure has no such output.
+    """
+
+    def __init__(self, rig: Rig, plant: Plant, seed: int) -> None:
+        self._tables = tuple(rig.channels)
+        self._plant = _sensed(rig, plant) if self._tables else None
+        self._map = rig.register_map
+        self._noise = {} if rig.simulation is None else rig.simulation.channel_noise
+        self._random = np.random.default_rng([seed, 0, _OF_SENSORS])
+        self._read = {table.column: 0.0 for table in self._tables}
+        self.sample()  # what a driveline has no place for is refused here, and not at the first SYNC
+
+    def sample(self) -> None:
+        """Read every sensor now."""
+        if self._plant is not None:
+            for table in self._tables:
+                noise = self._noise.get(table.column, 0.0) * float(self._random.standard_normal())
+                self._read[table.column] = self._plant.measured(table.kind, table.at) + noise
+
+    def objects(self, inverter: str) -> Mapping[ObjectId, Callable[[], int]]:
+        """Give what reads the objects of an inverter, in counts."""
+        return {
+            table.object_id: partial(self._count, table)
+            for table in self._tables
+            if table.inverter == inverter and table.object_id is not None
+        }
+
+    def registers(self) -> dict[str, float]:
+        """Return what the PLC's registers hold, by name, in the unit of its map."""
+        return {table.register_name: self._held(table) for table in self._tables if table.register_name is not None}
+
+    def _count(self, table: ChannelTable) -> int:
+        return round(self._read[table.column] / table.factor(self._map))
+
+    def _held(self, table: ChannelTable) -> float:
+        register = self._map[table.register_name or ""]
+        return _converted(register, self._read[table.column] / table.factor(self._map))
+
+
+def _sensed(rig: Rig, plant: Plant) -> SensedPlant:
+    if not isinstance(plant, SensedPlant):
+        listed = ", ".join(rig.channel_units)
+        raise UsageError(
+            f"rig {rig.name!r}, channels: expected a driveline that can be measured there, got one with a motor speed "
+            f"alone ({listed}). Take [[channels]] out of this rig file."
+        )
+    return plant
+
+
+def _converted(register: Register, value: float) -> float:
+    """Convert as an analogue input does: in whole steps, and saturating."""
+    if register.type not in _RANGES:
+        return value
+    step = 1.0 if register.scale is None else register.scale
+    low, high = _RANGES[register.type]
+    return min(max(round(value / step), low), high) * step
+
+
+SERIAL_NUMBERS = (1, 2)
+"""Of the drives behind m1 and m2; they stay with them where the node ids are swapped."""
 
 HOST_TIMEOUT_S = 1.0
 """Simulated time without a beat of the host after which the PLC permits no torque [s]: ten of the host's polls."""
-
-
-@dataclass(frozen=True, slots=True)
-class RigFaults:
-    """What is wrong with the simulated devices; by default nothing."""
-
-    m1: InverterFaults = field(default_factory=InverterFaults)
-    m2: InverterFaults = field(default_factory=InverterFaults)
-    bus: BusFaults = field(default_factory=BusFaults)
-    plc: PlcFaults = field(default_factory=PlcFaults)
 
 
 class RigServer:
@@ -92,7 +170,7 @@ class RigServer:
         self._faults = faults or RigFaults()
         self._real_time = real_time
         self._bridged = None if bus_url.startswith((IN_PROCESS, SOCKETCAN)) else bus_address(bus_url)
-        if bus_url.startswith(SOCKETCAN) and self._faults.bus != BusFaults():
+        if bus_url.startswith(SOCKETCAN) and self._faults.bus.touch_frames:
             raise UsageError(
                 f"bus {bus_url!r}: expected faults of the devices alone, got faults of the bus: frames of the "
                 "kernel's own bus are out of reach. Serve it at ws://127.0.0.1:0/ for them."
@@ -151,7 +229,7 @@ class RigServer:
         """Open the devices' end of the bus."""
         if self._bus_url.startswith(SOCKETCAN):
             return open_bus(self._bus_url)
-        if self._faults.bus == BusFaults():
+        if not self._faults.bus.touch_frames:
             return InlineBus(channel)
         devices = str(uuid.uuid4())
         stack.enter_context(FaultyWire(channel, devices, self._faults.bus, self._seed))
@@ -178,21 +256,16 @@ class RigServer:
         return part_m1 * prbs_nm, (1.0 - part_m1) * prbs_nm
 
     def _inverters(self) -> tuple[SimulatedInverter, SimulatedInverter]:
-        tables = self._rig.inverters
-        return (
-            _inverter(tables.m1, self._simulation, self._faults.m1, self._sensors.objects("m1")),
-            _inverter(tables.m2, self._simulation, self._faults.m2, self._sensors.objects("m2")),
-        )
+        tables, faults = self._rig.inverters, self._faults
+        m1 = _inverter(tables.m1, self._simulation, faults.m1, self._sensors.objects("m1"), SERIAL_NUMBERS[0])
+        m2 = _inverter(tables.m2, self._simulation, faults.m2, self._sensors.objects("m2"), SERIAL_NUMBERS[1])
+        if faults.bus.swapped_nodes:
+            return replace(m1, node_id=m2.node_id), replace(m2, node_id=m1.node_id)
+        return m1, m2
 
 
 def required_simulation(rig: Rig) -> SimulationTable:
-    """Give the table ``[simulation]`` of a rig file.
-
-    Raises
-    ------
-    UsageError
-        If it has none.
-    """
+    """Give the table ``[simulation]`` of a rig file."""
     if rig.simulation is None:
         raise UsageError(
             f"rig {rig.name!r}: expected a table [simulation] that says what to simulate, there is none. "
@@ -212,6 +285,7 @@ def _inverter(
     simulation: SimulationTable,
     faults: InverterFaults,
     sensors: Mapping[ObjectId, Callable[[], int]],
+    serial_number: int,
 ) -> SimulatedInverter:
     return SimulatedInverter(
         node_id=table.node_id,
@@ -224,6 +298,7 @@ def _inverter(
         rated_torque_unit_nm=table.rated_torque_unit.nm,
         sensors=sensors,
         faults=faults,
+        serial_number=serial_number,
     )
 
 

@@ -8,8 +8,8 @@ from typing import Self
 
 from drivers.canopen import can
 from drivers.canopen.can_link import SYNC_COB_ID, CanLink
+from hil.simulator.drive_physics import SimulatedInverter
 from hil.simulator.inverter_node import InverterNode
-from hil.simulator.inverter_settings import SimulatedInverter
 from hil.simulator.plant import Plant
 
 StepCallback = Callable[[float], None]
@@ -90,13 +90,7 @@ class SimulatedRig:
         self._added = source
 
     def close(self) -> None:
-        """Take the slaves off the bus and shut it down.
-
-        Raises
-        ------
-        Exception
-            What plant, slaves or a callback raised in the rig's thread: a defect, which stopped the rig.
-        """
+        """Take the slaves off the bus and shut it down."""
         for node in self._nodes:
             node.close()
         self._link.close()

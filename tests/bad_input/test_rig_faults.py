@@ -19,7 +19,7 @@ from hil.config.rig_file import read_rig
 from hil.recording import read_table
 from hil.recording.description import sidecar_of
 from hil.rig.live_course import course_path
-from hil.simulator.fault_spec import rig_faults
+from hil.simulator.fault_table import rig_faults
 from hil.store import store_of
 from tests.bad_input.conftest import Refused
 from tests.rig.observer import assert_disarmed, power_state

@@ -11,9 +11,7 @@ import pytest
 
 from hil.cli.main import run
 from hil.config.rig_file import read_rig
-from hil.simulator.inverter_settings import FaultAtStep, InverterFaults
-from hil.simulator.plc_device import PlcFaults
-from hil.simulator.rig_server import RigFaults
+from hil.simulator.faults import FaultAtStep, InverterFaults, PlcFaults, RigFaults
 from tests.rig.serving import served
 
 NOWHERE = ("--bus", "ws://127.0.0.1:9/", "--modbus", "127.0.0.1:9")

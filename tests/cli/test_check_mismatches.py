@@ -20,8 +20,8 @@ from drivers.resources import data_file
 from hil.cli.main import run
 from hil.config.rig_file import read_rig
 from hil.simulator import rig_server
-from hil.simulator.inverter_settings import FaultAtStep, InverterFaults, SimulatedInverter
-from hil.simulator.rig_server import RigFaults
+from hil.simulator.drive_physics import SimulatedInverter
+from hil.simulator.faults import FaultAtStep, InverterFaults, RigFaults
 from tests.rig.serving import served
 
 Edits = tuple[tuple[str, str], ...]

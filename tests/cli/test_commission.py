@@ -11,8 +11,7 @@ from pathlib import Path
 import pytest
 
 from hil.cli.main import run
-from hil.commission.announce import MOST_VEHICLE_S
-from hil.commission.registry import NAMES
+from hil.commission.engine import MOST_VEHICLE_S, NAMES
 from tests.cli.conftest import EXAMPLE, await_rows
 from tests.commission.rigs import Bench, bench
 from tests.rig.observer import assert_disarmed

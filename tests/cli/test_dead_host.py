@@ -17,7 +17,7 @@ from drivers.canopen.can_link import CanLink
 from drivers.inverter.cia402 import TORQUE_STATES, PowerState, state_of
 from hil.cli.main import run
 from hil.config.rig_file import read_rig
-from hil.simulator.fault_spec import rig_faults
+from hil.simulator.fault_table import rig_faults
 from tests.rig.observer import assert_disarmed, power_state
 from tests.rig.serving import served
 

@@ -8,25 +8,21 @@ from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from hil.commission.engine import Asked, Commissioning
-from hil.commission.finding import Finding
+from hil.commission.engine import NAMES, Asked, Commissioning
 from hil.commission.order import RigSource
-from hil.commission.record import StepRecord
-from hil.commission.registry import NAMES
 from hil.commission.runner import Conditions, Runner
-from hil.commission.state import State, load_state
+from hil.commission.state import Finding, State, StepRecord, load_state
 from hil.commission.step import Job, Step
 from hil.commission.talk import Script, Talk
 from hil.config.rig_file import read_rig
 from hil.rig.experiments.base import Phase
 from hil.rig.pacing import FreePacer, period_ns
 from hil.rig.realtime import NOT_ASKED
-from hil.simulator.fault_spec import rig_faults
+from hil.simulator.driveline import plant_for
+from hil.simulator.fault_table import rig_faults
 from hil.simulator.loopback import Address
-from hil.simulator.plant import Plant
-from hil.simulator.plant_factory import plant_for
+from hil.simulator.plant import EffectSpec, Plant
 from hil.simulator.rig_server import RigServer
-from hil.simulator.simulation_model import EffectSpec
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "rig.toml"
 

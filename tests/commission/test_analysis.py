@@ -13,19 +13,14 @@ from estimator.physics.stepper import Stepper
 from estimator.signals.decimate import decimate
 from estimator.signals.prbs import prbs_nm
 from estimator.signals.record import Record
-from hil.commission.analysis import amplitude
-from hil.commission.analysis.amplitude import Cap
-from hil.commission.analysis.comfort import vibration_m_s2
-from hil.commission.analysis.delay_selection import select_delay
-from hil.commission.analysis.measured import Measured, of_repeats
-from hil.commission.analysis.physical_fit import fit_two_mass
-from hil.commission.analysis.pulse_response import pulse_response, reading_lag
-from hil.commission.analysis.resonance_spread import ResonanceSpread, resonance_spread
-from hil.commission.analysis.response_ratio import response_ratio
-from hil.commission.predict import rigid_model
+from hil.commission import prbs_design as amplitude
+from hil.commission.physical_fit import fit_two_mass, select_delay
+from hil.commission.prbs_design import Cap, ResonanceSpread, resonance_spread, vibration_m_s2
+from hil.commission.responses import Measured, of_repeats, pulse_response, reading_lag, response_ratio
+from hil.commission.runner import rigid_model
 from hil.config.rig_file import read_rig
 from hil.rig.experiments.pulses import LEAD_S, Pulses
-from hil.simulator.simulation_model import DEFAULT_BUS
+from hil.simulator.plant import DEFAULT_BUS
 from tests.commission.rigs import EXAMPLE
 
 PERIOD_S = 0.01

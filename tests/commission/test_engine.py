@@ -6,12 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from hil.commission import announce, engine
+from hil.commission import engine
 from hil.commission.engine import Asked, Commissioning
-from hil.commission.finding import Finding
 from hil.commission.order import RigSource
-from hil.commission.record import Status, StepRecord
-from hil.commission.state import State, load_state
+from hil.commission.state import Finding, State, Status, StepRecord, load_state
 from hil.commission.step import Job, Outcome, Step
 from hil.commission.talk import Answer, Person, Script, Talk, What
 from hil.errors import RunAborted, UsageError
@@ -32,9 +30,8 @@ class World:
         self.text = EXAMPLE.read_text(encoding="utf-8")
         needs: dict[str, tuple[str, ...]] = {"first": (), "second": ("first",), "third": ("second",)}
         steps = tuple(Step(name, name, lambda job: "acts.", self._doer(name), needs=needs[name]) for name in NAMES)
-        for module in (engine, announce):
-            monkeypatch.setattr(module, "STEPS", steps)
-        run = announce.PlannedRun("run", 1.0, (0.0, 5.0), (0.0, 5.0), (0.0, 1.0))
+        monkeypatch.setattr(engine, "STEPS", steps)
+        run = engine.PlannedRun("run", 1.0, (0.0, 5.0), (0.0, 5.0), (0.0, 1.0))
         monkeypatch.setattr(engine, "plan_of", lambda job, step: [run] if step.name == "second" else [])
 
     def _doer(self, name: str):  # type: ignore[no-untyped-def]

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from hil.commission.record import Status
+from hil.commission.state import Status
 from hil.errors import RunAborted
 from tests.commission.rigs import bench
 from tests.rig.observer import assert_disarmed

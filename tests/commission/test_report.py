@@ -10,11 +10,9 @@ from typing import Any
 import pytest
 from rich.console import Console
 
-from hil.commission.finding import Finding, stated
-from hil.commission.record import RunRecord, Status, StepRecord
-from hil.commission.registry import STEPS
-from hil.commission.state import State
-from hil.commission.text import findings_table, result_document, result_lines
+from hil.commission.engine import STEPS
+from hil.commission.state import Finding, RunRecord, State, Status, StepRecord, stated
+from hil.commission.talk import findings_table, result_document, result_lines
 from hil.report.commission_html import commission_page
 
 TITLES = {step.name: step.title for step in STEPS}

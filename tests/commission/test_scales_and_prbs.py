@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from hil.commission.model_json import model_json
+from hil.commission.state import model_json
 from hil.commission.steps import prbs
-from hil.simulator.simulation_model import DEFAULT_BUS
+from hil.simulator.plant import DEFAULT_BUS
 from tests.commission.rigs import bench
 
 SHORT = (("duration_s = 30.0", "duration_s = 12.0"), ("speed_rad_s = 60.0", "speed_rad_s = 20.0"))

@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from hil.commission.record import RunRecord, Status, StepRecord
-from hil.commission.state import FILE_NAME, State, load_state
+from hil.commission.state import FILE_NAME, RunRecord, State, Status, StepRecord, load_state
 from hil.errors import UsageError
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from drivers.errors import DriverError
 from hil.commission import runner
-from hil.commission.record import Status
+from hil.commission.state import Status
 from hil.commission.step import Job
 from hil.errors import RunAborted
 from hil.recording import read_table
@@ -74,7 +74,7 @@ def test_interrupted_in_the_middle_it_disarms_and_resumes_there(
         with pytest.raises(KeyboardInterrupt):
             rig.call(step)
         assert_disarmed(rig.server.bus_url, 1, 2)
-    from hil.commission.registry import NAMES
+    from hil.commission.engine import NAMES
     from hil.commission.state import load_state
 
     state = load_state(rig.folder, NAMES)

@@ -26,10 +26,10 @@ from hil.rig.session import run_plan
 from hil.rig.stop import StopRequest
 from hil.rig.timing import RunTiming
 from hil.sample import Sample
+from hil.simulator.driveline import plant_for
 from hil.simulator.loopback import Address
-from hil.simulator.plant_factory import plant_for
+from hil.simulator.plant import DEFAULT_BUS
 from hil.simulator.rig_server import RigServer
-from hil.simulator.simulation_model import DEFAULT_BUS
 from tests.monitor.fake_source import FakeSource
 from tests.rig.serving import Samples as Recorded
 

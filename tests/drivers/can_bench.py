@@ -14,7 +14,8 @@ import can
 from drivers.canopen.can_link import CanLink
 from drivers.inverter.inverter import Inverter, InverterFeedback, InverterSettings
 from drivers.torque_guard import ErrorLimits, Evidence, GuardedTorque, GuardLimits, TorqueGuard, TorqueRequest
-from hil.simulator.inverter_settings import InverterFaults, SimulatedInverter
+from hil.simulator.drive_physics import SimulatedInverter
+from hil.simulator.faults import InverterFaults
 from hil.simulator.plant import Plant, RigidPlant
 from hil.simulator.simulated_rig import SimulatedRig
 

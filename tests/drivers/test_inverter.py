@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from drivers.canopen.can_link import CanLink
-from drivers.errors import CommandRefused, DeviceTimeout, ProtocolViolation
+from drivers.errors import CommandRefused, DeviceTimeout, ForeignController, ProtocolViolation
 from drivers.inverter.cia402 import PowerState, TorqueMode
 from drivers.inverter.inverter import Inverter
 from drivers.resources import data_file
@@ -107,11 +107,12 @@ def test_drive_can_be_armed_again(armed: Bench) -> None:
     assert armed.rig.torque_nm[0] == pytest.approx(30.0)
 
 
-def test_drive_left_armed_by_a_dead_host_stands_still_once_configured(armed: Bench) -> None:
+def test_a_drive_that_another_host_has_enabled_gets_no_nmt_command(armed: Bench) -> None:
     armed.cycle(guarded(120.0))
     with CanLink.open(f"virtual:{armed.channel}") as link:
-        Inverter(link, M1).configure()
-        assert armed.rig.torque_nm[0] == 0.0
+        with pytest.raises(ForeignController, match=r"m1 \(node 5\): power state is operation enabled"):
+            Inverter(link, M1).configure()
+        assert armed.rig.torque_nm[0] == pytest.approx(120.0)
 
 
 def test_unconfigured_drive_is_not_armed_by_disarming(healthy: Bench) -> None:

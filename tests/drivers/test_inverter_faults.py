@@ -10,7 +10,7 @@ import pytest
 from drivers.errors import BusDown, ConfigMismatch, DeviceFault, DeviceTimeout
 from drivers.inverter.cia402 import PowerState, TorqueMode
 from drivers.resources import data_file
-from hil.simulator.inverter_settings import FaultAtStep, InverterFaults
+from hil.simulator.faults import FaultAtStep, InverterFaults
 from tests.drivers.can_bench import M1, SIMULATED_M1, Bench, bench, frame, guarded
 
 OVER_CURRENT = 0x2310

@@ -23,7 +23,8 @@ from drivers.plc.register_map import RegisterMap, load_register_map
 from drivers.plc.types import ClutchState, DriveMode, PlcWatchdog, PrbsSettings, PrbsSource
 from drivers.resources import data_file
 from drivers.torque_guard import GuardedTorque, TorqueGuard, TorqueRequest
-from hil.simulator.plc_device import PlcDevice, PlcFaults, PlcSetup
+from hil.simulator.faults import PlcFaults
+from hil.simulator.plc_device import PlcDevice, PlcSetup
 from hil.simulator.plc_server import ServedPlc, serve_plc
 from tests.drivers.can_bench import FRESH, guard_limits
 

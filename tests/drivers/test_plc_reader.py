@@ -13,7 +13,8 @@ from drivers.plc.plc import Plc
 from drivers.plc.reader import Backoff, PlcReader
 from drivers.plc.register_map import RegisterMap, load_register_map
 from drivers.resources import data_file
-from hil.simulator.plc_device import PlcDevice, PlcFaults
+from hil.simulator.faults import PlcFaults
+from hil.simulator.plc_device import PlcDevice
 from hil.simulator.plc_server import serve_plc
 from tests.drivers.modbus_peers import free_port
 

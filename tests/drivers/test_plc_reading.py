@@ -13,7 +13,8 @@ from drivers.plc.reading import PLAUSIBLE, reading
 from drivers.plc.register import Register, WordOrder
 from drivers.plc.register_map import load_register_map
 from drivers.resources import data_file
-from hil.simulator.plc_device import PlcDevice, PlcFaults
+from hil.simulator.faults import PlcFaults
+from hil.simulator.plc_device import PlcDevice
 from hil.simulator.plc_server import serve_plc
 
 MAP = load_register_map(data_file("plc.toml"))

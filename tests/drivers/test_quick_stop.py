@@ -8,7 +8,7 @@ import pytest
 
 from drivers.errors import CommandRefused, DeviceTimeout
 from drivers.inverter.cia402 import PowerState
-from hil.simulator.inverter_settings import InverterFaults
+from hil.simulator.faults import InverterFaults
 from tests.drivers.can_bench import M1, Bench, bench, guarded
 
 

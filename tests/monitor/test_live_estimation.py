@@ -10,7 +10,7 @@ from estimator.physics.twist import Shaft
 from hil.monitor.live_estimation import LiveEstimation
 from hil.rig.live import LiveEstimate, OnlineSetup, tracking_chain, tracking_settings
 from hil.sample import Sample, SampleFlag
-from hil.simulator.simulation_model import DEFAULT_BUS
+from hil.simulator.plant import DEFAULT_BUS
 from tests.estimator.identification.tracking import roads
 from tests.estimator.identification.tracking.drives import drives
 from tests.monitor.fake_source import sample
@@ -18,7 +18,7 @@ from tests.monitor.two_mass import PERIOD_S, driven
 
 CYCLES = 2500
 RESONANCE_HZ, DAMPING = 8.22, 0.057
-"""Of the default bus (hil.simulator.simulation_model)."""
+"""Of the default bus (hil.simulator.plant)."""
 
 
 @pytest.fixture(scope="module")

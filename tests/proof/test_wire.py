@@ -14,7 +14,7 @@ from hil.proof.command import CommandFailed
 from hil.proof.wire import drive as driving
 from hil.proof.wire.concealed import WIRED
 from hil.proof.wire.run import RESULTS, run_wire
-from hil.simulator.fault_spec import rig_faults
+from hil.simulator.fault_table import rig_faults
 
 SEED = 7
 REFUSAL = "hil run: ended with status 3: error: PLC: clutch is closed, expected open. Nothing was armed."

@@ -11,8 +11,9 @@ from pathlib import Path
 from drivers.resources import data_file
 from hil.config.rig_file import Rig, read_rig
 from hil.rig.addresses import with_addresses
-from hil.simulator.plant_factory import plant_for
-from hil.simulator.rig_server import RigFaults, RigServer
+from hil.simulator.driveline import plant_for
+from hil.simulator.faults import RigFaults
+from hil.simulator.rig_server import RigServer
 from tests.rig.serving import ANY_PORT, CHANGES, EXAMPLE, changed
 
 CHANNELS = """

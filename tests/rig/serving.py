@@ -18,10 +18,11 @@ from hil.rig.plan import plan_run
 from hil.rig.session import run_plan
 from hil.rig.stop import StopRequest
 from hil.sample import Sample
+from hil.simulator.faults import RigFaults
 from hil.simulator.loopback import Address
 from hil.simulator.plant import RigidPlant
 from hil.simulator.plc_device import PlcDevice
-from hil.simulator.rig_server import RigFaults, RigServer
+from hil.simulator.rig_server import RigServer
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "rig.toml"
 INERTIA_KG_M2 = 10.0

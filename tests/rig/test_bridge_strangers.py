@@ -8,8 +8,11 @@ import os
 import resource
 import socket
 import struct
+import threading
+import time
 import uuid
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -19,7 +22,8 @@ import pytest
 from drivers.canopen.bus_token import forget_token, keep_token, kept_token, token_file
 from drivers.canopen.can_link import open_bus
 from drivers.errors import BusDown
-from hil.simulator.can_bridge import LONGEST_FRAME_BYTES, MOST_HOSTS, CanBridge
+from hil.simulator import can_bridge
+from hil.simulator.can_bridge import LONGEST_FRAME_BYTES, MOST_HOSTS, MOST_WAITING, CanBridge
 from hil.simulator.loopback import Address
 
 
@@ -171,10 +175,76 @@ def test_what_is_no_frame_of_a_bus_reaches_no_device(
 
 def test_a_few_hosts_and_no_more(bridge: CanBridge) -> None:
     hosts = [upgrade(bridge)[0] for _ in range(MOST_HOSTS)]
-    extra = socket.create_connection(("127.0.0.1", bridge.port), 5.0)
-    assert extra.recv(10) == b""
+    extra, answer = upgrade(bridge)
+    assert status_of(answer) == 503
     for each in (*hosts, extra):
         each.close()
+
+
+def drip(connections: list[socket.socket], texts: list[bytes], over: threading.Event) -> None:
+    """Send each its text, one byte every 0.1 s: a socket's own time-out never comes."""
+    for number in range(max(map(len, texts))):
+        for connection, text in zip(connections, texts, strict=True):
+            with suppress(OSError):
+                connection.send(text[number : number + 1])
+        if over.wait(0.1):
+            return
+
+
+def slow(bridge: CanBridge, named: bool) -> tuple[socket.socket, bytes]:
+    """Connect and, with the token, upgrade; what is left to be sent, slowly."""
+    if named:
+        return upgrade(bridge)[0], frame(1, bytes(1000), 1000)
+    return socket.create_connection(("127.0.0.1", bridge.port), 5.0), b"GET / HTTP/1.1\r\nX: " + bytes(1000)
+
+
+@pytest.mark.parametrize("named", [False, True])
+def test_a_handshake_has_one_deadline_however_slowly_it_is_sent(
+    bridge: CanBridge, named: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(can_bridge, "HANDSHAKE_S", 0.5)
+    connection, text = slow(bridge, named)
+    over, begun = threading.Event(), time.monotonic()
+    thread = threading.Thread(target=drip, args=([connection], [text], over))
+    thread.start()
+    connection.settimeout(10.0)
+    with suppress(ConnectionError):
+        while connection.recv(4096):
+            pass
+    took_s = time.monotonic() - begun
+    over.set()
+    thread.join()
+    connection.close()
+    assert took_s < 5.0
+
+
+@pytest.mark.parametrize("count", [20, MOST_WAITING + 10])
+def test_connections_without_the_token_keep_no_host_out(bridge: CanBridge, slave: can.BusABC, count: int) -> None:
+    waiting = [slow(bridge, named=False) for _ in range(count)]
+    over = threading.Event()
+    connections, texts = [each for each, _ in waiting], [text for _, text in waiting]
+    thread = threading.Thread(target=drip, args=(connections, texts, over))
+    thread.start()
+    begun = time.monotonic()
+    with open_bus(bridge.url) as host:
+        host.send(can.Message(arbitration_id=0x80, is_extended_id=False))
+        assert slave.recv(5.0) is not None
+    took_s = time.monotonic() - begun
+    over.set()
+    thread.join()
+    for connection in connections:
+        connection.close()
+    assert took_s < 2.0
+
+
+def test_a_host_may_last_longer_than_its_handshake(
+    bridge: CanBridge, slave: can.BusABC, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(can_bridge, "HANDSHAKE_S", 0.2)
+    with open_bus(bridge.url) as host:
+        time.sleep(0.5)
+        host.send(can.Message(arbitration_id=0x80, is_extended_id=False))
+        assert slave.recv(5.0) is not None
 
 
 def test_a_host_of_the_same_user_finds_the_token_of_the_port(bridge: CanBridge, slave: can.BusABC) -> None:

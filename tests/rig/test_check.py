@@ -8,10 +8,8 @@ from drivers.inverter.cia402 import PowerState
 from drivers.plc.register_map import load_register_map
 from drivers.resources import data_file
 from hil.rig.check import Verdict, check_rig
-from hil.simulator.fault_spec import rig_faults
-from hil.simulator.inverter_settings import FaultAtStep, InverterFaults
-from hil.simulator.plc_device import PlcFaults
-from hil.simulator.rig_server import RigFaults
+from hil.simulator.fault_table import rig_faults
+from hil.simulator.faults import FaultAtStep, InverterFaults, PlcFaults, RigFaults
 from tests.rig.observer import power_state
 from tests.rig.serving import changed, served
 

@@ -14,7 +14,7 @@ from drivers.errors import BusDown, ConfigMismatch, DeviceFault, DeviceTimeout, 
 from hil.errors import RunAborted
 from hil.rig.drive import RunSummary
 from hil.sample import SampleFlag
-from hil.simulator.fault_spec import rig_faults
+from hil.simulator.fault_table import rig_faults
 from hil.simulator.rig_server import RigServer
 from tests.rig.observer import assert_disarmed
 from tests.rig.serving import Samples, fast, run_once, served, small_rig

@@ -12,8 +12,7 @@ from hil.rig.build import open_devices
 from hil.rig.idle import Listening
 from hil.rig.timing import RunTiming
 from hil.sample import SampleFlag
-from hil.simulator.inverter_settings import FaultAtStep, InverterFaults
-from hil.simulator.rig_server import RigFaults
+from hil.simulator.faults import FaultAtStep, InverterFaults, RigFaults
 from tests.rig.observer import assert_disarmed
 from tests.rig.sensed import sensed_rig, served_with_sensors
 from tests.rig.serving import fast, served

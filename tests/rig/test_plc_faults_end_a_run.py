@@ -8,7 +8,7 @@ from drivers.errors import DriverError
 from drivers.plc.plc import Plc
 from hil.errors import RunAborted
 from hil.rig.experiments.base import Phase
-from hil.simulator.fault_spec import rig_faults
+from hil.simulator.fault_table import rig_faults
 from hil.simulator.rig_server import HOST_TIMEOUT_S
 from tests.rig.observer import assert_disarmed
 from tests.rig.serving import Samples, changed, fast, run_once, served, small_rig

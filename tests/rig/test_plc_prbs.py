@@ -20,7 +20,7 @@ from hil.rig.experiments.base import Phase
 from hil.rig.pacing import RealTimePacer, period_ns
 from hil.rig.plan import plan_run
 from hil.rig.stop import StopRequest
-from hil.simulator.plc_prbs import PlcPrbs as Generator
+from hil.simulator.plc_device import PlcPrbs as Generator
 from hil.simulator.rig_server import RigServer
 from tests.rig.observer import assert_disarmed
 from tests.rig.serving import Samples, changed, run, run_once, served, small_rig

@@ -5,8 +5,7 @@ from __future__ import annotations
 import pytest
 
 from hil.rig.check import Verdict, check_rig
-from hil.simulator.inverter_settings import FaultAtStep, InverterFaults
-from hil.simulator.rig_server import RigFaults
+from hil.simulator.faults import FaultAtStep, InverterFaults, RigFaults
 from tests.rig.observer import assert_disarmed
 from tests.rig.serving import changed, served, small_rig
 

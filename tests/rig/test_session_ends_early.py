@@ -13,9 +13,9 @@ from hil.rig.build import open_devices
 from hil.rig.drive import Progress
 from hil.rig.experiments.base import Phase
 from hil.rig.stop import StopRequest
-from hil.simulator.inverter_settings import FaultAtStep, InverterFaults
+from hil.simulator.faults import FaultAtStep, InverterFaults, RigFaults
 from hil.simulator.plc_device import PlcDevice, PlcSetup
-from hil.simulator.rig_server import RigFaults, RigServer
+from hil.simulator.rig_server import RigServer
 from tests.rig.observer import assert_disarmed
 from tests.rig.serving import Samples, changed, fast, run, run_once, served, small_rig
 

@@ -12,9 +12,8 @@ from hil.errors import RecordingError
 from hil.rig.replay import replay
 from hil.rig.trace import SUFFIXES, BusTrace
 from hil.sample import Sample, SampleFlag
-from hil.simulator.fault_spec import rig_faults
-from hil.simulator.inverter_settings import InverterFaults
-from hil.simulator.rig_server import RigFaults
+from hil.simulator.fault_table import rig_faults
+from hil.simulator.faults import InverterFaults, RigFaults
 from tests.rig.serving import changed, small_rig
 from tests.wire.traced import traced_run
 

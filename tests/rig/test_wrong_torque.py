@@ -6,7 +6,7 @@ import pytest
 
 from drivers.errors import CommandRefused, WrongTorque
 from hil.sample import SampleFlag
-from hil.simulator.fault_spec import rig_faults
+from hil.simulator.fault_table import rig_faults
 from tests.rig.observer import assert_disarmed
 from tests.rig.serving import Samples, changed, run_once, served, small_rig
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from hil.simulator.error_list import ErrorList
+from hil.simulator.drive_physics import ErrorList
 
 
 @pytest.mark.parametrize(

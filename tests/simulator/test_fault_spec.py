@@ -6,16 +6,25 @@ from pathlib import Path
 
 import pytest
 
+from drivers.inverter.cia402 import PowerState as S
 from drivers.plc.types import ClutchState, DriveMode
 from hil.errors import UsageError
-from hil.simulator.bus_faults import BusFaults, Since
-from hil.simulator.fault_sizes import Frames
-from hil.simulator.fault_spec import DEVICES, known_faults, rig_faults
-from hil.simulator.inverter_kinds import NOBODY, OVERCURRENT
-from hil.simulator.inverter_settings import FaultAtStep, InverterFaults
-from hil.simulator.plc_device import PlcDevice, PlcFaults
-from hil.simulator.rig_server import RigFaults
-from hil.simulator.torque_limits import DriveLimits
+from hil.simulator.fault_table import DEVICES, NOBODY, OVERCURRENT, known_faults, rig_faults
+from hil.simulator.faults import (
+    BusFaults,
+    DriveLimits,
+    FaultAtStep,
+    Frames,
+    InverterFaults,
+    LeavesOperation,
+    PlcFaults,
+    RigFaults,
+    SecondTpdo,
+    Since,
+    WrongSpeed,
+    WrongTorque,
+)
+from hil.simulator.plc_device import PlcDevice
 
 PERIOD_S = 0.01
 
@@ -54,6 +63,16 @@ PERIOD_S = 0.01
         ("bus.delay@2=0.003", RigFaults(bus=BusFaults(delay=Since(Frames(0.003), 200)))),
         ("bus.jitter=0.001", RigFaults(bus=BusFaults(jitter=Since(Frames(0.001), 0)))),
         ("bus.off@1", RigFaults(bus=BusFaults(off_at_step=100))),
+        ("m1.torque_gain@1=-1", RigFaults(m1=InverterFaults(wrong_torque=WrongTorque(100, gain=-1.0)))),
+        ("m1.leaves_operation@1", RigFaults(m1=InverterFaults(leaves_operation=LeavesOperation(100, S.SWITCHED_ON)))),
+        (
+            "m1.leaves_operation@1=quick_stop",
+            RigFaults(m1=InverterFaults(leaves_operation=LeavesOperation(100, S.QUICK_STOP_ACTIVE))),
+        ),
+        ("m2.speed_gain@1=-1", RigFaults(m2=InverterFaults(wrong_speed=WrongSpeed(100, -1.0)))),
+        ("m2.speed_stuck@1", RigFaults(m2=InverterFaults(wrong_speed=WrongSpeed(stuck_from_step=100)))),
+        ("m1.second_tpdo@1=2", RigFaults(m1=InverterFaults(second_tpdo=SecondTpdo(100, 2)))),
+        ("bus.swapped_nodes", RigFaults(bus=BusFaults(swapped_nodes=True))),
         (" plc.hang@1e1 ", RigFaults(plc=PlcFaults(hangs_at_s=10.0))),
     ],
 )
@@ -74,6 +93,8 @@ def test_what_adds_up_may_come_with_several_sizes() -> None:
     faults = rig_faults(["m1.lacks=0x6072", "m1.lacks=0x6007", "m1.weak_cooling=500", "m1.coarse_torque=5"], PERIOD_S)
     assert faults.m1.missing_objects == {0x6007, 0x6072}
     assert faults.m1.limits == DriveLimits(continuous_permille=500.0, torque_step_permille=5)
+    stuck = rig_faults(["m1.torque_gain@1=0", "m1.torque_offset@1=500"], PERIOD_S).m1.wrong_torque
+    assert stuck.given(-300.0, 100) == 500.0
 
 
 def test_none_is_no_fault() -> None:
@@ -121,6 +142,8 @@ def test_the_page_of_the_simulated_drives_has_every_fault() -> None:
         (["m1.emcy@1=0"], "expected an error code, 0x1000 to 0xFFFF, got '0'"),
         (["m1.emcy@1=soon"], "expected an error code, .* got 'soon'"),
         (["m1.hang@1=2"], "expected nothing after its name, got '=2'"),
+        (["m1.leaves_operation@1=fault"], "expected a state: ready, switched_on, quick_stop, disabled, got 'fault'"),
+        (["m1.second_tpdo@1=0"], "expected a whole number from 1 to 1000"),
         (["m1.lacks"], "expected an object, 0x1000 to 0xFFFF, got none. Write m1.lacks=INDEX"),
         (["m1.lacks=0x12345"], "expected an object"),
         (["m1.clock_drift=nan"], "expected a number from -100000 to 100000 parts per million, got 'nan'"),

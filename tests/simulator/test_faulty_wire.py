@@ -12,8 +12,7 @@ import can
 import pytest
 
 from drivers.canopen.inline_bus import InlineBus
-from hil.simulator.bus_faults import BusFaults, Since
-from hil.simulator.fault_sizes import Frames
+from hil.simulator.faults import BusFaults, Frames, Since
 from hil.simulator.faulty_wire import BUS_OFF_ERROR, FaultyWire
 from tests.drivers.can_bench import frame
 

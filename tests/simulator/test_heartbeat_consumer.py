@@ -10,7 +10,7 @@ import pytest
 from drivers.canopen.heartbeat import HEARTBEAT_COB_ID
 from drivers.errors import DeviceFault
 from drivers.inverter.cia402 import PowerState
-from hil.simulator.heartbeat_consumer import GRACE_NS, NS_PER_MS, HeartbeatConsumer
+from hil.simulator.stopping import GRACE_NS, NS_PER_MS, HeartbeatConsumer
 from tests.drivers.can_bench import M1, bench, guarded
 
 LONG_NS = 3600 * 1_000_000_000

@@ -10,8 +10,9 @@ import pytest
 
 from drivers.inverter.cia402 import STATUSWORD_STATE_BITS, Command, PowerState, TorqueMode, next_state, state_of
 from drivers.scaling import VelocityScale
+from hil.simulator.drive_physics import SimulatedInverter
+from hil.simulator.faults import FaultAtStep, InverterFaults
 from hil.simulator.inverter_device import InverterDevice, ObjectRefused
-from hil.simulator.inverter_settings import FaultAtStep, InverterFaults, SimulatedInverter
 
 DEFAULTS = {0x6007: 2, 0x605A: 6, 0x605B: 0, 0x605C: 0, 0x605D: 1, 0x605E: 0}
 QUIET = SimulatedInverter(5, torque_noise_counts=0.0, speed_noise_rad_s=0.0)

@@ -12,7 +12,7 @@ from drivers.canopen.heartbeat import NMT_COB_ID, NmtCommand, nmt_frame
 from drivers.canopen.sdo import SdoChannel
 from drivers.errors import ConfigMismatch, DeviceTimeout, ProtocolViolation
 from drivers.inverter.cia402 import PowerState
-from hil.simulator.inverter_settings import FaultAtStep, InverterFaults
+from hil.simulator.faults import FaultAtStep, InverterFaults
 from tests.drivers.can_bench import M1, Bench, bench, frame, guarded
 
 

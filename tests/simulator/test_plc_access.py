@@ -8,7 +8,7 @@ import pytest
 
 from drivers.plc.modbus_security import Credentials
 from drivers.plc.register import Access
-from hil.simulator.plc_access import PlcSecurity
+from hil.simulator.plc_server import PlcSecurity
 
 NO_FILES = Credentials(Path("ca"), Path("certificate"), Path("key"))
 SECURITY = PlcSecurity(NO_FILES, {"viewer": Access.READ, "operator": Access.READ_WRITE})

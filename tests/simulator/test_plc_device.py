@@ -9,8 +9,8 @@ from drivers.plc.register_map import load_register_map
 from drivers.plc.types import ClutchState, DriveMode
 from drivers.resources import data_file
 from estimator.signals.prbs import Prbs
-from hil.simulator.plc_answers import Answers
-from hil.simulator.plc_device import IDENTITY, PlcDevice, PlcFaults, PlcSetup, ValueRefusedError
+from hil.simulator.faults import Answers, PlcFaults
+from hil.simulator.plc_device import IDENTITY, PlcDevice, PlcSetup, ValueRefusedError
 
 RUNNING: dict[str, Value] = {
     "prbs_amplitude": 60.0,

@@ -8,11 +8,9 @@ import pytest
 
 from drivers.plc.register_map import load_register_map
 from drivers.resources import data_file
-from hil.simulator.fault_kind import Moment
-from hil.simulator.fault_spec import known_faults, rig_faults
-from hil.simulator.plc_answers import LATE_BY_S
-from hil.simulator.plc_device import PlcDevice, PlcFaults
-from hil.simulator.plc_faults import PLC_KINDS
+from hil.simulator.fault_table import known_faults, rig_faults
+from hil.simulator.faults import LATE_BY_S, PlcFaults
+from hil.simulator.plc_device import PlcDevice
 from hil.simulator.plc_server import PlcServer
 
 MAP = load_register_map(data_file("plc.toml"))
@@ -35,7 +33,6 @@ DEVICE_FAILURE = bytes.fromhex("0001 0000 0003 01 84 04")
     ],
 )
 def test_each_is_put_into_the_device_by_name(name: str, field: str) -> None:
-    assert PLC_KINDS[name].put_into(PlcFaults(), Moment(2.5, 0.01)) == PlcFaults(**{field: 2.5})
     assert f"{name}@S" in known_faults()
     assert rig_faults([f"plc.{name}@2.5"], 0.01).plc == PlcFaults(**{field: 2.5})
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from hil.simulator.sample_clock import SampleClock
+from hil.simulator.drive_physics import SampleClock
 
 
 def test_without_drift_every_sample_is_that_of_its_sync() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from drivers.canopen.can_link import CanLink
 from drivers.errors import DeviceTimeout
-from hil.simulator.inverter_settings import InverterFaults
+from hil.simulator.faults import InverterFaults
 from hil.simulator.plant import RigidPlant
 from hil.simulator.simulated_rig import SimulatedRig
 from tests.drivers.can_bench import (

@@ -13,10 +13,9 @@ from drivers.canopen.can_link import CanLink
 from drivers.errors import DeviceFault
 from drivers.inverter.cia402 import PowerState
 from drivers.inverter.inverter import Inverter
-from hil.simulator.heartbeat_consumer import NS_PER_MS
 from hil.simulator.plant import RigidPlant
-from hil.simulator.rpdo_deadline import RpdoDeadline
 from hil.simulator.simulated_rig import SimulatedRig
+from hil.simulator.stopping import NS_PER_MS, RpdoDeadline
 from tests.drivers.can_bench import M1, M2, SIMULATED_M1, SIMULATED_M2, Bench, guarded, new_channel, virtual_bus
 
 DEADLINE_MS = 100

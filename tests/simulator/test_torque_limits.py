@@ -9,9 +9,9 @@ from dataclasses import replace
 import pytest
 
 from drivers.inverter.cia402 import Command, StatusBit
+from hil.simulator.drive_physics import Heat
+from hil.simulator.faults import DriveLimits, InverterFaults
 from hil.simulator.inverter_device import InverterDevice
-from hil.simulator.inverter_settings import InverterFaults
-from hil.simulator.torque_limits import DriveLimits, Heat
 from tests.simulator.test_inverter_device import PERIOD_S, QUIET, enabled
 
 

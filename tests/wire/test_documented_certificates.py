@@ -14,9 +14,8 @@ from drivers.plc.modbus_security import ClientSecurity, Credentials, own_role
 from drivers.plc.register import Access, RegisterKind
 from drivers.plc.register_map import load_register_map
 from drivers.resources import data_file
-from hil.simulator.plc_access import PlcSecurity
 from hil.simulator.plc_device import PlcDevice
-from hil.simulator.plc_server import PlcServer
+from hil.simulator.plc_server import PlcSecurity, PlcServer
 from tests.docs.pages import DOCS, blocks
 
 pytestmark = pytest.mark.skipif(

@@ -11,7 +11,8 @@ import pytest
 
 from drivers.plc.register_map import load_register_map
 from drivers.resources import data_file
-from hil.simulator.plc_device import IDENTITY, PlcDevice, PlcFaults, PlcSetup
+from hil.simulator.faults import PlcFaults
+from hil.simulator.plc_device import IDENTITY, PlcDevice, PlcSetup
 from hil.simulator.plc_server import PlcServer
 
 pytestmark = pytest.mark.skipif(shutil.which("mbpoll") is None, reason="mbpoll is not installed (Debian: mbpoll)")

@@ -18,9 +18,8 @@ from drivers.plc.modbus_security import ClientSecurity, Credentials
 from drivers.plc.register import Access, RegisterKind
 from drivers.plc.register_map import load_register_map
 from drivers.resources import data_file
-from hil.simulator.plc_access import PlcSecurity
 from hil.simulator.plc_device import PlcDevice
-from hil.simulator.plc_server import PlcServer
+from hil.simulator.plc_server import PlcSecurity, PlcServer
 from tests.wire.certificates import SERVER_NAME, Authority, der_text
 from tests.wire.tls_peers import needs_openssl, openssl_exchange, openssl_server
 

@@ -33,11 +33,11 @@ from hil.rig.addresses import with_addresses
 from hil.rig.build import open_devices
 from hil.rig.check import Verdict, check_rig
 from hil.rig.trace import BusTrace
-from hil.simulator.bus_faults import BusFaults
 from hil.simulator.can_bridge import CanBridge
+from hil.simulator.driveline import plant_for
+from hil.simulator.faults import BusFaults, RigFaults
 from hil.simulator.loopback import Address
-from hil.simulator.plant_factory import plant_for
-from hil.simulator.rig_server import RigFaults, RigServer
+from hil.simulator.rig_server import RigServer
 from tests.drivers.can_bench import virtual_bus
 from tests.rig.serving import EXAMPLE, Samples, run, served
 from tests.wire.traced import traced_run

@@ -10,8 +10,7 @@ from drivers.errors import DeviceFault
 from hil.config.rig_file import Rig
 from hil.rig.build import open_devices
 from hil.rig.trace import BusTrace
-from hil.simulator.inverter_settings import FaultAtStep, InverterFaults
-from hil.simulator.rig_server import RigFaults
+from hil.simulator.faults import FaultAtStep, InverterFaults, RigFaults
 from tests.rig.serving import Samples, run, served
 
 EXCESS_TEMPERATURE = 0x4310

@@ -6,8 +6,7 @@ import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from hil.commission.engine import Asked
-from hil.commission.registry import NAMES
+from hil.commission.engine import NAMES, Asked
 from hil.commission.talk import Person, Script, Talk
 from hil.errors import UsageError
 

@@ -20,6 +20,7 @@ from hil.cli.commission.options import (
     Yes,
 )
 from hil.cli.pace import Pace, PaceOption
+from hil.cli.take_over_option import TakeOver
 from hil.cli.trust_option import TrustLaws
 
 if TYPE_CHECKING:
@@ -45,6 +46,7 @@ def commission(
     pace: PaceOption = Pace.REAL,
     bus: Bus = None,
     modbus: Modbus = None,
+    take_over: TakeOver = False,
     as_json: AsJson = False,
 ) -> None:
     """Lead through commissioning: devices, limits, signs, scales, friction, PRBS, experiments, models, diagnosis.
@@ -65,7 +67,7 @@ def commission(
 
     asked = asked_of_steps(skip or (), because or (), repeat or ())
     read_rig(rig)  # names every fault of the file, and of what it names, by the line
-    source = RigSource(rig, rig.read_text(encoding="utf-8"), bus, modbus)
+    source = RigSource(rig, rig.read_text(encoding="utf-8"), bus, modbus, take_over)
     console = Console(stderr=as_json, highlight=False)
     if dry_run:
         print_plan(job_in(out, source, model, trust_laws, travel, pace, console), console, as_json)
@@ -100,7 +102,7 @@ def _to_its_report(job: Job, talk: Talk, asked: Asked, console: Console, as_json
 def _commission(job: Job, talk: Talk, asked: Asked, console: Console) -> None:
     from hil.cli.commission.bar import Bar
     from hil.commission.engine import Commissioning
-    from hil.commission.text import findings_table
+    from hil.commission.talk import findings_table
 
     pacer = job.runner.conditions.pacer(job.rig)  # refuses a pace this rig must not be driven at, before anything
     job.say(f"{job.rig.name}: commissioning in {job.folder}, one cycle every {pacer.period_ns / 1e6:g} ms")

@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING
 
 from hil.cli.pace import Pace, pacer_for, scheduling
 from hil.cli.run_progress import RunProgress
-from hil.commission.analysis.comfort import DEFAULT_TRAVEL_M_PER_RAD
+from hil.commission.engine import NAMES
 from hil.commission.order import RigSource
-from hil.commission.record import StepRecord
-from hil.commission.registry import NAMES
+from hil.commission.prbs_design import DEFAULT_TRAVEL_M_PER_RAD
 from hil.commission.runner import Conditions, Runner
-from hil.commission.state import State, load_state
+from hil.commission.state import State, StepRecord, load_state
 from hil.commission.step import Job
 from hil.config.model_file import read_model
 

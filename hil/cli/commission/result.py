@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from hil.commission.announce import plan_document
-from hil.commission.registry import STEPS
+from hil.commission.engine import STEPS, plan_document
 from hil.commission.state import State
 from hil.commission.step import Job
-from hil.commission.text import plan_lines, result_document, result_lines
+from hil.commission.talk import plan_lines, result_document, result_lines
 from hil.provenance import provenance
 from hil.report.outputs import publish
 

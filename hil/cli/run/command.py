@@ -10,6 +10,7 @@ import typer
 from hil.cli.completers import experiment_names
 from hil.cli.filter_option import FilterOf, FilterRun
 from hil.cli.pace import Pace, PaceOption
+from hil.cli.take_over_option import TakeOver
 from hil.cli.trust_option import TrustLaws
 from hil.errors import UsageError
 
@@ -31,6 +32,7 @@ def run(
     pace: PaceOption = Pace.REAL,
     bus: Annotated[str | None, typer.Option(metavar="URL", help="CAN bus in place of the rig file's.")] = None,
     modbus: Annotated[str | None, typer.Option(metavar="HOST:PORT", help="PLC in place of the rig file's.")] = None,
+    take_over: TakeOver = False,
     trace: Annotated[
         Path | None,
         typer.Option(
@@ -53,7 +55,7 @@ def run(
     from hil.config.rig_file import read_rig
     from hil.rig.addresses import with_addresses
 
-    rig_file = with_addresses(read_rig(rig), bus, modbus)
+    rig_file = with_addresses(read_rig(rig), bus, modbus, take_over)
     if dry_run:
         from hil.cli.run.prediction import predict
 

@@ -1,15 +1,27 @@
-"""The experiments: eight PRBS runs at nearly constant speeds, tip-in and tip-out, and a reversal."""
+"""The experiments of the rig file, driven with the PRBS that was chosen, and the resonance in them."""
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any, TypeAlias
+
 import numpy as np
 
-from hil.commission.finding import Finding
-from hil.commission.order import Order, as_table
+from estimator.identification.modes.modes import Mode
+from estimator.identification.online.recursive import Status as OnlineStatus
+from estimator.identification.settings import Settings
+from hil.commission.order import Order, as_table, cruise_of, first_of, halt
+from hil.commission.readings import record_of, rounded
+from hil.commission.responses import of_repeats
+from hil.commission.state import Finding
 from hil.commission.step import Job, Outcome, Step
-from hil.commission.steps.noise import LOST_SHARE
-from hil.commission.steps.tables import cruise_of, first_of, halt
+from hil.commission.steps.noise_friction import LOST_SHARE
 from hil.config.experiment_tables import ReversalTable, TipTable
+from hil.errors import UsageError
+
+if TYPE_CHECKING:
+    from estimator.identification.best import BestEstimate
+    from estimator.identification.identify import Identification
+
 
 RUNS = 8
 """As many as the paper evaluates together."""
@@ -51,7 +63,7 @@ def _others(job: Job) -> list[tuple[str, TipTable | ReversalTable | None]]:
     return [("tip", first_of(job.rig, TipTable)), ("reversal", first_of(job.rig, ReversalTable))]
 
 
-def _about(job: Job) -> str:
+def _about_experiments(job: Job) -> str:
     amplitude_nm = job.evidence("prbs").get("amplitude_nm", job.rig.prbs.amplitude_nm)
     speed = cruise_of(job.rig).speed_rad_s
     return (
@@ -61,7 +73,7 @@ def _about(job: Job) -> str:
     )
 
 
-def _do(job: Job) -> Outcome:
+def _do_experiments(job: Job) -> Outcome:
     asked = orders(job)
     for number, order in enumerate(asked, start=1):
         job.say(f"  {number} of {len(asked)}: {order.name}")
@@ -87,4 +99,149 @@ def _do(job: Job) -> Outcome:
     return Outcome(findings, {"recordings": {run.name: run.recording for run in runs}})
 
 
-STEP = Step("experiments", "Experiments", _about, _do, orders, needs=("prbs",))
+EXPERIMENTS = Step("experiments", "Experiments", _about_experiments, _do_experiments, orders, needs=("prbs",))
+
+
+SPREAD = 0.02
+"""Largest standard deviation of the resonance between runs, relative: what the paper's runs agree to in its figures."""
+
+AGREEMENT = 0.02
+"""On-line and batch estimate of one run agree within this, relative: DESIGN's trials gave 1 to 2.2 %."""
+
+LEAST_FIT_PERCENT = 70.0
+"""Free-run fit of a batch model: below, a third of the speed's course is not the model's."""
+
+DRAWN_HZ = (0.5, 25.0)
+
+
+Found: TypeAlias = "tuple[Identification, BestEstimate]"
+"""What one run gave."""
+
+
+def cruises(job: Job) -> list[Any]:
+    """Return the PRBS runs at constant speed."""
+    runs = [run for run in job.runs_of("experiments") if run.name.startswith("cruise")]
+    if len(runs) < 2:
+        raise UsageError(
+            f"commissioning in {job.folder}: expected PRBS runs to work with, got {len(runs)} (experiments is "
+            f"{job.state.steps['experiments'].status.value}). Drive them: --repeat experiments; or skip this step."
+        )
+    return runs
+
+
+def _settings(job: Job) -> Settings:
+    return Settings(sample_time_s=2.0 * job.rig.period_s)
+
+
+def _about_identification(job: Job) -> str:
+    return "identifies the driveline from each PRBS run, on line and off line. Computes; commands no torque."
+
+
+def _do_identification(job: Job) -> Outcome:
+    from estimator.identification.best import best_estimate  # a second, and the bus comes first
+    from estimator.identification.identify import identify as identify_record
+
+    runs = cruises(job)
+    found: list[Found] = []
+    for i, run in enumerate(runs):
+        job.progress(f"identifying {run.name}", i / len(runs))
+        record, settings = record_of(job.recording(run)), _settings(job)
+        found.append((identify_record(record, settings), best_estimate(record, settings.high_pass_hz)))
+    job.progress("identified", 1.0)
+    modes = [None if best.mode is None else best.mode.mode for _, best in found]
+    evidence = {"runs": [_evidence(*each, run.name) for each, run in zip(found, runs, strict=True)]}
+    return Outcome([*_resonance_findings(modes), *_quality_findings(found)], evidence)
+
+
+def _resonance_findings(modes: list[Mode | None]) -> list[Finding]:
+    known = [mode for mode in modes if mode is not None]
+    look = "Look at the coherence in the report; raise the amplitude, or repeat on a better road"
+    findings = [Finding("runs with a resonance", str(len(modes)), str(len(known)), len(known) == len(modes), look)]
+    if len(known) < 2:
+        return findings
+    frequency = np.array([mode.frequency_hz for mode in known])
+    damping = np.array([mode.damping for mode in known])
+    spread = float(np.std(frequency, ddof=1) / np.mean(frequency))
+    return [
+        *findings,
+        Finding(
+            "resonance, mean of the runs",
+            f"the same within {100.0 * SPREAD:g} % (standard deviation)",
+            f"{of_repeats(frequency).shown('Hz')}; between runs {100.0 * spread:.2f} %",
+            spread <= SPREAD,
+            "See whether it depends on speed or time; the diagnosis looks for the cause",
+        ),
+        Finding("damping, mean of the runs", "–", of_repeats(damping).shown(), None),
+    ]
+
+
+def _quality_findings(found: list[Found]) -> list[Finding]:
+    from estimator.identification.best import Verdict
+
+    pairs = [(each.online_resonance, best.mode) for each, best in found]
+    both = [(a.frequency_hz, b.frequency_hz.value) for a, b in pairs if a is not None and b is not None]
+    worst = max((abs(a / b - 1.0) for a, b in both), default=float("nan"))
+    estimated = sum(each.estimate.status is OnlineStatus.ESTIMATED for each, _ in found)
+    fits = [best.fit.fit_percent for _, best in found]
+    good = sum(best.verdict in (Verdict.GOOD, Verdict.CLOSED_LOOP) for _, best in found)
+    return [
+        Finding(
+            "on line against off line, resonance",
+            f"within {100.0 * AGREEMENT:g} % in every run",
+            f"{100.0 * worst:.2f} % at worst" if both else "nothing to compare",
+            bool(both) and len(both) == len(found) and worst <= AGREEMENT,
+            "The on-line estimate needs more excitation, or longer runs",
+        ),
+        Finding("runs whose on-line estimate stands", str(len(found)), str(estimated), estimated == len(found)),
+        Finding(
+            "runs a linear model is enough for",
+            str(len(found)),
+            str(good),
+            good == len(found),
+            "The drive is not linear, or has more than two masses: see the diagnosis",
+        ),
+        Finding(
+            "free-run fit of the off-line models",
+            f"at least {LEAST_FIT_PERCENT:g} %",
+            f"{min(fits):.1f} to {max(fits):.1f} %",
+            min(fits) >= LEAST_FIT_PERCENT,
+            "A linear model does not explain everything: see the diagnosis",
+        ),
+    ]
+
+
+def _evidence(found: Identification, best: BestEstimate, run: str) -> dict[str, Any]:
+    frequency = np.geomspace(*DRAWN_HZ, 160)
+    frequency = frequency[frequency < 0.5 / found.data.sample_time_s]
+    spectral = found.spectral
+    return {
+        "run": run,
+        "best": _model(best.fit.model, None if best.mode is None else best.mode.mode) | {"verdict": best.verdict.value},
+        "batch": _model(found.batch.model, found.batch_resonance) | {"fit_percent": found.batch.fit_percent},
+        "online": _model(found.online, found.online_resonance) | {"status": found.estimate.status.value},
+        "frequency_hz": rounded(frequency),
+        "magnitude": rounded(np.abs(best.fit.model.response(frequency))),
+        "spectral": None
+        if spectral is None
+        else {
+            "frequency_hz": rounded(spectral.frequency_hz),
+            "magnitude": rounded(np.abs(spectral.response)),
+            "coherence": rounded(spectral.coherence),
+        },
+    }
+
+
+def _model(model: Any, mode: Mode | None) -> dict[str, Any]:
+    return {
+        "theta": model.theta.tolist(),
+        "nk": model.nk,
+        "sample_time_s": model.sample_time_s,
+        "poles": [[float(z.real), float(z.imag)] for z in model.poles],
+        "zeros": [[float(z.real), float(z.imag)] for z in model.zeros],
+        "resonance": None if mode is None else [mode.frequency_hz, mode.damping],
+    }
+
+
+IDENTIFICATION = Step(
+    "identification", "Identification", _about_identification, _do_identification, needs=("experiments",)
+)

@@ -19,18 +19,22 @@ from estimator.identification.modes.modes import Mode
 from estimator.identification.settings import Settings
 from estimator.signals.decimate import decimate
 from estimator.signals.record import FloatArray, Record
-from hil.commission.analysis import amplitude
-from hil.commission.analysis.amplitude import DAMPING_STD, FREQUENCY_STD, Cap, Choice
-from hil.commission.analysis.comfort import COMFORT_LIMIT_M_S2, vibration_m_s2
-from hil.commission.analysis.pulse_response import RINGING_S, averaged
-from hil.commission.analysis.resonance_spread import ResonanceSpread, resonance_spread
-from hil.commission.analysis.response_ratio import HIGH_PASS_HZ
-from hil.commission.finding import Finding
-from hil.commission.order import Order, as_table
+from hil.commission import prbs_design as amplitude
+from hil.commission.order import Order, as_table, cruise_of, halt
+from hil.commission.prbs_design import (
+    COMFORT_LIMIT_M_S2,
+    DAMPING_STD,
+    FREQUENCY_STD,
+    Cap,
+    Choice,
+    ResonanceSpread,
+    resonance_spread,
+    vibration_m_s2,
+)
 from hil.commission.readings import record_of
-from hil.commission.record import RunRecord
+from hil.commission.responses import HIGH_PASS_HZ, RINGING_S, averaged
+from hil.commission.state import Finding, RunRecord
 from hil.commission.step import Job, Outcome, Step
-from hil.commission.steps.tables import cruise_of, halt
 from hil.report.numbers import shown
 
 SPEED_BAND = 0.1
@@ -263,4 +267,4 @@ def _json(seen: _Seen) -> dict[str, Any]:
     }
 
 
-STEP = Step("prbs", "Amplitude of the PRBS", _about, _do, _orders, needs=("noise", "scales"))
+PRBS = Step("prbs", "Amplitude of the PRBS", _about, _do, _orders, needs=("noise", "scales"))

@@ -31,15 +31,15 @@ from hil.rig.plan import Plan, plan_run
 from hil.rig.session import run_plan
 from hil.rig.stop import StopRequest
 from hil.simulator.loopback import IN_PROCESS, Address
+from hil.simulator.plant import simulation_model
 from hil.simulator.rig_server import RigServer, required_simulation
-from hil.simulator.simulation_model import simulation_model
 
 RIG_FILE = Path(__file__).with_name("paper_rig.toml")
 
 EXPERIMENT = "cruise"
 
 GEAR_RATIO, WHEEL_RADIUS_M = 5.6, 0.48
-"""Of the bus that the default model is of (`hil.simulator.simulation_model.DEFAULT_BUS`)."""
+"""Of the bus that the default model is of (`hil.simulator.plant.DEFAULT_BUS`)."""
 
 ANY_PORT = Address("127.0.0.1", 0)
 

@@ -25,7 +25,7 @@ from hil.config.rig_file import Rig, read_rig
 from hil.errors import HilError
 from hil.proof.nominal_file import model_toml
 from hil.proof.wire.challenge import CONCEALED, Challenge, compile_truth, draw_challenge
-from hil.simulator.fault_spec import rig_faults
+from hil.simulator.fault_table import rig_faults
 from hil.simulator.loopback import modbus_address
 from hil.simulator.rig_server import RigServer
 

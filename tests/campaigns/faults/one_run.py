@@ -28,7 +28,7 @@ from hil.rig.pacing import FreePacer, Tick, period_ns
 from hil.rig.plan import plan_run
 from hil.rig.session import run_plan
 from hil.rig.stop import StopRequest
-from hil.simulator.fault_spec import rig_faults
+from hil.simulator.fault_table import rig_faults
 from hil.simulator.loopback import Address
 from hil.simulator.rig_server import RigServer
 from tests.campaigns.faults.kinds import UNTOUCHED, Kind

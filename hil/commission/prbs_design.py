@@ -1,0 +1,157 @@
+"""The amplitude of the PRBS: what the resonance needs, and what torque, speed and comfort allow."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from estimator.identification.linear_model import LinearModel
+from estimator.identification.modes.modes import Mode, resonance
+from estimator.physics.model import DrivelineModel, Structure
+from estimator.signals.record import FloatArray
+from hil.config.rig_file import Rig
+
+if TYPE_CHECKING:
+    from estimator.identification.offline.output_error import OutputErrorFit
+
+
+STEP = 1e-3
+"""Step of the differences, in standard deviations of each direction of theta."""
+
+
+@dataclass(frozen=True, slots=True)
+class ResonanceSpread:
+    """The resonance and the standard deviations of its frequency and damping, relative to each."""
+
+    mode: Mode
+    frequency_std: float
+    damping_std: float
+
+    def scaled(self, factor: float) -> ResonanceSpread:
+        """Return the same with standard deviations so many times as large."""
+        return ResonanceSpread(self.mode, factor * self.frequency_std, factor * self.damping_std)
+
+
+def resonance_spread(fit: OutputErrorFit, band_hz: tuple[float, float]) -> ResonanceSpread | None:
+    """Return the resonance of a fit and how well it is known; None without one in the band.
+
+    First order: differences along the principal directions of the covariance of theta, ``sigma^2 (J'J)^-1``.
+    """
+    mode = resonance(fit.model, band_hz)
+    if mode is None:
+        return None
+    sizes, directions = np.linalg.eigh(fit.covariance)
+    gradients = [
+        _change(fit.model, mode, np.sqrt(max(size, 0.0)) * v) for size, v in zip(sizes, directions.T, strict=True)
+    ]
+    frequency, damping = np.sqrt(np.sum(np.array(gradients) ** 2, axis=0))
+    return ResonanceSpread(mode, float(frequency) / mode.frequency_hz, float(damping) / abs(mode.damping))
+
+
+def _change(model: LinearModel, mode: Mode, step: FloatArray) -> tuple[float, float]:
+    """Return the change of frequency and damping for a change of theta, by a small part of it."""
+    moved = LinearModel.from_theta(model.theta + STEP * step, model.orders, model.sample_time_s)
+    near = (0.5 * mode.frequency_hz, 2.0 * mode.frequency_hz)
+    after = resonance(moved, near)
+    if after is None:
+        return 0.0, 0.0
+    return (after.frequency_hz - mode.frequency_hz) / STEP, (after.damping - mode.damping) / STEP
+
+
+FREQUENCY_STD = 0.002
+"""Relative: 0.2 % of the frequency shows a change of stiffness of 0.4 %."""
+
+DAMPING_STD = 0.02
+"""Relative: 2 % of the damping."""
+
+MARGIN = 2.0
+"""A road's unevenness and wind double what noise alone asks for; the run itself shows whether it was enough."""
+
+
+@dataclass(frozen=True, slots=True)
+class Cap:
+    """A largest amplitude [Nm], of both inverters together, and what sets it."""
+
+    amplitude_nm: float
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """The amplitude [Nm], and why it is not another."""
+
+    amplitude_nm: float
+    needed_nm: float
+    cap: Cap
+    reason: str
+
+
+def excess(spread: ResonanceSpread) -> float:
+    """Return how many times the spread is what it may be, frequency or damping, whichever is worse."""
+    return max(spread.frequency_std / FREQUENCY_STD, spread.damping_std / DAMPING_STD)
+
+
+def needed_nm(spread: ResonanceSpread, amplitude_nm: float) -> float:
+    """Return the least amplitude that determines the resonance [Nm], given what a test with another one came to."""
+    return MARGIN * amplitude_nm * excess(spread)
+
+
+def torque_caps(rig: Rig) -> Iterable[Cap]:
+    """Name what the torque guard leaves a PRBS besides the base torque of the rig's experiments."""
+    part = rig.prbs.part_m1
+    limits = {"m1": (part, rig.inverters.m1.torque_limit_nm), "m2": (1.0 - part, rig.inverters.m2.torque_limit_nm)}
+    for name, (carried, limit_nm) in limits.items():
+        if carried <= 0.0:
+            continue
+        yield Cap(rig.guard.prbs_limit_nm / carried, "guard.prbs_limit_nm")
+        for key, table in rig.experiments.items():
+            share = table.share_m1 if name == "m1" else 1.0 - table.share_m1
+            rest_nm = (limit_nm - share * table.torque_nm) / carried
+            yield Cap(rest_nm, f"inverters.{name}.torque_limit_nm besides experiments.{key}.torque_nm")
+    for key, table in rig.experiments.items():
+        yield Cap(rig.guard.sum_limit_nm - table.torque_nm, f"guard.sum_limit_nm besides experiments.{key}.torque_nm")
+
+
+def choose(wanted_nm: float, needed: float, caps: Iterable[Cap], step_nm: float) -> Choice:
+    """Choose the amplitude: the rig file's where it serves, more where the resonance asks for it, never above a cap."""
+    cap = min(caps, key=lambda each: each.amplitude_nm)
+    chosen = math.ceil(max(wanted_nm, needed) / step_nm - 1e-9) * step_nm
+    reason = "as in the rig file" if needed <= wanted_nm else "raised: the resonance asks for more than the rig file's"
+    if chosen > cap.amplitude_nm:
+        chosen = math.floor(cap.amplitude_nm / step_nm + 1e-9) * step_nm
+        reason = f"held down by {cap.reason}"
+    return Choice(chosen, needed, cap, reason)
+
+
+COMFORT_LIMIT_M_S2 = 0.315
+"""Upper end of "not uncomfortable" [m/s2 RMS]: ISO 2631-1:1997, C.2.3."""
+
+FELT_HZ = (0.5, 20.0)
+"""Band of vibration looked at [Hz]: ISO 2631-1 begins at 0.5 Hz; above 20 Hz W_d is below 0.1, and noise begins."""
+
+DEFAULT_TRAVEL_M_PER_RAD = 0.48 / 5.6
+"""Way per radian of the motor shaft [m]: wheel radius 0.48 m over ratio 5.6, the bus assumed in DESIGN."""
+
+
+def vibration_m_s2(
+    torque_nm: FloatArray,
+    speed_rad_s: FloatArray,
+    model: DrivelineModel,
+    period_s: float,
+    travel_m_per_rad: float,
+) -> float:
+    """Return the RMS of the vehicle's acceleration in the band that is felt [m/s2]."""
+    from scipy.signal import butter, sosfiltfilt  # half a second, and the bus comes first
+
+    values = model.values()
+    acceleration = np.gradient(speed_rad_s, period_s)
+    if model.structure is not Structure.ONE_MASS:
+        load = sum(values[name] for name in ("J_2", "J_L") if name in values)
+        acceleration = (torque_nm - values["J_M"] * acceleration) / load
+    high_hz = min(FELT_HZ[1], 0.45 / period_s)
+    felt = sosfiltfilt(butter(2, (FELT_HZ[0], high_hz), "bandpass", fs=1.0 / period_s, output="sos"), acceleration)
+    return float(travel_m_per_rad * np.sqrt(np.mean(felt**2)))

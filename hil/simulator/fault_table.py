@@ -1,0 +1,318 @@
+"""Faults of the simulated devices: one table of them, and how a person writes them.
+
+``m1.refuse_mode``, ``plc.clutch_closes@5.0``, ``m2.emcy@5.0=0x4210``, ``bus.lose=0.01``: device, kind, moment, size. A
+moment is in seconds of simulated time, which passes with SYNC alone: a rig that nobody drives stands still.
+
+A new fault is one row of `DEVICES`, and what it does in its device. The command line, its help, the tests and the
+campaigns read the table.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Any, Final
+
+from drivers.inverter.cia402 import PowerState
+from hil.errors import UsageError
+from hil.simulator.faults import FaultAtStep, Frames, LeavesOperation, RigFaults, SecondTpdo, Since
+
+OVERCURRENT: Final = 0x2310
+"""EMCY error code of CiA 402: continuous over current at the output."""
+
+NOBODY: Final = (0xBAD, 0xBAD)
+"""Vendor-ID and product code of no device."""
+
+LAST_COB_ID: Final = 0x7FF
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """When a fault comes, in simulated time [s], and its size; ``step`` is that SYNC, counted from 1."""
+
+    at_s: float
+    period_s: float
+    size: Any = None
+
+    @property
+    def step(self) -> int:
+        """Number of the SYNC at that time; 0 from power-on."""
+        return round(self.at_s / self.period_s)
+
+
+@dataclass(frozen=True, slots=True)
+class Size:
+    """What stands after the ``=`` of a fault: its sign in help and messages, what it may be in words, how it is read.
+
+    ``read`` raises ValueError for what it may not be; without a default it has to be given.
+    """
+
+    sign: str
+    expected: str
+    read: Callable[[str], Any]
+    default: Any = None
+
+
+class Kind:
+    """One kind of fault: a row of the table.
+
+    Parameters
+    ----------
+    fields
+        What it sets in the device's faults, by (dotted) name: a constant, or what makes it from the moment. To a set of
+        objects the value is added.
+    size
+        What it is asked for with; None for nothing.
+    timed
+        Whether it comes at a moment; else it is there from the start.
+    since_start
+        Whether the moment may be left out: then it is the start.
+    """
+
+    def __init__(
+        self, fields: Mapping[str, Any], size: Size | None = None, timed: bool = False, since_start: bool = False
+    ) -> None:
+        self._fields = fields
+        self.size = size
+        self.timed = timed
+        self.since_start = since_start
+
+    def put_into(self, faults: Any, when: Moment) -> Any:
+        """Return a device's faults with this one among them."""
+        for name, value in self._fields.items():
+            faults = _with(faults, name, value(when) if callable(value) else value)
+        return faults
+
+    def adds_up(self, faults: Any) -> bool:
+        """Whether it may come more than once, with other sizes."""
+        return (
+            any(isinstance(getattr(faults, name, None), frozenset) for name in self._fields) and self.size is not None
+        )
+
+    def written(self, name: str) -> str:
+        """Write it as a person does: ``emcy@S=CODE``, in brackets what may be left out; S stands for seconds."""
+        moment = "" if not self.timed else "[@S]" if self.since_start else "@S"
+        if self.size is None:
+            return name + moment
+        size = f"={self.size.sign}"
+        return name + moment + (size if self.size.default is None else f"[{size}]")
+
+
+def _with(faults: Any, name: str, value: Any) -> Any:
+    """Set one field; ``a.b`` is a field of a field."""
+    head, _, tail = name.partition(".")
+    before = getattr(faults, head)
+    if tail:
+        value = _with(before, tail, value)
+    elif isinstance(before, frozenset):
+        value = before | {value}
+    return replace(faults, **{head: value})
+
+
+def _number(sign: str, low: float, high: float, unit: str = "") -> Size:
+    return Size(sign, f"a number from {low:g} to {high:g} {unit}".rstrip(), _between(float, low, high))
+
+
+def _between(kind: Callable[[str], float], low: float, high: float) -> Callable[[str], Any]:
+    def read(text: str) -> float:
+        value = kind(text)
+        if not low <= value <= high:  # False for nan, too
+            raise ValueError(text)
+        return value
+
+    return read
+
+
+def _whole(text: str) -> int:
+    return int(text, 0)
+
+
+def _code(sign: str, what: str, default: int | None = None) -> Size:
+    return Size(sign, f"{what}, 0x1000 to 0xFFFF", _between(_whole, 0x1000, 0xFFFF), default)
+
+
+def _frames(sign: str, high: float, unit: str) -> Size:
+    """Describe an amount of the PDOs, or with ``:ID`` of the frames with one COB-ID."""
+
+    def read(text: str) -> Frames:
+        amount, colon, cob_id = text.partition(":")
+        which = _between(_whole, 0, LAST_COB_ID)(cob_id) if colon else None
+        return Frames(_between(float, 0.0, high)(amount), which)
+
+    words = f"a number from 0 to {high:g} {unit}, and :ID for frames of one COB-ID that are no PDO"
+    return Size(f"{sign}[:ID]", words, read)
+
+
+_STATES: Final = {
+    "ready": PowerState.READY_TO_SWITCH_ON,
+    "switched_on": PowerState.SWITCHED_ON,
+    "quick_stop": PowerState.QUICK_STOP_ACTIVE,
+    "disabled": PowerState.SWITCH_ON_DISABLED,
+}
+
+
+def _state(text: str) -> PowerState:
+    if text not in _STATES:
+        raise ValueError(text)
+    return _STATES[text]
+
+
+def _step(when: Moment) -> int:
+    return when.step
+
+
+def _size(when: Moment) -> Any:
+    return when.size
+
+
+def _at_s(when: Moment) -> float:
+    return when.at_s
+
+
+def _error(when: Moment) -> FaultAtStep:
+    return FaultAtStep(when.step, when.size)
+
+
+def _since(when: Moment) -> Since:
+    return Since(when.size, when.step)
+
+
+_STATE = Size("STATE", f"a state: {', '.join(_STATES)}", _state, PowerState.SWITCHED_ON)
+_FACTOR = _number("FACTOR", -10.0, 10.0, "times the torque asked for")
+_PERMILLE = _number("PERMILLE", -1e3, 1e3, "of rated torque")
+_SPEED_FACTOR = _number("FACTOR", -10.0, 10.0, "times the speed")
+_EVERY = Size("N", "a whole number from 1 to 1000: at every N-th SYNC", _between(_whole, 1, 1000), 1)
+_INDEX = _code("INDEX", "an object")
+_COOLING = _number("PERMILLE", 1.0, 1e3, "of rated torque")
+_COARSE = _number("PERMILLE", 1.0, 100.0, "of rated torque")
+
+_INVERTER: Final[Mapping[str, Kind]] = MappingProxyType(
+    {
+        "absent": Kind({"absent": True}),
+        "wrong_identity": Kind({"identity": NOBODY}),
+        "refuse_mode": Kind({"ignored_writes": 0x6060}),
+        "stuck": Kind({"ignored_writes": 0x6040}),
+        "hang": Kind({"hang_at_step": _step}, timed=True),
+        "reset": Kind({"reset_at_step": _step}, timed=True),
+        "bus_off": Kind({"bus_off_at_step": _step}, timed=True),
+        "stale_pdo": Kind({"stale_from_step": _step}, timed=True),
+        "ignores_target": Kind({"ignores_target_from_step": _step}, timed=True),
+        "leaves_operation": Kind(
+            {"leaves_operation": lambda when: LeavesOperation(when.step, when.size)}, _STATE, True
+        ),
+        "torque_gain": Kind({"wrong_torque.step": _step, "wrong_torque.gain": _size}, _FACTOR, True),
+        "torque_offset": Kind({"wrong_torque.step": _step, "wrong_torque.offset_permille": _size}, _PERMILLE, True),
+        "speed_gain": Kind({"wrong_speed.gain_from_step": _step, "wrong_speed.gain": _size}, _SPEED_FACTOR, True),
+        "speed_stuck": Kind({"wrong_speed.stuck_from_step": _step}, timed=True),
+        "second_tpdo": Kind({"second_tpdo": lambda when: SecondTpdo(when.step, when.size)}, _EVERY, True),
+        "stale_share": Kind({"stale_share": _size}, _number("SHARE", 0.0, 1.0, "of the PDOs")),
+        "fault": Kind({"fault": _error}, _code("CODE", "an error code", OVERCURRENT), True),
+        "emcy": Kind({"emcy": _error}, _code("CODE", "an error code"), True),
+        "brown_out": Kind({"brown_out_at_step": _step}, timed=True),
+        "clock_drift": Kind({"clock_drift_ppm": _size}, _number("PPM", -1e5, 1e5, "parts per million")),
+        "forgets": Kind({"ignored_writes": _size}, _INDEX),
+        "lacks": Kind({"missing_objects": _size}, _INDEX),
+        "locks": Kind({"locked_objects": _size}, _INDEX),
+        "field_weakening": Kind({"limits.base_speed_rad_s": _size}, _number("RAD_S", 1.0, 1e4, "rad/s")),
+        "weak_cooling": Kind({"limits.continuous_permille": _size}, _COOLING),
+        "coarse_torque": Kind({"limits.torque_step_permille": lambda when: round(when.size)}, _COARSE),
+    }
+)
+
+DEVICES: Final[Mapping[str, Mapping[str, Kind]]] = MappingProxyType(
+    {
+        "m1": _INVERTER,
+        "m2": _INVERTER,
+        "bus": {
+            **{
+                name: Kind({name: _since}, _frames("SHARE", 1.0, "of all"), True, True)
+                for name in ("lose", "corrupt", "repeat", "reorder")
+            },
+            **{name: Kind({name: _since}, _frames("SECONDS", 10.0, "s"), True, True) for name in ("delay", "jitter")},
+            "off": Kind({"off_at_step": _step}, timed=True),
+            "swapped_nodes": Kind({"swapped_nodes": True}),
+        },
+        "plc": {
+            "clutch_closes": Kind({"clutch_closes_at_s": _at_s}, timed=True),
+            "permissive_withdrawn": Kind({"permissive_withdrawn_at_s": _at_s}, timed=True),
+            "mode_changes": Kind({"mode_changes_at_s": _at_s}, timed=True),
+            "hang": Kind({"hangs_at_s": _at_s}, timed=True),
+            "exception": Kind({"exceptions_at_s": _at_s}, timed=True),
+            "slow": Kind({"late_at_s": _at_s}, timed=True),
+            "half_answer": Kind({"half_at_s": _at_s}, timed=True),
+            "reset": Kind({"resets_at_s": _at_s}, timed=True),
+            "wrong_unit": Kind({"wrong_unit_at_s": _at_s}, timed=True),
+            "wrong_transaction": Kind({"wrong_transaction_at_s": _at_s}, timed=True),
+            "swapped_floats": Kind({"swaps_floats": True}),
+            "wrong_width": Kind({"too_few_at_s": _at_s}, timed=True),
+        },
+    }
+)
+"""Every fault that can be asked for, by device and name."""
+
+_SPEC = re.compile(r"(?P<device>\w+)\.(?P<kind>\w+)(?:@(?P<at_s>[^=]+))?(?:=(?P<size>.+))?")
+
+
+def known_faults() -> str:
+    """List every fault in the way it is written, for help and messages; S stands for seconds."""
+    written = {
+        device: ", ".join(kind.written(name) for name, kind in kinds.items()) for device, kinds in DEVICES.items()
+    }
+    return f"m1.X or m2.X, X being {written['m1']}; bus.X, X being {written['bus']}; plc.X, X being {written['plc']}"
+
+
+def rig_faults(texts: Iterable[str], period_s: float) -> RigFaults:
+    """Read faults ``DEVICE.KIND[@S][=SIZE]``, as given to ``hil sim --fault``."""
+    faults = RigFaults()
+    known: set[tuple[str, str, Any]] = set()
+    for text in texts:
+        match = _SPEC.fullmatch(text.strip())
+        device, name, at_s, size = match.group("device", "kind", "at_s", "size") if match else ("", "", None, None)
+        kind = DEVICES.get(device, {}).get(name)
+        if kind is None:
+            raise UsageError(f"fault {text!r}: expected one of {known_faults()}.")
+        moment = Moment(_seconds(text, kind, at_s), period_s, _asked_size(text, kind, size))
+        before = getattr(faults, device)
+        once = (device, name, moment.size if kind.adds_up(before) else None)
+        if once in known:
+            raise UsageError(f"fault {text!r}: expected {device}.{name} once, got twice. Leave one out.")
+        known.add(once)
+        faults = replace(faults, **{device: kind.put_into(before, moment)})
+    return faults
+
+
+def _seconds(text: str, kind: Kind, at_s: str | None) -> float:
+    if at_s is None:
+        if kind.timed and not kind.since_start:
+            name = text.strip().partition("=")[0]
+            raise UsageError(f"fault {text!r}: expected a moment in seconds, got none. Write {name}@5.0")
+        return 0.0
+    if not kind.timed:
+        raise UsageError(f"fault {text!r}: expected no moment, got {at_s!r}: it is there from the start.")
+    try:
+        value = float(at_s)
+    except ValueError:
+        value = math.nan
+    if not 0.0 <= value < math.inf:
+        raise UsageError(f"fault {text!r}: expected seconds of simulated time, 0 or more, got {at_s!r}.")
+    return value
+
+
+def _asked_size(text: str, kind: Kind, given: str | None) -> Any:
+    size = kind.size
+    if size is None:
+        if given is not None:
+            raise UsageError(f"fault {text!r}: expected nothing after its name, got '={given}'.")
+        return None
+    if given is None:
+        if size.default is None:
+            device, _, name = text.strip().partition("@")[0].partition(".")
+            raise UsageError(f"fault {text!r}: expected {size.expected}, got none. Write {device}.{kind.written(name)}")
+        return size.default
+    try:
+        return size.read(given)
+    except ValueError as error:
+        raise UsageError(f"fault {text!r}: expected {size.expected}, got {given!r}.") from error

@@ -1,0 +1,235 @@
+"""What can be wrong with each simulated device; by default nothing. `hil.simulator.fault_table` has the names."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from enum import Enum
+from typing import Final
+
+from drivers.inverter.cia402 import PowerState
+from drivers.plc.types import DriveMode
+
+PDO_COB_IDS = range(0x180, 0x580)
+"""The PDOs of the predefined connection set (CiA 301)."""
+
+
+@dataclass(frozen=True, slots=True)
+class FaultAtStep:
+    """A fault the drive meets at one step: its error code, for EMCY and object 0x603F.
+
+    Steps count the SYNCs from 1, here and below; 0 is power-on.
+    """
+
+    step: int
+    emcy_code: int
+
+
+@dataclass(frozen=True, slots=True)
+class WrongTorque:
+    """A drive that gives another torque than it is asked for, and reports what it gives, from one step on.
+
+    It gives ``gain`` times what it is asked for, -1 being the other way round, and ``offset_permille`` of its rated
+    torque more.
+    """
+
+    step: int | None = None
+    gain: float = 1.0
+    offset_permille: float = 0.0
+
+    def given(self, wanted_permille: float, step: int) -> float:
+        """Torque it gives at a step [per mille of rated]."""
+        if self.step is None or step < self.step:
+            return wanted_permille
+        return self.gain * wanted_permille + self.offset_permille
+
+
+@dataclass(frozen=True, slots=True)
+class WrongSpeed:
+    """A resolver that reads another speed than the motor has, from one step on: so many times it, or stuck there."""
+
+    gain_from_step: int | None = None
+    gain: float = 1.0
+    stuck_from_step: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class DriveLimits:
+    """Limits a drive sets itself, besides max torque 0x6072; by default none that acts.
+
+    Attributes
+    ----------
+    base_speed_rad_s
+        Field weakening begins here [rad/s].
+    continuous_permille
+        Torque it can give for ever [per mille of rated].
+    thermal_time_constant_s
+        Of winding and heat sink together [s].
+    torque_step_permille
+        Coarseness of torque and current actual value [per mille].
+    """
+
+    base_speed_rad_s: float = math.inf
+    continuous_permille: float = math.inf
+    thermal_time_constant_s: float = 30.0
+    torque_step_permille: int = 1
+
+    def weakening(self, speed_rad_s: float) -> float:
+        """Field left at a speed, 0 to 1: torque per current, and largest torque, relative to standstill."""
+        return min(1.0, self.base_speed_rad_s / max(abs(speed_rad_s), 1e-9))
+
+    def quantised(self, permille: float) -> int:
+        """Round a reading to the steps this drive tells it in."""
+        return self.torque_step_permille * round(permille / self.torque_step_permille)
+
+
+@dataclass(frozen=True, slots=True)
+class LeavesOperation:
+    """The drive leaves OPERATION ENABLED by itself at one step, with neither fault nor EMCY, for another state."""
+
+    step: int
+    state: PowerState
+
+
+@dataclass(frozen=True, slots=True)
+class SecondTpdo:
+    """Somebody sends each TPDO again, with a speed of 0, at every n-th SYNC from one step on."""
+
+    step: int
+    every: int
+
+
+@dataclass(frozen=True, slots=True)
+class InverterFaults:
+    """What is wrong with a simulated inverter; by default nothing. What each does: docs/supported-protocols.md."""
+
+    absent: bool = False
+    hang_at_step: int | None = None
+    reset_at_step: int | None = None
+    bus_off_at_step: int | None = None
+    stale_from_step: int | None = None
+    stale_share: float = 0.0
+    ignores_target_from_step: int | None = None
+    leaves_operation: LeavesOperation | None = None
+    wrong_torque: WrongTorque = field(default_factory=WrongTorque)
+    wrong_speed: WrongSpeed = field(default_factory=WrongSpeed)
+    second_tpdo: SecondTpdo | None = None
+    fault: FaultAtStep | None = None
+    emcy: FaultAtStep | None = None
+    brown_out_at_step: int | None = None
+    identity: tuple[int, int] | None = None
+    velocity_unit: int | None = None
+    ignored_writes: frozenset[int] = frozenset()
+    missing_objects: frozenset[int] = frozenset()
+    locked_objects: frozenset[int] = frozenset()
+    clock_drift_ppm: float = 0.0
+    limits: DriveLimits = field(default_factory=DriveLimits)
+
+
+@dataclass(frozen=True, slots=True)
+class Frames:
+    """Some of the frames of a bus, and by how much they are touched: a share, 0 to 1, or a time [s]."""
+
+    amount: float
+    cob_id: int | None = None
+
+    def meant(self, cob_id: int) -> bool:
+        """Whether a frame is one of them; all PDOs are where no COB-ID is named."""
+        return cob_id in PDO_COB_IDS if self.cob_id is None else cob_id == self.cob_id
+
+
+@dataclass(frozen=True, slots=True)
+class Since:
+    """Frames that are touched from one SYNC on; 0 is the start."""
+
+    frames: Frames
+    step: int
+
+
+@dataclass(frozen=True, slots=True)
+class BusFaults:
+    """What is wrong with the bus; by default nothing.
+
+    A corrupt frame arrives one byte short, as from a faulty gateway: CAN's own CRC lets no wrong frame through. Delay
+    and jitter are of the wall clock. Swapped nodes: each inverter has the node id of the other.
+    """
+
+    lose: Since | None = None
+    corrupt: Since | None = None
+    repeat: Since | None = None
+    reorder: Since | None = None
+    delay: Since | None = None
+    jitter: Since | None = None
+    off_at_step: int | None = None
+    swapped_nodes: bool = False
+
+    @property
+    def touch_frames(self) -> bool:
+        """Whether a frame is ever treated in another way than on a good bus."""
+        return replace(self, swapped_nodes=False) != BusFaults()
+
+
+LATE_BY_S: Final = 1.5
+"""How late a slow PLC answers [s of the wall clock]: beyond the second that a client waits."""
+
+
+class Answers(Enum):
+    """How a PLC answers a request: well, or in one of the ways in which a real one fails."""
+
+    WELL = "well"
+    NOT = "not"  # the connection stays
+    EXCEPTION = "exception"
+    LATE = "late"
+    HALF = "half"
+    RESET = "reset"
+    TOO_FEW = "too few"  # one register less than was asked for
+    WRONG_UNIT = "wrong unit"  # as a gateway does that mixes up its devices
+    WRONG_TRANSACTION = "wrong transaction"
+
+
+@dataclass(frozen=True, slots=True)
+class PlcFaults:
+    """What goes wrong, and when in simulated time [s]; nothing by default.
+
+    ``answers_at_s`` has from when on the PLC answers in another way; of several the last one counts. ``refused_modes``
+    are requests it takes and does not follow, and with ``swaps_floats`` the words of its floating-point values have the
+    other order than the register map says.
+    """
+
+    clutch_closes_at_s: float = math.inf
+    permissive_withdrawn_at_s: float = math.inf
+    mode_changes_at_s: float = math.inf
+    hangs_at_s: float = math.inf
+    exceptions_at_s: float = math.inf
+    late_at_s: float = math.inf
+    half_at_s: float = math.inf
+    resets_at_s: float = math.inf
+    too_few_at_s: float = math.inf
+    wrong_unit_at_s: float = math.inf
+    wrong_transaction_at_s: float = math.inf
+    swaps_floats: bool = False
+    refused_modes: frozenset[DriveMode] = frozenset()
+
+    def answers(self, time_s: float) -> Answers:
+        """Tell how the PLC answers at a simulated time [s]; of several faults the one that came last."""
+        begun = {
+            self.hangs_at_s: Answers.NOT,
+            self.exceptions_at_s: Answers.EXCEPTION,
+            self.late_at_s: Answers.LATE,
+            self.half_at_s: Answers.HALF,
+            self.resets_at_s: Answers.RESET,
+            self.too_few_at_s: Answers.TOO_FEW,
+            self.wrong_unit_at_s: Answers.WRONG_UNIT,
+            self.wrong_transaction_at_s: Answers.WRONG_TRANSACTION,
+        }
+        return begun[max(due)] if (due := [at_s for at_s in begun if at_s <= time_s]) else Answers.WELL
+
+
+@dataclass(frozen=True, slots=True)
+class RigFaults:
+    """What is wrong with the simulated devices; by default nothing."""
+
+    m1: InverterFaults = field(default_factory=InverterFaults)
+    m2: InverterFaults = field(default_factory=InverterFaults)
+    bus: BusFaults = field(default_factory=BusFaults)
+    plc: PlcFaults = field(default_factory=PlcFaults)
