@@ -63,6 +63,8 @@ class EffectParameter:
         with the recording's initial state and belongs to no model.
     most : float
         Largest value that makes sense in a model, whatever the data: a share has no more than 1.
+    form : str
+        Name of the law's form where this parameter shapes it: of one that is not at its null.
     """
 
     name: str
@@ -74,6 +76,7 @@ class EffectParameter:
     optional: bool = False
     own: bool = False
     most: float = math.inf
+    form: str = ""
 
     def unit(self, motion: Motion) -> str:
         """Return the parameter's unit in a kind of motion."""
@@ -308,6 +311,11 @@ class Effect:
     def lasting(self) -> bool:
         """Whether it is a step that does not go back within a recording."""
         return self.step is not None and self.step.lasting
+
+    def form(self, values: Mapping[str, float]) -> str:
+        """Return the name of the law's form at some values; "" where it has no other one, or is in its plain one."""
+        shaped = (each for each in self.parameters if each.form and values.get(each.name, each.null) != each.null)
+        return next((each.form for each in shaped), "")
 
     @property
     def shared_parameters(self) -> tuple[EffectParameter, ...]:

@@ -134,6 +134,7 @@ def respond(
             moved = twist[k] - twist[k - 1] if k > 0 else 0.0
             share = min(max((inside - before) / moved, 0.0), 1.0) if moved != 0.0 else 0.0
             share *= backlash.damping_share(inside, p[slots.CONTACT])
+            share += p[slots.ACROSS] * (1.0 - share)
         out[k] = carried(inside, loading, stiffness, preload, p) + share * p[slots.C] * rate[k]
 
 

@@ -25,6 +25,7 @@ SHAPE = EffectParameter(
     0.5,
     "s: 0 of first order, 1/4 two equal poles, 1/2 Butterworth's, which is nearly a delay",
     True,
+    form="second order",
 )
 
 SLOWEST_S = 0.1

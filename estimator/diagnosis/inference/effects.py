@@ -57,4 +57,5 @@ def _found(
         profiles=profiles,
         share=belief.share,
         probability=belief.probability,
+        form=entry.form({name: p.value for name, p in parameters.items()}),
     )

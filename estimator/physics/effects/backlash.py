@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from estimator.compiled import compiled
 from estimator.lanes import choose, every
-from estimator.physics.effect import WITH_SPRING, Effect, EffectParameter, Element, Held, Start, Untestable
+from estimator.physics.effect import WITH_SPRING, Effect, EffectParameter, Element, Held, Retelling, Start, Untestable
 from estimator.physics.laws import fading
 from estimator.physics.model import DrivelineModel, Motion, Structure, unit
 from estimator.physics.motion import torque_reverses, torque_scale
@@ -34,9 +34,9 @@ def pressed(torque: float, loaded_twist: float, pull: float) -> float:
 
 
 def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
-    """Return a fifth of the twist that the torque in use gives, a twentieth of that for the contact depth, and 1."""
+    """Return a fifth of the twist that the torque in use gives, a twentieth of that for the contact depth, and 1s."""
     twist = torque_scale(records) / model.parameters["k"].value
-    return (0.2 * twist, 0.01 * twist, 1.0)
+    return (0.2 * twist, 0.01 * twist, 1.0, 1.0)
 
 
 def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
@@ -46,7 +46,16 @@ def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
     """
     contact: float | Held = Held(0.0) if model.structure is Structure.JOINT else 1.0
     pull: float | Held = Held(0.0) if model.structure is Structure.JOINT else 0.5
-    return [(size, contact, pull) for size in (0.1, 0.4, 1.2, 3.6)]
+    return [(size, contact, pull, Held(0.0)) for size in (0.1, 0.4, 1.2, 3.6)]
+
+
+def retold(
+    model: DrivelineModel, records: Sequence[Record], values: Mapping[str, float], line: Mapping[str, float]
+) -> list[Retelling]:
+    """Return the gap that was found with the damper across it, which its faces then do not share."""
+    if values["across"] > 0.0:
+        return []
+    return [Retelling((values["gap_rad"] / scales(model, records)[0], Held(0.0), Held(0.0), Held(1.0)), {})]
 
 
 CONTACT_PER_GAP = 0.05
@@ -74,13 +83,25 @@ EFFECT = Effect(
     name="backlash",
     element=Element.SHAFT,
     title="backlash in the shaft line",
-    law="T_S = k e + c (1 - exp(-|e|/e_c)) de/dt, times q where that pulls; e = twist beyond +-gap/2",
+    law="T_S = k e + c (1 - exp(-|e|/e_c)) de/dt, times q where that pulls; e = twist beyond +-gap/2; with the damper "
+    "across the gap T_S = k e + c d(twist)/dt",
     source="Nordin, Gutman: Automatica 38(10), 2002; contact damping after Hunt, Crossley 1975",
     excited_by="shaft torque that changes sign: reversal, tip-in and tip-out",
     parameters=(
         EffectParameter("gap_rad", "angle", 0.0, 0.0, 20.0, "total gap"),
         EffectParameter("contact_rad", "angle", 0.0, 0.02, 20.0, "depth over which the damping engages: e_c", True),
         EffectParameter("pull", "", 0.0, 0.0, 1.0, "share of a pull that an oil film passes on: q", True, most=1.0),
+        EffectParameter(
+            "across",
+            "",
+            0.0,
+            0.0,
+            1.0,
+            "share of the damping that acts across the gap, too",
+            True,
+            most=1.0,
+            form="damper across the gap",
+        ),
     ),
     structures=WITH_SPRING,
     resembles=(
@@ -93,6 +114,7 @@ EFFECT = Effect(
     scales=scales,
     starts=starts,
     testable=testable,
+    retold=retold,
     sentence=sentence,
     completed=completed,
     shows_start=frozenset({"twist", "preload"}),

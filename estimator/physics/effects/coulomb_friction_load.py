@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from estimator.physics.effect import WITH_SHAFT, Effect, EffectParameter, Element, Held, Retelling, Start, Untestable
 from estimator.physics.effects import coulomb_friction_motor
+from estimator.physics.effects.coulomb_friction_motor import CREEP, forms_near_rest
 from estimator.physics.model import DrivelineModel, Motion, unit
 from estimator.signals.record import Record
 
@@ -13,18 +14,25 @@ STICKING = 0.02
 """Presliding of a contact that sticks, in the scale of one that deflects."""
 
 PRESLIDING = EffectParameter(
-    "presliding_rad", "angle", 0.0, 0.5 * STICKING, 10.0, "deflection at which it breaks away: x_b", True
+    "presliding_rad",
+    "angle",
+    0.0,
+    0.5 * STICKING,
+    10.0,
+    "deflection at which it breaks away: x_b",
+    True,
+    form="presliding",
 )
 
 
 def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
-    """Return a twentieth of the torque in use, and the presliding of a motor: both have bearings and seals."""
+    """Return those of a motor: both have bearings and seals."""
     return coulomb_friction_motor.scales(model, records)
 
 
 def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
-    """Return one start: the problem is convex in the friction torque, without presliding, which waits for it."""
-    return [(0.5, Held(0.0))]
+    """Return one start: the problem is convex in the friction torque; presliding and creep wait for it."""
+    return [(0.5, Held(0.0), Held(0.0))]
 
 
 def retold(
@@ -38,10 +46,7 @@ def bending(
     size: str, model: DrivelineModel, records: Sequence[Record], values: Mapping[str, float]
 ) -> list[Retelling]:
     """Return the same of dry friction at the load whose torque is the parameter ``size``."""
-    if values["presliding_rad"] > 0.0:
-        return []
-    friction, _ = scales(model, records)
-    return [Retelling((values[size] / friction, presliding), {}) for presliding in (1.0, STICKING)]
+    return forms_near_rest(size, scales(model, records), values, (1.0, STICKING))
 
 
 def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
@@ -58,10 +63,11 @@ EFFECT = Effect(
     name="coulomb_friction_load",
     element=Element.LOAD,
     title="dry friction at the load",
-    law="T_f = T_c sign(w_L); with presliding dT_f/dt = (T_c / x_b) (w_L - |w_L| T_f / T_c)",
+    law="T_f = T_c sign(w_L); with presliding dT_f/dt = (T_c / x_b) (w_L - |w_L| T_f / T_c); creeping "
+    "T_f = T_c tanh(w_L / w_c)",
     source="Armstrong-Hélouvry, Dupont, Canudas de Wit: Automatica 30(7), 1994; presliding: Dahl, AIAA J. 14(12), 1976",
     excited_by="speed that changes sign: reversal",
-    parameters=(EffectParameter("friction_nm", "torque", 0.0, 0.0, 40.0, "friction torque T_c"), PRESLIDING),
+    parameters=(EffectParameter("friction_nm", "torque", 0.0, 0.0, 40.0, "friction torque T_c"), PRESLIDING, CREEP),
     structures=WITH_SHAFT,
     resembles=("coulomb_friction_motor", "stribeck_friction", "brake_drag"),
     scales=scales,

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Held, Retelling, Start, Untestable
 from estimator.physics.model import DrivelineModel, Motion, unit
-from estimator.physics.motion import torque_scale, turns
+from estimator.physics.motion import speed_scale, torque_scale, turns
 from estimator.signals.record import Record
 
 HELD_HZ = 20.0
@@ -15,25 +15,47 @@ HELD_HZ = 20.0
 milliradian before 16 Nm tear them loose. A fit begins there and moves on."""
 
 
+CREEPS_OVER = 0.01
+"""Share of the top speed over which a creeping friction changes sign, by scale: that of a line without a form of it."""
+
+PRESLIDING = EffectParameter(
+    "presliding_rad", "angle", 0.0, 0.05, 10.0, "deflection at which it breaks away: x_b", True, form="presliding"
+)
+CREEP = EffectParameter(
+    "creep_rad_s", "speed", 0.0, 0.02, 20.0, "speed over which it creeps near rest: w_c", True, form="creeping"
+)
+
+
 def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
-    """Return a twentieth of the torque in use, and the presliding with which a motor held by it swings at 20 Hz."""
+    """Return a twentieth of the torque in use, presliding by which a motor swings at 20 Hz, and a usual creep."""
     friction = 0.05 * torque_scale(records)
-    return (friction, friction / (model.parameters["J_M"].value * (2.0 * math.pi * HELD_HZ) ** 2))
+    presliding = friction / (model.parameters["J_M"].value * (2.0 * math.pi * HELD_HZ) ** 2)
+    return (friction, presliding, CREEPS_OVER * speed_scale(records))
 
 
 def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
-    """Return one start: the problem is convex in the friction torque, without presliding, which waits for it."""
-    return [(0.5, Held(0.0))]
+    """Return one start: the problem is convex in the friction torque; presliding and creep wait for it."""
+    return [(0.5, Held(0.0), Held(0.0))]
 
 
 def retold(
     model: DrivelineModel, records: Sequence[Record], values: Mapping[str, float], line: Mapping[str, float]
 ) -> list[Retelling]:
-    """Return the friction that was found, bending before it slides."""
-    if values["presliding_rad"] > 0.0:
+    """Return the friction that was found, bending before it slides, or creeping near rest."""
+    return forms_near_rest("friction_nm", scales(model, records), values, (1.0,))
+
+
+def forms_near_rest(
+    size: str, scale: Sequence[float], values: Mapping[str, float], presliding: Sequence[float]
+) -> list[Retelling]:
+    """Return a dry friction that was found sharp in its forms near rest, bent by each ``presliding``, or creeping.
+
+    The sizes before the two shapes keep what was found.
+    """
+    if values["presliding_rad"] > 0.0 or values["creep_rad_s"] > 0.0:
         return []
-    friction, _ = scales(model, records)
-    return [Retelling((values["friction_nm"] / friction, 1.0), {})]
+    found = values[size] / scale[0]
+    return [Retelling((found, bent, Held(0.0)), {}) for bent in presliding] + [Retelling((found, Held(0.0), 1.0), {})]
 
 
 def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
@@ -53,12 +75,14 @@ EFFECT = Effect(
     name="coulomb_friction_motor",
     element=Element.MOTOR,
     title="dry friction at the motor",
-    law="T_f = T_c sign(w_M); with presliding dT_f/dt = (T_c / x_b) (w_M - |w_M| T_f / T_c)",
+    law="T_f = T_c sign(w_M); with presliding dT_f/dt = (T_c / x_b) (w_M - |w_M| T_f / T_c); creeping "
+    "T_f = T_c tanh(w_M / w_c)",
     source="Armstrong-Hélouvry, Dupont, Canudas de Wit: Automatica 30(7), 1994; presliding: Dahl, AIAA J. 14(12), 1976",
     excited_by="motion in both directions, through standstill",
     parameters=(
         EffectParameter("friction_nm", "torque", 0.0, 0.0, 40.0, "friction torque T_c"),
-        EffectParameter("presliding_rad", "angle", 0.0, 0.05, 10.0, "deflection at which it breaks away: x_b", True),
+        PRESLIDING,
+        CREEP,
     ),
     structures=EVERY_LINE,
     resembles=("stribeck_friction", "quadratic_friction", "backlash", "shaft_hysteresis", "coulomb_friction_load"),

@@ -8,6 +8,7 @@ from estimator.compiled import compiled
 from estimator.lanes import choose, every
 from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Held, Retelling, Start, Untestable
 from estimator.physics.effects import coulomb_friction_motor
+from estimator.physics.effects.coulomb_friction_motor import CREEP, PRESLIDING
 from estimator.physics.laws import fading, smooth_sign
 from estimator.physics.model import DrivelineModel, Motion, unit
 from estimator.physics.motion import speed_scale
@@ -25,25 +26,25 @@ def law(speed: float, excess: float, coulomb: float, stribeck_speed: float, widt
 
 
 def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
-    """Return a twentieth of the torque in use, twice, a twentieth of the top speed, and a usual presliding."""
-    torque, presliding = coulomb_friction_motor.scales(model, records)
-    return (torque, torque, 0.05 * speed_scale(records), presliding)
+    """Return a twentieth of the torque in use, twice, a twentieth of the top speed, a usual presliding, and creep."""
+    torque, presliding, creep = coulomb_friction_motor.scales(model, records)
+    return (torque, torque, 0.05 * speed_scale(records), presliding, creep)
 
 
 def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
     """Return starts at narrow and wide Stribeck ranges: the fit is not convex in the width."""
-    return [(0.5, 0.3, width, Held(0.0)) for width in (0.6, 1.5, 3.0)]
+    return [(0.5, 0.3, width, Held(0.0), Held(0.0)) for width in (0.6, 1.5, 3.0)]
 
 
 def retold(
     model: DrivelineModel, records: Sequence[Record], values: Mapping[str, float], line: Mapping[str, float]
 ) -> list[Retelling]:
-    """Return the friction that was found, bending before it slides."""
-    if values["presliding_rad"] > 0.0:
+    """Return the friction that was found, bending before it slides, or creeping near rest."""
+    if values["presliding_rad"] > 0.0 or values["creep_rad_s"] > 0.0:
         return []
     found = (values[name] for name in ("excess_nm", "coulomb_nm", "stribeck_rad_s"))
     start = tuple(value / scale for value, scale in zip(found, scales(model, records)[:3], strict=True))
-    return [Retelling((*start, 1.0), {})]
+    return [Retelling((*start, 1.0, Held(0.0)), {}), Retelling((*start, Held(0.0), 1.0), {})]
 
 
 def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
@@ -66,7 +67,7 @@ EFFECT = Effect(
     element=Element.MOTOR,
     title="Stribeck friction at the motor",
     law="T_f = g(w_M) sign(w_M), g = T_c + T_x exp(-(w_M/w_s)^2); with presliding "
-    "dT_f/dt = ((T_c + T_x) / x_b) (w_M - |w_M| T_f / g)",
+    "dT_f/dt = ((T_c + T_x) / x_b) (w_M - |w_M| T_f / g); creeping T_f = g(w_M) tanh(w_M / w_c)",
     source="Armstrong-Hélouvry, Dupont, Canudas de Wit: Automatica 30(7), 1994; presliding: Canudas de Wit and others, "
     "IEEE Trans. Automat. Contr. 40(3), 1995",
     excited_by="slow motion in both directions, several passes through standstill",
@@ -74,7 +75,8 @@ EFFECT = Effect(
         EffectParameter("excess_nm", "torque", 0.0, 0.0, 40.0, "breakaway torque above T_c: T_x"),
         EffectParameter("coulomb_nm", "torque", 0.0, 0.0, 40.0, "friction torque at speed: T_c"),
         EffectParameter("stribeck_rad_s", "speed", 0.0, 0.02, 20.0, "speed range of the fall: w_s"),
-        EffectParameter("presliding_rad", "angle", 0.0, 0.05, 10.0, "deflection at which it breaks away: x_b", True),
+        PRESLIDING,
+        CREEP,
     ),
     structures=EVERY_LINE,
     resembles=("coulomb_friction_motor", "backlash", "coulomb_friction_load"),

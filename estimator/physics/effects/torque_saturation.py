@@ -54,7 +54,7 @@ EFFECT = Effect(
         EffectParameter("limit_m1_nm", "torque", math.inf, 0.05, 1.2, "limit of inverter M1: L_1", True),
         EffectParameter("limit_m2_nm", "torque", math.inf, 0.05, 1.2, "limit of inverter M2: L_2", True),
         EffectParameter("limit_sum_nm", "torque", math.inf, 0.05, 1.2, "limit of the sum: L", True),
-        EffectParameter("sharpness", "", EDGE, 2.0, EDGE, "sharpness of the knee: n", True),
+        EffectParameter("sharpness", "", EDGE, 2.0, EDGE, "sharpness of the knee: n", True, form="soft"),
     ),
     structures=EVERY_LINE,
     resembles=("inverter_gain_mismatch", "stiffness_nonlinearity"),

@@ -140,14 +140,26 @@ def conditions(
         p[slots.B_L] + warming_friction.cold_part(time_s, p[slots.WARMING], p[slots.WARMING_TIME]),
         dry_motor,
         dry_load,
-        max(sign_width, dry_motor / (fastest * inertia_motor)),
-        max(sign_width, dry_load / (fastest * carried)),
+        max(
+            changing_sign(sign_width, p[slots.COULOMB_CREEP], p[slots.STRIBECK_CREEP]),
+            dry_motor / (fastest * inertia_motor),
+        ),
+        max(
+            changing_sign(sign_width, p[slots.COULOMB_LOAD_CREEP], p[slots.BRAKE_CREEP]), dry_load / (fastest * carried)
+        ),
         branch_inertia(p),
         branch_frequency(p),
         fastest,
         inverse_yield,
         tyre(inertia_load, fastest, p),
     )
+
+
+@inlined
+def changing_sign(width: float, creep: float, other: float) -> float:
+    """Return the speed within which dry friction changes sign [rad/s]: the usual one where no law creeps."""
+    widest = max(creep, other)
+    return choose(widest > 0.0, widest, width)
 
 
 @inlined

@@ -46,14 +46,16 @@ def damping_torque(rate: float, p: FloatArray) -> float:
 def shaft_torque(twist: float, rate: float, loading: float, p: FloatArray, stiffness: float) -> float:
     """Return the torque the shaft carries [Nm] at a twist [rad], its rate [rad/s] and the hysteresis' loading [-]."""
     damping = damping_torque(rate, p)
+    across = like(0.0, damping)
     loaded, closed = twist, every(p[slots.GAP] <= 0.0)
     if not closed:
         loaded = beyond_gap(twist, p[slots.GAP])
-        damping *= backlash.damping_share(loaded, p[slots.CONTACT])
+        across = damping * p[slots.ACROSS]
+        damping = (damping - across) * backlash.damping_share(loaded, p[slots.CONTACT])
     law = p[slots.HARDENING], p[slots.SHAPE], p[slots.STAGE], p[slots.STAGE_FROM]
     elastic = stiffness * stiffness_nonlinearity.loaded_twist(loaded, *law)
     torque = float(elastic) + damping + float(p[slots.SLIDER]) * loading
-    return torque if closed else backlash.pressed(torque, loaded, p[slots.PULL])
+    return torque if closed else backlash.pressed(torque, loaded, p[slots.PULL]) + across
 
 
 @inlined

@@ -13,6 +13,7 @@ import pytest
 from estimator.physics import laws
 from estimator.physics.effects import (
     backlash,
+    quadratic_friction,
     shaft_hysteresis,
     stiffness_nonlinearity,
     stribeck_friction,
@@ -44,6 +45,7 @@ LAWS: list[tuple[Callable[..., Any], Sequence[Sequence[float]]]] = [
     (laws.overtoned_wave, [SIZES, EITHER_SIDE, (0.0, 2.0), (0.0, 0.3), (0.0, -0.2)]),
     (laws.wave, [SIZES, EITHER_SIDE, (0.0, 2.0)]),
     (backlash.damping_share, [EITHER_SIDE, SIZES]),
+    (quadratic_friction.law, [EITHER_SIDE, (0.0, 3.0), (1.7, 2.0, 2.1), (0.5, 40.0)]),
     (backlash.pressed, [EITHER_SIDE, EITHER_SIDE, (0.0, 0.5, 1.0)]),
     (shaft_hysteresis.loading_rate, [(-1.2, -0.5, 0.0, 0.9), EITHER_SIDE, (0.3, 2.0), (0.0, 0.8), (5.0, 600.0)]),
     (stiffness_nonlinearity.factor, [EITHER_SIDE, (-2.0, 0.0, 30.0), (0.5, 1.0, 2.0)]),

@@ -94,6 +94,14 @@ def test_faces_press_and_pull_as_much_as_the_oil_between_them(side: float, pull:
     assert shaft_torque(side * 0.021, side * -5.0, p) == pytest.approx(side * pull * (spring - damping), rel=1e-3)
 
 
+@pytest.mark.parametrize("across", [0.4, 1.0])
+def test_a_damper_across_the_gap_acts_in_it_and_the_faces_have_the_rest(across: float) -> None:
+    values = {"gap_rad": 0.04, "contact_rad": 1e-5, "pull": 0.0, "across": across}
+    p, damping = flat_values(TWO_MASS, {"backlash": values}), 5.0 * TWO_MASS["c"]
+    assert shaft_torque(0.01, 5.0, p) == pytest.approx(across * damping)
+    assert shaft_torque(0.05, 5.0, p) == pytest.approx(0.03 * TWO_MASS["k"] + damping)
+
+
 @pytest.mark.parametrize(("twist", "share"), [(0.0, 0.0), (1e-9, 1.0), (-0.3, 1.0)])
 def test_without_a_contact_depth_the_damper_acts_at_first_touch(twist: float, share: float) -> None:
     assert damping_share(twist, 0.0) == share
