@@ -6,8 +6,9 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
+from estimator.physics.driveline import EffectValue, Structure
+from estimator.physics.effect import Effect
 from estimator.physics.effects import (
     actuator_lag,
     aerodynamic_drag,
@@ -50,11 +51,7 @@ from estimator.physics.effects import (
     viscoelastic_shaft,
     warming_friction,
 )
-from estimator.physics.law_name import LawName
-
-if TYPE_CHECKING:
-    from estimator.physics.effect import Effect
-    from estimator.physics.model import DrivelineModel, EffectValue
+from estimator.physics.own_law import LawName
 
 _ENTRIES = (
     inverter_gain_mismatch.EFFECT,
@@ -120,7 +117,7 @@ BUILT_IN: Mapping[str, Effect] = MappingProxyType(_mutual(_ENTRIES))
 """The entries that the kernel has."""
 
 
-class _Effects(Mapping[str, "Effect"]):
+class _Effects(Mapping[str, Effect]):
     """The catalogue, in which the name of a user's own law finds its law, too."""
 
     def __getitem__(self, name: str) -> Effect:
@@ -137,15 +134,17 @@ EFFECTS: Mapping[str, Effect] = _Effects()
 """Name to entry, along the chain from torque command to load."""
 
 
-def effect_problems(name: str, values: Mapping[str, EffectValue], model: DrivelineModel) -> list[str]:
-    """Return what is wrong with an effect of a model, one line per fault; empty where nothing is."""
+def effect_problems(
+    name: str, values: Mapping[str, EffectValue], structure: Structure, laws: Sequence[LawName]
+) -> list[str]:
+    """Return what is wrong with an effect of a model that has these laws of its own, one line per fault."""
     entry = EFFECTS.get(name)
     if entry is None:
-        return [f"effects.{name}: unknown effect, expected one of {', '.join([*EFFECTS, *model.laws])}"]
+        return [f"effects.{name}: unknown effect, expected one of {', '.join([*EFFECTS, *laws])}"]
     problems = []
-    if model.structure not in entry.structures:
-        fits = ", ".join(sorted(structure.value for structure in entry.structures))
-        problems.append(f"effects.{name}: makes no sense in {model.structure.value}, expected {fits}")
+    if structure not in entry.structures:
+        fits = ", ".join(sorted(each.value for each in entry.structures))
+        problems.append(f"effects.{name}: makes no sense in {structure.value}, expected {fits}")
     expected = [parameter.name for parameter in entry.parameters]
     listed = ", ".join(expected)
     required = [parameter.name for parameter in entry.parameters if not parameter.optional]

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from estimator.physics.acting import Acting
-from estimator.physics.model import DrivelineModel, Motion, Structure, unit
+from estimator.physics.driveline import Driveline, Motion, Structure, unit
 from estimator.signals.record import OutputKind, Record
 
 
@@ -111,7 +111,7 @@ class Untestable:
     needs: str = ""
 
 
-Scales = Callable[[DrivelineModel, Sequence[Record]], tuple[float, ...]]
+Scales = Callable[[Driveline, Sequence[Record]], tuple[float, ...]]
 Start = tuple[float | Held | Within, ...]
 
 
@@ -131,12 +131,12 @@ class Retelling:
     line: Mapping[str, float]
 
 
-Retold = Callable[[DrivelineModel, Sequence[Record], Mapping[str, float], Mapping[str, float]], list[Retelling]]
+Retold = Callable[[Driveline, Sequence[Record], Mapping[str, float], Mapping[str, float]], list[Retelling]]
 Span = tuple[float, float]
-Spans = Callable[[DrivelineModel, Mapping[str, float], Mapping[str, float]], Mapping[str, tuple[Span, ...]]]
-Starts = Callable[[DrivelineModel, Sequence[Record]], list[Start]]
-Testable = Callable[[DrivelineModel, Sequence[Record]], Untestable | None]
-Objection = Callable[[DrivelineModel, Sequence[Record], Mapping[str, float]], str]
+Spans = Callable[[Driveline, Mapping[str, float], Mapping[str, float]], Mapping[str, tuple[Span, ...]]]
+Starts = Callable[[Driveline, Sequence[Record]], list[Start]]
+Testable = Callable[[Driveline, Sequence[Record]], Untestable | None]
+Objection = Callable[[Driveline, Sequence[Record], Mapping[str, float]], str]
 
 
 MOMENTS = (
@@ -146,10 +146,10 @@ MOMENTS = (
 """Own parameters of an event: from when to when it acts, since the recording began."""
 
 
-def long_enough(key: str) -> Callable[[DrivelineModel, Sequence[Record], Mapping[str, float]], str]:
+def long_enough(key: str) -> Callable[[Driveline, Sequence[Record], Mapping[str, float]], str]:
     """Return a check that a time is at least a tenth of the sampling period: shorter ones can't be reported."""
 
-    def check(_model: DrivelineModel, records: Sequence[Record], values: Mapping[str, float]) -> str:
+    def check(_model: Driveline, records: Sequence[Record], values: Mapping[str, float]) -> str:
         least = 0.1 * min(record.sample_time_s for record in records)
         if values[key] >= least:
             return ""
@@ -171,7 +171,7 @@ class Step:
         True where it does not go back within a recording.
     """
 
-    of: Callable[[DrivelineModel], str]
+    of: Callable[[Driveline], str]
     relative: bool = False
     lasting: bool = False
 

@@ -7,10 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from estimator.errors import BadModel
-from estimator.physics.law_name import LawName
 from estimator.physics.model import DrivelineModel, Plant, Structure, natural_frequencies_rad_s
 from estimator.physics.motion import reverses, speed_scale
-from estimator.physics.own_forces import Forces
+from estimator.physics.own_law import Forces, LawName
 from estimator.signals.record import FloatArray, Record
 
 RADIANS_PER_STEP = 0.2

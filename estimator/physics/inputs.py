@@ -3,35 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 
+from estimator.compiled import compiled, inlined
+from estimator.physics.kernel import bristles, sensing, slots, state_vector
+from estimator.physics.kernel.conditions import branch_frequency, branch_inertia
+from estimator.physics.kernel.line import is_bristled, is_within
 from estimator.physics.layout import LOAD, slot
-from estimator.physics.start import Start, initial_states
+from estimator.physics.start import Case, Start
 from estimator.physics.torque_path import path_of, recorded_shaft_torque
 from estimator.signals.record import FloatArray, IntArray, Record
 
 Key = TypeVar("Key", bound=Hashable)
-
-
-@dataclass(frozen=True, slots=True)
-class Case:
-    """One simulation of a recording.
-
-    Attributes
-    ----------
-    p : ndarray, shape (layout.SIZE,)
-        Parameters of the superset model, the recording's own among them.
-    extra_load_nm : ndarray, shape (N,), optional
-        Load torque over time, next to the constant one.
-    """
-
-    p: FloatArray
-    start: Start
-    extra_load_nm: FloatArray | None = None
 
 
 class Inputs(NamedTuple):
@@ -105,3 +91,51 @@ class _Rows(Generic[Key]):
         for row, values in zip(rows, self._rows, strict=True):
             row[: values.size], row[values.size :] = values, values[-1]
         return rows, np.array(self._chosen)
+
+
+def initial_state(start: Start, torque_nm: float, angle_rad: float, p: FloatArray) -> FloatArray:
+    """Return the kernel's state at the start: what is not unknown follows from the rest as if it were steady."""
+    only: FloatArray = initial_states([start], np.array([torque_nm]), angle_rad, p[np.newaxis])[0]
+    return only
+
+
+def initial_states(starts: Sequence[Start], torque_nm: FloatArray, angle_rad: float, p: FloatArray) -> FloatArray:
+    """Return ``initial_state`` of K simulations with these torques, (K,), and parameters, (K, layout.SIZE)."""
+    states = np.zeros((len(starts), state_vector.STATES))
+    for row, start in zip(states, starts, strict=True):
+        row[state_vector.ANGLE] = start.angle_rad
+        row[state_vector.SPEED] = start.speed_rad_s
+        row[state_vector.TWIST] = start.twist_rad
+        row[state_vector.LOAD_SPEED] = start.load_speed_rad_s
+        row[state_vector.MIDDLE_TWIST] = start.middle_twist_rad
+        row[state_vector.MIDDLE_SPEED] = start.middle_speed_rad_s
+        row[state_vector.TRACTION] = start.load_torque_nm
+    _follow(states, torque_nm, angle_rad, p)
+    return states
+
+
+@compiled
+def _follow(states: FloatArray, torque_nm: FloatArray, angle_rad: float, p: FloatArray) -> None:
+    """Fill in what follows from the rest, a row per simulation."""
+    for row in range(states.shape[0]):
+        follow(states[row], torque_nm[row], angle_rad, p[row])
+
+
+@inlined
+def follow(x: FloatArray, torque_nm: float, angle_rad: float, p: FloatArray) -> None:
+    """Fill in what follows from the rest of a state, shape (STATES,)."""
+    speed, carried = x[state_vector.SPEED], x[state_vector.LOAD_SPEED]
+    x[state_vector.VEHICLE_SPEED] = carried
+    x[state_vector.BRANCH_SPEED] = carried if p[slots.BEHIND] > 0.0 else speed
+    if is_within(p):  # another spring of the line carries what the shaft does
+        x[state_vector.BRANCH_TWIST] = (
+            p[slots.K] * x[state_vector.TWIST] / (branch_inertia(p) * branch_frequency(p) ** 2)
+        )
+    x[state_vector.LAGGED] = torque_nm + p[slots.LAGGED_BEFORE]
+    x[state_vector.LAG_RISE] = -p[slots.LAGGED_BEFORE]
+    x[state_vector.FILTERED] = sensing.reading(speed, angle_rad, p) + p[slots.FILTERED_BEFORE]
+    x[state_vector.FILTER_RISE] = -p[slots.FILTERED_BEFORE]
+    if is_bristled(p):  # of friction that has slid for long
+        x[state_vector.BRISTLES_MOTOR] = bristles.slid(speed, bristles.sliding(speed, p))
+        loaded = carried if p[slots.J_L] > 0.0 else speed
+        x[state_vector.BRISTLES_LOAD] = bristles.slid(loaded, p[slots.COULOMB_LOAD])

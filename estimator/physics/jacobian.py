@@ -14,10 +14,10 @@ import numpy as np
 
 from estimator.lanes import LANES
 from estimator.physics.differences import fill_differences
-from estimator.physics.inputs import Case
 from estimator.physics.parallel import concurrently
 from estimator.physics.problem import Problem, bounds, case_of, far_away, local_part, own_part, parameters
 from estimator.physics.simulate import simulate_outputs
+from estimator.physics.start import Case
 from estimator.physics.together import are_of_a_length, go_together, lanes_filled, simulate_together
 from estimator.physics.unknowns import Shared
 from estimator.signals.record import BoolArray, FloatArray, IntArray

@@ -12,8 +12,8 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 from estimator.compiled import compiled
+from estimator.physics.driveline import Driveline
 from estimator.physics.effect import EffectParameter, Start
-from estimator.physics.model import DrivelineModel
 from estimator.signals.record import Record
 
 TIME_CONSTANT = EffectParameter("time_constant_s", "s", 0.0, 0.0, 50.0, "time constant tau: by how much a ramp is late")
@@ -87,20 +87,20 @@ def faded(value: float, rise: float, low: LowPass) -> tuple[float, float]:
     return left, low.rise_of_output * value + low.rise_of_rise * rise
 
 
-def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+def scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
     """Return one sampling period; the shape has no unit."""
     return (min(record.sample_time_s for record in records), 1.0)
 
 
-def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
+def starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
     """Return a start below and one above a sampling period, with two equal poles."""
     return [(0.3, 0.25), (2.0, 0.25)]
 
 
-def quick_enough(key: str) -> Callable[[DrivelineModel, Sequence[Record], Mapping[str, float]], str]:
+def quick_enough(key: str) -> Callable[[Driveline, Sequence[Record], Mapping[str, float]], str]:
     """Return a check that a time is one of a torque path or a sensor."""
 
-    def check(_model: DrivelineModel, _records: Sequence[Record], values: Mapping[str, float]) -> str:
+    def check(_model: Driveline, _records: Sequence[Record], values: Mapping[str, float]) -> str:
         if values[key] <= SLOWEST_S:
             return ""
         return f"{values[key]:.2g} s are longer than any current loop, filter or bus takes"

@@ -11,14 +11,14 @@ from estimator.errors import BadModel
 from estimator.physics import catalogue, joint
 from estimator.physics.effect import Element
 from estimator.physics.grid import Grid
-from estimator.physics.inputs import Case, inputs_of, load_of
+from estimator.physics.inputs import inputs_of, load_of
 from estimator.physics.kernel import many, state_vector
 from estimator.physics.kernel.makes import Masses
 from estimator.physics.layout import slot
 from estimator.physics.model import Structure
 from estimator.physics.motion import motor_angle
-from estimator.physics.own_forces import FORCES
-from estimator.physics.start import Start
+from estimator.physics.own_law import FORCES
+from estimator.physics.start import Case, Start
 from estimator.signals.record import FloatArray, IntArray, Location, OutputKind, Record
 
 MASSES: dict[Structure, Masses] = {

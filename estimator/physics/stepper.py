@@ -7,11 +7,12 @@ import numpy as np
 from estimator.errors import BadModel
 from estimator.physics.effects import transport_delay
 from estimator.physics.grid import substeps_for
+from estimator.physics.inputs import initial_state
 from estimator.physics.kernel import integration, sensing, state_vector
 from estimator.physics.layout import flat, slot
 from estimator.physics.model import DrivelineModel
 from estimator.physics.simulate import MASSES
-from estimator.physics.start import Start, initial_state
+from estimator.physics.start import Start
 from estimator.physics.torque_path import shaft_torque_from
 
 SIGN_WIDTH_RAD_S = 0.02

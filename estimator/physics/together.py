@@ -10,11 +10,12 @@ import numpy as np
 
 from estimator.lanes import LANES
 from estimator.physics.grid import Grid
-from estimator.physics.inputs import Case, inputs_of
+from estimator.physics.inputs import inputs_of
 from estimator.physics.kernel import many, side_by_side
 from estimator.physics.model import Structure
 from estimator.physics.parallel import PARTS, concurrently
 from estimator.physics.simulate import MASSES, PERIODIC, TIMED, is_sensed, is_steep, output_state, simulate_outputs
+from estimator.physics.start import Case
 from estimator.signals.record import FloatArray, Record
 
 LENGTHS_DIFFER = 1.1

@@ -10,6 +10,7 @@ from estimator.physics.acting import Place
 from estimator.physics.catalogue import BUILT_IN
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
+from estimator.physics.inputs import initial_state
 from estimator.physics.kernel import slots, state_vector
 from estimator.physics.kernel.line import is_bristled_at_load, is_bristled_at_motor
 from estimator.physics.layout import LOAD, slot
@@ -17,7 +18,6 @@ from estimator.physics.model import Structure, natural_frequencies_rad_s
 from estimator.physics.motion import motor_angle, speed_scale, torque_scale
 from estimator.physics.problem import start_of
 from estimator.physics.simulate import MASSES, output_state
-from estimator.physics.start import initial_state
 from estimator.physics.torque_path import shaft_torque
 from estimator.signals.record import FloatArray, OutputKind, Record
 

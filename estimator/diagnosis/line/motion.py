@@ -10,12 +10,12 @@ import numpy as np
 from estimator.diagnosis.line.averages import block_mean
 from estimator.diagnosis.line.tangent import LOAD, MOTOR
 from estimator.physics.fit import FitResult
-from estimator.physics.inputs import Case
 from estimator.physics.kernel import state_vector
 from estimator.physics.model import Structure
 from estimator.physics.motion import motor_angle
 from estimator.physics.problem import Problem, local_part, parameters
 from estimator.physics.simulate import simulate_each
+from estimator.physics.start import Case
 from estimator.signals.record import FloatArray, Record
 
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from estimator.physics.acting import Acting, Place
+from estimator.physics.driveline import Driveline, Motion, unit
 from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Retelling
 from estimator.physics.effects import quadratic_friction
 from estimator.physics.effects.quadratic_friction import AT, EXPONENT
-from estimator.physics.model import DrivelineModel, Motion, unit
 from estimator.signals.record import Record
 
 
 def retold(
-    model: DrivelineModel, records: Sequence[Record], values: Mapping[str, float], line: Mapping[str, float]
+    model: Driveline, records: Sequence[Record], values: Mapping[str, float], line: Mapping[str, float]
 ) -> list[Retelling]:
     """Return the drag that was found with an exponent that is not 2."""
     return quadratic_friction.other_power("drag_nm_s2", quadratic_friction.scales(model, records)[0], values)

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 
 from estimator.compiled import compiled
 from estimator.physics.acting import Acting, Place
+from estimator.physics.driveline import Driveline, Motion, unit
 from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start, Untestable
-from estimator.physics.model import DrivelineModel, Motion, unit
 from estimator.physics.motion import reverses, speed_by_place, speed_scale, torque_scale
 from estimator.signals.record import Record
 
@@ -21,17 +21,17 @@ def law(speed: float, difference: float) -> float:
     return difference * abs(speed)
 
 
-def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+def scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
     """Return a twentieth of the torque in use at the top speed."""
     return (0.05 * torque_scale(records) / speed_scale(records),)
 
 
-def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
+def starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
     """Return one start of either sign: the problem is linear in it but for the sign of ``b_M`` within its bounds."""
     return [(0.5,), (-0.5,)]
 
 
-def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
+def testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
     """Need motion in both directions, and at each place at different speeds."""
     both = [record for record in records if reverses(record)]
     if not both:

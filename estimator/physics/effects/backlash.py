@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 
 from estimator.compiled import compiled
 from estimator.lanes import choose, every
+from estimator.physics.driveline import Driveline, Motion, Structure, unit
 from estimator.physics.effect import WITH_SPRING, Effect, EffectParameter, Element, Held, Retelling, Start, Untestable
 from estimator.physics.laws import fading
-from estimator.physics.model import DrivelineModel, Motion, Structure, unit
 from estimator.physics.motion import torque_reverses, torque_scale
 from estimator.signals.record import Record
 
@@ -33,13 +33,13 @@ def pressed(torque: float, loaded_twist: float, pull: float) -> float:
     return choose(loaded_twist == 0.0, 0.0, passed_on)
 
 
-def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+def scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
     """Return a fifth of the twist that the torque in use gives, a twentieth of that for the contact depth, and 1s."""
     twist = torque_scale(records) / model.parameters["k"].value
     return (0.2 * twist, 0.01 * twist, 1.0, 1.0)
 
 
-def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
+def starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
     """Return a ladder of gap sizes: a gap that is too large or too small is a local optimum.
 
     On a bench nothing can bounce, and the damping engages at once.
@@ -50,7 +50,7 @@ def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
 
 
 def retold(
-    model: DrivelineModel, records: Sequence[Record], values: Mapping[str, float], line: Mapping[str, float]
+    model: Driveline, records: Sequence[Record], values: Mapping[str, float], line: Mapping[str, float]
 ) -> list[Retelling]:
     """Return the gap that was found with the damper across it, which its faces then do not share."""
     if values["across"] > 0.0:
@@ -67,7 +67,7 @@ def completed(values: Mapping[str, float]) -> Mapping[str, float]:
     return {"contact_rad": CONTACT_PER_GAP * values.get("gap_rad", 0.0), **values}
 
 
-def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
+def testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
     """Need torque of both signs, so that the gap is crossed."""
     if any(torque_reverses(record) for record in records):
         return None

@@ -4,26 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from estimator.physics.driveline import Driveline, Motion, unit
 from estimator.physics.effect import EVERY_LINE, MOMENTS, Effect, EffectParameter, Element, Held, Retelling, Start
 from estimator.physics.effects import coulomb_friction_load
 from estimator.physics.effects.coulomb_friction_load import CREEP, PRESLIDING
-from estimator.physics.model import DrivelineModel, Motion, unit
 from estimator.physics.motion import reverses
 from estimator.signals.record import Record
 
 
-def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+def scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
     """Return those of dry friction at the load."""
     return coulomb_friction_load.scales(model, records)
 
 
-def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
+def starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
     """Return one start: its moments are found by a scan. Presliding and creep wait for them."""
     return [(0.5, Held(0.0), Held(0.0))]
 
 
 def retold(
-    model: DrivelineModel, records: Sequence[Record], values: Mapping[str, float], line: Mapping[str, float]
+    model: Driveline, records: Sequence[Record], values: Mapping[str, float], line: Mapping[str, float]
 ) -> list[Retelling]:
     """Return the brake that was found, bending before it slides, sticking or creeping, where a recording shows that."""
     if not any(reverses(record) for record in records):

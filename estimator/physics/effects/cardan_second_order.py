@@ -4,25 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from estimator.physics.driveline import Driveline, Motion, unit
 from estimator.physics.effect import WITH_SHAFT, Effect, EffectParameter, Element, Held, Start, Untestable
-from estimator.physics.model import DrivelineModel, Motion, unit
 from estimator.physics.motion import goes_round, speed_sweeps, torque_scale
 from estimator.signals.record import Record
 
 
-def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+def scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
     """Return a twentieth of the torque in use, the twist that it gives, and a twentieth."""
     torque = 0.05 * torque_scale(records)
     return (torque, torque / model.parameters["k"].value, 0.05)
 
 
-def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
+def starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
     """Return one start per cause; each is linear in amplitude and phase together."""
     off = Held(0.0)
     return [(off, 0.5, off), (0.5, off, off), (off, off, 0.5)]
 
 
-def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
+def testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
     """Need speeds at which twice per turn is near the resonance."""
     if not goes_round(records, 0.5):
         return Untestable("the motor makes less than half a turn: nothing recurs with its angle", "reversal")

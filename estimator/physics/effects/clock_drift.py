@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from estimator.physics.driveline import Driveline, Motion
 from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start
-from estimator.physics.model import DrivelineModel, Motion
 from estimator.physics.motion import longest_s
 from estimator.signals.record import Record
 
@@ -14,17 +14,17 @@ PARTED_S = 0.03
 further off ends where another of its periods matches."""
 
 
-def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+def scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
     """Return the rate of clocks that part by ``PARTED_S`` over the longest recording."""
     return (PARTED_S / longest_s(records),)
 
 
-def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
+def starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
     """Return starts on both sides, none further than a scale from the next: the error is not convex in the rate."""
     return [(side * parted,) for parted in (0.3, 1.0, 2.0, 3.0) for side in (-1.0, 1.0)]
 
 
-def unresolved(model: DrivelineModel, records: Sequence[Record], values: Mapping[str, float]) -> str:
+def unresolved(model: Driveline, records: Sequence[Record], values: Mapping[str, float]) -> str:
     """Object to clocks that part by less than a tenth of a sampling period over the longest recording."""
     least_s = 0.1 * min(record.sample_time_s for record in records)
     parted_s = abs(values["rate"]) * longest_s(records)

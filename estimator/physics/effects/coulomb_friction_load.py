@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from estimator.physics.driveline import Driveline, Motion, unit
 from estimator.physics.effect import WITH_SHAFT, Effect, EffectParameter, Element, Held, Retelling, Start, Untestable
 from estimator.physics.effects import coulomb_friction_motor
 from estimator.physics.effects.coulomb_friction_motor import CREEP, forms_near_rest
-from estimator.physics.model import DrivelineModel, Motion, unit
 from estimator.signals.record import Record
 
 STICKING = 0.02
@@ -25,31 +25,29 @@ PRESLIDING = EffectParameter(
 )
 
 
-def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+def scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
     """Return those of a motor: both have bearings and seals."""
     return coulomb_friction_motor.scales(model, records)
 
 
-def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
+def starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
     """Return one start: the problem is convex in the friction torque; presliding and creep wait for it."""
     return [(0.5, Held(0.0), Held(0.0))]
 
 
 def retold(
-    model: DrivelineModel, records: Sequence[Record], values: Mapping[str, float], line: Mapping[str, float]
+    model: Driveline, records: Sequence[Record], values: Mapping[str, float], line: Mapping[str, float]
 ) -> list[Retelling]:
     """Return the friction that was found, bending before it slides, or sticking: less than a heavy load shows."""
     return bending("friction_nm", model, records, values)
 
 
-def bending(
-    size: str, model: DrivelineModel, records: Sequence[Record], values: Mapping[str, float]
-) -> list[Retelling]:
+def bending(size: str, model: Driveline, records: Sequence[Record], values: Mapping[str, float]) -> list[Retelling]:
     """Return the same of dry friction at the load whose torque is the parameter ``size``."""
     return forms_near_rest(size, scales(model, records), values, (1.0, STICKING))
 
 
-def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
+def testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
     """Need a recording in which the speed takes both signs."""
     return coulomb_friction_motor.testable(model, records)
 

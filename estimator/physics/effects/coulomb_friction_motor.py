@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
+from estimator.physics.driveline import Driveline, Motion, unit
 from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Held, Retelling, Start, Untestable
-from estimator.physics.model import DrivelineModel, Motion, unit
 from estimator.physics.motion import speed_scale, torque_scale, turns
 from estimator.signals.record import Record
 
@@ -26,20 +26,20 @@ CREEP = EffectParameter(
 )
 
 
-def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+def scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
     """Return a twentieth of the torque in use, presliding by which a motor swings at 20 Hz, and a usual creep."""
     friction = 0.05 * torque_scale(records)
     presliding = friction / (model.parameters["J_M"].value * (2.0 * math.pi * HELD_HZ) ** 2)
     return (friction, presliding, CREEPS_OVER * speed_scale(records))
 
 
-def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
+def starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
     """Return one start: the problem is convex in the friction torque; presliding and creep wait for it."""
     return [(0.5, Held(0.0), Held(0.0))]
 
 
 def retold(
-    model: DrivelineModel, records: Sequence[Record], values: Mapping[str, float], line: Mapping[str, float]
+    model: Driveline, records: Sequence[Record], values: Mapping[str, float], line: Mapping[str, float]
 ) -> list[Retelling]:
     """Return the friction that was found, bending before it slides, or creeping near rest."""
     return forms_near_rest("friction_nm", scales(model, records), values, (1.0,))
@@ -58,7 +58,7 @@ def forms_near_rest(
     return [Retelling((found, bent, Held(0.0)), {}) for bent in presliding] + [Retelling((found, Held(0.0), 1.0), {})]
 
 
-def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
+def testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
     """Need a speed that takes both signs, in one recording or in several that share their load; or a known load."""
     if turns(model, records):
         return None

@@ -9,8 +9,8 @@ import numpy as np
 from estimator.compiled import compiled
 from estimator.lanes import choose, every
 from estimator.physics.acting import Acting, Place
+from estimator.physics.driveline import Driveline, Motion, unit
 from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start, Untestable
-from estimator.physics.model import DrivelineModel, Motion, unit
 from estimator.physics.motion import measured_speed, speed_scale, torque_scale
 from estimator.signals.record import FloatArray, Record
 
@@ -30,12 +30,12 @@ def law(speed: float, peak: float, peak_speed: float) -> float:
     return choose(peak_speed > 0.0, 2.0 * peak * ratio / (1.0 + ratio * ratio), 0.0)
 
 
-def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+def scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
     """Return a twentieth of the torque in use and the top speed."""
     return (0.05 * torque_scale(records), speed_scale(records))
 
 
-def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
+def starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
     """Return a peak inside the speeds driven and one at their end: the error is not convex in the peak's speed."""
     return [(1.0, 0.15), (1.0, 0.6)]
 
@@ -46,14 +46,14 @@ def speed_of(record: Record) -> FloatArray:
     return speed[np.isfinite(speed)]
 
 
-def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
+def testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
     """Need speeds far enough apart."""
     if any(float(np.ptp(speed_of(record))) >= LEAST_RANGE * speed_scale([record]) for record in records):
         return None
     return Untestable("the speed hardly varies: not separable from viscous friction and the constant load", "reversal")
 
 
-def implausible(model: DrivelineModel, records: Sequence[Record], values: Mapping[str, float]) -> str:
+def implausible(model: Driveline, records: Sequence[Record], values: Mapping[str, float]) -> str:
     """Object to a drag that does not level off in the speeds driven."""
     top = speed_scale(records)
     if values["peak_rad_s"] < STRAIGHT * top:

@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from estimator.compiled import compiled
+from estimator.physics.driveline import Driveline, Motion, natural_frequencies_rad_s, unit
 from estimator.physics.effect import WITH_SHAFT, Effect, EffectParameter, Element, Held, Retelling, Span, Start, Within
-from estimator.physics.model import DrivelineModel, Motion, natural_frequencies_rad_s, unit
 from estimator.signals.record import Record
 
 MOST_DAMPING = 0.15
@@ -57,14 +57,14 @@ def derived(values: Mapping[str, float], nominal: Mapping[str, float]) -> Mappin
     return {"frequency_hz": fastest / (2.0 * math.pi)}
 
 
-def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+def scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
     """Return a tenth of the motor's inertia, the line's own frequency, 1, a usual damping, and that inertia twice."""
     frequency = float(natural_frequencies_rad_s(model.values())[0]) / (2.0 * math.pi)
     tenth = 0.1 * model.parameters["J_M"].value
     return (tenth, frequency, 1.0, 0.05, tenth, tenth)
 
 
-def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
+def starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
     """Return heavy modes far above the first resonance, and light ones below, around and above it, as close as narrow.
 
     The heavy ones come first: where only what their spring does to the line shows, nothing else distinguishes them. An
@@ -77,7 +77,7 @@ def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
 
 
 def retold(
-    model: DrivelineModel, records: Sequence[Record], values: Mapping[str, float], line: Mapping[str, float]
+    model: Driveline, records: Sequence[Record], values: Mapping[str, float], line: Mapping[str, float]
 ) -> list[Retelling]:
     """Return an inertia before the shaft and one behind it that leave the line as compliant and as heavy as a branch.
 
@@ -112,7 +112,7 @@ def retold(
 
 
 def described(
-    model: DrivelineModel, values: Mapping[str, float], line: Mapping[str, float]
+    model: Driveline, values: Mapping[str, float], line: Mapping[str, float]
 ) -> Mapping[str, tuple[Span, ...]]:
     """Return the shaft's stiffness and that of the whole line, any damping, and the inertias with the further one."""
     more = within(values) or values["inertia_kg_m2"]
@@ -134,7 +134,7 @@ def sentence(values: Mapping[str, float], motion: Motion) -> str:
     )
 
 
-def implausible(model: DrivelineModel, records: Sequence[Record], values: Mapping[str, float]) -> str:
+def implausible(model: Driveline, records: Sequence[Record], values: Mapping[str, float]) -> str:
     """Object to a mode damped so much that it has no resonance to speak of, and to one too light or stiff to follow.
 
     A branch that stands for an inertia within the line is damped by the shaft next to it, too: ``c / (2 J_X w)`` comes

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from estimator.compiled import compiled
 from estimator.lanes import choose, every
 from estimator.physics.acting import Acting, Place
+from estimator.physics.driveline import Driveline, Motion
 from estimator.physics.effect import WITH_SHAFT, Effect, EffectParameter, Element, Start, Untestable
-from estimator.physics.model import DrivelineModel, Motion
 from estimator.physics.motion import torque_reverses, turns
 from estimator.signals.record import Record
 
@@ -21,17 +21,17 @@ def law(torque: float, sign: float, driving: float, back: float) -> float:
     return sign * abs(torque) * choose(torque * sign > 0.0, driving, back)
 
 
-def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+def scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
     """Return five per cent each."""
     return (0.05, 0.05)
 
 
-def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
+def starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
     """Return the same loss both ways: the problem is close to linear in both."""
     return [(0.5, 0.5)]
 
 
-def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
+def testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
     """Need both signs of torque and of speed, or else it is a gain of the torque or a constant load."""
     if turns(model, records) and any(torque_reverses(record) for record in records):
         return None

@@ -10,8 +10,8 @@ import numpy as np
 from estimator.compiled import compiled
 from estimator.lanes import every
 from estimator.physics.acting import Acting, Place
+from estimator.physics.driveline import Driveline, Motion, unit
 from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Held, Start
-from estimator.physics.model import DrivelineModel, Motion, unit
 from estimator.physics.motion import range_of, torque_scale
 from estimator.signals.record import Record
 
@@ -27,19 +27,19 @@ def law(angle: float, moment: float, turns: float, phase: float) -> float:
     return moment * math.sin(angle / turns + phase)
 
 
-def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+def scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
     """Return a fifth of the torque in use, and the gear ratio, or that with which the load swings by a radian."""
     return (0.2 * torque_scale(records), model.gear_ratio or max(range_of(records), 1.0))
 
 
-def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
+def starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
     """Return one start for each gear ratio that may be; the problem is linear in moment and phase together."""
     if model.gear_ratio is not None:
         return [(1.0, Held(1.0))]
     return [(1.0, 1.0 / swing) for swing in SWINGS_RAD]
 
 
-def implausible(model: DrivelineModel, records: Sequence[Record], values: Mapping[str, float]) -> str:
+def implausible(model: Driveline, records: Sequence[Record], values: Mapping[str, float]) -> str:
     """Refuse what changes, over the load's swing, by more than the torque does from end to end, however it hangs."""
     swing = min(range_of(records) / values["motor_turns_per_turn"], 2.0 * math.pi)
     most = max(float(np.abs(record.total_torque_nm).max()) for record in records)

@@ -8,8 +8,8 @@ import numpy as np
 
 from estimator.compiled import compiled
 from estimator.physics.acting import Acting, Place
+from estimator.physics.driveline import Driveline, Motion, unit
 from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start
-from estimator.physics.model import DrivelineModel, Motion, unit
 from estimator.physics.motion import range_of, torque_scale
 from estimator.signals.record import Record
 
@@ -20,12 +20,12 @@ def law(angle: float, stiffness: float) -> float:
     return stiffness * angle
 
 
-def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+def scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
     """Return the torque in use over half the range of the motion."""
     return (torque_scale(records) / max(0.5 * range_of(records), np.finfo(float).tiny),)
 
 
-def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
+def starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
     """Return springs from soft to stiff, close to each other: the error is not convex in what swings on them."""
     return [(float(share),) for share in np.geomspace(0.03, 2.0, 9)]
 

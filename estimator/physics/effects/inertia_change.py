@@ -4,23 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from estimator.physics.driveline import Driveline, Motion, load_inertia, unit
 from estimator.physics.effect import EVERY_LINE, MOMENTS, Effect, EffectParameter, Element, Span, Start, Step
-from estimator.physics.model import DrivelineModel, Motion, load_inertia, unit
 from estimator.signals.record import Record
 
 
-def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+def scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
     """Return a tenth of the load's inertia."""
     return (0.1 * model.parameters[load_inertia(model)].value,)
 
 
-def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
+def starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
     """Return a lighter and a heavier load."""
     return [(-1.0,), (1.0,)]
 
 
 def described(
-    model: DrivelineModel, values: Mapping[str, float], line: Mapping[str, float]
+    model: Driveline, values: Mapping[str, float], line: Mapping[str, float]
 ) -> Mapping[str, tuple[Span, ...]]:
     """Return the load's inertia before and after."""
     name = load_inertia(model)

@@ -4,23 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from estimator.physics.driveline import Driveline, Motion
 from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Held, Start, Untestable
-from estimator.physics.model import DrivelineModel, Motion
 from estimator.physics.motion import shares_differ
 from estimator.signals.record import Record
 
 
-def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+def scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
     """Return 1: gains are near it."""
     return (1.0, 1.0)
 
 
-def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
+def starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
     """Return starts in which one inverter is off and the other is right: both at once are a change of scale."""
     return [(0.9, Held(1.0)), (Held(1.0), 0.9)]
 
 
-def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
+def testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
     """Need two inputs whose ratio changes, or else a wrong gain is a change of all other parameters."""
     if any(record.torque_nm.shape[1] < 2 for record in records):
         return Untestable("there is one torque input only: its gain is that of all other parameters", "cruise")

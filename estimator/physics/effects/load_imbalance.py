@@ -4,23 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from estimator.physics.driveline import Driveline, Motion, unit
 from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Held, Start, Untestable
-from estimator.physics.model import DrivelineModel, Motion, unit
 from estimator.physics.motion import goes_round, torque_scale
 from estimator.signals.record import Record
 
 
-def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+def scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
     """Return a twentieth of the torque in use, 1, and a tenth of the amplitude for twice per turn."""
     return (0.05 * torque_scale(records), 1.0, 0.1, 0.1)
 
 
-def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
+def starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
     """Return one start: the problem is linear in amplitude and phase together."""
     return [(0.5, Held(model.gear_ratio or 1.0), 0.0, 0.0)]
 
 
-def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
+def testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
     """Need the gear ratio, and motion."""
     if model.gear_ratio is None:
         reason = "the model file has no [geometry] gear_ratio: the wheel's angle is unknown"

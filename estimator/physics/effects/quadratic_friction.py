@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from estimator.compiled import compiled
 from estimator.lanes import choose, every
 from estimator.physics.acting import Acting, Place
+from estimator.physics.driveline import Driveline, Motion, unit
 from estimator.physics.effect import (
     EVERY_LINE,
     Effect,
@@ -19,7 +20,6 @@ from estimator.physics.effect import (
     Untestable,
 )
 from estimator.physics.laws import power
-from estimator.physics.model import DrivelineModel, Motion, unit
 from estimator.physics.motion import speed_scale, speeds_differ, torque_scale
 from estimator.signals.record import Record
 
@@ -40,19 +40,19 @@ def law(speed: float, drag: float, exponent: float, at: float) -> float:
     return square * choose(exponent == SQUARE, 1.0, power(abs(speed) / at, exponent - SQUARE))
 
 
-def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+def scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
     """Return a twentieth of the torque in use at the top speed, 1, and the top speed."""
     top = speed_scale(records)
     return (0.05 * torque_scale(records) / top**2, 1.0, top)
 
 
-def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
+def starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
     """Return one start: the problem is convex in the drag. Its exponent waits for it."""
     return [(0.5, Held(SQUARE), Held(1.0))]
 
 
 def retold(
-    model: DrivelineModel, records: Sequence[Record], values: Mapping[str, float], line: Mapping[str, float]
+    model: Driveline, records: Sequence[Record], values: Mapping[str, float], line: Mapping[str, float]
 ) -> list[Retelling]:
     """Return the drag that was found with an exponent that is not 2."""
     return other_power("quadratic_nm_s2", scales(model, records)[0], values)
@@ -65,7 +65,7 @@ def other_power(size: str, scale: float, values: Mapping[str, float]) -> list[Re
     return [Retelling((values[size] / scale, SQUARE - 0.05, Held(1.0)), {})]
 
 
-def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
+def testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
     """Need speeds that differ, or else it is the constant load."""
     if speeds_differ(records):
         return None

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 
 from estimator.compiled import compiled
 from estimator.lanes import some
+from estimator.physics.driveline import Driveline, Motion
 from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start
-from estimator.physics.model import DrivelineModel, Motion
 from estimator.signals.record import OutputKind, Record
 
 STEEPEST = -0.5
@@ -43,12 +43,12 @@ def true_angle(read: float, once: float, once_phase: float, twice: float, twice_
     return angle
 
 
-def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+def scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
     """Return a hundredth of a radian, twice."""
     return (0.01, 0.01)
 
 
-def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
+def starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
     """Return one start: the problem is linear in amplitudes and phases together."""
     return [(0.5, 0.5)]
 

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from estimator.physics.driveline import Driveline, Motion, unit
 from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start, Untestable
-from estimator.physics.model import DrivelineModel, Motion, unit
 from estimator.physics.motion import torque_scale
 from estimator.signals.record import FloatArray, Record
 
@@ -47,17 +47,17 @@ def basis(time_s: FloatArray, at_s: FloatArray | None = None) -> FloatArray:
     return splines
 
 
-def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+def scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
     """Return a twentieth of the torque in use."""
     return (0.05 * torque_scale(records),)
 
 
-def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
+def starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
     """Return one start, a flat road: the problem is linear in the profile."""
     return [(0.0,)]
 
 
-def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
+def testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
     """Need a recording long enough for a profile."""
     if any(record.time_s[-1] - record.time_s[0] >= SHORTEST_S for record in records):
         return None

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from estimator.physics.driveline import Driveline, Motion
 from estimator.physics.effect import EVERY_STRUCTURE, Effect, EffectParameter, Element
-from estimator.physics.model import DrivelineModel, Motion
 from estimator.signals.record import Record
 
 
-def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+def scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
     """Return one sampling period."""
     return (min(record.sample_time_s for record in records),)
 

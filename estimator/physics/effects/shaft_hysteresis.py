@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 
 from estimator.compiled import compiled
 from estimator.lanes import choose
+from estimator.physics.driveline import Driveline, Motion, Structure, unit
 from estimator.physics.effect import WITH_SPRING, Effect, EffectParameter, Element, Held, Start
 from estimator.physics.laws import power
-from estimator.physics.model import DrivelineModel, Motion, Structure, unit
 from estimator.physics.motion import torque_scale
 from estimator.signals.record import Record
 
@@ -27,13 +27,13 @@ def loading_rate(loading: float, rate: float, sharpness: float, unloading: float
     return pace * math.copysign(1.0 - yielded, rate)
 
 
-def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+def scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
     """Return a twentieth of the torque in use, a fiftieth of the twist that it gives, and 1 for the shape."""
     torque = torque_scale(records)
     return (0.05 * torque, 0.02 * torque / model.parameters["k"].value, 1.0, 1.0, 1.0)
 
 
-def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
+def starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
     """Return sliders that yield early and late, a part of them in the nominal stiffness.
 
     That of a joint is a guess and free.

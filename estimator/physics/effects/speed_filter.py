@@ -7,8 +7,8 @@ from collections.abc import Mapping
 
 from estimator.compiled import compiled
 from estimator.physics import low_pass
+from estimator.physics.driveline import Motion
 from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, long_enough
-from estimator.physics.model import Motion
 from estimator.signals.record import OutputKind
 
 

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from estimator.physics.driveline import Motion, unit
 from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element
-from estimator.physics.model import Motion, unit
 from estimator.signals.record import OutputKind
 
 

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from estimator.physics.driveline import Driveline, Motion
 from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start, Untestable
-from estimator.physics.model import DrivelineModel, Motion
 from estimator.physics.motion import measured_speed, speed_scale
 from estimator.signals.record import OutputKind, Record
 
@@ -18,17 +18,17 @@ LEAST_SHARE = 0.5
 """Share of the magnitude from which a sensor's own motion has no sign left."""
 
 
-def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+def scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
     """Return 1: the share is one number."""
     return (1.0,)
 
 
-def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
+def starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
     """Return one start: the problem is linear in the share."""
     return [(0.9,)]
 
 
-def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
+def testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
     """Need a recording that comes to standstill: beyond it the sign may change, whatever the sensor reads."""
     if any(float(np.nanmin(np.abs(measured_speed(record)))) < STANDSTILL * speed_scale([record]) for record in records):
         return None
@@ -40,7 +40,7 @@ def sentence(values: Mapping[str, float], motion: Motion) -> str:
     return f"the sensor reads the magnitude of the speed (share {values['share']:.2g})"
 
 
-def implausible(model: DrivelineModel, records: Sequence[Record], values: Mapping[str, float]) -> str:
+def implausible(model: Driveline, records: Sequence[Record], values: Mapping[str, float]) -> str:
     """Object to a sensor that tells the sign of most of the speed: what differs with the sign is something else."""
     if values["share"] >= LEAST_SHARE:
         return ""

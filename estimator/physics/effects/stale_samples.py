@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from estimator.physics.driveline import Motion
 from estimator.physics.effect import EVERY_STRUCTURE, Effect, EffectParameter, Element
-from estimator.physics.model import Motion
 
 
 def sentence(values: Mapping[str, float], motion: Motion) -> str:

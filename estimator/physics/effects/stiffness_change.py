@@ -4,23 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from estimator.physics.driveline import Driveline, Motion
 from estimator.physics.effect import MOMENTS, WITH_SPRING, Effect, EffectParameter, Element, Span, Start, Step
-from estimator.physics.model import DrivelineModel, Motion
 from estimator.signals.record import Record
 
 
-def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+def scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
     """Return 1: the change is a share of the stiffness."""
     return (1.0,)
 
 
-def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
+def starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
     """Return a softer and a stiffer shaft."""
     return [(-0.2,), (0.2,)]
 
 
 def described(
-    model: DrivelineModel, values: Mapping[str, float], line: Mapping[str, float]
+    model: Driveline, values: Mapping[str, float], line: Mapping[str, float]
 ) -> Mapping[str, tuple[Span, ...]]:
     """Return the stiffness before and after."""
     before, after = line["k"], line["k"] * (1.0 + values["change"])

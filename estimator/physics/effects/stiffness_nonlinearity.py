@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 
 from estimator.compiled import compiled
 from estimator.lanes import choose, every
+from estimator.physics.driveline import Driveline, Motion, unit
 from estimator.physics.effect import WITH_SPRING, Effect, EffectParameter, Element, Held, Retelling, Start
 from estimator.physics.laws import beyond_gap, power
-from estimator.physics.model import DrivelineModel, Motion, unit
 from estimator.physics.motion import torque_scale
 from estimator.signals.record import Record
 
@@ -39,20 +39,20 @@ def loaded_twist(twist: float, hardening: float, shape: float, stage: float, sta
     return same + stage * beyond_gap(twist, 2.0 * stage_from)
 
 
-def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+def scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
     """Return the hardening for a fifth more stiffness at the twist of the torque in use, 1 twice, and that twist."""
     twist = torque_scale(records) / model.parameters["k"].value
     return (0.2 / twist**2, 1.0, 1.0, twist)
 
 
-def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
+def starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
     """Return a hardening and a softening start, without a second stage."""
     one = Held(0.0), Held(0.0)
     return [(0.5, 1.0, *one), (-0.5, 0.5, *one)]
 
 
 def retold(
-    model: DrivelineModel, records: Sequence[Record], values: Mapping[str, float], line: Mapping[str, float]
+    model: Driveline, records: Sequence[Record], values: Mapping[str, float], line: Mapping[str, float]
 ) -> list[Retelling]:
     """Return a shaft of two stages that hardens or softens as the one that was found, from small and larger twists."""
     if values["stage_share"] != 0.0:

@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 
 from estimator.compiled import compiled
 from estimator.lanes import choose, every
+from estimator.physics.driveline import Driveline, Motion, unit
 from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Held, Retelling, Start, Untestable
 from estimator.physics.effects import coulomb_friction_motor
 from estimator.physics.effects.coulomb_friction_motor import CREEP, PRESLIDING
 from estimator.physics.laws import fading, smooth_sign
-from estimator.physics.model import DrivelineModel, Motion, unit
 from estimator.physics.motion import speed_scale
 from estimator.signals.record import Record
 
@@ -25,19 +25,19 @@ def law(speed: float, excess: float, coulomb: float, stribeck_speed: float, widt
     return choose(stribeck_speed > 0.0, torque, 0.0)
 
 
-def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+def scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
     """Return a twentieth of the torque in use, twice, a twentieth of the top speed, a usual presliding, and creep."""
     torque, presliding, creep = coulomb_friction_motor.scales(model, records)
     return (torque, torque, 0.05 * speed_scale(records), presliding, creep)
 
 
-def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
+def starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
     """Return starts at narrow and wide Stribeck ranges: the fit is not convex in the width."""
     return [(0.5, 0.3, width, Held(0.0), Held(0.0)) for width in (0.6, 1.5, 3.0)]
 
 
 def retold(
-    model: DrivelineModel, records: Sequence[Record], values: Mapping[str, float], line: Mapping[str, float]
+    model: Driveline, records: Sequence[Record], values: Mapping[str, float], line: Mapping[str, float]
 ) -> list[Retelling]:
     """Return the friction that was found, bending before it slides, or creeping near rest."""
     if values["presliding_rad"] > 0.0 or values["creep_rad_s"] > 0.0:
@@ -47,7 +47,7 @@ def retold(
     return [Retelling((*start, 1.0, Held(0.0)), {}), Retelling((*start, Held(0.0), 1.0), {})]
 
 
-def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
+def testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
     """Need what Coulomb friction needs: both signs of the speed."""
     return coulomb_friction_motor.testable(model, records)
 

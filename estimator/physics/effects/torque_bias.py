@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from estimator.physics.acting import Acting, Place
+from estimator.physics.driveline import Driveline, Load, Motion, unit
 from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Held, Start, Untestable
-from estimator.physics.model import DrivelineModel, Load, Motion, unit
 from estimator.physics.motion import longest_s, torque_scale
 from estimator.signals.record import FloatArray, Record
 
@@ -23,23 +23,23 @@ def law(torque: FloatArray, since_start_s: FloatArray, offset: float, time_const
     return np.asarray(torque - offset * np.expm1(-since_start_s / time_constant_s))
 
 
-def is_load_known(model: DrivelineModel) -> bool:
+def is_load_known(model: Driveline) -> bool:
     """Tell whether the constant load torque is a number that the model gives."""
     return not isinstance(model.load, Load)
 
 
-def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+def scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
     """Return a fiftieth of the torque in use, and the longest recording's length."""
     return (0.02 * torque_scale(records), longest_s(records))
 
 
-def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
+def starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
     """Return drifts that end within the recording and beyond it, and an offset where the load is known."""
     drifting: list[Start] = [(0.5, 0.3), (1.0, 2.0)]
     return [(0.5, Held(0.0)), *drifting] if is_load_known(model) else drifting
 
 
-def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
+def testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
     """Need the load torque, or time to drift."""
     if is_load_known(model) or longest_s(records) >= LEAST_S:
         return None

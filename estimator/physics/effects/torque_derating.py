@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from estimator.physics.driveline import Driveline, Motion, unit
 from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Held, Retelling, Start
-from estimator.physics.model import DrivelineModel, Motion, unit
 from estimator.physics.motion import longest_s, torque_scale
 from estimator.signals.record import Record
 
@@ -14,18 +14,18 @@ QUICKEST = 0.04
 is a gain, or what a recording began with."""
 
 
-def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+def scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
     """Return 1 for the depth, the longest recording's length, and half of the torque in use, a usual rms of it."""
     return (1.0, longest_s(records), 0.5 * torque_scale(records))
 
 
-def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
+def starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
     """Return a decay within the recording and one that continues beyond it, by time alone."""
     return [(0.2, 0.3, Held(0.0)), (0.3, 2.0, Held(0.0))]
 
 
 def retold(
-    model: DrivelineModel, records: Sequence[Record], values: Mapping[str, float], line: Mapping[str, float]
+    model: Driveline, records: Sequence[Record], values: Mapping[str, float], line: Mapping[str, float]
 ) -> list[Retelling]:
     """Return a loss by the torque's own heat, within the recording and beyond it.
 
@@ -47,7 +47,7 @@ def sentence(values: Mapping[str, float], motion: Motion) -> str:
     )
 
 
-def implausible(model: DrivelineModel, records: Sequence[Record], values: Mapping[str, float]) -> str:
+def implausible(model: Driveline, records: Sequence[Record], values: Mapping[str, float]) -> str:
     """Object to a loss that comes too soon for warmth."""
     least_s = QUICKEST * scales(model, records)[1]
     if values["time_constant_s"] > least_s:

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from estimator.physics.acting import Acting, Place
+from estimator.physics.driveline import Driveline, Motion, unit
 from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Held, Start, Untestable
-from estimator.physics.model import DrivelineModel, Motion, unit
 from estimator.physics.motion import torque_reverses, torque_scale
 from estimator.signals.record import FloatArray, Record
 
@@ -21,18 +21,18 @@ def law(torque: FloatArray, _since_start_s: FloatArray, curvature: float, asymme
     return np.asarray(torque - torque * (curvature * np.abs(torque) + asymmetry * torque))
 
 
-def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+def scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
     """Return a tenth of the torque lost at the largest in use."""
     each = 0.1 / torque_scale(records)
     return (each, each)
 
 
-def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
+def starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
     """Return a symmetric law, and one of the positive torque alone."""
     return [(0.5, Held(0.0)), (0.3, 0.3)]
 
 
-def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
+def testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
     """Need torques of very different sizes."""
     sizes = np.concatenate([np.abs(record.total_torque_nm) for record in records])
     low, high = np.percentile(sizes, [10, 95])

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from estimator.physics.driveline import Driveline, Motion, unit
 from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Held, Start, Untestable
-from estimator.physics.model import DrivelineModel, Motion, unit
 from estimator.physics.motion import goes_round, speed_sweeps, torque_scale
 from estimator.signals.record import Record
 
@@ -13,12 +13,12 @@ ORDERS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 18, 20, 24, 30, 36, 48)
 """Periods per motor turn that are tried: pole pairs and slots of usual machines, and their small multiples."""
 
 
-def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+def scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
     """Return a twentieth of the torque in use, by itself and as a share, 1 for the order, a tenth for its overtone."""
     return (0.05 * torque_scale(records), 0.05, 1.0, 0.1, 0.1)
 
 
-def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
+def starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
     """Return two starts per order that machines show, one per cause; the order is a whole number and not fitted.
 
     One whose period the motor does not pass through once is any law of the angle, such as gravity.
@@ -34,7 +34,7 @@ def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
     ]
 
 
-def testable(model: DrivelineModel, records: Sequence[Record]) -> Untestable | None:
+def testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
     """Need the ripple to pass a frequency at which the line answers: a speed that changes much."""
     if not goes_round(records, 1.0 / ORDERS[-1]):
         return Untestable("the motor makes too little of a turn: nothing recurs with its angle", "reversal")

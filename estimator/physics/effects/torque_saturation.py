@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
+from estimator.physics.driveline import Driveline, Motion, unit
 from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Held, Start
-from estimator.physics.model import DrivelineModel, Motion, unit
 from estimator.physics.motion import largest_torque, torque_scale
 from estimator.signals.record import Record
 
@@ -14,13 +14,13 @@ EDGE = 100.0
 """Sharpness from which on a knee is an edge."""
 
 
-def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+def scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
     """Return the largest torque of one input, twice, of all together, and 1."""
     each = largest_torque(records)
     return (each, each, torque_scale(records), 1.0)
 
 
-def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
+def starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
     """Return limits of both inverters, of one of them, and of their sum."""
     off = Held(math.inf)
     return [

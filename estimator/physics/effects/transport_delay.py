@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 
 from estimator.compiled import compiled
 from estimator.physics import low_pass
+from estimator.physics.driveline import Driveline, Motion
 from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start, long_enough
-from estimator.physics.model import DrivelineModel, Motion
 from estimator.signals.record import FloatArray, Record
 
 
@@ -33,12 +33,12 @@ def delayed(torque: FloatArray, before: float, start: float, length: float) -> t
     return float(earlier + jump * share), float(6.0 * jump * share * (1.0 - share))
 
 
-def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+def scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
     """Return one sampling period."""
     return (min(record.sample_time_s for record in records),)
 
 
-def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
+def starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
     """Return starts within one period and at a few: the error is not convex in the delay."""
     return [(0.4,), (1.5,), (4.0,)]
 

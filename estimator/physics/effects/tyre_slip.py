@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 
 from estimator.compiled import compiled
 from estimator.lanes import choose, every
+from estimator.physics.driveline import Driveline, Motion, unit
 from estimator.physics.effect import WITH_SHAFT, Effect, EffectParameter, Element, Start
 from estimator.physics.laws import hyperbolic_tangent
-from estimator.physics.model import DrivelineModel, Motion, unit
 from estimator.physics.motion import speed_scale, torque_scale
 from estimator.signals.record import Record
 
@@ -60,13 +60,13 @@ def gripped(traction: float, grip: float, inverse_grip: float) -> float:
     return choose(inverse_grip == 0.0, traction, grip * hyperbolic_tangent(traction * inverse_grip))
 
 
-def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+def scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
     """Return a per cent of slip at the torque in use, 1, a tenth of the top speed, a radian, 10 ms, and the torque."""
     torque = torque_scale(records)
     return (0.01 / torque, 1.0, 0.1 * speed_scale(records), 1.0, 0.01, torque)
 
 
-def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
+def starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
     """Return creep from small to large, at once or after rolling, for a light and a heavy wheel, far from its grip."""
     return [
         (slip, wheel, creep, relaxation, damping, 4.0)
@@ -76,7 +76,7 @@ def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
     ]
 
 
-def implausible(model: DrivelineModel, records: Sequence[Record], values: Mapping[str, float]) -> str:
+def implausible(model: Driveline, records: Sequence[Record], values: Mapping[str, float]) -> str:
     """Object to a wheel so light that nothing tells it from a damper at the vehicle, and to a carcass at speed.
 
     A carcass that damps its wind-up at every speed is a spring with a damper: an elastic line, but no rolling tyre.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from estimator.compiled import compiled
+from estimator.physics.driveline import Driveline, Motion, natural_frequencies_rad_s
 from estimator.physics.effect import (
     WITH_SHAFT,
     Effect,
@@ -14,7 +15,6 @@ from estimator.physics.effect import (
     Start,
     long_enough,
 )
-from estimator.physics.model import DrivelineModel, Motion, natural_frequencies_rad_s
 from estimator.signals.record import Record
 
 
@@ -27,18 +27,18 @@ def relaxing_rate(torque: float, rate: float, stiffness: float, fastest: float, 
     return (stiffness * relaxation_s * rate - torque) * min(1.0 / relaxation_s, fastest)
 
 
-def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+def scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
     """Return a tenth of the shaft's stiffness, and the time in which the line swings by a radian."""
     return (0.1, 1.0 / float(natural_frequencies_rad_s(model.values())[0]))
 
 
-def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
+def starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
     """Return branches that relax faster than the line swings, with it, and slower."""
     return [(3.0, time) for time in (0.3, 1.0, 3.0)]
 
 
 def described(
-    model: DrivelineModel, values: Mapping[str, float], line: Mapping[str, float]
+    model: Driveline, values: Mapping[str, float], line: Mapping[str, float]
 ) -> Mapping[str, tuple[Span, ...]]:
     """Return the stiffness from slow to fast, and the damping with and without the branch."""
     stiffness = line["k"] * values["branch_share"]

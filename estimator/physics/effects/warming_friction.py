@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 
 from estimator.compiled import compiled
 from estimator.lanes import every
+from estimator.physics.driveline import Driveline, Motion, unit
 from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Span, Start
-from estimator.physics.model import DrivelineModel, Motion, unit
 from estimator.physics.motion import longest_s, speed_scale, torque_scale
 from estimator.signals.record import Record
 
@@ -21,18 +21,18 @@ def cold_part(time_s: float, cold: float, time_constant_s: float) -> float:
     return cold * math.exp(-time_s / time_constant_s)
 
 
-def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+def scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
     """Return a twentieth of the torque in use at the top speed, and the longest recording's length."""
     return (0.05 * torque_scale(records) / speed_scale(records), longest_s(records))
 
 
-def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
+def starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
     """Return a decay within the recording and one that continues beyond it."""
     return [(1.0, 0.3), (2.0, 1.5)]
 
 
 def described(
-    model: DrivelineModel, values: Mapping[str, float], line: Mapping[str, float]
+    model: Driveline, values: Mapping[str, float], line: Mapping[str, float]
 ) -> Mapping[str, tuple[Span, ...]]:
     """Return the friction from warm to cold."""
     name = "b_L" if "b_L" in line else "b_M"

@@ -14,7 +14,8 @@ import pytest
 from estimator.diagnosis import diagnose, first_use
 from estimator.diagnosis.first_use import COMPILING, is_first_use, signatures
 from estimator.physics.effect import Element
-from estimator.physics.own_law import OwnLaw, OwnParameter, named
+from estimator.physics.layout import named
+from estimator.physics.own_law import OwnLaw, OwnParameter
 from tests.estimator.diagnosis.planted import quiet
 from tests.estimator.physics.bench import ONE_MASS, model
 
