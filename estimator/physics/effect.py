@@ -1,7 +1,7 @@
 """What an entry of the catalogue is: a law that can be released from its null, and what is known of it.
 
 A missing effect is a constraint of the superset model to release: at ``null`` its law does nothing. A law
-that acts at one of the places of ``estimator.physics.acting`` is taken into the one kernel from its entry; one that
+that acts at one of the places of ``estimator.physics.effect`` is taken into the one kernel from its entry; one that
 changes the line itself is written into the kernel. Everything else about it stands in its entry.
 """
 
@@ -11,10 +11,47 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
+from typing import Any
 
-from estimator.physics.acting import Acting
 from estimator.physics.driveline import Driveline, Motion, Structure, unit
 from estimator.signals.record import OutputKind, Record
+
+
+class Place(Enum):
+    """Where a law acts, and so what it is given before its parameters, and what it returns.
+
+    Those of a speed or an angle are compiled: for one simulation and for several side by side (``estimator.lanes``).
+
+    Attributes
+    ----------
+    TORQUE
+        ``law(torque, since_start_s, ...)``, arrays of shape (N,): reading of all inputs together [Nm] to the torque
+        that acts.
+    MOTOR, LOAD
+        ``law(speed, ...)``: speed [rad/s] to the torque against a motion forward [Nm].
+    LOAD_ANGLE
+        ``law(angle, ...)``: simulated angle of the load [rad] to the torque against it [Nm].
+    RECORDED_ANGLE
+        The same of the motor's angle as recorded, from 0 at the start: where a simulated one would drift away.
+    SHAFT_LOSS
+        ``law(torque, sign, ...)``: torque of the shaft [Nm] and the sign of the load's speed, rounded at standstill, to
+        what of it does not reach the load [Nm].
+    """
+
+    TORQUE = "torque"
+    MOTOR = "motor"
+    LOAD = "load"
+    LOAD_ANGLE = "load_angle"
+    RECORDED_ANGLE = "recorded_angle"
+    SHAFT_LOSS = "shaft_loss"
+
+
+@dataclass(frozen=True, slots=True)
+class Acting:
+    """A law at a place: it takes all parameters of its entry, in their order, behind what the place gives."""
+
+    place: Place
+    law: Callable[..., Any]
 
 
 class Element(Enum):

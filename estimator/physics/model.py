@@ -11,6 +11,7 @@ from estimator.errors import BadModel
 from estimator.physics.catalogue import effect_problems
 from estimator.physics.driveline import (
     STRICTLY_POSITIVE,
+    Case,
     EffectValue,
     Load,
     Motion,
@@ -23,7 +24,6 @@ from estimator.physics.driveline import (
     unit,
 )
 from estimator.physics.own_law import LawName
-from estimator.physics.start import Case
 from estimator.signals.record import FloatArray, Record
 
 __all__ = [

@@ -21,7 +21,7 @@ import numpy as np
 
 from estimator.compiled import IS_COMPILED
 from estimator.errors import BadModel
-from estimator.lanes.tools import types
+from estimator.lanes.types import types
 from estimator.physics.driveline import Motion
 from estimator.physics.effect import EVERY_LINE, WITH_SHAFT, Effect, EffectParameter, Element
 from estimator.signals.record import FloatArray

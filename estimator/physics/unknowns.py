@@ -12,12 +12,12 @@ import numpy as np
 
 from estimator.physics import effect
 from estimator.physics.catalogue import EFFECTS
+from estimator.physics.driveline import Start
 from estimator.physics.effect import Effect, EffectParameter, Held, Within
 from estimator.physics.effects import road_grade
 from estimator.physics.layout import LOAD, slot
 from estimator.physics.model import DrivelineModel, Structure, natural_frequencies_rad_s
 from estimator.physics.motion import measured_speed, motor_angle, speed_scale, torque_scale
-from estimator.physics.start import Start
 from estimator.signals.record import FloatArray, OutputKind, Record
 
 

@@ -11,10 +11,9 @@ from estimator.diagnosis.inference.verdict import Decision
 from estimator.diagnosis.intervals import reported_covariance
 from estimator.diagnosis.result import Evidence, FoundEffect
 from estimator.physics.catalogue import EFFECTS
-from estimator.physics.fit import FitResult, fit
+from estimator.physics.fit import FitResult, fit, warm_start
 from estimator.physics.model import DrivelineModel
 from estimator.physics.problem import make_problem
-from estimator.physics.starts import warm_start
 from estimator.signals.record import FloatArray
 
 SMALLEST_P = 1e-300

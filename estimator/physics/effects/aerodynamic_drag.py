@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from estimator.physics.acting import Acting, Place
 from estimator.physics.driveline import Driveline, Motion, unit
-from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Retelling
+from estimator.physics.effect import EVERY_LINE, Acting, Effect, EffectParameter, Element, Place, Retelling
 from estimator.physics.effects import quadratic_friction
 from estimator.physics.effects.quadratic_friction import AT, EXPONENT
 from estimator.signals.record import Record

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from estimator.compiled import compiled
-from estimator.physics.acting import Acting, Place
 from estimator.physics.driveline import Driveline, Motion, unit
-from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start, Untestable
+from estimator.physics.effect import EVERY_LINE, Acting, Effect, EffectParameter, Element, Place, Start, Untestable
 from estimator.physics.motion import reverses, speed_by_place, speed_scale, torque_scale
 from estimator.signals.record import Record
 

@@ -8,9 +8,8 @@ import numpy as np
 
 from estimator.compiled import compiled
 from estimator.lanes import choose, every
-from estimator.physics.acting import Acting, Place
 from estimator.physics.driveline import Driveline, Motion, unit
-from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start, Untestable
+from estimator.physics.effect import EVERY_LINE, Acting, Effect, EffectParameter, Element, Place, Start, Untestable
 from estimator.physics.motion import measured_speed, speed_scale, torque_scale
 from estimator.signals.record import FloatArray, Record
 

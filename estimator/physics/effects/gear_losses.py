@@ -6,9 +6,8 @@ from collections.abc import Mapping, Sequence
 
 from estimator.compiled import compiled
 from estimator.lanes import choose, every
-from estimator.physics.acting import Acting, Place
 from estimator.physics.driveline import Driveline, Motion
-from estimator.physics.effect import WITH_SHAFT, Effect, EffectParameter, Element, Start, Untestable
+from estimator.physics.effect import WITH_SHAFT, Acting, Effect, EffectParameter, Element, Place, Start, Untestable
 from estimator.physics.motion import torque_reverses, turns
 from estimator.signals.record import Record
 

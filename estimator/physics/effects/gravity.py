@@ -9,9 +9,8 @@ import numpy as np
 
 from estimator.compiled import compiled
 from estimator.lanes import every
-from estimator.physics.acting import Acting, Place
 from estimator.physics.driveline import Driveline, Motion, unit
-from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Held, Start
+from estimator.physics.effect import EVERY_LINE, Acting, Effect, EffectParameter, Element, Held, Place, Start
 from estimator.physics.motion import range_of, torque_scale
 from estimator.signals.record import Record
 

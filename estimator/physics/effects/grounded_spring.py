@@ -7,9 +7,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from estimator.compiled import compiled
-from estimator.physics.acting import Acting, Place
 from estimator.physics.driveline import Driveline, Motion, unit
-from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start
+from estimator.physics.effect import EVERY_LINE, Acting, Effect, EffectParameter, Element, Place, Start
 from estimator.physics.motion import range_of, torque_scale
 from estimator.signals.record import Record
 

@@ -7,14 +7,15 @@ from collections.abc import Mapping, Sequence
 
 from estimator.compiled import compiled
 from estimator.lanes import choose, every
-from estimator.physics.acting import Acting, Place
 from estimator.physics.driveline import Driveline, Motion, unit
 from estimator.physics.effect import (
     EVERY_LINE,
+    Acting,
     Effect,
     EffectParameter,
     Element,
     Held,
+    Place,
     Retelling,
     Start,
     Untestable,

@@ -6,9 +6,18 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from estimator.physics.acting import Acting, Place
 from estimator.physics.driveline import Driveline, Load, Motion, unit
-from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Held, Start, Untestable
+from estimator.physics.effect import (
+    EVERY_LINE,
+    Acting,
+    Effect,
+    EffectParameter,
+    Element,
+    Held,
+    Place,
+    Start,
+    Untestable,
+)
 from estimator.physics.motion import longest_s, torque_scale
 from estimator.signals.record import FloatArray, Record
 

@@ -8,7 +8,7 @@ from estimator.compiled import inlined
 from estimator.lanes import every
 from estimator.physics.effects import resolver_error, speed_filter
 from estimator.physics.kernel import slots
-from estimator.physics.kernel.line import is_within
+from estimator.physics.kernel.conditions import is_within
 from estimator.physics.kernel.state_vector import LOAD_ANGLE, LOAD_SPEED, SPEED, TWIST, State
 from estimator.physics.low_pass import LowPass
 from estimator.signals.record import FloatArray

@@ -16,11 +16,10 @@ from estimator.diagnosis.assemble import load_torques
 from estimator.diagnosis.intervals import reported_covariance
 from estimator.identification.modes.modes import Mode
 from estimator.physics.effects import coulomb_friction_motor
-from estimator.physics.fit import FitResult
+from estimator.physics.fit import FitResult, best_fit
 from estimator.physics.model import DrivelineModel, Parameter, Structure
 from estimator.physics.motion import torque_scale
 from estimator.physics.problem import make_problem
-from estimator.physics.starts import best_fit
 from estimator.physics.unknowns import Shared
 from estimator.signals.record import Record
 from hil.commission.analysis.measured import TRUSTED, Z95, Measured

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from estimator.diagnosis.chain import mechanical
 from estimator.diagnosis.segments import tiles
 from estimator.physics.catalogue import EFFECTS
+from estimator.physics.driveline import Case
 from estimator.physics.free_run import settle
 from estimator.physics.grid import Grid, substeps_for
 from estimator.physics.inputs import load_of
@@ -16,7 +17,6 @@ from estimator.physics.layout import LOAD, flat, slot
 from estimator.physics.model import DrivelineModel, Motion, Structure
 from estimator.physics.problem import case_of, local_part, make_problem
 from estimator.physics.simulate import MASSES
-from estimator.physics.start import Case
 from estimator.physics.stepper import SIGN_WIDTH_RAD_S
 from estimator.signals.record import FloatArray, Location, Record
 from hil.errors import UsageError

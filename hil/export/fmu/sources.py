@@ -6,9 +6,13 @@ import math
 import re
 from importlib import resources
 
-from estimator.physics import low_pass, start, torque_path
+from estimator.physics import driveline as start
+from estimator.physics import inputs as torque_path
+from estimator.physics import low_pass
 from estimator.physics.effects import actuator_lag
-from estimator.physics.kernel import bristles, conditions, contact, line, rates, sensing, slots, state_vector
+from estimator.physics.kernel import bristles, conditions, rates, sensing, slots, state_vector
+from estimator.physics.kernel import conditions as line
+from estimator.physics.kernel import rates as contact
 from estimator.physics.layout import SIZE, slot
 from hil.export.c.translation import Translation
 from hil.export.fmu import variables as places

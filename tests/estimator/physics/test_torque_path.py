@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
+from estimator.physics.driveline import Start
 from estimator.physics.effects import transport_delay
 from estimator.physics.effects.actuator_lag import step
 from estimator.physics.grid import Grid
 from estimator.physics.layout import flat
 from estimator.physics.low_pass import low_pass
 from estimator.physics.simulate import simulate
-from estimator.physics.start import Start
 from estimator.signals.record import FloatArray
 from tests.estimator.physics.bench import SAMPLE_TIME_S, model, random_steps, record
 

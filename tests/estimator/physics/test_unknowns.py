@@ -7,12 +7,12 @@ from dataclasses import astuple, replace
 import numpy as np
 import pytest
 
+from estimator.physics.driveline import Start
 from estimator.physics.effect import Held, Within
 from estimator.physics.effects import road_grade
 from estimator.physics.effects.torque_ripple import ORDERS
 from estimator.physics.layout import flat, slot
 from estimator.physics.model import DrivelineModel, Parameter, Structure
-from estimator.physics.start import Start
 from estimator.physics.unknowns import Release, effect_unknowns, local_basis, nominal_unknowns, own_unknowns, released
 from estimator.signals.record import OutputKind
 from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, linear_record, model, random_steps

@@ -15,10 +15,10 @@ from scipy.linalg import block_diag, cholesky, solve_triangular
 from estimator.diagnosis.inference.disturbances import Limits, estimate, limits_for, starts
 from estimator.diagnosis.inference.sampled_line import Line, line_of
 from estimator.diagnosis.inference.whitener import Size, Whitener, readings, whitener, whitener_of
-from estimator.diagnosis.line.form_error import LASTS
+from estimator.diagnosis.line.motion import LASTS
+from estimator.physics.driveline import Start
 from estimator.physics.fit import FitResult, fit, not_fitted
 from estimator.physics.problem import make_problem, start_vector
-from estimator.physics.start import Start
 from estimator.signals.outputs import outputs_apart
 from estimator.signals.record import BoolArray, Channel, FloatArray, Location, OutputKind
 from tests.estimator.diagnosis.planted import drive_torque

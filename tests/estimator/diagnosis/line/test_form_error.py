@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from estimator.diagnosis.line.form_error import AROUND, FormPlace, change_around, form_changes
+from estimator.diagnosis.line.motion import AROUND, FormPlace, change_around, form_changes
+from estimator.physics.driveline import Start
 from estimator.physics.fit import not_fitted
 from estimator.physics.problem import make_problem, start_vector
-from estimator.physics.start import Start
 from estimator.signals.record import FloatArray
 from tests.estimator.physics.bench import SAMPLE_TIME_S, TWO_MASS, linear_record, model
 
