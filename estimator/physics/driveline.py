@@ -58,7 +58,7 @@ class Motion(Enum):
     TRANSLATION = "translation"
 
 
-_UNITS = {
+UNITS = {
     Motion.ROTATION: {
         "inertia": "kg m^2",
         "stiffness": "Nm/rad",
@@ -100,7 +100,7 @@ _DIMENSIONS = {
 
 def unit(dimension: str, motion: Motion) -> str:
     """Return the unit of a quantity; a dimension that is not mechanical, such as ``"s"``, is its own unit."""
-    return _UNITS[motion].get(dimension, dimension)
+    return UNITS[motion].get(dimension, dimension)
 
 
 def parameter_dimension(name: str) -> str:

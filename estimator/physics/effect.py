@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
-from estimator.physics.driveline import Driveline, Motion, Structure, unit
+from estimator.physics.driveline import UNITS, Driveline, Motion, Structure, unit
 from estimator.signals.record import OutputKind, Record
 
 
@@ -255,8 +255,9 @@ class Effect:
         recordings share; ``Held`` values are not fitted, those ``Within`` bounds of their own stay there.
     testable : callable
         Model and records to None, or to the reason why they can't tell; by default any recording can.
-    sentence : callable
-        Parameter values to the statement a driveline engineer would write.
+    text : str or callable
+        The statement a driveline engineer would write: a format string of the parameters, of times in ms, too
+        (``time_constant_ms``), and of units (``unit[torque]``); or a function of the values and the kind of motion.
     kinds : frozenset[OutputKind]
         Measured outputs it makes sense with.
     profile : bool
@@ -315,7 +316,7 @@ class Effect:
     parameters: tuple[EffectParameter, ...]
     structures: frozenset[Structure]
     resembles: tuple[str, ...]
-    sentence: Callable[[Mapping[str, float], Motion], str]
+    text: str | Callable[[Mapping[str, float], Motion], str]
     equivalent: tuple[str, ...] = ()
     contains: tuple[str, ...] = ()
     acting: Acting | None = None
@@ -348,6 +349,13 @@ class Effect:
     def lasting(self) -> bool:
         """Whether it is a step that does not go back within a recording."""
         return self.step is not None and self.step.lasting
+
+    def sentence(self, values: Mapping[str, float], motion: Motion) -> str:
+        """Return what was found, as a statement."""
+        if not isinstance(self.text, str):
+            return self.text(values, motion)
+        times_ms = {name.removesuffix("_s") + "_ms": 1e3 * value for name, value in values.items()}
+        return self.text.format(**{**times_ms, **values}, unit=UNITS[motion])
 
     def form(self, values: Mapping[str, float]) -> str:
         """Return the name of the law's form at some values; "" where it has no other one, or is in its plain one."""

@@ -13,7 +13,7 @@ from estimator.compiled import compiled, inlined
 from estimator.physics.catalogue import BUILT_IN
 from estimator.physics.driveline import Case, Start
 from estimator.physics.effect import Place
-from estimator.physics.effects import torque_saturation
+from estimator.physics.effects.torque import EDGE
 from estimator.physics.kernel import bristles, sensing, slots, state_vector
 from estimator.physics.kernel.conditions import branch_frequency, branch_inertia, is_bristled, is_within
 from estimator.physics.layout import LOAD, slot
@@ -45,7 +45,7 @@ def limited(torque: FloatArray, limit: float, sharpness: float) -> FloatArray:
     """Return a torque that stops at a limit [Nm], at an edge or in a knee: ``T / (1 + |T/L|^n)^(1/n)``."""
     if not np.isfinite(limit):
         return torque
-    if sharpness >= torque_saturation.EDGE:
+    if sharpness >= EDGE:
         return np.clip(torque, -limit, limit)
     ratio = np.abs(torque) / limit
     small, large = np.minimum(ratio, 1.0), np.maximum(ratio, 1.0)

@@ -233,7 +233,7 @@ class OwnLaw:
             scales=lambda model, records: tuple(p.scale for p in self.parameters),
             starts=lambda model, records: [tuple(p.start / p.scale for p in self.parameters)],
             testable=lambda model, records: None,
-            sentence=sentence,
+            text=sentence,
         )
 
 

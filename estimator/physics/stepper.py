@@ -6,7 +6,7 @@ import numpy as np
 
 from estimator.errors import BadModel
 from estimator.physics.driveline import Start
-from estimator.physics.effects import transport_delay
+from estimator.physics.effects.timing import TRANSPORT_DELAY
 from estimator.physics.grid import substeps_for
 from estimator.physics.inputs import initial_state, shaft_torque_from
 from estimator.physics.kernel import integration, sensing, state_vector
@@ -48,7 +48,7 @@ class Stepper:
             )
         self._period_s = period_s
         self._substeps = FINER * substeps_for(model.values(), period_s)
-        history = int(np.ceil(self._p[slot(transport_delay.EFFECT.name, "delay_s")] / period_s)) + 2
+        history = int(np.ceil(self._p[slot(TRANSPORT_DELAY.name, "delay_s")] / period_s)) + 2
         self._steps = 0
         self._warmth = 0.0
         self._torque = np.zeros(history)

@@ -12,7 +12,8 @@ from estimator.compiled import assembled, inlined
 from estimator.lanes import choose, every, like, some
 from estimator.physics.catalogue import BUILT_IN
 from estimator.physics.effect import Place
-from estimator.physics.effects import extra_torsional_mode, warming_friction
+from estimator.physics.effects.drag import cold_part
+from estimator.physics.effects.inertia import frequency_within
 from estimator.physics.kernel import slots
 from estimator.physics.kernel.state_vector import Conditions, Tyre
 from estimator.physics.laws import inertia_while, overtoned_wave, share_inside, wave
@@ -216,7 +217,7 @@ def branch_inertia(p: FloatArray) -> float:
 def branch_frequency(p: FloatArray) -> float:
     """Return the frequency of the extra mode on its own spring [rad/s]; within the line that follows."""
     if is_within(p):
-        return extra_torsional_mode.frequency_within(branch_inertia(p), p[slots.K], p[slots.LINE_SHARE])
+        return frequency_within(branch_inertia(p), p[slots.K], p[slots.LINE_SHARE])
     return 2.0 * math.pi * float(p[slots.BRANCH_FREQUENCY])
 
 
@@ -269,7 +270,7 @@ def conditions(
         inertia_load,
         1.0 / inertia_load if masses > 1 else 0.0,
         stiffness,
-        p[slots.B_L] + warming_friction.cold_part(time_s, p[slots.WARMING], p[slots.WARMING_TIME]),
+        p[slots.B_L] + cold_part(time_s, p[slots.WARMING], p[slots.WARMING_TIME]),
         dry_motor,
         dry_load,
         max(

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 from estimator.compiled import brief, compiled, inlined, ir_inlined
 from estimator.lanes import borrowed
-from estimator.physics.effects import actuator_lag, transport_delay
+from estimator.physics.effects.timing import LowPass, delayed, lag_step, low_pass
 from estimator.physics.kernel import slots
 from estimator.physics.kernel.bristles import bent, rubbed
 from estimator.physics.kernel.conditions import (
@@ -45,7 +45,6 @@ from estimator.physics.kernel.state_vector import (
     State,
     unpacked,
 )
-from estimator.physics.low_pass import LowPass, low_pass
 from estimator.signals.record import FloatArray, IntArray
 
 
@@ -107,8 +106,8 @@ def fed(
     supplied, rise = torque[k], 0.0
     if feed.shifted:
         source = place + (place + feed.begun) * p[slots.DRIFT] - feed.delay
-        supplied, rise = transport_delay.delayed(torque, feed.before_all, source, length)
-    return actuator_lag.step(supplied, rise, lagged, lag_rise, feed.lag)
+        supplied, rise = delayed(torque, feed.before_all, source, length)
+    return lag_step(supplied, rise, lagged, lag_rise, feed.lag)
 
 
 Made = Callable[..., None]

@@ -7,14 +7,9 @@ from typing import Any
 from estimator.compiled import inlined
 from estimator.lanes import choose, every, like, some
 from estimator.lanes.types import overload
-from estimator.physics.effects import (
-    backlash,
-    shaft_hysteresis,
-    stiffness_nonlinearity,
-    stribeck_friction,
-    tyre_slip,
-    viscoelastic_shaft,
-)
+from estimator.physics.effects.dry_friction import stribeck_law
+from estimator.physics.effects.load import build_up, carcass, coupling, gripped
+from estimator.physics.effects.shaft import damping_share, loaded_twist, loading_rate, pressed, relaxing_rate
 from estimator.physics.kernel import slots
 from estimator.physics.kernel.conditions import (
     Line,
@@ -75,7 +70,7 @@ def motor_friction(speed: float, p: FloatArray, width: float, dry: float) -> flo
         return friction
     coulomb, excess = p[slots.STRIBECK_COULOMB], p[slots.STRIBECK]
     friction += dry_friction(speed, p[slots.COULOMB], width)
-    return friction + stribeck_friction.law(speed, excess, coulomb, p[slots.STRIBECK_SPEED], width)
+    return friction + stribeck_law(speed, excess, coulomb, p[slots.STRIBECK_SPEED], width)
 
 
 @inlined
@@ -94,11 +89,11 @@ def shaft_torque(twist: float, rate: float, loading: float, p: FloatArray, stiff
     if not closed:
         loaded = beyond_gap(twist, p[slots.GAP])
         across = damping * p[slots.ACROSS]
-        damping = (damping - across) * backlash.damping_share(loaded, p[slots.CONTACT])
+        damping = (damping - across) * damping_share(loaded, p[slots.CONTACT])
     law = p[slots.HARDENING], p[slots.SHAPE], p[slots.STAGE], p[slots.STAGE_FROM]
-    elastic = stiffness * stiffness_nonlinearity.loaded_twist(loaded, *law)
+    elastic = stiffness * loaded_twist(loaded, *law)
     torque = float(elastic) + damping + float(p[slots.SLIDER]) * loading
-    return torque if closed else backlash.pressed(torque, loaded, p[slots.PULL]) + across
+    return torque if closed else pressed(torque, loaded, p[slots.PULL]) + across
 
 
 @inlined
@@ -174,7 +169,7 @@ def rates(line: Line, now: Conditions, x: State, p: FloatArray) -> State:
     if line.extended and some(p[slots.RELAXING] > 0.0):
         shaft, reaction = shaft + x.relaxing, reaction + x.relaxing
         stiffness = p[slots.RELAXING] * p[slots.K]
-        relaxing = viscoelastic_shaft.relaxing_rate(x.relaxing, rate, stiffness, now.fastest, p[slots.RELAXATION_TIME])
+        relaxing = relaxing_rate(x.relaxing, rate, stiffness, now.fastest, p[slots.RELAXATION_TIME])
     pull = shaft
     if line.extended:
         branch = branch_rate(x.branch_twist, own_rate, now, p)
@@ -214,7 +209,7 @@ def sliding(loading: float, rate: float, now: Conditions, p: FloatArray) -> floa
     if every(p[slots.SLIDER] == 0.0):
         return 0.0
     sharpness, unloading = p[slots.SHARPNESS], p[slots.UNLOADING]
-    return shaft_hysteresis.loading_rate(loading, rate * now.inverse_yield, sharpness, unloading, now.fastest)
+    return loading_rate(loading, rate * now.inverse_yield, sharpness, unloading, now.fastest)
 
 
 @inlined
@@ -262,14 +257,14 @@ def load_rates(line: Line, pull: float, now: Conditions, x: State, p: FloatArray
     if every(p[slots.RELAXATION] > 0.0):
         traction, roll = x.traction, abs(vehicle)
         relaxation = max(p[slots.RELAXATION], max(roll / now.fastest, tyre.least_relaxation))
-        rate = tyre_slip.build_up(slide, roll, traction, tyre.tread, relaxation)
-        traction += tyre_slip.carcass(slide, vehicle, tyre.winding, tyre.inverse_creep)
+        rate = build_up(slide, roll, traction, tyre.tread, relaxation)
+        traction += carcass(slide, vehicle, tyre.winding, tyre.inverse_creep)
     else:
         steepest = now.fastest * now.inertia_load
-        slope, share = tyre_slip.coupling(vehicle, p[slots.SLIP], p[slots.SLIP_SPEED], p[slots.SLIP_WHEEL], steepest)
+        slope, share = coupling(vehicle, p[slots.SLIP], p[slots.SLIP_SPEED], p[slots.SLIP_WHEEL], steepest)
         inverse_wheel, inverse_vehicle = now.inverse_load / share, now.inverse_load / (1.0 - share)
         traction = slope * slide
-    traction = tyre_slip.gripped(traction, p[slots.GRIP], tyre.inverse_grip)
+    traction = gripped(traction, p[slots.GRIP], tyre.inverse_grip)
     dry = dry_at_load(wheel, now)
     drag = load_friction(wheel, vehicle, now, p) - dry
     return (pull - dry - traction) * inverse_wheel, (traction - drag - load) * inverse_vehicle, rate

@@ -14,6 +14,7 @@ import numpy as np
 from estimator.compiled import IS_COMPILED, compiled, inlined
 from estimator.lanes import LANES, as_lanes, borrowed
 from estimator.physics.catalogue import BUILT_IN
+from estimator.physics.effects.timing import LowPass, low_pass
 from estimator.physics.kernel import slots
 from estimator.physics.kernel.bristles import bent, rubbed
 from estimator.physics.kernel.conditions import (
@@ -40,7 +41,6 @@ from estimator.physics.kernel.state_vector import (
     unpacked,
 )
 from estimator.physics.layout import slot
-from estimator.physics.low_pass import LowPass, low_pass
 from estimator.signals.record import FloatArray, IntArray
 
 MAKING = np.array(
