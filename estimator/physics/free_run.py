@@ -54,16 +54,6 @@ def free_run(model: DrivelineModel, record: Record, known: Own = NOTHING_KNOWN) 
 
     Besides load torque and initial state, what the model's effects leave to every recording is estimated from it:
     phases of angles, moments of events, the load profile of a road.
-
-    Parameters
-    ----------
-    known : mapping of (str, str) to float
-        Effect and parameter to what is known of these: the estimate starts there, and nothing is sought.
-
-    Raises
-    ------
-    BadModel
-        Where the model's structure does not have the recorded output.
     """
     profile = any(EFFECTS[name].profile for name in model.effects)
     problem = make_problem(model, [record], (), profile=profile)
@@ -147,21 +137,7 @@ def simulate_foreign(
     use: BoolArray,
     effects: Iterable[str] = (),
 ) -> FloatArray:
-    """Simulate a recording with a parameter vector that was fitted to others.
-
-    Parameters
-    ----------
-    p : ndarray, shape (layout.SIZE,)
-        Parameters.
-    use : ndarray of bool, shape (N,)
-        Samples from which what is the recording's own is estimated.
-    effects : iterable of str
-        Effects that were fitted next to the model's: what they leave to every recording is estimated too.
-
-    Returns
-    -------
-    ndarray, shape (N,)
-    """
+    """Simulate a recording with a parameter vector that was fitted to others."""
     names = {*model.effects, *effects}
     profile = any(EFFECTS[name].profile for name in names)
     problem = make_problem(

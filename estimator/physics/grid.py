@@ -59,13 +59,7 @@ class Grid:
 
 
 def substeps_for(values: Mapping[str, float], period_s: float) -> int:
-    """Return the integration steps per period that the line's natural frequency, or its fastest decay, needs.
-
-    Raises
-    ------
-    BadModel
-        Where that is beyond `FASTEST_IN_NYQUIST`.
-    """
+    """Return the integration steps per period that the line's natural frequency, or its fastest decay, needs."""
     if "J_M" not in values:
         return 1
     motor = (values["b_M"] + values.get("c", 0.0)) / values["J_M"]

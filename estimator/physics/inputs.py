@@ -83,21 +83,7 @@ def shaft_torque(torque_nm: FloatArray, since_start_s: FloatArray, p: FloatArray
 def shaft_torque_from(
     torque_nm: FloatArray, since_start_s: FloatArray, period_s: float, p: FloatArray, begun: float
 ) -> tuple[FloatArray, float]:
-    """Return the torque on the motor shaft, shape (N,) [Nm], and how warm the windings are behind it.
-
-    Parameters
-    ----------
-    torque_nm : ndarray, shape (N, M)
-        Reading of each input; gains other than 1 apply to the first two.
-    since_start_s : ndarray, shape (N,)
-        Time since the recording began [s].
-    period_s : float
-        For which each row's torque acts [s].
-    p : ndarray, shape (layout.SIZE,)
-        Parameters of the superset model.
-    begun : float
-        How warm the windings are at the first row, as ``warmth`` has it.
-    """
+    """Return the torque on the motor shaft, shape (N,) [Nm], and how warm the windings are behind it."""
     gains = np.array([p[_GAIN_M1], p[_GAIN_M2]])
     if (gains != 1.0).any():
         torque_nm = torque_nm.copy()

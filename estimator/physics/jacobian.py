@@ -35,28 +35,7 @@ def fill_differences(
     firsts: IntArray,
     found: FloatArray,
 ) -> None:
-    """Fill in the derivatives of the samples that count.
-
-    Parameters
-    ----------
-    moved : ndarray, shape (K, C, N)
-        Outputs of simulations with one unknown moved each [units of the outputs].
-    of : ndarray of int, shape (K, C)
-        Which of the I each output is.
-    outputs, use : ndarray, shape (I, N)
-        Of every output the simulation without [unit of the output], and which samples count.
-    steps : ndarray, shape (K,)
-        By how much it is moved, in scaled unknowns, without unit.
-    limits, least : ndarray, shape (I,)
-        Size of a simulation beyond which it has run away, and is taken to stay there; largest change that is none, but
-        of rounding alone [unit of the output].
-    columns : ndarray of int, shape (K,)
-        Which unknown is moved.
-    firsts : ndarray of int, shape (I,)
-        Where the samples of each output begin among all that count.
-    found : ndarray, shape (U, R)
-        A row per unknown.
-    """
+    """Fill in the derivatives of the samples that count."""
     for k, c in np.ndindex(of.shape):
         i = of[k, c]
         row, largest = firsts[i], 0.0
@@ -84,13 +63,7 @@ ROOM = 2**20
 
 @dataclass(frozen=True, slots=True)
 class _Moved:
-    """K simulations with one unknown moved each.
-
-    Attributes
-    ----------
-    of, columns : ndarray of int, shape (K,)
-        Which of the drives each is of, and which unknown is moved.
-    """
+    """K simulations with one unknown moved each."""
 
     of: IntArray
     columns: IntArray

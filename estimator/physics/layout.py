@@ -67,13 +67,7 @@ def flat_values(
 
 
 def named(laws: Sequence[OwnLaw]) -> tuple[LawName, ...]:
-    """Return the names of the laws of one model, which know the laws and their places in its parameter vector.
-
-    Raises
-    ------
-    BadModel
-        Where a name is taken.
-    """
+    """Return the names of the laws of one model, which know the laws and their places in its parameter vector."""
     names = [law.name for law in laws]
     taken = [name for name in names if name in BUILT_IN or names.count(name) > 1]
     if taken:

@@ -35,15 +35,7 @@ def unbounded_first(low: FloatArray, high: FloatArray, among: BoolArray) -> IntA
 
 
 def least_inside(triangle: FloatArray, target: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
-    """Return the least of ``|triangle @ x - target|`` with ``low <= x <= high``, shape (U,).
-
-    Parameters
-    ----------
-    triangle : ndarray, shape (U, U)
-        Upper triangular, without a zero on its diagonal; unknowns without bounds first (``unbounded_first``).
-    low, high : ndarray, shape (U,)
-        ``low <= 0 <= high``, -inf and inf where there is no bound.
-    """
+    """Return the least of ``|triangle @ x - target|`` with ``low <= x <= high``, shape (U,)."""
     free = int(_bounded(low, high).argmax())
     x, ended = least(np.ascontiguousarray(triangle), target, low, high, free, EXCHANGES)
     if not ended:
@@ -179,18 +171,7 @@ def minimise(
     iterations: int = 50,
     smooth: bool = True,
 ) -> Solution:
-    """Minimise ``sum(residual(x)**2)`` subject to ``low <= x <= high`` from one start.
-
-    Parameters
-    ----------
-    residual, jacobian : callable
-        Unknowns (U,) to errors (R,), in the order of time (one recording after the other), and to their derivatives
-        (R, U).
-    iterations : int
-        Jacobians at most; ``converged`` is False when they were used up.
-    smooth : bool
-        False where the errors have kinks, over which no Jacobian is carried on.
-    """
+    """Minimise ``sum(residual(x)**2)`` subject to ``low <= x <= high`` from one start."""
     x = np.clip(x0, low, high)
     errors, damping = residual(x), FIRST_DAMPING
     for _ in range(iterations):

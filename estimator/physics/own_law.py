@@ -147,11 +147,6 @@ class OwnLaw:
         """Return the law over arguments of shape (5, N), in the order of ``ARGUMENTS``; shape (N,).
 
         A function of numbers, which arrays make fail or mean something else, is called once for each column.
-
-        Raises
-        ------
-        BadModel
-            Where it fails, or returns what is no finite number for finite arguments.
         """
         try:
             with np.errstate(all="ignore"):

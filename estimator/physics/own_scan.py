@@ -209,17 +209,7 @@ class Scan:
 
 
 def scan(answers: FloatArray, error: FloatArray, lasting: bool = False) -> Scan:
-    """Prepare the search of all intervals of a grid.
-
-    Parameters
-    ----------
-    answers : ndarray, shape (M, R)
-        Summed answers, as ``Cells`` has them, with what is explained otherwise projected out.
-    error : ndarray, shape (R,)
-        Simulated less measured.
-    lasting : bool
-        See ``scanned``.
-    """
+    """Prepare the search of all intervals of a grid."""
     return scanned(answers @ answers.T, answers @ error, lasting)
 
 

@@ -50,13 +50,7 @@ _SENSED = (state_vector.SPEED, state_vector.LOAD_SPEED)
 
 
 def output_state(record: Record, structure: Structure) -> int:
-    """Return the index of the state a recording measures.
-
-    Raises
-    ------
-    BadModel
-        Where the structure has no such output.
-    """
+    """Return the index of the state a recording measures."""
     if (record.imposed is not None) != (structure is Structure.JOINT):
         got = "an imposed motion" if record.imposed is not None else f"{record.kind.value} as the output"
         raise BadModel(
@@ -112,17 +106,7 @@ def simulate_each(
     output: int | None = None,
     alike_s: FloatArray | None = None,
 ) -> FloatArray:
-    """Simulate a recording several times; see ``simulate``.
-
-    Parameters
-    ----------
-    alike_s : ndarray, shape (len(cases),), optional
-        Time since the recording began up to which each case is as the first one [s]: it is simulated from there on.
-
-    Returns
-    -------
-    ndarray, shape (len(cases), N)
-    """
+    """Simulate a recording several times; see ``simulate``."""
     if output is not None:
         return _simulated(grid, [record], cases, np.array([output]), False, alike_s)[:, 0]
     return simulate_outputs(grid, [record], cases, alike_s)[:, 0]
@@ -131,12 +115,7 @@ def simulate_each(
 def simulate_outputs(
     grid: Grid, outputs: Sequence[Record], cases: Sequence[Case], alike_s: FloatArray | None = None
 ) -> FloatArray:
-    """Simulate several measured outputs of one recording (``signals.outputs``), each as its sensor shows it.
-
-    Returns
-    -------
-    ndarray, shape (len(cases), len(outputs), N)
-    """
+    """Simulate several measured outputs of one recording (``signals.outputs``), each as its sensor shows it."""
     if grid.plant is not None:
         return np.stack([grid.plant.simulated(record, cases) for record in outputs], axis=1)
     if len(outputs) > 1 and any(map(is_steep, outputs)):  # the kernel leaves the slopes of one output
@@ -278,13 +257,7 @@ Outputs = Sequence[Record]
 
 
 def simulate_records(grid: Grid, drives: Sequence[Outputs], cases: Sequence[Case]) -> list[FloatArray]:
-    """Simulate every output of several recordings, a case of each: side by side where they can be, else on all cores.
-
-    Returns
-    -------
-    list of ndarray, shape (C_i, N_i)
-        Of each recording.
-    """
+    """Simulate every output of several recordings, a case of each: side by side or on all cores."""
     count = len(drives)
     fill_lanes = 1 < count <= LANES or (count > LANES and are_of_a_length(drives))
     if not fill_lanes or not go_together(grid, drives, [case.p for case in cases]):
@@ -308,15 +281,7 @@ def are_of_a_length(drives: Sequence[Outputs]) -> bool:
 
 
 def go_together(grid: Grid, drives: Sequence[Outputs], lines: Sequence[FloatArray], moved: Sequence[int] = ()) -> bool:
-    """Tell whether several recordings can be simulated as if they were one.
-
-    Parameters
-    ----------
-    lines : sequence of ndarray, shape (layout.SIZE,)
-        Parameters of each recording's line.
-    moved : sequence of int
-        Places of parameters that may also have other values.
-    """
+    """Tell whether several recordings can be simulated as if they were one."""
     if grid.structure is Structure.JOINT or grid.plant is not None or any(grid.active(p) for p in lines):
         return False
     p = np.array(lines)
@@ -336,18 +301,7 @@ def _make(outputs: Outputs) -> tuple[object, ...]:
 
 
 def simulate_together(grid: Grid, drives: Sequence[Outputs], of: Sequence[int], cases: Sequence[Case]) -> FloatArray:
-    """Simulate cases of several recordings as if these were one (``go_together``).
-
-    Parameters
-    ----------
-    of : sequence of int
-        Which of the recordings each case is of.
-
-    Returns
-    -------
-    ndarray, shape (len(cases), C, N)
-        As long as the longest recording; shorter ones continue under the torques they ended with.
-    """
+    """Simulate cases of several recordings as if these were one (``go_together``)."""
     records, first = [outputs[0] for outputs in drives], drives[0][0]
     wanted = np.array([output_state(each, grid.structure) for each in drives[0]])
     given = inputs_of(records, of, cases)

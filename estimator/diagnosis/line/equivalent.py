@@ -128,17 +128,7 @@ def observe(
 def run_filter(
     chain: Chain, error: FloatArray, weight: FloatArray, noise: float, prior: FloatArray, kept: Filtered
 ) -> float:
-    """Return the log-likelihood of an error; keep what the smoother needs where ``kept`` has room.
-
-    Parameters
-    ----------
-    error, weight : ndarray, shape (B,)
-        Observed output and how many samples each of its values averages; 0 is not observed.
-    noise : float
-        Variance of one sample.
-    prior : ndarray, shape (m, m)
-        Covariance before the first block.
-    """
+    """Return the log-likelihood of an error; keep what the smoother needs where ``kept`` has room."""
     m = prior.shape[0]
     keep = kept.surprises.shape[0] > 0
     f, h, half = np.zeros((m, m)), np.zeros(m), np.zeros((m, m))
@@ -260,15 +250,7 @@ class Explanation:
 
 
 def explain(result: FitResult, cut: Sequence[Line], place: Place, floor: float) -> Explanation:
-    """Estimate the input at one place that explains a fit's error.
-
-    Parameters
-    ----------
-    cut : sequence of Line
-        The fit's recordings in blocks.
-    floor : float
-        Noise floor of the output.
-    """
+    """Estimate the input at one place that explains a fit's error."""
     size = size_at(result, place)
 
     def deficit(exponent: float) -> float:

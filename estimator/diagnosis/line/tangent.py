@@ -184,19 +184,7 @@ def linearise(
     blocks: int,
     length: int,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return ``phi``, ``gamma``, ``c`` and ``d`` of a tangent by differences of the kernel over each block.
-
-    Parameters
-    ----------
-    torque, load : ndarray, shape (N,)
-        Torque on the motor shaft and load torque [Nm].
-    p, direct : ndarray, shape (layout.SIZE,)
-        Parameters of the superset model, and the same without delay and lag in the torque path.
-    start : ndarray, shape (STATES,)
-        State at the first sample.
-    length : int
-        Samples per block.
-    """
+    """Return ``phi``, ``gamma``, ``c`` and ``d`` of a tangent by differences of the kernel over each block."""
     n = nudges.states.shape[0]
     phi, gamma = np.empty((blocks, n, n)), np.empty((blocks, n, 2))
     c, d = np.empty((blocks, n)), np.empty((blocks, 2))
@@ -303,18 +291,7 @@ def block_length(result: FitResult) -> int:
 
 
 def tangent(result: FitResult, index: int, length: int) -> Tangent:
-    """Linearise one recording of a fit.
-
-    Parameters
-    ----------
-    length : int
-        Samples per block; what does not fill a block at the end is left out.
-
-    Returns
-    -------
-    Tangent
-        Of ``N // length`` blocks, or of one where the model is linear.
-    """
+    """Linearise one recording of a fit."""
     problem = result.problem
     if problem.grid.structure is Structure.JOINT:
         return _of_joint(result)

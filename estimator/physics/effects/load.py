@@ -40,20 +40,7 @@ SHORTEST_S = 4 * KNOT_SPACING_S
 
 
 def grade_basis(time_s: FloatArray, at_s: FloatArray | None = None) -> FloatArray:
-    """Return the profile's basis: cubic B-splines, the first left out (their sum is the constant load).
-
-    Parameters
-    ----------
-    time_s : ndarray, shape (N,)
-        Times of the recording, which the knots span [s].
-    at_s : ndarray, shape (M,), optional
-        Where to evaluate; at ``time_s`` by default.
-
-    Returns
-    -------
-    ndarray, shape (K, M)
-        Value of each of the K splines at each time.
-    """
+    """Return the profile's basis: cubic B-splines, the first left out (their sum is the constant load)."""
     from scipy.interpolate import BSpline  # a third of a second that few need
 
     first, last = float(time_s[0]), float(time_s[-1])

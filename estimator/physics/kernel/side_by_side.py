@@ -242,19 +242,7 @@ def integrate_side_by_side(
     sensor: bool,
     out: FloatArray,
 ) -> None:
-    """Do what ``integration.integrate`` does for some rows, at most `LANES`; their states stay as they are.
-
-    Parameters
-    ----------
-    rows : ndarray of int
-        Which of the K.
-    torque, load : ndarray, shape (T, N) and (L, N)
-        As there, each that drives any of them.
-    fed_by, loaded_by : ndarray of int, shape (K,)
-        Which of these drives each.
-    p, state, out
-        As there, a row each: (K, layout.SIZE), (K, STATES), (K, C, N).
-    """
+    """Do what ``integration.integrate`` does for some rows, at most `LANES`; their states stay as they are."""
     rows, torque, load, angle = borrowed(rows), borrowed(torque), borrowed(load), borrowed(angle)
     fed_by, loaded_by, outputs = borrowed(fed_by), borrowed(loaded_by), borrowed(outputs)
     p, state, out = borrowed(p), borrowed(state), borrowed(out)
