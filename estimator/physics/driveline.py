@@ -159,6 +159,10 @@ class Driveline(Protocol):
     def load(self) -> Load | float:
         """Whose the constant load torque is, or its value [Nm]."""
 
+    @property
+    def gear_ratio(self) -> float | None:
+        """Motor turns per wheel turn."""
+
     def values(self) -> dict[str, float]:
         """Nominal parameter values alone."""
 

@@ -139,12 +139,14 @@ def _at_motor(speed: FloatArray, p: FloatArray) -> FloatArray:
     size = p[slots.COULOMB] + np.zeros(speed.size)
     if p[slots.STRIBECK_SPEED] > 0.0:
         size += p[slots.STRIBECK_COULOMB] + p[slots.STRIBECK] * np.exp(-((speed / p[slots.STRIBECK_SPEED]) ** 2))
-    return size * np.sign(speed)
+    law_nm: FloatArray = size * np.sign(speed)
+    return law_nm
 
 
 def _at_load(speed: FloatArray, since_start_s: FloatArray, p: FloatArray) -> FloatArray:
     braked = (p[slots.BRAKE_FROM] <= since_start_s) & (since_start_s <= p[slots.BRAKE_TO])
-    return (p[slots.COULOMB_LOAD] + p[slots.BRAKE] * braked) * np.sign(speed)
+    law_nm: FloatArray = (p[slots.COULOMB_LOAD] + p[slots.BRAKE] * braked) * np.sign(speed)
+    return law_nm
 
 
 def _in_shaft(twist: FloatArray, p: FloatArray) -> FloatArray:
