@@ -99,6 +99,7 @@ class FoundEffect:
     profiles: Mapping[str, Profile] = field(default_factory=dict)
     share: float = math.nan
     probability: float = math.nan
+    form: str = ""
 
 
 @dataclass(frozen=True, slots=True)
