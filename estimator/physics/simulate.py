@@ -19,6 +19,7 @@ from estimator.physics.model import Structure
 from estimator.physics.motion import motor_angle
 from estimator.physics.own_forces import FORCES
 from estimator.physics.start import Start
+from estimator.physics.work import count
 from estimator.signals.record import FloatArray, IntArray, Location, OutputKind, Record
 
 MASSES: dict[Structure, Masses] = {
@@ -133,6 +134,7 @@ def simulate_outputs(
     ndarray, shape (len(cases), len(outputs), N)
     """
     if grid.plant is not None:
+        count(len(cases) * outputs[0].time_s.size)
         return np.stack([grid.plant.simulated(record, cases) for record in outputs], axis=1)
     if len(outputs) > 1 and any(map(is_steep, outputs)):  # the kernel leaves the slopes of one output
         return np.concatenate([simulate_outputs(grid, [record], cases, alike_s) for record in outputs], axis=1)
@@ -160,13 +162,14 @@ def _simulated(
 ) -> FloatArray:
     """Return states ``wanted``, shape (C,), of cases of one recording, as they are ``recorded`` or as they are."""
     record = outputs[0]
+    count(len(cases) * record.time_s.size)
     if grid.structure is Structure.JOINT:
         imposed = joint.imposed_in(record)
         return np.array([[_joint_output(record, imposed, case, int(state)) for state in wanted] for case in cases])
     own, given = _own_of(grid, record, cases), inputs_of([record], [0] * len(cases), cases)
-    count, samples = len(cases), record.time_s.size
-    slopes = np.zeros((count, 2, samples if recorded and is_steep(record) else 0))
-    out = np.empty((count, wanted.size, samples))
+    rows, samples = len(cases), record.time_s.size
+    slopes = np.zeros((rows, 2, samples if recorded and is_steep(record) else 0))
+    out = np.empty((rows, wanted.size, samples))
     many.integrate_each(
         MASSES[grid.structure],
         own,
@@ -185,7 +188,7 @@ def _simulated(
         recorded and is_sensed(record, wanted[0]),
         out,
         slopes,
-        _samples_alike(record, count, alike_s),
+        _samples_alike(record, rows, alike_s),
     )
     if own:
         own[1].finish()

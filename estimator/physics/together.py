@@ -15,6 +15,7 @@ from estimator.physics.kernel import many, side_by_side
 from estimator.physics.model import Structure
 from estimator.physics.parallel import PARTS, concurrently
 from estimator.physics.simulate import MASSES, PERIODIC, TIMED, is_sensed, is_steep, output_state, simulate_outputs
+from estimator.physics.work import count
 from estimator.signals.record import FloatArray, Record
 
 LENGTHS_DIFFER = 1.1
@@ -100,6 +101,7 @@ def simulate_together(grid: Grid, drives: Sequence[Outputs], of: Sequence[int], 
     wanted = np.array([output_state(each, grid.structure) for each in drives[0]])
     given = inputs_of(records, of, cases)
     out = np.empty((len(cases), wanted.size, given.torque.shape[1]))
+    count(len(cases) * given.torque.shape[1])
     many.integrate_each(
         MASSES[grid.structure],
         (),

@@ -218,6 +218,8 @@ def _likeliest(error: FloatArray, steepness: FloatArray) -> _Jitter | None:
         return float(np.sum(np.log(variance) + error**2 / variance))
 
     size, steep = float(np.std(error)), float(np.sqrt(np.mean(steepness**2)))
+    if not (size > 0.0 and steep > 0.0):  # nothing varies, or nothing moves: no reading is off its time
+        return None
     start = np.array([np.log(size), np.log(0.5 * size / steep)])
     best = optimize.minimize(cost, start, method="Nelder-Mead", options={"xatol": 1e-5, "fatol": 1e-4})
     noise, jitter = (float(value) for value in np.exp(best.x))
