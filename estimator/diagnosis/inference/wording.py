@@ -68,13 +68,13 @@ def _headline(verdict: Verdict, fit: Fit, effects: Sequence[FoundEffect], effort
     model = "re-tuned inside its tolerances, the nominal model" if beside.can_be_retuned else "the model"
     left = f"{model} leaves a free-run error of {_number(fit.retuned)} {fit.unit} at a noise of "
     left += f"{_number(fit.noise_floor)} {fit.unit}"
+    if not effort.finished:
+        return f"So far {left}. Give it more time (--budget-s), or fewer or shorter recordings."
     if verdict is Verdict.NO_MISMATCH:
         return (
             f"Nothing is missing: {model} leaves nothing but the noise and slow drift of the readings ({_noise(fit)})."
         )
     found = "; ".join(effect.statement for effect in effects)
-    if not effort.finished:
-        return f"So far {left}. Give it more time (--budget-s), or fewer or shorter recordings."
     if beside.strays and verdict is Verdict.UNEXPLAINED:
         return _wrong_values(left, beside.strays)
     if verdict is Verdict.UNEXPLAINED:
@@ -112,6 +112,10 @@ def _number(value: float) -> str:
     return f"{value:.3g}" if math.isfinite(value) else "unknown size"
 
 
+def _round(value: float) -> str:
+    return f"{float(f'{value:.3g}'):g}"
+
+
 def _noise(fit: Fit) -> str:
     return f"free-run error {_number(fit.retuned)} {fit.unit}, noise {_number(fit.noise_floor)} {fit.unit}"
 
@@ -142,7 +146,9 @@ def off_the_sheet(strays: Sequence[Stray]) -> str:
             said.append(f"{stray.name} {100.0 * abs(stray.ratio - 1.0):.2g} % {side} its nominal value (± {trusted})")
         else:
             value, unit = stray.ratio * stray.nominal, f" {stray.unit}" if stray.unit else ""
-            said.append(f"{stray.name} is {value:.3g}{unit}, the data sheet says {stray.nominal:.3g} ± {trusted}")
+            said.append(
+                f"{stray.name} is {_round(value)}{unit}, the data sheet says {_round(stray.nominal)} ± {trusted}"
+            )
     return " and ".join(said)
 
 

@@ -10,11 +10,10 @@ import pytest
 
 from estimator.diagnosis.hypotheses import everything, open_hypotheses
 from estimator.diagnosis.inference.disturbances import Size
+from estimator.diagnosis.inference.judge import Decision, decide, free_rms, grounds
 from estimator.diagnosis.inference.likelihood import compared, fitted
-from estimator.diagnosis.inference.posterior import free_rms
 from estimator.diagnosis.inference.remainder import tests as examined
 from estimator.diagnosis.inference.search import Search
-from estimator.diagnosis.inference.verdict import Decision, decide, grounds
 from estimator.diagnosis.result import Verdict
 from estimator.physics.model import EffectValue
 from estimator.signals.record import Record
