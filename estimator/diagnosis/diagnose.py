@@ -21,6 +21,10 @@ BUDGET_S = math.inf
 """Time after which a diagnosis is ended undecided [s]: none, so that the answer depends on no machine."""
 
 
+TO_SEARCH = 0.92
+"""Share of a limit of time after which no simulation is begun: the rest is for saying so."""
+
+
 def diagnose(
     records: Sequence[Record],
     model: DrivelineModel,
@@ -74,7 +78,7 @@ def diagnose(
         compile_laws(model, records[0].sample_time_s)
     with threadpool_limits(1, user_api="blas"):  # on tall, thin matrices more threads only wait for each other
         progress("checking the recordings", 0.0)
-        work = Work(BUDGET_S if budget_s is None else budget_s)
+        work = Work(BUDGET_S if budget_s is None else budget_s, TO_SEARCH)
         ready = prepare(records, model, holdout)
         return ready.finished(answer(ready, model, progress, effort, work))
 

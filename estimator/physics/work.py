@@ -20,10 +20,10 @@ class TimeIsUp(Exception):
 class Work:
     """Samples that were simulated, and the moment at which no further ones are."""
 
-    def __init__(self, limit_s: float = math.inf) -> None:
+    def __init__(self, limit_s: float = math.inf, share: float = 1.0) -> None:
         self.samples = 0
         self.limit_s = limit_s
-        self._end = time.perf_counter() + limit_s
+        self._end = time.perf_counter() + share * limit_s
         self._lock = threading.Lock()
 
     def add(self, samples: int) -> None:

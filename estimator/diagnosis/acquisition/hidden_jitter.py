@@ -175,6 +175,8 @@ def _rest(error: FloatArray, slopes: FloatArray, okay: BoolArray, block: int | N
             a, now = regressors[rows], filled[first:last][rows]
             left[rows] = now - a @ np.linalg.lstsq(a, now, rcond=None)[0]
     pairs = np.isfinite(left[:-1]) & np.isfinite(left[1:])
+    if not pairs.any():
+        return None
     this, following = slice(first, last - 1), slice(first + 1, last)
     return _Rest(
         lengths=(int(pairs.sum()),),
@@ -249,7 +251,7 @@ def _crossing(excess: Callable[[float], float], inside: float, outside: float) -
 
 def _of_the_many(rest: _Rest, found: _Jitter) -> bool:
     """Tell whether the typical row shows the jitter, by the median absolute error of the steep half of the rows."""
-    steep = rest.steepness > np.median(rest.steepness)
+    steep = rest.steepness >= np.median(rest.steepness)
     mad_to_sigma = 1.0 / float(stats.norm.ppf(0.75))
     typical = (mad_to_sigma * np.median(np.abs(rest.error[steep]))) ** 2
     expected = found.noise**2 + found.jitter_s**2 * float(np.median(rest.steepness[steep] ** 2))

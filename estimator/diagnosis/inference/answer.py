@@ -198,6 +198,7 @@ def _said(seen: _Seen, runs: FreeRuns, search: Search, model: DrivelineModel, le
     mismatch, remainder = _mismatch(seen, verdict, effects), _remainder(seen)
     traces = (*decision.traces,) if verdict is not Verdict.UNEXPLAINED else ()
     named = {each.name for each in effects} | {each.name for each in traces}
+    named |= {name for each in effects for name in each.indistinguishable_from}
     slight = tuple(Slight(each.name, each.share, decision.best.plain.values_of(each.name)) for each in traces)
     beside = Beside(
         remainder,
@@ -253,7 +254,7 @@ def _undecided(
     """Return the answer of a search that the limit of time has ended: nothing is decided, and nothing rejected."""
     names, blind = open_hypotheses(line, chain.records)
     fit, estimate = first_figures(chain, line, None if search is None else search.visited.get(frozenset()))
-    tried = set() if search is None else {*search.rivals}
+    tried = set() if search is None else {*search.rivals, *search.implausible}
     untried = tuple(name for name in names if name not in tried)
     simulations = 0 if search is None else search.simulations
     effort = Effort(level, simulations, False, untried, len(names), work.limit_s)
@@ -284,7 +285,7 @@ def _untestable(blind: Mapping[str, Untestable]) -> tuple[UntestableEffect, ...]
 
 def _effort(search: Search, level: str, decision: Decision) -> Effort:
     """Return what the search cost; ``untried`` is what looked worth a fit and had none."""
-    settled = {*search.rivals, *decision.best.effects}
+    settled = {*search.rivals, *search.implausible, *decision.best.effects}
     best = decision.best.score
     untried = tuple(
         name for name in search.names if name not in settled and search.foreseen.get(name, -math.inf) < best
@@ -353,27 +354,30 @@ def _rejected(search: Search, decision: Decision, named: set[str], untried: set[
     ``delta_bic`` is by how much the best set with a rival is less probable than the best of all: fitted, or as a score
     test foresees it at most.
     """
-    best, found = decision.best.score, []
-    for belief in decision.doubted:
-        if belief.name not in named:
-            found.append(RejectedEffect(belief.name, belief.reason, 0.0))
-    done = {*named, *untried, *(each.name for each in decision.doubted)}
-    for name, score in search.rivals.items():
-        if name not in done:
-            worse = best - score
-            reason = f"fitted: the best set with it is less probable by {-worse:.3g} in minus twice the log-probability"
-            if worse >= 0.0:
-                reason = "fitted: its values were no case of it, or did nothing, where the recordings were as probable"
-            found.append(RejectedEffect(name, reason, min(worse, 0.0)))
-    done |= {*search.rivals}
-    for name, score in search.foreseen.items():
-        if name not in done:
-            reason = (
-                "not fitted: a score test foresees that the best set with it is less probable by at least "
-                f"{score - best:.3g} in minus twice the log-probability"
-            )
-            found.append(RejectedEffect(name, reason, best - score))
-    return tuple(sorted(found, key=lambda each: -each.delta_bic))
+    best = decision.best.score
+    doubted = {each.name: RejectedEffect(each.name, each.reason, 0.0) for each in decision.doubted}
+    scores = (
+        (search.rivals, "fitted: the best set with it is {} in minus twice the log-probability"),
+        (
+            search.implausible,
+            "fitted, and ended at values that are no case of it: {} in minus twice the log-probability",
+        ),
+        (search.foreseen, "not fitted: a score test foresees that on top of what was found it makes that {} at best"),
+    )
+    found = dict(doubted)
+    for known, reason in scores:
+        for name, score in known.items():
+            if name not in found:
+                found[name] = RejectedEffect(name, reason.format(_compared(score - best)), min(best - score, 0.0))
+    found = {name: each for name, each in found.items() if name not in named and name not in untried}
+    return tuple(sorted(found.values(), key=lambda each: -each.delta_bic))
+
+
+def _compared(worse: float) -> str:
+    """Say by how much a score is worse than that of the best set; as good where it differs by less than a tenth."""
+    if abs(worse) < 0.1:
+        return "as good as without"
+    return f"{'worse' if worse > 0.0 else 'better'} by {abs(worse):.3g}"
 
 
 def _remainder(seen: _Seen) -> Remainder | None:

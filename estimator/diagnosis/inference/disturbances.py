@@ -123,6 +123,7 @@ def estimated(
 
     ``is_anew`` where it is begun from elsewhere, too (``starts``).
     """
+    check_time()
     whitened = whitening_of(result)
     begun = starts(sizes, limits) if is_anew else [sizes]
     return min((estimate(whitened, error, each, limits, rounds) for each in begun), key=lambda each: each[1])

@@ -64,9 +64,11 @@ class Search:
     path : list of Hypothesis
         Each better than the one before, from the nominal model to the best.
     rivals : dict of str to float
-        Best score of a set with each effect that was fitted at all.
+        Best score of a set with each effect that was fitted at all, to values that are a case of it.
+    implausible : dict of str to float
+        The same of others.
     foreseen : dict of str to float
-        The least score that a score test promises a set with each effect that was looked at.
+        The least score that a score test promises for each effect on top of the set that was looked at last.
     work : Work
         What was simulated so far; no further change is tried after ``most`` free runs of all recordings: ``stopped``.
     """
@@ -80,6 +82,7 @@ class Search:
     rough: dict[Effects, Hypothesis] = field(default_factory=dict)
     path: list[Hypothesis] = field(default_factory=list)
     rivals: dict[str, float] = field(default_factory=dict)
+    implausible: dict[str, float] = field(default_factory=dict)
     foreseen: dict[str, float] = field(default_factory=dict)
     work: Work = field(default_factory=Work)
     most: float = math.inf
@@ -206,10 +209,6 @@ class Search:
     def _learn(self, around: Hypothesis, view: Remembering) -> None:
         self.answers.learn(around.plain, view.found)
 
-    def _foresee(self, name: str, score: float) -> None:
-        with self._lock:
-            self.foreseen[name] = min(score, self.foreseen.get(name, math.inf))
-
     def _looks(
         self, current: Hypothesis, names: Sequence[str], rival: str = ""
     ) -> tuple[dict[str, list[Look]], Remembering]:
@@ -222,8 +221,8 @@ class Search:
         tried = [name for name in names if name != GRADE and name not in contained]
         looks = dict(zip(tried, concurrently(view.looks, tried), strict=True))
         price = float(np.log(current.plain.residual.size))
-        for name in tried:
-            self._foresee(name, current.score - looks[name][0].promise + price)
+        if not rival:
+            self.foreseen.update({name: current.score - looks[name][0].promise + price for name in tried})
         order = sorted(tried, key=lambda name: -looks[name][0].promise)
         least = max(WORTH_FITTING * looks[order[0]][0].promise, np.log(current.plain.residual.size)) if order else 0.0
         if rival and rival != GRADE:
@@ -262,11 +261,13 @@ class Search:
         loose = loosened(best, self.model)
         if loose is not None:
             best = self._more_plausible(best, self._compared(effects, loose, rival))
+        is_plausible = self.is_plausible(best)
         with self._lock:
-            self.rivals[name] = min(best.score, self.rivals.get(name, best.score))
-            if self.is_plausible(best) and best.score < getattr(self.rough.get(effects), "score", math.inf):
+            scores = self.rivals if is_plausible else self.implausible
+            scores[name] = min(best.score, scores.get(name, math.inf))
+            if is_plausible and (effects not in self.rough or best.score < self.rough[effects].score):
                 self.rough[effects] = best
-        return best if self.is_plausible(best) else None
+        return best if is_plausible else None
 
     def _compared(self, effects: Effects, begun: FitResult, rival: Hypothesis) -> Hypothesis:
         return compared(effects, begun, rival, self._limits_of(effects), len(self.names))

@@ -66,8 +66,8 @@ def _not_decided(effort: Effort) -> str:
 
 def _headline(verdict: Verdict, fit: Fit, effects: Sequence[FoundEffect], effort: Effort, beside: Beside) -> str:
     model = "re-tuned inside its tolerances, the nominal model" if beside.can_be_retuned else "the model"
-    left = f"{model} leaves a free-run error of {_number(fit.retuned)} {fit.unit} at a noise of "
-    left += f"{_number(fit.noise_floor)} {fit.unit}"
+    noise = f" at a noise of {fit.noise_floor:.3g} {fit.unit}" if math.isfinite(fit.noise_floor) else ""
+    left = f"{model} leaves a free-run error of {fit.retuned:.3g} {fit.unit}{noise}"
     if not effort.finished:
         return f"So far {left}. Give it more time (--budget-s), or fewer or shorter recordings."
     if verdict is Verdict.NO_MISMATCH:
@@ -108,16 +108,12 @@ def _pair(before: float, after: float) -> tuple[str, str]:
     return one, other
 
 
-def _number(value: float) -> str:
-    return f"{value:.3g}" if math.isfinite(value) else "unknown size"
-
-
 def _round(value: float) -> str:
     return f"{float(f'{value:.3g}'):g}"
 
 
 def _noise(fit: Fit) -> str:
-    return f"free-run error {_number(fit.retuned)} {fit.unit}, noise {_number(fit.noise_floor)} {fit.unit}"
+    return f"free-run error {fit.retuned:.3g} {fit.unit}, noise {fit.noise_floor:.3g} {fit.unit}"
 
 
 def _sure(effects: Sequence[FoundEffect]) -> str:

@@ -35,6 +35,7 @@ def test_a_named_effect_has_its_share_and_probability_and_the_model_has_it() -> 
     assert content["mismatch"]["element"] == "motor"
     rejected = [rival["name"] for rival in content["rejected"]]
     left = [*(entry["name"] for entry in content["untestable"]), *content["effort"]["untried"]]
+    left += content["effects"][0]["indistinguishable_from"]
     reported = ["coulomb_friction_motor", *rejected, *left]
     can_be = [n for n, entry in EFFECTS.items() if bench.model.structure in entry.structures and not entry.recognised]
     assert sorted(reported) == sorted(can_be)
