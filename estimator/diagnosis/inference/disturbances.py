@@ -22,6 +22,7 @@ from estimator.diagnosis.inference.whitener import READING, Size, Whitener, of_f
 from estimator.diagnosis.noise import noise_floor
 from estimator.physics.fit import FitResult
 from estimator.physics.motion import torque_scale
+from estimator.physics.work import check_time
 from estimator.signals.outputs import by_output
 from estimator.signals.record import FloatArray, OutputKind, Record
 
