@@ -50,6 +50,9 @@ NEARLY = 0.3
 FINISHED = 2
 """Best of these that are fitted to their end."""
 
+STARTS = 5
+"""Effects from each of which a search begins, the most promising."""
+
 MOST_EFFECTS = 8
 
 
@@ -102,21 +105,43 @@ class Search:
         return self._limits
 
     def run(self) -> Hypothesis:
-        """Return the best set of effects found."""
-        current = self.nothing()
-        self.path = [current]
+        """Return the best set of effects found, begun from each of the most promising effects.
+
+        One effect that imitates another may be the better one as long as it is alone, and what remains of it in the way
+        of the true one.
+        """
+        self.path = self._climbed([self.nothing()])
+        firsts = sorted((each for effects, each in self.visited.items() if len(effects) == 1), key=lambda h: h.score)
+        for first in firsts[:STARTS]:
+            if len(self.path[-1].effects) < 2:
+                break
+            if first.effects <= self.path[-1].effects or not self.is_plausible(first):
+                continue
+            path = self._climbed([self.nothing(), first], self.path)
+            if path[-1].score < self.path[-1].score:
+                self.path = path
+        return self.path[-1]
+
+    def _climbed(self, path: list[Hypothesis], rival: Sequence[Hypothesis] = ()) -> list[Hypothesis]:
+        """Return a way on which each set is better than the one before, to where no change lowers the score.
+
+        It is given up where, from its second effect on, a set is worse than one of as few effects on a rival's way.
+        """
         for _ in range(2 * MOST_EFFECTS):
-            self.progress("comparing hypotheses", 0.1 + 0.7 * len(self.path) / (len(self.path) + 3))
+            current = path[-1]
+            self.progress("comparing hypotheses", 0.1 + 0.7 * len(path) / (len(path) + 3))
             if self.simulations >= self.most:
                 self.stopped = True
                 break
-            better = self._best_addition(current) if len(current.effects) < MOST_EFFECTS else None
+            count = len(current.effects)
+            if count > 1 and any(len(r.effects) <= count and r.score < current.score for r in rival):
+                break
+            better = self._best_addition(current) if count < MOST_EFFECTS else None
             better = better or self._best_drop(current) or self._best_exchange(current) or self._graded(current)
             if better is None:
                 break
-            current = better
-            self.path.append(current)
-        return current
+            path = [*path, better]
+        return path
 
     @property
     def simulations(self) -> int:
@@ -138,10 +163,16 @@ class Search:
         rough = concurrently(lambda name: self._added(current, name, looks[name]), list(looks))
         found = [each for each in rough if each is not None] + self._begun_anew(current)
         found.sort(key=lambda each: each.score)
-        near = [each for each in found[:FINISHED] if each.score <= found[0].score + NEARLY * _gain(found[0], current)]
+        most = FINISHED if current.effects else STARTS
+        near = [each for each in found[:most] if self._may_be_best(each, found[0], current)]
         near = list({each.effects: each for each in reversed(near)}.values())  # of one set the best
         finished = concurrently(lambda each: self.finish(each, current), near)
         return self._better(finished, current)
+
+    def _may_be_best(self, each: Hypothesis, best: Hypothesis, current: Hypothesis) -> bool:
+        """Tell whether a fit of a few steps may end as the best: near it, or an event whose moments are not found."""
+        is_event = any(EFFECTS[name].event for name in each.effects - current.effects)
+        return each.score <= best.score + NEARLY * _gain(best, current) or (is_event and not current.effects)
 
     def _begun_anew(self, current: Hypothesis) -> list[Hypothesis]:
         """Fit a hypothesis' effects from other starts a few steps, once for each set of other effects.
